@@ -1,0 +1,90 @@
+"""Delassus matrix as rows of 3x3 blocks: the storage that all compiled kernels work on.
+
+A 2D contact becomes a 3D one whose second tangent is decoupled (W = its own stiffness, q = 0):
+a 3D solution of that contact has r_T2 = 0 and is exactly the 2D one, so one set of kernels
+serves both dimensions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class BlockRows:
+    """Compressed rows of 3x3 blocks, column indices sorted, every diagonal block present.
+
+    indptr (nc+1,), indices (nnzb,), data (nnzb, 3, 3), diagonal (nc,): position of W_ii in data.
+    """
+
+    indptr: NDArray[np.int32]
+    indices: NDArray[np.int32]
+    data: Array
+    diagonal: NDArray[np.int32]
+
+    @property
+    def diagonal_blocks(self) -> Array:
+        """W_ii, shape (nc, 3, 3)."""
+        return self.data[self.diagonal]
+
+    @property
+    def density(self) -> float:
+        """Stored blocks / contacts squared."""
+        return len(self.indices) / max(len(self.diagonal), 1) ** 2
+
+
+def block_rows(W: sparse.csr_array | Array, d: int) -> BlockRows:
+    """Block rows of a Delassus matrix W, (nc d, nc d), dense or sparse; d = 2 or 3."""
+    nc = W.shape[0] // d
+    rows, columns, tiles = _sparse_tiles(W, d) if sparse.issparse(W) else _dense_tiles(W, nc, d)
+    absent = np.setdiff1d(np.arange(nc), rows[rows == columns])
+    rows = np.concatenate([rows, absent])
+    columns = np.concatenate([columns, absent])
+    tiles = np.concatenate([tiles, np.zeros((len(absent), d, d))])
+    order = np.lexsort((columns, rows))
+    rows, columns = rows[order].astype(np.int32), columns[order].astype(np.int32)
+    indptr = np.searchsorted(rows, np.arange(nc + 1)).astype(np.int32)
+    indices = columns
+    diagonal = np.flatnonzero(rows == columns).astype(np.int32)
+    data = np.ascontiguousarray(tiles[order])
+    if d == 2:
+        data = _embed(data, diagonal)
+    for array in (indptr, indices, data, diagonal):
+        array.flags.writeable = False
+    return BlockRows(indptr, indices, data, diagonal)
+
+
+def _sparse_tiles(W: sparse.csr_array, d: int) -> tuple[NDArray, NDArray, Array]:
+    """Block row, block column and values (k, d, d) of the stored blocks."""
+    blocks = sparse.csr_array(W).tobsr((d, d))
+    rows = np.repeat(np.arange(len(blocks.indptr) - 1), np.diff(blocks.indptr))
+    return rows, blocks.indices.astype(np.int64), blocks.data
+
+
+def _dense_tiles(W: Array, nc: int, d: int) -> tuple[NDArray, NDArray, Array]:
+    """Block row, block column and values (k, d, d) of the blocks that are not all zero."""
+    tiles = np.asarray(W).reshape(nc, d, nc, d).swapaxes(1, 2)
+    rows, columns = np.nonzero(tiles.reshape(nc, nc, -1).any(axis=2))
+    return rows, columns, tiles[rows, columns]
+
+
+def _embed(planar: Array, diagonal: NDArray[np.int32]) -> Array:
+    """3x3 blocks of 2x2 ones; the second tangent gets the stiffness of the first."""
+    data = np.zeros((len(planar), 3, 3))
+    data[:, :2, :2] = planar
+    own = data[diagonal, 1, 1]
+    data[diagonal, 2, 2] = np.where(own > 0, own, 1.0)
+    return data
+
+
+def spatial(x: Array) -> Array:
+    """A writable copy of contact rows (nc, d) as (nc, 3); in 2D the second tangent is zero."""
+    out = np.zeros((len(x), 3))
+    out[:, : x.shape[1]] = x
+    return out

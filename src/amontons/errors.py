@@ -1,0 +1,41 @@
+"""Exceptions that a user meets; each message names what was expected and what was found."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+class AmontonsError(Exception):
+    """Root of all errors raised on purpose by amontons."""
+
+
+class InvalidInput(AmontonsError, ValueError):
+    """An argument has the wrong shape, sign or value: "argument: expected …, got …"."""
+
+
+class UnsupportedForm(AmontonsError, TypeError):
+    """The solver needs the other form of the problem; the message names those that fit."""
+
+
+class SingularOperator(AmontonsError, ArithmeticError):
+    """The stiffness can not be inverted: the message says which body or block is not held."""
+
+
+class FileFormatError(AmontonsError, ValueError):
+    """A file does not hold what its format asks for: names file, group or line, and expectation."""
+
+
+class MissingDependency(AmontonsError, ImportError):
+    """An optional package is not installed: names the extra that installs it."""
+
+
+class NotConverged(AmontonsError, RuntimeError):
+    """The solve did not reach its tolerance; `.solution` holds the best iterate and the record."""
+
+    def __init__(self, message: str, solution: Any) -> None:
+        super().__init__(message)
+        self.solution = solution
+
+
+class Interrupted(NotConverged, KeyboardInterrupt):
+    """Ctrl-C during a solve; `.solution` holds the best iterate so far."""

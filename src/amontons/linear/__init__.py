@@ -1,0 +1,8 @@
+"""Linear solvers behind one protocol: `factor(A)` returns an object that solves A x = b."""
+
+from .base import Factor, LinearSolver
+from .direct import Direct
+from .krylov import ConjugateGradient
+from .multigrid import AlgebraicMultigrid
+
+__all__ = ["AlgebraicMultigrid", "ConjugateGradient", "Direct", "Factor", "LinearSolver"]

@@ -1,0 +1,413 @@
+"""The one discrete problem of frictional contact, in FCLib's letters.
+
+    M v = H r + f,   u = H^T v + w,   u = W r + q   with W = H^T M^-1 H, q = H^T M^-1 f + w,
+    K* ∋ u + mu |u_T| n  ⟂  r ∈ K   per contact (Coulomb), or Tresca friction with a given bound.
+
+v are n displacements or velocities; r and u are (nc, d) in the local frames, rows
+[x_N, x_T1(, x_T2)], r.ravel() being FCLib's vector.  u_N >= 0 is open, r_N >= 0 compression.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+
+from . import judge
+from .blocks import BlockRows, block_rows, spatial
+from .cones import Coulomb, Law, Tresca
+from .errors import InvalidInput, SingularOperator, UnsupportedForm
+from .judge import Measure
+from .linear import Direct, Factor
+from .linear.small_blocks import block_diagonal_inverse
+
+Array = NDArray[np.float64]
+Matrix = sparse.csr_array | sparse.csc_array | Array
+DENSE_LIMIT = 4e9  # bytes that condensed() may fill before it refuses
+EXACT_WORK = 2e7  # n * nc * d up to which W is formed to judge a global problem with coupled M
+
+
+class Form(Enum):
+    """Which matrices a problem holds, or a solver needs."""
+
+    GLOBAL = "global"
+    DELASSUS = "local"
+    ANY = "any"
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionProblem:
+    """Either M, H, f, w (global form) or W, q (Delassus form), with a friction law.
+
+    Build it with `from_global` or `from_delassus`; both check every shape and number.
+    near_nullspace, (n, k), are the rigid modes of the bodies: multigrid uses them.
+    u_scale, one number in the unit of u, replaces |u_ref| in the residual measure.
+    """
+
+    law: Law
+    M: sparse.csc_array | None = None
+    H: sparse.csc_array | None = None
+    f: Array | None = None
+    w: Array | None = None
+    W: Matrix | None = None
+    q: Array | None = None
+    near_nullspace: Array | None = None
+    load_scale: float | None = None
+    u_scale: float | None = None
+    name: str = ""
+    _shared: dict[str, Factor] = field(default_factory=dict, repr=False)
+
+    # ---------------------------------------------------------------- construction
+    @classmethod
+    def from_global(
+        cls,
+        M: Matrix,
+        H: Matrix,
+        f: ArrayLike,
+        w: ArrayLike,
+        mu: ArrayLike | Law,
+        *,
+        near_nullspace: Array | None = None,
+        load_scale: float | None = None,
+        u_scale: float | None = None,
+        name: str = "",
+    ) -> FrictionProblem:
+        """The problem in v: M (n, n), H (n, nc d), f (n,), w (nc, d), mu (nc,) or a law.
+
+        load_scale, unit of f, is the size of the load when f alone does not tell (prescribed
+        displacements).  Raises InvalidInput naming the argument and the value.
+        """
+        law = _law(mu)
+        nc = len(law.coefficient)
+        M, H = _sparse("M", M), _sparse("H", H)
+        n = M.shape[0]
+        _expect("M", M.shape, (n, n))
+        f = _vector("f", f, (n,))
+        w = _contact_rows("w", w, nc)
+        _expect("H", H.shape, (n, nc * w.shape[1]))
+        if near_nullspace is not None and near_nullspace.shape[0] != n:
+            raise InvalidInput(
+                f"near_nullspace: expected {n} rows, got {near_nullspace.shape[0]}"
+            )
+        return cls(law, M=M, H=H, f=f, w=w, near_nullspace=near_nullspace,
+                   load_scale=load_scale, u_scale=u_scale, name=name)  # fmt: skip
+
+    @classmethod
+    def from_delassus(
+        cls, W: Matrix, q: ArrayLike, mu: ArrayLike | Law, *, name: str = ""
+    ) -> FrictionProblem:
+        """The problem in r: W (nc d, nc d) dense or sparse, q (nc, d), mu (nc,) or a law.
+
+        Raises InvalidInput naming the argument and the value.
+        """
+        law = _law(mu)
+        q = _contact_rows("q", q, len(law.coefficient))
+        if sparse.issparse(W):
+            W = _sparse("W", W).tocsr()
+        else:
+            W = _vector("W", W, (q.size, q.size))
+        _expect("W", W.shape, (q.size, q.size))
+        problem = cls(law, W=W, q=q, name=name)
+        _ = problem.kernel_data  # convert once, here, and not in the first solve
+        return problem
+
+    # ---------------------------------------------------------------- sizes and views
+    @property
+    def form(self) -> Form:
+        """GLOBAL or DELASSUS."""
+        return Form.DELASSUS if self.W is not None else Form.GLOBAL
+
+    @property
+    def contacts(self) -> int:
+        """Number of contacts nc."""
+        return len(self.law.coefficient)
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        rows = self.q if self.q is not None else self.w
+        assert rows is not None
+        return rows.shape[1]
+
+    @property
+    def unknowns(self) -> int:
+        """n in the global form, nc d in the Delassus form."""
+        return self.f.size if self.f is not None else self.contacts * self.dimension
+
+    @property
+    def mu(self) -> Array:
+        """Coefficients of Coulomb friction, (nc,); raises UnsupportedForm under Tresca's law."""
+        if isinstance(self.law, Coulomb):
+            return self.law.mu
+        raise UnsupportedForm("mu: this problem has Tresca friction, it has a bound and no mu")
+
+    @cached_property
+    def blocks(self) -> BlockRows:
+        """W in rows of 3x3 blocks (Delassus form only)."""
+        self._need(Form.DELASSUS)
+        assert self.W is not None
+        return block_rows(self.W, self.dimension)
+
+    @cached_property
+    def kernel_data(self) -> tuple:
+        """What the compiled kernels take: indptr, indices, data, q (nc, 3), law, Tresca?, rho."""
+        b = self.blocks
+        assert self.q is not None
+        q = spatial(self.q)
+        size = np.linalg.norm(b.diagonal_blocks, 2, axis=(1, 2)) if self.contacts else np.zeros(0)
+        able = b.diagonal_blocks[:, 0, 0] > 0
+        rho = np.where(able, 1 / np.where(able, size, 1.0), 0.0)
+        for array in (q, rho):
+            array.flags.writeable = False
+        tresca = isinstance(self.law, Tresca)
+        return b.indptr, b.indices, b.data, q, self.law.coefficient, tresca, rho
+
+    @cached_property
+    def q_norm(self) -> float:
+        """Euclidean norm of q (Delassus form only)."""
+        self._need(Form.DELASSUS)
+        return float(np.linalg.norm(self.q))  # type: ignore[arg-type]
+
+    def _need(self, form: Form) -> None:
+        if self.form is not form:
+            raise UnsupportedForm(
+                f"this needs the {form.value} form, the problem is {self.form.value}"
+                + ("; use problem.condensed()" if form is Form.DELASSUS else "")
+            )
+
+    # ---------------------------------------------------------------- operators
+    def factor(self) -> Factor:
+        """A direct factor of M, made once and shared by all variants of this problem."""
+        self._need(Form.GLOBAL)
+        if "M" not in self._shared:
+            self._shared["M"] = Direct().factor(self.M)  # type: ignore[arg-type]
+        return self._shared["M"]
+
+    @cached_property
+    def small_blocks(self) -> sparse.csc_array | None:
+        """M^-1 when M is block diagonal with small blocks (rigid bodies), else None."""
+        self._need(Form.GLOBAL)
+        return block_diagonal_inverse(self.M)  # type: ignore[arg-type]
+
+    def solve_M(self, b: Array) -> Array:
+        """M^-1 b, b of shape (n,) or (n, k)."""
+        inverse = self.small_blocks
+        return inverse @ b if inverse is not None else self.factor().solve(b)
+
+    @cached_property
+    def condensing_is_cheap(self) -> bool:
+        """True when W costs less than a few solves of the problem itself."""
+        return self.form is Form.DELASSUS or (
+            self.small_blocks is not None
+            or self.unknowns * self.contacts * self.dimension <= EXACT_WORK
+        )
+
+    def condensed(self) -> FrictionProblem:
+        """The Delassus form of this problem: W = H^T M^-1 H, q = H^T M^-1 f + w.
+
+        Raises InvalidInput when W would not fit into memory, SingularOperator when M can not
+        be inverted (a body held by contact alone).
+        """
+        return self if self.form is Form.DELASSUS else self._condensed
+
+    @cached_property
+    def _condensed(self) -> FrictionProblem:
+        assert self.H is not None and self.w is not None and self.f is not None
+        m = self.contacts * self.dimension
+        inverse = self.small_blocks
+        if inverse is not None:
+            W: Matrix = (self.H.T @ (inverse @ self.H)).tocsr()
+        else:
+            if 8.0 * m * m > DENSE_LIMIT:
+                raise InvalidInput(
+                    f"condensed: W would take {8e-9 * m * m:.1f} GB for {self.contacts} contacts; "
+                    "solve the global form with SemismoothNewton, which does not form W"
+                )
+            W = self._dense_delassus()
+        q = self.w + (self.H.T @ self.solve_M(self.f)).reshape(self.w.shape)
+        return FrictionProblem.from_delassus(W, q, self.law, name=self.name)
+
+    def _dense_delassus(self) -> Array:
+        """W by blocks of right-hand sides, so that memory stays near that of W itself."""
+        H = sparse.csc_array(self.H)
+        m = H.shape[1]
+        W = np.empty((m, m))
+        for first in range(0, m, 64):
+            columns = H[:, first : first + 64].toarray()
+            W[:, first : first + 64] = H.T @ self.solve_M(columns)
+        return W
+
+    def with_mu(self, mu: ArrayLike) -> FrictionProblem:
+        """The same problem with other friction coefficients: a number or (nc,)."""
+        law = Coulomb(np.broadcast_to(np.asarray(mu, dtype=float), (self.contacts,)))
+        return replace(self, law=law)
+
+    def with_load(self, load: ArrayLike) -> FrictionProblem:
+        """The same problem with another f (global form) or q (Delassus form)."""
+        if self.form is Form.GLOBAL:
+            return replace(self, f=_vector("f", load, (self.unknowns,)))
+        return replace(self, q=_contact_rows("q", load, self.contacts))
+
+    def velocity(self, r: Array) -> tuple[Array, Array | None]:
+        """(u, v) of reactions r, (nc, d); v is None in the Delassus form."""
+        if self.form is Form.DELASSUS:
+            assert self.W is not None and self.q is not None
+            return (self.W @ r.ravel()).reshape(r.shape) + self.q, None
+        assert self.H is not None and self.f is not None
+        v = self.solve_M(self.H @ r.ravel() + self.f)
+        return self.local_velocity(v), v
+
+    def local_velocity(self, v: Array) -> Array:
+        """u = H^T v + w, (nc, d)."""
+        assert self.H is not None and self.w is not None
+        return (self.H.T @ v).reshape(self.w.shape) + self.w
+
+    # ---------------------------------------------------------------- judging
+    @property
+    def measure(self) -> Measure:
+        """Which error measure applies, see `judge`."""
+        if self.form is Form.DELASSUS:
+            return Measure.EXACT
+        try:
+            cheap = self.condensing_is_cheap and self.condensed() is not None
+        except SingularOperator:
+            cheap = False
+        return Measure.EXACT if cheap else Measure.RESIDUAL
+
+    def error(self, r: Array, v: Array | None = None) -> float:
+        """Unit-free error of reactions r, (nc, d); v, (n,), is read by the residual measure.
+
+        Infinite when r or v hold a number that is not finite.
+        """
+        if self.measure is Measure.EXACT:
+            return self.condensed().exact_error(r)
+        if v is None:
+            v = self.velocity(r)[1]
+        assert v is not None
+        return self._residual_error(r, v)
+
+    def exact_error(self, r: Array) -> float:
+        """The exact measure of the Delassus form."""
+        rows = r if r.shape[1] == 3 and r.flags.c_contiguous else spatial(r)
+        size = self.q_norm
+        if size == 0:
+            return 0.0 if not rows.any() else np.inf
+        return judge.natural_error(*self.kernel_data, rows) / size
+
+    def _residual_error(self, r: Array, v: Array) -> float:
+        assert self.M is not None and self.H is not None and self.f is not None
+        u = self.local_velocity(v)
+        balance = np.linalg.norm(self.M @ v - self.H @ r.ravel() - self.f)
+        law = judge.scaled_residual(r, u, self.law, self.rho)
+        load, reference = self._scales
+        error = max(_ratio(balance, load), _ratio(law, reference))
+        return float(error) if np.isfinite(error) else np.inf
+
+    @cached_property
+    def local_stiffness(self) -> Array:
+        """H_i^T D^-1 H_i, (nc, d, d), D the block diagonal of M: a cheap stand-in for W_ii."""
+        self._need(Form.GLOBAL)
+        assert self.M is not None and self.H is not None
+        d, n = self.dimension, self.unknowns
+        inverse = _node_blocks_inverse(self.M, d if n % d == 0 else 1)
+        product = sparse.csc_array(inverse @ self.H)
+        full = (sparse.csr_array(self.H.T) @ product).tobsr((d, d))
+        out = np.zeros((self.contacts, d, d))
+        rows = np.repeat(np.arange(self.contacts), np.diff(full.indptr))
+        own = rows == full.indices
+        out[rows[own]] = full.data[own]
+        return out
+
+    @cached_property
+    def rho(self) -> Array:
+        """Augmentation parameter per contact, (nc,), unit of r / u; 0 where it can not react."""
+        if self.form is Form.DELASSUS:
+            return self.kernel_data[-1]
+        size = np.linalg.norm(self.local_stiffness, 2, axis=(1, 2))
+        return np.where(size > 0, 1 / np.where(size > 0, size, 1.0), 0.0)
+
+    @cached_property
+    def _scales(self) -> tuple[float, float]:
+        """Sizes of the load and of u for the residual measure."""
+        assert self.f is not None and self.w is not None
+        load = self.load_scale if self.load_scale is not None else float(np.linalg.norm(self.f))
+        if self.u_scale is not None:
+            return load, self.u_scale
+        try:
+            free = self.local_velocity(self.solve_M(self.f))
+        except SingularOperator:
+            free = self.w
+        return load, float(np.linalg.norm(free))
+
+
+def _ratio(size: float, scale: float) -> float:
+    """size / scale, with 0 / 0 = 0."""
+    return size / scale if scale > 0 else (0.0 if size == 0 else np.inf)
+
+
+def _node_blocks_inverse(M: sparse.csc_array, d: int) -> sparse.bsr_array:
+    """Inverse of the d x d block diagonal of M, pseudo-inverse where a block is singular."""
+    n = M.shape[0]
+    nodes = n // d
+    coo = M.tocoo()
+    own = coo.row // d == coo.col // d
+    blocks = np.zeros((nodes, d, d))
+    np.add.at(blocks, (coo.row[own] // d, coo.row[own] % d, coo.col[own] % d), coo.data[own])
+    index = np.arange(nodes)
+    return sparse.bsr_array((np.linalg.pinv(blocks), index, np.arange(nodes + 1)), shape=(n, n))
+
+
+# -------------------------------------------------------------------- checks at the border
+def _law(mu: ArrayLike | Law) -> Law:
+    return mu if isinstance(mu, Coulomb | Tresca) else Coulomb(np.asarray(mu, dtype=float))
+
+
+def _expect(name: str, found: tuple[int, ...], expected: tuple[int, ...]) -> None:
+    if found != expected:
+        raise InvalidInput(f"{name}: expected shape {expected}, got {found}")
+
+
+def _finite(name: str, values: Array) -> None:
+    bad = np.argwhere(~np.isfinite(values))
+    if len(bad):
+        where = ", ".join(str(k) for k in bad[0])
+        raise InvalidInput(f"{name}[{where}]: expected a finite number, got {values[tuple(bad[0])]}")
+
+
+def _vector(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
+    """A read-only float copy of that shape."""
+    array = np.array(values, dtype=float, order="C")
+    _expect(name, array.shape, shape)
+    _finite(name, array)
+    array.flags.writeable = False
+    return array
+
+
+def _contact_rows(name: str, values: ArrayLike, nc: int) -> Array:
+    """Contact rows (nc, 2 or 3), also from FCLib's flat vector."""
+    array = np.array(values, dtype=float, order="C")
+    if array.ndim == 1 and nc and array.size in (2 * nc, 3 * nc):
+        array = array.reshape(nc, -1)
+    if array.ndim != 2 or array.shape[0] != nc or array.shape[1] not in (2, 3):
+        raise InvalidInput(f"{name}: expected shape ({nc}, 2) or ({nc}, 3), got {array.shape}")
+    _finite(name, array)
+    array.flags.writeable = False
+    return array
+
+
+def _sparse(name: str, matrix: Matrix) -> sparse.csc_array:
+    """A canonical copy: columns sorted, duplicates summed, every entry finite."""
+    out = sparse.csc_array(matrix, dtype=float, copy=True)
+    out.sum_duplicates()
+    bad = np.flatnonzero(~np.isfinite(out.data))
+    if bad.size:
+        row = out.indices[bad[0]]
+        column = int(np.searchsorted(out.indptr, bad[0], side="right")) - 1
+        raise InvalidInput(
+            f"{name}[{row}, {column}]: expected a finite number, got {out.data[bad[0]]}"
+        )
+    return out

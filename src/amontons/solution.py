@@ -1,0 +1,150 @@
+"""What a solve returns: reactions, velocities, a status for every contact, and the record."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum, IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import judge
+from .judge import Measure
+from .problem import FrictionProblem
+
+Array = NDArray[np.float64]
+
+
+class ContactStatus(IntEnum):
+    """State of one contact; the numbers are those in files."""
+
+    OPEN = 0
+    SLIP = 1
+    STICK = 2
+
+
+class Outcome(Enum):
+    """How a solve ended; the value is a sentence of advice."""
+
+    CONVERGED = "The independent error measure is below the tolerance."
+    MAX_ITERATIONS = "Allow more iterations, or try method 'auto', which changes methods."
+    TIME_LIMIT = "Allow more time, start from this solution, or loosen the tolerance."
+    STAGNATED = (
+        "The error no longer falls: try method 'auto' or 'proximal-point', loosen the tolerance, "
+        "or check whether the problem has a solution."
+    )
+    CYCLED = (
+        "The iterates repeat: use a line search, start from 'gauss-seidel', or try method 'auto'."
+    )
+    NON_FINITE = "The iterates overflowed: check units and friction, or try method 'auto'."
+    BREAKDOWN = "The method can not go on here: see the detail, and try method 'auto'."
+    STOPPED = "Stopped on request; the best iterate so far is kept."
+
+    @property
+    def advice(self) -> str:
+        """What the user can do about it."""
+        return self.value
+
+
+@dataclass(frozen=True)
+class Step:
+    """One line of the history: what the driver saw after an iterate."""
+
+    iteration: int
+    error: float
+    linear_iterations: int
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class Convergence:
+    """The record of a solve."""
+
+    outcome: Outcome
+    iterations: int
+    error: float  # of the returned iterate, by the judge
+    tolerance: float
+    history: tuple[Step, ...]
+    linear_iterations: int
+    seconds: float
+    solver: str
+    measure: Measure
+    detail: str = ""
+
+    def __str__(self) -> str:
+        sign = "<=" if self.error <= self.tolerance else ">"
+        text = (
+            f"{self.outcome.name.lower().replace('_', ' ')} with {self.solver}: error "
+            f"{self.error:.1e} {sign} {self.tolerance:.0e} after {self.iterations} iterations "
+            f"in {self.seconds:.3g} s"
+        )
+        return f"{text} ({self.detail})" if self.detail else text
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionSolution:
+    """Reactions and velocities of a discrete problem, and what they mean.
+
+    r, u: (nc, d) in the local frames; v: (n,) or None in the Delassus form; status: (nc,) of
+    ContactStatus; sliding: (nc,) true where u_T != 0 by the law (with Tresca friction an open
+    contact may slide too); margin: (nc,) distance to the next status, in units of r_N.
+    """
+
+    problem: FrictionProblem
+    r: Array
+    u: Array
+    v: Array | None
+    status: NDArray[np.int8]
+    sliding: NDArray[np.bool_]
+    margin: Array
+    convergence: Convergence
+
+    @property
+    def converged(self) -> bool:
+        """True when the judge agrees with the tolerance."""
+        return self.convergence.outcome is Outcome.CONVERGED
+
+    @property
+    def pattern(self) -> str:
+        """Status of all contacts in order: f free, s stick, slip is + or - (2D) or l (3D)."""
+        letters = np.array(["f", "l", "s"])[self.status]
+        if self.r.shape[1] == 2:
+            slip = self.status == ContactStatus.SLIP
+            letters[slip] = np.where(self.r[slip, 1] >= 0, "+", "-")
+        return "".join(letters)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Numbers of open, slipping and sticking contacts."""
+        return {s.name.lower(): int((self.status == s).sum()) for s in ContactStatus}
+
+    @property
+    def fclib_error(self) -> float:
+        """The published FCLib error, for comparison only: it depends on the units."""
+        p = self.problem
+        q = p.q if p.q is not None else self.u - self._contact_part()
+        return judge.published_fclib_error(self.r, self.u, q, p.law)
+
+    def _contact_part(self) -> Array:
+        """W r without forming W."""
+        p = self.problem
+        assert p.H is not None
+        return (p.H.T @ p.solve_M(p.H @ self.r.ravel())).reshape(self.r.shape)
+
+    @property
+    def max_penetration(self) -> float:
+        """Largest -u_N, unit of u."""
+        return judge.max_penetration(self.u)
+
+    @property
+    def max_cone_violation(self) -> float:
+        """Largest excess of |r_T| over its bound, unit of r."""
+        return judge.max_cone_violation(self.r, self.problem.law)
+
+    def __str__(self) -> str:
+        c = self.counts
+        name = self.problem.name or "friction problem"
+        return (
+            f"{name}: {self.problem.contacts} contacts in {self.problem.dimension}D: "
+            f"{c['open']} open, {c['slip']} slip, {c['stick']} stick\n{self.convergence}"
+        )

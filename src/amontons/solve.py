@@ -1,0 +1,180 @@
+"""The driver: it alone judges, stops, records, and turns the best iterate into a solution."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import InvalidInput, SingularOperator, UnsupportedForm
+from .problem import Form, FrictionProblem
+from .solution import Convergence, FrictionSolution, Outcome, Step
+from .solvers import FITTING_GLOBAL, Auto
+from .solvers.base import Breakdown, Iterate, Solver, Target
+from .status import classify
+
+Array = NDArray[np.float64]
+Callback = Callable[[Step, Iterate], bool | None]
+MEMORY = 64  # iterates among which a repetition counts as a cycle
+PATIENCE = 200  # iterates without any progress before a solve counts as stagnated
+PROGRESS = 0.99  # the best error must fall at least by this factor within PATIENCE
+
+
+@dataclass
+class _Watch:
+    """The driver's memory of one solve."""
+
+    problem: FrictionProblem
+    tolerance: float
+    started: float = field(default_factory=time.perf_counter)
+    best: Iterate | None = None
+    error: float = np.inf
+    iterations: int = 0
+    linear_iterations: int = 0
+    history: list[Step] = field(default_factory=list)
+    seen: list[tuple[float, Array]] = field(default_factory=list)
+    mark: tuple[int, float] = (0, np.inf)  # iterate and error of the last real progress
+
+    def judge(self, iterate: Iterate) -> Step:
+        """Judge an iterate and remember it if it is the best."""
+        error = self.problem.error(iterate.r, iterate.v)
+        self.iterations += iterate.iterations
+        self.linear_iterations += iterate.linear_iterations
+        seconds = time.perf_counter() - self.started
+        step = Step(self.iterations, error, self.linear_iterations, seconds)
+        self.history.append(step)
+        if self.best is None or error < self.error:
+            self.best, self.error = iterate, error
+        if error < PROGRESS * self.mark[1]:
+            self.mark = (len(self.history), error)
+        return step
+
+    def cycled(self, iterate: Iterate, error: float) -> bool:
+        """True when this iterate was here before, with other iterates in between."""
+        size = np.abs(iterate.r).max(initial=0.0)
+        found = False
+        for old_error, old in self.seen[:-1]:
+            if abs(old_error - error) <= 1e-12 * error:
+                found = found or bool(np.abs(old - iterate.r).max(initial=0.0) <= 1e-13 * size)
+        self.seen.append((error, iterate.r))
+        del self.seen[:-MEMORY]
+        return found
+
+    @property
+    def stagnated(self) -> bool:
+        """True when the best error has not moved for PATIENCE iterates."""
+        return len(self.history) - self.mark[0] > PATIENCE
+
+
+def drive(
+    problem: FrictionProblem,
+    solver: Solver | None = None,
+    *,
+    tolerance: float = 1e-8,
+    max_iterations: int | None = None,
+    time_limit: float | None = None,
+    start: Iterate | FrictionSolution | None = None,
+    callback: Callback | None = None,
+) -> FrictionSolution:
+    """Run a solver until the judge is content or a limit is met; never raises for a failure.
+
+    tolerance: on the unit-free error of `judge`.  time_limit in seconds.  callback(step, iterate)
+    is called after every iterate; returning True stops.  Ctrl-C gives the outcome STOPPED with
+    the best iterate.  Raises UnsupportedForm when the solver needs the other form.
+    """
+    solver = solver if solver is not None else Auto()
+    _check_options(tolerance, max_iterations, time_limit)
+    if solver.form is not Form.ANY and solver.form is not problem.form:
+        problem_form = problem.form.value
+        hint = "problem.condensed()" if solver.form is Form.DELASSUS else ", ".join(FITTING_GLOBAL)
+        raise UnsupportedForm(
+            f"{type(solver).__name__} needs the {solver.form.value} form, the problem is "
+            f"{problem_form}; use {hint}"
+        )
+    watch = _Watch(problem, tolerance)
+    deadline = watch.started + (time_limit if time_limit is not None else np.inf)
+    outcome, detail = _run(
+        watch, solver, _start(problem, start), Target(tolerance, deadline),
+        max_iterations if max_iterations is not None else np.inf, callback,
+    )
+    return _finish(watch, outcome, detail, solver)
+
+
+def _run(
+    watch: _Watch, solver: Solver, start: Iterate, target: Target, limit: float,
+    callback: Callback | None,
+) -> tuple[Outcome, str]:
+    """The loop; returns why it ended."""
+    try:
+        step = watch.judge(start)
+        if step.error <= target.tolerance:
+            return Outcome.CONVERGED, ""
+        for iterate in solver.iterates(watch.problem, start, target):
+            step = watch.judge(iterate)
+            if callback is not None and callback(step, iterate):
+                return Outcome.STOPPED, "by the callback"
+            if step.error <= target.tolerance:
+                return Outcome.CONVERGED, iterate.stage
+            if not np.isfinite(step.error):
+                return Outcome.NON_FINITE, ""
+            if watch.iterations >= limit:
+                return Outcome.MAX_ITERATIONS, ""
+            if time.perf_counter() > target.deadline:
+                return Outcome.TIME_LIMIT, ""
+            if watch.cycled(iterate, step.error):
+                return Outcome.CYCLED, ""
+            if watch.stagnated:
+                return Outcome.STAGNATED, ""
+        return Outcome.STAGNATED, "the method has nothing left to try"
+    except Breakdown as reason:
+        return Outcome.BREAKDOWN, str(reason)
+    except SingularOperator as reason:
+        return Outcome.BREAKDOWN, str(reason)
+    except KeyboardInterrupt:
+        return Outcome.STOPPED, "by the user"
+
+
+def _finish(watch: _Watch, outcome: Outcome, detail: str, solver: Solver) -> FrictionSolution:
+    problem = watch.problem
+    best = watch.best if watch.best is not None else Iterate(_zero(problem))
+    if best.v is None or problem.form is Form.DELASSUS:
+        u, v = problem.velocity(best.r)
+    else:
+        u, v = problem.local_velocity(best.v), best.v
+    status, sliding, margin = classify(problem, best.r, u)
+    seconds = time.perf_counter() - watch.started
+    record = Convergence(
+        outcome, watch.iterations, watch.error, watch.tolerance, tuple(watch.history),
+        watch.linear_iterations, seconds, type(solver).__name__, problem.measure, detail,
+    )
+    return FrictionSolution(problem, best.r, u, v, status, sliding, margin, record)
+
+
+def _zero(problem: FrictionProblem) -> Array:
+    return np.zeros((problem.contacts, problem.dimension))
+
+
+def _start(problem: FrictionProblem, start: Iterate | FrictionSolution | None) -> Iterate:
+    """The first iterate: zero reactions, or a copy of what the user gives."""
+    if start is None:
+        return Iterate(_zero(problem), None, 0)
+    r = np.array(start.r, dtype=float)
+    if r.shape != (problem.contacts, problem.dimension):
+        raise InvalidInput(
+            f"start: expected r of shape {(problem.contacts, problem.dimension)}, got {r.shape}"
+        )
+    if not np.isfinite(r).all():
+        raise InvalidInput("start: r holds a number that is not finite")
+    return Iterate(r, start.v, 0)
+
+
+def _check_options(tolerance: float, max_iterations: int | None, limit: float | None) -> None:
+    if not (0 < tolerance < 1):
+        raise InvalidInput(f"tolerance: expected between 0 and 1, got {tolerance}")
+    if max_iterations is not None and max_iterations < 1:
+        raise InvalidInput(f"max_iterations: expected at least 1, got {max_iterations}")
+    if limit is not None and not limit > 0:
+        raise InvalidInput(f"time_limit: expected seconds > 0, got {limit}")

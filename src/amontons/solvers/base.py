@@ -1,0 +1,73 @@
+"""The contract of a solver: a frozen dataclass whose one method yields iterates.
+
+A solver never stops itself and never judges itself; the driver in `solve.py` does both.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InvalidInput
+from ..problem import Form, FrictionProblem
+
+Array = NDArray[np.float64]
+
+
+class Breakdown(Exception):
+    """A solver can not go on; the reason becomes the detail of the outcome."""
+
+
+@dataclass(frozen=True, eq=False)
+class Iterate:
+    """One state of a solver: reactions r, (nc, d), and v, (n,), if the solver has it."""
+
+    r: Array
+    v: Array | None = None
+    iterations: int = 1  # how many iterations this state is ahead of the one before
+    linear_iterations: int = 0
+    stage: str = ""  # which stage of a portfolio made it
+
+
+@dataclass(frozen=True)
+class Target:
+    """What the driver will ask for: a hint for stages that run inside one compiled call."""
+
+    tolerance: float
+    deadline: float = np.inf  # time.perf_counter() at which the driver will stop
+
+    @property
+    def seconds_left(self) -> float:
+        """Time until the deadline."""
+        return self.deadline - time.perf_counter()
+
+
+class Solver(Protocol):
+    """Options as fields; `iterates` yields until the driver stops asking."""
+
+    form: ClassVar[Form]
+
+    def iterates(
+        self, problem: FrictionProblem, start: Iterate, target: Target
+    ) -> Iterator[Iterate]:
+        """Iterates from `start`; raises Breakdown with a reason when there is no next one."""
+        ...
+
+
+def check_positive(**fields: float) -> None:
+    """Raise InvalidInput for the first option that is not a positive finite number."""
+    for name, value in fields.items():
+        if not (value > 0 and np.isfinite(value)):
+            raise InvalidInput(f"{name}: expected a positive number, got {value}")
+
+
+def check_at_least(minimum: int, **fields: int) -> None:
+    """Raise InvalidInput for the first option below `minimum`."""
+    for name, value in fields.items():
+        if value < minimum:
+            raise InvalidInput(f"{name}: expected at least {minimum}, got {value}")

@@ -1,0 +1,200 @@
+"""Non-smooth Gauss-Seidel (NSGS): contact after contact, each solved exactly.
+
+    r_i <- exact solution of contact i given all other reactions,        [ABD] eq. (12)
+
+optionally with Anderson acceleration: the sweep G is a fixed-point map, and the next iterate is
+the combination of the last ones whose residual G(r) - r is smallest.  A mixed iterate may leave
+the cone; the next sweep brings it back, so only sweeps are ever handed out.
+
+[ABD] V. Acary, M. Brémond, F. Dubois, "Méthodes de Newton non-lisses pour les problèmes de
+contact frottant dans les systèmes de multi-corps flexibles", CSMA 2017.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from ..blocks import spatial
+from ..one_contact import solve_contact
+from ..problem import Form, FrictionProblem
+from .base import Iterate, Target, check_at_least
+
+Array = NDArray[np.float64]
+
+
+@njit(cache=True)
+def sweep_inplace(indptr, indices, data, q, coefficient, tresca, diagonal, backward, r):  # noqa: PLR0913
+    """One Gauss-Seidel sweep over all contacts; returns the change |W_ii (r_i' - r_i)|."""
+    nc = len(coefficient)
+    change = 0.0
+    for step in range(nc):
+        i = nc - 1 - step if backward else step
+        b0, b1, b2 = q[i, 0], q[i, 1], q[i, 2]
+        for k in range(indptr[i], indptr[i + 1]):
+            j = indices[k]
+            if j == i:
+                continue
+            b = data[k]
+            r0, r1, r2 = r[j, 0], r[j, 1], r[j, 2]
+            b0 += b[0, 0] * r0 + b[0, 1] * r1 + b[0, 2] * r2
+            b1 += b[1, 0] * r0 + b[1, 1] * r1 + b[1, 2] * r2
+            b2 += b[2, 0] * r0 + b[2, 1] * r1 + b[2, 2] * r2
+        A = data[diagonal[i]]
+        x0, x1, x2, _ = solve_contact(A, b0, b1, b2, coefficient[i], tresca, r[i, 1], r[i, 2])
+        d0, d1, d2 = x0 - r[i, 0], x1 - r[i, 1], x2 - r[i, 2]
+        r[i, 0], r[i, 1], r[i, 2] = x0, x1, x2
+        size = abs(A[0, 0]) + abs(A[1, 1]) + abs(A[2, 2])
+        change += size * size * (d0 * d0 + d1 * d1 + d2 * d2)
+    return math.sqrt(change)
+
+
+@njit(cache=True)
+def sweeps_inplace(indptr, indices, data, q, coefficient, tresca, diagonal, r, sweeps, small):  # noqa: PLR0913
+    """Up to `sweeps` forward sweeps, fewer when one changes less than `small`; returns how many."""
+    for k in range(sweeps):
+        change = sweep_inplace(
+            indptr, indices, data, q, coefficient, tresca, diagonal, False, r
+        )
+        if change <= small:
+            return k + 1
+    return sweeps
+
+
+@njit(cache=True)
+def _least_squares(gram, target, k, weights):
+    """Solve (gram + tiny I) w = target for the leading k unknowns, by Gauss with pivots."""
+    a = gram[:k, :k].copy()
+    b = target[:k].copy()
+    shift = 0.0
+    for i in range(k):
+        shift = max(shift, a[i, i])
+    for i in range(k):
+        a[i, i] += 1e-13 * shift
+    for i in range(k):
+        p = i
+        for j in range(i + 1, k):
+            if abs(a[j, i]) > abs(a[p, i]):
+                p = j
+        if a[p, i] == 0.0:
+            return False
+        if p != i:
+            for j in range(k):
+                a[i, j], a[p, j] = a[p, j], a[i, j]
+            b[i], b[p] = b[p], b[i]
+        for j in range(i + 1, k):
+            factor = a[j, i] / a[i, i]
+            for l in range(i, k):
+                a[j, l] -= factor * a[i, l]
+            b[j] -= factor * b[i]
+    for i in range(k - 1, -1, -1):
+        total = b[i]
+        for j in range(i + 1, k):
+            total -= a[i, j] * weights[j]
+        weights[i] = total / a[i, i]
+    return True
+
+
+@njit(cache=True)
+def anderson_inplace(  # noqa: PLR0913
+    indptr, indices, data, q, coefficient, tresca, diagonal, r, depth, sweeps, small
+):
+    """Accelerated sweeps; r ends as the last plain sweep.  Returns (sweeps done, last change).
+
+    The history is dropped when the residual doubles.  `small` ends the loop as above.
+    """
+    nc = len(coefficient)
+    m = 3 * nc
+    steps = np.zeros((depth, m))  # differences of G(r)
+    slopes = np.zeros((depth, m))  # differences of the residual G(r) - r
+    gram = np.zeros((depth, depth))
+    target = np.zeros(depth)
+    weights = np.zeros(depth)
+    x = r.copy()
+    old_g = np.zeros(m)
+    old_f = np.zeros(m)
+    count = 0  # differences stored since the last restart
+    change = math.inf
+    old_size = math.inf
+    for k in range(sweeps):
+        r[:] = x
+        change = sweep_inplace(
+            indptr, indices, data, q, coefficient, tresca, diagonal, False, r
+        )
+        if change <= small:
+            return k + 1, change
+        g = r.reshape(m)
+        xf = x.reshape(m)
+        size = 0.0
+        for i in range(m):
+            size += (g[i] - xf[i]) ** 2
+        size = math.sqrt(size)
+        if k > 0:
+            if size > 2.0 * old_size:
+                count = 0
+            else:
+                slot = count % depth
+                count += 1
+                for i in range(m):
+                    steps[slot, i] = g[i] - old_g[i]
+                    slopes[slot, i] = g[i] - xf[i] - old_f[i]
+        filled = min(count, depth)
+        old_size = size
+        for i in range(m):
+            old_g[i] = g[i]
+            old_f[i] = g[i] - xf[i]
+        x[:] = r
+        if filled > 0:
+            for a in range(filled):
+                for b in range(a + 1):
+                    total = 0.0
+                    for i in range(m):
+                        total += slopes[a, i] * slopes[b, i]
+                    gram[a, b] = gram[b, a] = total
+                total = 0.0
+                for i in range(m):
+                    total += slopes[a, i] * old_f[i]
+                target[a] = total
+            if _least_squares(gram, target, filled, weights):
+                xf = x.reshape(m)
+                for a in range(filled):
+                    for i in range(m):
+                        xf[i] -= weights[a] * steps[a, i]
+    return sweeps, change
+
+
+@dataclass(frozen=True)
+class GaussSeidel:
+    """NSGS on the Delassus form; one iterate per `batch` sweeps.
+
+    anderson_depth > 0 accelerates: the window of past sweeps, 5 to 10 is usual.
+    """
+
+    form: ClassVar[Form] = Form.DELASSUS
+    anderson_depth: int = 0  # past sweeps that are combined; 0: plain sweeps
+    batch: int = 1  # sweeps between two judgements
+
+    def __post_init__(self) -> None:
+        check_at_least(0, anderson_depth=self.anderson_depth)
+        check_at_least(1, batch=self.batch)
+
+    def iterates(
+        self, problem: FrictionProblem, start: Iterate, target: Target
+    ) -> Iterator[Iterate]:
+        """Sweeps from `start`, for ever."""
+        d = problem.dimension
+        data = (*problem.kernel_data[:6], problem.blocks.diagonal)
+        r = spatial(start.r)
+        window = max(4 * self.anderson_depth, self.batch)  # a call starts with an empty history
+        while True:
+            if self.anderson_depth:
+                done, _ = anderson_inplace(*data, r, self.anderson_depth, window, 0.0)
+            else:
+                done = sweeps_inplace(*data, r, self.batch, 0.0)
+            yield Iterate(r[:, :d].copy(), iterations=done)
