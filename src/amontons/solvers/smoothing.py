@@ -1,0 +1,301 @@
+"""Smoothing Newton on the second-order cone: each iteration factorises W plus 3x3 blocks.
+
+With x = (mu r_N, r_T) and y = (u_N / mu + |u_T|, u_T), Coulomb's law is x, y in the Lorentz cone,
+x . y = 0.  The projection in x - P(x - rho y) = 0 is smoothed spectrally,
+
+    P_eps(z): phi(l) = (l + sqrt(l^2 + 4 eps^2)) / 2 on both eigenvalues l = z_0 ± |z_T|,
+
+|u_T| becomes sqrt(|u_T|^2 + sigma^2) - sigma, and eps_i = sigma rho_i, sigma a velocity.
+With G = dy/du and S = dx/dr the Newton equation, multiplied by (rho P' G)^-1, is
+
+    [ W + (1/rho) G^-1 (P'^-1 - I) S ] dr = - (1/rho) G^-1 P'^-1 F,
+
+and the eigenvalues of P'^-1 - I are known without cancellation: with s = sqrt(l^2 + 4 eps^2),
+a = s + l and b = s - l (the smaller one as 4 eps^2 / the larger), they are b/a for both l and
+(b_1 + b_2) / (a_1 + a_2) for the third.  sigma shrinks as the equations are met.
+
+A proximal term alpha_i (r_i - center_i) added to u makes singular problems regular:
+`ProximalPoint` uses it.  Contacts with mu = 0 are smoothed in their normal alone.
+
+[CT] X. Chen, P. Tseng, "Non-interior continuation methods for solving semidefinite
+complementarity problems", Math. Program. 95 (2003); [FLT] M. Fukushima, Z.-Q. Luo, P. Tseng,
+"Smoothing functions for second-order-cone complementarity problems", SIAM J. Optim. 12 (2002).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from ..blocks import spatial
+from ..cones import Tresca
+from ..errors import UnsupportedForm
+from ..judge import contact_residual, natural_error
+from ..problem import Form, FrictionProblem
+from .base import Breakdown, Iterate, Target, check_at_least, check_positive
+from .block_lu import Symbolic, analyse, factorise_inplace, solve_inplace
+from .gauss_seidel import sweep_inplace
+
+Array = NDArray[np.float64]
+PINNED = 1e16  # relative stiffness that keeps r_T = 0 where mu = 0
+
+
+@njit(cache=True)
+def _split(l, eps):
+    """s + l and s - l with s = sqrt(l^2 + 4 eps^2), the smaller one without cancellation."""
+    s = math.sqrt(l * l + 4.0 * eps * eps)
+    if l > 0.0:
+        a = s + l
+        return a, 4.0 * eps * eps / a
+    b = s - l
+    return 4.0 * eps * eps / b, b
+
+
+@njit(cache=True)
+def _smoothed(r, u, mu, rho, sigma, i):
+    """F_sigma of contact i (three scalars, unit of r), and what its derivative needs."""
+    eps = sigma * rho
+    if mu == 0.0:
+        a, b = _split(r[i, 0] - rho * u[i, 0], eps)
+        return r[i, 0] - 0.5 * a, 0.0, 0.0, a, b, 1.0, 0.0, 1.0, 0.0
+    root = math.sqrt(u[i, 1] ** 2 + u[i, 2] ** 2 + sigma * sigma)
+    x0 = mu * r[i, 0]
+    z0 = x0 - rho * (u[i, 0] / mu + root - sigma)
+    z1 = r[i, 1] - rho * u[i, 1]
+    z2 = r[i, 2] - rho * u[i, 2]
+    t = math.sqrt(z1 * z1 + z2 * z2)
+    c, s = (z1 / t, z2 / t) if t > 0.0 else (1.0, 0.0)
+    a1, b1 = _split(z0 + t, eps)
+    a2, b2 = _split(z0 - t, eps)
+    radial = 0.25 * (a1 - a2)
+    f0 = x0 - 0.25 * (a1 + a2)
+    return f0, r[i, 1] - radial * c, r[i, 2] - radial * s, a1, b1, a2, b2, c, s
+
+
+@njit(cache=True)
+def _merit(r, u, mu, rho, sigma):
+    """|F_sigma / rho| over all contacts, unit of u."""
+    total = 0.0
+    for i in range(len(mu)):
+        if rho[i] > 0.0:
+            f = _smoothed(r, u, mu[i], rho[i], sigma, i)
+            total += (f[0] ** 2 + f[1] ** 2 + f[2] ** 2) / rho[i] ** 2
+    return math.sqrt(total)
+
+
+@njit(cache=True)
+def _assemble(r, u, mu, rho, sigma, shift, prox, extra, rhs):  # noqa: PLR0913
+    """Block diagonal and right-hand side of the Newton equation."""
+    for i in range(len(mu)):
+        d = extra[i]
+        d[:, :] = 0.0
+        if rho[i] <= 0.0:  # W_ii = 0: this contact can not react
+            d[0, 0] = d[1, 1] = d[2, 2] = 1e300
+            rhs[i, :] = 0.0
+            continue
+        f0, f1, f2, a1, b1, a2, b2, c, s = _smoothed(r, u, mu[i], rho[i], sigma, i)
+        if mu[i] == 0.0:
+            k = b1 / a1
+            d[0, 0] = k / rho[i]
+            d[1, 1] = d[2, 2] = PINNED / rho[i]
+            rhs[i, 0] = -(1.0 + k) * f0 / rho[i]
+            rhs[i, 1] = rhs[i, 2] = 0.0
+        else:
+            k1, k2, k3 = b1 / a1, b2 / a2, (b1 + b2) / (a1 + a2)
+            mean, half = 0.5 * (k1 + k2), 0.5 * (k1 - k2)
+            # K = P'^-1 - I in the basis (n, t1, t2)
+            k00, k01, k02 = mean, half * c, half * s
+            k11 = mean * c * c + k3 * s * s
+            k12 = (mean - k3) * c * s
+            k22 = mean * s * s + k3 * c * c
+            root = math.sqrt(u[i, 1] ** 2 + u[i, 2] ** 2 + sigma * sigma)
+            e1, e2 = u[i, 1] / root, u[i, 2] / root
+            g0 = f0 + k00 * f0 + k01 * f1 + k02 * f2
+            g1 = f1 + k01 * f0 + k11 * f1 + k12 * f2
+            g2 = f2 + k02 * f0 + k12 * f1 + k22 * f2
+            m, w = mu[i], 1.0 / rho[i]
+            rhs[i, 0] = -w * m * (g0 - e1 * g1 - e2 * g2)
+            rhs[i, 1] = -w * g1
+            rhs[i, 2] = -w * g2
+            d[0, 0] = w * m * m * (k00 - e1 * k01 - e2 * k02)
+            d[0, 1] = w * m * (k01 - e1 * k11 - e2 * k12)
+            d[0, 2] = w * m * (k02 - e1 * k12 - e2 * k22)
+            d[1, 0], d[1, 1], d[1, 2] = w * m * k01, w * k11, w * k12
+            d[2, 0], d[2, 1], d[2, 2] = w * m * k02, w * k12, w * k22
+        add = shift / rho[i] + prox[i]
+        d[0, 0] += add
+        d[1, 1] += add
+        d[2, 2] += add
+
+
+@njit(cache=True)
+def _product(indptr, indices, data, prox, x, out):
+    """out = (W + diag(prox)) x."""
+    for i in range(len(prox)):
+        u0, u1, u2 = prox[i] * x[i, 0], prox[i] * x[i, 1], prox[i] * x[i, 2]
+        for k in range(indptr[i], indptr[i + 1]):
+            j = indices[k]
+            b = data[k]
+            x0, x1, x2 = x[j, 0], x[j, 1], x[j, 2]
+            u0 += b[0, 0] * x0 + b[0, 1] * x1 + b[0, 2] * x2
+            u1 += b[1, 0] * x0 + b[1, 1] * x1 + b[1, 2] * x2
+            u2 += b[2, 0] * x0 + b[2, 1] * x1 + b[2, 2] * x2
+        out[i, 0], out[i, 1], out[i, 2] = u0, u1, u2
+
+
+@njit(cache=True)
+def _law_error(r, u, mu, rho):
+    """|(r - P(r - rho û)) / rho|, the judge's formula with u given."""
+    total = 0.0
+    for i in range(len(mu)):
+        if rho[i] > 0.0:
+            e0, e1, e2 = contact_residual(
+                r[i, 0], r[i, 1], r[i, 2], u[i, 0], u[i, 1], u[i, 2], rho[i], mu[i], False
+            )
+            total += e0 * e0 + e1 * e1 + e2 * e2
+    return math.sqrt(total)
+
+
+@njit(cache=True)
+def newton_inplace(  # noqa: PLR0913
+    indptr, indices, data, q, mu, rho, order, upper_start, upper, lower_start, lower,
+    prox, center, x, r, sigma, shift, goal, steps,
+):  # fmt: skip
+    """At most `steps` Newton steps on x; r ends as the best iterate by the law's own residual.
+
+    goal: residual, unit of u, at which to stop.  prox (nc,), center (nc, 3): proximal term.
+    Returns (steps done, best residual, sigma); a negative count says that a factor broke down.
+    """
+    nc = len(mu)
+    extra = np.empty((nc, 3, 3))
+    U, L = np.empty((len(upper), 3, 3)), np.empty((len(upper), 3, 3))
+    inverse, work = np.empty((nc, 3, 3)), np.zeros((nc, 3, 3))
+    rhs, dr, du = np.empty((nc, 3)), np.empty((nc, 3)), np.empty((nc, 3))
+    u, trial, trial_u = np.empty((nc, 3)), np.empty((nc, 3)), np.empty((nc, 3))
+    r[:, :] = x
+    _product(indptr, indices, data, prox, x, u)
+    for i in range(nc):
+        for a in range(3):
+            u[i, a] += q[i, a] - prox[i] * center[i, a]
+    best = _law_error(x, u, mu, rho)
+    count = 0
+    root = math.sqrt(nc)
+    floor = 1e-3 * goal / root
+    value = _merit(x, u, mu, rho, sigma)
+    recent = np.full(4, value)
+    while count < steps and best > goal:
+        count += 1
+        _assemble(x, u, mu, rho, sigma, shift, prox, extra, rhs)
+        if not factorise_inplace(
+            indptr, indices, data, extra, order, upper_start, upper, lower_start, lower,
+            U, L, inverse, work,
+        ):  # fmt: skip
+            return -count, best, sigma
+        solve_inplace(
+            order, upper_start, upper, lower_start, lower, U, L, inverse, rhs, dr
+        )
+        _product(indptr, indices, data, prox, dr, du)
+        ceiling = recent.max()
+        step = 1.0
+        for _ in range(12):
+            for i in range(nc):
+                for a in range(3):
+                    trial[i, a] = x[i, a] + step * dr[i, a]
+                    trial_u[i, a] = u[i, a] + step * du[i, a]
+            value = _merit(trial, trial_u, mu, rho, sigma)
+            if value <= (1.0 - 1e-4 * step) * ceiling:
+                break
+            step *= 0.5
+        if not math.isfinite(value):
+            return -count, best, sigma
+        x[:, :] = trial
+        u[:, :] = trial_u
+        residual = _law_error(x, u, mu, rho)
+        if residual < best:
+            best = residual
+            r[:, :] = x
+        recent[count % 4] = value
+        if value <= 3.0 * sigma * root:
+            sigma = max(0.3 * sigma, floor)
+            recent[:] = _merit(x, u, mu, rho, sigma)
+        elif step < 0.01:
+            sigma *= 2.0
+            recent[:] = _merit(x, u, mu, rho, sigma)
+    return count, best, sigma
+
+
+@dataclass(frozen=True)
+class SmoothingNewton:
+    """Smoothing Newton on the Delassus form, for Coulomb friction."""
+
+    form: ClassVar[Form] = Form.DELASSUS
+    sigma: float = 0.1  # first smoothing velocity, relative to |q| / sqrt(nc)
+    shift: float = 1e-8  # added to the Newton matrix, relative to |W_ii|: W is often singular
+    batch: int = 1  # Newton steps between two judgements
+
+    def __post_init__(self) -> None:
+        check_positive(sigma=self.sigma, shift=self.shift)
+        check_at_least(1, batch=self.batch)
+
+    def iterates(
+        self, problem: FrictionProblem, start: Iterate, target: Target
+    ) -> Iterator[Iterate]:
+        """Newton steps from `start`, until a factorisation breaks down."""
+        work = Workspace.of(problem)
+        x = spatial(start.r)
+        sigma = self.sigma * problem.q_norm / math.sqrt(max(problem.contacts, 1))
+        while True:
+            count, _, sigma, _ = work.newton(x, sigma, self.shift, goal=0.0, steps=self.batch)
+            if count < 0:
+                raise Breakdown("the Newton matrix is singular")
+            yield Iterate(x[:, : problem.dimension].copy(), iterations=count)
+
+
+@dataclass(frozen=True, eq=False)
+class Workspace:
+    """A Coulomb problem in Delassus form with the symbolic factor that all Newton steps share."""
+
+    problem: FrictionProblem
+    symbolic: Symbolic
+
+    @classmethod
+    def of(cls, problem: FrictionProblem) -> Workspace:
+        """Order and analyse W once; raises UnsupportedForm under Tresca's law."""
+        if isinstance(problem.law, Tresca):
+            raise UnsupportedForm(
+                "smoothing Newton needs Coulomb friction; use SemismoothNewton or GaussSeidel"
+            )
+        return cls(problem, analyse(problem.blocks))
+
+    def newton(  # noqa: PLR0913
+        self, x: Array, sigma: float, shift: float, *, goal: float, steps: int,
+        alpha: float = 0.0, center: Array | None = None,
+    ) -> tuple[int, float, float, Array]:  # fmt: skip
+        """Newton steps on x in place: (steps, best residual, sigma, best r).
+
+        alpha, relative to |W_ii|, is the weight of the proximal term about `center`.
+        """
+        indptr, indices, data, q, mu, _, rho = self.problem.kernel_data
+        prox = np.where(rho > 0, alpha / np.where(rho > 0, rho, 1.0), 0.0)
+        best = np.empty_like(x)
+        count, residual, sigma = newton_inplace(
+            indptr, indices, data, q, mu, rho, *self.symbolic.arrays,
+            prox, x.copy() if center is None else center, x, best, sigma, shift, goal, steps,
+        )  # fmt: skip
+        return count, residual, sigma, best
+
+    def error(self, r: Array) -> float:
+        """The judge's residual before division by |q|, unit of u."""
+        return natural_error(*self.problem.kernel_data, r)
+
+    def sweeps(self, r: Array, count: int) -> None:
+        """Gauss-Seidel sweeps on r in place, alternating direction."""
+        data = (*self.problem.kernel_data[:6], self.problem.blocks.diagonal)
+        for k in range(count):
+            sweep_inplace(*data, k % 2 == 1, r)
