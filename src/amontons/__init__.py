@@ -19,6 +19,7 @@ _HOME = {
     "solution": ("ContactStatus", "Convergence", "FrictionSolution", "Outcome"),
     "solvers": ("GaussSeidel",),
     "solve": ("drive",),
+    "fclib": ("read_fclib", "write_fclib"),
 }  # fmt: skip
 _MODULE = {name: module for module, names in _HOME.items() for name in names}
 
