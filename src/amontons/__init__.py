@@ -20,6 +20,10 @@ _HOME = {
     "solvers": ("GaussSeidel",),
     "solve": ("drive",),
     "fclib": ("read_fclib", "write_fclib"),
+    "fem": ("Mesh", "box", "read_mesh"),
+    "contact": ("LevelSet", "Plane", "Sphere"),
+    "model": ("Body", "BodyForce", "Contact", "ContactFields", "Fix", "LinearElastic", "Model",
+              "Traction"),
 }  # fmt: skip
 _MODULE = {name: module for module, names in _HOME.items() for name in names}
 

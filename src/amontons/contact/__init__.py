@@ -1,0 +1,6 @@
+"""Contact: obstacles, local frames, and the matrices that tie contacts to nodes."""
+
+from .geometry import LevelSet, Obstacle, Plane, Sphere, frames
+from .nodal import ContactRows, nodal_contact
+
+__all__ = ["ContactRows", "LevelSet", "Obstacle", "Plane", "Sphere", "frames", "nodal_contact"]

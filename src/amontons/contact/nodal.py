@@ -1,0 +1,66 @@
+"""Nodal contact: every node of the slave surface is one contact with a lumped weight.
+
+The reaction of a contact is a nodal force; divided by the weight, the integral of the node's
+shape function over the surface, it is a traction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..errors import InvalidInput
+from ..fem.mesh import Mesh
+from ..fem.surfaces import nodal_weights
+from .geometry import Obstacle, frames
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class ContactRows:
+    """Contacts of one slave surface, in the order of its nodes.
+
+    nodes (nc,); points (nc, d); weights (nc,), area; gap (nc,), length; frames (nc, d, d), rows
+    n, t1(, t2); H (n_dofs, nc d): local displacements are H^T v + [gap, 0, 0].
+    """
+
+    nodes: Index
+    points: Array
+    weights: Array
+    gap: Array
+    frames: Array
+    H: sparse.csc_array
+
+    def at(self, kept: NDArray[np.bool_]) -> ContactRows:
+        """A selection of these contacts."""
+        columns = np.repeat(kept, self.points.shape[1])
+        return ContactRows(self.nodes[kept], self.points[kept], self.weights[kept],
+                           self.gap[kept], self.frames[kept],
+                           sparse.csc_array(self.H[:, columns]))  # fmt: skip
+
+
+def nodal_contact(mesh: Mesh, surface: str, obstacle: Obstacle) -> ContactRows:
+    """Contacts between the nodes of a surface and a rigid obstacle, in the mesh's own dofs."""
+    nodes = mesh.surface_nodes(surface)
+    weights = nodal_weights(mesh.points, mesh.surface(surface))[nodes]
+    if not (weights > 0).all():
+        raise InvalidInput(f"surface {surface!r}: a node has no area, got {weights.min()}")
+    points = mesh.points[nodes]
+    axes = frames(obstacle.normals(points))
+    size = len(mesh.points) * mesh.dim
+    H = contact_columns(nodes, axes, size)
+    return ContactRows(nodes, points, weights, obstacle.gap(points), axes, H)
+
+
+def contact_columns(nodes: Index, axes: Array, size: int) -> sparse.csc_array:
+    """H (size, nc d): column i d + k holds axis k of contact i at the dofs of its node."""
+    nc, d = axes.shape[:2]
+    rows = np.broadcast_to((nodes[:, None] * d + np.arange(d))[:, None, :], (nc, d, d))
+    columns = np.broadcast_to(np.arange(nc * d).reshape(nc, d, 1), (nc, d, d))
+    entries = (axes.ravel(), (rows.ravel(), columns.ravel()))
+    return sparse.coo_array(entries, shape=(size, nc * d)).tocsc()

@@ -1,0 +1,102 @@
+"""Structured boxes: hexahedra, tetrahedra, quadrilaterals, triangles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import permutations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InvalidInput
+from .cells import FACET_KIND
+from .mesh import Cells, Facets, Mesh, facet_table
+
+Index = NDArray[np.int64]
+KINDS = {2: ("quad", "tri"), 3: ("hex", "tet")}
+SIDES = {2: (("left", "right"), ("bottom", "top")),
+         3: (("left", "right"), ("front", "back"), ("bottom", "top"))}  # fmt: skip
+
+
+def box(
+    size: Sequence[float],
+    cells: int | Sequence[int],
+    kind: str | None = None,
+    *,
+    origin: Sequence[float] | None = None,
+) -> Mesh:
+    """A rectangle or cuboid of `size` (2 or 3 lengths) with its lowest corner at `origin`.
+
+    cells: number per direction, one for all or one each.  kind: "hex" or "tet", in 2D "quad" or
+    "tri" (the first is the default).  Surfaces left/right (x), front/back (y), bottom/top (z);
+    in 2D left/right (x), bottom/top (y).  Region "default".
+
+    >>> box((1, 1, 1), cells=2).points.shape
+    (27, 3)
+    """
+    lengths, counts, kind = _checked(size, cells, kind)
+    dim = len(lengths)
+    start = np.zeros(dim) if origin is None else np.asarray(origin, dtype=float)
+    if start.shape != (dim,) or not np.isfinite(start).all():
+        raise InvalidInput(f"origin: expected {dim} finite numbers, got {origin!r}")
+    axes = [np.linspace(0, 1, n + 1) for n in counts]
+    unit = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    unit = unit.transpose(*range(dim - 1, -1, -1), dim).reshape(-1, dim)  # x runs fastest
+    cube = _cubes(counts)
+    nodes = cube if kind in ("hex", "quad") else _simplices(cube, dim)
+    block = Cells(kind, nodes)
+    surfaces = _sides(unit, block, dim)
+    return Mesh(start + unit * lengths, (block,), surfaces, grid=counts)
+
+
+def _checked(
+    size: Sequence[float], cells: int | Sequence[int], kind: str | None
+) -> tuple[NDArray[np.float64], tuple[int, ...], str]:
+    lengths = np.asarray(size, dtype=float)
+    if lengths.shape not in ((2,), (3,)) or not (np.isfinite(lengths) & (lengths > 0)).all():
+        raise InvalidInput(f"size: expected 2 or 3 lengths > 0, got {size!r}")
+    dim = len(lengths)
+    counts = np.broadcast_to(cells, dim) if np.ndim(cells) == 0 else np.asarray(cells)
+    if counts.shape != (dim,) or (counts != np.floor(counts)).any() or (counts < 1).any():
+        raise InvalidInput(
+            f"cells: expected one whole number >= 1 or {dim} of them, got {cells!r}"
+        )
+    kind = KINDS[dim][0] if kind is None else kind
+    if kind not in KINDS[dim]:
+        raise InvalidInput(
+            f"kind: expected {' or '.join(KINDS[dim])} for {dim} lengths, got {kind!r}"
+        )
+    return lengths, tuple(int(c) for c in counts), kind
+
+
+def _cubes(counts: tuple[int, ...]) -> Index:
+    """Nodes of all quadrilaterals or hexahedra in VTK order, (k, 4 or 8)."""
+    strides = np.cumprod([1, *(n + 1 for n in counts[:-1])])
+    grids = np.meshgrid(*[np.arange(n) for n in counts], indexing="ij")
+    first = sum(g.ravel(order="F") * s for g, s in zip(grids, strides, strict=True))
+    square = np.array([0, strides[0], strides[0] + strides[1], strides[1]])
+    corner = square if len(counts) == 2 else np.concatenate([square, square + strides[2]])
+    return first[:, None] + corner
+
+
+def _simplices(cube: Index, dim: int) -> Index:
+    """Each cube cut into dim! simplices along its diagonal (conforming between neighbours)."""
+    position = {2: [0, 1, 3, 2], 3: [0, 1, 3, 2, 4, 5, 7, 6]}[dim]  # bits of (x, y, z) -> VTK
+    pieces = []
+    for order in permutations(range(dim)):
+        path = np.cumsum([0, *(1 << axis for axis in order)])
+        pieces.append(cube[:, [position[p] for p in path]])
+    return np.stack(pieces, axis=1).reshape(-1, dim + 1)
+
+
+def _sides(unit: NDArray[np.float64], block: Cells, dim: int) -> dict[str, tuple[Facets, ...]]:
+    """Named facets of the unit box; call after the cells are positive."""
+    positive = Mesh(unit, (block,)).cells
+    table = np.concatenate([nodes for _, nodes in facet_table(positive)])
+    out = {}
+    for axis, names in enumerate(SIDES[dim]):
+        for value, name in zip((0.0, 1.0), names, strict=True):
+            on = (unit[table, axis] == value).all(axis=1)
+            nodes = table[on]
+            out[name] = (Facets(FACET_KIND[nodes.shape[1]], nodes),)
+    return out

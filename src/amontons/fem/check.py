@@ -1,0 +1,73 @@
+"""Checks of cells at the border: shapes, node numbers, orientation, degenerate cells."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InvalidInput
+from .cells import CELLS, ReferenceCell
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+FLAT = 1e-10  # det / (longest edge)^dim below which a cell counts as degenerate
+# node order of the mirrored cell
+MIRROR = {
+    "tri": [0, 2, 1],
+    "quad": [0, 3, 2, 1],
+    "tet": [0, 2, 1, 3],
+    "hex": [0, 3, 2, 1, 4, 7, 6, 5],
+    "wedge": [0, 2, 1, 3, 5, 4],
+    "pyramid": [0, 3, 2, 1, 4],
+}
+
+
+def checked_cells(points: Array, kind: str, nodes: ArrayLike, region: str) -> Index:
+    """Read-only node numbers (k, nodes), every cell positive; raises InvalidInput otherwise.
+
+    A cell negative at all its corners is mirrored; one that changes sign is not valid.
+    """
+    if kind not in CELLS or CELLS[kind].dim != points.shape[1]:
+        fitting = [c.kind for c in CELLS.values() if c.dim == points.shape[1]]
+        raise InvalidInput(f"cells: expected one of {', '.join(fitting)}, got {kind!r}")
+    cell = CELLS[kind]
+    table = np.array(nodes, dtype=np.int64)
+    if table.ndim != 2 or table.shape[1] != cell.nodes:
+        raise InvalidInput(f"{kind} cells: expected shape (k, {cell.nodes}), got {table.shape}")
+    if table.min() < 0 or table.max() >= len(points):
+        raise InvalidInput(
+            f"{kind} cells: expected node numbers 0..{len(points) - 1}, "
+            f"got {table.min()}..{table.max()}"
+        )
+    low, high = _determinants(cell, points[table])
+    turned = high < -FLAT
+    table[turned] = table[np.flatnonzero(turned)[:, None], MIRROR[kind]]
+    bad = np.flatnonzero(~turned & (low <= FLAT))
+    if bad.size:
+        raise InvalidInput(
+            _complaint(kind, region, table[bad[0]], points, int(bad.size), low[bad[0]])
+        )
+    table.flags.writeable = False
+    return table
+
+
+def _determinants(cell: ReferenceCell, coordinates: Array) -> tuple[Array, Array]:
+    """Smallest and largest Jacobian determinant of each cell over h^dim, each (k,)."""
+    size = np.ptp(coordinates, axis=1).max(axis=1)
+    scale = np.where(size > 0, size, 1.0) ** cell.dim
+    where = cell.gauss[0] if cell.kind == "pyramid" else cell.corners
+    values = np.stack([np.linalg.det(cell.jacobians(coordinates, x)) for x in where])
+    return values.min(axis=0) / scale, values.max(axis=0) / scale
+
+
+def _complaint(
+    kind: str, region: str, nodes: Index, points: Array, count: int, value: float
+) -> str:
+    centre = ", ".join(f"{c:.4g}" for c in points[nodes].mean(axis=0))
+    what = (
+        "degenerate (no volume)" if abs(value) <= FLAT else "folded (its Jacobian changes sign)"
+    )
+    return (
+        f"mesh: {kind} cell near ({centre}) in region {region!r} is {what}; "
+        f"{count} such cells, expected none"
+    )

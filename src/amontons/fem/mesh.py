@@ -1,0 +1,138 @@
+"""Meshes as plain arrays: points, cells by region, outward facets of named surfaces."""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InvalidInput
+from .cells import CELLS
+from .check import checked_cells
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Cells of one kind in one region: nodes (k, nodes per cell) in VTK order."""
+
+    kind: str
+    nodes: Index
+    region: str = "default"
+
+
+@dataclass(frozen=True, eq=False)
+class Facets:
+    """Boundary facets of one kind ("line", "tri", "quad"): nodes (k, nodes per facet).
+
+    Right-hand rule outwards; in 2D the outward normal is the right side of the direction.
+    """
+
+    kind: str
+    nodes: Index
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A mesh of first order in 2D or 3D.
+
+    points (n, dim), unit of length; cells: blocks by kind and region; surfaces: name -> facets.
+    Every point belongs to a cell; inverted cells are turned, degenerate ones rejected.
+    grid: cells per direction if the mesh is a structured box (multigrid makes use of it).
+    """
+
+    points: Array
+    cells: tuple[Cells, ...]
+    surfaces: dict[str, tuple[Facets, ...]] = field(default_factory=dict)
+    order: int = 1
+    grid: tuple[int, ...] | None = None
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        points = np.array(self.points, dtype=float)
+        if points.ndim != 2 or points.shape[1] not in (2, 3):
+            raise InvalidInput(f"points: expected shape (n, 2) or (n, 3), got {points.shape}")
+        if not np.isfinite(points).all():
+            row = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
+            raise InvalidInput(f"points[{row}]: expected finite numbers, got {points[row]}")
+        if self.order != 1:
+            raise InvalidInput(
+                f"order: expected 1 (nodes at the corners only), got {self.order}"
+            )
+        points.flags.writeable = False
+        object.__setattr__(self, "points", points)
+        blocks = tuple(
+            Cells(b.kind, checked_cells(points, b.kind, b.nodes, b.region), b.region)
+            for b in self.cells
+            if len(b.nodes)
+        )
+        object.__setattr__(self, "cells", blocks)
+        self._check_use()
+
+    def _check_use(self) -> None:
+        if not self.cells:
+            raise InvalidInput(f"mesh: expected cells of dimension {self.dim}, got none")
+        used = np.zeros(len(self.points), dtype=bool)
+        for block in self.cells:
+            used[block.nodes] = True
+        if not used.all():
+            raise InvalidInput(
+                f"points[{int(np.flatnonzero(~used)[0])}]: belongs to no cell; "
+                f"{int((~used).sum())} such points, leave them out and renumber"
+            )
+
+    @property
+    def dim(self) -> int:
+        """2 or 3."""
+        return self.points.shape[1]
+
+    @property
+    def regions(self) -> tuple[str, ...]:
+        """Names of the regions in order of appearance."""
+        return tuple(dict.fromkeys(block.region for block in self.cells))
+
+    @property
+    def cell_count(self) -> int:
+        """Number of cells of all kinds."""
+        return sum(len(block.nodes) for block in self.cells)
+
+    def surface(self, name: str) -> tuple[Facets, ...]:
+        """Facets of a named surface; a wrong name lists the known ones and the nearest."""
+        if name not in self.surfaces:
+            raise InvalidInput(unknown("surface", name, self.surfaces))
+        facets = self.surfaces[name]
+        if not sum(len(block.nodes) for block in facets):
+            raise InvalidInput(f"surface {name!r}: holds no facets")
+        return facets
+
+    def surface_nodes(self, name: str) -> Index:
+        """Sorted node numbers of a surface, (k,)."""
+        return np.unique(np.concatenate([b.nodes.ravel() for b in self.surface(name)]))
+
+    def bounding_box(self) -> tuple[Array, Array]:
+        """Smallest and largest coordinates, each (dim,)."""
+        return self.points.min(axis=0), self.points.max(axis=0)
+
+
+def unknown(what: str, name: object, known: object) -> str:
+    """A message for a name that does not exist: lists the known ones and the nearest."""
+    names = [str(k) for k in known]  # type: ignore[attr-defined]
+    if not names:
+        return f"{what} {name!r}: not found, there are no named {what}s"
+    near = difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    return f"{what} {name!r}: not found, known: {', '.join(sorted(names))}{hint}"
+
+
+def facet_table(cells: tuple[Cells, ...]) -> list[tuple[str, Index]]:
+    """All sides of all cells, outwards: (kind, nodes) per local side and block."""
+    kinds = {1: "point", 2: "line", 3: "tri", 4: "quad"}
+    return [
+        (kinds[len(side)], block.nodes[:, side])
+        for block in cells
+        for side in CELLS[block.kind].facets
+    ]

@@ -1,0 +1,212 @@
+"""From a model to matrices: bodies block by block, supports lifted, contacts in local rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..contact import ContactRows, nodal_contact
+from ..errors import InvalidInput
+from ..fem.elasticity import body_load, stiffness
+from ..fem.mesh import unknown
+from ..fem.surfaces import surface_load
+from ..linear import Factor
+from .parts import Body, BodyForce, Contact, Fix, Traction
+from .rigid import Piece, near_nullspace, pieces
+from .values import vector_at
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+SAME = 1e-12  # prescribed values that differ by less, relative to the largest, agree
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """Contacts of one pair: body of the slave, kept (slave nodes,), rows of the kept ones."""
+
+    body: int
+    kept: NDArray[np.bool_]
+    all_points: Array
+    rows: ContactRows
+
+
+@dataclass(frozen=True, eq=False)
+class Discretisation:
+    """All arrays of a model at load factor 1, whatever the friction.
+
+    free (n,), fixed: dofs of the whole model; prescribed (dofs,), load (n,): force on the free
+    dofs with the prescribed values lifted in; gap (nc,); carried (nc, d): part of the local
+    displacement that the supports prescribe.
+    """
+
+    offsets: Index
+    free: Index
+    fixed: Index
+    prescribed: Array
+    M: sparse.csc_array
+    H: sparse.csc_array
+    load: Array
+    gap: Array
+    carried: Array
+    placed: tuple[Placed, ...]
+    parts: list[Piece]
+    whole_H: sparse.csc_array
+    shared: dict[str, Factor] = field(default_factory=dict)  # factors of M, for all variants
+
+    @property
+    def dofs(self) -> int:
+        """Free and fixed degrees of freedom."""
+        return len(self.prescribed)
+
+    @property
+    def near_nullspace(self) -> Array:
+        """Rigid modes on the free dofs, (n, k)."""
+        return near_nullspace(self.parts, self.free, self.dofs)
+
+
+def discretise(
+    bodies: tuple[Body, ...],
+    supports: tuple[Fix, ...],
+    loads: tuple[Traction | BodyForce, ...],
+    contacts: tuple[Contact, ...],
+) -> Discretisation:
+    """Assemble everything that depends on neither friction nor load factor."""
+    offsets = np.cumsum([0, *(body.mesh.points.size for body in bodies)])
+    values = prescribed_values(bodies, supports, offsets)
+    is_fixed = ~np.isnan(values)
+    free, fixed = np.flatnonzero(~is_fixed), np.flatnonzero(is_fixed)
+    if not free.size:
+        raise InvalidInput("supports: every degree of freedom is fixed, nothing left to solve")
+    K = sparse.block_diag([stiffness(b.mesh, b.material) for b in bodies], format="csr")
+    prescribed = np.where(is_fixed, values, 0.0)
+    placed = tuple(_place(bodies, contact, is_fixed, offsets) for contact in contacts)
+    whole_H = sparse.hstack([_shifted(p, offsets) for p in placed], format="csc")
+    if not whole_H.shape[1]:
+        raise InvalidInput(
+            "contacts: every slave node is fixed by a support, no contact is left"
+        )
+    load = external_load(bodies, loads, offsets)
+    d = bodies[0].mesh.dim
+    return Discretisation(
+        offsets, free, fixed, prescribed,
+        M=sparse.csc_array(K[free][:, free]),
+        H=sparse.csc_array(whole_H.tocsr()[free]),
+        load=(load - K @ prescribed)[free],
+        gap=np.concatenate([p.rows.gap for p in placed]),
+        carried=(whole_H.T @ prescribed).reshape(-1, d),
+        placed=placed,
+        parts=[
+            piece
+            for k, body in enumerate(bodies)
+            for piece in pieces(body.mesh, body.name, int(offsets[k]))
+        ],
+        whole_H=whole_H,
+    )  # fmt: skip
+
+
+def locate(bodies: tuple[Body, ...], on: str) -> tuple[int, str]:
+    """(body, surface) of a name "surface" or "body.surface"."""
+    found = [k for k, body in enumerate(bodies) if on in body.mesh.surfaces]
+    if len(found) == 1:
+        return found[0], on
+    if len(found) > 1:
+        choices = ", ".join(f"{bodies[k].name}.{on}" for k in found)
+        raise InvalidInput(f"surface {on!r}: several bodies have it, write one of {choices}")
+    for k, body in enumerate(bodies):
+        prefix = f"{body.name}."
+        if on.startswith(prefix) and on[len(prefix) :] in body.mesh.surfaces:
+            return k, on[len(prefix) :]
+    names = [s for body in bodies for s in body.mesh.surfaces]
+    if len(bodies) > 1:
+        names += [f"{body.name}.{s}" for body in bodies for s in body.mesh.surfaces]
+    raise InvalidInput(unknown("surface", on, dict.fromkeys(names)))
+
+
+def prescribed_values(
+    bodies: tuple[Body, ...], supports: tuple[Fix, ...], offsets: Index
+) -> Array:
+    """Prescribed displacement of every dof, NaN where it is free, (dofs,)."""
+    values = np.full(int(offsets[-1]), np.nan)
+    for support in supports:
+        k, surface = locate(bodies, support.on)
+        mesh = bodies[k].mesh
+        nodes = mesh.surface(surface) and mesh.surface_nodes(surface)
+        given = vector_at(
+            support.value, mesh.points[nodes], f"fix on {support.on!r}", free=True
+        )
+        dofs = offsets[k] + nodes[:, None] * mesh.dim + np.arange(mesh.dim)
+        _check_agreement(values[dofs], given, mesh.points[nodes], support.on)
+        values[dofs] = np.where(np.isnan(given), values[dofs], given)
+    return values
+
+
+def _check_agreement(old: Array, new: Array, points: Array, on: str) -> None:
+    """Two supports may meet at a node only if they say the same."""
+    with np.errstate(invalid="ignore"):
+        size = np.nanmax(np.abs(np.concatenate([old.ravel(), new.ravel(), [0.0]])))
+        clash = np.argwhere(np.abs(old - new) > SAME * size)
+    if len(clash):
+        node, axis = clash[0]
+        raise InvalidInput(
+            f"fix on {on!r}: component {axis} at {points[node]} is {new[node, axis]}, but another "
+            f"support prescribes {old[node, axis]} there"
+        )
+
+
+def external_load(
+    bodies: tuple[Body, ...], loads: tuple[Traction | BodyForce, ...], offsets: Index
+) -> Array:
+    """Nodal forces of tractions and body forces, (dofs,)."""
+    out = np.zeros(int(offsets[-1]))
+    for load in loads:
+        if isinstance(load, Traction):
+            k, surface = locate(bodies, load.on)
+            mesh = bodies[k].mesh
+            facets, nodes = mesh.surface(surface), mesh.surface_nodes(surface)
+            traction = np.zeros_like(mesh.points)
+            traction[nodes] = vector_at(
+                load.value, mesh.points[nodes], f"traction on {load.on!r}"
+            )
+            out[offsets[k] : offsets[k + 1]] += surface_load(
+                mesh.points, facets, traction
+            ).ravel()
+        else:
+            _add_body_force(out, bodies, load, offsets)
+    return out
+
+
+def _add_body_force(
+    out: Array, bodies: tuple[Body, ...], load: BodyForce, offsets: Index
+) -> None:
+    regions = {region for body in bodies for region in body.mesh.regions}
+    if load.region is not None and load.region not in regions:
+        raise InvalidInput("body force: " + unknown("region", load.region, regions))
+    for k, body in enumerate(bodies):
+        if load.region is None or load.region in body.mesh.regions:
+            force = vector_at(load.value, body.mesh.points, "body force")
+            part = body_load(body.mesh, force, load.region)
+            out[offsets[k] : offsets[k + 1]] += part.ravel()
+
+
+def _place(
+    bodies: tuple[Body, ...], contact: Contact, is_fixed: NDArray[np.bool_], offsets: Index
+) -> Placed:
+    """Contacts of one pair without those whose normal the supports prescribe."""
+    k, surface = locate(bodies, contact.slave)
+    mesh = bodies[k].mesh
+    assert contact.obstacle is not None
+    rows = nodal_contact(mesh, surface, contact.obstacle)
+    dofs = offsets[k] + rows.nodes[:, None] * mesh.dim + np.arange(mesh.dim)
+    normal = np.where(is_fixed[dofs], 0.0, rows.frames[:, 0])
+    kept = np.linalg.norm(normal, axis=1) > 1e-9
+    return Placed(k, kept, rows.points, rows.at(kept))
+
+
+def _shifted(placed: Placed, offsets: Index) -> sparse.coo_array:
+    """H of one pair in the dofs of the whole model."""
+    H = placed.rows.H.tocoo()
+    rows = H.coords[0] + offsets[placed.body]
+    return sparse.coo_array((H.data, (rows, H.coords[1])), shape=(int(offsets[-1]), H.shape[1]))

@@ -1,0 +1,180 @@
+"""A model: assembled to one discrete problem, and its solution recovered as mechanics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..cones import Coulomb, Law, Tresca
+from ..errors import InvalidInput
+from ..problem import FrictionProblem
+from ..solution import FrictionSolution
+from .assembly import Discretisation, discretise, locate
+from .fields import ContactFields, recover_fields
+from .parts import Body, BodyForce, Contact, Fix, Traction
+from .rigid import check_held, loose_modes
+from .values import ScalarValue, scalar_at
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """Elastic bodies in frictional contact with obstacles, small strains.
+
+    Gaps and normals are taken once in the reference configuration.  load_factor multiplies the
+    loads and the prescribed displacements, not the gaps.
+    """
+
+    bodies: Sequence[Body]
+    supports: Sequence[Fix] = ()
+    contacts: Sequence[Contact] = ()
+    loads: Sequence[Traction | BodyForce] = ()
+    load_factor: float = 1.0
+    name: str = ""
+    _shared: dict[str, Discretisation] = field(default_factory=dict, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        for name, kind in (("bodies", Body), ("supports", Fix), ("contacts", Contact),
+                           ("loads", Traction | BodyForce)):  # fmt: skip
+            object.__setattr__(self, name, _tuple_of(name, getattr(self, name), kind))
+        if not self.bodies:
+            raise InvalidInput("bodies: expected at least one, got none")
+        if not self.contacts:
+            raise InvalidInput("contacts: expected at least one, got none")
+        dims = {body.mesh.dim for body in self.bodies}
+        if len(dims) > 1:
+            raise InvalidInput("bodies: expected all in 2D or all in 3D, got both")
+        laws = {contact.friction for contact in self.contacts}
+        if len(laws) > 1:
+            raise InvalidInput("contacts: expected one friction law, got both mu and tresca")
+        if not np.isfinite(self.load_factor):
+            raise InvalidInput(f"load_factor: expected a finite number, got {self.load_factor}")
+        object.__setattr__(self, "bodies", _named(self.bodies))
+        for part in (*self.supports, *self.contacts, *self.loads):
+            if not isinstance(part, BodyForce):
+                k, surface = locate(
+                    self.bodies, part.slave if isinstance(part, Contact) else part.on
+                )
+                self.bodies[k].mesh.surface(surface)
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        return self.bodies[0].mesh.dim
+
+    @property
+    def discretisation(self) -> Discretisation:
+        """Matrices at load factor 1, assembled once and shared by variants of this model."""
+        if "all" not in self._shared:
+            self._shared["all"] = discretise(
+                self.bodies, self.supports, self.loads, self.contacts
+            )
+        return self._shared["all"]
+
+    def assemble(self) -> FrictionProblem:
+        """The discrete problem in global form, made once.
+
+        Its unknowns are the displacements of the free dofs; prescribed ones are lifted into f
+        and w.  Nodes whose normal direction is prescribed by supports are no contacts.  Raises
+        SingularOperator naming the body and the rigid modes that nothing can hold.
+        """
+        return self._problem
+
+    @cached_property
+    def _problem(self) -> FrictionProblem:
+        parts = self.discretisation
+        law = self._law()
+        self._check_held(parts, law)
+        w = self.load_factor * parts.carried
+        w[:, 0] += parts.gap
+        f = self.load_factor * parts.load
+        base = FrictionProblem.from_global(
+            parts.M, parts.H, f, w, law, near_nullspace=parts.near_nullspace,
+            load_scale=_load_size(parts, f, w), name=self.name,
+        )  # fmt: skip
+        return replace(base, _shared=parts.shared)
+
+    def _law(self) -> Law:
+        values = []
+        for contact, placed in zip(self.contacts, self.discretisation.placed, strict=True):
+            name = contact.friction
+            given = scalar_at(
+                getattr(contact, name), placed.all_points, f"{name} on {contact.slave!r}"
+            )
+            values.append(given[placed.kept])
+        both = np.concatenate(values)
+        if self.contacts[0].friction == "mu":
+            return Coulomb(both)
+        return Tresca(
+            both * np.concatenate([p.rows.weights for p in self.discretisation.placed])
+        )
+
+    def _check_held(self, parts: Discretisation, law: Law) -> None:
+        fixed = np.zeros(parts.dofs, dtype=bool)
+        fixed[parts.fixed] = True
+        acting = np.ones(parts.carried.shape, dtype=bool)
+        acting[:, 1:] = (law.coefficient > 0)[:, None]
+        check_held(loose_modes(parts.parts, fixed), parts.whole_H, parts.dofs, acting.ravel())
+
+    def with_mu(self, mu: ScalarValue) -> Model:
+        """The same model with Coulomb friction mu in all its contacts."""
+        return self._variant(
+            contacts=tuple(replace(c, mu=mu, tresca=None) for c in self.contacts)
+        )
+
+    def with_load(self, factor: float) -> Model:
+        """The same model at a load factor: scales loads and prescribed displacements, not gaps."""
+        return self._variant(load_factor=float(factor))
+
+    def _variant(self, **changes: object) -> Model:
+        """A copy that shares the assembled matrices, which must not depend on the changes."""
+        other = replace(self, **changes)  # type: ignore[arg-type]
+        object.__setattr__(other, "_shared", self._shared)
+        return other
+
+    def recover(self, solution: FrictionSolution) -> ContactFields:
+        """Displacements, tractions and resultant of a solution of `assemble()`."""
+        surfaces = tuple(locate(self.bodies, c.slave) for c in self.contacts)
+        return recover_fields(
+            self.bodies, surfaces, self.discretisation, solution, self.load_factor
+        )
+
+
+def _load_size(parts: Discretisation, f: Array, w: Array) -> float:
+    """Size of the load, also when only an overlap (gap < 0) loads the bodies: |M H overlap|."""
+    overlap = np.zeros_like(w)
+    overlap[:, 0] = np.minimum(w[:, 0], 0)
+    return float(
+        np.hypot(np.linalg.norm(f), np.linalg.norm(parts.M @ (parts.H @ overlap.ravel())))
+    )
+
+
+def _tuple_of(name: str, values: object, kind: object) -> tuple:
+    if isinstance(values, kind):  # type: ignore[arg-type]
+        values = (values,)
+    try:
+        items = tuple(values)  # type: ignore[arg-type]
+    except TypeError as error:
+        raise InvalidInput(f"{name}: expected a list, got {values!r}") from error
+    for item in items:
+        if not isinstance(item, kind):  # type: ignore[arg-type]
+            raise InvalidInput(f"{name}: expected {kind}, got {item!r}")
+    return items
+
+
+def _named(bodies: tuple[Body, ...]) -> tuple[Body, ...]:
+    """Bodies with distinct names: "body", or "body 1", "body 2", … where none is given."""
+    several = len(bodies) > 1
+    out = tuple(
+        body if body.name else replace(body, name=f"body {k + 1}" if several else "body")
+        for k, body in enumerate(bodies)
+    )
+    names = [body.name for body in out]
+    if len(set(names)) < len(names):
+        raise InvalidInput(f"bodies: expected distinct names, got {', '.join(names)}")
+    return out

@@ -1,0 +1,108 @@
+"""What a model is made of: bodies, supports, loads, contacts.
+
+Surfaces are named as in the mesh; "body.surface" where several bodies know the same name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ..contact import Obstacle
+from ..errors import InvalidInput
+from ..fem.elasticity import LinearElastic, materials_by_region
+from ..fem.mesh import Mesh
+from .values import ScalarValue, VectorValue
+
+METHODS = ("nodal",)
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A mesh and its material: one LinearElastic, or one per region name."""
+
+    mesh: Mesh
+    material: LinearElastic | Mapping[str, LinearElastic]
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.mesh, Mesh):
+            raise InvalidInput(f"mesh: expected a Mesh (see box, read_mesh), got {self.mesh!r}")
+        if not isinstance(self.material, LinearElastic | Mapping):
+            raise InvalidInput(
+                "material: expected LinearElastic or a dict region -> LinearElastic, "
+                f"got {self.material!r}"
+            )
+        materials_by_region(self.mesh, self.material)
+
+
+@dataclass(frozen=True, eq=False)
+class Fix:
+    """Prescribed displacement of a surface, unit of length.
+
+    value: one number or None (free) or function x -> number per component, or one function
+    x -> components, x being the point (dim,) of a node.
+    """
+
+    on: str
+    value: VectorValue
+
+
+@dataclass(frozen=True, eq=False)
+class Traction:
+    """Force per area on a surface (per length in 2D): components or functions of x (dim,)."""
+
+    on: str
+    value: VectorValue
+
+
+@dataclass(frozen=True, eq=False)
+class BodyForce:
+    """Force per volume in all bodies, or in the named region: components or functions of x."""
+
+    value: VectorValue
+    region: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """Unilateral contact of a slave surface with an obstacle, with friction.
+
+    Either mu, the coefficient of Coulomb friction, or tresca, the largest shear traction (a
+    stress): a number, one number per slave node, or a function of points (n, dim) -> (n,).
+    """
+
+    slave: str
+    obstacle: Obstacle | None = None
+    mu: ScalarValue | None = None
+    tresca: ScalarValue | None = None
+    master: str | None = None
+    method: str = "nodal"
+
+    def __post_init__(self) -> None:
+        if (self.mu is None) == (self.tresca is None):
+            raise InvalidInput(
+                f"contact on {self.slave!r}: expected either mu or tresca (mu=0: no friction)"
+            )
+        if (self.obstacle is None) == (self.master is None):
+            raise InvalidInput(
+                f"contact on {self.slave!r}: expected either an obstacle or a master surface"
+            )
+        if self.method not in METHODS:
+            raise InvalidInput(
+                f"method: expected one of {', '.join(METHODS)}, got {self.method!r}"
+            )
+        if self.master is not None:
+            raise InvalidInput(
+                f"contact on {self.slave!r}: master surfaces come with the dual mortar method, "
+                "which is not available yet; use an obstacle"
+            )
+        if not (hasattr(self.obstacle, "gap") and hasattr(self.obstacle, "normals")):
+            raise InvalidInput(
+                f"obstacle: expected a Plane, Sphere or LevelSet, got {self.obstacle!r}"
+            )
+
+    @property
+    def friction(self) -> str:
+        """Name of the law: "mu" or "tresca"."""
+        return "mu" if self.mu is not None else "tresca"

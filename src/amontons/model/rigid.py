@@ -1,0 +1,144 @@
+"""Rigid-body modes of connected pieces: which of them supports and contacts hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from ..errors import SingularOperator
+from ..fem.mesh import Mesh
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+RANK = 1e-9  # singular values below this part of the largest possible one count as zero
+NAMES = {
+    2: ("translation along x", "translation along y", "rotation in the plane"),
+    3: ("translation along x", "translation along y", "translation along z",
+        "rotation about x", "rotation about y", "rotation about z"),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A connected part of a body: name, dofs (k,) in the whole model, modes (k, 3 or 6)."""
+
+    name: str
+    dofs: Index
+    modes: Array
+
+
+def pieces(mesh: Mesh, name: str, offset: int) -> list[Piece]:
+    """Connected pieces of a mesh whose dofs start at `offset`."""
+    labels = _labels(mesh)
+    count = int(labels.max()) + 1
+    out = []
+    for label in range(count):
+        nodes = np.flatnonzero(labels == label)
+        title = name if count == 1 else f"{name} (part {label + 1} of {count})"
+        dofs = offset + (nodes[:, None] * mesh.dim + np.arange(mesh.dim)).ravel()
+        out.append(Piece(title, dofs, rigid_modes(mesh.points[nodes])))
+    return out
+
+
+def _labels(mesh: Mesh) -> NDArray[np.int32]:
+    """Number of the connected piece of every node, (n,)."""
+    links = [
+        np.stack([np.repeat(b.nodes[:, 0], b.nodes.shape[1] - 1), b.nodes[:, 1:].ravel()])
+        for b in mesh.cells
+    ]
+    start, end = np.concatenate(links, axis=1)
+    n = len(mesh.points)
+    graph = sparse.coo_array((np.ones(len(start)), (start, end)), shape=(n, n))
+    return csgraph.connected_components(graph, directed=False)[1]
+
+
+def rigid_modes(points: Array) -> Array:
+    """Translations, then rotations about the centre scaled to size 1: (n dim, 3 or 6)."""
+    n, dim = points.shape
+    x = points - points.mean(axis=0)
+    size = np.abs(x).max()
+    x = x / (size if size > 0 else 1.0)
+    columns = [np.tile(row, (n, 1)) for row in np.eye(dim)]
+    if dim == 2:
+        columns.append(np.stack([-x[:, 1], x[:, 0]], axis=1))
+    else:
+        columns += [np.cross(axis, x) for axis in np.eye(3)]
+    return np.stack([column.ravel() for column in columns], axis=1)
+
+
+def loose_modes(parts: list[Piece], fixed: NDArray[np.bool_]) -> list[tuple[Piece, Array]]:
+    """Pieces with the modes that supports leave free: bases (6, k), orthonormal, k > 0."""
+    out = []
+    for piece in parts:
+        basis = _null_space(piece.modes[fixed[piece.dofs]])
+        if basis.shape[1]:
+            out.append((piece, basis))
+    return out
+
+
+def check_held(
+    loose: list[tuple[Piece, Array]], H: sparse.csc_array, dofs: int, acting: NDArray[np.bool_]
+) -> None:
+    """Raise SingularOperator when a loose mode could not be held even by closed contacts.
+
+    H (dofs, nc d); acting (nc d,): the contact rows that can carry a force (no shear if mu = 0).
+    """
+    if not loose:
+        return
+    spread = np.concatenate([np.full(basis.shape[1], k) for k, (_, basis) in enumerate(loose)])
+    motion = np.zeros((dofs, len(spread)))
+    for k, (piece, basis) in enumerate(loose):
+        motion[np.ix_(piece.dofs, spread == k)] = piece.modes @ basis
+    left = _null_space((H.T @ motion)[acting])
+    if not left.shape[1]:
+        return
+    texts = []
+    for k, (piece, basis) in enumerate(loose):
+        modes = basis @ left[spread == k]
+        if np.abs(modes).max(initial=0.0) > 1e-6:
+            texts.append(f"body {piece.name!r} is free to move: {describe(modes)}")
+    raise SingularOperator(
+        "; ".join(texts) + "; hold it with a support (Fix), friction or another contact"
+    )
+
+
+def describe(modes: Array) -> str:
+    """Rigid modes (3 or 6, k) in words: the axis modes among them, or mixed ones."""
+    names = NAMES[2 if len(modes) == 3 else 3]
+    u, s, _ = np.linalg.svd(modes, full_matrices=False)
+    span = u[:, s > 1e-6 * max(s.max(initial=0.0), 1e-300)]
+    inside = np.linalg.norm(span, axis=1) > 1 - 1e-6
+    words = [name for name, is_in in zip(names, inside, strict=True) if is_in]
+    mixed = span.shape[1] - len(words)
+    if mixed:
+        involved = np.flatnonzero(~inside & (np.linalg.norm(span, axis=1) > 1e-6))
+        words.append(
+            f"{mixed} combination{'s' if mixed > 1 else ''} of "
+            + " and ".join(names[k] for k in involved)
+        )
+    return ", ".join(words)
+
+
+def near_nullspace(parts: list[Piece], free: Index, dofs: int) -> Array:
+    """Rigid modes of every piece on the free dofs, (len(free), k): for multigrid."""
+    out = np.zeros((dofs, sum(piece.modes.shape[1] for piece in parts)))
+    column = 0
+    for piece in parts:
+        k = piece.modes.shape[1]
+        out[piece.dofs, column : column + k] = piece.modes
+        column += k
+    return out[free]
+
+
+def _null_space(matrix: Array) -> Array:
+    """Orthonormal basis (columns) of the null space of matrix (rows, k)."""
+    k = matrix.shape[1]
+    if not matrix.shape[0]:
+        return np.eye(k)
+    _, s, vt = np.linalg.svd(matrix, full_matrices=matrix.shape[0] < k)
+    rank = int((s > RANK * max(float(s[0]), RANK)).sum())
+    return vt[rank:].T
