@@ -190,7 +190,8 @@ def _finite(what: str, values: Array, points: Array) -> Array:
     bad = np.argwhere(~np.isfinite(values))
     if len(bad):
         raise InvalidInput(
-            f"{what}: expected finite numbers, got {values[tuple(bad[0])]} at {points[bad[0][0]]}"
+            f"{what}: expected finite numbers, got {values[tuple(bad[0])]} "
+            f"at {points[bad[0][0]]}"
         )
     return values
 

@@ -2,7 +2,8 @@
 
 from .box import box
 from .elasticity import LinearElastic, cell_stress, stiffness, von_mises
-from .mesh import Cells, Facets, Mesh
+from .facets import Cells, Facets
+from .mesh import Mesh
 from .read import read_mesh
 
 __all__ = ["Cells", "Facets", "LinearElastic", "Mesh", "box", "cell_stress", "read_mesh",

@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from ..errors import InvalidInput
 from .cells import FACET_KIND
-from .mesh import Cells, Facets, Mesh, facet_table
+from .facets import Cells, Facets, sides
+from .mesh import Mesh
 
+Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 KINDS = {2: ("quad", "tri"), 3: ("hex", "tet")}
 SIDES = {2: (("left", "right"), ("bottom", "top")),
@@ -51,7 +53,7 @@ def box(
 
 def _checked(
     size: Sequence[float], cells: int | Sequence[int], kind: str | None
-) -> tuple[NDArray[np.float64], tuple[int, ...], str]:
+) -> tuple[Array, tuple[int, ...], str]:
     lengths = np.asarray(size, dtype=float)
     if lengths.shape not in ((2,), (3,)) or not (np.isfinite(lengths) & (lengths > 0)).all():
         raise InvalidInput(f"size: expected 2 or 3 lengths > 0, got {size!r}")
@@ -89,14 +91,13 @@ def _simplices(cube: Index, dim: int) -> Index:
     return np.stack(pieces, axis=1).reshape(-1, dim + 1)
 
 
-def _sides(unit: NDArray[np.float64], block: Cells, dim: int) -> dict[str, tuple[Facets, ...]]:
-    """Named facets of the unit box; call after the cells are positive."""
-    positive = Mesh(unit, (block,)).cells
-    table = np.concatenate([nodes for _, nodes in facet_table(positive)])
+def _sides(unit: Array, block: Cells, dim: int) -> dict[str, tuple[Facets, ...]]:
+    """Facets of the six (four) sides by name; Mesh turns them outwards."""
+    on_side = (unit == 0) | (unit == 1)
+    ((size, table),) = sides((block,), on_side.any(axis=1)).items()
     out = {}
     for axis, names in enumerate(SIDES[dim]):
         for value, name in zip((0.0, 1.0), names, strict=True):
             on = (unit[table, axis] == value).all(axis=1)
-            nodes = table[on]
-            out[name] = (Facets(FACET_KIND[nodes.shape[1]], nodes),)
+            out[name] = (Facets(FACET_KIND[size], table[on]),)
     return out

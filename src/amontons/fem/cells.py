@@ -45,7 +45,7 @@ class ReferenceCell:
         return self.corners.mean(axis=0)
 
     def jacobians(self, coordinates: Array, point: Array) -> Array:
-        """d x / d reference at a reference point, (k, space, dim); coordinates (k, nodes, space)."""
+        """Slopes of x (k, nodes, space) at a reference point, (k, space, dim)."""
         return np.einsum("kas,ad->ksd", coordinates, self.gradient(point))
 
 
@@ -88,7 +88,7 @@ def _wedge() -> tuple[Array, Callable, Callable]:
 
 
 def _pyramid() -> tuple[Array, Callable, Callable]:
-    """Rational shape functions; the gradient has no limit at the apex, where none is asked for."""
+    """Rational shape functions; the gradient has no limit at the apex, do not ask there."""
     corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1.0]])
 
     def shape(x: Array) -> Array:
@@ -131,19 +131,31 @@ _HEX_FACETS = (
 _WEDGE_FACETS = ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5))
 _PYRAMID_FACETS = ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4))
 
+_TRI_FACETS = ((0, 1), (1, 2), (2, 0))
+_QUAD_FACETS = ((0, 1), (1, 2), (2, 3), (3, 0))
+_TET_FACETS = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
+
+
+def _cell(
+    kind: str,
+    facets: Facets,
+    parts: tuple[Array, Callable, Callable],
+    gauss: tuple[Array, Array],
+) -> ReferenceCell:
+    corners, shape, gradient = parts
+    return ReferenceCell(kind, corners.shape[1], corners, facets, shape, gradient, gauss)
+
+
 CELLS = {
     cell.kind: cell
     for cell in (
-        ReferenceCell("line", 1, *_tensor(np.array([[0], [1]]))[:1], ((0,), (1,)),
-                      *_tensor(np.array([[0], [1]]))[1:], _LINE),
-        ReferenceCell("tri", 2, _simplex(2)[0], ((0, 1), (1, 2), (2, 0)), *_simplex(2)[1:], _TRI),
-        ReferenceCell("quad", 2, _SQUARE, ((0, 1), (1, 2), (2, 3), (3, 0)),
-                      *_tensor(_SQUARE)[1:], _QUAD),
-        ReferenceCell("tet", 3, _simplex(3)[0], ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)),
-                      *_simplex(3)[1:], _TET),
-        ReferenceCell("hex", 3, _CUBE, _HEX_FACETS, *_tensor(_CUBE)[1:], _HEX),
-        ReferenceCell("wedge", 3, _wedge()[0], _WEDGE_FACETS, *_wedge()[1:], _WEDGE),
-        ReferenceCell("pyramid", 3, _pyramid()[0], _PYRAMID_FACETS, *_pyramid()[1:], _PYRAMID),
+        _cell("line", ((0,), (1,)), _tensor(np.array([[0], [1]])), _LINE),
+        _cell("tri", _TRI_FACETS, _simplex(2), _TRI),
+        _cell("quad", _QUAD_FACETS, _tensor(_SQUARE), _QUAD),
+        _cell("tet", _TET_FACETS, _simplex(3), _TET),
+        _cell("hex", _HEX_FACETS, _tensor(_CUBE), _HEX),
+        _cell("wedge", _WEDGE_FACETS, _wedge(), _WEDGE),
+        _cell("pyramid", _PYRAMID_FACETS, _pyramid(), _PYRAMID),
     )
-}  # fmt: skip
+}
 FACET_KIND = {2: "line", 3: "tri", 4: "quad"}  # by number of nodes

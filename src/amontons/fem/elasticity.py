@@ -17,6 +17,7 @@ from scipy import sparse
 
 from ..errors import InvalidInput, MissingDependency
 from .cells import CELLS
+from .check import determinant
 from .mesh import Mesh, unknown
 
 Array = NDArray[np.float64]
@@ -68,7 +69,7 @@ Materials = Mapping[str, LinearElastic]
 def materials_by_region(
     mesh: Mesh, material: LinearElastic | Materials
 ) -> dict[str, LinearElastic]:
-    """One material per region of the mesh; raises InvalidInput for missing or unknown regions."""
+    """One material per region of the mesh; InvalidInput for missing or unknown ones."""
     if isinstance(material, LinearElastic):
         return dict.fromkeys(mesh.regions, material)
     for region in material:
@@ -143,7 +144,7 @@ def body_load(mesh: Mesh, force: Array, region: str | None = None) -> Array:
         coordinates = mesh.points[block.nodes]
         for at, weight in zip(*cell.gauss, strict=True):
             shape = cell.shape(at)
-            volume = weight * np.linalg.det(cell.jacobians(coordinates, at))
+            volume = weight * determinant(cell.jacobians(coordinates, at))
             value = np.einsum("a,kac->kc", shape, force[block.nodes]) * volume[:, None]
             for local, share in enumerate(shape):
                 np.add.at(load, block.nodes[:, local], share * value)

@@ -4,36 +4,17 @@ from __future__ import annotations
 
 import difflib
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InvalidInput
-from .cells import CELLS
 from .check import checked_cells
+from .facets import Cells, Facets, boundary, oriented
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-
-
-@dataclass(frozen=True, eq=False)
-class Cells:
-    """Cells of one kind in one region: nodes (k, nodes per cell) in VTK order."""
-
-    kind: str
-    nodes: Index
-    region: str = "default"
-
-
-@dataclass(frozen=True, eq=False)
-class Facets:
-    """Boundary facets of one kind ("line", "tri", "quad"): nodes (k, nodes per facet).
-
-    Right-hand rule outwards; in 2D the outward normal is the right side of the direction.
-    """
-
-    kind: str
-    nodes: Index
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +53,8 @@ class Mesh:
         )
         object.__setattr__(self, "cells", blocks)
         self._check_use()
+        surfaces = {k: oriented(blocks, v, k, points) for k, v in self.surfaces.items()}
+        object.__setattr__(self, "surfaces", surfaces)
 
     def _check_use(self) -> None:
         if not self.cells:
@@ -109,6 +92,11 @@ class Mesh:
             raise InvalidInput(f"surface {name!r}: holds no facets")
         return facets
 
+    @cached_property
+    def boundary(self) -> tuple[Facets, ...]:
+        """All facets that belong to one cell only."""
+        return boundary(self.cells)
+
     def surface_nodes(self, name: str) -> Index:
         """Sorted node numbers of a surface, (k,)."""
         return np.unique(np.concatenate([b.nodes.ravel() for b in self.surface(name)]))
@@ -126,13 +114,3 @@ def unknown(what: str, name: object, known: object) -> str:
     near = difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
     hint = f"; did you mean {near[0]!r}?" if near else ""
     return f"{what} {name!r}: not found, known: {', '.join(sorted(names))}{hint}"
-
-
-def facet_table(cells: tuple[Cells, ...]) -> list[tuple[str, Index]]:
-    """All sides of all cells, outwards: (kind, nodes) per local side and block."""
-    kinds = {1: "point", 2: "line", 3: "tri", 4: "quad"}
-    return [
-        (kinds[len(side)], block.nodes[:, side])
-        for block in cells
-        for side in CELLS[block.kind].facets
-    ]

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..errors import InvalidInput
 from .cells import CELLS
-from .mesh import Facets
+from .facets import Facets
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ def facet_areas(points: Array, facets: Facets) -> Array:
 
 
 def nodal_weights(points: Array, surface: tuple[Facets, ...]) -> Array:
-    """Integral of every node's shape function over a surface, (n,), unit of area; 0 elsewhere."""
+    """Integral of every node's shape function over a surface, (n,), area; 0 elsewhere."""
     weights = np.zeros(len(points))
     for facets in surface:
         cell = CELLS[facets.kind]

@@ -151,8 +151,8 @@ def _check_agreement(old: Array, new: Array, points: Array, on: str) -> None:
     if len(clash):
         node, axis = clash[0]
         raise InvalidInput(
-            f"fix on {on!r}: component {axis} at {points[node]} is {new[node, axis]}, but another "
-            f"support prescribes {old[node, axis]} there"
+            f"fix on {on!r}: component {axis} at {points[node]} is {new[node, axis]}, but "
+            f"another support prescribes {old[node, axis]} there"
         )
 
 

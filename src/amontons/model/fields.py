@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InvalidInput
-from ..fem.mesh import Facets
+from ..fem import Facets
 from ..solution import FrictionSolution
 from .assembly import Discretisation
 from .parts import Body

@@ -128,7 +128,7 @@ class Model:
         )
 
     def with_load(self, factor: float) -> Model:
-        """The same model at a load factor: scales loads and prescribed displacements, not gaps."""
+        """The same model at a load factor on loads and prescribed displacements, not gaps."""
         return self._variant(load_factor=float(factor))
 
     def _variant(self, **changes: object) -> Model:

@@ -85,7 +85,7 @@ def check_held(
 ) -> None:
     """Raise SingularOperator when a loose mode could not be held even by closed contacts.
 
-    H (dofs, nc d); acting (nc d,): the contact rows that can carry a force (no shear if mu = 0).
+    H (dofs, nc d); acting (nc d,): contact rows that can carry a force, no shear if mu = 0.
     """
     if not loose:
         return

@@ -48,8 +48,9 @@ def scalar_at(value: ScalarValue, points: Array, what: str) -> Array:
             found = found[:n]
         elif found.ndim:
             raise InvalidInput(
-                f"{what}: expected a function of points (n, {points.shape[1]}) that returns (n,), "
-                f"got shape {found.shape} for n = {len(padded)}; x[:, 0] is the first coordinate"
+                f"{what}: expected a function of points (n, {points.shape[1]}) "
+                f"that returns (n,), got shape {found.shape} for n = {len(padded)}; "
+                "x[:, 0] is the first coordinate"
             )
     else:
         try:
