@@ -54,6 +54,8 @@ class _Watch:
 
     def cycled(self, iterate: Iterate, error: float) -> bool:
         """True when this iterate was here before, with other iterates in between."""
+        if self.seen and abs(self.seen[-1][0] - error) <= 1e-12 * error:
+            return False  # standing still is no cycle: patience decides
         size = np.abs(iterate.r).max(initial=0.0)
         found = False
         for old_error, old in self.seen[:-1]:

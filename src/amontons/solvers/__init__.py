@@ -1,13 +1,38 @@
 """Solvers of the discrete problem, one file per family; a new one is a file and a line here."""
 
 from .base import Breakdown, Iterate, Solver, Target
+from .functions import AlartCurnier, ComplementarityFunction, JeanMoreau, NaturalMap
 from .gauss_seidel import GaussSeidel
-
-Auto = GaussSeidel
+from .hybrid import Auto, Hybrid
+from .newton import SemismoothNewton
+from .smoothing import ProximalPoint, SmoothingNewton
 
 METHODS: dict[str, type] = {
+    "auto": Auto,
     "gauss-seidel": GaussSeidel,
+    "hybrid": Hybrid,
+    "proximal-point": ProximalPoint,
+    "semismooth-newton": SemismoothNewton,
+    "smoothing-newton": SmoothingNewton,
 }
-FITTING_GLOBAL = ("SemismoothNewton", "Auto")
+FITTING_GLOBAL = tuple(
+    solver.__name__ for solver in METHODS.values() if solver.form.value != "local"
+)
 
-__all__ = ["METHODS", "Auto", "Breakdown", "GaussSeidel", "Iterate", "Solver", "Target"]
+__all__ = [
+    "METHODS",
+    "AlartCurnier",
+    "Auto",
+    "Breakdown",
+    "ComplementarityFunction",
+    "GaussSeidel",
+    "Hybrid",
+    "Iterate",
+    "JeanMoreau",
+    "NaturalMap",
+    "ProximalPoint",
+    "SemismoothNewton",
+    "SmoothingNewton",
+    "Solver",
+    "Target",
+]

@@ -8,6 +8,7 @@ against the finished rows of U, in a dense work row: no search for positions.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numba import njit
@@ -36,6 +37,11 @@ class Symbolic:
     def arrays(self) -> tuple[Index, ...]:
         """What the compiled functions take."""
         return self.order, self.upper_start, self.upper, self.lower_start, self.lower
+
+    @cached_property
+    def products(self) -> int:
+        """Products of 3x3 blocks in one factorisation: what it costs."""
+        return int(np.diff(self.upper_start)[self.lower].sum())
 
     @property
     def fill(self) -> int:
@@ -169,16 +175,6 @@ def _invert3(a, out):
 
 
 @njit(cache=True, fastmath={"contract"})
-def _subtract_product(w, l, u):
-    """w -= l u for 3x3 blocks."""
-    for a in range(3):
-        l0, l1, l2 = l[a, 0], l[a, 1], l[a, 2]
-        w[a, 0] -= l0 * u[0, 0] + l1 * u[1, 0] + l2 * u[2, 0]
-        w[a, 1] -= l0 * u[0, 1] + l1 * u[1, 1] + l2 * u[2, 1]
-        w[a, 2] -= l0 * u[0, 2] + l1 * u[1, 2] + l2 * u[2, 2]
-
-
-@njit(cache=True, fastmath={"contract"})
 def factorise_inplace(  # noqa: PLR0913
     indptr, indices, data, extra, order, upper_start, upper, lower_start, lower, U, L, inverse, work
 ):
@@ -210,8 +206,16 @@ def factorise_inplace(  # noqa: PLR0913
                 for b in range(3):
                     l[a, b] = w0 * inv[0, b] + w1 * inv[1, b] + w2 * inv[2, b]
                     w[a, b] = 0.0
+            l00, l01, l02 = l[0, 0], l[0, 1], l[0, 2]
+            l10, l11, l12 = l[1, 0], l[1, 1], l[1, 2]
+            l20, l21, l22 = l[2, 0], l[2, 1], l[2, 2]
             for j in range(upper_start[c], upper_start[c + 1]):
-                _subtract_product(work[upper[j]], l, U[j])
+                t = upper[j]
+                for b in range(3):  # nine scalars of L stay in registers: the hot loop
+                    u0, u1, u2 = U[j, 0, b], U[j, 1, b], U[j, 2, b]
+                    work[t, 0, b] -= l00 * u0 + l01 * u1 + l02 * u2
+                    work[t, 1, b] -= l10 * u0 + l11 * u1 + l12 * u2
+                    work[t, 2, b] -= l20 * u0 + l21 * u1 + l22 * u2
         regular = _invert3(pivot, inverse[p])
         for a in range(3):
             for b in range(3):

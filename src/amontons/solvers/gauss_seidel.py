@@ -103,70 +103,77 @@ def _least_squares(gram, target, k, weights):
 
 @njit(cache=True)
 def anderson_inplace(  # noqa: PLR0913
-    indptr, indices, data, q, coefficient, tresca, diagonal, r, depth, sweeps, small
+    indptr, indices, data, q, coefficient, tresca, diagonal, r, x, history, count, sweeps, small
 ):
     """Accelerated sweeps; r ends as the last plain sweep.  Returns (sweeps done, last change).
 
-    The history is dropped when the residual doubles.  `small` ends the loop as above.
+    x (nc, 3) is the next point to sweep from and history (2, depth + 1, 3 nc) holds differences
+    of G(r) and of the residual G(r) - r, the last row of each the values themselves; count
+    (2,) how many are stored and whether there are values, so that a call goes on where the last
+    one ended.  The history is dropped when the residual doubles.  `small` ends the loop as above.
     """
-    nc = len(coefficient)
-    m = 3 * nc
-    steps = np.zeros((depth, m))  # differences of G(r)
-    slopes = np.zeros((depth, m))  # differences of the residual G(r) - r
-    gram = np.zeros((depth, depth))
-    target = np.zeros(depth)
-    weights = np.zeros(depth)
-    x = r.copy()
-    old_g = np.zeros(m)
-    old_f = np.zeros(m)
-    count = 0  # differences stored since the last restart
+    depth = history.shape[1] - 1
+    m = history.shape[2]
+    steps, slopes = history[0], history[1]
+    gram, target, weights = np.zeros((depth, depth)), np.zeros(depth), np.zeros(depth)
+    g, xf = r.reshape(m), x.reshape(m)
     change = math.inf
-    old_size = math.inf
     for k in range(sweeps):
-        r[:] = x
+        r[:, :] = x
         change = sweep_inplace(
             indptr, indices, data, q, coefficient, tresca, diagonal, False, r
         )
         if change <= small:
+            x[:, :] = r
             return k + 1, change
-        g = r.reshape(m)
-        xf = x.reshape(m)
-        size = 0.0
+        size = old_size = 0.0
         for i in range(m):
             size += (g[i] - xf[i]) ** 2
-        size = math.sqrt(size)
-        if k > 0:
-            if size > 2.0 * old_size:
-                count = 0
-            else:
-                slot = count % depth
-                count += 1
-                for i in range(m):
-                    steps[slot, i] = g[i] - old_g[i]
-                    slopes[slot, i] = g[i] - xf[i] - old_f[i]
-        filled = min(count, depth)
-        old_size = size
+            old_size += slopes[depth, i] ** 2
+        if count[1] == 0 or size > 4.0 * old_size:
+            count[0] = 0
+        else:
+            slot = count[0] % depth
+            count[0] += 1
+            for i in range(m):
+                steps[slot, i] = g[i] - steps[depth, i]
+                slopes[slot, i] = g[i] - xf[i] - slopes[depth, i]
+        count[1] = 1
+        filled = min(count[0], depth)
         for i in range(m):
-            old_g[i] = g[i]
-            old_f[i] = g[i] - xf[i]
-        x[:] = r
-        if filled > 0:
+            steps[depth, i] = g[i]
+            slopes[depth, i] = g[i] - xf[i]
+        x[:, :] = r
+        for a in range(filled):
+            for b in range(a + 1):
+                gram[a, b] = gram[b, a] = np.dot(slopes[a], slopes[b])
+            target[a] = np.dot(slopes[a], slopes[depth])
+        if filled > 0 and _least_squares(gram, target, filled, weights):
             for a in range(filled):
-                for b in range(a + 1):
-                    total = 0.0
-                    for i in range(m):
-                        total += slopes[a, i] * slopes[b, i]
-                    gram[a, b] = gram[b, a] = total
-                total = 0.0
                 for i in range(m):
-                    total += slopes[a, i] * old_f[i]
-                target[a] = total
-            if _least_squares(gram, target, filled, weights):
-                xf = x.reshape(m)
-                for a in range(filled):
-                    for i in range(m):
-                        xf[i] -= weights[a] * steps[a, i]
+                    xf[i] -= weights[a] * steps[a, i]
     return sweeps, change
+
+
+@dataclass(eq=False)
+class Acceleration:
+    """Anderson's memory between two calls: see `anderson_inplace`."""
+
+    kernel: tuple
+    r: Array  # the last plain sweep, (nc, 3)
+    depth: int
+
+    def __post_init__(self) -> None:
+        self.x = self.r.copy()
+        self.r = self.r.copy()
+        self.history = np.zeros((2, self.depth + 1, self.r.size))
+        self.count = np.zeros(2, dtype=np.int64)
+
+    def sweep(self, sweeps: int, small: float) -> tuple[int, float]:
+        """Go on for `sweeps` sweeps; (sweeps done, last change)."""
+        return anderson_inplace(
+            *self.kernel, self.r, self.x, self.history, self.count, sweeps, small
+        )
 
 
 @dataclass(frozen=True)
@@ -189,12 +196,13 @@ class GaussSeidel:
     ) -> Iterator[Iterate]:
         """Sweeps from `start`, for ever."""
         d = problem.dimension
-        data = (*problem.kernel_data[:6], problem.blocks.diagonal)
+        kernel = (*problem.kernel_data[:6], problem.blocks.diagonal)
         r = spatial(start.r)
-        window = max(4 * self.anderson_depth, self.batch)  # a call starts with an empty history
+        if self.anderson_depth:
+            memory = Acceleration(kernel, r, self.anderson_depth)
+            while True:
+                done, _ = memory.sweep(self.batch, 0.0)
+                yield Iterate(memory.r[:, :d].copy(), iterations=done)
         while True:
-            if self.anderson_depth:
-                done, _ = anderson_inplace(*data, r, self.anderson_depth, window, 0.0)
-            else:
-                done = sweeps_inplace(*data, r, self.batch, 0.0)
+            done = sweeps_inplace(*kernel, r, self.batch, 0.0)
             yield Iterate(r[:, :d].copy(), iterations=done)

@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 
 from ..blocks import spatial
 from ..cones import Tresca
-from ..errors import UnsupportedForm
+from ..errors import InvalidInput, UnsupportedForm
 from ..judge import contact_residual, natural_error
 from ..problem import Form, FrictionProblem
 from .base import Breakdown, Iterate, Target, check_at_least, check_positive
@@ -165,11 +165,11 @@ def _law_error(r, u, mu, rho):
 @njit(cache=True)
 def newton_inplace(  # noqa: PLR0913
     indptr, indices, data, q, mu, rho, order, upper_start, upper, lower_start, lower,
-    prox, center, x, r, sigma, shift, goal, steps,
+    prox, center, x, r, sigma, shift, tracking, shrink, goal, steps, patience,
 ):  # fmt: skip
     """At most `steps` Newton steps on x; r ends as the best iterate by the law's own residual.
 
-    goal: residual, unit of u, at which to stop.  prox (nc,), center (nc, 3): proximal term.
+    goal: residual, unit of u, at which to stop; patience: steps without halving it.  prox (nc,), center (nc, 3): proximal term.
     Returns (steps done, best residual, sigma); a negative count says that a factor broke down.
     """
     nc = len(mu)
@@ -184,12 +184,13 @@ def newton_inplace(  # noqa: PLR0913
         for a in range(3):
             u[i, a] += q[i, a] - prox[i] * center[i, a]
     best = _law_error(x, u, mu, rho)
-    count = 0
+    count = last_gain = 0
+    milestone = best
     root = math.sqrt(nc)
     floor = 1e-3 * goal / root
     value = _merit(x, u, mu, rho, sigma)
     recent = np.full(4, value)
-    while count < steps and best > goal:
+    while count < steps and best > goal and count - last_gain <= patience:
         count += 1
         _assemble(x, u, mu, rho, sigma, shift, prox, extra, rhs)
         if not factorise_inplace(
@@ -220,9 +221,11 @@ def newton_inplace(  # noqa: PLR0913
         if residual < best:
             best = residual
             r[:, :] = x
+        if best <= 0.5 * milestone:
+            milestone, last_gain = best, count
         recent[count % 4] = value
-        if value <= 3.0 * sigma * root:
-            sigma = max(0.3 * sigma, floor)
+        if value <= tracking * sigma * root:
+            sigma = max(shrink * sigma, floor)
             recent[:] = _merit(x, u, mu, rho, sigma)
         elif step < 0.01:
             sigma *= 2.0
@@ -237,10 +240,14 @@ class SmoothingNewton:
     form: ClassVar[Form] = Form.DELASSUS
     sigma: float = 0.1  # first smoothing velocity, relative to |q| / sqrt(nc)
     shift: float = 1e-8  # added to the Newton matrix, relative to |W_ii|: W is often singular
+    tracking: float = 0.3  # sigma shrinks when |F_sigma / rho| <= tracking sigma sqrt(nc)
+    shrink: float = 0.3  # factor on sigma then
     batch: int = 1  # Newton steps between two judgements
 
     def __post_init__(self) -> None:
-        check_positive(sigma=self.sigma, shift=self.shift)
+        check_positive(sigma=self.sigma, shift=self.shift, tracking=self.tracking)
+        if not 0 < self.shrink < 1:
+            raise InvalidInput(f"shrink: expected between 0 and 1, got {self.shrink}")
         check_at_least(1, batch=self.batch)
 
     def iterates(
@@ -251,7 +258,7 @@ class SmoothingNewton:
         x = spatial(start.r)
         sigma = self.sigma * problem.q_norm / math.sqrt(max(problem.contacts, 1))
         while True:
-            count, _, sigma, _ = work.newton(x, sigma, self.shift, goal=0.0, steps=self.batch)
+            count, _, sigma, _ = work.newton(x, sigma, self, goal=0.0, steps=self.batch)
             if count < 0:
                 raise Breakdown("the Newton matrix is singular")
             yield Iterate(x[:, : problem.dimension].copy(), iterations=count)
@@ -274,8 +281,8 @@ class Workspace:
         return cls(problem, analyse(problem.blocks))
 
     def newton(  # noqa: PLR0913
-        self, x: Array, sigma: float, shift: float, *, goal: float, steps: int,
-        alpha: float = 0.0, center: Array | None = None,
+        self, x: Array, sigma: float, options: SmoothingNewton, *, goal: float, steps: int,
+        alpha: float = 0.0, center: Array | None = None, patience: int = 10**9,
     ) -> tuple[int, float, float, Array]:  # fmt: skip
         """Newton steps on x in place: (steps, best residual, sigma, best r).
 
@@ -286,7 +293,8 @@ class Workspace:
         best = np.empty_like(x)
         count, residual, sigma = newton_inplace(
             indptr, indices, data, q, mu, rho, *self.symbolic.arrays,
-            prox, x.copy() if center is None else center, x, best, sigma, shift, goal, steps,
+            prox, x.copy() if center is None else center, x, best, sigma,
+            options.shift, options.tracking, options.shrink, goal, steps, patience,
         )  # fmt: skip
         return count, residual, sigma, best
 
@@ -299,3 +307,54 @@ class Workspace:
         data = (*self.problem.kernel_data[:6], self.problem.blocks.diagonal)
         for k in range(count):
             sweep_inplace(*data, k % 2 == 1, r)
+
+
+@dataclass(frozen=True)
+class ProximalPoint:
+    """Proximal point on r for singular and hyperstatic problems, inner solves by smoothing Newton.
+
+    Outer step: r solves the problem with u + alpha_i (r_i - center_i) in place of u, center the
+    last r.  alpha is halved after a step that lowered the error and grows fourfold after one
+    that did not; a few Gauss-Seidel sweeps of alternating direction come in between.
+    """
+
+    form: ClassVar[Form] = Form.DELASSUS
+    inner: SmoothingNewton = field(default_factory=SmoothingNewton)
+    alpha: float = 1e-2  # first proximal weight, relative to |W_ii|
+    alpha_min: float = 1e-5
+    inner_steps: int = 12
+    inner_reduction: float = 0.3  # the inner residual aims at this part of the current error
+    sweeps: int = 10
+
+    def __post_init__(self) -> None:
+        check_positive(alpha=self.alpha, alpha_min=self.alpha_min)
+        check_at_least(1, inner_steps=self.inner_steps)
+        check_at_least(0, sweeps=self.sweeps)
+
+    def iterates(
+        self, problem: FrictionProblem, start: Iterate, target: Target
+    ) -> Iterator[Iterate]:
+        """Outer steps from `start`, for ever."""
+        work = Workspace.of(problem)
+        yield from self.steps(work, spatial(start.r))
+
+    def steps(self, work: Workspace, r: Array) -> Iterator[Iterate]:
+        """Outer steps from r, (nc, 3)."""
+        d = work.problem.dimension
+        root = math.sqrt(max(work.problem.contacts, 1))
+        alpha, best, error = self.alpha, r, work.error(r)
+        while True:
+            sigma = max(error, 1e-16 * work.problem.q_norm) / root
+            x = best.copy()
+            count, _, _, found = work.newton(
+                x, sigma, self.inner, goal=self.inner_reduction * error,
+                steps=self.inner_steps, alpha=alpha, center=best.copy(),
+            )  # fmt: skip
+            work.sweeps(found, self.sweeps)
+            new = work.error(found)
+            if new < error:
+                best, error = found, new
+                alpha = max(0.5 * alpha, self.alpha_min)
+            else:
+                alpha = min(4.0 * alpha, 1e4)
+            yield Iterate(best[:, :d].copy(), iterations=abs(count), stage="proximal point")

@@ -1,0 +1,275 @@
+"""Combinations: `Hybrid` runs one solver after another, `Auto` is the portfolio behind `solve`.
+
+What `Auto` does, in order, until the driver is content (measured on 32 FCLib problems, see
+docs/choosing-a-solver.md):
+
+    problem                      stages
+    Coulomb, Delassus form       10 Gauss-Seidel sweeps; then sweeps, plain or with Anderson
+                                 acceleration, as long as their measured rate promises an end
+                                 before smoothing Newton would be there; smoothing Newton from the
+                                 best point and from zero; proximal point; repeated from the best
+    Tresca, Delassus form        the same sweeps, then semismooth Newton
+    global form, W cheap         the same on W = H^T M^-1 H (rigid bodies, small meshes)
+    global form, W dear          semismooth Newton without W, then W after all if it fits
+
+Every stage starts from the best reaction so far, and is dropped when it does not help.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import islice
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..blocks import spatial
+from ..cones import Tresca
+from ..errors import InvalidInput, SingularOperator
+from ..judge import natural_error
+from ..problem import Form, FrictionProblem
+from .base import Breakdown, Iterate, Solver, Target, check_at_least
+from .gauss_seidel import Acceleration, GaussSeidel, sweeps_inplace
+from .newton import SemismoothNewton
+from .smoothing import ProximalPoint, SmoothingNewton, Workspace
+
+Array = NDArray[np.float64]
+CHUNK = 20  # sweeps between two looks at their rate
+LONGEST = 6000  # sweeps after which Newton gets its chance whatever the rate promises
+HOPELESS = 8.0  # sweeps that promise to cost this many times Newton are left at once
+NEWTON_STEPS = 120
+PATIENCE = 25  # Newton steps without halving the error
+ROUNDS = 6  # repetitions of the last stages before Auto gives up
+# Nanoseconds measured on one core: only their ratios matter, and only roughly.
+SWEEP_BLOCK, SWEEP_CONTACT, HISTORY_CONTACT, PRODUCT, NEWTON_CONTACT = 3.0, 90.0, 200.0, 5.4, 700.0
+
+
+@dataclass(frozen=True)
+class Hybrid:
+    """`first` for some iterates, then `main` from the last of them ([ABD] NSN-AC-HYBRID)."""
+
+    form: ClassVar[Form] = Form.ANY
+    first: Solver = field(default_factory=lambda: GaussSeidel(batch=100))
+    main: Solver = field(default_factory=SemismoothNewton)
+    iterates_of_first: int = 1
+
+    def __post_init__(self) -> None:
+        check_at_least(1, iterates_of_first=self.iterates_of_first)
+
+    def iterates(
+        self, problem: FrictionProblem, start: Iterate, target: Target
+    ) -> Iterator[Iterate]:
+        """Iterates of `first`, then of `main`; the global form is condensed where one needs it."""
+        for iterate in islice(
+            _run(self.first, problem, start, target), self.iterates_of_first
+        ):
+            start = iterate
+            yield iterate
+        yield from _run(self.main, problem, start, target)
+
+
+def _run(
+    solver: Solver, problem: FrictionProblem, start: Iterate, target: Target
+) -> Iterator[Iterate]:
+    """Iterates of a solver, on the condensed problem if it needs the Delassus form."""
+    if solver.form is Form.DELASSUS:
+        problem = problem.condensed()
+    elif solver.form is Form.GLOBAL and problem.form is Form.DELASSUS:
+        raise InvalidInput(f"{type(solver).__name__}: the problem has no global form")
+    return solver.iterates(problem, start, target)
+
+
+@dataclass(frozen=True)
+class Auto:
+    """The portfolio: tries, watches the error, switches, polishes with Newton."""
+
+    form: ClassVar[Form] = Form.ANY
+    sweeps: int = 10  # plain sweeps that every problem gets first
+    depth: int = 8  # past sweeps that Anderson acceleration combines
+
+    def __post_init__(self) -> None:
+        check_at_least(1, sweeps=self.sweeps, depth=self.depth)
+
+    def iterates(
+        self, problem: FrictionProblem, start: Iterate, target: Target
+    ) -> Iterator[Iterate]:
+        """The best reaction after each stage, until nothing is left to try."""
+        if problem.form is Form.GLOBAL and not problem.condensing_is_cheap:
+            yield from self._without_delassus(problem, start, target)
+        elif problem.contacts:
+            condensed = problem.condensed()
+            if start.v is not None and problem.form is Form.GLOBAL:
+                start = Iterate(start.r)
+            yield from _Portfolio(condensed, self, target, spatial(start.r)).stages()
+
+    def _without_delassus(
+        self, problem: FrictionProblem, start: Iterate, target: Target
+    ) -> Iterator[Iterate]:
+        best, last = math.inf, start
+        try:
+            for k, iterate in enumerate(SemismoothNewton().iterates(problem, start, target)):
+                error = problem.error(iterate.r, iterate.v)
+                if error < best:
+                    best, last, seen = error, iterate, k
+                yield iterate
+                if k - seen > 15:
+                    break
+        except Breakdown:
+            pass
+        yield from self.iterates_condensed(problem, last, target)
+
+    def iterates_condensed(
+        self, problem: FrictionProblem, start: Iterate, target: Target
+    ) -> Iterator[Iterate]:
+        """The Delassus portfolio on a global problem whose W is dear."""
+        try:
+            condensed = problem.condensed()
+        except InvalidInput as reason:
+            raise Breakdown(str(reason)) from reason
+        yield from _Portfolio(condensed, self, target, spatial(start.r)).stages()
+
+
+@dataclass(eq=False)
+class _Portfolio:
+    """One run on the Delassus form; r is the best reaction so far, (nc, 3)."""
+
+    problem: FrictionProblem
+    options: Auto
+    target: Target
+    r: Array
+    error: float = math.inf  # of r, unit of u
+    latest: float = math.inf  # of the last reaction tried
+
+    def __post_init__(self) -> None:
+        self.error = self._judge(self.r)
+        self.goal = self.target.tolerance * self.problem.q_norm
+        self.kernel = (*self.problem.kernel_data[:6], self.problem.blocks.diagonal)
+
+    def stages(self) -> Iterator[Iterate]:
+        """All stages in the order of the module's table."""
+        yield self._plain(self.options.sweeps)
+        yield from self._sweeping()
+        if isinstance(self.problem.law, Tresca):
+            yield from self._semismooth()
+            return
+        for round_ in range(ROUNDS):
+            yield from self._newton(round_)
+            yield from self._proximal(round_)
+            yield from self._semismooth(steps=15)
+            yield self._plain(300 if round_ == 0 else 3000)
+
+    # ---------------------------------------------------------------- stages
+    def _plain(self, sweeps: int) -> Iterate:
+        x = self.r.copy()
+        count = sweeps_inplace(*self.kernel, x, sweeps, 0.1 * self.goal)
+        return self._offer(x, count, "Gauss-Seidel")
+
+    def _sweeping(self) -> Iterator[Iterate]:
+        """Accelerated and plain sweeps, whichever falls faster, while they are worth it."""
+        memory = Acceleration(self.kernel, self.r, self.options.depth)
+        plain = self.r.copy()
+        fast = {True: math.inf, False: math.inf}  # cost up to the goal, as the last chunk predicts
+        last = {True: self.error, False: self.error}
+        done, spent, small = 0, 0.0, 0.3 * self.goal
+        while done < LONGEST:
+            accelerate = fast[True] <= fast[False]
+            if accelerate:
+                count, change = memory.sweep(CHUNK, small)
+                iterate = self._offer(memory.r.copy(), count, "Anderson Gauss-Seidel")
+            else:
+                count = sweeps_inplace(*self.kernel, plain, CHUNK, small)
+                change = self.goal
+                iterate = self._offer(plain.copy(), count, "Gauss-Seidel")
+            if change <= small:
+                small *= 0.1
+            yield iterate
+            done += count
+            rate = math.log(max(last[accelerate], 1e-300) / max(self.latest, 1e-300)) / count
+            last[accelerate] = self.latest
+            wanted = math.log(max(self.latest / self.goal, 1.0))
+            cost = self.costs["accelerated" if accelerate else "sweep"]
+            fast[accelerate] = cost * wanted / rate if rate > 0 else math.inf
+            if not accelerate and fast[False] == math.inf:
+                fast[False] = 1e300  # so that the other one is tried again
+            spent += cost * count
+            newton, promised = self._newton_cost(), min(fast.values())
+            if done >= 2 * CHUNK and promised > (1.0 if spent > newton else HOPELESS) * newton:
+                return
+
+    @cached_property
+    def work(self) -> Workspace:
+        """Symbolic factor, made when Newton is first thought of."""
+        return Workspace.of(self.problem)
+
+    @cached_property
+    def costs(self) -> dict[str, float]:
+        """Nanoseconds of a sweep, an accelerated sweep and a Newton step, by operation counts."""
+        blocks, contacts = len(self.problem.blocks.indices), self.problem.contacts
+        sweep = SWEEP_BLOCK * blocks + SWEEP_CONTACT * contacts
+        if isinstance(self.problem.law, Tresca):
+            newton = 0.3 * float(3 * contacts) ** 3
+        else:
+            newton = PRODUCT * self.work.symbolic.products + NEWTON_CONTACT * contacts
+            newton += 2 * SWEEP_BLOCK * blocks
+        history = HISTORY_CONTACT * contacts
+        return {"sweep": sweep, "accelerated": sweep + history, "newton": newton}
+
+    def _newton_cost(self) -> float:
+        """Nanoseconds that Newton will take: about three steps per decimal digit, and a start."""
+        digits = math.log10(max(self.error / self.goal, 1.0))
+        return self.costs["newton"] * (6 + 3 * digits)
+
+    def _newton(self, round_: int) -> Iterator[Iterate]:
+        """Smoothing Newton from the best point and from zero, in several variants."""
+        root = math.sqrt(self.problem.contacts)
+        nearby = max(self.error, self.goal) / root
+        afar = 0.1 * self.problem.q_norm / root
+        zero = np.zeros_like(self.r)
+        starts = [(self.r, nearby, 0.3), (zero, afar, 0.3)]
+        if self.problem.contacts <= 300 or round_:  # variants are cheap there
+            starts += [(self.r, 10 * nearby, 0.5), (zero, 10 * afar, 0.5)]
+        for origin, sigma, shrink in starts:
+            count, _, _, found = self.work.newton(
+                origin.copy(), sigma, SmoothingNewton(shrink=shrink), goal=0.5 * self.goal,
+                steps=NEWTON_STEPS, patience=PATIENCE,
+            )  # fmt: skip
+            yield self._offer(found, abs(count), "smoothing Newton")
+
+    def _proximal(self, round_: int) -> Iterator[Iterate]:
+        """Proximal point while it makes progress."""
+        self.r = self.r.copy()
+        self.work.sweeps(self.r, 10)
+        self.error = self._judge(self.r)
+        mark, patience = self.error, 0
+        for iterate in ProximalPoint(alpha=1e-2 * 0.1**round_).steps(self.work, self.r):
+            yield self._offer(spatial(iterate.r), iterate.iterations, "proximal point")
+            patience = 0 if self.error < 0.5 * mark else patience + 1
+            mark = min(mark, self.error) if patience == 0 else mark
+            if patience > 25:
+                return
+
+    def _semismooth(self, steps: int = 60) -> Iterator[Iterate]:
+        start = Iterate(self.r[:, : self.problem.dimension].copy())
+        try:
+            newton = SemismoothNewton().iterates(self.problem, start, self.target)
+            for iterate in islice(newton, steps):
+                yield self._offer(spatial(iterate.r), 1, "semismooth Newton")
+        except (Breakdown, SingularOperator):
+            return
+
+    # ---------------------------------------------------------------- bookkeeping
+    def _judge(self, r: Array) -> float:
+        return natural_error(*self.problem.kernel_data, r)
+
+    def _offer(self, x: Array, iterations: int, stage: str) -> Iterate:
+        """Keep x if it is better, and hand out the best."""
+        self.latest = error = self._judge(x)
+        if error < self.error:
+            self.r, self.error = x, error
+        return Iterate(
+            self.r[:, : self.problem.dimension].copy(), iterations=iterations, stage=stage
+        )
