@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import InvalidInput
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 
 def _regions(x: Array, mu: Array) -> tuple[Array, ...]:
@@ -131,6 +132,11 @@ class Coulomb:
         """Residual of the law, (nc, d), unit of r; zero exactly at a solution."""
         return natural_map(r, u, self.mu, rho)
 
+    def regions(self, r: Array, u: Array, rho: Array) -> tuple[Mask, Mask]:
+        """Masks (closed, sliding), (nc,): the piece of the natural map that holds at (r, u)."""
+        inside, polar, *_ = _regions(r - rho[:, None] * with_de_saxce(u, self.mu), self.mu)
+        return ~polar, ~polar & ~inside
+
     def bound(self, r: Array) -> Array:
         """Largest |r_T| allowed at r, shape (nc,)."""
         return self.mu * np.maximum(r[:, 0], 0)
@@ -159,6 +165,11 @@ class Tresca:
         x = r - rho[:, None] * u
         normal = np.maximum(x[:, 0], 0)
         return r - np.column_stack([normal, project_disk(x[:, 1:], self.limit)])
+
+    def regions(self, r: Array, u: Array, rho: Array) -> tuple[Mask, Mask]:
+        """Masks (closed, sliding), (nc,); an open contact may slide."""
+        x = r - rho[:, None] * u
+        return x[:, 0] > 0, np.linalg.norm(x[:, 1:], axis=1) > self.limit
 
     def bound(self, r: Array) -> Array:
         """Largest |r_T| allowed at r, shape (nc,)."""

@@ -12,10 +12,10 @@ Multiplied by the denominator, u_T x e = 0 is a trigonometric polynomial of degr
     p = A_NN b_T - b_N A_TN,   Q = mu (b_N A_TT - b_T A_NT),
 
 with at most four roots.  A Newton iteration from the last sliding direction finds the root in
-nearly all calls; otherwise every sign change on a fine circle is refined by bisection.  Tresca
+nearly all calls; otherwise every sign change on the circle is refined by bisection.  Tresca
 friction has the same equation with another p and Q.  When A has no admissible solution (A
 singular, or mu beyond existence) the best point of a projection iteration is returned with
-state STICK or SLIP by its own law: the judge sees such a contact.
+the state of that projection: the judge sees such a contact.
 
 Where several states fit (large mu) the first in the order open, stick, slip is taken.
 """
@@ -29,137 +29,157 @@ from numba import njit
 
 OPEN, SLIP, STICK = 0, 1, 2
 NEWTON_STEPS = 12
-ANGLES = 64  # points of the circle searched when Newton fails: roots are at most four
+ANGLES = 16  # intervals of the circle searched when Newton fails: roots are at most four
+PROJECTIONS = 500  # of the last resort
+BISECTIONS = 55  # of such an interval: to the last bit
+ROUNDING = 1e-13  # relative size of what counts as zero at the edge between stick and slip
 
 
 @njit(cache=True)
-def _slip_angle(p1, p2, q11, q12, q21, q22, d0, d1, d2, c, s):  # noqa: PLR0913
-    """Direction (cos, sin) with (p + Q e) x e = 0, (p + Q e).e >= 0, d0 - d1 c - d2 s > 0.
+def _slip_direction(p1, p2, q11, q12, q21, q22, d0, d1, d2, size, c, s):  # noqa: PLR0913
+    """Direction e = (cos, sin) with (p + Q e) x e = 0, (p + Q e).e >= 0, d0 - d.e > 0.
 
-    (c, s) is the first guess; the last returned flag is False when there is no such direction.
+    (c, s) is the first guess, `size` the magnitude of p and Q before cancellation; the last
+    value returned is False when there is no such direction.  Newton's method where the root
+    attracts the flow t' = g(t), one step of that flow elsewhere.
     """
-    size = math.hypot(p1, p2) + abs(q11) + abs(q12) + abs(q21) + abs(q22)
-    if size == 0.0:
-        return c, s, True
+    step = 1.0
     for _ in range(NEWTON_STEPS):
         v1 = p1 + q11 * c + q12 * s
         v2 = p2 + q21 * c + q22 * s
         g = c * v2 - s * v1
         along = c * v1 + s * v2
-        # e_perp . Q e_perp - e . (p + Q e)
+        if abs(g) <= 4e-16 * size or abs(step) < 1e-15:
+            if along >= -ROUNDING * size and d0 - d1 * c - d2 * s > 0.0:
+                return c, s, True
+            break
         slope = s * s * q11 - s * c * (q12 + q21) + c * c * q22 - along
-        if abs(g) <= 4e-16 * size:
-            if along >= 0.0 and d0 - d1 * c - d2 * s > 0.0 and slope <= 0.0:
-                return c, s, True
-            break
-        if slope >= 0.0:
-            break
-        step = max(min(-g / slope, 0.7), -0.7)
-        c, s = c * math.cos(step) - s * math.sin(step), s * math.cos(step) + c * math.sin(step)
-        length = math.hypot(c, s)
+        if slope < 0.0:
+            step = max(min(-g / slope, 1.0), -1.0)
+        else:
+            step = 1.0 if g > 0.0 else -1.0
+        c, s = c - s * step, s + c * step  # turns by atan(step)
+        length = math.sqrt(c * c + s * s)
         c, s = c / length, s / length
-        if abs(step) < 1e-15:
-            v1 = p1 + q11 * c + q12 * s
-            v2 = p2 + q21 * c + q22 * s
-            if c * v1 + s * v2 >= 0.0 and d0 - d1 * c - d2 * s > 0.0:
-                return c, s, True
-            break
-    return _scan_angles(p1, p2, q11, q12, q21, q22, d0, d1, d2, size, c, s)
+    return _search_circle(p1, p2, q11, q12, q21, q22, d0, d1, d2, size, c, s)
 
 
 @njit(cache=True)
-def _scan_angles(p1, p2, q11, q12, q21, q22, d0, d1, d2, size, near_c, near_s):  # noqa: PLR0913
-    """The admissible root nearest to a direction, by bisection of every sign change."""
+def _search_circle(p1, p2, q11, q12, q21, q22, d0, d1, d2, size, near_c, near_s):  # noqa: PLR0913
+    """Return the admissible root nearest to a direction, of all roots of g on the circle.
+
+    Each interval is split where g'' and g' change sign, so that roots close together are found.
+    """
     best, best_c, best_s = -2.0, near_c, near_s
+    # g = a0 + a1 cos t + b1 sin t + a2 cos 2t + b2 sin 2t
+    a0, a1, b1 = 0.5 * (q21 - q12), p2, -p1
+    a2, b2 = 0.5 * (q21 + q12), 0.5 * (q22 - q11)
     width = 2.0 * math.pi / ANGLES
+    cuts = np.empty(5)
     for k in range(ANGLES):
-        a = width * (k - 0.5)
-        b = a + width
-        ca, sa, cb, sb = math.cos(a), math.sin(a), math.cos(b), math.sin(b)
-        ga = ca * (p2 + q21 * ca + q22 * sa) - sa * (p1 + q11 * ca + q12 * sa)
-        gb = cb * (p2 + q21 * cb + q22 * sb) - sb * (p1 + q11 * cb + q12 * sb)
-        if (ga > 0.0) == (gb > 0.0) and min(abs(ga), abs(gb)) > 1e-14 * size:
-            continue
-        for _ in range(60):
-            m = 0.5 * (a + b)
-            cm, sm = math.cos(m), math.sin(m)
-            gm = cm * (p2 + q21 * cm + q22 * sm) - sm * (p1 + q11 * cm + q12 * sm)
-            if (gm > 0.0) == (ga > 0.0):
-                a = m
-            else:
-                b = m
-        m = 0.5 * (a + b)
-        cm, sm = math.cos(m), math.sin(m)
-        v1 = p1 + q11 * cm + q12 * sm
-        v2 = p2 + q21 * cm + q22 * sm
-        along, across = cm * v1 + sm * v2, cm * v2 - sm * v1
-        admissible = along >= -1e-14 * size and abs(across) <= 1e-12 * size
-        if admissible and d0 - d1 * cm - d2 * sm > 0.0:
-            closeness = cm * near_c + sm * near_s
-            if closeness > best:
-                best, best_c, best_s = closeness, cm, sm
+        cuts[0], cuts[4] = width * (k - 0.5), width * (k + 0.5)
+        cuts[2] = _sign_change(0.0, -a1, -b1, -4.0 * a2, -4.0 * b2, cuts[0], cuts[4])
+        cuts[1] = _sign_change(0.0, b1, -a1, 2.0 * b2, -2.0 * a2, cuts[0], cuts[2])
+        cuts[3] = _sign_change(0.0, b1, -a1, 2.0 * b2, -2.0 * a2, cuts[2], cuts[4])
+        for j in range(4):
+            t = _sign_change(a0, a1, b1, a2, b2, cuts[j], cuts[j + 1])
+            c, s = math.cos(t), math.sin(t)
+            v1 = p1 + q11 * c + q12 * s
+            v2 = p2 + q21 * c + q22 * s
+            closeness = c * near_c + s * near_s
+            if (
+                closeness > best
+                and abs(c * v2 - s * v1) <= ROUNDING * size
+                and c * v1 + s * v2 >= -ROUNDING * size
+                and d0 - d1 * c - d2 * s > 0.0
+            ):
+                best, best_c, best_s = closeness, c, s
     return best_c, best_s, best > -2.0
 
 
 @njit(cache=True)
-def _solve3(A, b0, b1, b2):
-    """-A^-1 b by cofactors, and whether A is regular to rounding."""
-    c00 = A[1, 1] * A[2, 2] - A[1, 2] * A[2, 1]
-    c01 = A[1, 2] * A[2, 0] - A[1, 0] * A[2, 2]
-    c02 = A[1, 0] * A[2, 1] - A[1, 1] * A[2, 0]
-    det = A[0, 0] * c00 + A[0, 1] * c01 + A[0, 2] * c02
-    size = abs(A[0, 0] * A[1, 1] * A[2, 2])
-    if not abs(det) > 1e-13 * size:
-        return 0.0, 0.0, 0.0, False
-    c10 = A[0, 2] * A[2, 1] - A[0, 1] * A[2, 2]
-    c11 = A[0, 0] * A[2, 2] - A[0, 2] * A[2, 0]
-    c12 = A[0, 1] * A[2, 0] - A[0, 0] * A[2, 1]
-    c20 = A[0, 1] * A[1, 2] - A[0, 2] * A[1, 1]
-    c21 = A[0, 2] * A[1, 0] - A[0, 0] * A[1, 2]
-    c22 = A[0, 0] * A[1, 1] - A[0, 1] * A[1, 0]
-    x0 = -(c00 * b0 + c10 * b1 + c20 * b2) / det
-    x1 = -(c01 * b0 + c11 * b1 + c21 * b2) / det
-    x2 = -(c02 * b0 + c12 * b1 + c22 * b2) / det
-    return x0, x1, x2, True
+def _trigonometric(a0, a1, b1, a2, b2, t):  # noqa: PLR0913
+    c, s = math.cos(t), math.sin(t)
+    return a0 + a1 * c + b1 * s + a2 * (c * c - s * s) + 2.0 * b2 * s * c
 
 
 @njit(cache=True)
-def solve_coulomb(A, b0, b1, b2, mu, g1, g2):
+def _sign_change(a0, a1, b1, a2, b2, left, right):  # noqa: PLR0913
+    """Where the polynomial changes sign, by bisection; `right` when it does not."""
+    positive = _trigonometric(a0, a1, b1, a2, b2, left) > 0.0
+    if (_trigonometric(a0, a1, b1, a2, b2, right) > 0.0) == positive:
+        return right
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (left + right)
+        if (_trigonometric(a0, a1, b1, a2, b2, middle) > 0.0) == positive:
+            left = middle
+        else:
+            right = middle
+    return 0.5 * (left + right)
+
+
+@njit(cache=True)
+def _stick(s11, s12, s21, s22, y1, y2):  # noqa: PLR0913
+    """-S^-1 y of a 2x2 S by elimination with a pivot, and whether S is regular to rounding."""
+    if abs(s21) > abs(s11):
+        s11, s12, y1, s21, s22, y2 = s21, s22, y2, s11, s12, y1
+    if s11 == 0.0:
+        return 0.0, 0.0, False
+    k = s21 / s11
+    last = s22 - k * s12
+    if not abs(last) > 1e-15 * (abs(s22) + abs(k * s12)):
+        return 0.0, 0.0, False
+    x2 = (k * y1 - y2) / last
+    return -(y1 + s12 * x2) / s11, x2, True
+
+
+@njit(cache=True)
+def solve_coulomb(A, b0, b1, b2, mu, g1, g2):  # noqa: PLR0913
     """(r_N, r_T1, r_T2, state) of one contact under Coulomb friction; (g1, g2) guesses r_T."""
-    if b0 >= 0.0 or A[0, 0] <= 0.0:
+    a = A[0, 0]
+    if b0 >= 0.0 or a <= 0.0:
         return 0.0, 0.0, 0.0, OPEN
     if mu == 0.0:
-        return -b0 / A[0, 0], 0.0, 0.0, SLIP
-    x0, x1, x2, regular = _solve3(A, b0, b1, b2)
+        return -b0 / a, 0.0, 0.0, SLIP
+    # closed: u_N = 0 leaves u_T = S r_T + y
+    k1, k2 = A[1, 0] / a, A[2, 0] / a
+    y1, y2 = b1 - k1 * b0, b2 - k2 * b0
+    s11, s12 = A[1, 1] - k1 * A[0, 1], A[1, 2] - k1 * A[0, 2]
+    s21, s22 = A[2, 1] - k2 * A[0, 1], A[2, 2] - k2 * A[0, 2]
+    x1, x2, regular = _stick(s11, s12, s21, s22, y1, y2)
+    x0 = -(b0 + A[0, 1] * x1 + A[0, 2] * x2) / a
     if regular and x0 > 0.0 and x1 * x1 + x2 * x2 <= mu * mu * x0 * x0:
         return x0, x1, x2, STICK
-    length = math.hypot(g1, g2)
-    if length == 0.0:
-        g1, g2 = (x1, x2) if regular else (-b1, -b2)
-        length = math.hypot(g1, g2)
-    c, s = (-g1 / length, -g2 / length) if length > 0.0 else (1.0, 0.0)
     d1, d2 = mu * A[0, 1], mu * A[0, 2]
-    c, s, found = _slip_angle(
-        A[0, 0] * b1 - b0 * A[1, 0], A[0, 0] * b2 - b0 * A[2, 0],
-        mu * (b0 * A[1, 1] - b1 * A[0, 1]), mu * (b0 * A[1, 2] - b1 * A[0, 2]),
-        mu * (b0 * A[2, 1] - b2 * A[0, 1]), mu * (b0 * A[2, 2] - b2 * A[0, 2]),
-        A[0, 0], d1, d2, c, s,
-    )
+    p1, p2 = a * y1, a * y2
+    q11, q12 = mu * b0 * s11 - d1 * y1, mu * b0 * s12 - d2 * y1
+    q21, q22 = mu * b0 * s21 - d1 * y2, mu * b0 * s22 - d2 * y2
+    size = a * (abs(b1) + abs(b2)) - b0 * (abs(A[1, 0]) + abs(A[2, 0]))
+    size += (abs(d1) + abs(d2)) * (abs(b1) + abs(b2))
+    size -= mu * b0 * (abs(A[1, 1]) + abs(A[2, 2]) + abs(A[1, 2]) + abs(A[2, 1]))
+    if abs(p1) + abs(p2) + abs(q11) + abs(q12) + abs(q21) + abs(q22) <= 1e-16 * size:
+        return -b0 / a, 0.0, 0.0, STICK  # u_T = 0 whatever r_T
+    if g1 == 0.0 and g2 == 0.0:
+        g1, g2 = (x1, x2) if regular else (-y1, -y2)
+    length = math.sqrt(g1 * g1 + g2 * g2)
+    c, s = (-g1 / length, -g2 / length) if length > 0.0 else (1.0, 0.0)
+    c, s, found = _slip_direction(p1, p2, q11, q12, q21, q22, a, d1, d2, size, c, s)
     if found:
-        r = -b0 / (A[0, 0] - d1 * c - d2 * s)
+        r = -b0 / (a - d1 * c - d2 * s)
         return r, -mu * r * c, -mu * r * s, SLIP
     return _project_until_still(A, b0, b1, b2, mu)
 
 
 @njit(cache=True)
 def _project_until_still(A, b0, b1, b2, mu):
-    """Fixed point r <- P_K(r - rho û): the safe way out for singular or overly coupled blocks."""
+    """Best point of r <- P_K(r - rho û): the way out for singular or overly coupled blocks."""
     size = 0.0
     for k in range(3):
         size = max(size, abs(A[k, 0]) + abs(A[k, 1]) + abs(A[k, 2]))
     rho = 1.0 / size
     r0, r1, r2, state = max(-b0 * rho, 0.0), 0.0, 0.0, STICK
-    for _ in range(500):
+    best0, best1, best2, best_state, least = r0, r1, r2, state, math.inf
+    for _ in range(PROJECTIONS):
         u0 = b0 + A[0, 0] * r0 + A[0, 1] * r1 + A[0, 2] * r2
         u1 = b1 + A[1, 0] * r0 + A[1, 1] * r1 + A[1, 2] * r2
         u2 = b2 + A[2, 0] * r0 + A[2, 1] * r1 + A[2, 2] * r2
@@ -175,46 +195,45 @@ def _project_until_still(A, b0, b1, b2, mu):
             p1, p2, state = mu * p0 * x1 / t, mu * p0 * x2 / t, SLIP
         move = abs(p0 - r0) + abs(p1 - r1) + abs(p2 - r2)
         r0, r1, r2 = p0, p1, p2
+        if move < least:
+            best0, best1, best2, best_state, least = r0, r1, r2, state, move
         if move <= 1e-15 * (abs(r0) + abs(r1) + abs(r2)):
             break
-    return r0, r1, r2, state
+    return best0, best1, best2, best_state
 
 
 @njit(cache=True)
-def _disk(a11, a12, a21, a22, b1, b2, bound, g1, g2):  # noqa: PLR0913
-    """r_T of u_T = A r_T + b with |r_T| <= bound, and whether it sticks."""
-    det = a11 * a22 - a12 * a21
-    if det > 0.0:
-        x1 = -(a22 * b1 - a12 * b2) / det
-        x2 = -(a11 * b2 - a21 * b1) / det
-        if x1 * x1 + x2 * x2 <= bound * bound:
-            return x1, x2, STICK
-    length = math.hypot(g1, g2)
-    if length == 0.0:
-        g1, g2 = -b1, -b2
-        length = math.hypot(g1, g2)
+def _disk(s11, s12, s21, s22, y1, y2, bound, g1, g2):  # noqa: PLR0913
+    """r_T of u_T = S r_T + y with |r_T| <= bound, and its state; (g1, g2) guesses r_T."""
+    if y1 == 0.0 and y2 == 0.0:
+        return 0.0, 0.0, STICK
+    x1, x2, regular = _stick(s11, s12, s21, s22, y1, y2)
+    if regular and x1 * x1 + x2 * x2 <= bound * bound:
+        return x1, x2, STICK
+    if g1 == 0.0 and g2 == 0.0:
+        g1, g2 = -y1, -y2
+    length = math.sqrt(g1 * g1 + g2 * g2)
     c, s = (-g1 / length, -g2 / length) if length > 0.0 else (1.0, 0.0)
-    c, s, _ = _slip_angle(
-        b1, b2, -bound * a11, -bound * a12, -bound * a21, -bound * a22, 1.0, 0.0, 0.0, c, s
-    )
+    size = abs(y1) + abs(y2) + bound * (abs(s11) + abs(s12) + abs(s21) + abs(s22))
+    q11, q12, q21, q22 = -bound * s11, -bound * s12, -bound * s21, -bound * s22
+    c, s, _ = _slip_direction(y1, y2, q11, q12, q21, q22, 1.0, 0.0, 0.0, size, c, s)
     return -bound * c, -bound * s, SLIP
 
 
 @njit(cache=True)
-def solve_tresca(A, b0, b1, b2, bound, g1, g2):
-    """(r_N, r_T1, r_T2, state) of one contact under Tresca friction; open contacts may slide."""
-    r1, r2, slides = _disk(
-        A[1, 1], A[1, 2], A[2, 1], A[2, 2], b1, b2, bound, g1, g2
-    )
-    if b0 + A[0, 1] * r1 + A[0, 2] * r2 >= 0.0 or A[0, 0] <= 0.0:
+def solve_tresca(A, b0, b1, b2, bound, g1, g2):  # noqa: PLR0913
+    """(r_N, r_T1, r_T2, state) of one contact under Tresca friction; open ones may slide."""
+    a = A[0, 0]
+    r1, r2, state = _disk(A[1, 1], A[1, 2], A[2, 1], A[2, 2], b1, b2, bound, g1, g2)
+    if b0 + A[0, 1] * r1 + A[0, 2] * r2 >= 0.0 or a <= 0.0:
         return 0.0, r1, r2, OPEN
-    k1, k2 = A[1, 0] / A[0, 0], A[2, 0] / A[0, 0]
-    r1, r2, slides = _disk(
+    k1, k2 = A[1, 0] / a, A[2, 0] / a
+    r1, r2, state = _disk(
         A[1, 1] - k1 * A[0, 1], A[1, 2] - k1 * A[0, 2],
         A[2, 1] - k2 * A[0, 1], A[2, 2] - k2 * A[0, 2],
         b1 - k1 * b0, b2 - k2 * b0, bound, r1, r2,
-    )
-    return max(-(b0 + A[0, 1] * r1 + A[0, 2] * r2) / A[0, 0], 0.0), r1, r2, slides
+    )  # fmt: skip
+    return max(-(b0 + A[0, 1] * r1 + A[0, 2] * r2) / a, 0.0), r1, r2, state
 
 
 @njit(cache=True)
@@ -223,27 +242,6 @@ def solve_contact(A, b0, b1, b2, coefficient, tresca, g1, g2):  # noqa: PLR0913
     if tresca:
         return solve_tresca(A, b0, b1, b2, coefficient, g1, g2)
     return solve_coulomb(A, b0, b1, b2, coefficient, g1, g2)
-
-
-@njit(cache=True)
-def classify_contacts(A, u, r, coefficient, tresca, status, sliding):  # noqa: PLR0913
-    """Fill status and sliding, (nc,), by one exact local solve per contact about (r, u)."""
-    for i in range(len(coefficient)):
-        a = A[i]
-        b0 = u[i, 0] - a[0, 0] * r[i, 0] - a[0, 1] * r[i, 1] - a[0, 2] * r[i, 2]
-        b1 = u[i, 1] - a[1, 0] * r[i, 0] - a[1, 1] * r[i, 1] - a[1, 2] * r[i, 2]
-        b2 = u[i, 2] - a[2, 0] * r[i, 0] - a[2, 1] * r[i, 1] - a[2, 2] * r[i, 2]
-        x0, x1, x2, state = solve_contact(
-            a, b0, b1, b2, coefficient[i], tresca, r[i, 1], r[i, 2]
-        )
-        status[i] = state
-        if state == OPEN and tresca:
-            det = a[1, 1] * a[2, 2] - a[1, 2] * a[2, 1]
-            y1 = a[1, 2] * b2 - a[2, 2] * b1
-            y2 = a[2, 1] * b1 - a[1, 1] * b2
-            sliding[i] = not (det > 0.0 and math.hypot(y1, y2) <= coefficient[i] * det)
-        else:
-            sliding[i] = state != STICK
 
 
 def solve_one(A, b, coefficient: float, tresca: bool = False):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum, IntEnum
+from enum import Enum
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,16 +12,9 @@ from numpy.typing import NDArray
 from . import judge
 from .judge import Measure
 from .problem import FrictionProblem
+from .status import ContactStatus, classify
 
 Array = NDArray[np.float64]
-
-
-class ContactStatus(IntEnum):
-    """State of one contact; the numbers are those in files."""
-
-    OPEN = 0
-    SLIP = 1
-    STICK = 2
 
 
 class Outcome(Enum):
@@ -85,19 +79,33 @@ class Convergence:
 class FrictionSolution:
     """Reactions and velocities of a discrete problem, and what they mean.
 
-    r, u: (nc, d) in the local frames; v: (n,) or None in the Delassus form; status: (nc,) of
-    ContactStatus; sliding: (nc,) true where u_T != 0 by the law (with Tresca friction an open
-    contact may slide too); margin: (nc,) distance to the next status, in units of r_N.
+    r, u: (nc, d) in the local frames; v: (n,) or None in the Delassus form.
     """
 
     problem: FrictionProblem
     r: Array
     u: Array
     v: Array | None
-    status: NDArray[np.int8]
-    sliding: NDArray[np.bool_]
-    margin: Array
     convergence: Convergence
+
+    @cached_property
+    def _classified(self) -> tuple[NDArray[np.int8], NDArray[np.bool_], Array]:
+        return classify(self.problem, self.r, self.u)
+
+    @property
+    def status(self) -> NDArray[np.int8]:
+        """ContactStatus of every contact, (nc,)."""
+        return self._classified[0]
+
+    @property
+    def sliding(self) -> NDArray[np.bool_]:
+        """True where the law lets a contact slide, (nc,): with Tresca friction also if open."""
+        return self._classified[1]
+
+    @property
+    def margin(self) -> Array:
+        """Distance of every contact to its next status, (nc,), in the unit of r_N."""
+        return self._classified[2]
 
     @property
     def converged(self) -> bool:

@@ -14,7 +14,6 @@ from .problem import Form, FrictionProblem
 from .solution import Convergence, FrictionSolution, Outcome, Step
 from .solvers import FITTING_GLOBAL, Auto
 from .solvers.base import Breakdown, Iterate, Solver, Target
-from .status import classify
 
 Array = NDArray[np.float64]
 Callback = Callable[[Step, Iterate], bool | None]
@@ -146,13 +145,12 @@ def _finish(watch: _Watch, outcome: Outcome, detail: str, solver: Solver) -> Fri
         u, v = problem.velocity(best.r)
     else:
         u, v = problem.local_velocity(best.v), best.v
-    status, sliding, margin = classify(problem, best.r, u)
     seconds = time.perf_counter() - watch.started
     record = Convergence(
         outcome, watch.iterations, watch.error, watch.tolerance, tuple(watch.history),
         watch.linear_iterations, seconds, type(solver).__name__, problem.measure, detail,
     )
-    return FrictionSolution(problem, best.r, u, v, status, sliding, margin, record)
+    return FrictionSolution(problem, best.r, u, v, record)
 
 
 def _zero(problem: FrictionProblem) -> Array:
