@@ -22,7 +22,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from .cones import Coulomb, Law, natural_map, with_de_saxce
+from .cones import Law
 
 Array = NDArray[np.float64]
 
@@ -101,10 +101,7 @@ def published_fclib_error(r: Array, u: Array, q: Array, law: Law) -> float:
 
     It adds newtons to metres: reported for comparison with publications, never used to decide.
     """
-    if isinstance(law, Coulomb):
-        residual = natural_map(r, u, law.mu, np.ones(len(r)))
-    else:
-        residual = law.natural_map(r, u, np.ones(len(r)))
+    residual = law.natural_map(r, u, np.ones(len(r)))
     scale = max(np.linalg.norm(q), np.linalg.norm(r), np.linalg.norm(u))
     return float(np.linalg.norm(residual) / scale) if scale > 0 else 0.0
 
@@ -128,5 +125,4 @@ __all__ = [
     "natural_error",
     "published_fclib_error",
     "scaled_residual",
-    "with_de_saxce",
 ]

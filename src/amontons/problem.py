@@ -9,9 +9,11 @@ v are n displacements or velocities; r and u are (nc, d) in the local frames, ro
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -59,7 +61,7 @@ class FrictionProblem:
     load_scale: float | None = None
     u_scale: float | None = None
     name: str = ""
-    _shared: dict[str, Factor] = field(default_factory=dict, repr=False)
+    _shared: dict[str, tuple[tuple, Any]] = field(default_factory=dict, repr=False)
 
     # ---------------------------------------------------------------- construction
     @classmethod
@@ -149,8 +151,9 @@ class FrictionProblem:
     def blocks(self) -> BlockRows:
         """W in rows of 3x3 blocks (Delassus form only)."""
         self._need(Form.DELASSUS)
-        assert self.W is not None
-        return block_rows(self.W, self.dimension)
+        W, d = self.W, self.dimension
+        assert W is not None
+        return self._kept("blocks", (W,), lambda: block_rows(W, d))
 
     @cached_property
     def kernel_data(self) -> tuple:
@@ -158,7 +161,9 @@ class FrictionProblem:
         b = self.blocks
         assert self.q is not None
         q = spatial(self.q)
-        size = np.linalg.norm(b.diagonal_blocks, 2, axis=(1, 2)) if self.contacts else np.zeros(0)
+        size = (
+            np.linalg.norm(b.diagonal_blocks, 2, axis=(1, 2)) if self.contacts else np.zeros(0)
+        )
         able = b.diagonal_blocks[:, 0, 0] > 0
         rho = np.where(able, 1 / np.where(able, size, 1.0), 0.0)
         for array in (q, rho):
@@ -172,6 +177,13 @@ class FrictionProblem:
         self._need(Form.DELASSUS)
         return float(np.linalg.norm(self.q))  # type: ignore[arg-type]
 
+    def _kept(self, name: str, sources: tuple, make: Callable[[], Any]) -> Any:
+        """What `make` gives, made once for all variants that hold the same source matrices."""
+        entry = self._shared.get(name)
+        if entry is None or any(a is not b for a, b in zip(entry[0], sources, strict=True)):
+            entry = self._shared[name] = (sources, make())
+        return entry[1]
+
     def _need(self, form: Form) -> None:
         if self.form is not form:
             raise UnsupportedForm(
@@ -183,15 +195,17 @@ class FrictionProblem:
     def factor(self) -> Factor:
         """A direct factor of M, made once and shared by all variants of this problem."""
         self._need(Form.GLOBAL)
-        if "M" not in self._shared:
-            self._shared["M"] = Direct().factor(self.M)  # type: ignore[arg-type]
-        return self._shared["M"]
+        M = self.M
+        assert M is not None
+        return self._kept("factor", (M,), lambda: Direct().factor(M))
 
     @cached_property
     def small_blocks(self) -> sparse.csc_array | None:
         """M^-1 when M is block diagonal with small blocks (rigid bodies), else None."""
         self._need(Form.GLOBAL)
-        return block_diagonal_inverse(self.M)  # type: ignore[arg-type]
+        M = self.M
+        assert M is not None
+        return self._kept("inverse", (M,), lambda: block_diagonal_inverse(M))
 
     def solve_M(self, b: Array) -> Array:
         """M^-1 b, b of shape (n,) or (n, k)."""
@@ -216,7 +230,11 @@ class FrictionProblem:
 
     @cached_property
     def _condensed(self) -> FrictionProblem:
-        assert self.H is not None and self.w is not None and self.f is not None
+        base = self._kept("condensed", (self.M, self.H), self._condense)
+        return replace(base, law=self.law, q=self.free_velocity, name=self.name)
+
+    def _condense(self) -> FrictionProblem:
+        assert self.H is not None
         m = self.contacts * self.dimension
         inverse = self.small_blocks
         if inverse is not None:
@@ -228,8 +246,17 @@ class FrictionProblem:
                     "solve the global form with SemismoothNewton, which does not form W"
                 )
             W = self._dense_delassus()
-        q = self.w + (self.H.T @ self.solve_M(self.f)).reshape(self.w.shape)
-        return FrictionProblem.from_delassus(W, q, self.law, name=self.name)
+        return FrictionProblem.from_delassus(W, self.free_velocity, self.law)
+
+    @cached_property
+    def free_velocity(self) -> Array:
+        """q, (nc, d): the local velocity without any reaction, w + H^T M^-1 f in the global form."""
+        if self.q is not None:
+            return self.q
+        assert self.f is not None
+        q = self.local_velocity(self.solve_M(self.f))
+        q.flags.writeable = False
+        return q
 
     def _dense_delassus(self) -> Array:
         """W by blocks of right-hand sides, so that memory stays near that of W itself."""
@@ -267,7 +294,7 @@ class FrictionProblem:
         return (self.H.T @ v).reshape(self.w.shape) + self.w
 
     # ---------------------------------------------------------------- judging
-    @property
+    @cached_property
     def measure(self) -> Measure:
         """Which error measure applies, see `judge`."""
         if self.form is Form.DELASSUS:
@@ -281,12 +308,15 @@ class FrictionProblem:
     def error(self, r: Array, v: Array | None = None) -> float:
         """Unit-free error of reactions r, (nc, d); v, (n,), is read by the residual measure.
 
-        Infinite when r or v hold a number that is not finite.
+        Infinite when r or v hold a number that is not finite, and without v when M is singular.
         """
         if self.measure is Measure.EXACT:
             return self.condensed().exact_error(r)
         if v is None:
-            v = self.velocity(r)[1]
+            try:
+                v = self.velocity(r)[1]
+            except SingularOperator:
+                return np.inf
         assert v is not None
         return self._residual_error(r, v)
 
@@ -338,7 +368,7 @@ class FrictionProblem:
         if self.u_scale is not None:
             return load, self.u_scale
         try:
-            free = self.local_velocity(self.solve_M(self.f))
+            free = self.free_velocity
         except SingularOperator:
             free = self.w
         return load, float(np.linalg.norm(free))
@@ -375,7 +405,9 @@ def _finite(name: str, values: Array) -> None:
     bad = np.argwhere(~np.isfinite(values))
     if len(bad):
         where = ", ".join(str(k) for k in bad[0])
-        raise InvalidInput(f"{name}[{where}]: expected a finite number, got {values[tuple(bad[0])]}")
+        raise InvalidInput(
+            f"{name}[{where}]: expected a finite number, got {values[tuple(bad[0])]}"
+        )
 
 
 def _vector(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
@@ -403,6 +435,8 @@ def _sparse(name: str, matrix: Matrix) -> sparse.csc_array:
     """A canonical copy: columns sorted, duplicates summed, every entry finite."""
     out = sparse.csc_array(matrix, dtype=float, copy=True)
     out.sum_duplicates()
+    for array in (out.data, out.indices, out.indptr):
+        array.flags.writeable = False
     bad = np.flatnonzero(~np.isfinite(out.data))
     if bad.size:
         row = out.indices[bad[0]]

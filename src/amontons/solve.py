@@ -18,7 +18,7 @@ from .solvers.base import Breakdown, Iterate, Solver, Target
 Array = NDArray[np.float64]
 Callback = Callable[[Step, Iterate], bool | None]
 MEMORY = 64  # iterates among which a repetition counts as a cycle
-PATIENCE = 200  # iterates without any progress before a solve counts as stagnated
+PATIENCE = 500  # iterates without any progress before a solve counts as stagnated
 PROGRESS = 0.99  # the best error must fall at least by this factor within PATIENCE
 
 
@@ -53,16 +53,17 @@ class _Watch:
 
     def cycled(self, iterate: Iterate, error: float) -> bool:
         """True when this iterate was here before, with other iterates in between."""
-        if self.seen and abs(self.seen[-1][0] - error) <= 1e-12 * error:
-            return False  # standing still is no cycle: patience decides
-        size = np.abs(iterate.r).max(initial=0.0)
-        found = False
-        for old_error, old in self.seen[:-1]:
-            if abs(old_error - error) <= 1e-12 * error:
-                found = found or bool(np.abs(old - iterate.r).max(initial=0.0) <= 1e-13 * size)
+        same = [self._repeats(iterate, error, *old) for old in self.seen]
         self.seen.append((error, iterate.r))
         del self.seen[:-MEMORY]
-        return found
+        return any(same) and not same[-1]
+
+    @staticmethod
+    def _repeats(iterate: Iterate, error: float, old_error: float, old: Array) -> bool:
+        if abs(old_error - error) > 1e-12 * error:
+            return False
+        size = np.abs(iterate.r).max(initial=0.0)
+        return bool(np.abs(old - iterate.r).max(initial=0.0) <= 1e-13 * size)
 
     @property
     def stagnated(self) -> bool:
@@ -115,10 +116,11 @@ def _run(
             return Outcome.CONVERGED, ""
         for iterate in solver.iterates(watch.problem, start, target):
             step = watch.judge(iterate)
-            if callback is not None and callback(step, iterate):
-                return Outcome.STOPPED, "by the callback"
+            stop = callback is not None and callback(step, iterate)
             if step.error <= target.tolerance:
                 return Outcome.CONVERGED, iterate.stage
+            if stop:
+                return Outcome.STOPPED, "by the callback"
             if not np.isfinite(step.error):
                 return Outcome.NON_FINITE, ""
             if watch.iterations >= limit:
@@ -142,7 +144,7 @@ def _finish(watch: _Watch, outcome: Outcome, detail: str, solver: Solver) -> Fri
     problem = watch.problem
     best = watch.best if watch.best is not None else Iterate(_zero(problem))
     if best.v is None or problem.form is Form.DELASSUS:
-        u, v = problem.velocity(best.r)
+        u, v = _velocity(problem, best.r)
     else:
         u, v = problem.local_velocity(best.v), best.v
     seconds = time.perf_counter() - watch.started
@@ -151,6 +153,15 @@ def _finish(watch: _Watch, outcome: Outcome, detail: str, solver: Solver) -> Fri
         watch.linear_iterations, seconds, type(solver).__name__, problem.measure, detail,
     )
     return FrictionSolution(problem, best.r, u, v, record)
+
+
+def _velocity(problem: FrictionProblem, r: Array) -> tuple[Array, Array | None]:
+    """(u, v) of reactions; the state v = 0 when M is singular and no solver found another."""
+    try:
+        return problem.velocity(r)
+    except SingularOperator:
+        v = np.zeros(problem.unknowns)
+        return problem.local_velocity(v), v
 
 
 def _zero(problem: FrictionProblem) -> Array:
@@ -168,6 +179,8 @@ def _start(problem: FrictionProblem, start: Iterate | FrictionSolution | None) -
         )
     if not np.isfinite(r).all():
         raise InvalidInput("start: r holds a number that is not finite")
+    if start.v is not None and problem.form is Form.GLOBAL and start.v.size != problem.unknowns:
+        raise InvalidInput(f"start: expected v of {problem.unknowns} entries, got {start.v.size}")
     return Iterate(r, start.v, 0)
 
 
