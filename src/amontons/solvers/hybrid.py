@@ -42,7 +42,8 @@ CHUNK = 20  # sweeps between two looks at their rate
 LONGEST = 6000  # sweeps after which Newton gets its chance whatever the rate promises
 HOPELESS = 8.0  # sweeps that promise to cost this many times Newton are left at once
 NEWTON_STEPS = 120
-PATIENCE = 25  # Newton steps without halving the error
+PATIENCE = 40  # Newton steps without halving the error
+SEMISMOOTH_CONTACTS = 600  # above, a dense factor costs more than it brings
 ROUNDS = 6  # repetitions of the last stages before Auto gives up
 # Nanoseconds measured on one core: only their ratios matter, and only roughly.
 SWEEP_BLOCK, SWEEP_CONTACT, HISTORY_CONTACT, PRODUCT, NEWTON_CONTACT = 3.0, 90.0, 200.0, 5.4, 700.0
@@ -143,6 +144,7 @@ class _Portfolio:
     r: Array
     error: float = math.inf  # of r, unit of u
     latest: float = math.inf  # of the last reaction tried
+    budget: float = 0.0  # cost of Newton steps not yet matched by sweeps
 
     def __post_init__(self) -> None:
         self.error = self._judge(self.r)
@@ -159,8 +161,9 @@ class _Portfolio:
         for round_ in range(ROUNDS):
             yield from self._newton(round_)
             yield from self._proximal(round_)
-            yield from self._semismooth(steps=15)
-            yield self._plain(300 if round_ == 0 else 3000)
+            if round_ and self.problem.contacts <= SEMISMOOTH_CONTACTS:
+                yield from self._semismooth(steps=15)
+            yield from self._patient_sweeps()
 
     # ---------------------------------------------------------------- stages
     def _plain(self, sweeps: int) -> Iterate:
@@ -171,34 +174,55 @@ class _Portfolio:
     def _sweeping(self) -> Iterator[Iterate]:
         """Accelerated and plain sweeps, whichever falls faster, while they are worth it."""
         memory = Acceleration(self.kernel, self.r, self.options.depth)
-        plain = self.r.copy()
-        fast = {True: math.inf, False: math.inf}  # cost up to the goal, as the last chunk predicts
+        plain = self.r.copy()  # not from accelerated points: they keep the slow modes
+        promise = {True: math.inf, False: math.inf}  # cost up to the goal, by acceleration
         last = {True: self.error, False: self.error}
-        done, spent, small = 0, 0.0, 0.3 * self.goal
-        while done < LONGEST:
-            accelerate = fast[True] <= fast[False]
+        done, spent, small = {True: 0, False: 0}, 0.0, 0.3 * self.goal
+        accelerate = True
+        while sum(done.values()) < LONGEST:
+            chunk = max(CHUNK, done[accelerate] // 4)
             if accelerate:
-                count, change = memory.sweep(CHUNK, small)
+                count, change = memory.sweep(chunk, small)
                 iterate = self._offer(memory.r.copy(), count, "Anderson Gauss-Seidel")
             else:
-                count = sweeps_inplace(*self.kernel, plain, CHUNK, small)
-                change = self.goal
+                count = sweeps_inplace(*self.kernel, plain, chunk, small)
+                change = small if count < chunk else math.inf
                 iterate = self._offer(plain.copy(), count, "Gauss-Seidel")
-            if change <= small:
-                small *= 0.1
+            small *= 0.1 if change <= small else 1.0
             yield iterate
-            done += count
-            rate = math.log(max(last[accelerate], 1e-300) / max(self.latest, 1e-300)) / count
-            last[accelerate] = self.latest
-            wanted = math.log(max(self.latest / self.goal, 1.0))
             cost = self.costs["accelerated" if accelerate else "sweep"]
-            fast[accelerate] = cost * wanted / rate if rate > 0 else math.inf
-            if not accelerate and fast[False] == math.inf:
-                fast[False] = 1e300  # so that the other one is tried again
+            promise[accelerate] = cost * self._sweeps_left(last[accelerate], count)
+            last[accelerate] = self.latest
+            done[accelerate] += count
             spent += cost * count
-            newton, promised = self._newton_cost(), min(fast.values())
-            if done >= 2 * CHUNK and promised > (1.0 if spent > newton else HOPELESS) * newton:
-                return
+            best, newton = min(promise.values()), self._newton_cost()
+            if best > newton and done[True] >= 2 * CHUNK:
+                if not done[False]:  # plain sweeps win now and then: try them before leaving
+                    accelerate = False
+                    continue
+                if best > (1.0 if spent > newton else HOPELESS) * newton:
+                    return
+            accelerate = promise[True] <= promise[False]
+
+    def _sweeps_left(self, before: float, count: int) -> float:
+        """Sweeps to the goal at the rate of the last `count`, infinite without progress."""
+        rate = math.log(max(before, 1e-300) / max(self.latest, 1e-300)) / count
+        left = math.log(max(self.latest / self.goal, 1.0))
+        return left / rate if rate > 0 else math.inf
+
+    def _patient_sweeps(self) -> Iterator[Iterate]:
+        """Plain sweeps worth what Newton has cost so far, ended when 1000 of them gain little."""
+        x = self.r.copy()
+        while self.budget > 0:
+            start, count = self.error, 0
+            for _ in range(10):
+                done = sweeps_inplace(*self.kernel, x, 100, 0.1 * self.goal)
+                count += done
+                yield self._offer(x.copy(), done, "Gauss-Seidel")
+            self.budget -= count * self.costs["sweep"]
+            if self.error > 0.7 * start:
+                break
+        self.budget = 0.0
 
     @cached_property
     def work(self) -> Workspace:
@@ -237,6 +261,7 @@ class _Portfolio:
                 origin.copy(), sigma, SmoothingNewton(shrink=shrink), goal=0.5 * self.goal,
                 steps=NEWTON_STEPS, patience=PATIENCE,
             )  # fmt: skip
+            self.budget += abs(count) * self.costs["newton"]
             yield self._offer(found, abs(count), "smoothing Newton")
 
     def _proximal(self, round_: int) -> Iterator[Iterate]:
@@ -246,6 +271,7 @@ class _Portfolio:
         self.error = self._judge(self.r)
         mark, patience = self.error, 0
         for iterate in ProximalPoint(alpha=1e-2 * 0.1**round_).steps(self.work, self.r):
+            self.budget += iterate.iterations * self.costs["newton"]
             yield self._offer(spatial(iterate.r), iterate.iterations, "proximal point")
             patience = 0 if self.error < 0.5 * mark else patience + 1
             mark = min(mark, self.error) if patience == 0 else mark
