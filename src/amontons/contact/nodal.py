@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..errors import InvalidInput
+from ..fem.facets import inner_facets
 from ..fem.mesh import Mesh
 from ..fem.surfaces import nodal_weights
 from .geometry import Obstacle, frames
@@ -46,6 +47,7 @@ class ContactRows:
 
 def nodal_contact(mesh: Mesh, surface: str, obstacle: Obstacle) -> ContactRows:
     """Contacts between the nodes of a surface and a rigid obstacle, in the mesh's own dofs."""
+    check_exterior(mesh, surface)
     nodes = mesh.surface_nodes(surface)
     weights = nodal_weights(mesh.points, mesh.surface(surface))[nodes]
     if not (weights > 0).all():
@@ -55,6 +57,18 @@ def nodal_contact(mesh: Mesh, surface: str, obstacle: Obstacle) -> ContactRows:
     size = len(mesh.points) * mesh.dim
     H = contact_columns(nodes, axes, size)
     return ContactRows(nodes, points, weights, obstacle.gap(points), axes, H)
+
+
+def check_exterior(mesh: Mesh, surface: str) -> None:
+    """Raise InvalidInput when a facet of the surface lies between two cells."""
+    facets = mesh.surface(surface)
+    total = sum(len(block.nodes) for block in facets)
+    inner = inner_facets(mesh.cells, facets, len(mesh.points))
+    if inner:
+        raise InvalidInput(
+            f"surface {surface!r}: {inner} of its {total} facets lie between two cells, "
+            "contact needs an outer surface"
+        )
 
 
 def contact_columns(nodes: Index, axes: Array, size: int) -> sparse.csc_array:

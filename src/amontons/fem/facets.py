@@ -60,6 +60,20 @@ def boundary(cells: tuple[Cells, ...]) -> tuple[Facets, ...]:
     return tuple(block for block in out if len(block.nodes))
 
 
+def inner_facets(cells: tuple[Cells, ...], facets: tuple[Facets, ...], points: int) -> int:
+    """How many of the given facets lie between two cells."""
+    near = np.zeros(points, dtype=bool)
+    for block in facets:
+        near[block.nodes] = True
+    known = sides(cells, near)
+    count = 0
+    for block in facets:
+        both = np.concatenate([known[block.nodes.shape[1]], block.nodes])
+        _, times = np.unique(np.sort(both, axis=1), axis=0, return_counts=True)
+        count += int((times > 2).sum())  # twice as a side of cells, once as a given facet
+    return count
+
+
 def oriented(
     cells: tuple[Cells, ...], facets: tuple[Facets, ...], name: str, points: Array
 ) -> tuple[Facets, ...]:

@@ -68,6 +68,13 @@ class Mesh:
                 f"{int((~used).sum())} such points, leave them out and renumber"
             )
 
+    def __repr__(self) -> str:
+        kinds = ", ".join(f"{len(b.nodes)} {b.kind}" for b in self.cells)
+        return (
+            f"Mesh({self.dim}D, {len(self.points)} points, {kinds}; regions "
+            f"{', '.join(self.regions)}; surfaces {', '.join(self.surfaces) or 'none'})"
+        )
+
     @property
     def dim(self) -> int:
         """2 or 3."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,6 @@ from ..errors import InvalidInput
 from ..fem.elasticity import body_load, stiffness
 from ..fem.mesh import unknown
 from ..fem.surfaces import surface_load
-from ..linear import Factor
 from .parts import Body, BodyForce, Contact, Fix, Traction
 from .rigid import Piece, near_nullspace, pieces
 from .values import vector_at
@@ -54,7 +53,6 @@ class Discretisation:
     placed: tuple[Placed, ...]
     parts: list[Piece]
     whole_H: sparse.csc_array
-    shared: dict[str, Factor] = field(default_factory=dict)  # factors of M, for all variants
 
     @property
     def dofs(self) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +37,7 @@ class Model:
     loads: Sequence[Traction | BodyForce] = ()
     load_factor: float = 1.0
     name: str = ""
-    _shared: dict[str, Discretisation] = field(default_factory=dict, init=False, repr=False)
+    _shared: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
         for name, kind in (("bodies", Body), ("supports", Fix), ("contacts", Contact),
@@ -97,7 +98,8 @@ class Model:
             parts.M, parts.H, f, w, law, near_nullspace=parts.near_nullspace,
             load_scale=_load_size(parts, f, w), name=self.name,
         )  # fmt: skip
-        return replace(base, _shared=parts.shared)
+        first = self._shared.setdefault("problem", base)
+        return replace(base, M=first.M, H=first.H, _shared=first._shared)  # one factor for all
 
     def _law(self) -> Law:
         values = []
@@ -161,9 +163,10 @@ def _tuple_of(name: str, values: object, kind: object) -> tuple:
         items = tuple(values)  # type: ignore[arg-type]
     except TypeError as error:
         raise InvalidInput(f"{name}: expected a list, got {values!r}") from error
+    wanted = getattr(kind, "__name__", "Traction or BodyForce")
     for item in items:
         if not isinstance(item, kind):  # type: ignore[arg-type]
-            raise InvalidInput(f"{name}: expected {kind}, got {item!r}")
+            raise InvalidInput(f"{name}: expected {wanted}, got {item!r}")
     return items
 
 
