@@ -1,0 +1,22 @@
+"""Fixtures for all tests: no window opens, and the shared folder of data is optional."""
+
+import os
+from pathlib import Path
+
+import matplotlib as mpl
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    mpl.use("Agg")
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """The folder of FCLib files and reference numbers; tests that need it skip without it."""
+    folder = Path(os.environ.get("AMONTONS_SHARED", ROOT.parent / "shared"))
+    if not folder.is_dir():
+        pytest.skip(f"no shared data at {folder}; set AMONTONS_SHARED")
+    return folder
