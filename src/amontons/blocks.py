@@ -70,7 +70,7 @@ def _sparse_tiles(W: sparse.csr_array, d: int) -> tuple[NDArray, NDArray, Array]
 def _dense_tiles(W: Array, nc: int, d: int) -> tuple[NDArray, NDArray, Array]:
     """Block row, block column and values (k, d, d) of the blocks that are not all zero."""
     tiles = np.asarray(W).reshape(nc, d, nc, d).swapaxes(1, 2)
-    rows, columns = np.nonzero(tiles.reshape(nc, nc, -1).any(axis=2))
+    rows, columns = np.nonzero(tiles.reshape(nc, nc, d * d).any(axis=2))
     return rows, columns, tiles[rows, columns]
 
 

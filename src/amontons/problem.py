@@ -109,7 +109,7 @@ class FrictionProblem:
         law = _law(mu)
         q = _contact_rows("q", q, len(law.coefficient))
         if sparse.issparse(W):
-            W = _sparse("W", W).tocsr()
+            W = _read_only(_sparse("W", W).tocsr())
         else:
             W = _vector("W", W, (q.size, q.size))
         _expect("W", W.shape, (q.size, q.size))
@@ -431,12 +431,17 @@ def _contact_rows(name: str, values: ArrayLike, nc: int) -> Array:
     return array
 
 
+def _read_only(matrix):
+    """Lock the arrays of a sparse matrix, so that sharing it is safe."""
+    for array in (matrix.data, matrix.indices, matrix.indptr):
+        array.flags.writeable = False
+    return matrix
+
+
 def _sparse(name: str, matrix: Matrix) -> sparse.csc_array:
     """A canonical copy: columns sorted, duplicates summed, every entry finite."""
     out = sparse.csc_array(matrix, dtype=float, copy=True)
     out.sum_duplicates()
-    for array in (out.data, out.indices, out.indptr):
-        array.flags.writeable = False
     bad = np.flatnonzero(~np.isfinite(out.data))
     if bad.size:
         row = out.indices[bad[0]]
@@ -444,4 +449,4 @@ def _sparse(name: str, matrix: Matrix) -> sparse.csc_array:
         raise InvalidInput(
             f"{name}[{row}, {column}]: expected a finite number, got {out.data[bad[0]]}"
         )
-    return out
+    return _read_only(out)

@@ -1,0 +1,164 @@
+"""The judge: its NumPy twin, its independence of units and frames, and its special cases."""
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+from amontons import judge
+from amontons.cones import Coulomb, Tresca
+from amontons.judge import Measure
+from amontons.problem import FrictionProblem
+from amontons.solve import drive
+from amontons.solvers import GaussSeidel
+
+
+def random_local(seed=0, nc=6, d=3, law=Coulomb):
+    rng = np.random.default_rng(seed)
+    root = rng.standard_normal((nc * d, nc * d))
+    W = root @ root.T / (nc * d) + np.eye(nc * d)
+    problem = FrictionProblem.from_delassus(
+        W, rng.standard_normal((nc, d)), law(0.8 * rng.random(nc))
+    )
+    return problem, rng.standard_normal((nc, d))
+
+
+def twin(problem, r):
+    """The exact measure written with dense NumPy."""
+    nc, d = r.shape
+    u = (problem.W @ r.ravel()).reshape(r.shape) + problem.q
+    own = problem.W.reshape(nc, d, nc, d)[np.arange(nc), :, np.arange(nc), :]
+    rho = 1 / np.linalg.norm(own, 2, axis=(1, 2))
+    residual = problem.law.natural_map(r, u, rho) / rho[:, None]
+    return np.linalg.norm(residual) / np.linalg.norm(problem.q)
+
+
+@pytest.mark.parametrize("law", [Coulomb, Tresca])
+@pytest.mark.parametrize("d", [2, 3])
+def test_compiled_and_numpy_agree(d, law):
+    for seed in range(50):
+        problem, r = random_local(seed, d=d, law=law)
+        assert problem.error(r) == pytest.approx(twin(problem, r), rel=1e-12)
+        u = problem.velocity(r)[0]
+        size = judge.scaled_residual(r, u, problem.law, problem.rho)
+        assert problem.error(r) == pytest.approx(size / problem.q_norm, rel=1e-12)
+
+
+@pytest.mark.parametrize("law", [Coulomb, Tresca])
+@pytest.mark.parametrize("force", [1e-9, 1e9])
+@pytest.mark.parametrize("length", [1e-9, 1e9])
+def test_units_do_not_matter(force, length, law):
+    problem, r = random_local(1, law=law)
+    number = problem.law.coefficient * (force if law is Tresca else 1)
+    other = FrictionProblem.from_delassus(
+        problem.W * (length / force), problem.q * length, law(number)
+    )
+    assert other.error(force * r) == pytest.approx(problem.error(r), rel=1e-10)
+
+
+def test_order_and_tangent_axes_do_not_matter():
+    problem, r = random_local(2)
+    rng = np.random.default_rng(3)
+    order = rng.permutation(6)
+    index = (3 * order[:, None] + np.arange(3)).ravel()
+    shuffled = FrictionProblem.from_delassus(
+        problem.W[np.ix_(index, index)], problem.q[order], problem.mu[order]
+    )
+    assert shuffled.error(r[order]) == pytest.approx(problem.error(r), rel=1e-12)
+    turn = np.zeros((18, 18))
+    for i, t in enumerate(rng.uniform(0, 6, 6)):
+        c, s = np.cos(t), np.sin(t)
+        turn[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] = [[1, 0, 0], [0, c, -s], [0, s, c]]
+    turned = FrictionProblem.from_delassus(
+        turn @ problem.W @ turn.T, turn @ problem.q.ravel(), problem.mu
+    )
+    assert turned.error((turn @ r.ravel()).reshape(6, 3)) == pytest.approx(problem.error(r))
+
+
+def test_planar_is_embedded_in_space():
+    problem, r = random_local(4, d=2)
+    W = np.zeros((6, 3, 6, 3))
+    W[:, :2, :, :2] = problem.W.reshape(6, 2, 6, 2)
+    W[np.arange(6), 2, np.arange(6), 2] = W[np.arange(6), 1, np.arange(6), 1]
+    flat = np.column_stack([problem.q, np.zeros(6)])
+    solid = FrictionProblem.from_delassus(W.reshape(18, 18), flat, problem.mu)
+    assert solid.error(np.column_stack([r, np.zeros(6)])) == pytest.approx(problem.error(r))
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_not_finite_is_infinitely_wrong(bad):
+    problem, r = random_local(5)
+    for k in range(3):
+        wrong = r.copy()
+        wrong[2, k] = bad
+        assert problem.error(wrong) == np.inf
+
+
+def test_a_contact_that_can_not_react():
+    W = np.zeros((6, 6))
+    W[3:, 3:] = np.eye(3)
+    problem = FrictionProblem.from_delassus(W, [[1, 0, 0], [-1, 0, 0]], [0.5, 0.5])
+    assert problem.error(np.array([[0, 0, 0], [1.0, 0, 0]])) == 0
+    assert problem.error(np.array([[1e-9, 0, 0], [1.0, 0, 0]])) == np.inf
+    closed = problem.with_load([[-1, 0, 0], [-1, 0, 0]])
+    assert closed.error(np.array([[0, 0, 0], [1.0, 0, 0]])) == pytest.approx(1 / np.sqrt(2))
+
+
+def test_without_load_only_zero_is_right():
+    problem = FrictionProblem.from_delassus(np.eye(3), [[0, 0, 0]], [0.5])
+    assert problem.error(np.zeros((1, 3))) == 0
+    assert problem.error(np.full((1, 3), 1e-30)) == np.inf
+
+
+def residual_pair():
+    """A global problem judged by its residual, and the same one judged exactly."""
+    rng = np.random.default_rng(6)
+    M = sparse.diags_array([-1.0, 2.5, -1.0], offsets=[-1, 0, 1], shape=(60, 60))
+    H = sparse.random_array((60, 15), density=0.1, rng=rng)
+    w = rng.standard_normal((5, 3)) - [1, 0, 0]
+    problem = FrictionProblem.from_global(M, H, rng.standard_normal(60), w, [0.3] * 5)
+    large = FrictionProblem.from_global(M, H, problem.f, w, [0.3] * 5)
+    large.__dict__["measure"] = Measure.RESIDUAL
+    return problem, large
+
+
+def test_residual_and_exact_measures_agree_on_right_and_wrong():
+    exact, residual = residual_pair()
+    assert exact.measure is Measure.EXACT
+    r = drive(exact.condensed(), GaussSeidel(), tolerance=1e-13, max_iterations=5000).r
+    v = exact.velocity(r)[1]
+    assert exact.error(r) < 1e-12
+    assert residual.error(r, v) < 1e-11
+    assert residual.error(r) < 1e-11  # it finds v by itself
+    wrong = 1.1 * r
+    assert exact.error(wrong) > 1e-3
+    assert residual.error(wrong) > 1e-3
+    assert residual.error(r, 1.1 * v) > 1e-3  # out of balance
+    assert residual.error(r, np.full(60, np.nan)) == np.inf
+
+
+@pytest.mark.parametrize("force", [1e-9, 1e9])
+def test_residual_measure_is_free_of_units(force):
+    _, problem = residual_pair()
+    r, v = np.random.default_rng(7).random((5, 3)), np.random.default_rng(8).random(60)
+    other = FrictionProblem.from_global(
+        force * problem.M, force * problem.H, force * problem.f, problem.w * force, [0.3] * 5
+    )
+    other.__dict__["measure"] = Measure.RESIDUAL
+    # H^T maps v to u: H scaled by `force` makes u `force` times larger at equal r and v
+    assert other.error(r, v) == pytest.approx(problem.error(r, v), rel=1e-9)
+
+
+def test_reported_numbers():
+    law = Coulomb([0.5])
+    r, u = np.array([[2.0, 3.0, 4.0]]), np.array([[-0.5, 0.0, 0.0]])
+    assert judge.max_penetration(u) == 0.5
+    assert judge.max_penetration(-u) == 0
+    assert judge.max_cone_violation(r, law) == 4
+    assert judge.max_cone_violation(np.array([[-2.0, 0, 0]]), law) == 2
+    assert judge.max_cone_violation(np.zeros((0, 3)), Coulomb([])) == 0
+    assert (
+        judge.published_fclib_error(np.zeros((1, 3)), np.zeros((1, 3)), np.zeros((1, 3)), law)
+        == 0
+    )
+    assert judge.published_fclib_error(np.array([[1.0, 0, 0]]), np.array([[1.0, 0, 0]]),
+                                       np.array([[2.0, 0, 0]]), law) == pytest.approx(0.5)  # fmt: skip
