@@ -6,6 +6,8 @@ Names load on first use, so that `amontons --help` and FCLib work never import a
 from __future__ import annotations
 
 import importlib
+import sys
+from types import ModuleType
 from typing import Any
 
 __version__ = "0.1.0"
@@ -20,6 +22,10 @@ _HOME = {
     "solvers": ("GaussSeidel",),
     "solve": ("drive",),
     "fclib": ("read_fclib", "write_fclib"),
+    "case": ("read_case",),
+    "results": ("ModelSolution",),
+    "api": ("solve",),
+    "analysis": ("performance_profile",),
     "fem": ("Mesh", "box", "read_mesh"),
     "contact": ("LevelSet", "Plane", "Sphere"),
     "model": ("Body", "BodyForce", "Contact", "ContactFields", "Fix", "LinearElastic", "Model",
@@ -28,6 +34,17 @@ _HOME = {
 _MODULE = {name: module for module, names in _HOME.items() for name in names}
 
 __all__ = sorted(_MODULE)
+
+
+class _Package(ModuleType):
+    """Keeps `amontons.solve` the verb, also when the module of that name is imported."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if not (name in _MODULE and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package
 
 
 def __getattr__(name: str) -> Any:

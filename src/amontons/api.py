@@ -1,0 +1,135 @@
+"""The verbs: they take a model or a discrete problem and call the layers below."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, overload
+
+from .errors import Interrupted, InvalidInput, NotConverged
+from .problem import Form, FrictionProblem
+from .results import ModelSolution
+from .solution import FrictionSolution, Outcome, Step
+from .solve import Callback, drive
+from .solvers.base import Iterate, Solver
+
+if TYPE_CHECKING:
+    from .model import Model
+
+Start = Iterate | FrictionSolution | ModelSolution | None
+
+
+@overload
+def solve(
+    problem: FrictionProblem, solver: Solver | None = None, *, tolerance: float = 1e-8,
+    max_iterations: int | None = None, time_limit: float | None = None, start: Start = None,
+    callback: Callback | None = None, check: bool = True,
+) -> FrictionSolution: ...  # fmt: skip
+@overload
+def solve(
+    problem: Model, solver: Solver | None = None, *, tolerance: float = 1e-8,
+    max_iterations: int | None = None, time_limit: float | None = None, start: Start = None,
+    callback: Callback | None = None, check: bool = True,
+) -> ModelSolution: ...  # fmt: skip
+def solve(problem, solver=None, *, tolerance=1e-8, max_iterations=None, time_limit=None,
+          start=None, callback=None, check=True):  # fmt: skip
+    """Solve a model or a discrete problem until the independent error is below `tolerance`.
+
+    solver: by default the portfolio `Auto`.  time_limit: seconds.  start: a solution of a
+    neighbouring problem.  callback(step, iterate) is called after every iterate, True stops; it
+    replaces the progress line that a terminal shows.  check: raise NotConverged (Interrupted
+    after Ctrl-C), which carries the best solution, instead of returning it.
+
+    A model is condensed for solvers that need the Delassus form; a FrictionProblem has the form
+    its owner chose, and the wrong one raises UnsupportedForm.
+    """
+    run = drive if isinstance(problem, FrictionProblem) else drive_any_form
+    options = {"tolerance": tolerance, "max_iterations": max_iterations,
+               "time_limit": time_limit, "start": start}  # fmt: skip
+    result = _solve(problem, solver, run, callback, options)
+    if check:
+        raise_unless_converged(result)
+    return result
+
+
+def solve_any_form(
+    problem: FrictionProblem | Model, solver: Solver | None = None, *,
+    callback: Callback | None = None, **options: Any,
+) -> FrictionSolution | ModelSolution:  # fmt: skip
+    """Solve like `solve` with check=False, condensing a FrictionProblem too where need be."""
+    return _solve(problem, solver, drive_any_form, callback, {"tolerance": 1e-8, **options})
+
+
+def _solve(
+    problem: FrictionProblem | Model, solver: Solver | None, run: Callable[..., Any],
+    callback: Callback | None, options: dict[str, Any],
+) -> Any:  # fmt: skip
+    """Assemble, drive, recover."""
+    model = None if isinstance(problem, FrictionProblem) else problem
+    if model is not None and not (hasattr(model, "assemble") and hasattr(model, "recover")):
+        raise InvalidInput(f"problem: expected a Model or a FrictionProblem, got {model!r}")
+    began = time.perf_counter()
+    discrete = problem if model is None else model.assemble()
+    assembled = time.perf_counter() - began
+    if isinstance(options.get("start"), ModelSolution):
+        options["start"] = options["start"].solution
+    with _progress(callback, options["tolerance"]) as seen:
+        found = run(discrete, solver, callback=seen, **options)
+    if model is None:
+        return found
+    return ModelSolution(model, found, model.recover(found), assembled)
+
+
+def drive_any_form(
+    problem: FrictionProblem, solver: Solver | None = None, **options: Any
+) -> FrictionSolution:
+    """`drive`, condensing a global problem for a solver that needs the Delassus form."""
+    if solver is None or solver.form is not Form.DELASSUS or problem.form is Form.DELASSUS:
+        return drive(problem, solver, **options)
+    began = time.perf_counter()
+    condensed = problem.condensed()
+    spent = time.perf_counter() - began
+    found = drive(condensed, solver, **options)
+    u, v = problem.velocity(found.r)
+    record = found.convergence
+    history = tuple(replace(step, seconds=step.seconds + spent) for step in record.history)
+    record = replace(record, seconds=record.seconds + spent, history=history)
+    return replace(found, problem=problem, u=u, v=v, convergence=record)
+
+
+def raise_unless_converged(result: FrictionSolution | ModelSolution) -> None:
+    """Raise NotConverged, or Interrupted after Ctrl-C, carrying the result."""
+    record = result.convergence
+    if record.outcome is Outcome.CONVERGED:
+        return
+    message = f"{record}. {record.outcome.advice}"
+    by_user = record.outcome is Outcome.STOPPED and record.detail == "by the user"
+    raise (Interrupted if by_user else NotConverged)(message, result)
+
+
+@contextmanager
+def _progress(callback: Callback | None, tolerance: float) -> Iterator[Callback | None]:
+    """A line on stderr with iteration, error and time, if that is a terminal."""
+    if callback is not None or not sys.stderr.isatty():
+        yield callback
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status("solving …", refresh_per_second=8) as line:
+        shown = 0.0  # drawing takes longer than a small solve: a few lines per second will do
+
+        def show(step: Step, iterate: Iterate) -> None:
+            nonlocal shown
+            if step.seconds < shown + 0.1:
+                return
+            shown = step.seconds
+            stage = f"[dim]{iterate.stage}[/dim]  " if iterate.stage else ""
+            line.update(
+                f"{stage}iteration {step.iteration}  error {step.error:.1e} "
+                f"[dim](goal {tolerance:.0e})[/dim]  {step.seconds:.1f} s"
+            )
+
+        yield show

@@ -1,0 +1,272 @@
+"""From the tables of a case file to a model and solver settings."""
+
+from __future__ import annotations
+
+import math
+import os
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import AmontonsError, FileFormatError, InvalidInput, MissingDependency
+from ..expressions import Expression
+from .overrides import apply_overrides
+from .settings import LIMITS, Settings, make_solver, method_class
+from .tables import Table
+
+if TYPE_CHECKING:
+    from ..contact import Obstacle
+    from ..fem import LinearElastic, Mesh
+    from ..model import Contact, Model
+
+TOP = ("title", "mesh", "material", "fix", "traction", "body_force", "contact", "solver")
+MAX_NODES = 50_000_000  # of a box: a typing error must not fill the memory
+LATER = {  # words of the format that this version can not serve
+    "neo-hookean": "large deformations are not available yet, use 'linear-elastic'",
+    "ciarlet-geymonat": "large deformations are not available yet, use 'linear-elastic'",
+    "dual-mortar": "contact between two bodies is not available yet, use 'nodal'",
+    "nitsche": "Nitsche's method is not available yet, use 'nodal'",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A model, the settings of the [solver] table, and a title."""
+
+    model: Model
+    settings: Settings
+    title: str
+    path: Path
+
+
+def read_case(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Case:
+    """The case in a TOML file; overrides such as "mesh.cells=32" replace single values.
+
+    Raises FileFormatError naming the file, the key, what was found and what was expected.
+    """
+    path = Path(path)
+    top = Table(str(path), "", apply_overrides(_load(path), overrides, str(path)))
+    top.only(*TOP)
+    title = top.text("title", path.stem if path.stem != "case" else path.parent.name)
+    return Case(_model(top, path, title), _settings(top), title, path)
+
+
+def _load(path: Path) -> dict[str, Any]:
+    try:
+        with path.open("rb") as file:
+            return tomllib.load(file)
+    except FileNotFoundError:
+        raise FileFormatError(f"{path}: no such file") from None
+    except IsADirectoryError:
+        raise FileFormatError(f"{path}: expected a TOML case file, this is a folder") from None
+    except OSError as reason:
+        raise FileFormatError(f"{path}: can not be read: {reason.strerror}") from None
+    except UnicodeDecodeError:
+        raise FileFormatError(f"{path}: expected UTF-8 text") from None
+    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as reason:
+        raise FileFormatError(f"{path}: not valid TOML: {reason}") from None
+
+
+# -------------------------------------------------------------------------------- model
+def _model(top: Table, path: Path, title: str) -> Model:
+    from ..model import Body, BodyForce, Fix, Model, Traction
+
+    mesh = _mesh(top.table("mesh"), path)
+    material = _materials(top.table("material"), mesh)
+    fixes = [_on_surface(Fix, table, mesh, free=True) for table in top.tables("fix")]
+    loads: list = [_on_surface(Traction, table, mesh) for table in top.tables("traction")]
+    for table in top.tables("body_force"):
+        table.only("value", "region")
+        region = table.text("region") if "region" in table.data else None
+        loads.append(BodyForce(_vector(table, "value", mesh), region=region))
+    if "contact" not in top.data:
+        raise top.error("contact", "missing, expected at least one table [[contact]]")
+    contacts = [_contact(table, mesh) for table in top.tables("contact")]
+    with _Blame(top, ""):
+        return Model([Body(mesh, material)], supports=fixes, contacts=contacts, loads=loads,
+                     name=title)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Blame:
+    """Turns what the layers below reject into a complaint about a key of the file."""
+
+    table: Table
+    key: str
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: type | None, error: BaseException | None, trace: object) -> None:
+        if isinstance(error, FileFormatError | MissingDependency):
+            return
+        if isinstance(error, InvalidInput):
+            raise self.table.error(self.key, str(error)) from error
+
+
+def _mesh(table: Table, path: Path) -> Mesh:
+    from ..fem import box, read_mesh
+
+    if ("box" in table.data) == ("file" in table.data):
+        raise table.error("", "expected either box, the sizes of a box, or file")
+    if "file" in table.data:
+        table.only("file")
+        name = path.parent / table.text("file")
+        if not name.is_file():
+            raise table.error("file", f"no such file: {name}")
+        with _Blame(table, "file"):
+            return read_mesh(str(name))
+    table.only("box", "cells", "kind")
+    size = table.numbers("box", (2, 3))
+    cells = table.need("cells", "a whole number or one per direction")
+    counts = cells if isinstance(cells, list) else [cells] * len(size)
+    if len(counts) != len(size) or not all(type(c) is int and c >= 1 for c in counts):
+        raise table.error("cells", f"expected a whole number >= 1, or {len(size)} of them, "
+                          f"got {cells!r}")  # fmt: skip
+    if math.prod(c + 1 for c in counts) > MAX_NODES:
+        raise table.error("cells", f"expected at most {MAX_NODES} nodes, got {cells!r}")
+    with _Blame(table, ""):
+        return box(size, counts, table.text("kind") if "kind" in table.data else None)
+
+
+def _materials(table: Table, mesh: Mesh) -> LinearElastic | dict[str, LinearElastic]:
+    """One material for all, [material.default], and one per region named otherwise."""
+    found = {region: _material(table.table(region)) for region in table.data}
+    if not found:
+        raise table.error("", "expected a table [material.default]")
+    if set(found) == {"default"}:
+        return found["default"]
+    if "default" in found and "default" not in mesh.regions:
+        found = {region: found.get(region, found["default"]) for region in mesh.regions} | {
+            region: law for region, law in found.items() if region != "default"
+        }
+    return found
+
+
+def _material(table: Table) -> LinearElastic:
+    from ..model import LinearElastic
+
+    table.only("law", "young", "poisson", "plane", "density")
+    _available(table, "law", ("linear-elastic",), ("neo-hookean", "ciarlet-geymonat"))
+    if "density" in table.data and not table.number("density") > 0:  # read by dynamics only
+        raise table.error("density", f"expected a number > 0, got {table.data['density']!r}")
+    young, poisson = table.number("young"), table.number("poisson")
+    with _Blame(table, ""):
+        return LinearElastic(
+            young, poisson, table.choice("plane", ("strain", "stress"), "strain")
+        )
+
+
+def _available(table: Table, key: str, now: Sequence[str], later: Sequence[str]) -> str:
+    """A word that may belong to what is planned but not there."""
+    word = table.choice(key, (*now, *later), now[0])
+    if word in later:
+        raise table.error(key, f"'{word}': {LATER[word]}")
+    return word
+
+
+def _contact(table: Table, mesh: Mesh) -> Contact:
+    from ..model import Contact
+
+    table.only("slave", "obstacle", "master", "friction", "method")
+    _available(table, "method", ("nodal",), ("dual-mortar", "nitsche"))
+    slave = table.text("slave")
+    if ("obstacle" in table.data) == ("master" in table.data):
+        raise table.error("", "expected either obstacle or master")
+    friction = table.table("friction")
+    friction.only("coulomb", "tresca")
+    if len(friction.data) != 1:
+        raise friction.error("", "expected either coulomb, a coefficient, or tresca, a stress")
+    key = next(iter(friction.data))
+    law = {"coulomb": "mu", "tresca": "tresca"}[key]
+    value = _scalar(friction, key)
+    if isinstance(value, float) and value < 0:
+        raise friction.error(key, f"expected a number >= 0, got {value}")
+    with _Blame(table, ""):
+        if "master" in table.data:
+            return Contact(slave, master=table.text("master"), **{law: value})
+        return Contact(slave, _obstacle(table.table("obstacle"), mesh.dim), **{law: value})
+
+
+def _obstacle(table: Table, dim: int) -> Obstacle:
+    from ..contact import LevelSet, Plane, Sphere
+
+    table.only("plane", "sphere", "level_set")
+    if len(table.data) != 1:
+        raise table.error("", "expected one of plane, sphere, level_set")
+    kind = next(iter(table.data))
+    if kind == "level_set":
+        function = _scalar(table, "level_set")
+        if isinstance(function, float):
+            raise table.error(kind, f"expected an expression in x, y, z, got {function}")
+        return LevelSet(function)
+    inner = table.table(kind)
+    with _Blame(inner, ""):
+        if kind == "plane":
+            inner.only("point", "normal")
+            point = inner.numbers("point", (dim,)) if "point" in inner.data else None
+            return Plane(normal=inner.numbers("normal", (dim,)), point=point)
+        inner.only("center", "radius")
+        return Sphere(center=inner.numbers("center", (dim,)), radius=inner.number("radius"))
+
+
+# ------------------------------------------------------------------------------- values
+def _on_surface(kind: type, table: Table, mesh: Mesh, *, free: bool = False) -> Any:
+    table.only("on", "value")
+    on = table.text("on")
+    value = _vector(table, "value", mesh, free=free)
+    with _Blame(table, "on"):
+        mesh.surface(on)
+    return kind(on, value)
+
+
+def _vector(table: Table, key: str, mesh: Mesh, *, free: bool = False) -> list:
+    """One number, expression or, for supports, "free" (None) per component."""
+    words = "numbers or expressions" + (' or "free"' if free else "")
+    values = table.need(key, f"a list of {mesh.dim} {words}")
+    if not isinstance(values, list) or len(values) != mesh.dim:
+        raise table.error(key, f"expected a list of {mesh.dim} {words}, got {values!r}")
+    return [
+        None if free and value == "free" else _entry(table, f"{key}[{k}]", value, mesh.dim)
+        for k, value in enumerate(values)
+    ]
+
+
+def _scalar(table: Table, key: str) -> float | Expression:
+    return _entry(table, key, table.need(key, "a number or an expression"), 3)
+
+
+def _entry(table: Table, key: str, value: Any, dim: int) -> float | Expression:
+    """A finite number, or an expression; one without variables is a number at once."""
+    if not isinstance(value, str):
+        return table.as_number(key, value)
+    try:
+        expression = Expression(value)
+        if dim == 2 and "z" in expression.names:
+            raise InvalidInput(f"expression {value!r}: 'z' does not exist in 2D")
+        return expression if expression.names else float(expression([0.0, 0.0, 0.0]))
+    except AmontonsError as reason:
+        raise table.error(key, str(reason)) from None
+
+
+# ------------------------------------------------------------------------------- solver
+def _settings(top: Table) -> Settings:
+    table = top.table("solver") if "solver" in top.data else Table(top.file, "solver", {})
+    method = table.text("method", "auto")
+    tolerance = table.number("tolerance", 1e-8)
+    if not 0 < tolerance < 1:
+        raise table.error("tolerance", f"expected a number between 0 and 1, got {tolerance}")
+    limits = [table.whole(key) for key in LIMITS]
+    seconds = table.number("time_limit") if "time_limit" in table.data else None
+    if seconds is not None and not seconds > 0:
+        raise table.error("time_limit", f"expected seconds > 0, got {seconds}")
+    used = ("method", "tolerance", "time_limit", *LIMITS)
+    options = {key: value for key, value in table.data.items() if key not in used}
+    with _Blame(table, ""):
+        method_class(method)
+    with _Blame(top, ""):
+        make_solver(method, options)
+    limit = next((value for value in limits if value is not None), None)
+    return Settings(method, tolerance, limit, seconds, options)

@@ -1,0 +1,63 @@
+"""Single values set on the command line: `mesh.cells=32`, `contact.friction.coulomb=0.5`."""
+
+from __future__ import annotations
+
+import copy
+import tomllib
+from collections.abc import Sequence
+from typing import Any
+
+from ..errors import InvalidInput
+
+
+def split_override(text: str) -> tuple[list[str], Any]:
+    """Dotted path and value of "a.b=value"; the value is read as TOML, else as a text."""
+    key, sign, value = text.partition("=")
+    path = [part.strip() for part in key.split(".")]
+    if not sign or not all(path):
+        raise InvalidInput(f"--set {text}: expected key=value, such as mesh.cells=32")
+    return path, _value(value.strip())
+
+
+def _value(text: str) -> Any:
+    try:
+        found = tomllib.loads(f"value = {text}")
+    except (tomllib.TOMLDecodeError, RecursionError, ValueError):
+        return text
+    return found["value"] if set(found) == {"value"} else text
+
+
+def apply_overrides(
+    data: dict[str, Any], overrides: Sequence[str], file: str
+) -> dict[str, Any]:
+    """A copy of the data of a case file with some values replaced or added.
+
+    A list of tables takes an index, `fix.0.on=top`; the only one needs none.
+    """
+    data = copy.deepcopy(data)
+    for text in overrides:
+        path, value = split_override(text)
+        _set(data, path, value, f"{file}: --set {text}")
+    return data
+
+
+def _set(data: dict[str, Any], path: list[str], value: Any, blame: str) -> None:
+    node: Any = data
+    for k, part in enumerate(path):
+        last = k == len(path) - 1
+        if isinstance(node, list) and not part.isdigit() and len(node) == 1:
+            node = node[0]
+        if isinstance(node, list):
+            if not part.isdigit() or int(part) >= len(node):
+                raise InvalidInput(
+                    f"{blame}: expected an index from 0 to {len(node) - 1}, got '{part}'"
+                )
+            key: Any = int(part)
+        elif isinstance(node, dict):
+            key = part
+        else:
+            raise InvalidInput(f"{blame}: '{path[k - 1]}' is a value, it has no '{part}'")
+        if last:
+            node[key] = value
+        else:
+            node = node.setdefault(key, {}) if isinstance(node, dict) else node[key]

@@ -1,0 +1,143 @@
+"""The command line.  Only click is imported here, so that `amontons --help` is immediate."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from .. import __version__
+from .group import Commands
+
+EPILOG = """\b
+Examples:
+  amontons solve example:cube                 a built-in model, results in cube-results/
+  amontons solve KaplasTower.hdf5 --tolerance 1e-6
+  amontons solve case.toml --set mesh.cells=32 --set contact.friction.coulomb=0.5
+  amontons info problem.hdf5                  what is in there, and which methods fit
+  amontons bench *.hdf5 --methods gauss-seidel,auto --tolerances 1e-3,1e-6
+
+\b
+Exit codes: 0 converged, 1 not converged (results are written all the same),
+2 bad input (nothing is written), 130 interrupted (the best state is written).
+"""
+SOURCE_HELP = """SOURCE is a TOML case file, an FCLib HDF5 file, or example:NAME."""
+
+
+@click.group(
+    cls=Commands, epilog=EPILOG, context_settings={"help_option_names": ["-h", "--help"]}
+)
+@click.version_option(__version__, prog_name="amontons")
+def main() -> None:
+    """Frictional contact mechanics: from a mesh, a case file or an FCLib problem to a solution.
+
+    Each answer is judged by an error measure that no solver computes for itself and that does
+    not depend on units.  `amontons COMMAND --help` explains a command.
+    """
+
+
+@main.command(
+    epilog="""\b
+Examples:
+  amontons solve example:cube --set mesh.cells=8 -o out
+  amontons solve case.toml --method semismooth-newton --set solver.halvings=20
+  amontons solve problem.hdf5 --quiet --json - | jq .error
+"""
+)
+@click.argument("source")
+@click.option("--method", metavar="NAME", help="Solver, such as auto or gauss-seidel.")
+@click.option("--tolerance", type=float, metavar="X", help="Unit-free error to reach. [1e-8]")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
+              help="Replace a value of the case, mesh.cells=32, or of the solver, "
+              "solver.batch=10; may be repeated.")  # fmt: skip
+@click.option("--max-iterations", type=click.IntRange(min=1), metavar="N",
+              help="Stop after N iterations.")  # fmt: skip
+@click.option("--time-limit", type=float, metavar="SECONDS", help="Stop after that time.")
+@click.option("-o", "--output", "folder", type=click.Path(path_type=Path), metavar="DIR",
+              help="Folder for the results. [name of the source with -results]")  # fmt: skip
+@click.option("--json", "json_copy", metavar="FILE",
+              help="A copy of solution.json; - prints it and nothing else.")  # fmt: skip
+@click.option("--quiet", is_flag=True, help="No progress, no summary.")
+def solve(**options: object) -> int:
+    """Solve a problem and write the results.
+
+    SOURCE is a TOML case file, an FCLib HDF5 file, or example:NAME.  Writes solution.json,
+    solution.h5, status.png, convergence.png and, for models, solution.vtu into DIR.
+    """
+    from .solve import run
+
+    return run(**options)  # type: ignore[arg-type]
+
+
+@main.command()
+@click.argument("source")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
+              help="Replace a value of the case.")  # fmt: skip
+@click.option("--json", "json_copy", metavar="FILE", help="The same as JSON; - prints it.")
+def info(**options: object) -> None:
+    """Say what a problem is: sizes, rank, density, friction, scales, methods that fit.
+
+    SOURCE is a TOML case file, an FCLib HDF5 file, or example:NAME.
+    """
+    from .info import run
+
+    run(**options)  # type: ignore[arg-type]
+
+
+@main.command(
+    epilog="""\b
+Examples:
+  amontons convert global.hdf5 local.hdf5 --form local
+  amontons convert case.toml problem.hdf5
+"""
+)
+@click.argument("source")
+@click.argument("target", type=click.Path(path_type=Path))
+@click.option("--form", type=click.Choice(["local", "global"]),
+              help="local: W, q; global: M, H, f, w. [the form it has]")  # fmt: skip
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
+              help="Replace a value of the case.")  # fmt: skip
+def convert(**options: object) -> None:
+    """Write a problem as an FCLib file, in either form.
+
+    SOURCE is a TOML case file, an FCLib HDF5 file, a results folder, or example:NAME.
+    """
+    from .convert import run
+
+    run(**options)  # type: ignore[arg-type]
+
+
+@main.command(
+    epilog="""\b
+Example:
+  amontons bench *.hdf5 --methods gauss-seidel,auto --tolerances 1e-3,1e-6 --profile p.png
+"""
+)
+@click.argument("files", nargs=-1, required=True, metavar="FILES…")
+@click.option("--methods", default="auto", show_default=True, metavar="A,B,…", help="Solvers.")
+@click.option("--tolerances", default="1e-3,1e-6", show_default=True, metavar="X,Y,…",
+              help="Errors to reach.")  # fmt: skip
+@click.option("--time-limit", type=float, default=60.0, show_default=True, metavar="SECONDS",
+              help="For each solve; a method that misses it has failed.")  # fmt: skip
+@click.option("--profile", type=click.Path(path_type=Path), metavar="FILE.png",
+              help="Draw Dolan-Moré performance profiles.")  # fmt: skip
+@click.option("--json", "json_copy", metavar="FILE", help="All times as JSON; - prints them.")
+def bench(**options: object) -> None:
+    """Compare methods on many problems: times to reach a tolerance, side by side.
+
+    Times are those of a second run (the first one compiles), from the problem as read to a
+    solution that the judge accepts; the best of several where they are short.
+    """
+    from .bench import run
+
+    run(**options)  # type: ignore[arg-type]
+
+
+@main.command()
+def examples() -> None:
+    """List the built-in examples; solve one with `amontons solve example:NAME`."""
+    from .sources import examples as known
+
+    width = max(len(name) for name in known())
+    for name, line in known().items():
+        click.echo(f"{name:<{width}}  {line}")

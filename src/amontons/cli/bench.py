@@ -1,0 +1,167 @@
+"""`amontons bench`: times to reach a tolerance, side by side, and performance profiles."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import click
+import numpy as np
+
+from .. import api, output
+from ..analysis.profiles import performance_profile
+from ..case import Settings
+from ..errors import InvalidInput, SingularOperator, UnsupportedForm
+from ..files import replacing
+from ..problem import Form, FrictionProblem
+from ..solution import Outcome
+from .sources import open_source, with_flags
+from .terminal import check_writable, deliver_json, show_table
+
+SCHEMA = "amontons/bench/1"
+REPEATS = 5
+BUDGET = 2.0  # seconds after which a solve is not repeated again
+
+
+@dataclass(frozen=True)
+class Timing:
+    """One method on one file to one tolerance; seconds is infinite when it failed."""
+
+    file: str
+    method: str
+    tolerance: float
+    seconds: float
+    outcome: str
+    error: float
+    iterations: int
+
+
+def run(
+    files: Sequence[str], methods: str, tolerances: str, time_limit: float,
+    profile: Path | None, json_copy: str | None,
+) -> None:  # fmt: skip
+    """Check all input, solve all, show."""
+    check_writable(profile)
+    check_writable(json_copy)
+    names = _words("methods", methods)
+    goals = [_tolerance(text) for text in _words("tolerances", tolerances)]
+    sources = {file: open_source(file) for file in files}
+    for source in sources.values():
+        for name in names:
+            with_flags(source.settings, name, goals[0], time_limit=time_limit)
+    timings = []
+    for file, source in sources.items():
+        problem = source.discrete()
+        for goal in goals:
+            for name in names:
+                timings.append(_time(file, problem, name, goal, time_limit))
+                if json_copy != "-":
+                    click.echo(f"\r\x1b[K{source.name}  {name}  {goal:g}", err=True, nl=False)
+    if json_copy != "-":
+        click.echo("\r\x1b[K", err=True, nl=False)
+        _show(timings, names, goals)
+    if profile is not None:
+        _draw(timings, names, goals, profile)
+    if json_copy is not None:
+        rows = [asdict(timing) for timing in timings]
+        data = {"schema": SCHEMA, "versions": output.versions(), "results": rows}
+        deliver_json(output.to_json(data), json_copy)
+
+
+def _words(option: str, text: str) -> list[str]:
+    words = [word.strip() for word in text.split(",") if word.strip()]
+    if not words:
+        raise InvalidInput(f"{option}: expected words with commas between them, got {text!r}")
+    return words
+
+
+def _tolerance(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 < value < 1:
+        raise InvalidInput(f"tolerances: expected numbers between 0 and 1, got {text!r}")
+    return value
+
+
+def _fresh(problem: FrictionProblem) -> FrictionProblem:
+    """The problem as read: nothing factored or condensed; W is in blocks, as after reading."""
+    fresh = replace(problem, _shared={})
+    if fresh.form is Form.DELASSUS:
+        _ = fresh.kernel_data
+    return fresh
+
+
+def _time(
+    file: str, problem: FrictionProblem, method: str, tolerance: float, limit: float
+) -> Timing:
+    """Best time of some runs after one that compiles."""
+    settings = with_flags(Settings(), method, tolerance, time_limit=limit)
+    best, found, spent = math.inf, None, 0.0
+    for attempt in range(1 + REPEATS):
+        fresh = _fresh(problem)
+        began = time.perf_counter()
+        try:
+            found = api.solve_any_form(
+                fresh, settings.solver(), tolerance=tolerance, time_limit=limit,
+                callback=lambda step, iterate: None,
+            )  # fmt: skip
+        except (UnsupportedForm, SingularOperator, InvalidInput) as reason:
+            return Timing(file, method, tolerance, math.inf, str(reason), math.inf, 0)
+        seconds = time.perf_counter() - began
+        record = found.convergence
+        if record.outcome is Outcome.STOPPED:
+            raise KeyboardInterrupt
+        converged = record.outcome is Outcome.CONVERGED
+        if attempt > 0 or seconds > BUDGET:
+            best = min(best, seconds if converged else math.inf)
+            spent += seconds
+        if spent > BUDGET or (attempt > 0 and not converged):
+            break
+    name = record.outcome.name.lower()
+    return Timing(file, method, tolerance, best, name, record.error, record.iterations)
+
+
+# ------------------------------------------------------------------------------ showing
+def _show(timings: list[Timing], names: list[str], goals: list[float]) -> None:
+    """One line per file and tolerance, one column per method."""
+    table = {(t.file, t.tolerance, t.method): t for t in timings}
+    rows = []
+    for file in dict.fromkeys(t.file for t in timings):
+        for goal in goals:
+            cells = [table[file, goal, name] for name in names]
+            best = min(cell.seconds for cell in cells)
+            rows.append([Path(file).stem, f"{goal:g}", *[_cell(cell, best) for cell in cells]])
+    show_table("Time to solution", ["problem", "tolerance", *names], rows)
+    solved = [
+        f"{name} {sum(math.isfinite(t.seconds) for t in timings if t.method == name)}"
+        for name in names
+    ]
+    click.echo(f"solved of {len(timings) // len(names)}: {', '.join(solved)}")
+
+
+def _cell(timing: Timing, best: float) -> str:
+    if not math.isfinite(timing.seconds):
+        failed = timing.outcome.replace("_", " ")
+        return f"[red]{failed if len(failed) < 20 else 'does not fit'}[/red]"
+    text = f"{1e3 * timing.seconds:.3g} ms" if timing.seconds < 1 else f"{timing.seconds:.3g} s"
+    return f"[bold]{text}[/bold]" if timing.seconds == best else text
+
+
+def _draw(timings: list[Timing], names: list[str], goals: list[float], path: Path) -> None:
+    """One panel per tolerance."""
+    from ..plots import profile_figure
+
+    profiles = {}
+    for goal in goals:
+        columns = [
+            [t.seconds for t in timings if t.method == name and t.tolerance == goal]
+            for name in names
+        ]
+        profiles[goal] = performance_profile(np.array(columns).T)
+    with replacing(path) as temporary:
+        profile_figure(profiles, names).savefig(temporary)

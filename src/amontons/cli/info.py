@@ -1,0 +1,114 @@
+"""`amontons info`: what a problem is, and which methods fit it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..cones import Tresca
+from ..errors import InvalidInput, SingularOperator
+from ..output import to_json
+from ..problem import Form, FrictionProblem
+from ..solvers import METHODS
+from .sources import open_source
+from .terminal import check_writable, deliver_json, show_table
+
+RANK_LIMIT = 2000  # rows of W up to which its singular values are computed
+
+
+def run(source: str, overrides: Sequence[str], json_copy: str | None) -> None:
+    """Print the table, or the JSON."""
+    check_writable(json_copy)
+    opened = open_source(source, overrides)
+    facts = describe(opened.discrete())
+    facts = {"name": opened.name, **facts}
+    if json_copy != "-":
+        show_table(opened.title, ["", ""], [[k, _text(v)] for k, v in facts.items()], "left")
+    if json_copy is not None:
+        deliver_json(to_json(facts), json_copy)
+
+
+def describe(problem: FrictionProblem) -> dict[str, Any]:
+    """Facts about a problem by name; W is looked at only where it is cheap to form."""
+    facts: dict[str, Any] = {
+        "form": problem.form.value, "dimension": problem.dimension,
+        "contacts": problem.contacts, "unknowns": problem.unknowns,
+    }  # fmt: skip
+    if problem.form is Form.GLOBAL:
+        assert problem.M is not None and problem.H is not None
+        facts |= {"entries of M": problem.M.nnz, "entries of H": problem.H.nnz,
+                  "asymmetry of M": _asymmetry(problem.M)}  # fmt: skip
+    coefficient = problem.law.coefficient
+    name = "friction bound" if isinstance(problem.law, Tresca) else "friction coefficient"
+    facts[name] = [float(coefficient.min(initial=math.inf)), float(coefficient.max(initial=0))]
+    facts |= _delassus_facts(problem)
+    facts["scales (a guess)"] = _scales(problem)
+    facts["methods that fit"] = fitting_methods(problem)
+    return facts
+
+
+def _delassus_facts(problem: FrictionProblem) -> dict[str, Any]:
+    """Density, asymmetry and rank of W."""
+    if not problem.contacts:
+        return {}
+    try:
+        if not problem.condensing_is_cheap:
+            return {"W": "not formed, too large"}
+        local = problem.condensed()
+    except (SingularOperator, InvalidInput) as reason:
+        return {"W": str(reason)}
+    assert local.W is not None
+    facts: dict[str, Any] = {
+        "density of W (blocks)": local.blocks.density,
+        "asymmetry of W": _asymmetry(local.W),
+    }
+    m = local.W.shape[0]
+    if m <= RANK_LIMIT:
+        dense = local.W if isinstance(local.W, np.ndarray) else local.W.toarray()
+        values = np.linalg.svd(dense, compute_uv=False)
+        rank = int((values > m * np.finfo(float).eps * values[0]).sum()) if values.size else 0
+        facts["rank of W"] = f"{rank} of {m}"
+    return facts
+
+
+def _asymmetry(matrix: Any) -> float:
+    """max |A - A^T| / max |A|."""
+    size = abs(matrix).max() if matrix.shape[0] else 0.0
+    return float(abs(matrix - matrix.T).max() / size) if size else 0.0
+
+
+def _scales(problem: FrictionProblem) -> str:
+    """What the sizes suggest; files do not record units."""
+    rho = problem.rho[problem.rho > 0]
+    if not rho.size:
+        return "no contact can react"
+    stiffness = f"1/|W_ii| from {rho.min():.2g} to {rho.max():.2g}"
+    if problem.form is Form.GLOBAL and problem.small_blocks is None:
+        return f"elastic bodies, u probably displacements; local stiffness {stiffness}"
+    if problem.form is Form.GLOBAL:
+        return f"rigid bodies, u probably velocities and r impulses; effective mass {stiffness}"
+    return f"u probably velocities and r impulses; effective mass {stiffness}"
+
+
+def fitting_methods(problem: FrictionProblem) -> list[str]:
+    """Methods of this form, or that this command line reaches by condensing."""
+    names = []
+    for name, kind in METHODS.items():
+        fits = kind.form in (Form.ANY, problem.form)
+        if fits or (kind.form is Form.DELASSUS and problem.condensing_is_cheap):
+            names.append(name if fits else f"{name} (after condensing)")
+    return names
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.3g}"
+    if isinstance(value, list):
+        if all(isinstance(item, float) for item in value):
+            low, high = value
+            return f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
+        return ", ".join(map(str, value))
+    return str(value)

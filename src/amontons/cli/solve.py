@@ -1,0 +1,74 @@
+"""`amontons solve`: solve, judge, write, summarise."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+
+from .. import api, output
+from ..results import ModelSolution
+from ..solution import FrictionSolution, Outcome
+from .group import INTERRUPTED
+from .sources import Source, open_source, with_flags
+from .terminal import check_folder, check_writable
+
+
+def run(
+    source: str, method: str | None, tolerance: float | None, overrides: Sequence[str],
+    max_iterations: int | None, time_limit: float | None, folder: Path | None,
+    json_copy: str | None, quiet: bool,
+) -> int:  # fmt: skip
+    """Solve and write; returns the exit code."""
+    opened = open_source(source, overrides)
+    settings = with_flags(opened.settings, method, tolerance, max_iterations, time_limit)
+    folder = folder if folder is not None else Path(f"{opened.name}-results")
+    check_folder(folder)
+    check_writable(json_copy)
+    silent = quiet or json_copy == "-"
+    found = api.solve_any_form(
+        opened.target, settings.solver(), tolerance=settings.tolerance,
+        max_iterations=settings.max_iterations, time_limit=settings.time_limit,
+        callback=(lambda step, iterate: None) if silent else None,
+    )  # fmt: skip
+    result = _output(opened, found, settings.method)
+    copy = None if json_copy in (None, "-") else Path(str(json_copy))
+    output.save(result, folder, copy)
+    if json_copy == "-":
+        click.echo(output.to_json(output.summary(result)), nl=False)
+    elif not quiet:
+        _report(result, folder)
+    return _finish(found)
+
+
+def _output(
+    source: Source, found: FrictionSolution | ModelSolution, method: str
+) -> output.Output:
+    if isinstance(found, ModelSolution):
+        return output.Output(found.solution, found.model, found.fields, source.title, method,
+                             found.assemble_seconds)  # fmt: skip
+    return output.Output(found, title=source.title, method=method,
+                         from_fclib=source.from_fclib)  # fmt: skip
+
+
+def _report(result: output.Output, folder: Path) -> None:
+    click.echo(output.describe(result))
+    click.echo(f"results in {folder}/")
+
+
+def _finish(found: FrictionSolution | ModelSolution) -> int:
+    """Exit code; what went wrong, and what to do about it, goes to stderr."""
+    record = found.convergence
+    if record.outcome is Outcome.CONVERGED:
+        return 0
+    sys.stdout.flush()
+    name = record.outcome.name.lower().replace("_", " ")
+    detail = f" ({record.detail})" if record.detail else ""
+    click.echo(
+        f"Not converged: {name}{detail}, error {record.error:.1e} > {record.tolerance:.0e}. "
+        f"{record.outcome.advice}", err=True,
+    )  # fmt: skip
+    by_user = record.outcome is Outcome.STOPPED and record.detail == "by the user"
+    return INTERRUPTED if by_user else 1

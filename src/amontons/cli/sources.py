@@ -1,0 +1,158 @@
+"""What a command works on: a case file, an FCLib file, or a built-in example."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..case import Settings, make_solver, method_class, read_case
+from ..case.overrides import split_override
+from ..case.settings import LIMITS
+from ..errors import FileFormatError, InvalidInput
+from ..expressions import nearest
+from ..problem import FrictionProblem
+
+if TYPE_CHECKING:
+    from ..model import Model
+
+HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+DATA = files("amontons") / "examples_data"
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A problem, or a model to assemble, with solver settings and a short name."""
+
+    name: str
+    title: str
+    problem: FrictionProblem | None = None
+    model: Model | None = None
+    from_fclib: bool = False
+    settings: Settings = field(default_factory=Settings)
+
+    @property
+    def target(self) -> Model | FrictionProblem:
+        """What `solve` takes."""
+        return self.model if self.model is not None else self.discrete()
+
+    def discrete(self) -> FrictionProblem:
+        """The discrete problem; assembles a model."""
+        if self.problem is not None:
+            return self.problem
+        assert self.model is not None
+        return self.model.assemble()
+
+
+def open_source(text: str, overrides: Sequence[str] = ()) -> Source:
+    """Read a SOURCE; overrides are those of --set."""
+    if text.startswith("example:"):
+        return _example(text.removeprefix("example:"), overrides)
+    path = Path(text)
+    if path.is_dir() and (path / "solution.h5").is_file():
+        path = path / "solution.h5"
+    if path.is_dir():
+        raise FileFormatError(f"{path}: expected a case or FCLib file, this is a folder")
+    if not path.exists():
+        hint = "" if path.suffix else "; built-in examples are written example:NAME"
+        raise FileFormatError(f"{path}: no such file{hint}")
+    if path.suffix.lower() == ".toml":
+        return _case(path, path.stem, overrides)
+    return _fclib(path, overrides)
+
+
+def _case(path: Path, name: str, overrides: Sequence[str]) -> Source:
+    case = read_case(path, overrides)
+    return Source(name, case.title, model=case.model, settings=case.settings)
+
+
+def _fclib(path: Path, overrides: Sequence[str]) -> Source:
+    from ..fclib import read_fclib
+
+    try:
+        with path.open("rb") as file:
+            known = file.read(8) == HDF5_SIGNATURE or path.suffix.lower() in (".hdf5", ".h5")
+    except OSError as reason:
+        raise FileFormatError(f"{path}: can not be read: {reason.strerror}") from None
+    if not known:
+        raise FileFormatError(
+            f"{path}: expected a TOML case file (.toml) or an FCLib HDF5 file, this is neither"
+        )
+    problem = read_fclib(path)
+    settings = override_settings(Settings(), overrides)
+    return Source(path.stem, path.stem, problem=problem, from_fclib=True, settings=settings)
+
+
+def override_settings(settings: Settings, overrides: Sequence[str]) -> Settings:
+    """Settings changed by `solver.field=value`; `make_solver` checks the fields."""
+    for text in overrides:
+        path, value = split_override(text)
+        if path[0] != "solver" or len(path) != 2:
+            raise InvalidInput(
+                f"--set {text}: expected solver.FIELD=VALUE, as this is not a case file"
+            )
+        key = path[1]
+        if key in LIMITS:
+            if type(value) is not int or value < 1:
+                raise InvalidInput(f"--set {text}: expected a whole number >= 1")
+            settings = replace(settings, max_iterations=value)
+        elif key in ("tolerance", "time_limit"):
+            if not isinstance(value, int | float) or isinstance(value, bool):
+                raise InvalidInput(f"--set {text}: expected a number")
+            settings = replace(settings, **{key: float(value)})
+        elif key == "method":
+            method_class(str(value))
+            settings = replace(settings, method=str(value))
+        else:
+            settings = replace(settings, options={**settings.options, key: value})
+    return settings
+
+
+def with_flags(
+    settings: Settings, method: str | None, tolerance: float | None,
+    max_iterations: int | None = None, time_limit: float | None = None,
+) -> Settings:  # fmt: skip
+    """Settings with the flags of the command line, which win; the solver is checked here."""
+    if method is not None:
+        method_class(method)
+        settings = replace(settings, method=method)
+    for key, value in (("tolerance", tolerance), ("max_iterations", max_iterations),
+                       ("time_limit", time_limit)):  # fmt: skip
+        if value is not None:
+            settings = replace(settings, **{key: value})
+    if not 0 < settings.tolerance < 1:
+        raise InvalidInput(
+            f"tolerance: expected a number between 0 and 1, got {settings.tolerance}"
+        )
+    if settings.time_limit is not None and not settings.time_limit > 0:
+        raise InvalidInput(f"time-limit: expected seconds > 0, got {settings.time_limit}")
+    make_solver(settings.method, settings.options)
+    return settings
+
+
+# ----------------------------------------------------------------------------- examples
+def examples() -> dict[str, str]:
+    """Names of the built-in examples and one line about each."""
+    from ..gallery import GALLERY
+
+    found = {}
+    for file in DATA.iterdir():
+        if file.name.endswith(".toml"):
+            found[file.name[:-5]] = tomllib.loads(file.read_text(encoding="utf-8"))["title"]
+    found |= {name: (make.__doc__ or "").splitlines()[0] for name, make in GALLERY.items()}
+    return dict(sorted(found.items()))
+
+
+def _example(name: str, overrides: Sequence[str]) -> Source:
+    from ..gallery import GALLERY
+
+    if name in GALLERY:
+        settings = override_settings(Settings(), overrides)
+        return Source(name, name, problem=GALLERY[name](), settings=settings)
+    known = examples()
+    if name not in known:
+        raise InvalidInput(f"example:{name}: no such example{nearest(name, known)}")
+    return _case(Path(str(DATA / f"{name}.toml")), name, overrides)

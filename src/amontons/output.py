@@ -1,0 +1,238 @@
+"""Solutions as files: VTK, HDF5, JSON and figures, each complete or not there at all."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import platform
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import InvalidInput
+from .files import replacing
+from .solution import FrictionSolution
+from .solvers import METHODS
+
+if TYPE_CHECKING:
+    from .model import ContactFields, Model
+
+Array = NDArray[np.float64]
+SCHEMA = "amontons/solution/1"
+LIBRARIES = ("amontons", "numpy", "scipy", "numba", "ngsolve")
+FIGURES = (".png", ".svg", ".pdf")
+
+
+@dataclass(frozen=True, eq=False)
+class Output:
+    """A solution and what is known about where it comes from.
+
+    model and fields go together; from_fclib: the HDF5 file is then an FCLib file as well.
+    """
+
+    solution: FrictionSolution
+    model: Model | None = None
+    fields: ContactFields | None = None
+    title: str = ""
+    method: str = ""  # as on the command line; empty: the name of the solver's class
+    assemble_seconds: float = 0.0
+    from_fclib: bool = False
+
+
+# ------------------------------------------------------------------------------- choosing
+def write(output: Output, path: str | os.PathLike[str]) -> None:
+    """Write one file; the suffix decides: .vtu, .h5 (or .hdf5), .json."""
+    writers = {".vtu": write_vtu, ".h5": write_h5, ".hdf5": write_h5, ".json": write_json}
+    suffix = Path(path).suffix.lower()
+    if suffix not in writers:
+        raise InvalidInput(
+            f"{path}: expected a name that ends in {', '.join(writers)}, got {suffix!r}"
+        )
+    with replacing(path) as temporary:
+        writers[suffix](output, temporary)
+
+
+def plot(output: Output, path: str | os.PathLike[str]) -> None:
+    """Draw the status figure; the suffix decides: .png, .svg, .pdf."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in FIGURES:
+        raise InvalidInput(
+            f"{path}: expected a name that ends in {', '.join(FIGURES)}, got {suffix!r}"
+        )
+    with replacing(path) as temporary:
+        plot_status(output, temporary)
+
+
+def plot_status(output: Output, path: Path) -> None:
+    """Write status.png."""
+    from .plots import status_figure
+
+    status_figure(output.solution, output.fields, output.title, output.model).savefig(path)
+
+
+def plot_convergence(output: Output, path: Path) -> None:
+    """Write convergence.png."""
+    from .plots import convergence_figure
+
+    convergence_figure(output.solution.convergence, output.title).savefig(path)
+
+
+def save(
+    output: Output, folder: str | os.PathLike[str], copy: str | os.PathLike[str] | None = None
+) -> list[Path]:
+    """Write all files of a solution into a folder, made if need be; returns their paths.
+
+    copy: where a second solution.json goes.  Nothing is renamed before all is written.
+    """
+    writers: dict[str, Callable[[Output, Path], None]] = {
+        "solution.json": write_json, "solution.h5": write_h5,
+        "status.png": plot_status, "convergence.png": plot_convergence,
+    }  # fmt: skip
+    if output.model is not None:
+        writers["solution.vtu"] = write_vtu
+    folder = Path(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as reason:
+        raise InvalidInput(f"{folder}: can not be made: {reason.strerror}") from None
+    jobs = [(folder / name, writer) for name, writer in writers.items()]
+    if copy is not None:
+        jobs.append((Path(copy), write_json))
+    with ExitStack() as stack:
+        for path, writer in jobs:
+            writer(output, stack.enter_context(replacing(path)))
+    return [path for path, _ in jobs]
+
+
+# ----------------------------------------------------------------------------------- JSON
+def summary(output: Output) -> dict[str, Any]:
+    """The record of a solve, schema amontons/solution/1; None for what is not finite."""
+    found, record = output.solution, output.solution.convergence
+    problem = found.problem
+    setup = record.history[0].seconds if record.history else 0.0
+    contacts = {"total": problem.contacts, **found.counts, "sliding": int(found.sliding.sum())}
+    resultant = None if output.fields is None else output.fields.resultant.tolist()
+    data = {
+        "schema": SCHEMA,
+        "title": output.title or problem.name,
+        "outcome": record.outcome.name.lower(),
+        "advice": record.outcome.advice,
+        "detail": record.detail,
+        "method": output.method or _method_name(record.solver),
+        "error": record.error,
+        "fclib_error": found.fclib_error,
+        "measure": record.measure.value,
+        "tolerance": record.tolerance,
+        "iterations": record.iterations,
+        "linear_iterations": record.linear_iterations,
+        "seconds": {
+            "assemble": output.assemble_seconds,
+            "setup": setup,  # factorisation and all else before the first judgement
+            "solve": record.seconds - setup,
+            "total": output.assemble_seconds + record.seconds,
+        },
+        "dimension": problem.dimension,
+        "unknowns": problem.unknowns,
+        "contacts": contacts,
+        "resultant": resultant,
+        "max_penetration": found.max_penetration,
+        "max_cone_violation": found.max_cone_violation,
+        "versions": versions(),
+    }
+    return finite(data)
+
+
+def _method_name(solver: str) -> str:
+    """Name on the command line of a solver's class, the class itself if it has none."""
+    return next((name for name, kind in METHODS.items() if kind.__name__ == solver), solver)
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python and of the libraries that are installed."""
+    found = {"python": platform.python_version()}
+    for name in LIBRARIES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def finite(value: Any) -> Any:
+    """The same data with None for numbers that JSON can not hold."""
+    if isinstance(value, dict):
+        return {key: finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    if isinstance(value, float | np.floating):
+        return float(value) if math.isfinite(value) else None
+    return value
+
+
+def to_json(data: Any) -> str:
+    """JSON text, strict: no NaN."""
+    return json.dumps(finite(data), indent=2, allow_nan=False) + "\n"
+
+
+def write_json(output: Output, path: Path) -> None:
+    """Write solution.json."""
+    path.write_text(to_json(summary(output)), encoding="utf-8")
+
+
+def describe(output: Output) -> str:
+    """What a person wants to know, in a few lines."""
+    lines = [str(output.solution)]
+    if output.fields is not None:
+        names = ("x", "y", "z")[: len(output.fields.resultant)]
+        pairs = zip(names, output.fields.resultant, strict=True)
+        force = ", ".join(f"{name} {value:.6g}" for name, value in pairs)
+        lines.append(f"resultant on the slave: {force}")
+        lines.append(f"largest pressure: {output.fields.pressure.max(initial=0.0):.6g}")
+    return "\n".join(lines)
+
+
+# ------------------------------------------------------------------------------ HDF5, VTK
+def write_h5(output: Output, path: Path) -> None:
+    """Write solution.h5: r, u, v, status, sliding, margin, and points, frames of a model.
+
+    The solution of an FCLib problem is written as an FCLib file, with the group /solution.
+    """
+    import h5py
+
+    from .fclib import write_fclib
+
+    found = output.solution
+    if output.from_fclib:
+        write_fclib(found.problem, path, solution=found)
+    with h5py.File(path, "a" if output.from_fclib else "w") as file:
+        file.attrs["schema"] = SCHEMA
+        file.attrs["outcome"] = found.convergence.outcome.name.lower()
+        file.attrs["error"] = found.convergence.error
+        file["r"], file["u"] = found.r, found.u
+        if found.v is not None:
+            file["v"] = found.v
+        file["status"] = found.status
+        file["sliding"] = found.sliding.astype(np.int8)
+        file["margin"] = found.margin
+        if output.model is not None and output.fields is not None:
+            fields = output.fields
+            file["points"], file["frames"] = fields.points, fields.frames
+            file["weights"] = fields.weights
+            for body, values in zip(output.model.bodies, fields.displacement, strict=True):
+                file[f"displacement/{body.name}"] = values
+
+
+def write_vtu(output: Output, path: Path) -> None:
+    """Write solution.vtu; raises InvalidInput for a problem without geometry."""
+    from .vtk import write_model
+
+    if output.model is None or output.fields is None:
+        raise InvalidInput("vtu: this solution has no mesh; write .h5 or .json")
+    write_model(output.model, output.fields, output.solution, path)
