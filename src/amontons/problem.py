@@ -30,7 +30,7 @@ from .linear.small_blocks import block_diagonal_inverse
 Array = NDArray[np.float64]
 Matrix = sparse.csr_array | sparse.csc_array | Array
 DENSE_LIMIT = 4e9  # bytes that condensed() may fill before it refuses
-EXACT_WORK = 2e7  # n * nc * d up to which W is formed to judge a global problem with coupled M
+EXACT_WORK = 2e6  # n * nc * d up to which W is formed to judge a global problem with coupled M
 
 
 class Form(Enum):

@@ -1,6 +1,7 @@
 """Solvers of the discrete problem, one file per family; a new one is a file and a line here."""
 
 from .base import Breakdown, Iterate, Solver, Target
+from .compressed import CompressedDelassus
 from .functions import AlartCurnier, ComplementarityFunction, JeanMoreau, NaturalMap
 from .gauss_seidel import GaussSeidel
 from .hybrid import Auto, Hybrid
@@ -9,6 +10,7 @@ from .smoothing import ProximalPoint, SmoothingNewton
 
 METHODS: dict[str, type] = {
     "auto": Auto,
+    "compressed-delassus": CompressedDelassus,
     "gauss-seidel": GaussSeidel,
     "hybrid": Hybrid,
     "proximal-point": ProximalPoint,
@@ -25,6 +27,7 @@ __all__ = [
     "Auto",
     "Breakdown",
     "ComplementarityFunction",
+    "CompressedDelassus",
     "GaussSeidel",
     "Hybrid",
     "Iterate",

@@ -1,0 +1,211 @@
+"""The portfolio on the Delassus form: what `Auto` runs there, one stage after another.
+
+    Coulomb   10 Gauss-Seidel sweeps; then sweeps, plain or with Anderson acceleration, as long
+              as their measured rate promises an end before smoothing Newton would be there, or
+              until they have cost as much as Newton would; smoothing Newton from the best point
+              and from zero; proximal point; plain sweeps worth the cost of Newton so far; again
+    Tresca    the same sweeps, then semismooth Newton
+
+Every stage starts from the best reaction so far, and is dropped when it does not help.  Costs
+are operation counts, so that the same problem takes the same path on every machine.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..blocks import spatial
+from ..cones import Tresca
+from ..errors import SingularOperator
+from ..judge import natural_error
+from ..problem import FrictionProblem
+from .base import Breakdown, Iterate, Target
+from .gauss_seidel import Acceleration, sweeps_inplace
+from .newton import SemismoothNewton
+from .smoothing import ProximalPoint, SmoothingNewton, Workspace
+
+Array = NDArray[np.float64]
+FIRST_SWEEPS = 10  # plain sweeps that every problem gets first
+DEPTH = 8  # past sweeps that Anderson acceleration combines
+CHUNK = 20  # sweeps between two looks at their rate
+LONGEST = 6000  # sweeps after which Newton gets its chance whatever the rate promises
+HOPELESS = 8.0  # sweeps that promise to cost this many times Newton are left at once
+NEWTON_STEPS = 120
+PATIENCE = 40  # Newton steps without halving the error
+SEMISMOOTH_CONTACTS = 600  # above, a dense factor costs more than it brings
+ROUNDS = 6  # repetitions of the last stages before Auto gives up
+# Nanoseconds measured on one core: only their ratios matter, and only roughly.
+SWEEP_BLOCK, SWEEP_CONTACT, HISTORY_CONTACT, PRODUCT, NEWTON_CONTACT = 3.0, 90.0, 200.0, 5.4, 700.0
+
+
+@dataclass(eq=False)
+class Portfolio:
+    """One run on the Delassus form; r is the best reaction so far, (nc, 3)."""
+
+    problem: FrictionProblem
+    target: Target
+    r: Array
+    error: float = math.inf  # of r, unit of u
+    latest: float = math.inf  # of the last reaction tried
+    budget: float = 0.0  # cost of Newton steps not yet matched by sweeps
+
+    def __post_init__(self) -> None:
+        self.error = self._judge(self.r)
+        self.goal = self.target.tolerance * self.problem.q_norm
+        self.kernel = (*self.problem.kernel_data[:6], self.problem.blocks.diagonal)
+
+    def stages(self) -> Iterator[Iterate]:
+        """All stages in the order of the module's text."""
+        yield self._plain(FIRST_SWEEPS)
+        yield from self._sweeping()
+        if isinstance(self.problem.law, Tresca):
+            yield from self._semismooth()
+            return
+        for round_ in range(ROUNDS):
+            yield from self._newton(round_)
+            yield from self._proximal(round_)
+            if round_ and self.problem.contacts <= SEMISMOOTH_CONTACTS:
+                yield from self._semismooth(steps=15)
+            yield from self._patient_sweeps()
+
+    # ---------------------------------------------------------------- stages
+    def _plain(self, sweeps: int) -> Iterate:
+        x = self.r.copy()
+        count = sweeps_inplace(*self.kernel, x, sweeps, 0.1 * self.goal)
+        return self._offer(x, count, "Gauss-Seidel")
+
+    def _sweeping(self) -> Iterator[Iterate]:
+        """Accelerated and plain sweeps, whichever falls faster, while they are worth it."""
+        memory = Acceleration(self.kernel, self.r, DEPTH)
+        plain = self.r.copy()  # not from accelerated points: they keep the slow modes
+        promise = {True: math.inf, False: math.inf}  # cost up to the goal, by acceleration
+        last = {True: self.error, False: self.error}
+        done, spent, small = {True: 0, False: 0}, 0.0, 0.3 * self.goal
+        accelerate = True
+        while sum(done.values()) < LONGEST:
+            chunk = max(CHUNK, done[accelerate] // 4)
+            if accelerate:
+                count, change = memory.sweep(chunk, small)
+                iterate = self._offer(memory.r.copy(), count, "Anderson Gauss-Seidel")
+            else:
+                count = sweeps_inplace(*self.kernel, plain, chunk, small)
+                change = small if count < chunk else math.inf
+                iterate = self._offer(plain.copy(), count, "Gauss-Seidel")
+            small *= 0.1 if change <= small else 1.0
+            yield iterate
+            cost = self.costs["accelerated" if accelerate else "sweep"]
+            promise[accelerate] = cost * self._sweeps_left(last[accelerate], count)
+            last[accelerate] = self.latest
+            done[accelerate] += count
+            spent += cost * count
+            best, newton = min(promise.values()), self._newton_cost()
+            if best > newton and done[True] >= 2 * CHUNK:
+                if not done[False]:  # plain sweeps win now and then: try them before leaving
+                    accelerate = False
+                    continue
+                if best > (1.0 if spent > newton else HOPELESS) * newton:
+                    return
+            accelerate = promise[True] <= promise[False]
+
+    def _sweeps_left(self, before: float, count: int) -> float:
+        """Sweeps to the goal at the rate of the last `count`, infinite without progress."""
+        rate = math.log(max(before, 1e-300) / max(self.latest, 1e-300)) / count
+        left = math.log(max(self.latest / self.goal, 1.0))
+        return left / rate if rate > 0 else math.inf
+
+    def _patient_sweeps(self) -> Iterator[Iterate]:
+        """Plain sweeps worth what Newton has cost so far, ended when 1000 of them gain little."""
+        x = self.r.copy()
+        while self.budget > 0:
+            start, count = self.error, 0
+            for _ in range(10):
+                done = sweeps_inplace(*self.kernel, x, 100, 0.1 * self.goal)
+                count += done
+                yield self._offer(x.copy(), done, "Gauss-Seidel")
+            self.budget -= count * self.costs["sweep"]
+            if self.error > 0.7 * start:
+                break
+        self.budget = 0.0
+
+    @cached_property
+    def work(self) -> Workspace:
+        """Symbolic factor, made when Newton is first thought of."""
+        return Workspace.of(self.problem)
+
+    @cached_property
+    def costs(self) -> dict[str, float]:
+        """Nanoseconds of a sweep, an accelerated sweep and a Newton step, by operation counts."""
+        blocks, contacts = len(self.problem.blocks.indices), self.problem.contacts
+        sweep = SWEEP_BLOCK * blocks + SWEEP_CONTACT * contacts
+        if isinstance(self.problem.law, Tresca):
+            newton = 0.3 * float(3 * contacts) ** 3
+        else:
+            newton = PRODUCT * self.work.symbolic.products + NEWTON_CONTACT * contacts
+            newton += 2 * SWEEP_BLOCK * blocks
+        history = HISTORY_CONTACT * contacts
+        return {"sweep": sweep, "accelerated": sweep + history, "newton": newton}
+
+    def _newton_cost(self) -> float:
+        """Nanoseconds that Newton will take: about three steps per decimal digit, and a start."""
+        digits = math.log10(max(self.error / self.goal, 1.0))
+        return self.costs["newton"] * (6 + 3 * digits)
+
+    def _newton(self, round_: int) -> Iterator[Iterate]:
+        """Smoothing Newton from the best point and from zero, in several variants."""
+        root = math.sqrt(self.problem.contacts)
+        nearby = max(self.error, self.goal) / root
+        afar = 0.1 * self.problem.q_norm / root
+        zero = np.zeros_like(self.r)
+        starts = [(self.r, nearby, 0.3), (zero, afar, 0.3)]
+        if self.problem.contacts <= 300 or round_:  # variants are cheap there
+            starts += [(self.r, 10 * nearby, 0.5), (zero, 10 * afar, 0.5)]
+        for origin, sigma, shrink in starts:
+            count, _, _, found = self.work.newton(
+                origin.copy(), sigma, SmoothingNewton(shrink=shrink), goal=0.5 * self.goal,
+                steps=NEWTON_STEPS, patience=PATIENCE,
+            )  # fmt: skip
+            self.budget += abs(count) * self.costs["newton"]
+            yield self._offer(found, abs(count), "smoothing Newton")
+
+    def _proximal(self, round_: int) -> Iterator[Iterate]:
+        """Proximal point while it makes progress."""
+        self.r = self.r.copy()
+        self.work.sweeps(self.r, 10)
+        self.error = self._judge(self.r)
+        mark, patience = self.error, 0
+        for iterate in ProximalPoint(alpha=1e-2 * 0.1**round_).steps(self.work, self.r):
+            self.budget += iterate.iterations * self.costs["newton"]
+            yield self._offer(spatial(iterate.r), iterate.iterations, "proximal point")
+            patience = 0 if self.error < 0.5 * mark else patience + 1
+            mark = min(mark, self.error) if patience == 0 else mark
+            if patience > 25:
+                return
+
+    def _semismooth(self, steps: int = 60) -> Iterator[Iterate]:
+        start = Iterate(self.r[:, : self.problem.dimension].copy())
+        try:
+            newton = SemismoothNewton().iterates(self.problem, start, self.target)
+            for iterate in islice(newton, steps):
+                yield self._offer(spatial(iterate.r), 1, "semismooth Newton")
+        except (Breakdown, SingularOperator):
+            return
+
+    # ---------------------------------------------------------------- bookkeeping
+    def _judge(self, r: Array) -> float:
+        return natural_error(*self.problem.kernel_data, r)
+
+    def _offer(self, x: Array, iterations: int, stage: str) -> Iterate:
+        """Keep x if it is better, and hand out the best."""
+        self.latest = error = self._judge(x)
+        if error < self.error:
+            self.r, self.error = x, error
+        return Iterate(
+            self.r[:, : self.problem.dimension].copy(), iterations=iterations, stage=stage
+        )
