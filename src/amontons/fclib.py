@@ -365,12 +365,19 @@ def write_fclib(
                 _put_matrix(root.create_group(name), _storage(problem, name))
         _put_texts(root.create_group("info"), problem, title, description)
         if solution is not None:
-            write_solution_group(file, solution)
+            _put_solution(file.create_group("solution"), solution)
 
 
-def write_solution_group(file: h5py.File, solution: FrictionSolution) -> None:
-    """FCLib's standard group /solution: r, u and, for the global form, v."""
-    group = file.create_group("solution")
+def write_arrays(path: Path, arrays: dict[str, NDArray], notes: dict[str, str | float]) -> None:
+    """Add datasets, and attributes of the file, to an HDF5 file that may not exist yet."""
+    with h5py.File(path, "a") as file:
+        file.attrs.update(notes)
+        for name, values in arrays.items():
+            file[name] = values
+
+
+def _put_solution(group: h5py.Group, solution: FrictionSolution) -> None:
+    """FCLib's standard group: r, u and, for the global form, v."""
     _put(group, "r", solution.r.ravel())
     _put(group, "u", solution.u.ravel())
     if solution.v is not None:

@@ -204,29 +204,20 @@ def write_h5(output: Output, path: Path) -> None:
 
     The solution of an FCLib problem is written as an FCLib file, with the group /solution.
     """
-    import h5py
+    from .fclib import write_arrays, write_fclib
 
-    from .fclib import write_fclib
-
-    found = output.solution
+    found, fields = output.solution, output.fields
+    arrays = {"r": found.r, "u": found.u, "v": found.v, "status": found.status,
+              "sliding": found.sliding.astype(np.int8), "margin": found.margin}  # fmt: skip
+    if output.model is not None and fields is not None:
+        arrays |= {"points": fields.points, "frames": fields.frames, "weights": fields.weights}
+        for body, values in zip(output.model.bodies, fields.displacement, strict=True):
+            arrays[f"displacement/{body.name}"] = values
     if output.from_fclib:
         write_fclib(found.problem, path, solution=found)
-    with h5py.File(path, "a" if output.from_fclib else "w") as file:
-        file.attrs["schema"] = SCHEMA
-        file.attrs["outcome"] = found.convergence.outcome.name.lower()
-        file.attrs["error"] = found.convergence.error
-        file["r"], file["u"] = found.r, found.u
-        if found.v is not None:
-            file["v"] = found.v
-        file["status"] = found.status
-        file["sliding"] = found.sliding.astype(np.int8)
-        file["margin"] = found.margin
-        if output.model is not None and output.fields is not None:
-            fields = output.fields
-            file["points"], file["frames"] = fields.points, fields.frames
-            file["weights"] = fields.weights
-            for body, values in zip(output.model.bodies, fields.displacement, strict=True):
-                file[f"displacement/{body.name}"] = values
+    notes = {"schema": SCHEMA, "outcome": found.convergence.outcome.name.lower(),
+             "error": found.convergence.error}  # fmt: skip
+    write_arrays(path, {k: a for k, a in arrays.items() if a is not None}, notes)
 
 
 def write_vtu(output: Output, path: Path) -> None:

@@ -5,20 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import meshio
 import numpy as np
 from numpy.typing import NDArray
 
+from .fem import cell_stress, von_mises
+from .fem.write import write_meshes
 from .solution import FrictionSolution
 
 if TYPE_CHECKING:
     from .model import ContactFields, Model
 
 Array = NDArray[np.float64]
-CELL_TYPES = {
-    "tri": "triangle", "quad": "quad", "tet": "tetra", "hex": "hexahedron", "wedge": "wedge",
-    "pyramid": "pyramid",
-}  # fmt: skip
 OFF = -1  # CSTATUS of nodes that are no contact; the other contact fields are zero there
 
 
@@ -31,24 +28,17 @@ def write_model(
     traction and of the slip, CSTATUS 0 open, 1 slip, 2 stick and -1 off the contact surface,
     CSLIDING 0 or 1, CFORCE force on the slave in global axes.
     """
-    sizes = [len(body.mesh.points) for body in model.bodies]
-    starts = np.concatenate([[0], np.cumsum(sizes)])
-    cells, body_of_cell, stress = [], [], []
-    for k, body in enumerate(model.bodies):
-        stress.append(_von_mises(body, fields.displacement[k]))
-        for block in body.mesh.cells:
-            cells.append((CELL_TYPES[block.kind], block.nodes + starts[k]))
-            body_of_cell.append(np.full(len(block.nodes), k))
-    ends = np.cumsum([len(nodes) for _, nodes in cells])[:-1]
-    meshio.Mesh(
-        _spatial(np.concatenate([body.mesh.points for body in model.bodies])),
-        cells,
-        point_data={
-            "displacement": _spatial(np.concatenate(fields.displacement)),
-            **_contact_fields(fields, solution, starts),
-        },
-        cell_data={"von_mises": np.split(np.concatenate(stress), ends), "body": body_of_cell},
-    ).write(path)
+    pairs = list(zip(model.bodies, fields.displacement, strict=True))
+    starts = np.cumsum([0, *(len(body.mesh.points) for body, _ in pairs)])
+    stress = [cell_stress(body.mesh, body.material, moved) for body, moved in pairs]
+    owner = [np.full(body.mesh.cell_count, k) for k, (body, _) in enumerate(pairs)]
+    displacement = _spatial(np.concatenate(fields.displacement))
+    write_meshes(
+        path,
+        [body.mesh for body, _ in pairs],
+        {"displacement": displacement, **_contact_fields(fields, solution, starts)},
+        {"von_mises": von_mises(np.concatenate(stress)), "body": np.concatenate(owner)},
+    )
 
 
 def _contact_fields(
@@ -73,13 +63,6 @@ def _contact_fields(
         everywhere[node] = given
         out[name] = everywhere
     return out
-
-
-def _von_mises(body, displacement: Array) -> Array:
-    """Von Mises stress at the centre of every cell, unit of stress."""
-    from .fem import cell_stress, von_mises
-
-    return von_mises(cell_stress(body.mesh, body.material, displacement))
 
 
 def _spatial(vectors: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
@@ -58,10 +59,9 @@ def run(
         for goal in goals:
             for name in names:
                 timings.append(_time(file, problem, name, goal, time_limit))
-                if json_copy != "-":
-                    click.echo(f"\r\x1b[K{source.name}  {name}  {goal:g}", err=True, nl=False)
+                _progress(f"{source.name}  {name}  {goal:g}")
+    _progress("")
     if json_copy != "-":
-        click.echo("\r\x1b[K", err=True, nl=False)
         _show(timings, names, goals)
     if profile is not None:
         _draw(timings, names, goals, profile)
@@ -69,6 +69,12 @@ def run(
         rows = [asdict(timing) for timing in timings]
         data = {"schema": SCHEMA, "versions": output.versions(), "results": rows}
         deliver_json(output.to_json(data), json_copy)
+
+
+def _progress(text: str) -> None:
+    """What runs now, on one line that is overwritten; nothing where nobody looks."""
+    if sys.stderr.isatty():
+        click.echo(f"\r\x1b[K{text}", err=True, nl=False)
 
 
 def _words(option: str, text: str) -> list[str]:

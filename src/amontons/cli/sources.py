@@ -81,7 +81,14 @@ def _fclib(path: Path, overrides: Sequence[str]) -> Source:
         raise FileFormatError(
             f"{path}: expected a TOML case file (.toml) or an FCLib HDF5 file, this is neither"
         )
-    problem = read_fclib(path)
+    try:
+        problem = read_fclib(path)
+    except FileFormatError as reason:
+        if path.name != "solution.h5" or "fclib_local or fclib_global" not in str(reason):
+            raise
+        raise FileFormatError(
+            f"{path}: the results of a model hold no problem to read; give the case file"
+        ) from None
     settings = override_settings(Settings(), overrides)
     return Source(path.stem, path.stem, problem=problem, from_fclib=True, settings=settings)
 

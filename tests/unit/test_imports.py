@@ -1,0 +1,94 @@
+"""The import rule, read from the files: downwards only, and heavy packages in one place."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import amontons
+
+PACKAGE = Path(amontons.__file__).parent
+ORDER = (
+    "errors < files < cones < linear < blocks < judge < problem < one_contact < status < solution < "
+    "solvers < solve < fem < contact < model < evolution < analysis < gallery < fclib < "
+    "expressions < case < vtk < plots < output < results < report < api < cli"
+).split(" < ")
+ALONE = {  # package: the file or folder that imports it, one for each kind of file
+    "ngsolve": "fem", "pyamg": "linear", "meshio": "fem", "matplotlib": "plots",
+    "h5py": "fclib", "click": "cli", "rslab": "linear", "pypardiso": "linear",
+}  # fmt: skip
+FILES = sorted(PACKAGE.rglob("*.py"))
+
+
+def home(path):
+    """First folder or file name below the package."""
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def imports(path):
+    """(package or None, names) of every import, with relative ones resolved to our homes."""
+    depth = len(path.relative_to(PACKAGE).parts)
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            for name in node.names:
+                yield name.name
+        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+            yield node.module
+        elif isinstance(node, ast.ImportFrom) and node.level == depth:
+            names = [node.module] if node.module else [name.name for name in node.names]
+            yield from (f"amontons.{name}" for name in names)
+        elif isinstance(node, ast.ImportFrom) and node.level > depth:
+            raise AssertionError(f"{path}: import from above the package")
+
+
+def test_every_module_has_its_place():
+    homes = {home(path) for path in FILES} - {"__init__", "__main__"}
+    known = set(ORDER) | {"examples_data"}
+    assert homes <= known, f"put {homes - known} into ORDER"
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_imports_go_downwards(path):
+    if home(path) in {"__init__", "__main__"}:
+        return
+    place = ORDER.index(home(path)) if home(path) in ORDER else 0
+    for name in imports(path):
+        target = name.split(".")[1] if name.startswith("amontons.") else "__version__"
+        if target not in ("__version__", home(path)):
+            assert ORDER.index(target) < place, f"{home(path)} imports {target}"
+
+
+@pytest.mark.parametrize("package", ALONE)
+def test_heavy_packages_are_imported_in_one_place(package):
+    users = {home(p) for p in FILES for name in imports(p) if name.split(".")[0] == package}
+    assert users <= {ALONE[package]}
+
+
+def modules_after(code):
+    """Names of all modules loaded by a fresh interpreter that runs `code`."""
+    report = f"{code}\nimport sys\nprint(*sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", report], capture_output=True, text=True, check=True
+    )
+    return set(done.stdout.split())
+
+
+def test_importing_the_package_is_light():
+    loaded = modules_after("import amontons")
+    assert not loaded & {"numpy", "scipy", "numba", "ngsolve", "matplotlib", "h5py", "pyamg"}
+
+
+def test_discrete_problems_need_no_mesh_library():
+    loaded = modules_after("import amontons; amontons.FrictionProblem; amontons.GaussSeidel")
+    assert not loaded & {"ngsolve", "matplotlib", "h5py", "pyamg", "meshio", "click"}
+
+
+def test_public_names_exist():
+    assert amontons.__all__ == sorted(set(amontons.__all__))
+    for name in amontons.__all__:
+        assert getattr(amontons, name) is not None
+    assert set(amontons.__all__) <= set(dir(amontons))
+    with pytest.raises(AttributeError, match="nothing_like_this"):
+        _ = amontons.nothing_like_this
