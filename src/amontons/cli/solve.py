@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -27,13 +28,16 @@ def run(
     folder = folder if folder is not None else Path(f"{opened.name}-results")
     check_folder(folder)
     check_writable(json_copy)
+    began = time.perf_counter()
+    opened.discrete()
+    assembled = time.perf_counter() - began if opened.model is not None else 0.0
     silent = quiet or json_copy == "-"
     found = api.solve_any_form(
         opened.target, settings.solver(), tolerance=settings.tolerance,
         max_iterations=settings.max_iterations, time_limit=settings.time_limit,
         callback=(lambda step, iterate: None) if silent else None,
     )  # fmt: skip
-    result = _output(opened, found, settings.method)
+    result = _output(opened, found, settings.method, assembled)
     copy = None if json_copy in (None, "-") else Path(str(json_copy))
     output.save(result, folder, copy)
     if json_copy == "-":
@@ -44,11 +48,11 @@ def run(
 
 
 def _output(
-    source: Source, found: FrictionSolution | ModelSolution, method: str
+    source: Source, found: FrictionSolution | ModelSolution, method: str, assembled: float
 ) -> output.Output:
     if isinstance(found, ModelSolution):
         return output.Output(found.solution, found.model, found.fields, source.title, method,
-                             found.assemble_seconds)  # fmt: skip
+                             assembled)  # fmt: skip
     return output.Output(found, title=source.title, method=method,
                          from_fclib=source.from_fclib)  # fmt: skip
 

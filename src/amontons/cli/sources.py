@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from ..case import Settings, make_solver, method_class, read_case
 from ..case.overrides import split_override
 from ..case.settings import LIMITS
-from ..errors import FileFormatError, InvalidInput
+from ..errors import FileFormatError, InvalidInput, SingularOperator
 from ..expressions import nearest
 from ..problem import FrictionProblem
 
@@ -33,6 +33,7 @@ class Source:
     model: Model | None = None
     from_fclib: bool = False
     settings: Settings = field(default_factory=Settings)
+    file: str = ""  # for messages
 
     @property
     def target(self) -> Model | FrictionProblem:
@@ -44,7 +45,10 @@ class Source:
         if self.problem is not None:
             return self.problem
         assert self.model is not None
-        return self.model.assemble()
+        try:
+            return self.model.assemble()
+        except (InvalidInput, SingularOperator) as reason:
+            raise type(reason)(f"{self.file}: {reason}") from reason
 
 
 def open_source(text: str, overrides: Sequence[str] = ()) -> Source:
@@ -66,7 +70,7 @@ def open_source(text: str, overrides: Sequence[str] = ()) -> Source:
 
 def _case(path: Path, name: str, overrides: Sequence[str]) -> Source:
     case = read_case(path, overrides)
-    return Source(name, case.title, model=case.model, settings=case.settings)
+    return Source(name, case.title, model=case.model, settings=case.settings, file=str(path))
 
 
 def _fclib(path: Path, overrides: Sequence[str]) -> Source:
