@@ -21,6 +21,8 @@ from scipy.sparse import linalg as sparse_linalg
 from ..errors import InvalidInput, MissingDependency, SingularOperator
 
 Array = NDArray[np.float64]
+Solve = Callable[[Array], Array]
+REFINE_ABOVE = 1e-14  # relative residual of the trial solve above which solves are refined
 RESIDUAL_LIMIT = 1e-6  # relative residual of the trial solve above which a factor is refused
 
 
@@ -53,32 +55,38 @@ class Direct:
                 'installed; python -m pip install "amontons[mkl]" or use another backend'
             )
 
-    def factor(self, matrix: sparse.csc_array, near_nullspace: Array | None = None) -> DirectFactor:
+    def factor(
+        self, matrix: sparse.csc_array, near_nullspace: Array | None = None
+    ) -> DirectFactor:
         """A trusted factor of `matrix`, (n, n); raises SingularOperator when none can be had."""
         matrix = sparse.csc_array(matrix)
         if matrix.shape[0] != matrix.shape[1]:
             raise InvalidInput(f"matrix: expected a square one, got shape {matrix.shape}")
-        matrix.sort_indices()
+        if not matrix.has_sorted_indices:
+            matrix = matrix.sorted_indices()
         empty = np.flatnonzero(np.diff(matrix.indptr) == 0)
         if empty.size:
-            raise SingularOperator(f"matrix: column {empty[0]} is empty, the operator is singular")
+            raise SingularOperator(
+                f"matrix: column {empty[0]} is empty, the operator is singular"
+            )
         chosen = [self.backend] if self.backend else [b for b in Backend if b.installed]
         reasons = []
         for backend in chosen:
             try:
                 solve = _FACTORISE[backend](matrix, self.threads)
-                _check(matrix, solve)
-                return DirectFactor(solve, backend)
+                return DirectFactor(_checked(matrix, solve), backend)
             except (ArithmeticError, RuntimeError, MemoryError, ValueError) as error:
                 reasons.append(f"{backend.value}: {error}")
-        raise SingularOperator("matrix: no backend could factorise it (" + "; ".join(reasons) + ")")
+        raise SingularOperator(
+            "matrix: no backend could factorise it (" + "; ".join(reasons) + ")"
+        )
 
 
 @dataclass(frozen=True)
 class DirectFactor:
     """A checked sparse factor."""
 
-    apply: Callable[[Array], Array]
+    apply: Solve
     backend: Backend
     exact: bool = True
     iterations: int = 0
@@ -88,18 +96,36 @@ class DirectFactor:
         return self.apply(b)
 
 
-def _check(matrix: sparse.csc_array, solve: Callable[[Array], Array]) -> None:
-    """Solve for a known vector: a singular matrix shows here, whatever the backend says."""
+def _checked(matrix: sparse.csc_array, solve: Solve) -> Solve:
+    """`solve`, once refined where it is inexact, after a trial with a known solution.
+
+    A singular matrix shows here, whatever the backend says; so do perturbed pivots, which
+    lose digits of indefinite matrices.
+    """
     x = np.cos(np.arange(matrix.shape[0]))
     b = matrix @ x
+    scale = max((np.abs(matrix) @ np.abs(x)).max(initial=0.0), np.finfo(float).tiny)
     found = solve(b)
-    scale = np.abs(matrix) @ np.abs(x) + np.abs(b)
-    residual = np.abs(matrix @ found - b).max() / max(scale.max(), np.finfo(float).tiny)
+    if np.isfinite(found).all() and np.abs(matrix @ found - b).max() > REFINE_ABOVE * scale:
+        solve = _refined(matrix, solve)
+        found = solve(b)
+    residual = np.abs(matrix @ found - b).max() / scale
     if not np.isfinite(found).all() or residual > RESIDUAL_LIMIT:
         raise SingularOperator(f"trial solve failed with relative residual {residual:.1e}")
     growth = np.abs(found - x).max()
     if growth > 1e-2:  # cond(A) eps of that size: no digit of a solution could be trusted
         raise SingularOperator(f"singular to working precision (trial error {growth:.1e})")
+    return solve
+
+
+def _refined(matrix: sparse.csc_array, solve: Solve) -> Solve:
+    """`solve` with one step of iterative refinement."""
+
+    def refined(b: Array) -> Array:
+        x = solve(b)
+        return x + solve(b - matrix @ x)
+
+    return refined
 
 
 def _symmetric(matrix: sparse.csc_array) -> bool:
@@ -108,7 +134,7 @@ def _symmetric(matrix: sparse.csc_array) -> bool:
     return bool(difference.max() <= 1e-13 * abs(matrix).max())
 
 
-def _rslab(matrix: sparse.csc_array, threads: int) -> Callable[[Array], Array]:
+def _rslab(matrix: sparse.csc_array, threads: int) -> Solve:
     import rslab
 
     options = {"threads": threads} if threads else {}
@@ -122,7 +148,7 @@ def _rslab(matrix: sparse.csc_array, threads: int) -> Callable[[Array], Array]:
     return solve
 
 
-def _pardiso(matrix: sparse.csc_array, threads: int) -> Callable[[Array], Array]:
+def _pardiso(matrix: sparse.csc_array, threads: int) -> Solve:
     import pypardiso
 
     solver = pypardiso.PyPardisoSolver()
@@ -131,7 +157,7 @@ def _pardiso(matrix: sparse.csc_array, threads: int) -> Callable[[Array], Array]
     return lambda b: solver.solve(rows, np.asfortranarray(b, dtype=float))
 
 
-def _superlu(matrix: sparse.csc_array, threads: int) -> Callable[[Array], Array]:
+def _superlu(matrix: sparse.csc_array, threads: int) -> Solve:
     with warnings.catch_warnings():
         warnings.simplefilter("error", sparse_linalg.MatrixRankWarning)
         factor = sparse_linalg.splu(sparse.csc_matrix(matrix), permc_spec="MMD_AT_PLUS_A")

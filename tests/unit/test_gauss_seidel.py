@@ -1,0 +1,71 @@
+"""Gauss-Seidel sweeps against a NumPy twin that solves contact after contact."""
+
+import numpy as np
+import pytest
+
+from amontons.cones import Coulomb, Tresca
+from amontons.errors import InvalidInput
+from amontons.one_contact import solve_one
+from amontons.problem import FrictionProblem
+from amontons.solve import drive
+from amontons.solvers import GaussSeidel
+from amontons.solvers.base import Iterate, Target
+
+
+def random_problem(d=3, law=Coulomb, nc=5):
+    rng = np.random.default_rng(d)
+    root = rng.standard_normal((nc * d, nc * d))
+    q = rng.standard_normal((nc, d)) - np.eye(1, d)
+    return FrictionProblem.from_delassus(
+        root @ root.T / nc + np.eye(nc * d), q, law(0.3 * np.ones(nc))
+    )
+
+
+def sweep(problem, r):
+    """One sweep with dense matrices."""
+    r, d = r.copy(), problem.dimension
+    for i in range(problem.contacts):
+        own = slice(d * i, d * i + d)
+        A = np.eye(3)
+        A[:d, :d] = problem.W[own, own]
+        others = r.copy()
+        others[i] = 0
+        b = np.zeros(3)
+        b[:d] = problem.W[own] @ others.ravel() + problem.q[i]
+        tresca = isinstance(problem.law, Tresca)
+        r[i] = solve_one(A, b, problem.law.coefficient[i], tresca)[0][:d]
+    return r
+
+
+@pytest.mark.parametrize("law", [Coulomb, Tresca])
+@pytest.mark.parametrize("d", [2, 3])
+def test_sweeps_are_those_of_the_dense_twin(d, law):
+    problem = random_problem(d, law)
+    expected = np.zeros((5, d))
+    iterates = GaussSeidel().iterates(problem, Iterate(expected), Target(1e-8))
+    for _ in range(4):
+        expected = sweep(problem, expected)
+        np.testing.assert_allclose(next(iterates).r, expected, atol=1e-10)
+
+
+@pytest.mark.parametrize("options", [{}, {"batch": 7}, {"anderson_depth": 5}])
+@pytest.mark.parametrize("law", [Coulomb, Tresca])
+def test_options_lead_to_the_same_solution(options, law):
+    problem = random_problem(3, law)
+    reference = drive(problem, GaussSeidel(), tolerance=1e-13, max_iterations=100_000)
+    other = drive(problem, GaussSeidel(**options), tolerance=1e-12, max_iterations=100_000)
+    assert other.converged
+    np.testing.assert_allclose(other.r, reference.r, atol=1e-8)
+
+
+def test_batches_count_their_sweeps():
+    iterates = GaussSeidel(batch=3).iterates(
+        random_problem(), Iterate(np.zeros((5, 3))), Target(1e-8)
+    )
+    assert next(iterates).iterations == 3
+
+
+@pytest.mark.parametrize("options", [{"batch": 0}, {"anderson_depth": -1}])
+def test_options_are_checked(options):
+    with pytest.raises(InvalidInput, match=next(iter(options))):
+        GaussSeidel(**options)
