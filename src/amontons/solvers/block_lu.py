@@ -1,7 +1,7 @@
 """Sparse LU of 3x3 blocks without pivoting across blocks, for W plus a block diagonal.
 
 Newton matrices of contact problems keep the pattern of W, so ordering (minimum degree on the
-graph of blocks) and symbolic factorisation are done once.  Rows are eliminated one after another
+block graph) and symbolic factorisation are done once.  Rows are eliminated one after another
 against the finished rows of U, in a dense work row: no search for positions.
 """
 
@@ -176,7 +176,19 @@ def _invert3(a, out):
 
 @njit(cache=True, fastmath={"contract"})
 def factorise_inplace(  # noqa: PLR0913
-    indptr, indices, data, extra, order, upper_start, upper, lower_start, lower, U, L, inverse, work
+    indptr,
+    indices,
+    data,
+    extra,
+    order,
+    upper_start,
+    upper,
+    lower_start,
+    lower,
+    U,
+    L,
+    inverse,
+    work,
 ):
     """LU of W + blockdiag(extra) into U, L (fill/2, 3, 3) and inverse pivots (nc, 3, 3).
 

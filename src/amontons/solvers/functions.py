@@ -1,6 +1,6 @@
 """Complementarity functions: F(r, u) = 0 exactly when a contact obeys its law.
 
-Each returns F, unit of r, with one element of its generalised Jacobian, A = dF/dr and B = dF/du,
+Each gives F, unit of r, and one element of its generalised Jacobian, A = dF/dr and B = dF/du,
 shape (nc, d, d).  With x = r - rho u, [ABD] eqs. (8)-(10):
 
     Alart-Curnier  F_N = r_N - x_N^+,  F_T = r_T - P_disk(mu x_N^+)(x_T)

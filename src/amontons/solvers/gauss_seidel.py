@@ -57,7 +57,7 @@ def sweep_inplace(indptr, indices, data, q, coefficient, tresca, diagonal, backw
 
 @njit(cache=True)
 def sweeps_inplace(indptr, indices, data, q, coefficient, tresca, diagonal, r, sweeps, small):  # noqa: PLR0913
-    """Up to `sweeps` forward sweeps, fewer when one changes less than `small`; returns how many."""
+    """Up to `sweeps` sweeps, fewer when one changes less than `small`; returns how many."""
     for k in range(sweeps):
         change = sweep_inplace(
             indptr, indices, data, q, coefficient, tresca, diagonal, False, r
@@ -110,7 +110,7 @@ def anderson_inplace(  # noqa: PLR0913
     x (nc, 3) is the next point to sweep from and history (2, depth + 1, 3 nc) holds differences
     of G(r) and of the residual G(r) - r, the last row of each the values themselves; count
     (2,) how many are stored and whether there are values, so that a call goes on where the last
-    one ended.  The history is dropped when the residual doubles.  `small` ends the loop as above.
+    one ended.  The history is dropped when the residual doubles; `small` as above.
     """
     depth = history.shape[1] - 1
     m = history.shape[2]

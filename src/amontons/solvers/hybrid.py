@@ -12,7 +12,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import islice
@@ -46,10 +45,8 @@ class Hybrid:
     def iterates(
         self, problem: FrictionProblem, start: Iterate, target: Target
     ) -> Iterator[Iterate]:
-        """Iterates of `first`, then of `main`; the global form is condensed where one needs it."""
-        for iterate in islice(
-            _run(self.first, problem, start, target), self.iterates_of_first
-        ):
+        """Iterates of `first`, then of `main`; condensed where one of them needs it."""
+        for iterate in islice(_run(self.first, problem, start, target), self.iterates_of_first):
             start = iterate
             yield iterate
         yield from _run(self.main, problem, start, target)
@@ -109,7 +106,11 @@ def _regular(problem: FrictionProblem) -> bool:
 
 
 def _watched(
-    solver: Solver, problem: FrictionProblem, start: Iterate, target: Target, best: list[Iterate]
+    solver: Solver,
+    problem: FrictionProblem,
+    start: Iterate,
+    target: Target,
+    best: list[Iterate],
 ) -> Iterator[Iterate]:
     """Iterates of a solver until it breaks down or stalls; best[0] becomes the best of them."""
     error = problem.error(start.r, start.v)

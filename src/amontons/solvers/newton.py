@@ -5,18 +5,20 @@ With (F, A, B) of a complementarity function (`functions`):
     Delassus form   (A + B W) dr = -F
     global form     M dv - H dr = -(M v - H r - f),   A dr + B H^T dv = -F
 
-The global form never forms W.  Either the whole system is factorised in each step (Augmented), or
-M is factorised once and dr comes from GMRES on A + B W, one solve with M per iteration
-(SchurComplement).  Its preconditioner replaces W by S^-1, S = E^T M E with E = H (H^T H)^-1 the
-stiffness of the contact unknowns alone, which is sparse: (A S + B) y = g, dr = S y.  The tolerance
-of GMRES follows the Newton residual (Eisenstat-Walker), so early steps are cheap.
+The global form never forms W.  Either the whole system is factorised in each step
+(Augmented), or M is factorised once and dr comes from GMRES on A + B W, a solve with M per
+iteration (SchurComplement).  Its preconditioner replaces W by S^-1, S = E^T M E with
+E = H (H^T H)^-1 the stiffness of the contact unknowns alone, which is sparse:
+(A S + B) y = g, dr = S y.  The tolerance of GMRES follows the Newton residual ([EW]), so early
+steps are cheap.
 
 Merit function of the line search: |F / rho|, unit of u, against the largest of the last values.
 Contacts that can not react (W_ii = 0) keep r = 0.
 
 [QS] L. Qi, J. Sun, "A nonsmooth version of Newton's method", Math. Program. 58 (1993);
-[EW] S. Eisenstat, H. Walker, "Choosing the forcing terms in an inexact Newton method", SIAM J.
-Sci. Comput. 17 (1996); [GLL] L. Grippo, F. Lampariello, S. Lucidi, SIAM J. Numer. Anal. 23 (1986).
+[EW] S. Eisenstat, H. Walker, "Choosing the forcing terms in an inexact Newton method",
+SIAM J. Sci. Comput. 17 (1996); [GLL] L. Grippo, F. Lampariello, S. Lucidi, "A nonmonotone
+line search technique for Newton's method", SIAM J. Numer. Anal. 23 (1986).
 """
 
 from __future__ import annotations
@@ -34,22 +36,38 @@ from ..errors import SingularOperator
 from ..linear import Direct, LinearSolver
 from ..problem import Form, FrictionProblem
 from .base import Breakdown, Iterate, Target, check_at_least, check_positive
-from .functions import AlartCurnier, ComplementarityFunction
+from .functions import AlartCurnier, ComplementarityFunction, Linearised
 
 Array = NDArray[np.float64]
-DENSE_UNKNOWNS = 1200  # reactions up to which a dense factor of A + B W is quicker than a sparse
+DENSE_UNKNOWNS = (
+    1200  # reactions up to which a dense factor of A + B W is quicker than a sparse
+)
 FORCING = (1e-10, 0.1)  # smallest and largest relative tolerance of GMRES
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Reactions r and velocities u, (nc, d), with v, (n,), in the global form."""
+
+    r: Array
+    u: Array
+    v: Array | None = None
+
+    def moved(self, t: float, step: State) -> State:
+        """This state plus t times a step."""
+        v = None if self.v is None or step.v is None else self.v + t * step.v
+        return State(self.r + t * step.r, self.u + t * step.u, v)
 
 
 class Linearisation(Protocol):
     """The Newton equation of one problem; W is hidden in it."""
 
-    def velocity(self, r: Array) -> tuple[Array, Array | None]:
-        """(u, v) that r causes."""
+    def state(self, start: Iterate) -> State:
+        """The first state."""
         ...
 
-    def step(self, A: Array, B: Array, F: Array, forcing: float) -> tuple[Array, Array, int]:
-        """(dr, du, linear iterations), dr and du (nc, d), of (A + B W) dr = -F."""
+    def step(self, state: State, linearised: Linearised, forcing: float) -> tuple[State, int]:
+        """The Newton step of a state, and the linear iterations it took."""
         ...
 
 
@@ -57,7 +75,7 @@ class Linearisation(Protocol):
 class SemismoothNewton:
     """Semismooth Newton with a non-monotone line search.
 
-    linear: None takes the best for the form: dense or sparse LU of A + B W in the Delassus form,
+    linear: None takes the best for the form: LU of A + B W in the Delassus form,
     the Schur complement with one factor of M in the global form.  A LinearSolver given here
     factorises the whole system of the global form in each step.
     """
@@ -79,37 +97,30 @@ class SemismoothNewton:
     ) -> Iterator[Iterate]:
         """Newton steps from `start`; raises Breakdown when a step can not be computed."""
         system = self._linearise(problem)
-        law, d = problem.law, problem.dimension
-        able = problem.rho > 0
-        rho = self.rho * np.where(able, problem.rho, 1.0)
-        r = np.where(able[:, None], start.r, 0.0)
-        u, v = system.velocity(r)
+        law = _Residual(self.function, problem, self.rho)
+        state = system.state(Iterate(law.admissible(start.r), start.v))
         values: list[float] = []
-        forcing, blocked = FORCING[1], np.where(able, 0.0, 1.0)[:, None, None] * np.eye(d)
+        forcing = FORCING[1]
         while True:
-            F, A, B = self.function.linearise(r, u, law, rho)
-            F, A, B = F * able[:, None], A * able[:, None, None] + blocked, B * able[:, None, None]
-            values = [*values, _size(F, rho)][-self.memory :]
+            linearised = law.linearise(state)
+            values = [*values, law.size(linearised[0])][-self.memory :]
             if len(values) > 1:  # [EW] choice 2
-                ratio = values[-1] / max(values[-2], np.finfo(float).tiny)
+                ratio = min(values[-1] / max(values[-2], np.finfo(float).tiny), 1.0)
                 forcing = float(np.clip(0.5 * ratio**2, *FORCING))
-            dr, du, count = system.step(A, B, F, forcing)
-            if not np.isfinite(dr).all():
+            step, count = system.step(state, linearised, forcing)
+            if not np.isfinite(step.r).all():
                 raise Breakdown("the Newton step is not finite")
-            t = self._search(r, u, dr, du, max(values), rho, able, law)
-            r = r + t * dr
-            u, v = system.velocity(r)
-            yield Iterate(r, v, linear_iterations=count)
+            state = state.moved(self._length(law, state, step, max(values)), step)
+            yield Iterate(state.r, state.v, linear_iterations=count)
 
-    def _search(self, r, u, dr, du, ceiling, rho, able, law) -> float:  # noqa: PLR0913
-        """[GLL] step length; the full step when no shorter one helps."""
+    def _length(self, law: _Residual, state: State, step: State, ceiling: float) -> float:
+        """[GLL] step length; the shortest when none helps, 1 without a line search."""
         t = 1.0
         for _ in range(self.halvings):
-            F = self.function.residual(r + t * dr, u + t * du, law, rho) * able[:, None]
-            if _size(F, rho) <= (1 - 1e-4 * t) * ceiling:
+            if law.size(law.evaluate(state.moved(t, step))) <= (1 - 1e-4 * t) * ceiling:
                 return t
             t /= 2
-        return t if self.halvings else 1.0
+        return t
 
     def _linearise(self, problem: FrictionProblem) -> Linearisation:
         if problem.form is Form.DELASSUS:
@@ -119,9 +130,34 @@ class SemismoothNewton:
         return SchurComplement.of(problem)
 
 
-def _size(F: Array, rho: Array) -> float:
-    """|F / rho|, unit of u."""
-    return float(np.linalg.norm(F / rho[:, None]))
+class _Residual:
+    """A complementarity function on one problem; contacts that can not react keep r = 0."""
+
+    def __init__(
+        self, function: ComplementarityFunction, problem: FrictionProblem, scale: float
+    ) -> None:
+        self.function, self.law = function, problem.law
+        self.able = problem.rho > 0
+        self.rho = scale * np.where(self.able, problem.rho, 1.0)
+        self.blocked = (~self.able)[:, None, None] * np.eye(problem.dimension)
+
+    def admissible(self, r: Array) -> Array:
+        """r with zero where a contact can not react."""
+        return np.where(self.able[:, None], r, 0.0)
+
+    def evaluate(self, state: State) -> Array:
+        """F, (nc, d), unit of r."""
+        return self.admissible(self.function.residual(state.r, state.u, self.law, self.rho))
+
+    def linearise(self, state: State) -> Linearised:
+        """(F, A, B), with A = 1 and B = 0 where a contact can not react."""
+        F, A, B = self.function.linearise(state.r, state.u, self.law, self.rho)
+        able = self.able[:, None, None]
+        return self.admissible(F), A * able + self.blocked, B * able
+
+    def size(self, F: Array) -> float:
+        """|F / rho|, unit of u."""
+        return float(np.linalg.norm(F / self.rho[:, None]))
 
 
 def block_diagonal(blocks: Array) -> sparse.csr_array:
@@ -139,12 +175,13 @@ class Condensed:
 
     problem: FrictionProblem
 
-    def velocity(self, r: Array) -> tuple[Array, Array | None]:
-        """(u, None) that r causes."""
-        return self.problem.velocity(r)
+    def state(self, start: Iterate) -> State:
+        """r of the start and its velocity."""
+        return State(start.r, self.problem.velocity(start.r)[0])
 
-    def step(self, A: Array, B: Array, F: Array, forcing: float) -> tuple[Array, Array, int]:
+    def step(self, state: State, linearised: Linearised, forcing: float) -> tuple[State, int]:
         """A dense factor for few reactions or a full W, else a sparse one."""
+        F, A, B = linearised
         W = self.problem.W
         assert W is not None
         if sparse.issparse(W) and F.size > DENSE_UNKNOWNS:
@@ -152,8 +189,7 @@ class Condensed:
             dr = Direct().factor(sparse.csc_array(matrix)).solve(-F.ravel())
         else:
             dr = _dense_step(A, B, W, F)
-        dr = dr.reshape(F.shape)
-        return dr, (W @ dr.ravel()).reshape(F.shape), 0
+        return State(dr.reshape(F.shape), (W @ dr).reshape(F.shape)), 0
 
 
 def _dense_step(A: Array, B: Array, W, F: Array) -> Array:
@@ -181,20 +217,22 @@ class Augmented:
     problem: FrictionProblem
     linear: LinearSolver
 
-    def velocity(self, r: Array) -> tuple[Array, Array | None]:
-        """(u, v) that r causes."""
-        return self.problem.velocity(r)
+    def state(self, start: Iterate) -> State:
+        """r and v of the start, v = 0 where there is none: M may be singular here."""
+        v = start.v if start.v is not None else np.zeros(self.problem.unknowns)
+        return State(start.r, self.problem.local_velocity(v), v)
 
-    def step(self, A: Array, B: Array, F: Array, forcing: float) -> tuple[Array, Array, int]:
-        """dr from [M, -H; B H^T, A]."""
+    def step(self, state: State, linearised: Linearised, forcing: float) -> tuple[State, int]:
+        """The whole step from [M, -H; B H^T, A]."""
+        F, A, B = linearised
         p = self.problem
-        assert p.M is not None and p.H is not None
+        assert p.M is not None and p.H is not None and p.f is not None and state.v is not None
         coupling = block_diagonal(B) @ p.H.T
         matrix = sparse.block_array([[p.M, -p.H], [coupling, block_diagonal(A)]], format="csc")
-        b = np.concatenate([np.zeros(p.unknowns), -F.ravel()])
-        solution = self.linear.factor(matrix).solve(b)
+        balance = p.f + p.H @ state.r.ravel() - p.M @ state.v
+        solution = self.linear.factor(matrix).solve(np.concatenate([balance, -F.ravel()]))
         dv, dr = solution[: p.unknowns], solution[p.unknowns :]
-        return dr.reshape(F.shape), (p.H.T @ dv).reshape(F.shape), 0
+        return State(dr.reshape(F.shape), (p.H.T @ dv).reshape(F.shape), dv), 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,38 +256,37 @@ class SchurComplement:
         E = H @ block_diagonal(inverse)  # exact where contacts share no unknown
         return cls(problem, sparse.csr_array(E.T @ problem.M @ E))
 
-    def velocity(self, r: Array) -> tuple[Array, Array | None]:
-        """(u, v) that r causes."""
-        return self.problem.velocity(r)
+    def state(self, start: Iterate) -> State:
+        """r of the start and its velocities."""
+        return State(start.r, *self.problem.velocity(start.r))
 
-    def apply(self, r: Array) -> Array:
-        """W r, flat, by one solve with M."""
+    def response(self, r: Array) -> tuple[Array, Array]:
+        """(W r flat, M^-1 H r) by one solve with M."""
         p = self.problem
         assert p.H is not None
-        return p.H.T @ p.solve_M(p.H @ r)
+        v = p.solve_M(p.H @ r)
+        return p.H.T @ v, v
 
-    def step(self, A: Array, B: Array, F: Array, forcing: float) -> tuple[Array, Array, int]:
+    def step(self, state: State, linearised: Linearised, forcing: float) -> tuple[State, int]:
         """GMRES to the relative tolerance `forcing`, preconditioned from the right."""
+        F, A, B = linearised
         D, E = block_diagonal(A), block_diagonal(B)
         try:
             local = Direct().factor(sparse.csc_array(D @ self.S + E))
         except SingularOperator as reason:
             raise Breakdown(f"preconditioner: {reason}") from reason
         count = 0
-        images: list[tuple[Array, Array]] = []
 
         def operator(y: Array) -> Array:
             nonlocal count
             count += 1
             dr = self.S @ local.solve(y)
-            Wdr = self.apply(dr)
-            images.append((dr, Wdr))
-            return D @ dr + E @ Wdr
+            return D @ dr + E @ self.response(dr)[0]
 
-        m = F.size
-        matrix = sparse_linalg.LinearOperator((m, m), matvec=operator, dtype=float)
+        matrix = sparse_linalg.LinearOperator((F.size, F.size), matvec=operator, dtype=float)
         y, _ = sparse_linalg.gmres(
             matrix, -F.ravel(), rtol=forcing, atol=0.0, restart=80, maxiter=3
         )
         dr = self.S @ local.solve(y)
-        return dr.reshape(F.shape), self.apply(dr).reshape(F.shape), count
+        du, dv = self.response(dr)
+        return State(dr.reshape(F.shape), du.reshape(F.shape), dv), count

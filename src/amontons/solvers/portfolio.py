@@ -42,7 +42,13 @@ PATIENCE = 40  # Newton steps without halving the error
 SEMISMOOTH_CONTACTS = 600  # above, a dense factor costs more than it brings
 ROUNDS = 6  # repetitions of the last stages before Auto gives up
 # Nanoseconds measured on one core: only their ratios matter, and only roughly.
-SWEEP_BLOCK, SWEEP_CONTACT, HISTORY_CONTACT, PRODUCT, NEWTON_CONTACT = 3.0, 90.0, 200.0, 5.4, 700.0
+SWEEP_BLOCK, SWEEP_CONTACT, HISTORY_CONTACT, PRODUCT, NEWTON_CONTACT = (
+    3.0,
+    90.0,
+    200.0,
+    5.4,
+    700.0,
+)
 
 
 @dataclass(eq=False)
@@ -121,7 +127,7 @@ class Portfolio:
         return left / rate if rate > 0 else math.inf
 
     def _patient_sweeps(self) -> Iterator[Iterate]:
-        """Plain sweeps worth what Newton has cost so far, ended when 1000 of them gain little."""
+        """Plain sweeps worth what Newton has cost, ended when 1000 of them gain little."""
         x = self.r.copy()
         while self.budget > 0:
             start, count = self.error, 0
@@ -141,7 +147,7 @@ class Portfolio:
 
     @cached_property
     def costs(self) -> dict[str, float]:
-        """Nanoseconds of a sweep, an accelerated sweep and a Newton step, by operation counts."""
+        """Nanoseconds of a sweep, an accelerated sweep and a Newton step, by operations."""
         blocks, contacts = len(self.problem.blocks.indices), self.problem.contacts
         sweep = SWEEP_BLOCK * blocks + SWEEP_CONTACT * contacts
         if isinstance(self.problem.law, Tresca):
@@ -153,7 +159,7 @@ class Portfolio:
         return {"sweep": sweep, "accelerated": sweep + history, "newton": newton}
 
     def _newton_cost(self) -> float:
-        """Nanoseconds that Newton will take: about three steps per decimal digit, and a start."""
+        """Nanoseconds that Newton will take: about three steps per digit, and a start."""
         digits = math.log10(max(self.error / self.goal, 1.0))
         return self.costs["newton"] * (6 + 3 * digits)
 

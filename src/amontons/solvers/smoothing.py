@@ -1,7 +1,7 @@
 """Smoothing Newton on the second-order cone: each iteration factorises W plus 3x3 blocks.
 
-With x = (mu r_N, r_T) and y = (u_N / mu + |u_T|, u_T), Coulomb's law is x, y in the Lorentz cone,
-x . y = 0.  The projection in x - P(x - rho y) = 0 is smoothed spectrally,
+With x = (mu r_N, r_T) and y = (u_N / mu + |u_T|, u_T), Coulomb's law is: x and y in the
+Lorentz cone, x . y = 0.  The projection in x - P(x - rho y) = 0 is smoothed spectrally,
 
     P_eps(z): phi(l) = (l + sqrt(l^2 + 4 eps^2)) / 2 on both eigenvalues l = z_0 ± |z_T|,
 
@@ -169,7 +169,8 @@ def newton_inplace(  # noqa: PLR0913
 ):  # fmt: skip
     """At most `steps` Newton steps on x; r ends as the best iterate by the law's own residual.
 
-    goal: residual, unit of u, at which to stop; patience: steps without halving it.  prox (nc,), center (nc, 3): proximal term.
+    goal: residual, unit of u, at which to stop; patience: steps without halving it;
+    prox (nc,), center (nc, 3): proximal term.
     Returns (steps done, best residual, sigma); a negative count says that a factor broke down.
     """
     nc = len(mu)
@@ -198,9 +199,7 @@ def newton_inplace(  # noqa: PLR0913
             U, L, inverse, work,
         ):  # fmt: skip
             return -count, best, sigma
-        solve_inplace(
-            order, upper_start, upper, lower_start, lower, U, L, inverse, rhs, dr
-        )
+        solve_inplace(order, upper_start, upper, lower_start, lower, U, L, inverse, rhs, dr)
         _product(indptr, indices, data, prox, dr, du)
         ceiling = recent.max()
         step = 1.0
@@ -266,7 +265,7 @@ class SmoothingNewton:
 
 @dataclass(frozen=True, eq=False)
 class Workspace:
-    """A Coulomb problem in Delassus form with the symbolic factor that all Newton steps share."""
+    """A Coulomb problem in Delassus form and the symbolic factor its Newton steps share."""
 
     problem: FrictionProblem
     symbolic: Symbolic
@@ -311,7 +310,7 @@ class Workspace:
 
 @dataclass(frozen=True)
 class ProximalPoint:
-    """Proximal point on r for singular and hyperstatic problems, inner solves by smoothing Newton.
+    """Proximal point on r for singular, hyperstatic problems; inner solver smoothing Newton.
 
     Outer step: r solves the problem with u + alpha_i (r_i - center_i) in place of u, center the
     last r.  alpha is halved after a step that lowered the error and grows fourfold after one
