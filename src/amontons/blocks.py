@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 class BlockRows:
     """Compressed rows of 3x3 blocks, column indices sorted, every diagonal block present.
 
-    indptr (nc+1,), indices (nnzb,), data (nnzb, 3, 3), diagonal (nc,): position of W_ii in data.
+    indptr (nc+1,), indices (nnzb,), data (nnzb, 3, 3), diagonal (nc,): where W_ii is in data.
     """
 
     indptr: NDArray[np.int32]

@@ -4,7 +4,8 @@ Contact vectors are rows [x_N, x_T] in the local frame, shape (nc, d) with d = 2
 is open, r_N >= 0 is compression.
 
 Coulomb: K = { r : |r_T| <= mu r_N }, K* contains u_hat = u + mu |u_T| n, orthogonal to r.
-Tresca:  r_N >= 0 orthogonal to u_N >= 0; |r_T| <= bound, r_T opposes u_T, |r_T| = bound if u_T != 0.
+Tresca:  r_N >= 0 orthogonal to u_N >= 0; |r_T| <= bound, and r_T opposes u_T
+         with |r_T| = bound if u_T != 0.
 
 [ABH] V. Acary, M. Brémond, O. Huber, "On solving contact problems with Coulomb friction:
 formulations and numerical comparisons", Inria RR-9118 (2018).

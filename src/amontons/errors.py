@@ -22,7 +22,7 @@ class SingularOperator(AmontonsError, ArithmeticError):
 
 
 class FileFormatError(AmontonsError, ValueError):
-    """A file does not hold what its format asks for: names file, group or line, and expectation."""
+    """A file does not hold what its format asks for: names file, place and expectation."""
 
 
 class MissingDependency(AmontonsError, ImportError):
@@ -30,7 +30,7 @@ class MissingDependency(AmontonsError, ImportError):
 
 
 class NotConverged(AmontonsError, RuntimeError):
-    """The solve did not reach its tolerance; `.solution` holds the best iterate and the record."""
+    """The solve missed its tolerance; `.solution` holds the best iterate and the record."""
 
     def __init__(self, message: str, solution: Any) -> None:
         super().__init__(message)

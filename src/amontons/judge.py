@@ -6,11 +6,12 @@ and does not change with units.  With û = u + mu |u_T| n (Coulomb) or u (Tresca
 *exact*:     rho_i = 1 / |W_ii|_2, u = W r + q formed again from r,
              error = |(r_i - P(r_i - rho_i û_i)) / rho_i| / |q|.
 *residual*:  rho_i = 1 / |H_i^T D^-1 H_i|_2 with D the block diagonal of M, u = H^T v + w,
-             error = max(|M v - H r - f| / |load|, |(r_i - P(r_i - rho_i û_i)) / rho_i| / |u_ref|).
+             error = max(|M v - H r - f| / |load|,
+                         |(r_i - P(r_i - rho_i û_i)) / rho_i| / |u_ref|).
 
 A contact with W_ii = 0 can not react: r_i = 0 and u_N >= 0 are checked instead.
-`natural_error` is compiled because a whole solve of a small problem takes 0.1 ms; its NumPy twin
-is `cones.natural_map`, and the tests compare the two.
+`natural_error` is compiled because a whole solve of a small problem takes 0.1 ms; its NumPy
+twin is `cones.natural_map`, and the tests compare the two.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The one discrete problem of frictional contact, in FCLib's letters.
 
     M v = H r + f,   u = H^T v + w,   u = W r + q   with W = H^T M^-1 H, q = H^T M^-1 f + w,
-    K* ∋ u + mu |u_T| n  ⟂  r ∈ K   per contact (Coulomb), or Tresca friction with a given bound.
+    K* ∋ u + mu |u_T| n  ⟂  r ∈ K   per contact (Coulomb), or Tresca's law with a given bound.
 
 v are n displacements or velocities; r and u are (nc, d) in the local frames, rows
 [x_N, x_T1(, x_T2)], r.ravel() being FCLib's vector.  u_N >= 0 is open, r_N >= 0 compression.
@@ -142,7 +142,7 @@ class FrictionProblem:
 
     @property
     def mu(self) -> Array:
-        """Coefficients of Coulomb friction, (nc,); raises UnsupportedForm under Tresca's law."""
+        """Coefficients of Coulomb friction, (nc,); raises UnsupportedForm under Tresca's."""
         if isinstance(self.law, Coulomb):
             return self.law.mu
         raise UnsupportedForm("mu: this problem has Tresca friction, it has a bound and no mu")
@@ -157,7 +157,7 @@ class FrictionProblem:
 
     @cached_property
     def kernel_data(self) -> tuple:
-        """What the compiled kernels take: indptr, indices, data, q (nc, 3), law, Tresca?, rho."""
+        """What kernels take: indptr, indices, data, q (nc, 3), coefficient, Tresca?, rho."""
         b = self.blocks
         assert self.q is not None
         q = spatial(self.q)
@@ -242,15 +242,16 @@ class FrictionProblem:
         else:
             if 8.0 * m * m > DENSE_LIMIT:
                 raise InvalidInput(
-                    f"condensed: W would take {8e-9 * m * m:.1f} GB for {self.contacts} contacts; "
-                    "solve the global form with SemismoothNewton, which does not form W"
+                    f"condensed: W would take {8e-9 * m * m:.1f} GB for {self.contacts} "
+                    "contacts; solve the global form with SemismoothNewton, "
+                    "which does not form W"
                 )
             W = self._dense_delassus()
         return FrictionProblem.from_delassus(W, self.free_velocity, self.law)
 
     @cached_property
     def free_velocity(self) -> Array:
-        """q, (nc, d): the local velocity without any reaction, w + H^T M^-1 f in the global form."""
+        """q, (nc, d): local velocity without reactions, w + H^T M^-1 f in the global form."""
         if self.q is not None:
             return self.q
         assert self.f is not None
@@ -354,7 +355,7 @@ class FrictionProblem:
 
     @cached_property
     def rho(self) -> Array:
-        """Augmentation parameter per contact, (nc,), unit of r / u; 0 where it can not react."""
+        """Augmentation parameter, (nc,), unit of r / u; 0 where a contact can not react."""
         if self.form is Form.DELASSUS:
             return self.kernel_data[-1]
         size = np.linalg.norm(self.local_stiffness, 2, axis=(1, 2))

@@ -24,11 +24,12 @@ class Outcome(Enum):
     MAX_ITERATIONS = "Allow more iterations, or try method 'auto', which changes methods."
     TIME_LIMIT = "Allow more time, start from this solution, or loosen the tolerance."
     STAGNATED = (
-        "The error no longer falls: try method 'auto' or 'proximal-point', loosen the tolerance, "
-        "or check whether the problem has a solution."
+        "The error no longer falls: try method 'auto' or 'proximal-point', loosen the "
+        "tolerance, or check whether the problem has a solution."
     )
     CYCLED = (
-        "The iterates repeat: use a line search, start from 'gauss-seidel', or try method 'auto'."
+        "The iterates repeat: use a line search, start from 'gauss-seidel', "
+        "or try method 'auto'."
     )
     NON_FINITE = "The iterates overflowed: check units and friction, or try method 'auto'."
     BREAKDOWN = "The method can not go on here: see the detail, and try method 'auto'."

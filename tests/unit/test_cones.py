@@ -141,7 +141,8 @@ def test_natural_map_of_tresca_is_zero_exactly_at_solutions(r, u, solves, rho):
 
 def test_natural_map_scales_with_units():
     rng = np.random.default_rng(RNG_SEED)
-    r, u, mu, rho = rng.standard_normal((50, 3)), rng.standard_normal((50, 3)), rng.random(50), rng.random(50)  # fmt: skip
+    r, u = rng.standard_normal((2, 50, 3))
+    mu, rho = rng.random((2, 50))
     newtons, metres = 1e9, 1e-3
     scaled = natural_map(newtons * r, metres * u, mu, rho * newtons / metres)
     np.testing.assert_allclose(scaled, newtons * natural_map(r, u, mu, rho), rtol=1e-9)

@@ -11,9 +11,9 @@ import amontons
 
 PACKAGE = Path(amontons.__file__).parent
 ORDER = (
-    "errors < files < cones < linear < blocks < judge < problem < one_contact < status < solution < "
-    "solvers < solve < fem < contact < model < evolution < analysis < gallery < fclib < "
-    "expressions < case < vtk < plots < output < results < report < api < cli"
+    "errors < files < cones < linear < blocks < judge < problem < one_contact < status < "
+    "solution < solvers < solve < fem < contact < model < evolution < analysis < gallery "
+    "< fclib < expressions < case < vtk < plots < output < results < report < api < cli"
 ).split(" < ")
 ALONE = {  # package: the file or folder that imports it, one for each kind of file
     "ngsolve": "fem", "pyamg": "linear", "matplotlib": "plots", "click": "cli",

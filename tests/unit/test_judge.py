@@ -160,5 +160,5 @@ def test_reported_numbers():
         judge.published_fclib_error(np.zeros((1, 3)), np.zeros((1, 3)), np.zeros((1, 3)), law)
         == 0
     )
-    assert judge.published_fclib_error(np.array([[1.0, 0, 0]]), np.array([[1.0, 0, 0]]),
-                                       np.array([[2.0, 0, 0]]), law) == pytest.approx(0.5)  # fmt: skip
+    one = np.array([[1.0, 0, 0]])
+    assert judge.published_fclib_error(one, one, 2 * one, law) == pytest.approx(0.5)

@@ -1,4 +1,4 @@
-"""The protocol that every linear solver follows, so that a solver never knows which one runs."""
+"""The protocol of all linear solvers, so that a contact solver never knows which one runs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 class Factor(Protocol):
     """A prepared operator: solves A x = b, b of shape (n,) or (n, k), as often as one likes."""
 
-    exact: bool  # a direct solve, to rounding; otherwise an approximation with its own tolerance
+    exact: bool  # a direct solve, to rounding; else an approximation with its own tolerance
     iterations: int  # inner iterations so far; stays 0 for a direct solve
 
     def solve(self, b: Array) -> Array:

@@ -1,8 +1,8 @@
 """Sparse direct solvers, best installed one first; a factor that fails its check is not used.
 
-Order by evidence (105 000 unknowns of 3D elasticity, one thread): rslab 9 s, MKL Pardiso 8 s and
-1 GB to install (extra `mkl`), SuperLU of SciPy only as a last resort.  Every factor is tried on
-a known right-hand side before it is trusted.
+Order by evidence (105 000 unknowns of 3D elasticity, one thread): rslab 9 s, MKL Pardiso 8 s
+and 1 GB to install (extra `mkl`), SuperLU of SciPy only as a last resort.  Every factor is
+tried on a known right-hand side before it is trusted.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Direct:
     def factor(
         self, matrix: sparse.csc_array, near_nullspace: Array | None = None
     ) -> DirectFactor:
-        """A trusted factor of `matrix`, (n, n); raises SingularOperator when none can be had."""
+        """A trusted factor of `matrix`, (n, n); raises SingularOperator when there is none."""
         matrix = sparse.csc_array(matrix)
         if matrix.shape[0] != matrix.shape[1]:
             raise InvalidInput(f"matrix: expected a square one, got shape {matrix.shape}")

@@ -28,9 +28,13 @@ class ConjugateGradient:
         if not 0 < self.tolerance < 1:
             raise InvalidInput(f"tolerance: expected between 0 and 1, got {self.tolerance}")
         if self.max_iterations < 1:
-            raise InvalidInput(f"max_iterations: expected at least 1, got {self.max_iterations}")
+            raise InvalidInput(
+                f"max_iterations: expected at least 1, got {self.max_iterations}"
+            )
 
-    def factor(self, matrix: sparse.csc_array, near_nullspace: Array | None = None) -> KrylovFactor:
+    def factor(
+        self, matrix: sparse.csc_array, near_nullspace: Array | None = None
+    ) -> KrylovFactor:
         """Set up the preconditioner of `matrix`, (n, n)."""
         inner = self.preconditioner.factor(matrix, near_nullspace)
         return KrylovFactor(sparse.csr_array(matrix), inner, self)
@@ -63,7 +67,7 @@ class KrylovFactor:
         )
         if info != 0 or not np.isfinite(x).all():
             raise SingularOperator(
-                f"conjugate gradients: no convergence in {self.options.max_iterations} iterations; "
-                "is the matrix symmetric positive definite?"
+                f"conjugate gradients: no convergence in {self.options.max_iterations} "
+                "iterations; is the matrix symmetric positive definite?"
             )
         return x

@@ -24,7 +24,9 @@ class AlgebraicMultigrid:
         if self.block_size < 1:
             raise InvalidInput(f"block_size: expected at least 1, got {self.block_size}")
 
-    def factor(self, matrix: sparse.csc_array, near_nullspace: Array | None = None) -> Hierarchy:
+    def factor(
+        self, matrix: sparse.csc_array, near_nullspace: Array | None = None
+    ) -> Hierarchy:
         """Hierarchy of a symmetric positive definite matrix, (n, n)."""
         import pyamg
 

@@ -13,7 +13,7 @@ LARGEST_BLOCK = 48  # unknowns coupled with each other, above which a sparse fac
 
 
 def block_diagonal_inverse(matrix: sparse.csc_array) -> sparse.csc_array | None:
-    """M^-1 as a sparse matrix when no more than LARGEST_BLOCK unknowns hang together, else None.
+    """M^-1 as a sparse matrix when at most LARGEST_BLOCK unknowns hang together, else None.
 
     Raises SingularOperator naming the unknowns of a block that can not be inverted.
     """
