@@ -69,8 +69,8 @@ def _solve(
 ) -> Any:  # fmt: skip
     """Assemble, drive, recover."""
     model = None if isinstance(problem, FrictionProblem) else problem
-    if model is not None and not (hasattr(model, "assemble") and hasattr(model, "recover")):
-        raise InvalidInput(f"problem: expected a Model or a FrictionProblem, got {model!r}")
+    if problem is None or not (model is None or hasattr(model, "assemble")):
+        raise InvalidInput(f"problem: expected a Model or a FrictionProblem, got {problem!r}")
     began = time.perf_counter()
     discrete = problem if model is None else model.assemble()
     assembled = time.perf_counter() - began

@@ -56,9 +56,9 @@ def random_delassus(
 
 
 def box_tower(boxes: int = 4, *, mu: float = 0.6, push: float = 0.3) -> FrictionProblem:
-    """Tower of rigid unit boxes on the ground, the top one pushed: one time step, global form.
+    """Tower of rigid boxes, the top one pushed (one time step, global form).
 
-    Each box of 1 kg has six velocities and touches the one below at four corners.  push: the
+    Each unit box of 1 kg has six velocities and touches the one below at four corners.  push:
     force on the top box as a part of its weight.  v is a velocity in m/s, r an impulse in N s;
     the step is 1 s.  W is singular: four corners are more than three unknowns can tell apart.
     """
@@ -92,7 +92,7 @@ def _point_forces(arm: Array) -> Array:
 def sphere_packing(
     count: int = 5, *, layers: int = 4, mu: float = 0.3, seed: int = 1
 ) -> FrictionProblem:
-    """Spheres in layers on a square grid, shaken: one time step, local form.
+    """Layers of spheres on a square grid, shaken (one time step, local form).
 
     count x count spheres a layer, of 1 kg and diameter 1 m, touch their six neighbours and the
     ground; random velocities and weight load them for one step of 1 s.

@@ -246,17 +246,19 @@ def convergence_figure(record: Convergence, title: str = "") -> Figure:
     error = np.array([step.error for step in record.history])
     positive = error[(error > 0) & np.isfinite(error)]
     floor = min(positive.min(initial=np.inf), record.tolerance) / 10
+    ceiling = 3 * max(positive.max(initial=0.0), 10 * record.tolerance)
     error = np.where(np.isfinite(error), np.maximum(error, floor), np.nan)
     marker = "o" if len(error) <= 60 else ""
     for axes, name, label in ((left, "iteration", "iterations"), (right, "seconds", "seconds")):
         x = np.array([getattr(step, name) for step in record.history])
-        axes.semilogy(x, error, color=COLOURS[ContactStatus.STICK], marker=marker, markersize=4,
+        axes.set(xlim=(0, max(x.max(initial=0.0), 1e-9) * 1.03), ylim=(floor, ceiling),
+                 yscale="log")  # fmt: skip
+        axes.plot(x, error, color=COLOURS[ContactStatus.STICK], marker=marker, markersize=4,
                       linewidth=1.2)  # fmt: skip
         axes.axhline(record.tolerance, color="#D55E00", linestyle="--", linewidth=1)
         axes.set_xlabel(label)
         axes.grid(which="major", alpha=0.25)
         axes.spines[["top", "right"]].set_visible(False)
-        axes.set_xlim(left=0)
     left.annotate("tolerance", (0.99, record.tolerance), xycoords=("axes fraction", "data"),
                   ha="right", va="bottom", color="#D55E00", fontsize=9)  # fmt: skip
     left.set_ylabel(f"error ({record.measure.value} measure)")

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 TOP = ("title", "mesh", "material", "fix", "traction", "body_force", "contact", "solver")
 MAX_NODES = 50_000_000  # of a box: a typing error must not fill the memory
+LONGEST = 1e100  # edge of a box, in any unit: volumes and their inverses must stay finite
 LATER = {  # words of the format that this version can not serve
     "neo-hookean": "large deformations are not available yet, use 'linear-elastic'",
     "ciarlet-geymonat": "large deformations are not available yet, use 'linear-elastic'",
@@ -120,6 +121,8 @@ def _mesh(table: Table, path: Path) -> Mesh:
             return read_mesh(str(name))
     table.only("box", "cells", "kind")
     size = table.numbers("box", (2, 3))
+    if any(not 1 / LONGEST < abs(length) < LONGEST for length in size):
+        raise table.error("box", f"expected lengths that can be squared, got {size}")
     cells = table.need("cells", "a whole number or one per direction")
     counts = cells if isinstance(cells, list) else [cells] * len(size)
     if len(counts) != len(size) or not all(type(c) is int and c >= 1 for c in counts):

@@ -1,0 +1,178 @@
+"""Commands that work: files, streams, exit codes, start-up time."""
+
+import json
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import amontons as am
+from amontons.cli import main
+from amontons.fclib import read_fclib, write_fclib
+from amontons.gallery import box_tower, random_delassus
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_fclib(box_tower(2), "tower.hdf5")
+    write_fclib(random_delassus(1, 8), "random.hdf5")
+    return tmp_path
+
+
+def run(*arguments):
+    return CliRunner().invoke(main, [str(a) for a in arguments])
+
+
+def test_solve_writes_everything(folder):
+    result = run("solve", "tower.hdf5")
+    assert result.exit_code == 0
+    assert "8 contacts in 3D" in result.stdout
+    assert "converged" in result.stdout
+    names = {path.name for path in (folder / "tower-results").iterdir()}
+    assert names == {"solution.json", "solution.h5", "status.png", "convergence.png"}
+
+
+def test_solve_case_writes_vtu_too(folder):
+    result = run("solve", "example:slab", "--set", "mesh.cells=[6,3]", "-o", "out/deep")
+    assert result.exit_code == 0
+    assert (folder / "out" / "deep" / "solution.vtu").is_file()
+    assert "resultant" in result.stdout
+
+
+def test_json_on_stdout_is_all_there_is(folder):
+    result = run("solve", "tower.hdf5", "--json", "-")
+    data = json.loads(result.stdout)
+    assert data["schema"] == "amontons/solution/1"
+    assert data["method"] == "auto"
+    assert (folder / "tower-results" / "solution.json").is_file()
+
+
+def test_json_copy(folder):
+    run("solve", "tower.hdf5", "--json", "copy.json", "--quiet")
+    assert (folder / "copy.json").read_text() == (
+        folder / "tower-results" / "solution.json"
+    ).read_text()
+
+
+def test_quiet(folder):
+    result = run("solve", "tower.hdf5", "--quiet")
+    assert (result.exit_code, result.output) == (0, "")
+
+
+def test_not_converged_is_exit_code_1_with_results(folder):
+    result = run("solve", "random.hdf5", "--method", "gauss-seidel", "--max-iterations", 1,
+                 "--tolerance", "1e-13")  # fmt: skip
+    assert result.exit_code == 1
+    assert "max iterations" in result.stderr
+    assert "Allow more iterations" in result.stderr
+    data = json.loads((folder / "random-results" / "solution.json").read_text())
+    assert data["outcome"] == "max_iterations"
+
+
+def test_interrupted_is_exit_code_130_with_results(folder, monkeypatch):
+    def iterates(self, problem, start, target):
+        from amontons.solvers import Iterate
+
+        yield Iterate(np.ones_like(start.r))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(am.GaussSeidel, "iterates", iterates)
+    result = run("solve", "random.hdf5", "--method", "gauss-seidel")
+    assert result.exit_code == 130
+    data = json.loads((folder / "random-results" / "solution.json").read_text())
+    assert data["outcome"] == "stopped"
+
+
+def test_interrupted_before_the_solve_writes_nothing(folder, monkeypatch):
+    def interrupt(*arguments):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("amontons.fclib.read_fclib", interrupt)
+    before = set(folder.iterdir())
+    assert run("solve", "random.hdf5").exit_code == 130
+    assert set(folder.iterdir()) == before
+
+
+@pytest.mark.parametrize("method", ["gauss-seidel", "semismooth-newton", "auto"])
+def test_methods_reach_global_files_too(folder, method):
+    result = run("solve", "tower.hdf5", "--method", method, "--json", "-")
+    assert json.loads(result.stdout)["method"] == method
+
+
+def test_solver_fields(folder):
+    flags = ["--set", "solver.batch=5", "--set", "solver.max_sweeps=10"]
+    result = run("solve", "random.hdf5", "--method", "gauss-seidel", *flags,
+                 "--tolerance", "1e-14", "--json", "-")  # fmt: skip
+    assert json.loads(result.stdout)["iterations"] <= 10
+
+
+def test_convert(folder):
+    assert run("convert", "tower.hdf5", "local.hdf5", "--form", "local").exit_code == 0
+    local = read_fclib("local.hdf5")
+    assert local.form is am.Form.DELASSUS
+    np.testing.assert_allclose(local.q, box_tower(2).condensed().q)
+    run("solve", "tower.hdf5")
+    assert run("convert", "tower-results", "again.hdf5").exit_code == 0
+    assert read_fclib("again.hdf5").form is am.Form.GLOBAL
+    assert run("convert", "example:slab", "slab.hdf5", "--set", "mesh.cells=4").exit_code == 0
+    assert read_fclib("slab.hdf5").dimension == 2
+
+
+def test_info(folder):
+    result = run("info", "tower.hdf5")
+    assert result.exit_code == 0
+    assert "rank of W" in result.stdout
+    assert "gauss-seidel" in result.stdout
+    data = json.loads(run("info", "tower.hdf5", "--json", "-").stdout)
+    assert data["contacts"] == 8
+    assert data["rank of W"] == "12 of 24"
+
+
+def test_bench(folder):
+    result = run("bench", "tower.hdf5", "random.hdf5", "--methods", "auto,gauss-seidel",
+                 "--tolerances", "1e-2,1e-4", "--profile", "p.png", "--json",
+                 "b.json")  # fmt: skip
+    assert result.exit_code == 0
+    assert "tower" in result.stdout
+    rows = json.loads((folder / "b.json").read_text())["results"]
+    assert len(rows) == 8
+    assert all(row["outcome"] == "converged" and row["seconds"] > 0 for row in rows)
+    assert (folder / "p.png").stat().st_size > 1000
+
+
+def test_bench_counts_failures(folder):
+    result = run("bench", "random.hdf5", "--methods", "auto,gauss-seidel", "--tolerances",
+                 "1e-6", "--time-limit", "1e-9", "--profile", "p.png", "--json",
+                 "-")  # fmt: skip
+    rows = json.loads(result.stdout)["results"]
+    assert all(row["seconds"] is None and row["outcome"] == "time_limit" for row in rows)
+
+
+def test_examples_are_listed():
+    result = run("examples")
+    assert "cube " in result.stdout
+    assert all(len(line) < 100 for line in result.stdout.splitlines())
+
+
+@pytest.mark.parametrize(
+    "command", [[], ["solve"], ["info"], ["convert"], ["bench"], ["examples"]]
+)
+def test_help(command):
+    result = run(*command, "--help")
+    assert result.exit_code == 0
+    assert "Usage" in result.stdout
+
+
+def test_version():
+    assert am.__version__ in run("--version").stdout
+
+
+def test_start_up_is_immediate():
+    began = time.perf_counter()
+    code = "import sys; from amontons.cli import main; assert 'numpy' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True)
+    assert time.perf_counter() - began < 2.0  # 0.1 s on an idle machine

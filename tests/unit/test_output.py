@@ -1,0 +1,161 @@
+"""Files of a solution: contents by the contract, figures that exist, nothing half-written."""
+
+import json
+from dataclasses import replace
+
+import h5py
+import meshio
+import numpy as np
+import pytest
+
+import amontons as am
+from amontons import output
+from amontons.fclib import read_fclib, write_fclib
+from amontons.gallery import GALLERY, box_tower, one_contact_2d
+from amontons.plots import convergence_figure, profile_figure, status_figure
+from amontons.solve import drive
+
+KEYS = {
+    "outcome", "advice", "method", "error", "fclib_error", "tolerance", "iterations",
+    "linear_iterations", "seconds", "dimension", "unknowns", "contacts", "resultant", "measure",
+    "max_penetration", "max_cone_violation", "versions", "schema",
+}  # fmt: skip
+
+
+def solved(dimension, **contact):
+    body = am.Body(am.box((1,) * dimension, cells=3), am.LinearElastic(200, 0.3))
+    plane = am.Plane(normal=(0,) * (dimension - 1) + (1,))
+    contact = contact or {"mu": 0.4}
+    push = (0.02, -0.02) if dimension == 2 else (0.02, 0.0, -0.02)
+    return am.solve(
+        am.Model([body], supports=[am.Fix("top", push)],
+                 contacts=[am.Contact("bottom", plane, **contact)], name="block")
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module", params=[2, 3])
+def solution(request):
+    return solved(request.param)
+
+
+def test_json(solution, tmp_path):
+    solution.write(tmp_path / "a.json")
+    data = json.loads((tmp_path / "a.json").read_text())
+    assert data.keys() >= KEYS
+    assert data["schema"] == "amontons/solution/1"
+    assert data["outcome"] == "converged"
+    assert data["method"] == "auto"
+    assert data["seconds"].keys() == {"assemble", "setup", "solve", "total"}
+    assert data["contacts"]["total"] == sum(
+        data["contacts"][k] for k in ("open", "slip", "stick")
+    )
+    assert len(data["resultant"]) == data["dimension"]
+    assert data["versions"]["amontons"] == am.__version__
+
+
+def test_json_has_no_nan():
+    found = drive(one_contact_2d(), max_iterations=1)
+    broken = replace(found, convergence=replace(found.convergence, error=np.inf))
+    data = output.summary(output.Output(broken))
+    assert data["error"] is None
+    assert data["resultant"] is None
+    assert "NaN" not in output.to_json(data)
+
+
+def test_h5(solution, tmp_path):
+    solution.write(tmp_path / "a.h5")
+    with h5py.File(tmp_path / "a.h5") as file:
+        np.testing.assert_array_equal(file["r"], solution.r)
+        np.testing.assert_array_equal(file["u"], solution.u)
+        np.testing.assert_array_equal(file["v"], solution.v)
+        np.testing.assert_array_equal(file["status"], solution.status)
+        np.testing.assert_array_equal(file["points"], solution.points)
+        np.testing.assert_array_equal(file["frames"], solution.frames)
+        np.testing.assert_array_equal(file["displacement/body"], solution.displacement[0])
+
+
+def test_h5_of_an_fclib_problem_is_an_fclib_file(tmp_path):
+    write_fclib(box_tower(2), tmp_path / "a.hdf5")
+    found = drive(read_fclib(tmp_path / "a.hdf5"))
+    output.write(output.Output(found, from_fclib=True), tmp_path / "b.h5")
+    assert read_fclib(tmp_path / "b.h5").contacts == 8
+    with h5py.File(tmp_path / "b.h5") as file:
+        np.testing.assert_array_equal(file["solution/r"], found.r.ravel())
+        np.testing.assert_array_equal(file["r"], found.r)
+
+
+def test_vtu(solution, tmp_path):
+    solution.write(tmp_path / "a.vtu")
+    mesh = meshio.read(tmp_path / "a.vtu")
+    d = solution.problem.dimension
+    np.testing.assert_allclose(mesh.point_data["displacement"][:, :d], solution.displacement[0])
+    node = solution.fields.node
+    fields = mesh.point_data
+    np.testing.assert_allclose(fields["CPRESS"][node], solution.pressure)
+    np.testing.assert_allclose(fields["COPEN"][node], solution.gap)
+    np.testing.assert_array_equal(fields["CSTATUS"][node], solution.status)
+    np.testing.assert_allclose(fields["CSHEAR"][node], np.linalg.norm(solution.shear, axis=1))
+    np.testing.assert_allclose(fields["CSLIP"][node], np.linalg.norm(solution.slip, axis=1))
+    assert (np.delete(fields["CSTATUS"], node) == -1).all()
+    for values in fields.values():
+        assert np.isfinite(values).all()
+    assert all((stress >= 0).all() for stress in mesh.cell_data["von_mises"])
+
+
+@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
+def test_plot(solution, suffix, tmp_path):
+    path = tmp_path / f"a{suffix}"
+    solution.plot(path)
+    assert path.stat().st_size > 1000
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("name", GALLERY)
+def test_figures_without_geometry(name, tmp_path):
+    found = drive(GALLERY[name]())
+    status_figure(found, title=name).savefig(tmp_path / "a.png")
+    convergence_figure(found.convergence, name).savefig(tmp_path / "b.png")
+
+
+@pytest.mark.parametrize("contact", [{"mu": 0.0}, {"tresca": 1.0}, {"tresca": 0.0}])
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_figures_of_other_laws(contact, dimension, tmp_path):
+    solved(dimension, **contact).plot(tmp_path / "a.png")
+
+
+def test_figure_of_a_failure(tmp_path):
+    found = drive(one_contact_2d())
+    broken = replace(found.convergence, error=np.inf, history=())
+    convergence_figure(broken).savefig(tmp_path / "a.png")
+
+
+def test_profile_figure(tmp_path):
+    profiles = {
+        1e-3: am.performance_profile([[1.0, 2.0]]),
+        1e-6: am.performance_profile([[np.inf] * 2]),
+    }
+    profile_figure(profiles, ["a", "b"]).savefig(tmp_path / "a.png")
+
+
+def test_unknown_suffix(solution, tmp_path):
+    with pytest.raises(am.InvalidInput, match=r"\.vtu"):
+        solution.write(tmp_path / "a.xyz")
+    with pytest.raises(am.InvalidInput, match=r"\.png"):
+        solution.plot(tmp_path / "a.xyz")
+    with pytest.raises(am.InvalidInput, match="no mesh"):
+        output.write(output.Output(drive(one_contact_2d())), tmp_path / "a.vtu")
+    assert not list(tmp_path.iterdir())
+
+
+def test_nothing_half_written(solution, tmp_path, monkeypatch):
+    output.save(solution.output, tmp_path)
+    old = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    assert len(old) == 5
+
+    def fail(*arguments):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("amontons.output.plot_convergence", fail)
+    with pytest.raises(am.InvalidInput, match="No space left"):
+        output.save(solution.output, tmp_path)
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == old
