@@ -1,0 +1,20 @@
+"""Name of the machine and versions, so that a committed figure says where it was measured."""
+
+import os
+import platform
+from importlib.metadata import version
+from pathlib import Path
+
+PACKAGES = ("amontons", "numpy", "scipy", "numba", "rslab", "ngsolve")
+
+
+def describe() -> dict[str, str]:
+    """CPU, cores, Python and package versions."""
+    info = Path("/proc/cpuinfo")
+    cpu = platform.processor() or platform.machine()
+    if info.exists():
+        lines = [x for x in info.read_text().splitlines() if x.startswith("model name")]
+        cpu = lines[0].split(":", 1)[1].strip() if lines else cpu
+    versions = {name: version(name) for name in PACKAGES}
+    cores = str(os.cpu_count())
+    return {"cpu": cpu, "cores": cores, "python": platform.python_version(), **versions}
