@@ -4,8 +4,10 @@
 
 One linear solve is the factorisation of the stiffness and one back substitution by the same
 solver (`amontons.Direct`); the nonlinear time is the whole of `drive(problem)` on a fresh
-problem, its own factorisation, judge and status included.  Best of three (one at level 5), one thread,
-compiled code warm.  Writes results/cube.md and results/cube.json beside this file.
+problem: its own factorisation, judge and status included.  Best of three (one at level 5), one
+thread, compiled code warm.
+
+Writes results/cube.md and results/cube.json beside this file.
 """
 
 import os

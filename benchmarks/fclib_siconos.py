@@ -181,8 +181,8 @@ def _cell(row):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("folder", nargs="?", type=Path,
-                        default=Path(os.environ.get("AMONTONS_SHARED", "../shared")) / "data/fclib")  # fmt: skip
+    shared = Path(os.environ.get("AMONTONS_SHARED", "../shared"))
+    parser.add_argument("folder", nargs="?", type=Path, default=shared / "data/fclib")
     parser.add_argument("--siconos", default="/usr/bin/python3", help="Python that has Siconos")
     parser.add_argument("--cap", type=float, default=6.0, help="seconds for one run of Siconos")
     parser.add_argument("--limit", type=float, default=60.0, help="seconds for one run of ours")
