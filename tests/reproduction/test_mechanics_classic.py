@@ -35,6 +35,30 @@ def test_a_wedge_pushed_up_an_incline(mu, expected):
     assert -horizontal / vertical == pytest.approx(expected, abs=1e-6)
 
 
+@pytest.mark.parametrize("mu", [0.0, 0.1, 0.2, 0.3])
+def test_a_heavy_wedge_pushed_by_its_side(mu):
+    """Contact alone carries the weight G; the push on the left side is F = G (…) / (…)."""
+    turn = np.array([[1, -0.1], [0.1, 1]]) / np.hypot(1, 0.1)
+    flat = am.box((6, 4), (12, 8))
+    weight = 1000.0
+    model = am.Model(
+        [
+            am.Body(
+                am.Mesh(flat.points @ turn.T, flat.cells, flat.surfaces),
+                am.LinearElastic(206e3, 0.3),
+            )
+        ],
+        supports=[am.Fix("left", (0.05, None))],
+        contacts=[am.Contact("bottom", am.Plane(turn @ (0, 1)), mu=mu)],
+        loads=[am.BodyForce((0, -weight / 24))],
+    )
+    solution = am.drive(model.assemble(), tolerance=1e-9)
+    assert solution.converged
+    push, carried = model.recover(solution).resultant
+    assert carried == pytest.approx(weight, rel=1e-7)
+    assert -push / weight == pytest.approx((0.1 + mu) / (1 - 0.1 * mu), rel=1e-6)
+
+
 def graded_half_plane(cells, fine, reach=20.0):
     """A rectangle under y = 0, `reach` deep, twice as wide, `fine` cells at the origin."""
     base = am.box((2, 1), cells)

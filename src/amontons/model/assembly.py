@@ -78,7 +78,8 @@ def discretise(
     free, fixed = np.flatnonzero(~is_fixed), np.flatnonzero(is_fixed)
     if not free.size:
         raise InvalidInput("supports: every degree of freedom is fixed, nothing left to solve")
-    K = sparse.block_diag([stiffness(b.mesh, b.material) for b in bodies], format="csr")
+    parts = [stiffness(body.mesh, body.material).tocsr() for body in bodies]
+    K = parts[0] if len(parts) == 1 else sparse.block_diag(parts, format="csr")
     prescribed = np.where(is_fixed, values, 0.0)
     placed = tuple(_place(bodies, contact, is_fixed, offsets) for contact in contacts)
     whole_H = sparse.hstack([_shifted(p, offsets) for p in placed], format="csc")

@@ -9,9 +9,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from ..cones import Coulomb, Law, Tresca
 from ..errors import InvalidInput
+from ..linear import Direct
 from ..problem import FrictionProblem
 from ..solution import FrictionSolution
 from .assembly import Discretisation, discretise, locate
@@ -90,13 +92,14 @@ class Model:
     def _problem(self) -> FrictionProblem:
         parts = self.discretisation
         law = self._law()
-        self._check_held(parts, law)
+        loose = self._loose_but_held(parts, law)
         w = self.load_factor * parts.carried
         w[:, 0] += parts.gap
         f = self.load_factor * parts.load
         base = FrictionProblem.from_global(
             parts.M, parts.H, f, w, law, near_nullspace=parts.near_nullspace,
             load_scale=_load_size(parts, f, w), name=self.name,
+            u_scale=_bonded_size(parts, f, w) if loose else None,
         )  # fmt: skip
         first = self._shared.setdefault("problem", base)
         return replace(base, M=first.M, H=first.H, _shared=first._shared)  # one factor for all
@@ -116,12 +119,15 @@ class Model:
             both * np.concatenate([p.rows.weights for p in self.discretisation.placed])
         )
 
-    def _check_held(self, parts: Discretisation, law: Law) -> None:
+    def _loose_but_held(self, parts: Discretisation, law: Law) -> bool:
+        """True when contact alone holds a body; raises SingularOperator when nothing does."""
         fixed = np.zeros(parts.dofs, dtype=bool)
         fixed[parts.fixed] = True
         acting = np.ones(parts.carried.shape, dtype=bool)
         acting[:, 1:] = (law.coefficient > 0)[:, None]
-        check_held(loose_modes(parts.parts, fixed), parts.whole_H, parts.dofs, acting.ravel())
+        loose = loose_modes(parts.parts, fixed)
+        check_held(loose, parts.whole_H, parts.dofs, acting.ravel())
+        return bool(loose)
 
     def with_mu(self, mu: ScalarValue) -> Model:
         """The same model with Coulomb friction mu in all its contacts."""
@@ -154,6 +160,18 @@ def _load_size(parts: Discretisation, f: Array, w: Array) -> float:
     return float(
         np.hypot(np.linalg.norm(f), np.linalg.norm(parts.M @ (parts.H @ overlap.ravel())))
     )
+
+
+def _bonded_size(parts: Discretisation, f: Array, w: Array) -> float:
+    """Size of local displacements when springs as stiff as the nodes bond all contacts.
+
+    It replaces the size without contact, which is infinite where contact alone holds a body.
+    """
+    H = parts.H
+    stiffness = sparse.diags_array(abs(H).T @ parts.M.diagonal())
+    bonded = sparse.csc_array(parts.M + H @ stiffness @ H.T)
+    v = Direct().factor(bonded).solve(f - H @ (stiffness @ w.ravel()))
+    return float(np.linalg.norm(H.T @ v + w.ravel()))
 
 
 def _tuple_of(name: str, values: object, kind: object) -> tuple:
