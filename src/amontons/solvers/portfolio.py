@@ -122,6 +122,8 @@ class Portfolio:
 
     def _sweeps_left(self, before: float, count: int) -> float:
         """Sweeps to the goal at the rate of the last `count`, infinite without progress."""
+        if not (math.isfinite(before) and math.isfinite(self.latest)):
+            return math.inf
         rate = math.log(max(before, 1e-300) / max(self.latest, 1e-300)) / count
         left = math.log(max(self.latest / self.goal, 1.0))
         return left / rate if rate > 0 else math.inf
@@ -182,11 +184,10 @@ class Portfolio:
 
     def _proximal(self, round_: int) -> Iterator[Iterate]:
         """Proximal point while it makes progress."""
-        self.r = self.r.copy()
-        self.work.sweeps(self.r, 10)
-        self.error = self._judge(self.r)
+        x = self.r.copy()
+        self.work.sweeps(x, 10)
         mark, patience = self.error, 0
-        for iterate in ProximalPoint(alpha=1e-2 * 0.1**round_).steps(self.work, self.r):
+        for iterate in ProximalPoint(alpha=1e-2 * 0.1**round_).steps(self.work, x):
             self.budget += iterate.iterations * self.costs["newton"]
             yield self._offer(spatial(iterate.r), iterate.iterations, "proximal point")
             patience = 0 if self.error < 0.5 * mark else patience + 1
