@@ -14,7 +14,7 @@ from ..errors import AmontonsError, FileFormatError, InvalidInput, MissingDepend
 from ..expressions import Expression
 from .overrides import apply_overrides
 from .settings import LIMITS, Settings, make_solver, method_class
-from .tables import Table
+from .tables import LARGEST, Table
 
 if TYPE_CHECKING:
     from ..contact import Obstacle
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 TOP = ("title", "mesh", "material", "fix", "traction", "body_force", "contact", "solver")
 MAX_NODES = 50_000_000  # of a box: a typing error must not fill the memory
-LONGEST = 1e100  # edge of a box, in any unit: volumes and their inverses must stay finite
 LATER = {  # words of the format that this version can not serve
     "neo-hookean": "large deformations are not available yet, use 'linear-elastic'",
     "ciarlet-geymonat": "large deformations are not available yet, use 'linear-elastic'",
@@ -121,8 +120,8 @@ def _mesh(table: Table, path: Path) -> Mesh:
             return read_mesh(str(name))
     table.only("box", "cells", "kind")
     size = table.numbers("box", (2, 3))
-    if any(not 1 / LONGEST < abs(length) < LONGEST for length in size):
-        raise table.error("box", f"expected lengths that can be squared, got {size}")
+    if any(0 < abs(length) < 1 / LARGEST for length in size):
+        raise table.error("box", f"expected lengths above {1 / LARGEST:g}, got {size}")
     cells = table.need("cells", "a whole number or one per direction")
     counts = cells if isinstance(cells, list) else [cells] * len(size)
     if len(counts) != len(size) or not all(type(c) is int and c >= 1 for c in counts):

@@ -11,6 +11,9 @@ from ..errors import FileFormatError
 from ..expressions import nearest
 
 
+LARGEST = 1e100  # in any unit: squares must stay finite
+
+
 @dataclass(frozen=True)
 class Table:
     """One table of a file; `where` is its dotted path, "" for the file itself."""
@@ -74,6 +77,8 @@ class Table:
             number = math.inf
         if not math.isfinite(number):
             raise self.error(key, f"expected a finite number, got {value!r}")
+        if abs(number) > LARGEST:
+            raise self.error(key, f"expected a number up to {LARGEST:g}, got {value!r}")
         return number
 
     def numbers(self, key: str, counts: Sequence[int]) -> list[float]:
