@@ -24,12 +24,13 @@ from .blocks import BlockRows, block_rows, spatial
 from .cones import Coulomb, Law, Tresca
 from .errors import InvalidInput, SingularOperator, UnsupportedForm
 from .judge import Measure
-from .linear import Direct, Factor
+from .linear import ConjugateGradient, Direct, Factor, LinearSolver
 from .linear.small_blocks import block_diagonal_inverse
 
 Array = NDArray[np.float64]
 Matrix = sparse.csr_array | sparse.csc_array | Array
 DENSE_LIMIT = 4e9  # bytes that condensed() may fill before it refuses
+DIRECT_LIMIT = 600_000  # unknowns of a mesh whose factor takes some 10 GB
 EXACT_WORK = 2e6  # n * nc * d up to which W is formed to judge a global problem with coupled M
 
 
@@ -193,11 +194,17 @@ class FrictionProblem:
 
     # ---------------------------------------------------------------- operators
     def factor(self) -> Factor:
-        """A direct factor of M, made once and shared by all variants of this problem."""
+        """M prepared for solves, made once and shared by all variants of this problem.
+
+        A sparse factor; conjugate gradients with multigrid where the factor of a mesh would not
+        fit into memory (more than DIRECT_LIMIT unknowns, near_nullspace given).
+        """
         self._need(Form.GLOBAL)
-        M = self.M
+        M, modes = self.M, self.near_nullspace
         assert M is not None
-        return self._kept("factor", (M,), lambda: Direct().factor(M))
+        iterative = self.unknowns > DIRECT_LIMIT and modes is not None
+        solver: LinearSolver = ConjugateGradient() if iterative else Direct()
+        return self._kept("factor", (M,), lambda: solver.factor(M, modes))
 
     @cached_property
     def small_blocks(self) -> sparse.csc_array | None:
@@ -270,7 +277,11 @@ class FrictionProblem:
         return W
 
     def with_mu(self, mu: ArrayLike) -> FrictionProblem:
-        """The same problem with other friction coefficients: a number or (nc,)."""
+        """The same problem with other friction coefficients: a number or (nc,).
+
+        Raises UnsupportedForm under Tresca's law, which has no mu.
+        """
+        _ = self.mu
         law = Coulomb(np.broadcast_to(np.asarray(mu, dtype=float), (self.contacts,)))
         return replace(self, law=law)
 
