@@ -13,6 +13,7 @@ import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache, reduce
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -155,7 +156,7 @@ def _source(text: str, node: ast.AST) -> str:
     return (ast.get_source_segment(text.strip(), node) or "this")[:40]
 
 
-def _number(text: str, value: float) -> float:
+def _number(text: str, value: Any) -> float:
     try:
         return float(value)
     except OverflowError:
@@ -178,11 +179,11 @@ def _unknown(text: str, name: str) -> InvalidInput:
     return _error(text, f"unknown name '{name}'{nearest(name, known)}")
 
 
-def _evaluate(node: ast.AST, values: dict[str, Array | float]) -> Array:
+def _evaluate(node: ast.AST, values: dict[str, Array | float]) -> Any:
     """Value of a tree that `_check` has accepted."""
     match node:
         case ast.Constant(value=value):
-            return np.float64(value)
+            return _number("", value)
         case ast.Name(id=name):
             return values[name]
         case ast.BinOp(left=left, op=op, right=right):

@@ -200,7 +200,7 @@ def _refuse_bilateral(source: _Source, root: str, form: Form) -> None:
         if isinstance(node, h5py.Group):
             empty = 0 in (source.integer(f"{where}/m"), source.integer(f"{where}/n"))
         else:
-            empty = not node.size
+            empty = isinstance(node, h5py.Dataset) and not node.size
         if not empty:
             raise source.error(where, "bilateral constraints are not supported; "
                                "eliminate them, or add them to M as stiff springs")  # fmt: skip
@@ -221,6 +221,7 @@ def _read_local(source: _Source, root: str, d: int, mu: Array) -> FclibProblem:
     q = _contact_vector(source, f"{root}/vectors/q", d, mu)
     W = _sparse(source, f"{root}/W", (q.size, q.size))
     problem = FclibProblem.from_delassus(W.matrix, q, mu, name=source.path.stem)
+    assert isinstance(problem, FclibProblem)
     return replace(problem, stored={"W": replace(W, matrix=problem.W)})
 
 
@@ -230,6 +231,7 @@ def _read_global(source: _Source, root: str, d: int, mu: Array) -> FclibProblem:
     M = _sparse(source, f"{root}/M", (f.size, f.size))
     H = _sparse(source, f"{root}/H", (f.size, w.size))
     problem = FclibProblem.from_global(M.matrix, H.matrix, f, w, mu, name=source.path.stem)
+    assert isinstance(problem, FclibProblem)
     stored = {"M": replace(M, matrix=problem.M), "H": replace(H, matrix=problem.H)}
     return replace(problem, stored=stored)
 

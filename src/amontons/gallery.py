@@ -102,7 +102,9 @@ def sphere_packing(
         [(x, y, z) for z in range(layers) for y in range(count) for x in range(count)], float
     )
     index = {tuple(c): k for k, c in enumerate(centres.astype(int))}
-    pairs = [(k, None, np.array([0.0, 0, 1])) for k, c in enumerate(centres) if c[2] == 0]
+    pairs: list[tuple[int, int | None, Array]] = [
+        (k, None, np.array([0.0, 0, 1])) for k, c in enumerate(centres) if c[2] == 0
+    ]
     for k, c in enumerate(centres.astype(int)):
         for axis in np.eye(3, dtype=int):
             other = index.get(tuple(c + axis))

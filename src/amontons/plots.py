@@ -14,6 +14,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from .solution import ContactStatus, Convergence, FrictionSolution
@@ -125,7 +126,7 @@ def _ranked_reactions(axes: Axes, solution: FrictionSolution) -> None:
                      marker=MARKERS[status], color=COLOURS[status], edgecolors=INK,
                      linewidths=0.3)  # fmt: skip
     axes.set_xlim(0, len(order) + 1)
-    axes.xaxis.get_major_locator().set_params(integer=True)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
 
 
 def _marker_size(count: int) -> float:

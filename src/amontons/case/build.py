@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..errors import AmontonsError, FileFormatError, InvalidInput, MissingDependency
 from ..expressions import Expression
 from .overrides import apply_overrides
@@ -182,14 +184,15 @@ def _contact(table: Table, mesh: Mesh) -> Contact:
     if len(friction.data) != 1:
         raise friction.error("", "expected either coulomb, a coefficient, or tresca, a stress")
     key = next(iter(friction.data))
-    law = {"coulomb": "mu", "tresca": "tresca"}[key]
     value = _scalar(friction, key)
     if isinstance(value, float) and value < 0:
         raise friction.error(key, f"expected a number >= 0, got {value}")
+    mu, tresca = (value, None) if key == "coulomb" else (None, value)
     with _Blame(table, ""):
         if "master" in table.data:
-            return Contact(slave, master=table.text("master"), **{law: value})
-        return Contact(slave, _obstacle(table.table("obstacle"), mesh.dim), **{law: value})
+            return Contact(slave, master=table.text("master"), mu=mu, tresca=tresca)
+        obstacle = _obstacle(table.table("obstacle"), mesh.dim)
+        return Contact(slave, obstacle, mu=mu, tresca=tresca)
 
 
 def _obstacle(table: Table, dim: int) -> Obstacle:
@@ -201,7 +204,7 @@ def _obstacle(table: Table, dim: int) -> Obstacle:
     kind = next(iter(table.data))
     if kind == "level_set":
         function = _scalar(table, "level_set")
-        if isinstance(function, float):
+        if not isinstance(function, Expression):
             raise table.error(kind, f"expected an expression in x, y, z, got {function}")
         return LevelSet(function)
     inner = table.table(kind)
@@ -248,7 +251,7 @@ def _entry(table: Table, key: str, value: Any, dim: int) -> float | Expression:
         expression = Expression(value)
         if dim == 2 and "z" in expression.names:
             raise InvalidInput(f"expression {value!r}: 'z' does not exist in 2D")
-        return expression if expression.names else float(expression([0.0, 0.0, 0.0]))
+        return expression if expression.names else float(expression(np.zeros(3)))
     except AmontonsError as reason:
         raise table.error(key, str(reason)) from None
 

@@ -6,6 +6,7 @@ import dataclasses
 import re
 import types
 import typing
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
@@ -79,10 +80,12 @@ def _convert(name: str, value: Any, hint: Any) -> Any:
 def _component(name: str, value: str, protocol: type) -> Any:
     """A part of a solver by its class name in kebab-case: `linear = "conjugate-gradient"`."""
     wanted = [key for key in vars(protocol) if not key.startswith("_")]
-    fitting = {
+    fitting: dict[str, Callable[[], Any]] = {
         _kebab(kind.__name__): kind
         for kind in (getattr(home, key) for home in (solvers, linear) for key in home.__all__)
-        if dataclasses.is_dataclass(kind) and all(hasattr(kind, key) for key in wanted)
+        if isinstance(kind, type)
+        and dataclasses.is_dataclass(kind)
+        and all(hasattr(kind, key) for key in wanted)
     }
     if value not in fitting:
         raise InvalidInput(f"solver.{name}: unknown value '{value}'{nearest(value, fitting)}")

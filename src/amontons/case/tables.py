@@ -10,7 +10,6 @@ from typing import Any
 from ..errors import FileFormatError
 from ..expressions import nearest
 
-
 LARGEST = 1e100  # in any unit: squares must stay finite
 
 

@@ -18,7 +18,7 @@ from ..case import Settings
 from ..errors import InvalidInput, SingularOperator, UnsupportedForm
 from ..files import replacing
 from ..problem import Form, FrictionProblem
-from ..solution import Outcome
+from ..solution import Convergence, Outcome
 from .sources import open_source, with_flags
 from .terminal import check_writable, deliver_json, show_table
 
@@ -106,30 +106,42 @@ def _time(
     file: str, problem: FrictionProblem, method: str, tolerance: float, limit: float
 ) -> Timing:
     """Best time of some runs after one that compiles."""
-    settings = with_flags(Settings(), method, tolerance, time_limit=limit)
-    best, found, spent = math.inf, None, 0.0
-    for attempt in range(1 + REPEATS):
-        fresh = _fresh(problem)
-        began = time.perf_counter()
-        try:
-            found = api.solve_any_form(
-                fresh, settings.solver(), tolerance=tolerance, time_limit=limit,
-                callback=lambda step, iterate: None,
-            )  # fmt: skip
-        except (UnsupportedForm, SingularOperator, InvalidInput) as reason:
-            return Timing(file, method, tolerance, math.inf, str(reason), math.inf, 0)
-        seconds = time.perf_counter() - began
-        record = found.convergence
-        if record.outcome is Outcome.STOPPED:
-            raise KeyboardInterrupt
-        converged = record.outcome is Outcome.CONVERGED
-        if attempt > 0 or seconds > BUDGET:
-            best = min(best, seconds if converged else math.inf)
-            spent += seconds
-        if spent > BUDGET or (attempt > 0 and not converged):
+    best, spent = math.inf, 0.0
+    seconds, record = _once(problem, method, tolerance, limit)
+    if isinstance(record, str):
+        return Timing(file, method, tolerance, math.inf, record, math.inf, 0)
+    if seconds > BUDGET:  # compiling does not matter, and twice would be long
+        best = seconds if record.outcome is Outcome.CONVERGED else math.inf
+        spent = seconds
+    for _ in range(REPEATS):
+        if spent > BUDGET:
             break
-    name = record.outcome.name.lower()
-    return Timing(file, method, tolerance, best, name, record.error, record.iterations)
+        seconds, record = _once(problem, method, tolerance, limit)
+        assert not isinstance(record, str)
+        spent += seconds
+        if record.outcome is not Outcome.CONVERGED:
+            break
+        best = min(best, seconds)
+    outcome = record.outcome.name.lower()
+    return Timing(file, method, tolerance, best, outcome, record.error, record.iterations)
+
+
+def _once(
+    problem: FrictionProblem, method: str, tolerance: float, limit: float
+) -> tuple[float, Convergence | str]:
+    """Seconds and record of one solve, or why the method does not fit."""
+    fresh, solver = _fresh(problem), Settings(method).solver()
+    began = time.perf_counter()
+    try:
+        found = api.solve_any_form(
+            fresh, solver, tolerance=tolerance, time_limit=limit,
+            callback=lambda step, iterate: None,
+        )  # fmt: skip
+    except (UnsupportedForm, SingularOperator, InvalidInput) as reason:
+        return math.inf, str(reason)
+    if found.convergence.outcome is Outcome.STOPPED:
+        raise KeyboardInterrupt
+    return time.perf_counter() - began, found.convergence
 
 
 # ------------------------------------------------------------------------------ showing
