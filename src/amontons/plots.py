@@ -100,9 +100,11 @@ def _cone_plane(axes: Axes, solution: FrictionSolution) -> None:
         line = np.linspace(0, 1.1 * high, 2)
     axes.plot(line, line, color=INK, linewidth=1)
     axes.fill_between(line, line, color=INK, alpha=0.05, linewidth=0)
-    for status in (ContactStatus.STICK, ContactStatus.SLIP):
+    size = _marker_size(int(closed.sum()))
+    # slipping contacts, few and at the edge of the cone, are drawn larger and last
+    for status, factor in ((ContactStatus.STICK, 1), (ContactStatus.SLIP, 2)):
         chosen = closed & (solution.status == status)
-        axes.scatter(bound[chosen], shear[chosen], s=_marker_size(closed.sum()),
+        axes.scatter(bound[chosen], shear[chosen], s=factor * size,
                      marker=MARKERS[status], color=COLOURS[status], alpha=0.8,
                      edgecolors="white", linewidths=0.3)  # fmt: skip
 
@@ -112,7 +114,7 @@ def _ranked_reactions(axes: Axes, solution: FrictionSolution) -> None:
     normal = solution.r[:, 0]
     order = np.argsort(-normal, kind="stable")
     rank = np.arange(1, len(order) + 1)
-    positive = normal[normal > 0]
+    positive = normal[(normal > 0) & (solution.status != ContactStatus.OPEN)]
     axes.set(xlabel="contacts, largest reaction first", ylabel="normal reaction  $r_N$",
              title="How the contacts share the load")  # fmt: skip
     if positive.size and positive.max() > WIDE * positive.min():
