@@ -120,7 +120,15 @@ def _sign_change(a0, a1, b1, a2, b2, left, right):  # noqa: PLR0913
 
 @njit(cache=True)
 def _stick(s11, s12, s21, s22, y1, y2):  # noqa: PLR0913
-    """-S^-1 y of a 2x2 S by elimination with a pivot, and whether S is regular to rounding."""
+    """-S^-1 y of a 2x2 S by elimination with a pivot, and whether S is regular to rounding.
+
+    A tangent that a support holds already (no compliance, no motion) takes no reaction.
+    """
+    if s12 == 0.0 and s21 == 0.0:
+        if s22 == 0.0 and y2 == 0.0 and s11 > 0.0:
+            return -y1 / s11, 0.0, True
+        if s11 == 0.0 and y1 == 0.0 and s22 > 0.0:
+            return 0.0, -y2 / s22, True
     if abs(s21) > abs(s11):
         s11, s12, y1, s21, s22, y2 = s21, s22, y2, s11, s12, y1
     if s11 == 0.0:

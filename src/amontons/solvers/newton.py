@@ -24,7 +24,7 @@ line search technique for Newton's method", SIAM J. Numer. Anal. 23 (1986).
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -42,6 +42,7 @@ Array = NDArray[np.float64]
 DENSE_UNKNOWNS = (
     1200  # reactions up to which a dense factor of A + B W is quicker than a sparse
 )
+NO_STIFFNESS = 1e-13  # relative compliance below which a direction can not react
 FORCING = (1e-10, 0.1)  # smallest and largest relative tolerance of GMRES
 
 
@@ -99,6 +100,7 @@ class SemismoothNewton:
         system = self._linearise(problem)
         law = _Residual(self.function, problem, self.rho)
         state = system.state(Iterate(law.admissible(start.r), start.v))
+        state = replace(state, r=law.admissible(state.r))
         values: list[float] = []
         forcing = FORCING[1]
         while True:
@@ -131,33 +133,48 @@ class SemismoothNewton:
 
 
 class _Residual:
-    """A complementarity function on one problem; contacts that can not react keep r = 0."""
+    """A complementarity function on one problem.
+
+    Directions that can not react keep r = 0: contacts with W_ii = 0, and tangents that a
+    support holds already.
+    """
 
     def __init__(
         self, function: ComplementarityFunction, problem: FrictionProblem, scale: float
     ) -> None:
         self.function, self.law = function, problem.law
-        self.able = problem.rho > 0
-        self.rho = scale * np.where(self.able, problem.rho, 1.0)
-        self.blocked = (~self.able)[:, None, None] * np.eye(problem.dimension)
+        self.able = _able(problem)
+        self.rho = scale * np.where(problem.rho > 0, problem.rho, 1.0)
+        self.blocked = (~self.able)[:, :, None] * np.eye(problem.dimension)
 
     def admissible(self, r: Array) -> Array:
-        """r with zero where a contact can not react."""
-        return np.where(self.able[:, None], r, 0.0)
+        """r with zero in the directions that can not react."""
+        return np.where(self.able, r, 0.0)
 
     def evaluate(self, state: State) -> Array:
         """F, (nc, d), unit of r."""
         return self.admissible(self.function.residual(state.r, state.u, self.law, self.rho))
 
     def linearise(self, state: State) -> Linearised:
-        """(F, A, B), with A = 1 and B = 0 where a contact can not react."""
+        """(F, A, B), with rows A = 1 and B = 0 in directions that can not react."""
         F, A, B = self.function.linearise(state.r, state.u, self.law, self.rho)
-        able = self.able[:, None, None]
+        able = self.able[:, :, None]
         return self.admissible(F), A * able + self.blocked, B * able
 
     def size(self, F: Array) -> float:
         """|F / rho|, unit of u."""
         return float(np.linalg.norm(F / self.rho[:, None]))
+
+
+def _able(problem: FrictionProblem) -> NDArray[np.bool_]:
+    """Directions, (nc, d), in which a reaction moves its own contact; none without a normal."""
+    if problem.form is Form.DELASSUS:
+        blocks = problem.blocks.diagonal_blocks
+    else:
+        blocks = problem.local_stiffness
+    own = np.diagonal(blocks, axis1=1, axis2=2)[:, : problem.dimension]
+    able = own > NO_STIFFNESS * own.max(axis=1, keepdims=True, initial=0.0)
+    return able & able[:, :1]
 
 
 def block_diagonal(blocks: Array) -> sparse.csr_array:
@@ -218,9 +235,22 @@ class Augmented:
     linear: LinearSolver
 
     def state(self, start: Iterate) -> State:
-        """r and v of the start, v = 0 where there is none: M may be singular here."""
-        v = start.v if start.v is not None else np.zeros(self.problem.unknowns)
-        return State(start.r, self.problem.local_velocity(v), v)
+        """r and v of the start; where there is none, of the contacts bonded by springs.
+
+        M may be singular here, and Newton from r = 0 would have a singular matrix too.
+        """
+        p = self.problem
+        if start.v is not None:
+            return State(start.r, p.local_velocity(start.v), start.v)
+        assert p.M is not None and p.H is not None and p.f is not None and p.w is not None
+        spring = abs(p.H).T @ p.M.diagonal()
+        bonded = (
+            p.M + p.H @ sparse.dia_array((spring[None], 0), shape=2 * (spring.size,)) @ p.H.T
+        )
+        factor = self.linear.factor(sparse.csc_array(bonded))
+        v = factor.solve(p.f - p.H @ (spring * p.w.ravel()))
+        u = p.local_velocity(v)
+        return State(-spring.reshape(u.shape) * u, u, v)
 
     def step(self, state: State, linearised: Linearised, forcing: float) -> tuple[State, int]:
         """The whole step from [M, -H; B H^T, A]."""
@@ -254,7 +284,9 @@ class SchurComplement:
         own = rows == gram.indices
         inverse[rows[own]] = np.linalg.pinv(gram.data[own])
         E = H @ block_diagonal(inverse)  # exact where contacts share no unknown
-        return cls(problem, sparse.csr_array(E.T @ problem.M @ E))
+        S = sparse.csr_array(E.T @ problem.M @ E)
+        held = (S.diagonal() == 0).astype(float)  # directions that a support holds already
+        return cls(problem, sparse.csr_array(S + sparse.diags_array(held)))
 
     def state(self, start: Iterate) -> State:
         """r of the start and its velocities."""
