@@ -55,6 +55,32 @@ def random_delassus(
     return FrictionProblem.from_delassus(W, q, np.full(contacts, mu), name=f"random-{seed}")
 
 
+def cylinder_on_half_plane(
+    strips: int = 101, *, approach: float = 5e-3, shift: float = 0.0, mu: float = 0.5
+) -> FrictionProblem:
+    """Cylinder pressed and then pushed sideways on an elastically similar half plane, in 2D.
+
+    Hertz, and Cattaneo and Mindlin's partial slip: normal and tangential compliance are equal
+    and do not couple.  Radius 1, modulus E* = 1 (plane strain), strips of constant traction on
+    -0.2 <= x <= 0.2; each contact is a strip, r its force, u its gap and sliding.  approach and
+    shift are the displacements of the cylinder against a point at depth 10.
+
+    K. L. Johnson, "Contact Mechanics" (1985), section 2.1 (Flamant), 4.2 and 7.2.
+    """
+    half_width = 0.2
+    x, h = np.linspace(-half_width, half_width, strips, retstep=True)
+
+    def integral(s: Array) -> Array:
+        """Integral of ln(10 / |s|)."""
+        return s * (1 + np.log(10 / np.abs(s)))
+
+    distance = x[:, None] - x[None, :]
+    compliance = 2 / (np.pi * h) * (integral(distance + h / 2) - integral(distance - h / 2))
+    W = np.kron(compliance, np.eye(2))
+    q = np.column_stack([x**2 / 2 - approach, np.full(strips, shift)])
+    return FrictionProblem.from_delassus(W, q, np.full(strips, mu), name="cylinder")
+
+
 def box_tower(boxes: int = 4, *, mu: float = 0.6, push: float = 0.3) -> FrictionProblem:
     """Tower of rigid boxes, the top one pushed (one time step, global form).
 
@@ -130,6 +156,7 @@ def sphere_packing(
 
 
 GALLERY: dict[str, Callable[[], FrictionProblem]] = {
+    "cylinder": cylinder_on_half_plane,
     "one-contact": one_contact_2d,
     "spheres": sphere_packing,
     "tower": box_tower,

@@ -157,7 +157,7 @@ class FrictionProblem:
         return self._kept("blocks", (W,), lambda: block_rows(W, d))
 
     @cached_property
-    def kernel_data(self) -> tuple:
+    def kernel_data(self) -> tuple[Any, ...]:
         """What kernels take: indptr, indices, data, q (nc, 3), coefficient, Tresca?, rho."""
         b = self.blocks
         assert self.q is not None

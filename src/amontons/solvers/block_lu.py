@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -34,7 +35,7 @@ class Symbolic:
     lower: Index
 
     @property
-    def arrays(self) -> tuple[Index, ...]:
+    def arrays(self) -> tuple[Any, ...]:
         """What the compiled functions take."""
         return self.order, self.upper_start, self.upper, self.lower_start, self.lower
 
