@@ -191,7 +191,9 @@ def describe(output: Output) -> str:
     lines = [str(output.solution)]
     if output.fields is not None:
         names = ("x", "y", "z")[: len(output.fields.resultant)]
-        pairs = zip(names, output.fields.resultant, strict=True)
+        total = output.fields.resultant
+        total = np.where(np.abs(total) > 1e-8 * np.abs(total).max(), total, 0.0)
+        pairs = zip(names, total, strict=True)
         force = ", ".join(f"{name} {value:.6g}" for name, value in pairs)
         lines.append(f"resultant on the slave: {force}")
         lines.append(f"largest pressure: {output.fields.pressure.max(initial=0.0):.6g}")

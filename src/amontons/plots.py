@@ -32,6 +32,7 @@ MARKERS = {ContactStatus.OPEN: "o", ContactStatus.SLIP: "^", ContactStatus.STICK
 INK = "#333333"
 WIDE = 1e2  # ratio of largest to smallest reaction above which axes are logarithmic
 MAX_ARROWS = 400
+ARROW_LENGTH = 2.2  # of the longest, in spacings of the arrows: neighbours stay apart
 
 
 def status_figure(
@@ -235,8 +236,13 @@ def _shear_arrows(axes: Axes, fields: ContactFields, origin: Array, view: Array)
     if not shear.any():
         return
     stride = -(-len(shear) // MAX_ARROWS)
-    at = ((fields.points - origin) @ view.T)[::stride]
-    arrows = axes.quiver(at[:, 0], at[:, 1], shear[::stride, 0], shear[::stride, 1], color=INK,
+    at, shear = ((fields.points - origin) @ view.T)[::stride], shear[::stride]
+    spacing = np.sqrt(np.prod(np.maximum(np.ptp(at, axis=0), 1e-12)) / len(at))
+    length = np.linalg.norm(shear, axis=1)
+    shown = length > 1e-3 * length.max()
+    at, shear = at[shown], shear[shown]
+    arrows = axes.quiver(at[:, 0], at[:, 1], shear[:, 0], shear[:, 1], color=INK, angles="xy",
+                         scale_units="xy", scale=length.max() / (ARROW_LENGTH * spacing),
                          width=0.003, pivot="tail", clip_on=False)  # fmt: skip
     arrows.set_in_layout(False)  # long arrows at the rim must not squeeze the map
 
