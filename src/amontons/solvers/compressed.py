@@ -77,8 +77,9 @@ class CompressedDelassus:
         while True:
             u = problem.local_velocity(v)
             moved = u - (compressed.W @ r.ravel()).reshape(u.shape)
-            local = Target(max(self.inner_reduction * error, 0.1 * target.tolerance))
-            found, count = _contact_solve(compressed.with_load(moved), r, local)
+            tolerance = max(self.inner_reduction * error, 0.1 * target.tolerance)
+            local = Target(tolerance, target.deadline)
+            found = _contact_solve(compressed.with_load(moved), r, local)
             v_found = problem.velocity(found)[1]
             assert v_found is not None
             error = problem.error(found, v_found)
@@ -102,17 +103,16 @@ def _check_fits(problem: FrictionProblem) -> None:
         raise Breakdown(f"the compressed W would take {16e-9 * m * m:.1f} GB")
 
 
-def _contact_solve(problem: FrictionProblem, r: Array, target: Target) -> tuple[Array, int]:
-    """Reaction of the contact problem with the compressed W, and sweeps or steps spent."""
-    count = 0
+def _contact_solve(problem: FrictionProblem, r: Array, target: Target) -> Array:
+    """Reaction of the contact problem with the compressed W."""
     found = r
     if problem.error(r) <= target.tolerance:
-        return r, 0
+        return r
     for iterate in Portfolio(problem, target, spatial(r)).stages():
-        found, count = iterate.r, count + iterate.iterations
-        if problem.error(found) <= target.tolerance:
+        found = iterate.r
+        if problem.error(found) <= target.tolerance or target.seconds_left <= 0:
             break
-    return found, count
+    return found
 
 
 @dataclass(eq=False)

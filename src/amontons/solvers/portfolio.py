@@ -177,7 +177,7 @@ class Portfolio:
         for origin, sigma, shrink in starts:
             count, _, _, found = self.work.newton(
                 origin.copy(), sigma, SmoothingNewton(shrink=shrink), goal=0.5 * self.goal,
-                steps=NEWTON_STEPS, patience=PATIENCE,
+                steps=self._affordable(NEWTON_STEPS), patience=PATIENCE,
             )  # fmt: skip
             self.budget += abs(count) * self.costs["newton"]
             yield self._offer(found, abs(count), "smoothing Newton")
@@ -205,6 +205,15 @@ class Portfolio:
             return
 
     # ---------------------------------------------------------------- bookkeeping
+    def _affordable(self, steps: int) -> int:
+        """Newton steps of one compiled call that still fit before the driver's deadline."""
+        left = self.target.seconds_left
+        return (
+            steps
+            if math.isinf(left)
+            else max(1, min(steps, int(1e9 * left / self.costs["newton"])))
+        )
+
     def _judge(self, r: Array) -> float:
         return natural_error(*self.problem.kernel_data, r)
 
