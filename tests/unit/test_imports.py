@@ -16,7 +16,7 @@ ORDER = (
     "< fclib < expressions < case < vtk < plots < output < results < report < api < cli"
 ).split(" < ")
 ALONE = {  # package: the file or folder that imports it, one for each kind of file
-    "ngsolve": "fem", "pyamg": "linear", "matplotlib": "plots", "click": "cli",
+    "ngsolve": "fem", "netgen": "fem", "pyamg": "linear", "matplotlib": "plots", "click": "cli",
     "rslab": "linear", "pypardiso": "linear",
     "meshio": "fem vtk",  # reads meshes, writes pictures
     "h5py": "fclib output",  # the exchange format, our results

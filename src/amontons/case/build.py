@@ -109,17 +109,12 @@ class _Blame:
 
 
 def _mesh(table: Table, path: Path) -> Mesh:
-    from ..fem import box, read_mesh
+    from ..fem import box
 
     if ("box" in table.data) == ("file" in table.data):
         raise table.error("", "expected either box, the sizes of a box, or file")
     if "file" in table.data:
-        table.only("file")
-        name = path.parent / table.text("file")
-        if not name.is_file():
-            raise table.error("file", f"no such file: {name}")
-        with _Blame(table, "file"):
-            return read_mesh(str(name))
+        return _mesh_file(table, path)
     table.only("box", "cells", "kind")
     size = table.numbers("box", (2, 3))
     if any(0 < abs(length) < 1 / LARGEST for length in size):
@@ -133,6 +128,27 @@ def _mesh(table: Table, path: Path) -> Mesh:
         raise table.error("cells", f"expected at most {MAX_NODES} nodes, got {cells!r}")
     with _Blame(table, ""):
         return box(size, counts, table.text("kind") if "kind" in table.data else None)
+
+
+def _mesh_file(table: Table, path: Path) -> Mesh:
+    """The mesh of a mesh file, or of a CAD file, which needs a size of cells."""
+    from ..fem import is_cad, read_cad, read_mesh
+
+    table.only("file", "size")
+    name = path.parent / table.text("file")
+    if not name.is_file():
+        raise table.error("file", f"no such file: {name}")
+    if not is_cad(name):
+        if "size" in table.data:
+            raise table.error("size", "only for CAD files, a mesh file has its cells")
+        with _Blame(table, "file"):
+            return read_mesh(name)
+    table.need("size", "the size of cells in mm, as a CAD file has no mesh")
+    size = table.number("size")
+    if size <= 0:
+        raise table.error("size", f"expected a length > 0, got {size}")
+    with _Blame(table, "file"):
+        return read_cad(name, size)
 
 
 def _materials(table: Table, mesh: Mesh) -> LinearElastic | dict[str, LinearElastic]:

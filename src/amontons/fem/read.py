@@ -17,6 +17,7 @@ from .mesh import Mesh
 from .raw import RawBlock, RawMesh, to_mesh
 
 KINDS = {"triangle": "tri", "tetra": "tet", "hexahedron": "hex"}
+CAD_SUFFIXES = (".step", ".stp", ".iges", ".igs", ".brep")
 TAGS = ("gmsh:physical", "medit:ref", "cell_tags", "MaterialID", "region", "avsucd:material")
 
 
@@ -28,7 +29,12 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
     cells with constant z is a mesh in 2D.  Raises FileFormatError naming file and line.
     """
     name = os.fspath(path)
-    head = _head(Path(name))
+    if is_cad(name):
+        raise FileFormatError(
+            f"{name}: expected a mesh file; a CAD file holds shapes, mesh it with "
+            "read_cad(path, size)"
+        )
+    head = file_head(Path(name))
     if gmsh.is_text(head):
         try:
             text = Path(name).read_text(encoding="utf-8")
@@ -38,9 +44,15 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
     return to_mesh(_from_meshio(name), name)
 
 
-def _head(path: Path) -> bytes:
+def is_cad(path: str | os.PathLike[str]) -> bool:
+    """Whether the suffix is that of a CAD file, for read_cad."""
+    return Path(path).suffix.lower() in CAD_SUFFIXES
+
+
+def file_head(path: Path) -> bytes:
+    """The first bytes of a file that exists, can be read and is not empty."""
     if path.is_dir():
-        raise FileFormatError(f"{path}: expected a mesh file, this is a folder")
+        raise FileFormatError(f"{path}: expected a file, this is a folder")
     try:
         with path.open("rb") as file:
             head = file.read(4096)
@@ -49,7 +61,7 @@ def _head(path: Path) -> bytes:
     except OSError as error:
         raise FileFormatError(f"{path}: can not be read: {error.strerror}") from None
     if not head.strip():
-        raise FileFormatError(f"{path}: expected a mesh file, this one is empty")
+        raise FileFormatError(f"{path}: this file is empty")
     return head
 
 
