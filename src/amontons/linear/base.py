@@ -14,8 +14,15 @@ Array = NDArray[np.float64]
 class Factor(Protocol):
     """A prepared operator: solves A x = b, b of shape (n,) or (n, k), as often as one likes."""
 
-    exact: bool  # a direct solve, to rounding; else an approximation with its own tolerance
-    iterations: int  # inner iterations so far; stays 0 for a direct solve
+    @property
+    def exact(self) -> bool:
+        """A direct solve, to rounding; else an approximation with its own tolerance."""
+        ...
+
+    @property
+    def iterations(self) -> int:
+        """Inner iterations so far; stays 0 for a direct solve."""
+        ...
 
     def solve(self, b: Array) -> Array:
         """The solution x, shape of b."""
