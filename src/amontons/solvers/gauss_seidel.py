@@ -29,7 +29,7 @@ from .base import Iterate, Target, check_at_least
 Array = NDArray[np.float64]
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath={"contract"})
 def sweep_inplace(indptr, indices, data, q, coefficient, tresca, diagonal, backward, r):  # noqa: PLR0913
     """One Gauss-Seidel sweep over all contacts; returns the change |W_ii (r_i' - r_i)|."""
     nc = len(coefficient)
@@ -103,19 +103,21 @@ def _least_squares(gram, target, k, weights):
 
 @njit(cache=True)
 def anderson_inplace(  # noqa: PLR0913
-    indptr, indices, data, q, coefficient, tresca, diagonal, r, x, history, count, sweeps, small
-):
+    indptr, indices, data, q, coefficient, tresca, diagonal, r, x, history, gram, count, sweeps,
+    small,
+):  # fmt: skip
     """Accelerated sweeps; r ends as the last plain sweep.  Returns (sweeps done, last change).
 
     x (nc, 3) is the next point to sweep from and history (2, depth + 1, 3 nc) holds differences
-    of G(r) and of the residual G(r) - r, the last row of each the values themselves; count
-    (2,) how many are stored and whether there are values, so that a call goes on where the last
-    one ended.  The history is dropped when the residual doubles; `small` as above.
+    of G(r) and of the residual G(r) - r, the last row of each the values themselves; gram
+    (depth, depth) the products of the latter; count (2,) how many are stored and whether there
+    are values.  So a call goes on where the last one ended.  The history is dropped when the
+    residual doubles; `small` as above.
     """
     depth = history.shape[1] - 1
     m = history.shape[2]
     steps, slopes = history[0], history[1]
-    gram, target, weights = np.zeros((depth, depth)), np.zeros(depth), np.zeros(depth)
+    target, weights = np.zeros(depth), np.zeros(depth)
     g, xf = r.reshape(m), x.reshape(m)
     change = math.inf
     for k in range(sweeps):
@@ -138,6 +140,8 @@ def anderson_inplace(  # noqa: PLR0913
             for i in range(m):
                 steps[slot, i] = g[i] - steps[depth, i]
                 slopes[slot, i] = g[i] - xf[i] - slopes[depth, i]
+            for a in range(min(count[0], depth)):
+                gram[a, slot] = gram[slot, a] = np.dot(slopes[a], slopes[slot])
         count[1] = 1
         filled = min(count[0], depth)
         for i in range(m):
@@ -145,8 +149,6 @@ def anderson_inplace(  # noqa: PLR0913
             slopes[depth, i] = g[i] - xf[i]
         x[:, :] = r
         for a in range(filled):
-            for b in range(a + 1):
-                gram[a, b] = gram[b, a] = np.dot(slopes[a], slopes[b])
             target[a] = np.dot(slopes[a], slopes[depth])
         if filled > 0 and _least_squares(gram, target, filled, weights):
             for a in range(filled):
@@ -167,12 +169,13 @@ class Acceleration:
         self.x = self.r.copy()
         self.r = self.r.copy()
         self.history = np.zeros((2, self.depth + 1, self.r.size))
+        self.gram = np.zeros((self.depth, self.depth))
         self.count = np.zeros(2, dtype=np.int64)
 
     def sweep(self, sweeps: int, small: float) -> tuple[int, float]:
         """Go on for `sweeps` sweeps; (sweeps done, last change)."""
         return anderson_inplace(
-            *self.kernel, self.r, self.x, self.history, self.count, sweeps, small
+            *self.kernel, self.r, self.x, self.history, self.gram, self.count, sweeps, small
         )
 
 

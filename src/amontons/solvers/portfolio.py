@@ -33,7 +33,7 @@ from .smoothing import ProximalPoint, SmoothingNewton, Workspace
 
 Array = NDArray[np.float64]
 FIRST_SWEEPS = 10  # plain sweeps that every problem gets first
-DEPTH = 8  # past sweeps that Anderson acceleration combines
+DEPTH = 10  # past sweeps that Anderson acceleration combines
 CHUNK = 20  # sweeps between two looks at their rate
 LONGEST = 6000  # sweeps after which Newton gets its chance whatever the rate promises
 HOPELESS = 8.0  # sweeps that promise to cost this many times Newton are left at once
