@@ -20,7 +20,7 @@ _HOME = {
     "problem": ("Form", "FrictionProblem"),
     "solution": ("ContactStatus", "Convergence", "FrictionSolution", "Outcome"),
     "solvers": ("AlartCurnier", "Auto", "CompressedDelassus", "GaussSeidel", "Hybrid",
-                "JeanMoreau", "NaturalMap", "ProximalPoint", "SemismoothNewton",
+                "JeanMoreau", "LocalSolver", "NaturalMap", "ProximalPoint", "SemismoothNewton",
                 "SmoothingNewton"),
     "solve": ("drive",),
     "fclib": ("read_fclib", "write_fclib"),

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+import amontons as am
 from amontons.cones import Coulomb, Tresca
 from amontons.errors import InvalidInput
+from amontons.gallery import random_delassus
 from amontons.one_contact import solve_one
 from amontons.problem import FrictionProblem
 from amontons.solve import drive
@@ -69,3 +71,21 @@ def test_batches_count_their_sweeps():
 def test_options_are_checked(options):
     with pytest.raises(InvalidInput, match=next(iter(options))):
         GaussSeidel(**options)
+
+
+@pytest.mark.parametrize("local", [am.LocalSolver.NEWTON, am.LocalSolver.PROJECTION])
+@pytest.mark.parametrize("mu", [0.0, 0.3, 1.0])
+def test_local_solvers_of_the_literature_reach_the_exact_solution(local, mu):
+    problem = random_delassus(3, 12, mu=mu)
+    exact = drive(problem, am.GaussSeidel(), tolerance=1e-10)
+    found = drive(problem, am.GaussSeidel(local=local), tolerance=1e-10)
+    assert exact.converged
+    assert found.converged
+    np.testing.assert_allclose(found.u, exact.u, atol=1e-8)
+
+
+def test_local_newton_needs_coulomb_friction():
+    problem = random_delassus(3, 4)
+    tresca = am.FrictionProblem.from_delassus(problem.W, problem.q, am.Tresca(np.ones(4)))
+    with pytest.raises(am.UnsupportedForm, match="NEWTON"):
+        drive(tresca, am.GaussSeidel(local=am.LocalSolver.NEWTON))

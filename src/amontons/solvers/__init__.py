@@ -5,6 +5,7 @@ from .compressed import CompressedDelassus
 from .functions import AlartCurnier, ComplementarityFunction, JeanMoreau, NaturalMap
 from .gauss_seidel import GaussSeidel
 from .hybrid import Auto, Hybrid
+from .local_contact import LocalSolver
 from .newton import SemismoothNewton
 from .smoothing import ProximalPoint, SmoothingNewton
 
@@ -32,6 +33,7 @@ __all__ = [
     "Hybrid",
     "Iterate",
     "JeanMoreau",
+    "LocalSolver",
     "NaturalMap",
     "ProximalPoint",
     "SemismoothNewton",

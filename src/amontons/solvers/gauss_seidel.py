@@ -22,15 +22,24 @@ from numba import njit
 from numpy.typing import NDArray
 
 from ..blocks import spatial
+from ..cones import Tresca
+from ..errors import UnsupportedForm
 from ..one_contact import solve_contact
 from ..problem import Form, FrictionProblem
 from .base import Iterate, Target, check_at_least
+from .local_contact import LocalSolver, newton_contact, projection_contact
 
 Array = NDArray[np.float64]
+EXACT, NEWTON = int(LocalSolver.EXACT), int(LocalSolver.NEWTON)
+
+
+def sweep_data(problem: FrictionProblem, local: LocalSolver = LocalSolver.EXACT) -> tuple:
+    """What a sweep takes before r: W in blocks, q, the law, diagonal blocks, local solver."""
+    return (*problem.kernel_data[:6], problem.blocks.diagonal, int(local))
 
 
 @njit(cache=True, fastmath={"contract"})
-def sweep_inplace(indptr, indices, data, q, coefficient, tresca, diagonal, backward, r):  # noqa: PLR0913
+def sweep_inplace(indptr, indices, data, q, coefficient, tresca, diagonal, local, backward, r):  # noqa: PLR0913
     """One Gauss-Seidel sweep over all contacts; returns the change |W_ii (r_i' - r_i)|."""
     nc = len(coefficient)
     change = 0.0
@@ -47,7 +56,13 @@ def sweep_inplace(indptr, indices, data, q, coefficient, tresca, diagonal, backw
             b1 += b[1, 0] * r0 + b[1, 1] * r1 + b[1, 2] * r2
             b2 += b[2, 0] * r0 + b[2, 1] * r1 + b[2, 2] * r2
         A = data[diagonal[i]]
-        x0, x1, x2, _ = solve_contact(A, b0, b1, b2, coefficient[i], tresca, r[i, 1], r[i, 2])
+        c, r0, r1, r2 = coefficient[i], r[i, 0], r[i, 1], r[i, 2]
+        if local == EXACT:
+            x0, x1, x2, _ = solve_contact(A, b0, b1, b2, c, tresca, r1, r2)
+        elif local == NEWTON:
+            x0, x1, x2 = newton_contact(A, b0, b1, b2, c, r0, r1, r2)
+        else:
+            x0, x1, x2 = projection_contact(A, b0, b1, b2, c, r0, r1, r2)
         d0, d1, d2 = x0 - r[i, 0], x1 - r[i, 1], x2 - r[i, 2]
         r[i, 0], r[i, 1], r[i, 2] = x0, x1, x2
         size = abs(A[0, 0]) + abs(A[1, 1]) + abs(A[2, 2])
@@ -56,11 +71,13 @@ def sweep_inplace(indptr, indices, data, q, coefficient, tresca, diagonal, backw
 
 
 @njit(cache=True)
-def sweeps_inplace(indptr, indices, data, q, coefficient, tresca, diagonal, r, sweeps, small):  # noqa: PLR0913
+def sweeps_inplace(
+    indptr, indices, data, q, coefficient, tresca, diagonal, local, r, sweeps, small
+):  # noqa: PLR0913
     """Up to `sweeps` sweeps, fewer when one changes less than `small`; returns how many."""
     for k in range(sweeps):
         change = sweep_inplace(
-            indptr, indices, data, q, coefficient, tresca, diagonal, False, r
+            indptr, indices, data, q, coefficient, tresca, diagonal, local, False, r
         )
         if change <= small:
             return k + 1
@@ -103,8 +120,8 @@ def _least_squares(gram, target, k, weights):
 
 @njit(cache=True)
 def anderson_inplace(  # noqa: PLR0913
-    indptr, indices, data, q, coefficient, tresca, diagonal, r, x, history, gram, count, sweeps,
-    small,
+    indptr, indices, data, q, coefficient, tresca, diagonal, local, r, x, history, gram, count,
+    sweeps, small,
 ):  # fmt: skip
     """Accelerated sweeps; r ends as the last plain sweep.  Returns (sweeps done, last change).
 
@@ -123,7 +140,7 @@ def anderson_inplace(  # noqa: PLR0913
     for k in range(sweeps):
         r[:, :] = x
         change = sweep_inplace(
-            indptr, indices, data, q, coefficient, tresca, diagonal, False, r
+            indptr, indices, data, q, coefficient, tresca, diagonal, local, False, r
         )
         if change <= small:
             x[:, :] = r
@@ -187,6 +204,7 @@ class GaussSeidel:
     """
 
     form: ClassVar[Form] = Form.DELASSUS
+    local: LocalSolver = LocalSolver.EXACT  # how one contact is solved
     anderson_depth: int = 0  # past sweeps that are combined; 0: plain sweeps
     batch: int = 1  # sweeps between two judgements
 
@@ -199,7 +217,9 @@ class GaussSeidel:
     ) -> Iterator[Iterate]:
         """Sweeps from `start`, for ever."""
         d = problem.dimension
-        kernel = (*problem.kernel_data[:6], problem.blocks.diagonal)
+        if isinstance(problem.law, Tresca) and self.local is not LocalSolver.EXACT:
+            raise UnsupportedForm(f"local={self.local.name}: needs Coulomb friction; use EXACT")
+        kernel = sweep_data(problem, self.local)
         r = spatial(start.r)
         if self.anderson_depth:
             memory = Acceleration(kernel, r, self.anderson_depth)

@@ -1,12 +1,11 @@
-"""Iterative solutions of a single contact, as the Gauss-Seidel variants of the literature use them.
+"""Iterative solutions of a single contact, as Gauss-Seidel variants of the literature use them.
 
 The exact solution (`one_contact`) is faster and safer; these exist for comparison.
 
-Newton (NSGS-AC)           Newton steps on Alart and Curnier's function of the one contact, [ABD]
-                           eq. (8), without line search; the exact solution where they fail
-projection (NSGS-FP-VI-UPK)  r <- P_K(r - rho û) with rho adapted until it is a contraction:
-                           rho shrinks while rho |û(r) - û(r')| > 0.9 |r - r'| and grows when the
-                           ratio is below 0.3
+- Newton (NSGS-AC): Newton steps on Alart and Curnier's function of the one contact, [ABD]
+  eq. (8), without line search; the exact solution takes over where they fail.
+- Projection (NSGS-FP-VI-UPK): r <- P_K(r - rho û), with rho adapted until it is a contraction:
+  rho shrinks while rho |û(r) - û(r')| > 0.9 |r - r'| and grows when the ratio is below 0.3.
 
 [ABD] V. Acary, M. Brémond, F. Dubois, CSMA 2017 (see `gauss_seidel`).
 """
@@ -62,6 +61,19 @@ def _newton_row(A, b0, b1, b2, mu, rho, r0, r1, r2, F, J):  # noqa: PLR0913
 
 
 @njit(cache=True)
+def _determinant(J, column, F):
+    """Determinant of J with F in place of a column (1 to 3; 0: of J itself), for Cramer."""
+    total = 0.0
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        a = F[i] if column == 1 else J[i, 0]
+        b1, b2 = (F[j], F[k]) if column == 2 else (J[j, 1], J[k, 1])
+        c1, c2 = (F[j], F[k]) if column == 3 else (J[j, 2], J[k, 2])
+        total += a * (b1 * c2 - b2 * c1)
+    return total
+
+
+@njit(cache=True)
 def newton_contact(A, b0, b1, b2, mu, r0, r1, r2):  # noqa: PLR0913
     """(r_N, r_T1, r_T2) by Newton from (r0, r1, r2); exact where Newton does not converge."""
     g1, g2 = r1, r2
@@ -74,15 +86,12 @@ def newton_contact(A, b0, b1, b2, mu, r0, r1, r2):  # noqa: PLR0913
             scale = abs(r0) + abs(r1) + abs(r2) + rho * (abs(b0) + abs(b1) + abs(b2))
             if abs(F[0]) + abs(F[1]) + abs(F[2]) <= CLOSE * scale:
                 return r0, r1, r2
-            det = (
-                J[0, 0] * (J[1, 1] * J[2, 2] - J[1, 2] * J[2, 1])
-                - J[0, 1] * (J[1, 0] * J[2, 2] - J[1, 2] * J[2, 0])
-                + J[0, 2] * (J[1, 0] * J[2, 1] - J[1, 1] * J[2, 0])
-            )
+            det = _determinant(J, 0, F)
             if not abs(det) > 1e-14:
                 break
-            step = np.linalg.solve(J, F)
-            r0, r1, r2 = r0 - step[0], r1 - step[1], r2 - step[2]
+            r0 -= _determinant(J, 1, F) / det
+            r1 -= _determinant(J, 2, F) / det
+            r2 -= _determinant(J, 3, F) / det
     x0, x1, x2, _ = solve_contact(A, b0, b1, b2, mu, False, g1, g2)
     return x0, x1, x2
 

@@ -27,7 +27,7 @@ from ..errors import SingularOperator
 from ..judge import natural_error
 from ..problem import FrictionProblem
 from .base import Breakdown, Iterate, Target
-from .gauss_seidel import Acceleration, sweeps_inplace
+from .gauss_seidel import Acceleration, sweep_data, sweeps_inplace
 from .newton import SemismoothNewton
 from .smoothing import ProximalPoint, SmoothingNewton, Workspace
 
@@ -65,7 +65,7 @@ class Portfolio:
     def __post_init__(self) -> None:
         self.error = self._judge(self.r)
         self.goal = self.target.tolerance * self.problem.q_norm
-        self.kernel = (*self.problem.kernel_data[:6], self.problem.blocks.diagonal)
+        self.kernel = sweep_data(self.problem)
 
     def stages(self) -> Iterator[Iterate]:
         """All stages in the order of the module's text."""

@@ -40,7 +40,7 @@ from ..judge import contact_residual, natural_error
 from ..problem import Form, FrictionProblem
 from .base import Breakdown, Iterate, Target, check_at_least, check_positive
 from .block_lu import Symbolic, analyse, factorise_inplace, solve_inplace
-from .gauss_seidel import sweep_inplace
+from .gauss_seidel import sweep_data, sweep_inplace
 
 Array = NDArray[np.float64]
 PINNED = 1e16  # relative stiffness that keeps r_T = 0 where mu = 0
@@ -303,7 +303,7 @@ class Workspace:
 
     def sweeps(self, r: Array, count: int) -> None:
         """Gauss-Seidel sweeps on r in place, alternating direction."""
-        data = (*self.problem.kernel_data[:6], self.problem.blocks.diagonal)
+        data = sweep_data(self.problem)
         for k in range(count):
             sweep_inplace(*data, k % 2 == 1, r)
 
