@@ -28,7 +28,7 @@ MAX_NODES = 50_000_000  # of a box: a typing error must not fill the memory
 LATER = {  # words of the format that this version can not serve
     "neo-hookean": "large deformations are not available yet, use 'linear-elastic'",
     "ciarlet-geymonat": "large deformations are not available yet, use 'linear-elastic'",
-    "dual-mortar": "contact between two bodies is not available yet, use 'nodal'",
+    "dual-mortar": "mortar contact is not available yet, use 'nodal'",
     "nitsche": "Nitsche's method is not available yet, use 'nodal'",
 }
 

@@ -2,5 +2,7 @@
 
 from .geometry import LevelSet, Obstacle, Plane, Sphere, frames
 from .nodal import ContactRows, nodal_contact
+from .pairs import pair_contact
 
-__all__ = ["ContactRows", "LevelSet", "Obstacle", "Plane", "Sphere", "frames", "nodal_contact"]
+__all__ = ["ContactRows", "LevelSet", "Obstacle", "Plane", "Sphere", "frames", "nodal_contact",
+           "pair_contact"]  # fmt: skip

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..contact import ContactRows, nodal_contact
+from ..contact import ContactRows, nodal_contact, pair_contact
 from ..errors import InvalidInput
 from ..fem.elasticity import body_load, stiffness
 from ..fem.mesh import unknown
@@ -24,12 +24,16 @@ SAME = 1e-12  # prescribed values that differ by less, relative to the largest, 
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """Contacts of one pair: body of the slave, kept (slave nodes,), rows of the kept ones."""
+    """Contacts of one pair: body of the slave, kept (slave nodes,), rows of the kept ones.
+
+    H (dofs, nc d): the rows in the dofs of the whole model, with those of a master body.
+    """
 
     body: int
     kept: NDArray[np.bool_]
     all_points: Array
     rows: ContactRows
+    H: sparse.csc_array
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +86,7 @@ def discretise(
     K = parts[0] if len(parts) == 1 else sparse.block_diag(parts, format="csr")
     prescribed = np.where(is_fixed, values, 0.0)
     placed = tuple(_place(bodies, contact, is_fixed, offsets) for contact in contacts)
-    whole_H = sparse.hstack([_shifted(p, offsets) for p in placed], format="csc")
+    whole_H = sparse.hstack([p.H for p in placed], format="csc")
     if not whole_H.shape[1]:
         raise InvalidInput(
             "contacts: every slave node is fixed by a support, no contact is left"
@@ -196,16 +200,28 @@ def _place(
     """Contacts of one pair without those whose normal the supports prescribe."""
     k, surface = locate(bodies, contact.slave)
     mesh = bodies[k].mesh
-    assert contact.obstacle is not None
-    rows = nodal_contact(mesh, surface, contact.obstacle)
-    dofs = offsets[k] + rows.nodes[:, None] * mesh.dim + np.arange(mesh.dim)
-    normal = np.where(is_fixed[dofs], 0.0, rows.frames[:, 0])
-    kept = np.linalg.norm(normal, axis=1) > 1e-9
-    return Placed(k, kept, rows.points, rows.at(kept))
+    size = int(offsets[-1])
+    if contact.master is None:
+        assert contact.obstacle is not None
+        rows = nodal_contact(mesh, surface, contact.obstacle)
+        met = np.ones(len(rows.nodes), dtype=bool)
+        H = _shifted(rows.H, int(offsets[k]), size)
+    else:
+        j, other = locate(bodies, contact.master)
+        rows, on_master, met = pair_contact(mesh, surface, bodies[j].mesh, other)
+        H = _shifted(rows.H, int(offsets[k]), size) + _shifted(on_master, int(offsets[j]), size)
+    d = mesh.dim
+    H = sparse.csc_array(H)
+    normal = sparse.csc_array(H[:, ::d]).multiply(~is_fixed[:, None])
+    kept = np.sqrt(np.asarray(normal.power(2).sum(axis=0)).ravel()) > 1e-9
+    all_kept = met.copy()
+    all_kept[met] = kept
+    points = mesh.points[mesh.surface_nodes(surface)]
+    return Placed(k, all_kept, points, rows.at(kept), H[:, np.repeat(kept, d)])
 
 
-def _shifted(placed: Placed, offsets: Index) -> sparse.coo_array:
-    """H of one pair in the dofs of the whole model."""
-    H = placed.rows.H.tocoo()
-    rows = H.coords[0] + offsets[placed.body]
-    return sparse.coo_array((H.data, (rows, H.coords[1])), shape=(int(offsets[-1]), H.shape[1]))
+def _shifted(H: sparse.csc_array, offset: int, size: int) -> sparse.csc_array:
+    """Columns on one body in the dofs of the whole model, (size, nc d)."""
+    part = H.tocoo()
+    entries = (part.data, (part.coords[0] + offset, part.coords[1]))
+    return sparse.coo_array(entries, shape=(size, H.shape[1])).tocsc()

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """Elastic bodies in frictional contact with obstacles, small strains.
+    """Elastic bodies in frictional contact with obstacles and each other, small strains.
 
     Gaps and normals are taken once in the reference configuration.  load_factor multiplies the
     loads and the prescribed displacements, not the gaps.
@@ -58,12 +58,9 @@ class Model:
         if not np.isfinite(self.load_factor):
             raise InvalidInput(f"load_factor: expected a finite number, got {self.load_factor}")
         object.__setattr__(self, "bodies", _named(self.bodies))
-        for part in (*self.supports, *self.contacts, *self.loads):
-            if not isinstance(part, BodyForce):
-                k, surface = locate(
-                    self.bodies, part.slave if isinstance(part, Contact) else part.on
-                )
-                self.bodies[k].mesh.surface(surface)
+        for name in _surfaces(*self.supports, *self.contacts, *self.loads):
+            k, surface = locate(self.bodies, name)
+            self.bodies[k].mesh.surface(surface)
 
     @property
     def dimension(self) -> int:
@@ -151,6 +148,17 @@ class Model:
         return recover_fields(
             self.bodies, surfaces, self.discretisation, solution, self.load_factor
         )
+
+
+def _surfaces(*parts: Fix | Traction | BodyForce | Contact) -> list[str]:
+    """Names of all surfaces that parts of a model refer to."""
+    names: list[str] = []
+    for part in parts:
+        if isinstance(part, Contact):
+            names += [part.slave] if part.master is None else [part.slave, part.master]
+        elif not isinstance(part, BodyForce):
+            names.append(part.on)
+    return names
 
 
 def _load_size(parts: Discretisation, f: Array, w: Array) -> float:

@@ -66,7 +66,10 @@ class BodyForce:
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """Unilateral contact of a slave surface with an obstacle, with friction.
+    """Unilateral contact of a slave surface with an obstacle or a master, with friction.
+
+    master: another surface, of any body; slave nodes without a facet of it in front of them are
+    left out.
 
     Either mu, the coefficient of Coulomb friction, or tresca, the largest shear traction (a
     stress): a number, one number per slave node, or a function of points (n, dim) -> (n,).
@@ -92,12 +95,9 @@ class Contact:
             raise InvalidInput(
                 f"method: expected one of {', '.join(METHODS)}, got {self.method!r}"
             )
-        if self.master is not None:
-            raise InvalidInput(
-                f"contact on {self.slave!r}: master surfaces come with the dual mortar method, "
-                "which is not available yet; use an obstacle"
-            )
-        if not (hasattr(self.obstacle, "gap") and hasattr(self.obstacle, "normals")):
+        if self.master is None and not (
+            hasattr(self.obstacle, "gap") and hasattr(self.obstacle, "normals")
+        ):
             raise InvalidInput(
                 f"obstacle: expected a Plane, Sphere or LevelSet, got {self.obstacle!r}"
             )
