@@ -2,8 +2,9 @@
 
     Coulomb   10 Gauss-Seidel sweeps; then sweeps, plain or with Anderson acceleration, as long
               as their measured rate promises an end before smoothing Newton would be there, or
-              until they have cost as much as Newton would; smoothing Newton from the best point
-              and from zero; proximal point; plain sweeps worth the cost of Newton so far; again
+              until they have cost as much as Newton would; semismooth Newton where W is dense
+              (deformable bodies); smoothing Newton from the best point and from zero; proximal
+              point; plain sweeps worth the cost of Newton so far; again from smoothing Newton
     Tresca    the same sweeps, then semismooth Newton
 
 Every stage starts from the best reaction so far, and is dropped when it does not help.  Costs
@@ -40,6 +41,7 @@ HOPELESS = 8.0  # sweeps that promise to cost this many times Newton are left at
 NEWTON_STEPS = 120
 PATIENCE = 40  # Newton steps without halving the error
 SEMISMOOTH_CONTACTS = 600  # above, a dense factor costs more than it brings
+DENSE = 0.5  # share of blocks of W above which it comes from a mesh
 ROUNDS = 6  # repetitions of the last stages before Auto gives up
 # Nanoseconds measured on one core: only their ratios matter, and only roughly.
 SWEEP_BLOCK, SWEEP_CONTACT, HISTORY_CONTACT, PRODUCT, NEWTON_CONTACT = (
@@ -74,6 +76,8 @@ class Portfolio:
         if isinstance(self.problem.law, Tresca):
             yield from self._semismooth()
             return
+        if self.problem.blocks.density > DENSE:  # deformable bodies: W is regular
+            yield from self._semismooth(steps=15)
         for round_ in range(ROUNDS):
             yield from self._newton(round_)
             yield from self._proximal(round_)
