@@ -6,6 +6,7 @@ without pyplot: no global state, no display needed.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from .model import ContactFields, Model
 
 Array = NDArray[np.float64]
+Patches = Iterator[tuple[Array, NDArray[np.int64]]]  # polygons (k, corners, 2) and their nodes
 COLOURS = {
     ContactStatus.OPEN: "#C9D1D9",
     ContactStatus.SLIP: "#E69F00",
@@ -31,6 +33,7 @@ COLOURS = {
 MARKERS = {ContactStatus.OPEN: "o", ContactStatus.SLIP: "^", ContactStatus.STICK: "s"}
 INK = "#333333"
 WIDE = 1e2  # ratio of largest to smallest reaction above which axes are logarithmic
+QUARTERS = {"quad9": ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3))}
 MAX_ARROWS = 400
 ARROW_LENGTH = 2.2  # of the longest, in spacings of the arrows: neighbours stay apart
 
@@ -212,7 +215,7 @@ def _view(points: Array) -> tuple[Array, Array, tuple[str, str]]:
 def _node_patches(
     model: Model, fields: ContactFields, origin: Array, axes: Array
 ) -> tuple[list[Array], NDArray[np.int64]]:
-    """Facets cut into one quadrilateral per corner, and the contact at that corner or -1."""
+    """Facets cut into one patch per node, and the contact at that node or -1."""
     patches, owner = [], []
     for body, blocks in fields.facets:
         points = (model.bodies[body].mesh.points - origin) @ axes.T
@@ -220,14 +223,30 @@ def _node_patches(
         here = np.flatnonzero(fields.body == body)
         contact[fields.node[here]] = here
         for facets in blocks:
-            corners = points[facets.nodes]
-            centre = corners.mean(axis=1)
-            after = 0.5 * (corners + np.roll(corners, -1, axis=1))
-            for k in range(corners.shape[1]):
-                quad = np.stack([corners[:, k], after[:, k], centre, after[:, k - 1]], axis=1)
-                patches.extend(quad)
-                owner.append(contact[facets.nodes[:, k]])
+            cut = _thirds if facets.kind == "tri6" else _quarters
+            for table in QUARTERS.get(facets.kind, [slice(None)]):
+                for patch, nodes in cut(points, facets.nodes[:, table]):
+                    patches.extend(patch)
+                    owner.append(contact[nodes])
     return patches, np.concatenate(owner)
+
+
+def _quarters(points: Array, nodes: NDArray[np.int64]) -> Patches:
+    """A quadrilateral per corner: to the middles of the sides and the centre."""
+    corners = points[nodes]
+    centre = corners.mean(axis=1)
+    after = 0.5 * (corners + np.roll(corners, -1, axis=1))
+    for k in range(corners.shape[1]):
+        patch = np.stack([corners[:, k], after[:, k], centre, after[:, k - 1]], axis=1)
+        yield patch, nodes[:, k]
+
+
+def _thirds(points: Array, nodes: NDArray[np.int64]) -> Patches:
+    """A triangle per side for the node in its middle: the corners have no contact."""
+    corners = points[nodes[:, :3]]
+    centre = corners.mean(axis=1)
+    for k in range(3):
+        yield np.stack([corners[:, k], corners[:, k - 2], centre], axis=1), nodes[:, 3 + k]
 
 
 def _shear_arrows(axes: Axes, fields: ContactFields, origin: Array, view: Array) -> None:

@@ -26,7 +26,8 @@ def write_model(
 
     COPEN gap, CPRESS pressure (positive in compression), CSHEAR and CSLIP lengths of the shear
     traction and of the slip, CSTATUS 0 open, 1 slip, 2 stick and -1 off the contact surface,
-    CSLIDING 0 or 1, CFORCE force on the slave in global axes.
+    CSLIDING 0 or 1, CFORCE force on the slave in global axes.  Corners of triangles of second
+    order are no contacts: the first four get the mean of the contacts around.
     """
     pairs = list(zip(model.bodies, fields.displacement, strict=True))
     starts = np.cumsum([0, *(len(body.mesh.points) for body, _ in pairs)])
@@ -62,7 +63,23 @@ def _contact_fields(
             everywhere[:] = OFF
         everywhere[node] = given
         out[name] = everywhere
+    for name in ("COPEN", "CPRESS", "CSHEAR", "CSLIP"):
+        out[name] = _with_corners(out[name], fields, starts)
     return out
+
+
+def _with_corners(values: Array, fields: ContactFields, starts: NDArray[np.int64]) -> Array:
+    """Values (n,) with means at corners of triangles of second order: no contacts there."""
+    total, count = np.zeros_like(values), np.zeros_like(values)
+    for body, blocks in fields.facets:
+        for facets in blocks:
+            if facets.kind == "tri6":
+                nodes = facets.nodes + starts[body]
+                for k in range(3):
+                    sides = nodes[:, [3 + k, 3 + (k - 1) % 3]]
+                    np.add.at(total, nodes[:, k], values[sides].mean(axis=1))
+                    np.add.at(count, nodes[:, k], 1)
+    return np.where(count > 0, total / np.maximum(count, 1), values)
 
 
 def _spatial(vectors: Array) -> Array:

@@ -76,6 +76,9 @@ def _model(top: Table, path: Path, title: str) -> Model:
     from ..model import Body, BodyForce, Fix, Model, Traction
 
     mesh = _mesh(top.table("mesh"), path)
+    order = top.table("mesh").whole("order", 1)
+    if order not in (1, 2):
+        raise top.error("mesh.order", f"expected 1 or 2, got {order}")
     material = _materials(top.table("material"), mesh)
     fixes = [_on_surface(Fix, table, mesh, free=True) for table in top.tables("fix")]
     loads: list = [_on_surface(Traction, table, mesh) for table in top.tables("traction")]
@@ -87,8 +90,8 @@ def _model(top: Table, path: Path, title: str) -> Model:
         raise top.error("contact", "missing, expected at least one table [[contact]]")
     contacts = [_contact(table, mesh) for table in top.tables("contact")]
     with _Blame(top, ""):
-        return Model([Body(mesh, material)], supports=fixes, contacts=contacts, loads=loads,
-                     name=title)  # fmt: skip
+        body = Body(mesh, material, order=order)
+        return Model([body], supports=fixes, contacts=contacts, loads=loads, name=title)
 
 
 @dataclass(frozen=True)
@@ -115,7 +118,7 @@ def _mesh(table: Table, path: Path) -> Mesh:
         raise table.error("", "expected either box, the sizes of a box, or file")
     if "file" in table.data:
         return _mesh_file(table, path)
-    table.only("box", "cells", "kind")
+    table.only("box", "cells", "kind", "order")
     size = table.numbers("box", (2, 3))
     if any(0 < abs(length) < 1 / LARGEST for length in size):
         raise table.error("box", f"expected lengths above {1 / LARGEST:g}, got {size}")
@@ -134,7 +137,7 @@ def _mesh_file(table: Table, path: Path) -> Mesh:
     """The mesh of a mesh file, or of a CAD file, which needs a size of cells."""
     from ..fem import is_cad, read_cad, read_mesh
 
-    table.only("file", "size")
+    table.only("file", "size", "order")
     name = path.parent / table.text("file")
     if not name.is_file():
         raise table.error("file", f"no such file: {name}")

@@ -1,8 +1,8 @@
 """Contact: obstacles, local frames, and the matrices that tie contacts to nodes."""
 
 from .geometry import LevelSet, Obstacle, Plane, Sphere, frames
-from .nodal import ContactRows, nodal_contact
+from .nodal import ContactRows, contact_nodes, nodal_contact
 from .pairs import pair_contact
 
-__all__ = ["ContactRows", "LevelSet", "Obstacle", "Plane", "Sphere", "frames", "nodal_contact",
-           "pair_contact"]  # fmt: skip
+__all__ = ["ContactRows", "LevelSet", "Obstacle", "Plane", "Sphere", "contact_nodes", "frames",
+           "nodal_contact", "pair_contact"]  # fmt: skip

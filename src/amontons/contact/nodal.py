@@ -48,15 +48,22 @@ class ContactRows:
 def nodal_contact(mesh: Mesh, surface: str, obstacle: Obstacle) -> ContactRows:
     """Contacts between the nodes of a surface and a rigid obstacle, in the mesh's own dofs."""
     check_exterior(mesh, surface)
-    nodes = mesh.surface_nodes(surface)
-    weights = nodal_weights(mesh.points, mesh.surface(surface))[nodes]
-    if not (weights > 0).all():
-        raise InvalidInput(f"surface {surface!r}: a node has no area, got {weights.min()}")
+    nodes, weights = contact_nodes(mesh, surface)
     points = mesh.points[nodes]
     axes = frames(obstacle.normals(points))
     size = len(mesh.points) * mesh.dim
     H = contact_columns(nodes, axes, size)
     return ContactRows(nodes, points, weights, obstacle.gap(points), axes, H)
+
+
+def contact_nodes(mesh: Mesh, surface: str) -> tuple[Index, Array]:
+    """Nodes that get a contact, and their weights: those of a surface whose weight is positive.
+
+    It is zero at the corners of triangles of second order; only their middles get contacts.
+    """
+    weights = nodal_weights(mesh.points, mesh.surface(surface))
+    nodes = np.flatnonzero(weights > 0)
+    return nodes, weights[nodes]
 
 
 def check_exterior(mesh: Mesh, surface: str) -> None:

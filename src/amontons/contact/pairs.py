@@ -24,9 +24,9 @@ from scipy.spatial import cKDTree
 from ..errors import InvalidInput
 from ..fem.facets import Facets
 from ..fem.mesh import Mesh
-from ..fem.surfaces import nodal_normals, nodal_weights
+from ..fem.surfaces import nodal_normals
 from .geometry import frames
-from .nodal import ContactRows, check_exterior, contact_columns
+from .nodal import ContactRows, check_exterior, contact_columns, contact_nodes
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -72,7 +72,7 @@ def pair_contact(
     """
     check_exterior(slave, surface)
     check_exterior(master, master_surface)
-    nodes = slave.surface_nodes(surface)
+    nodes, weights = contact_nodes(slave, surface)
     facets = master.surface(master_surface)
     if other := {block.kind for block in facets} - set(KINDS):
         raise InvalidInput(
@@ -92,8 +92,7 @@ def pair_contact(
     gap = np.einsum("ic,ic->i", points - hit.closest[found], normal)
     axes = frames(normal)
     rows = ContactRows(
-        nodes[found], points,
-        nodal_weights(slave.points, slave.surface(surface))[nodes][found], gap, axes,
+        nodes[found], points, weights[found], gap, axes,
         contact_columns(nodes[found], axes, slave.points.size),
     )  # fmt: skip
     return rows, _master_columns(hit, axes, master.points.size), found

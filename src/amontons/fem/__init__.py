@@ -5,7 +5,9 @@ from .cad import mesh_shape, read_cad
 from .elasticity import LinearElastic, cell_stress, stiffness, von_mises
 from .facets import Cells, Facets
 from .mesh import Mesh
+from .order import second_order
 from .read import is_cad, read_mesh
 
 __all__ = ["Cells", "Facets", "LinearElastic", "Mesh", "box", "cell_stress", "is_cad",
-           "mesh_shape", "read_cad", "read_mesh", "stiffness", "von_mises"]  # fmt: skip
+           "mesh_shape", "read_cad", "read_mesh", "second_order", "stiffness",
+           "von_mises"]  # fmt: skip

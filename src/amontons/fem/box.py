@@ -99,5 +99,5 @@ def _sides(unit: Array, block: Cells, dim: int) -> dict[str, tuple[Facets, ...]]
     for axis, names in enumerate(SIDES[dim]):
         for value, name in zip((0.0, 1.0), names, strict=True):
             on = (unit[table, axis] == value).all(axis=1)
-            out[name] = (Facets(FACET_KIND[size], table[on]),)
+            out[name] = (Facets(FACET_KIND[dim, size], table[on]),)
     return out

@@ -175,7 +175,7 @@ def _from_netgen(mesh: Any, dim: int) -> Mesh:
             Cells("tet" if dim == 3 else "tri", number[nodes[rows]], name)
             for name, rows in regions.items()
         ),
-        {name: (Facets(FACET_KIND[dim], sides[rows]),) for name, rows in surfaces.items()},
+        {name: (Facets(FACET_KIND[dim, dim], sides[rows]),) for name, rows in surfaces.items()},
     )
 
 

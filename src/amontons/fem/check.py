@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InvalidInput
-from .cells import CELLS, ReferenceCell
+from .cells import CELLS, FIRST, ReferenceCell
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+STRAIGHT = 1e-9  # distance from the middle, relative to the largest cell
 FLAT = 1e-10  # det / (longest edge)^dim below which a cell counts as degenerate
 # node order of the mirrored cell
 MIRROR = {
@@ -20,6 +21,11 @@ MIRROR = {
     "wedge": [0, 2, 1, 3, 5, 4],
     "pyramid": [0, 3, 2, 1, 4],
 }
+for _kind in ("tri6", "quad9", "tet10", "hex27"):
+    _corners, _parents = MIRROR[FIRST[_kind]], [set(p) for p in CELLS[_kind].parents]
+    MIRROR[_kind] = _corners + [
+        len(_corners) + _parents.index({_corners[k] for k in p}) for p in _parents
+    ]
 
 
 def checked_cells(points: Array, kind: str, nodes: ArrayLike, region: str) -> Index:
@@ -39,6 +45,7 @@ def checked_cells(points: Array, kind: str, nodes: ArrayLike, region: str) -> In
             f"{kind} cells: expected node numbers 0..{len(points) - 1}, "
             f"got {table.min()}..{table.max()}"
         )
+    _check_straight(cell, points[table], region)
     low, high = _determinants(cell, points[table])
     turned = high < -FLAT
     table[turned] = table[np.flatnonzero(turned)[:, None], MIRROR[kind]]
@@ -49,6 +56,19 @@ def checked_cells(points: Array, kind: str, nodes: ArrayLike, region: str) -> In
         )
     table.flags.writeable = False
     return table
+
+
+def _check_straight(cell: ReferenceCell, coordinates: Array, region: str) -> None:
+    """Nodes between corners must be in the middle: the engine knows straight sides only."""
+    first = cell.corner_count
+    size = np.ptp(coordinates, axis=1).max(initial=0.0)
+    for k, parents in enumerate(cell.parents):
+        off = coordinates[:, first + k] - coordinates[:, list(parents)].mean(axis=1)
+        if np.abs(off).max() > STRAIGHT * size:
+            raise InvalidInput(
+                f"{cell.kind} cells: expected straight sides, nodes in the middle; region "
+                f"{region!r} has others"
+            )
 
 
 def _determinants(cell: ReferenceCell, coordinates: Array) -> tuple[Array, Array]:

@@ -19,6 +19,7 @@ from ..errors import InvalidInput, MissingDependency
 from .cells import CELLS
 from .check import determinant
 from .mesh import Mesh, unknown
+from .nodal_basis import hierarchical_from_nodal
 
 Array = NDArray[np.float64]
 
@@ -84,12 +85,13 @@ def materials_by_region(
 def stiffness(mesh: Mesh, material: LinearElastic | Materials) -> sparse.bsr_array:
     """Stiffness matrix (n dim, n dim) in blocks of dim x dim, force per length.
 
-    Integrated with 2 Gauss points per direction.
+    Integrated exactly where the sides of quadrilaterals and hexahedra are parallel; otherwise
+    with mesh.order + 1 Gauss points per direction.
     """
     ng = _ngsolve()
     by_region = materials_by_region(mesh, material)
     engine_mesh = _engine_mesh(mesh)
-    space = ng.H1(engine_mesh, order=1, dim=mesh.dim)
+    space = ng.H1(engine_mesh, order=mesh.order, dim=mesh.dim)
     lame = engine_mesh.MaterialCF({k: m.lame_lambda(mesh.dim) for k, m in by_region.items()})
     shear = engine_mesh.MaterialCF({k: m.shear for k, m in by_region.items()})
     u, v = space.TnT()
@@ -103,9 +105,13 @@ def stiffness(mesh: Mesh, material: LinearElastic | Materials) -> sparse.bsr_arr
     values, columns, pointers = (part.NumPy() for part in form.mat.CSR())
     size, d = len(mesh.points) * mesh.dim, mesh.dim
     blocks = values.reshape(-1, d, d).copy()  # the engine's memory dies with the form
-    return sparse.bsr_array(
+    matrix = sparse.bsr_array(
         (blocks, columns.copy(), pointers.astype(np.int32)), shape=(size, size)
     )
+    if mesh.order == 1:
+        return matrix
+    change = sparse.kron(hierarchical_from_nodal(ng, mesh, engine_mesh), np.eye(d), "csr")
+    return sparse.bsr_array(change.T @ matrix.tocsr() @ change, blocksize=(d, d))
 
 
 def _ngsolve() -> Any:
@@ -119,15 +125,17 @@ def _ngsolve() -> Any:
 
 
 def _engine_mesh(mesh: Mesh) -> Any:
-    """The NGSolve mesh with the same nodes and regions, in the same order."""
+    """The NGSolve mesh with the same corners and regions, in the same order."""
     ng = _ngsolve()
     from netgen.meshing import Mesh as NetgenMesh
 
     out = NetgenMesh(dim=mesh.dim)
-    out.AddPoints(np.c_[mesh.points, np.zeros(len(mesh.points))][:, :3].copy())
+    tables = [(block, block.nodes[:, : CELLS[block.kind].corner_count]) for block in mesh.cells]
+    points = mesh.points[: 1 + max(int(nodes.max()) for _, nodes in tables)]
+    out.AddPoints(np.c_[points, np.zeros(len(points))][:, :3].copy())
     index = {region: out.AddRegion(region, mesh.dim) for region in mesh.regions}
-    for block in mesh.cells:
-        nodes = np.ascontiguousarray(block.nodes, dtype=np.int32)
+    for block, table in tables:
+        nodes = np.ascontiguousarray(table, dtype=np.int32)
         out.AddElements(dim=mesh.dim, index=index[block.region], data=nodes, base=0)
     return ng.Mesh(out)
 

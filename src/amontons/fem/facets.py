@@ -25,7 +25,7 @@ class Cells:
 
 @dataclass(frozen=True, eq=False)
 class Facets:
-    """Facets of one kind ("line", "tri", "quad"): nodes (k, nodes per facet).
+    """Facets of one kind ("line", "tri", "quad", "line3", …): nodes (k, nodes per facet).
 
     Right-hand rule outwards; in 2D the outward normal is the right side of the direction.
     """
@@ -52,11 +52,12 @@ def sides(cells: tuple[Cells, ...], near: NDArray[np.bool_] | None = None) -> di
 def boundary(cells: tuple[Cells, ...]) -> tuple[Facets, ...]:
     """Facets that belong to one cell only, outwards."""
     out = []
+    dim = CELLS[cells[0].kind].dim if cells else 3
     for size, nodes in sorted(sides(cells).items()):
         _, first, count = np.unique(
             np.sort(nodes, axis=1), axis=0, return_index=True, return_counts=True
         )
-        out.append(Facets(FACET_KIND[size], nodes[np.sort(first[count == 1])]))
+        out.append(Facets(FACET_KIND[dim, size], nodes[np.sort(first[count == 1])]))
     return tuple(block for block in out if len(block.nodes))
 
 
@@ -95,7 +96,7 @@ def oriented(
 def _node_table(block: Facets, name: str, points: Array) -> Index:
     nodes = np.array(block.nodes, dtype=np.int64)
     dim = points.shape[1]
-    kinds = {k: v for k, v in FACET_KIND.items() if (v == "line") == (dim == 2)}
+    kinds = {size: kind for (d, size), kind in FACET_KIND.items() if d == dim}
     if nodes.ndim != 2 or kinds.get(nodes.shape[1]) != block.kind:
         raise InvalidInput(
             f"surface {name!r}: expected facets {', '.join(kinds.values())} in {dim}D, "

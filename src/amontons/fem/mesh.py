@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InvalidInput
+from .cells import CELLS
 from .check import checked_cells
 from .facets import Cells, Facets, boundary, oriented
 
@@ -19,7 +20,7 @@ Index = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A mesh of first order in 2D or 3D.
+    """A mesh in 2D or 3D, of first order or, see `second_order`, of second order.
 
     points (n, dim), unit of length; cells: blocks by kind and region; surfaces: name -> facets.
     Every point belongs to a cell; inverted cells are turned, degenerate ones rejected.
@@ -29,7 +30,6 @@ class Mesh:
     points: Array
     cells: tuple[Cells, ...]
     surfaces: dict[str, tuple[Facets, ...]] = field(default_factory=dict)
-    order: int = 1
     grid: tuple[int, ...] | None = None
     name: str = ""
 
@@ -40,10 +40,6 @@ class Mesh:
         if not np.isfinite(points).all():
             row = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
             raise InvalidInput(f"points[{row}]: expected finite numbers, got {points[row]}")
-        if self.order != 1:
-            raise InvalidInput(
-                f"order: expected 1 (nodes at the corners only), got {self.order}"
-            )
         points.flags.writeable = False
         object.__setattr__(self, "points", points)
         blocks = tuple(
@@ -59,6 +55,8 @@ class Mesh:
     def _check_use(self) -> None:
         if not self.cells:
             raise InvalidInput(f"mesh: expected cells of dimension {self.dim}, got none")
+        if len({CELLS[block.kind].order for block in self.cells}) > 1:
+            raise InvalidInput("mesh: expected cells of one order, got both")
         used = np.zeros(len(self.points), dtype=bool)
         for block in self.cells:
             used[block.nodes] = True
@@ -79,6 +77,11 @@ class Mesh:
     def dim(self) -> int:
         """2 or 3."""
         return self.points.shape[1]
+
+    @property
+    def order(self) -> int:
+        """1, or 2 with nodes also in the middle of edges, quadrilaterals and hexahedra."""
+        return CELLS[self.cells[0].kind].order
 
     @property
     def regions(self) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileFormatError, InvalidInput
-from .cells import CELLS
+from .cells import LINEAR
 from .facets import Cells, Facets, boundary
 from .mesh import Mesh
 
@@ -64,13 +64,13 @@ def to_mesh(raw: RawMesh, path: str) -> Mesh:
 
 
 def _dim(kind: str) -> int:
-    return CELLS[kind].dim if kind in CELLS else 0
+    return LINEAR[kind].dim if kind in LINEAR else 0
 
 
 def _dimension(raw: RawMesh, path: str) -> tuple[int, Array]:
     """(2, points without z) for plane meshes, (3, points) where there are solid cells."""
     kinds = {b.kind for b in raw.blocks if len(b.nodes)}
-    known = {*CELLS, "vertex"}
+    known = {*LINEAR, "vertex"}
     if kinds - known:
         raise FileFormatError(
             f"{path}: expected elements of first order ({', '.join(sorted(known))}), "

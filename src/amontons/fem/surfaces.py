@@ -11,6 +11,8 @@ from .facets import Facets
 
 Array = NDArray[np.float64]
 
+ZERO = 1e-12  # weights below this part of the largest are rounding errors
+
 
 def facet_normals(points: Array, facets: Facets, at: Array | None = None) -> Array:
     """Outward normals times area per reference area at a reference point (default: centre).
@@ -34,13 +36,17 @@ def facet_areas(points: Array, facets: Facets) -> Array:
 
 
 def nodal_weights(points: Array, surface: tuple[Facets, ...]) -> Array:
-    """Integral of every node's shape function over a surface, (n,), area; 0 elsewhere."""
+    """Integral of every node's shape function over a surface, (n,), area; 0 elsewhere.
+
+    It is zero also at the corners of triangles of second order.
+    """
     weights = np.zeros(len(points))
     for facets in surface:
         cell = CELLS[facets.kind]
         for at, weight in zip(*cell.gauss, strict=True):
             area = weight * np.linalg.norm(facet_normals(points, facets, at), axis=1)
             np.add.at(weights, facets.nodes, area[:, None] * cell.shape(at))
+    weights[np.abs(weights) < ZERO * weights.max(initial=0.0)] = 0.0
     return weights
 
 

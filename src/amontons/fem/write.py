@@ -12,7 +12,8 @@ from .mesh import Mesh
 Array = NDArray[np.float64]
 CELL_TYPES = {
     "tri": "triangle", "quad": "quad", "tet": "tetra", "hex": "hexahedron", "wedge": "wedge",
-    "pyramid": "pyramid",
+    "pyramid": "pyramid", "tri6": "triangle6", "quad9": "quad9", "tet10": "tetra10",
+    "hex27": "hexahedron27",
 }  # fmt: skip
 
 

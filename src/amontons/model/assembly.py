@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..contact import ContactRows, nodal_contact, pair_contact
+from ..contact import ContactRows, contact_nodes, nodal_contact, pair_contact
 from ..errors import InvalidInput
 from ..fem.elasticity import body_load, stiffness
 from ..fem.mesh import unknown
@@ -216,7 +216,7 @@ def _place(
     kept = np.sqrt(np.asarray(normal.power(2).sum(axis=0)).ravel()) > 1e-9
     all_kept = met.copy()
     all_kept[met] = kept
-    points = mesh.points[mesh.surface_nodes(surface)]
+    points = mesh.points[contact_nodes(mesh, surface)[0]]
     return Placed(k, all_kept, points, rows.at(kept), H[:, np.repeat(kept, d)])
 
 

@@ -12,6 +12,7 @@ from ..contact import Obstacle
 from ..errors import InvalidInput
 from ..fem.elasticity import LinearElastic, materials_by_region
 from ..fem.mesh import Mesh
+from ..fem.order import second_order
 from .values import ScalarValue, VectorValue
 
 METHODS = ("nodal",)
@@ -19,11 +20,16 @@ METHODS = ("nodal",)
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A mesh and its material: one LinearElastic, or one per region name."""
+    """A mesh and its material: one LinearElastic, or one per region name.
+
+    order: 1 or 2, degree of the displacement.  With 2 the mesh becomes one of second order, see
+    `second_order`: its points are then all nodes.
+    """
 
     mesh: Mesh
     material: LinearElastic | Mapping[str, LinearElastic]
     name: str = ""
+    order: int = 1
 
     def __post_init__(self) -> None:
         if not isinstance(self.mesh, Mesh):
@@ -33,6 +39,11 @@ class Body:
                 "material: expected LinearElastic or a dict region -> LinearElastic, "
                 f"got {self.material!r}"
             )
+        if self.order not in (1, 2):
+            raise InvalidInput(f"order: expected 1 or 2, got {self.order!r}")
+        if self.order == 2:
+            object.__setattr__(self, "mesh", second_order(self.mesh))
+        object.__setattr__(self, "order", self.mesh.order)
         materials_by_region(self.mesh, self.material)
 
 

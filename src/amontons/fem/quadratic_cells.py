@@ -1,0 +1,89 @@
+"""Reference cells of second order: nodes at the corners and at the middles, Lagrange shapes.
+
+Nodes in VTK order: corners, middles of edges, of quadrilateral faces, of the hexahedron.  Sides
+are straight: every node sits at the mean of its parents, the corners that it lies between.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import roots_jacobi
+
+from .linear_cells import LINEAR, ReferenceCell
+
+Array = NDArray[np.float64]
+Parents = tuple[tuple[int, ...], ...]
+
+_TRI = ((0, 1), (1, 2), (2, 0))
+_QUAD = ((0, 1), (1, 2), (2, 3), (3, 0))
+_TET = (*_TRI, (0, 3), (1, 3), (2, 3))
+_HEX = (*_QUAD, (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7),
+        (0, 3, 7, 4), (1, 2, 6, 5), (0, 1, 5, 4), (3, 2, 6, 7), (0, 1, 2, 3), (4, 5, 6, 7),
+        tuple(range(8)))  # fmt: skip
+PARENTS = {"line3": ((0, 1),), "tri6": _TRI, "quad9": (*_QUAD, (0, 1, 2, 3)), "tet10": _TET,
+           "hex27": _HEX}  # fmt: skip
+FIRST = {"line3": "line", "tri6": "tri", "quad9": "quad", "tet10": "tet", "hex27": "hex"}
+SECOND = {first: second for second, first in FIRST.items()}
+
+
+def _lagrange(nodes: Array, simplex: bool) -> tuple[Callable, Callable]:
+    """Shape functions that are 1 at one node each, of degree 2 in all or in each direction."""
+    dim = nodes.shape[1]
+    powers = np.array([
+        p for p in product(range(3), repeat=dim) if not simplex or sum(p) <= 2
+    ])  # fmt: skip
+    lower = np.maximum(powers - 1, 0)
+
+    def monomials(x: Array) -> Array:
+        return (x**powers).prod(axis=1)
+
+    def slopes(x: Array) -> Array:
+        columns = []
+        for k in range(dim):
+            parts = x**powers
+            parts[:, k] = powers[:, k] * x[k] ** lower[:, k]
+            columns.append(parts.prod(axis=1))
+        return np.stack(columns, axis=1)
+
+    weights = np.linalg.inv([monomials(x) for x in nodes]).T
+    return lambda x: weights @ monomials(x), lambda x: weights @ slopes(x)
+
+
+def _gauss(dim: int, simplex: bool) -> tuple[Array, Array]:
+    """Three points per direction, exact to degree 5; on simplices by collapsing the cube."""
+    points, weights = [], []
+    rules = [roots_jacobi(3, dim - 1 - k if simplex else 0, 0) for k in range(dim)]
+    for nodes in product(range(3), repeat=dim):
+        at = np.array([(1 + rules[k][0][j]) / 2 for k, j in enumerate(nodes)])
+        scale = [2.0 ** -(dim - k if simplex else 1) for k in range(dim)]
+        weights.append(np.prod([rules[k][1][j] * scale[k] for k, j in enumerate(nodes)]))
+        if simplex:
+            at *= np.cumprod([1.0, *(1 - at[:-1])])
+        points.append(at)
+    return np.array(points), np.array(weights)
+
+
+def _cell(kind: str) -> ReferenceCell:
+    first, parents = LINEAR[FIRST[kind]], PARENTS[kind]
+    middles = [first.corners[list(p)].mean(axis=0) for p in parents]
+    nodes = np.vstack([first.corners, middles])
+    simplex = FIRST[kind] in ("tri", "tet")
+    shape, gradient = _lagrange(nodes, simplex)
+    facets = tuple(_facet(facet, parents, len(first.corners)) for facet in first.facets)
+    return ReferenceCell(kind, first.dim, nodes, facets, shape, gradient,
+                         _gauss(first.dim, simplex), parents)  # fmt: skip
+
+
+def _facet(corners: tuple[int, ...], parents: Parents, first: int) -> tuple[int, ...]:
+    """Nodes of one side, in the order of its own kind."""
+    kind = {1: None, 2: "line3", 3: "tri6", 4: "quad9"}[len(corners)]
+    place = {frozenset(p): first + k for k, p in enumerate(parents)}
+    wanted = PARENTS[kind] if kind else ()
+    return (*corners, *(place[frozenset(corners[j] for j in p)] for p in wanted))
+
+
+QUADRATIC = {kind: _cell(kind) for kind in PARENTS}
