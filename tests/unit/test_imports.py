@@ -12,14 +12,15 @@ import amontons
 PACKAGE = Path(amontons.__file__).parent
 ORDER = (
     "errors < files < cones < linear < blocks < judge < problem < one_contact < status < "
-    "solution < solvers < solve < fem < contact < model < evolution < analysis < gallery "
-    "< fclib < expressions < case < vtk < plots < output < results < report < api < cli"
+    "solution < solvers < solve < fem < contact < model < masonry < evolution < analysis "
+    "< gallery < fclib < checkpoint < expressions < case < vtk < plots < output < results "
+    "< report < api < cli"
 ).split(" < ")
 ALONE = {  # package: the file or folder that imports it, one for each kind of file
     "ngsolve": "fem", "netgen": "fem", "pyamg": "linear", "matplotlib": "plots", "click": "cli",
     "rslab": "linear", "pypardiso": "linear",
     "meshio": "fem vtk",  # reads meshes, writes pictures
-    "h5py": "fclib output",  # the exchange format, our results
+    "h5py": "fclib output checkpoint",  # the exchange format, our results, our states
 }  # fmt: skip
 FILES = sorted(PACKAGE.rglob("*.py"))
 

@@ -173,12 +173,11 @@ def _material(table: Table) -> LinearElastic:
 
     table.only("law", "young", "poisson", "plane", "density")
     _available(table, "law", ("linear-elastic",), ("neo-hookean", "ciarlet-geymonat"))
-    if "density" in table.data and not table.number("density") > 0:  # read by dynamics only
-        raise table.error("density", f"expected a number > 0, got {table.data['density']!r}")
+    density = table.number("density") if "density" in table.data else None
     young, poisson = table.number("young"), table.number("poisson")
     with _Blame(table, ""):
         return LinearElastic(
-            young, poisson, table.choice("plane", ("strain", "stress"), "strain")
+            young, poisson, table.choice("plane", ("strain", "stress"), "strain"), density
         )
 
 

@@ -28,12 +28,14 @@ Array = NDArray[np.float64]
 class LinearElastic:
     """Isotropic elasticity: young, unit of stress, > 0; -1 < poisson < 0.5.
 
-    plane: "strain" or "stress", read in 2D only.
+    plane: "strain" or "stress", read in 2D only.  density: mass per volume (per area in 2D),
+    read by dynamics only.
     """
 
     young: float
     poisson: float
     plane: str = "strain"
+    density: float | None = None
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.young) and self.young > 0):
@@ -50,6 +52,8 @@ class LinearElastic:
             )
         if self.plane not in ("strain", "stress"):
             raise InvalidInput(f'plane: expected "strain" or "stress", got {self.plane!r}')
+        if self.density is not None and not (np.isfinite(self.density) and self.density > 0):
+            raise InvalidInput(f"density: expected a finite number > 0, got {self.density!r}")
 
     @property
     def shear(self) -> float:

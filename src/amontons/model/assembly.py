@@ -40,12 +40,13 @@ class Placed:
 class Discretisation:
     """All arrays of a model at load factor 1, whatever the friction.
 
-    free (n,), fixed: dofs of the whole model; prescribed (dofs,), load (n,): force on the free
-    dofs with the prescribed values lifted in; gap (nc,); carried (nc, d): part of the local
-    displacement that the supports prescribe.
+    K (dofs, dofs): stiffness of the whole model; free (n,), fixed: its dofs; prescribed
+    (dofs,), load (n,): force on the free dofs with the prescribed values lifted in; gap (nc,);
+    carried (nc, d): part of the local displacement that the supports prescribe.
     """
 
     offsets: Index
+    K: sparse.csr_array
     free: Index
     fixed: Index
     prescribed: Array
@@ -94,7 +95,7 @@ def discretise(
     load = external_load(bodies, loads, offsets)
     d = bodies[0].mesh.dim
     return Discretisation(
-        offsets, free, fixed, prescribed,
+        offsets, K, free, fixed, prescribed,
         M=sparse.csc_array(K[free][:, free]),
         H=sparse.csc_array(whole_H.tocsr()[free]),
         load=(load - K @ prescribed)[free],

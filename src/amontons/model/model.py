@@ -88,11 +88,26 @@ class Model:
     @cached_property
     def _problem(self) -> FrictionProblem:
         parts = self.discretisation
-        law = self._law()
-        loose = self._loose_but_held(parts, law)
         w = self.load_factor * parts.carried
         w[:, 0] += parts.gap
-        f = self.load_factor * parts.load
+        return self._discrete(self.load_factor * parts.load, w)
+
+    def increment(self, load: Array, prescribed: Array, before: Array) -> FrictionProblem:
+        """The discrete problem of a quasi-static step, with friction on the new slip only.
+
+        load (dofs,): nodal forces; prescribed (dofs,): values on the fixed dofs, else zero;
+        before (nc, d-1): tangential displacement at the end of the last step.
+        """
+        parts = self.discretisation
+        w = (parts.whole_H.T @ prescribed).reshape(parts.carried.shape)
+        w[:, 0] += parts.gap
+        w[:, 1:] -= before
+        return self._discrete((load - parts.K @ prescribed)[parts.free], w)
+
+    def _discrete(self, f: Array, w: Array) -> FrictionProblem:
+        """The problem with a load f and local values w; shares its matrices with others."""
+        parts, law = self.discretisation, self.law
+        loose = self._loose_but_held(parts, law)
         base = FrictionProblem.from_global(
             parts.M, parts.H, f, w, law, near_nullspace=parts.near_nullspace,
             load_scale=_load_size(parts, f, w), name=self.name,
@@ -101,7 +116,9 @@ class Model:
         first = self._shared.setdefault("problem", base)
         return replace(base, M=first.M, H=first.H, _shared=first._shared)  # one factor for all
 
-    def _law(self) -> Law:
+    @cached_property
+    def law(self) -> Law:
+        """Friction law of all contacts: Coulomb's coefficients, or bounds in the unit of r."""
         values = []
         for contact, placed in zip(self.contacts, self.discretisation.placed, strict=True):
             name = contact.friction

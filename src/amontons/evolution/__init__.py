@@ -1,0 +1,9 @@
+"""Evolution in time: Moreau-Jean dynamics and quasi-static steps as iterators of results."""
+
+from .energy import Energies
+from .moreau_jean import MoreauJean
+from .quasi_static import QuasiStatic
+from .state import State, TimeStep, at_rest
+from .stepping import evolve
+
+__all__ = ["Energies", "MoreauJean", "QuasiStatic", "State", "TimeStep", "at_rest", "evolve"]

@@ -1,0 +1,198 @@
+"""Moreau-Jean time stepping of elastic bodies with contact, friction and impacts.
+
+With v_theta = theta v1 + (1 - theta) v0, q1 = q0 + h v_theta, and impulses r of the contacts,
+
+    M (v1 - v0) + h C v_theta + h K (q0 + theta h v_theta) = h f_theta + H r,
+    M_hat v1 = H r + f,   M_hat = M + theta h C + theta^2 h^2 K                          (1)
+
+A contact takes part when its gap, predicted as gap + prediction h u_N, is not positive; then
+the law holds between r and u1 + e (u_N of before, 0), e being the restitution ([J], [AB] 10.1).
+
+That law alone can create energy, of the order of the step size, where a closed contact is about
+to open or a sliding one turns round: the work of its impulse is r . u_theta, the law speaks of
+u1.  Such a contact is solved again with the law on u_theta, which never creates energy.
+
+Left out: corrections of the penetration that an impact leaves, h (1 - theta) |u_N| at most.
+
+[AB] V. Acary, B. Brogliato, "Numerical methods for nonsmooth dynamical systems", Springer 2008.
+[J] M. Jean, "The non smooth contact dynamics method", CMAME 177 (1999).
+[A] V. Acary, "Energy conservation and dissipation properties of time-integration methods for
+nonsmooth elastodynamics with contact", ZAMM 96 (2016).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..cones import Coulomb, Law, Tresca
+from ..errors import InvalidInput
+from ..model import Model
+from ..problem import FrictionProblem
+from ..solution import FrictionSolution
+from ..solvers.base import Iterate
+from .energy import Energies
+from .state import State, TimeStep
+from .system import Inertia, Motion
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+Solve = Callable[[FrictionProblem, Iterate], FrictionSolution]
+TOUCHING = 1e-9  # gaps below this part of the size of a contact's area count as closed
+CREATED = 1e-10  # energy that all contacts together may create in a step, relative to the total
+
+
+@dataclass(frozen=True)
+class MoreauJean:
+    """Options of the dynamics; `step`, the step size, in the unit of time of the model."""
+
+    step: float
+    theta: float = 0.5  # 1/2: no numerical damping; 1: implicit Euler
+    restitution: float = 0.0  # normal velocity after over before an impact
+    prediction: float = 0.5  # part of a step by which gaps are predicted
+    mass_damping: float = 0.0  # Rayleigh, per time
+    stiffness_damping: float = 0.0  # Rayleigh, time
+    lumped: bool = False  # mass at the nodes instead of the consistent matrix
+
+    def __post_init__(self) -> None:
+        _expect("step", self.step, self.step > 0, "> 0")
+        _expect("theta", self.theta, 0.5 <= self.theta <= 1, "from 1/2 to 1")
+        _expect("restitution", self.restitution, 0 <= self.restitution <= 1, "from 0 to 1")
+        _expect("prediction", self.prediction, 0 <= self.prediction <= 1, "from 0 to 1")
+        for name in ("mass_damping", "stiffness_damping"):
+            _expect(name, getattr(self, name), getattr(self, name) >= 0, ">= 0")
+
+    def prepare(self, model: Model) -> MovingModel:
+        """The matrices of all steps."""
+        return MovingModel(self, model)
+
+
+class MovingModel:
+    """A model with the matrices of (1); `advance` makes one step."""
+
+    def __init__(self, method: MoreauJean, model: Model) -> None:
+        self.method, self.motion = method, Motion(model)
+        parts = self.motion.parts
+        inertia = Inertia(
+            self.motion.body, method.mass_damping, method.stiffness_damping, method.lumped
+        )
+        h, theta = method.step, method.theta
+        self.M, self.C, self.K = inertia.M, inertia.C, parts.K
+        self.M_hat = sparse.csr_array(self.M + theta * h * self.C + theta**2 * h**2 * self.K)
+        self.closed = TOUCHING * np.concatenate([p.rows.weights for p in parts.placed]) ** (
+            1 / (model.dimension - 1)
+        )
+        nc, d = parts.carried.shape
+        M_free = self.M_hat[parts.free][:, parts.free]
+        self.base = FrictionProblem.from_global(
+            M_free, parts.H, np.zeros(len(parts.free)), np.zeros((nc, d)), self.motion.body.law,
+            near_nullspace=parts.near_nullspace, name=model.name,
+        )  # fmt: skip
+        self._last_active: tuple[Index, FrictionProblem] = (np.arange(nc), self.base)
+
+    def advance(self, state: State, time: float, solve: Solve) -> TimeStep:
+        """One step from a state to a time; solve(problem, start) solves its problem."""
+        parts, method = self.motion.parts, self.method
+        h, theta = method.step, method.theta
+        v0, q0 = state.velocity, state.displacement
+        u0 = self._local(v0)
+        gap = parts.gap + self._local(q0)[:, 0]
+        active = np.flatnonzero(gap + method.prediction * h * u0[:, 0] <= self.closed)
+        v1 = np.zeros(parts.dofs)
+        before, after = self.motion.prescribed(state.time), self.motion.prescribed(time)
+        v1[parts.fixed] = ((after - before) / h)[parts.fixed]
+        force = theta * self.motion.load(time) + (1 - theta) * self.motion.load(state.time)
+        known = self.M @ v0 + h * (
+            force - (1 - theta) * (self.C @ v0) - self.K @ (q0 + h * theta * (1 - theta) * v0)
+        )
+        f = (known - self.M_hat @ v1)[parts.free]
+        carried = self._local(v1)[active]  # by the supports
+        start = Iterate(h * state.force[active])
+        shift = np.zeros_like(carried)
+        shift[:, 0] = method.restitution * u0[active, 0]
+        solved = np.zeros(len(active), dtype=bool)  # with the law on u_theta
+        while True:
+            solution = solve(self._problem(active, f, carried + shift), start)
+            v1[parts.free] = _velocity(solution)
+            v_theta = theta * v1 + (1 - theta) * v0
+            q1 = q0 + h * v_theta
+            impulse = np.zeros_like(parts.carried)
+            impulse[active] = solution.r
+            energies = self._energies(state, v1, q1, force, impulse)
+            wrong = self._creating(impulse, v_theta, energies)[active] & ~solved
+            if not wrong.any() or theta == 1 and not method.restitution:
+                break
+            solved |= wrong
+            shift[solved] = (1 - theta) / theta * u0[active][solved]
+            start = Iterate(solution.r)
+        u = self._local(q1)
+        new = State(state.index + 1, time, q1, v1, impulse / h, u[:, 1:])
+        return TimeStep(self.motion.body, new, solution, active, energies, parts.gap + u[:, 0])
+
+    def _local(self, v: Array) -> Array:
+        """Local values of motions (dofs,): (nc, d)."""
+        parts = self.motion.parts
+        return (parts.whole_H.T @ v).reshape(parts.carried.shape)
+
+    def _problem(self, active: Index, f: Array, w: Array) -> FrictionProblem:
+        """The problem of the active contacts, with the matrices of the last one if it can."""
+        if not np.array_equal(self._last_active[0], active):
+            columns = (active[:, None] * w.shape[1] + np.arange(w.shape[1])).ravel()
+            H = sparse.csc_array(self.base.H[:, columns])  # type: ignore[index]
+            law = _law_at(self.motion.body.law, active)
+            problem = replace(self.base, H=H, law=law)
+            self._last_active = (active, problem)
+        problem = self._last_active[1]
+        if isinstance(problem.law, Tresca):  # impulses
+            bound = _law_at(self.motion.body.law, active).coefficient * self.method.step
+            return replace(problem, f=f, w=w, law=Tresca(bound))
+        return replace(problem, f=f, w=w)
+
+    def _creating(self, impulse: Array, v_theta: Array, energies: Energies) -> Mask:
+        """Contacts whose impulse creates more energy than rounding, (nc,)."""
+        work = (impulse * self._local(v_theta)).sum(axis=1)
+        least = CREATED * (energies.total + abs(energies.loads) + abs(energies.supports))
+        return work > least / max(len(work), 1)
+
+    def _energies(
+        self, state: State, v1: Array, q1: Array, force: Array, impulse: Array
+    ) -> Energies:
+        """The balance of the step, see `energy`."""
+        parts, h, theta = self.motion.parts, self.method.step, self.method.theta
+        M, K, C = self.M, self.K, self.C
+        dv, dq = v1 - state.velocity, q1 - state.displacement
+        pushed = parts.whole_H @ impulse.ravel()
+        q_theta = state.displacement + theta * dq
+        # what the supports must do for the balance of momentum on the fixed dofs
+        held = np.zeros_like(dq)
+        rest = M @ dv + C @ dq + h * (K @ q_theta - force) - pushed
+        held[parts.fixed] = rest[parts.fixed]
+        kinetic, elastic = 0.5 * v1 @ (M @ v1), 0.5 * q1 @ (K @ q1)
+        v0, q0 = state.velocity, state.displacement
+        gain = kinetic + elastic - 0.5 * v0 @ (M @ v0) - 0.5 * q0 @ (K @ q0)
+        return Energies(
+            kinetic=float(kinetic), elastic=float(elastic), gain=float(gain),
+            loads=float(force @ dq), supports=float(held @ dq) / h,
+            contact=float(pushed @ dq) / h, damping=float(dq @ (C @ dq)) / h,
+            numerical=float((theta - 0.5) * (dv @ (M @ dv) + dq @ (K @ dq))),
+        )  # fmt: skip
+
+
+def _velocity(solution: FrictionSolution) -> Array:
+    assert solution.v is not None  # the problem is in global form
+    return solution.v
+
+
+def _law_at(law: Law, contacts: Index) -> Law:
+    kind = Coulomb if isinstance(law, Coulomb) else Tresca
+    return kind(law.coefficient[contacts])
+
+
+def _expect(name: str, value: float, good: bool, wanted: str) -> None:
+    if not (np.isfinite(value) and good):
+        raise InvalidInput(f"{name}: expected a number {wanted}, got {value!r}")

@@ -1,0 +1,80 @@
+"""Quasi-static steps: equilibrium at each time, friction on the slip since the last one.
+
+Loads and supports that depend on time are evaluated; where none does, all of them grow with
+the time as load factor.  Gaps are positions, so nothing drifts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InvalidInput
+from ..model import Model
+from ..solvers.base import Iterate
+from .energy import Energies
+from .moreau_jean import Solve
+from .state import State, TimeStep
+from .system import Motion
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class QuasiStatic:
+    """Steps of size `step` in time, or in the load factor where nothing depends on time."""
+
+    step: float
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.step) and self.step > 0):
+            raise InvalidInput(f"step: expected a number > 0, got {self.step!r}")
+
+    def prepare(self, model: Model) -> SlowModel:
+        """The matrices of all steps."""
+        return SlowModel(model)
+
+
+class SlowModel:
+    """A model without inertia; `advance` makes one step."""
+
+    def __init__(self, model: Model) -> None:
+        self.motion = Motion(model)
+
+    def advance(self, state: State, time: float, solve: Solve) -> TimeStep:
+        """One step from a state to a time; solve(problem, start) solves its problem."""
+        parts = self.motion.parts
+        factor = 1.0 if self.motion.is_timed else time
+        load, prescribed = (
+            factor * self.motion.load(time),
+            factor * self.motion.prescribed(time),
+        )
+        problem = self.motion.body.increment(load, prescribed, state.slip)
+        solution = solve(problem, Iterate(state.force))
+        assert solution.v is not None
+        q1 = prescribed.copy()
+        q1[parts.free] = solution.v
+        dq = q1 - state.displacement
+        u = (parts.whole_H.T @ q1).reshape(parts.carried.shape)
+        energies = self._energies(state, q1, load, parts.whole_H @ solution.r.ravel())
+        time_step = time - state.time
+        velocity = dq / time_step if time_step else np.zeros_like(dq)
+        new = State(state.index + 1, time, q1, velocity, solution.r, u[:, 1:])
+        active = np.arange(len(parts.gap))
+        return TimeStep(self.motion.body, new, solution, active, energies, parts.gap + u[:, 0])
+
+    def _energies(self, state: State, q1: Array, load: Array, pushed: Array) -> Energies:
+        """The balance of `energy` with theta = 1 and no mass."""
+        parts, K = self.motion.parts, self.motion.parts.K
+        dq = q1 - state.displacement
+        held = np.zeros_like(dq)
+        held[parts.fixed] = (K @ q1 - load - pushed)[parts.fixed]
+        elastic = 0.5 * q1 @ (K @ q1)
+        before = 0.5 * state.displacement @ (K @ state.displacement)
+        return Energies(
+            elastic=float(elastic), gain=float(elastic - before), loads=float(load @ dq),
+            supports=float(held @ dq), contact=float(pushed @ dq),
+            numerical=float(0.5 * dq @ (K @ dq)),
+        )  # fmt: skip

@@ -1,0 +1,142 @@
+"""Where an evolution stands, and what one step of it gives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InvalidInput
+from ..model import Fix, Model
+from ..model.assembly import prescribed_values
+from ..model.values import VectorValue, vector_at
+from ..problem import FrictionProblem
+from ..solution import ContactStatus, FrictionSolution
+from .energy import Energies
+from .timed import part_at, steady
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """All that the next step needs: it may be saved, and the evolution goes on from it.
+
+    index: steps done; time; displacement, velocity (dofs,) of all bodies one after another;
+    force (nc, d): contact forces on the slaves in the local frames, zero where none is active;
+    slip (nc, d-1): tangential displacement since the start.
+    """
+
+    index: int
+    time: float
+    displacement: Array
+    velocity: Array
+    force: Array
+    slip: Array
+
+    def __post_init__(self) -> None:
+        for name in ("displacement", "velocity", "force", "slip"):
+            array = np.array(getattr(self, name), dtype=float)
+            if not np.isfinite(array).all():
+                raise InvalidInput(f"state: {name} holds a number that is not finite")
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+
+
+@dataclass(frozen=True, eq=False)
+class TimeStep:
+    """One step: the state after it, its discrete problem's solution, its energies.
+
+    active (k,): the contacts that are in the problem, in order; the rest is open.  gap (nc,)
+    after the step, unit of length.
+    """
+
+    model: Model
+    state: State
+    solution: FrictionSolution
+    active: Index
+    energies: Energies
+    gap: Array
+
+    @property
+    def time(self) -> float:
+        """Time at the end of the step."""
+        return self.state.time
+
+    @property
+    def problem(self) -> FrictionProblem:
+        """The discrete problem: velocities and impulses in dynamics."""
+        return self.solution.problem
+
+    @property
+    def displacement(self) -> tuple[Array, ...]:
+        """Displacement of every body, (nodes, dim)."""
+        return self._by_body(self.state.displacement)
+
+    @property
+    def v(self) -> tuple[Array, ...]:
+        """Velocity of every body, (nodes, dim)."""
+        return self._by_body(self.state.velocity)
+
+    def _by_body(self, values: Array) -> tuple[Array, ...]:
+        offsets = self.model.discretisation.offsets
+        parts = np.split(values, offsets[1:-1])
+        return tuple(
+            part.reshape(body.mesh.points.shape)
+            for part, body in zip(parts, self.model.bodies, strict=True)
+        )
+
+    @cached_property
+    def status(self) -> NDArray[np.int8]:
+        """ContactStatus of all contacts, (nc,)."""
+        out = np.full(len(self.gap), int(ContactStatus.OPEN), dtype=np.int8)
+        out[self.active] = self.solution.status
+        return out
+
+    def __str__(self) -> str:
+        e = self.energies
+        counts = ((s.name.lower(), int((self.status == s).sum())) for s in ContactStatus)
+        return (
+            f"t = {self.time:.6g}: {', '.join(f'{number} {name}' for name, number in counts)}; "
+            f"kinetic {e.kinetic:.3e}, elastic {e.elastic:.3e}, contact {e.contact:.2e}; "
+            f"{self.solution.convergence}"
+        )
+
+
+def at_rest(
+    model: Model,
+    *,
+    time: float = 0.0,
+    velocity: VectorValue | Sequence[VectorValue] = 0.0,
+) -> State:
+    """The undeformed model at a time, moving with a velocity.
+
+    velocity: a value per component, a function of x, or a list of one of these per body.  Fixed
+    dofs start with their prescribed displacement and without velocity.
+    """
+    parts = steady(model).discretisation
+    q, v = np.zeros(parts.dofs), np.zeros(parts.dofs)
+    per_body = _one_each(velocity, len(model.bodies))
+    for body, value, a, b in zip(
+        model.bodies, per_body, parts.offsets[:-1], parts.offsets[1:], strict=True
+    ):
+        v[a:b] = vector_at(value, body.mesh.points, "velocity").ravel()
+    v[parts.fixed] = 0.0
+    supports: tuple[Fix, ...] = tuple(part_at(s, time) for s in model.supports)  # type: ignore[misc]
+    q[parts.fixed] = prescribed_values(model.bodies, supports, parts.offsets)[parts.fixed]
+    nc, d = parts.carried.shape
+    u = (parts.whole_H.T @ q).reshape(nc, d)
+    return State(0, time, q, v, np.zeros((nc, d)), u[:, 1:])
+
+
+def _one_each(velocity: object, bodies: int) -> list:
+    """A velocity for every body; a list of vectors or functions is one per body."""
+    if isinstance(velocity, list | tuple):
+        several = all(isinstance(v, list | tuple) or callable(v) for v in velocity)
+        if several and len(velocity) == bodies:
+            return list(velocity)
+    return [velocity] * bodies

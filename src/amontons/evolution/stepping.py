@@ -1,0 +1,74 @@
+"""The loop over steps: times, warm starts, failures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..errors import InvalidInput, NotConverged
+from ..model import Model
+from ..problem import FrictionProblem
+from ..solution import FrictionSolution
+from ..solve import drive
+from ..solvers.base import Iterate, Solver
+from .moreau_jean import MoreauJean
+from .quasi_static import QuasiStatic
+from .state import State, TimeStep, at_rest
+from .system import Motion
+
+WHOLE = 1e-9  # the end may miss a whole number of steps by this part of a step
+
+
+def evolve(
+    model: Model,
+    method: MoreauJean | QuasiStatic,
+    *,
+    until: float,
+    start: State | None = None,
+    solver: Solver | None = None,
+    tolerance: float = 1e-8,
+    check: bool = True,
+) -> Iterator[TimeStep]:
+    """The steps of a model up to the time `until`, each solved from the reactions of the last.
+
+    start: by default the undeformed model at rest at time 0; any `step.state` goes on from
+    there and gives the same numbers as an evolution without a stop.  Supports and loads may
+    depend on time: expressions in t, or functions of (x, t).  check: raise NotConverged, which
+    carries the solution of the step, instead of going on with it.
+
+    The problem of a step is `step.problem`.
+    """
+    prepared = method.prepare(model)
+    state = start if start is not None else at_rest(model)
+    _check(state, prepared.motion, method.step, until)
+
+    def solve(problem: FrictionProblem, first: Iterate) -> FrictionSolution:
+        solution = drive(problem, solver, tolerance=tolerance, start=first)
+        if check and not solution.converged:
+            record = solution.convergence
+            raise NotConverged(f"step {state.index + 1}: {record}. {record.outcome.advice}",
+                               solution)  # fmt: skip
+        return solution
+
+    first = state.time - state.index * method.step
+    while state.time < until - WHOLE * method.step:
+        step = prepared.advance(state, first + (state.index + 1) * method.step, solve)
+        state = step.state
+        yield step
+
+
+def _check(state: State, motion: Motion, step: float, until: float) -> None:
+    """Raise InvalidInput for a state of another model, or an end that is not ahead."""
+    parts = motion.parts
+    shapes = {"displacement": (parts.dofs,), "velocity": (parts.dofs,),
+              "force": parts.carried.shape, "slip": parts.carried[:, 1:].shape}  # fmt: skip
+    for name, wanted in shapes.items():
+        found = getattr(state, name).shape
+        if found != wanted:
+            raise InvalidInput(
+                f"start: expected {name} of shape {wanted}, got {found}: "
+                "it belongs to another model"
+            )
+    if not (np.isfinite(until) and until > state.time - WHOLE * step):
+        raise InvalidInput(f"until: expected a time after {state.time:g}, got {until!r}")

@@ -1,0 +1,96 @@
+"""The matrices of a model that moves: mass, damping, stiffness, contact, loads in time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..fem.mass import lumped, mass
+from ..model import Fix, Model
+from ..model.assembly import Discretisation, external_load, prescribed_values
+from .timed import is_timed, part_at, steady
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Loads and prescribed displacements of a model as functions of time.
+
+    model: as the user gave it; only its steady form, `body`, is assembled.
+    """
+
+    model: Model
+
+    @cached_property
+    def body(self) -> Model:
+        """The model at time 0."""
+        return steady(self.model)
+
+    @cached_property
+    def parts(self) -> Discretisation:
+        """The arrays of the model."""
+        return self.body.discretisation
+
+    @cached_property
+    def is_timed(self) -> bool:
+        """True when a load or a support depends on time."""
+        return any(is_timed(p.value) for p in (*self.model.supports, *self.model.loads))
+
+    @cached_property
+    def _steady_load(self) -> Array:
+        steady = tuple(p for p in self.model.loads if not is_timed(p.value))
+        return external_load(self.model.bodies, steady, self.parts.offsets)
+
+    @cached_property
+    def _supports_move(self) -> bool:
+        return any(is_timed(support.value) for support in self.model.supports)
+
+    def load(self, t: float) -> Array:
+        """Nodal forces at time t, (dofs,)."""
+        moving = tuple(part_at(p, t) for p in self.model.loads if is_timed(p.value))
+        if not moving:
+            return self._steady_load
+        forces = external_load(self.model.bodies, moving, self.parts.offsets)  # type: ignore[arg-type]
+        return self._steady_load + forces
+
+    def prescribed(self, t: float) -> Array:
+        """Prescribed displacement at time t, (dofs,), zero on the free dofs."""
+        if not self._supports_move:
+            return self._steady_displacement
+        return self._prescribed(t)
+
+    @cached_property
+    def _steady_displacement(self) -> Array:
+        return self._prescribed(0.0)
+
+    def _prescribed(self, t: float) -> Array:
+        supports: tuple[Fix, ...] = tuple(part_at(s, t) for s in self.model.supports)  # type: ignore[misc]
+        values = prescribed_values(self.model.bodies, supports, self.parts.offsets)
+        out = np.zeros(self.parts.dofs)
+        out[self.parts.fixed] = values[self.parts.fixed]
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class Inertia:
+    """Mass matrix M and Rayleigh damping C = mass_damping M + stiffness_damping K."""
+
+    model: Model
+    mass_damping: float
+    stiffness_damping: float
+    is_lumped: bool
+    M: sparse.csr_array = field(init=False)
+    C: sparse.csr_array = field(init=False)
+
+    def __post_init__(self) -> None:
+        blocks = [mass(body.mesh, body.material) for body in self.model.bodies]
+        M = sparse.csr_array(sparse.block_diag(blocks, format="csr"))
+        M = lumped(M) if self.is_lumped else M
+        C = self.mass_damping * M + self.stiffness_damping * self.model.discretisation.K
+        object.__setattr__(self, "M", M)
+        object.__setattr__(self, "C", sparse.csr_array(C))
