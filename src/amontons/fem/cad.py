@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import pickle
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -58,10 +59,13 @@ def read_cad(
 def _read_apart(name: str, size: float) -> Mesh:
     """The mesh by another process: OpenCascade prints, and broken files can make it crash."""
     code = f"import sys; sys.path[:] = {sys.path!r}; from {__name__} import _child; _child()"
+    suffix = Path(name).suffix.lower()
     with tempfile.TemporaryDirectory() as folder:
         answer = Path(folder) / "answer"
+        part = Path(folder) / f"part{'.iges' if suffix == '.igs' else suffix}"
+        shutil.copyfile(name, part)  # Netgen knows neither .igs nor .STEP
         done = subprocess.run(
-            [sys.executable, "-c", code, name, repr(size), str(answer)],
+            [sys.executable, "-c", code, str(part), repr(size), str(answer)],
             capture_output=True, stdin=subprocess.DEVNULL,
         )  # fmt: skip
         found = pickle.loads(answer.read_bytes()) if answer.exists() else None
@@ -141,7 +145,8 @@ def _check_plane(shape: Any) -> None:
     low, high = (np.array([p.x, p.y, p.z]) for p in shape.bounding_box)
     if high[2] - low[2] > TOLERANCE * (1 + (high - low).max()):
         raise InvalidInput(
-            "shape: expected solids, or faces in a plane of constant z; got other faces"
+            "shape: expected solids, or faces in a plane of constant z; got loose faces, which "
+            "IGES files often hold: export the part as a STEP file"
         )
 
 
@@ -151,7 +156,7 @@ def _check_count(parts: Sequence[Any], size: float, dim: int) -> None:
     count = content / size**dim * {2: 4 / np.sqrt(3), 3: 6 * np.sqrt(2)}[dim]
     if count > MAX_CELLS:
         raise InvalidInput(
-            f"size: {size} gives about {count:.1g} cells, expected at most {MAX_CELLS:.0e}"
+            f"size: {size} gives about {count:.2g} cells, expected at most {MAX_CELLS:.2g}"
         )
 
 
