@@ -24,6 +24,7 @@ _HOME = {
                 "SmoothingNewton"),
     "solve": ("drive",),
     "fclib": ("read_fclib", "write_fclib"),
+    "masonry": ("Bond", "Wall"),
     "evolution": ("MoreauJean", "QuasiStatic", "State", "TimeStep", "at_rest", "evolve"),
     "checkpoint": ("export_fclib", "load_state", "save_state"),
     "case": ("read_case",),

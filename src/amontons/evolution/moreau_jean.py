@@ -10,7 +10,11 @@ the law holds between r and u1 + e (u_N of before, 0), e being the restitution (
 
 That law alone can create energy, of the order of the step size, where a closed contact is about
 to open or a sliding one turns round: the work of its impulse is r . u_theta, the law speaks of
-u1.  Such a contact is solved again with the law on u_theta, which never creates energy.
+u1.  Where the contacts of a step together would do so, those that do are solved again with the
+law on u_theta, which never creates energy.
+
+M_hat does not change, and its W falls apart into the bodies: it is formed once, and every step
+cuts the active contacts out of it.
 
 Left out: corrections of the penetration that an impact leaves, h (1 - theta) |u_N| at most.
 
@@ -24,6 +28,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,9 +47,11 @@ from .system import Inertia, Motion
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
-Solve = Callable[[FrictionProblem, Iterate], FrictionSolution]
+Local = Callable[[FrictionProblem], FrictionProblem]
+Solve = Callable[[FrictionProblem, Iterate, Local | None], FrictionSolution]
 TOUCHING = 1e-9  # gaps below this part of the size of a contact's area count as closed
-CREATED = 1e-10  # energy that all contacts together may create in a step, relative to the total
+CREATED = 0.1  # energy contacts may create in a step, relative to the total, per tolerance
+W_LIMIT = 1e9  # bytes of W above which it is not formed
 
 
 @dataclass(frozen=True)
@@ -58,6 +65,7 @@ class MoreauJean:
     mass_damping: float = 0.0  # Rayleigh, per time
     stiffness_damping: float = 0.0  # Rayleigh, time
     lumped: bool = False  # mass at the nodes instead of the consistent matrix
+    condense: bool = True  # form W once where it fits into memory; it pays after a few steps
 
     def __post_init__(self) -> None:
         _expect("step", self.step, self.step > 0, "> 0")
@@ -67,16 +75,16 @@ class MoreauJean:
         for name in ("mass_damping", "stiffness_damping"):
             _expect(name, getattr(self, name), getattr(self, name) >= 0, ">= 0")
 
-    def prepare(self, model: Model) -> MovingModel:
-        """The matrices of all steps."""
-        return MovingModel(self, model)
+    def prepare(self, model: Model, tolerance: float) -> MovingModel:
+        """The matrices of all steps; tolerance of their solves."""
+        return MovingModel(self, model, tolerance)
 
 
 class MovingModel:
     """A model with the matrices of (1); `advance` makes one step."""
 
-    def __init__(self, method: MoreauJean, model: Model) -> None:
-        self.method, self.motion = method, Motion(model)
+    def __init__(self, method: MoreauJean, model: Model, tolerance: float) -> None:
+        self.method, self.motion, self.tolerance = method, Motion(model), tolerance
         parts = self.motion.parts
         inertia = Inertia(
             self.motion.body, method.mass_damping, method.stiffness_damping, method.lumped
@@ -113,11 +121,12 @@ class MovingModel:
         f = (known - self.M_hat @ v1)[parts.free]
         carried = self._local(v1)[active]  # by the supports
         start = Iterate(h * state.force[active])
+        local = self._local_problem if self._condenses else None
         shift = np.zeros_like(carried)
         shift[:, 0] = method.restitution * u0[active, 0]
         solved = np.zeros(len(active), dtype=bool)  # with the law on u_theta
         while True:
-            solution = solve(self._problem(active, f, carried + shift), start)
+            solution = solve(self._problem(active, f, carried + shift), start, local)
             v1[parts.free] = _velocity(solution)
             v_theta = theta * v1 + (1 - theta) * v0
             q1 = q0 + h * v_theta
@@ -125,7 +134,7 @@ class MovingModel:
             impulse[active] = solution.r
             energies = self._energies(state, v1, q1, force, impulse)
             wrong = self._creating(impulse, v_theta, energies)[active] & ~solved
-            if not wrong.any() or theta == 1 and not method.restitution:
+            if not wrong.any():
                 break
             solved |= wrong
             shift[solved] = (1 - theta) / theta * u0[active][solved]
@@ -142,7 +151,7 @@ class MovingModel:
     def _problem(self, active: Index, f: Array, w: Array) -> FrictionProblem:
         """The problem of the active contacts, with the matrices of the last one if it can."""
         if not np.array_equal(self._last_active[0], active):
-            columns = (active[:, None] * w.shape[1] + np.arange(w.shape[1])).ravel()
+            columns = _rows_of(active, w.shape[1])
             H = sparse.csc_array(self.base.H[:, columns])  # type: ignore[index]
             law = _law_at(self.motion.body.law, active)
             problem = replace(self.base, H=H, law=law)
@@ -153,11 +162,37 @@ class MovingModel:
             return replace(problem, f=f, w=w, law=Tresca(bound))
         return replace(problem, f=f, w=w)
 
+    @property
+    def _condenses(self) -> bool:
+        return self.method.condense and 8.0 * self.base.w.size**2 <= W_LIMIT  # type: ignore[union-attr]
+
+    @cached_property
+    def _W(self) -> sparse.csr_array:
+        """W of all contacts, sparse: bodies do not see each other."""
+        return sparse.csr_array(self.base.condensed().W)
+
+    @cached_property
+    def _one_W(self) -> dict[bytes, sparse.csr_array]:
+        """W of the last active set, by the set."""
+        return {}
+
+    def _local_problem(self, problem: FrictionProblem) -> FrictionProblem:
+        """The Delassus form of a problem of the last active set."""
+        active, key = self._last_active[0], self._last_active[0].tobytes()
+        if key not in self._one_W:
+            rows = _rows_of(active, self.base.dimension)
+            self._one_W.clear()
+            self._one_W[key] = self._W[rows][:, rows]
+        return FrictionProblem.from_delassus(
+            self._one_W[key], problem.free_velocity, problem.law, name=problem.name
+        )  # type: ignore[arg-type]
+
     def _creating(self, impulse: Array, v_theta: Array, energies: Energies) -> Mask:
-        """Contacts whose impulse creates more energy than rounding, (nc,)."""
-        work = (impulse * self._local(v_theta)).sum(axis=1)
-        least = CREATED * (energies.total + abs(energies.loads) + abs(energies.supports))
-        return work > least / max(len(work), 1)
+        """Contacts whose impulse creates energy, (nc,); none if all together dissipate."""
+        size = energies.total + abs(energies.loads) + abs(energies.supports)
+        if energies.contact <= CREATED * self.tolerance * size:
+            return np.zeros(len(impulse), dtype=bool)
+        return (impulse * self._local(v_theta)).sum(axis=1) > 0
 
     def _energies(
         self, state: State, v1: Array, q1: Array, force: Array, impulse: Array
@@ -186,6 +221,11 @@ class MovingModel:
 def _velocity(solution: FrictionSolution) -> Array:
     assert solution.v is not None  # the problem is in global form
     return solution.v
+
+
+def _rows_of(contacts: Index, d: int) -> Index:
+    """Rows of the local vectors of some contacts."""
+    return (contacts[:, None] * d + np.arange(d)).ravel()
 
 
 def _law_at(law: Law, contacts: Index) -> Law:

@@ -32,8 +32,8 @@ class QuasiStatic:
         if not (np.isfinite(self.step) and self.step > 0):
             raise InvalidInput(f"step: expected a number > 0, got {self.step!r}")
 
-    def prepare(self, model: Model) -> SlowModel:
-        """The matrices of all steps."""
+    def prepare(self, model: Model, tolerance: float) -> SlowModel:
+        """The matrices of all steps; equilibrium at the end never creates energy."""
         return SlowModel(model)
 
 
@@ -52,7 +52,7 @@ class SlowModel:
             factor * self.motion.prescribed(time),
         )
         problem = self.motion.body.increment(load, prescribed, state.slip)
-        solution = solve(problem, Iterate(state.force))
+        solution = solve(problem, Iterate(state.force), None)
         assert solution.v is not None
         q1 = prescribed.copy()
         q1[parts.free] = solution.v

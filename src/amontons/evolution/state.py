@@ -97,6 +97,16 @@ class TimeStep:
         out[self.active] = self.solution.status
         return out
 
+    def resultant(self, pairs: Sequence[int] | None = None) -> Array:
+        """Sum of the contact forces on the slaves of some (all) contact pairs, global axes."""
+        placed = self.model.discretisation.placed
+        ends = np.cumsum([0, *(len(p.rows.nodes) for p in placed)])
+        total = np.zeros(self.model.dimension)
+        for k in range(len(placed)) if pairs is None else pairs:
+            force = self.state.force[ends[k] : ends[k + 1]]
+            total += np.einsum("ik,ikc->c", force, placed[k].rows.frames)
+        return total
+
     def __str__(self) -> str:
         e = self.energies
         counts = ((s.name.lower(), int((self.status == s).sum())) for s in ContactStatus)

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from ..errors import InvalidInput, NotConverged
 from ..model import Model
-from ..problem import FrictionProblem
+from ..problem import Form, FrictionProblem
 from ..solution import FrictionSolution
 from ..solve import drive
 from ..solvers.base import Iterate, Solver
-from .moreau_jean import MoreauJean
+from .moreau_jean import Local, MoreauJean
 from .quasi_static import QuasiStatic
 from .state import State, TimeStep, at_rest
 from .system import Motion
@@ -39,12 +40,19 @@ def evolve(
 
     The problem of a step is `step.problem`.
     """
-    prepared = method.prepare(model)
+    prepared = method.prepare(model, tolerance)
     state = start if start is not None else at_rest(model)
     _check(state, prepared.motion, method.step, until)
 
-    def solve(problem: FrictionProblem, first: Iterate) -> FrictionSolution:
-        solution = drive(problem, solver, tolerance=tolerance, start=first)
+    def solve(
+        problem: FrictionProblem, first: Iterate, local: Local | None
+    ) -> FrictionSolution:
+        if local is None or (solver is not None and solver.form is Form.GLOBAL):
+            solution = drive(problem, solver, tolerance=tolerance, start=first)
+        else:
+            found = drive(local(problem), solver, tolerance=tolerance, start=first)
+            u, v = problem.velocity(found.r)
+            solution = replace(found, problem=problem, u=u, v=v)
         if check and not solution.converged:
             record = solution.convergence
             raise NotConverged(f"step {state.index + 1}: {record}. {record.outcome.advice}",

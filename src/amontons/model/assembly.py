@@ -215,10 +215,24 @@ def _place(
     H = sparse.csc_array(H)
     normal = sparse.csc_array(H[:, ::d]).multiply(~is_fixed[:, None])
     kept = np.sqrt(np.asarray(normal.power(2).sum(axis=0)).ravel()) > 1e-9
+    points = mesh.points[contact_nodes(mesh, surface)[0]]
+    kept &= _wanted(contact, points)[met]
     all_kept = met.copy()
     all_kept[met] = kept
-    points = mesh.points[contact_nodes(mesh, surface)[0]]
     return Placed(k, all_kept, points, rows.at(kept), H[:, np.repeat(kept, d)])
+
+
+def _wanted(contact: Contact, points: Array) -> NDArray[np.bool_]:
+    """Which slave nodes a contact asks for, (n,)."""
+    if contact.where is None:
+        return np.ones(len(points), dtype=bool)
+    wanted = np.asarray(contact.where(points))
+    if wanted.shape != (len(points),) or wanted.dtype != bool:
+        raise InvalidInput(
+            f"contact on {contact.slave!r}: expected where to return ({len(points)},) of bool "
+            f"for points {points.shape}, got {wanted.dtype} of shape {wanted.shape}"
+        )
+    return wanted
 
 
 def _shifted(H: sparse.csc_array, offset: int, size: int) -> sparse.csc_array:

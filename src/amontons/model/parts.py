@@ -5,8 +5,11 @@ Surfaces are named as in the mesh; "body.surface" where several bodies know the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..contact import Obstacle
 from ..errors import InvalidInput
@@ -15,6 +18,7 @@ from ..fem.mesh import Mesh
 from ..fem.order import second_order
 from .values import ScalarValue, VectorValue
 
+Array = NDArray[np.float64]
 METHODS = ("nodal",)
 
 
@@ -84,6 +88,7 @@ class Contact:
 
     Either mu, the coefficient of Coulomb friction, or tresca, the largest shear traction (a
     stress): a number, one number per slave node, or a function of points (n, dim) -> (n,).
+    where: a function of points (n, dim) -> (n,) bool that tells which slave nodes take part.
     """
 
     slave: str
@@ -92,6 +97,7 @@ class Contact:
     tresca: ScalarValue | None = None
     master: str | None = None
     method: str = "nodal"
+    where: Callable[[Array], NDArray[np.bool_]] | None = None
 
     def __post_init__(self) -> None:
         if (self.mu is None) == (self.tresca is None):

@@ -1,0 +1,215 @@
+"""Masonry: walls of elastic blocks in dry contact, on a floor and under a plate.
+
+The columns of H are independent by construction.  Blocks are numbered upwards, rows from left
+to right, the plate last; every node is the slave of one contact at most, and its master lies on
+a block with a smaller number.  So the contacts, in this order, form a triangular matrix with
+ones at the slave nodes.  Where faces meet at an edge, the bed joint takes the node, and a bed
+node over the joint of two blocks goes to the left one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .contact import Plane
+from .errors import InvalidInput
+from .fem import box
+from .model import Body, BodyForce, Contact, Fix, LinearElastic, Model, Traction
+from .model.values import VectorValue
+
+Array = NDArray[np.float64]
+SAME = 1e-9  # lengths that differ by less, relative to a block's length, are the same
+
+
+class Bond(Enum):
+    """How the rows lie on each other."""
+
+    STACK = "joints one above the other"
+    RUNNING = "every second row shifted by half a block, half blocks at its ends"
+    TOOTHED = "every second row shifted by half a block, no half blocks"
+
+
+@dataclass(frozen=True)
+class Wall:
+    """A wall of equal blocks: `rows` rows of `blocks` blocks each, in bond.
+
+    size: length, thickness and height of a block (length and height in 2D); cells: of a block
+    per direction, an even number along its length where half blocks occur.  A row of half
+    blocks holds one block more.  mu between blocks, mu_support at the floor and at the plate.
+    plate: height of the plate that lies on top, 0 for none; it has the material plate_material.
+    """
+
+    rows: int
+    blocks: int
+    size: Sequence[float]
+    cells: Sequence[int]
+    material: LinearElastic
+    bond: Bond = Bond.RUNNING
+    mu: float = 0.83
+    mu_support: float = 0.53
+    plate: float = 0.0
+    plate_material: LinearElastic | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("rows", "blocks"):
+            value = getattr(self, name)
+            if not (isinstance(value, int) and value >= 1):
+                raise InvalidInput(f"{name}: expected a whole number >= 1, got {value!r}")
+        if not isinstance(self.bond, Bond):
+            raise InvalidInput(f"bond: expected a Bond, got {self.bond!r}")
+        if len(self.size) not in (2, 3) or len(self.cells) != len(self.size):
+            raise InvalidInput(
+                f"size, cells: expected 2 or 3 numbers each, got {self.size!r}, {self.cells!r}"
+            )
+        if not self.plate >= 0:
+            raise InvalidInput(f"plate: expected a height >= 0, got {self.plate!r}")
+        if self.bond is Bond.RUNNING and self.rows > 1 and self.cells[0] % 2:
+            raise InvalidInput(
+                "cells: expected an even number along the length, for half blocks, "
+                f"got {self.cells[0]}"
+            )
+
+    # ------------------------------------------------------------------ geometry
+    @property
+    def height(self) -> float:
+        """Height of the wall, without the plate."""
+        return self.rows * self.size[-1]
+
+    @property
+    def spans(self) -> list[list[tuple[float, float]]]:
+        """(left, right) of every block, row by row."""
+        length = self.size[0]
+        out = []
+        for row in range(self.rows):
+            shift = length / 2 if row % 2 and self.bond is not Bond.STACK else 0.0
+            edges = [shift + k * length for k in range(self.blocks + 1)]
+            if shift and self.bond is Bond.RUNNING:
+                edges = [0.0, *edges[:-1], self.blocks * length]
+            out.append(list(zip(edges[:-1], edges[1:], strict=True)))
+        return out
+
+    @property
+    def bodies(self) -> list[Body]:
+        """The blocks, "row 1 block 1" and so on from below, and the plate."""
+        out = []
+        for row, spans in enumerate(self.spans):
+            for k, span in enumerate(spans):
+                out.append(self._block(f"row {row + 1} block {k + 1}", span, row))
+        if self.plate:
+            out.append(self._plate())
+        return out
+
+    def _block(self, name: str, span: tuple[float, float], row: int) -> Body:
+        along = round(self.cells[0] * (span[1] - span[0]) / self.size[0])
+        mesh = box(
+            (span[1] - span[0], *self.size[1:]), (along, *self.cells[1:]),
+            origin=(span[0], *self._thickness_zero, row * self.size[-1]),
+        )  # fmt: skip
+        return Body(mesh, self.material, name=name)
+
+    def _plate(self) -> Body:
+        left, right = self.spans[-1][0][0], self.spans[-1][-1][1]
+        along = round(self.cells[0] * (right - left) / self.size[0])
+        mesh = box(
+            (right - left, *self.size[1:-1], self.plate), (along, *self.cells[1:-1], 1),
+            origin=(left, *self._thickness_zero, self.height),
+        )  # fmt: skip
+        return Body(mesh, self.plate_material or self.material, name="plate")
+
+    @property
+    def _thickness_zero(self) -> tuple[float, ...]:
+        return (0.0,) * (len(self.size) - 2)
+
+    # ------------------------------------------------------------------ contacts
+    @property
+    def contacts(self) -> list[Contact]:
+        """All contacts: floor, bed joints, head joints, plate."""
+        up = (*self._thickness_zero, 0.0, 1.0)
+        out = []
+        for row, spans in enumerate(self.spans):
+            for k, span in enumerate(spans):
+                name = f"row {row + 1} block {k + 1}"
+                if row == 0:
+                    out.append(Contact(f"{name}.bottom", Plane(up), mu=self.mu_support))
+                else:
+                    out += self._beds(f"{name}.bottom", span, row - 1, self.mu)
+                if k:
+                    free = self._overhangs(span[0], row)
+                    above = None if free else _Above(row * self.size[-1] + self._tolerance)
+                    left = f"row {row + 1} block {k}.right"
+                    out.append(Contact(f"{name}.left", master=left, mu=self.mu, where=above))
+        if self.plate:
+            ends = (self.spans[-1][0][0], self.spans[-1][-1][1])
+            out += self._beds("plate.bottom", ends, self.rows - 1, self.mu_support)
+        return out
+
+    def _beds(
+        self, slave: str, span: tuple[float, float], below: int, mu: float
+    ) -> list[Contact]:
+        """Contacts of a lower face with all blocks of the row below it."""
+        out, taken = [], -np.inf
+        for k, (left, right) in enumerate(self.spans[below]):
+            if min(right, span[1]) - max(left, span[0]) > self._tolerance:
+                part = _Between(max(left - self._tolerance, taken), right + self._tolerance)
+                master = f"row {below + 1} block {k + 1}.top"
+                out.append(Contact(slave, master=master, mu=mu, where=part))
+                taken = right + self._tolerance
+        return out
+
+    def _overhangs(self, x: float, row: int) -> bool:
+        """True where nothing lies below x."""
+        if row == 0:
+            return False
+        below = self.spans[row - 1]
+        return not below[0][0] - self._tolerance <= x <= below[-1][1] + self._tolerance
+
+    @property
+    def _tolerance(self) -> float:
+        return SAME * self.size[0]
+
+    # ------------------------------------------------------------------ the whole
+    def model(
+        self,
+        supports: Sequence[Fix] = (),
+        loads: Sequence[Traction | BodyForce] = (),
+        name: str = "wall",
+    ) -> Model:
+        """The wall as a model; surfaces are "row 1 block 1.top", …, "plate.top"."""
+        return Model(self.bodies, supports, self.contacts, loads, name=name)
+
+    def sheared(self, pressure: VectorValue, displacement: VectorValue) -> Model:
+        """The wall under its plate: a traction on the plate's top, whose sides are guided.
+
+        displacement: of the plate's top; its vertical component is None (free).
+        """
+        if not self.plate:
+            raise InvalidInput("plate: expected a height > 0, got 0: nothing to load")
+        return self.model(
+            [Fix("plate.top", displacement)], [Traction("plate.top", pressure)], "sheared wall"
+        )
+
+
+@dataclass(frozen=True)
+class _Between:
+    """Points with low < x <= high."""
+
+    low: float
+    high: float
+
+    def __call__(self, points: Array) -> NDArray[np.bool_]:
+        return (points[:, 0] > self.low) & (points[:, 0] <= self.high)
+
+
+@dataclass(frozen=True)
+class _Above:
+    """Points above a height."""
+
+    height: float
+
+    def __call__(self, points: Array) -> NDArray[np.bool_]:
+        return points[:, -1] > self.height
