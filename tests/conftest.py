@@ -3,6 +3,7 @@
 import os
 from pathlib import Path
 
+import hypothesis
 import matplotlib as mpl
 import pytest
 
@@ -11,6 +12,9 @@ ROOT = Path(__file__).resolve().parents[1]
 
 def pytest_configure(config: pytest.Config) -> None:
     mpl.use("Agg")
+    # the first example of a test may compile: no deadline, but the same examples every time
+    hypothesis.settings.register_profile("amontons", deadline=None, derandomize=True)
+    hypothesis.settings.load_profile("amontons")
 
 
 @pytest.fixture(scope="session")

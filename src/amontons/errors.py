@@ -36,6 +36,9 @@ class NotConverged(AmontonsError, RuntimeError):
         super().__init__(message)
         self.solution = solution
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (str(self), self.solution)
+
 
 class Interrupted(NotConverged, KeyboardInterrupt):
     """Ctrl-C during a solve; `.solution` holds the best iterate so far."""

@@ -9,7 +9,10 @@ and does not change with units.  With û = u + mu |u_T| n (Coulomb) or u (Tresca
              error = max(|M v - H r - f| / |load|,
                          |(r_i - P(r_i - rho_i û_i)) / rho_i| / |u_ref|).
 
-A contact with W_ii = 0 can not react: r_i = 0 and u_N >= 0 are checked instead.
+At r = 0 the map of a penetrating contact is |u_N| / sqrt(1 + mu^2) only, and would vanish for
+"glued" contacts with a huge mu; each contact counts at least half its penetration, which
+changes nothing up to mu = 1.7.  A contact with W_ii = 0 can not react: r_i = 0 and u_N >= 0
+are checked instead.
 `natural_error` is compiled because a whole solve of a small problem takes 0.1 ms; its NumPy
 twin is `cones.natural_map`, and the tests compare the two.
 """
@@ -26,6 +29,7 @@ from numpy.typing import NDArray
 from .cones import Law
 
 Array = NDArray[np.float64]
+PENETRATION = 0.5  # share of a penetration that counts at least, whatever mu
 
 
 class Measure(Enum):
@@ -35,7 +39,7 @@ class Measure(Enum):
     RESIDUAL = "residual"
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def contact_residual(r0, r1, r2, u0, u1, u2, rho, coefficient, tresca):  # noqa: PLR0913
     """(r - P(r - rho û)) / rho of one 3D contact, unit of u; scalars in, three scalars out."""
     slip = math.sqrt(u1 * u1 + u2 * u2)
@@ -56,7 +60,7 @@ def contact_residual(r0, r1, r2, u0, u1, u2, rho, coefficient, tresca):  # noqa:
     return (r0 - p0) / rho, (r1 - scale * x1) / rho, (r2 - scale * x2) / rho
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def natural_error(indptr, indices, data, q, coefficient, tresca, rho, r):
     """Euclidean norm of the scaled natural map, unit of u, with u = W r + q formed here.
 
@@ -77,7 +81,7 @@ def natural_error(indptr, indices, data, q, coefficient, tresca, rho, r):
             e0, e1, e2 = contact_residual(
                 r[i, 0], r[i, 1], r[i, 2], u0, u1, u2, rho[i], coefficient[i], tresca
             )
-            total += e0 * e0 + e1 * e1 + e2 * e2
+            total += max(e0 * e0 + e1 * e1 + e2 * e2, (PENETRATION * min(u0, 0.0)) ** 2)
         elif u0 < 0.0:
             total += u0 * u0
         if rho[i] <= 0.0 and (r[i, 0] != 0.0 or r[i, 1] != 0.0 or r[i, 2] != 0.0):
@@ -94,7 +98,9 @@ def scaled_residual(r: Array, u: Array, law: Law, rho: Array) -> float:
         return math.inf
     index = np.flatnonzero(able)
     inner = law.at(index).natural_map(r[index], u[index], rho[index]) / rho[index, None]
-    return float(np.hypot(np.linalg.norm(inner), np.linalg.norm(np.minimum(u[~able, 0], 0))))
+    penetration = np.minimum(u[:, 0], 0)
+    size = np.maximum(np.linalg.norm(inner, axis=1), PENETRATION * -penetration[index])
+    return float(np.hypot(np.linalg.norm(size), np.linalg.norm(penetration[~able])))
 
 
 def published_fclib_error(r: Array, u: Array, q: Array, law: Law) -> float:

@@ -35,7 +35,7 @@ BISECTIONS = 55  # of such an interval: to the last bit
 ROUNDING = 1e-13  # relative size of what counts as zero at the edge between stick and slip
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _slip_direction(p1, p2, q11, q12, q21, q22, d0, d1, d2, size, c, s):  # noqa: PLR0913
     """Direction e = (cos, sin) with (p + Q e) x e = 0, (p + Q e).e >= 0, d0 - d.e > 0.
 
@@ -64,7 +64,7 @@ def _slip_direction(p1, p2, q11, q12, q21, q22, d0, d1, d2, size, c, s):  # noqa
     return _search_circle(p1, p2, q11, q12, q21, q22, d0, d1, d2, size, c, s)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _search_circle(p1, p2, q11, q12, q21, q22, d0, d1, d2, size, near_c, near_s):  # noqa: PLR0913
     """Return the admissible root nearest to a direction, of all roots of g on the circle.
 
@@ -97,13 +97,13 @@ def _search_circle(p1, p2, q11, q12, q21, q22, d0, d1, d2, size, near_c, near_s)
     return best_c, best_s, best > -2.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _trigonometric(a0, a1, b1, a2, b2, t):  # noqa: PLR0913
     c, s = math.cos(t), math.sin(t)
     return a0 + a1 * c + b1 * s + a2 * (c * c - s * s) + 2.0 * b2 * s * c
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _sign_change(a0, a1, b1, a2, b2, left, right):  # noqa: PLR0913
     """Where the polynomial changes sign, by bisection; `right` when it does not."""
     positive = _trigonometric(a0, a1, b1, a2, b2, left) > 0.0
@@ -118,7 +118,7 @@ def _sign_change(a0, a1, b1, a2, b2, left, right):  # noqa: PLR0913
     return 0.5 * (left + right)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _stick(s11, s12, s21, s22, y1, y2):  # noqa: PLR0913
     """-S^-1 y of a 2x2 S by elimination with a pivot, and whether S is regular to rounding.
 
@@ -141,7 +141,7 @@ def _stick(s11, s12, s21, s22, y1, y2):  # noqa: PLR0913
     return -(y1 + s12 * x2) / s11, x2, True
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def solve_coulomb(A, b0, b1, b2, mu, g1, g2):  # noqa: PLR0913
     """(r_N, r_T1, r_T2, state) of one contact under Coulomb friction; (g1, g2) guesses r_T."""
     a = A[0, 0]
@@ -165,20 +165,21 @@ def solve_coulomb(A, b0, b1, b2, mu, g1, g2):  # noqa: PLR0913
     size = a * (abs(b1) + abs(b2)) - b0 * (abs(A[1, 0]) + abs(A[2, 0]))
     size += (abs(d1) + abs(d2)) * (abs(b1) + abs(b2))
     size -= mu * b0 * (abs(A[1, 1]) + abs(A[2, 2]) + abs(A[1, 2]) + abs(A[2, 1]))
-    if abs(p1) + abs(p2) + abs(q11) + abs(q12) + abs(q21) + abs(q22) <= 1e-16 * size:
+    if abs(p1) + abs(p2) + abs(q11) + abs(q12) + abs(q21) + abs(q22) <= 1e-15 * size:
         return -b0 / a, 0.0, 0.0, STICK  # u_T = 0 whatever r_T
     if g1 == 0.0 and g2 == 0.0:
         g1, g2 = (x1, x2) if regular else (-y1, -y2)
     length = math.sqrt(g1 * g1 + g2 * g2)
     c, s = (-g1 / length, -g2 / length) if length > 0.0 else (1.0, 0.0)
     c, s, found = _slip_direction(p1, p2, q11, q12, q21, q22, a, d1, d2, size, c, s)
-    if found:
-        r = -b0 / (a - d1 * c - d2 * s)
+    coupling = a - d1 * c - d2 * s
+    if found and coupling > ROUNDING * (a + abs(d1) + abs(d2)):
+        r = -b0 / coupling
         return r, -mu * r * c, -mu * r * s, SLIP
     return _project_until_still(A, b0, b1, b2, mu)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _project_until_still(A, b0, b1, b2, mu):
     """Best point of r <- P_K(r - rho û): the way out for singular or overly coupled blocks."""
     size = 0.0
@@ -210,7 +211,7 @@ def _project_until_still(A, b0, b1, b2, mu):
     return best0, best1, best2, best_state
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _disk(s11, s12, s21, s22, y1, y2, bound, g1, g2):  # noqa: PLR0913
     """r_T of u_T = S r_T + y with |r_T| <= bound, and its state; (g1, g2) guesses r_T."""
     if y1 == 0.0 and y2 == 0.0:
@@ -228,7 +229,7 @@ def _disk(s11, s12, s21, s22, y1, y2, bound, g1, g2):  # noqa: PLR0913
     return -bound * c, -bound * s, SLIP
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def solve_tresca(A, b0, b1, b2, bound, g1, g2):  # noqa: PLR0913
     """(r_N, r_T1, r_T2, state) of one contact under Tresca friction; open ones may slide."""
     a = A[0, 0]
@@ -244,7 +245,7 @@ def solve_tresca(A, b0, b1, b2, bound, g1, g2):  # noqa: PLR0913
     return max(-(b0 + A[0, 1] * r1 + A[0, 2] * r2) / a, 0.0), r1, r2, state
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def solve_contact(A, b0, b1, b2, coefficient, tresca, g1, g2):  # noqa: PLR0913
     """(r_N, r_T1, r_T2, state) of one contact under either law."""
     if tresca:

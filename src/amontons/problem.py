@@ -165,7 +165,7 @@ class FrictionProblem:
         size = (
             np.linalg.norm(b.diagonal_blocks, 2, axis=(1, 2)) if self.contacts else np.zeros(0)
         )
-        able = b.diagonal_blocks[:, 0, 0] > 0
+        able = size > 0
         rho = np.where(able, 1 / np.where(able, size, 1.0), 0.0)
         for array in (q, rho):
             array.flags.writeable = False
@@ -282,14 +282,21 @@ class FrictionProblem:
         Raises UnsupportedForm under Tresca's law, which has no mu.
         """
         _ = self.mu
-        law = Coulomb(np.broadcast_to(np.asarray(mu, dtype=float), (self.contacts,)))
+        values = _real("mu", mu)
+        if values.shape not in ((), (self.contacts,)):
+            raise InvalidInput(
+                f"mu: expected a number or shape ({self.contacts},), got {values.shape}"
+            )
+        law = Coulomb(np.broadcast_to(values, (self.contacts,)))
         return replace(self, law=law)
 
     def with_load(self, load: ArrayLike) -> FrictionProblem:
         """The same problem with another f (global form) or q (Delassus form)."""
         if self.form is Form.GLOBAL:
             return replace(self, f=_vector("f", load, (self.unknowns,)))
-        return replace(self, q=_contact_rows("q", load, self.contacts))
+        q = _contact_rows("q", load, self.contacts)
+        _expect("q", q.shape, (self.contacts, self.dimension))
+        return replace(self, q=q)
 
     def velocity(self, r: Array) -> tuple[Array, Array | None]:
         """(u, v) of reactions r, (nc, d); v is None in the Delassus form."""
@@ -405,7 +412,7 @@ def _node_blocks_inverse(M: sparse.csc_array, d: int) -> sparse.bsr_array:
 
 # -------------------------------------------------------------------- checks at the border
 def _law(mu: ArrayLike | Law) -> Law:
-    return mu if isinstance(mu, Coulomb | Tresca) else Coulomb(np.asarray(mu, dtype=float))
+    return mu if isinstance(mu, Coulomb | Tresca) else Coulomb(_real("mu", mu))
 
 
 def _expect(name: str, found: tuple[int, ...], expected: tuple[int, ...]) -> None:
@@ -422,9 +429,22 @@ def _finite(name: str, values: Array) -> None:
         )
 
 
+def _real(name: str, values: object) -> Array:
+    """A float copy; rejects texts, ragged lists and complex numbers."""
+    try:
+        raw = np.asarray(values)
+        if np.iscomplexobj(raw):
+            raise InvalidInput(f"{name}: expected real numbers, got complex ones")
+        return np.array(raw, dtype=float, order="C")
+    except (TypeError, ValueError) as error:
+        if isinstance(error, InvalidInput):
+            raise
+        raise InvalidInput(f"{name}: expected an array of numbers ({error})") from error
+
+
 def _vector(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
     """A read-only float copy of that shape."""
-    array = np.array(values, dtype=float, order="C")
+    array = _real(name, values)
     _expect(name, array.shape, shape)
     _finite(name, array)
     array.flags.writeable = False
@@ -433,7 +453,7 @@ def _vector(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
 
 def _contact_rows(name: str, values: ArrayLike, nc: int) -> Array:
     """Contact rows (nc, 2 or 3), also from FCLib's flat vector."""
-    array = np.array(values, dtype=float, order="C")
+    array = _real(name, values)
     if array.ndim == 1 and nc and array.size in (2 * nc, 3 * nc):
         array = array.reshape(nc, -1)
     if array.ndim != 2 or array.shape[0] != nc or array.shape[1] not in (2, 3):
@@ -452,6 +472,10 @@ def _read_only(matrix):
 
 def _sparse(name: str, matrix: Matrix) -> sparse.csc_array:
     """A canonical copy: columns sorted, duplicates summed, every entry finite."""
+    if not sparse.issparse(matrix):
+        matrix = _real(name, matrix)
+    elif np.iscomplexobj(matrix.data):
+        raise InvalidInput(f"{name}: expected real numbers, got complex ones")
     out = sparse.csc_array(matrix, dtype=float, copy=True)
     out.sum_duplicates()
     bad = np.flatnonzero(~np.isfinite(out.data))

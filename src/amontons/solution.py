@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import judge
+from .errors import SingularOperator
 from .judge import Measure
 from .problem import FrictionProblem
 from .status import ContactStatus, classify
@@ -108,6 +109,11 @@ class FrictionSolution:
         """Distance of every contact to its next status, (nc,), in the unit of r_N."""
         return self._classified[2]
 
+    def __post_init__(self) -> None:
+        for array in (self.r, self.u, self.v):
+            if array is not None:
+                array.flags.writeable = False
+
     @property
     def converged(self) -> bool:
         """True when the judge agrees with the tolerance."""
@@ -128,10 +134,20 @@ class FrictionSolution:
         return {s.name.lower(): int((self.status == s).sum()) for s in ContactStatus}
 
     @property
-    def fclib_error(self) -> float:
-        """The published FCLib error, for comparison only: it depends on the units."""
+    def fclib_error(self) -> float | None:
+        """The published FCLib error, for comparison only: it depends on the units.
+
+        None where it is not defined: M is singular and there is no q, or the solve was stopped
+        before M was factorised.
+        """
         p = self.problem
-        return judge.published_fclib_error(self.r, self.u, p.free_velocity, p.law)
+        if not self.convergence.history:
+            return None
+        try:
+            q = p.free_velocity
+        except SingularOperator:
+            return None
+        return judge.published_fclib_error(self.r, self.u, q, p.law)
 
     @property
     def max_penetration(self) -> float:

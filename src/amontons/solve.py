@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InvalidInput, SingularOperator, UnsupportedForm
+from .judge import Measure
 from .problem import Form, FrictionProblem
 from .solution import Convergence, FrictionSolution, Outcome, Step
-from .solvers import FITTING_GLOBAL, Auto
+from .solvers import Auto
 from .solvers.base import Breakdown, Iterate, Solver, Target
 
 Array = NDArray[np.float64]
@@ -89,11 +90,17 @@ def drive(
     the other form.
     """
     solver = solver if solver is not None else Auto()
+    if isinstance(solver, type) or not hasattr(solver, "iterates"):
+        raise InvalidInput(
+            f"solver: expected an instance such as GaussSeidel(), got {solver!r}"
+        )
+    if callback is not None and not callable(callback):
+        raise InvalidInput(f"callback: expected a function, got {callback!r}")
     _check_options(tolerance, max_iterations, time_limit)
     if solver.form is not Form.ANY and solver.form is not problem.form:
         problem_form = problem.form.value
         condense = solver.form is Form.DELASSUS
-        hint = "problem.condensed()" if condense else ", ".join(FITTING_GLOBAL)
+        hint = "problem.condensed()" if condense else "Auto or a solver of the local form"
         raise UnsupportedForm(
             f"{type(solver).__name__} needs the {solver.form.value} form, the problem is "
             f"{problem_form}; use {hint}"
@@ -101,14 +108,22 @@ def drive(
     watch = _Watch(problem, tolerance)
     deadline = watch.started + (time_limit if time_limit is not None else np.inf)
     outcome, detail = _run(
-        watch, solver, _start(problem, start), Target(tolerance, deadline),
-        max_iterations if max_iterations is not None else np.inf, callback,
+        watch,
+        solver,
+        _start(problem, start),
+        Target(tolerance, deadline),
+        max_iterations if max_iterations is not None else np.inf,
+        callback,
     )
     return _finish(watch, outcome, detail, solver)
 
 
 def _run(
-    watch: _Watch, solver: Solver, start: Iterate, target: Target, limit: float,
+    watch: _Watch,
+    solver: Solver,
+    start: Iterate,
+    target: Target,
+    limit: float,
     callback: Callback | None,
 ) -> tuple[Outcome, str]:
     """The loop; returns why it ended."""
@@ -138,6 +153,8 @@ def _run(
         return Outcome.BREAKDOWN, str(reason)
     except SingularOperator as reason:
         return Outcome.BREAKDOWN, str(reason)
+    except ArithmeticError as reason:
+        return Outcome.NON_FINITE, str(reason)
     except KeyboardInterrupt:
         return Outcome.STOPPED, "by the user"
 
@@ -145,14 +162,25 @@ def _run(
 def _finish(watch: _Watch, outcome: Outcome, detail: str, solver: Solver) -> FrictionSolution:
     problem = watch.problem
     best = watch.best if watch.best is not None else Iterate(_zero(problem))
-    if best.v is None or problem.form is Form.DELASSUS:
-        u, v = _velocity(problem, best.r)
-    else:
+    measure = problem.measure if watch.best is not None else Measure.EXACT
+    if problem.form is Form.GLOBAL and best.v is not None:
         u, v = problem.local_velocity(best.v), best.v
+    elif watch.best is None and problem.form is Form.GLOBAL:
+        u, v = _at_rest(problem)  # stopped in the first factorisation: do not start it again
+    else:
+        u, v = _velocity(problem, best.r)
     seconds = time.perf_counter() - watch.started
     record = Convergence(
-        outcome, watch.iterations, watch.error, watch.tolerance, tuple(watch.history),
-        watch.linear_iterations, seconds, type(solver).__name__, problem.measure, detail,
+        outcome,
+        watch.iterations,
+        watch.error,
+        watch.tolerance,
+        tuple(watch.history),
+        watch.linear_iterations,
+        seconds,
+        type(solver).__name__,
+        measure,
+        detail,
     )
     return FrictionSolution(problem, best.r, u, v, record)
 
@@ -162,8 +190,13 @@ def _velocity(problem: FrictionProblem, r: Array) -> tuple[Array, Array | None]:
     try:
         return problem.velocity(r)
     except SingularOperator:
-        v = np.zeros(problem.unknowns)
-        return problem.local_velocity(v), v
+        return _at_rest(problem)
+
+
+def _at_rest(problem: FrictionProblem) -> tuple[Array, Array]:
+    """(u, v) of v = 0."""
+    v = np.zeros(problem.unknowns)
+    return problem.local_velocity(v), v
 
 
 def _zero(problem: FrictionProblem) -> Array:
@@ -174,6 +207,10 @@ def _start(problem: FrictionProblem, start: Iterate | FrictionSolution | None) -
     """The first iterate: zero reactions, or a copy of what the user gives."""
     if start is None:
         return Iterate(_zero(problem), None, 0)
+    if not hasattr(start, "r") or not hasattr(start, "v"):
+        raise InvalidInput(
+            f"start: expected a solution or an Iterate, got {type(start).__name__}"
+        )
     r = np.array(start.r, dtype=float)
     if r.shape != (problem.contacts, problem.dimension):
         raise InvalidInput(
@@ -187,7 +224,17 @@ def _start(problem: FrictionProblem, start: Iterate | FrictionSolution | None) -
     return Iterate(r, start.v, 0)
 
 
+def _check_number(name: str, value: object) -> None:
+    if not isinstance(value, int | float | np.number) or isinstance(value, bool):
+        raise InvalidInput(f"{name}: expected a number, got {value!r}")
+
+
 def _check_options(tolerance: float, max_iterations: int | None, limit: float | None) -> None:
+    _check_number("tolerance", tolerance)
+    if max_iterations is not None:
+        _check_number("max_iterations", max_iterations)
+    if limit is not None:
+        _check_number("time_limit", limit)
     if not (0 < tolerance < 1):
         raise InvalidInput(f"tolerance: expected between 0 and 1, got {tolerance}")
     if max_iterations is not None and max_iterations < 1:

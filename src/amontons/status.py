@@ -33,6 +33,9 @@ def classify(
     smaller of r_N and rho |u_T| for a slipping one.
     """
     closed, sliding = problem.law.regions(r, u, problem.rho)
+    closed = closed & (
+        r[:, 0] > 0
+    )  # of an unconverged state: without force there is no contact
     status = np.where(
         closed, np.where(sliding, ContactStatus.SLIP, ContactStatus.STICK), ContactStatus.OPEN
     ).astype(np.int8)

@@ -58,3 +58,11 @@ def test_body_that_friction_can_not_hold_is_not_converged():
     solution = drive(free_cube((0.9, 0, -1)).assemble(), time_limit=20)
     assert not solution.converged
     assert np.isfinite(solution.r).all()
+
+
+def test_support_that_pushes_a_node_into_the_obstacle_is_refused():
+    contact = am.Contact("bottom", FLOOR, mu=0.5)
+    body = am.Body(am.box((1, 1, 1), cells=2), MATERIAL)
+    model = am.Model([body], [am.Fix("left", (0, 0, -0.1))], [contact])
+    with pytest.raises(am.InvalidInput, match=r"supports hold the node .* push it 0\.1"):
+        model.assemble()

@@ -6,7 +6,7 @@ from scipy import sparse
 
 from amontons import judge
 from amontons.cones import Coulomb, Tresca
-from amontons.judge import Measure
+from amontons.judge import Measure, scaled_residual
 from amontons.problem import FrictionProblem
 from amontons.solve import drive
 from amontons.solvers import GaussSeidel
@@ -162,3 +162,17 @@ def test_reported_numbers():
     )
     one = np.array([[1.0, 0, 0]])
     assert judge.published_fclib_error(one, one, 2 * one, law) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("mu", [1e3, 1e6, 1e9])
+def test_penetration_is_never_forgiven_for_a_huge_mu(mu):
+    problem = FrictionProblem.from_delassus(np.eye(2), [[-1.0, 0.5]], [mu])
+    assert problem.error(np.zeros((1, 2))) > 0.4
+    law = Coulomb([mu])
+    assert scaled_residual(np.zeros((1, 2)), np.array([[-1.0, 0.5]]), law, np.ones(1)) >= 0.5
+
+
+def test_a_contact_without_normal_compliance_still_obeys_tresca():
+    problem = FrictionProblem.from_delassus(np.diag([0.0, 1.0]), [[1.0, 1.0]], Tresca([0.5]))
+    assert problem.error(np.zeros((1, 2))) > 0.1
+    assert problem.error(np.array([[0.0, -0.5]])) < 1e-15

@@ -1,5 +1,6 @@
 """The driver: every outcome, from solvers made to end in it."""
 
+import pickle
 import time
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+import amontons as am
 from amontons.errors import InvalidInput, UnsupportedForm
 from amontons.problem import Form, FrictionProblem
 from amontons.solution import Outcome
@@ -193,3 +195,46 @@ def test_the_wrong_form_names_what_fits():
         drive(problem, GaussSeidel())
     with pytest.raises(InvalidInput, match="start: expected v of 3 entries, got 4"):
         drive(problem, start=Iterate(np.zeros((1, 3)), np.zeros(4)))
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"solver": "gauss-seidel"}, "solver"),
+        ({"solver": am.GaussSeidel}, "solver"),
+        ({"tolerance": "a"}, "tolerance"),
+        ({"max_iterations": "a"}, "max_iterations"),
+        ({"time_limit": "a"}, "time_limit"),
+        ({"callback": 3}, "callback"),
+        ({"start": np.zeros((1, 3))}, "start"),
+    ],
+)
+def test_wrong_types_are_named(options, text):
+    with pytest.raises(am.InvalidInput, match=text):
+        drive(PROBLEM, **options)
+
+
+def test_returned_arrays_are_read_only():
+    solution = drive(PROBLEM)
+    with pytest.raises(ValueError, match="read-only"):
+        solution.r[0, 0] = 1.0
+
+
+def test_not_converged_survives_pickling():
+    error = am.NotConverged("no", None)
+    assert str(pickle.loads(pickle.dumps(error))) == "no"
+
+
+def test_interrupt_in_the_first_factorisation_is_not_repeated(monkeypatch):
+    block = am.Body(am.box((1, 1, 1), cells=3), am.LinearElastic(young=200, poisson=0.3))
+    contact = am.Contact("bottom", am.Plane(normal=(0, 0, 1)), mu=0.5)
+    problem = am.Model([block], [am.Fix("top", (0, 0, -0.1))], [contact]).assemble()
+
+    def interrupted(self):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(type(problem), "factor", interrupted)
+    solution = drive(problem)
+    assert solution.convergence.outcome is am.Outcome.STOPPED
+    assert not solution.r.any()
+    assert solution.counts["open"] == problem.contacts

@@ -10,8 +10,11 @@ from __future__ import annotations
 import importlib.util
 import warnings
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +26,7 @@ from ..errors import InvalidInput, MissingDependency, SingularOperator
 Array = NDArray[np.float64]
 Solve = Callable[[Array], Array]
 REFINE_ABOVE = 1e-14  # relative residual of the trial solve above which solves are refined
+INTERRUPTIBLE = 20_000  # unknowns from which a factorisation takes longer than one waits
 RESIDUAL_LIMIT = 1e-6  # relative residual of the trial solve above which a factor is refused
 
 
@@ -138,15 +142,33 @@ def _rslab(matrix: sparse.csc_array, threads: int) -> Solve:
     import rslab
 
     rslab.set_log_level("error")  # a singular matrix is reported by our own check
+    stop = rslab.Interrupt()
     options = {"threads": threads} if threads else {}
     factorise = rslab.ldlt if _symmetric(matrix) else rslab.lu
-    factor = factorise(matrix, **options)
+    if matrix.shape[0] > INTERRUPTIBLE:
+        run = partial(factorise, matrix, interrupt=stop, **options)
+        factor = _cancelled_by_ctrl_c(run, stop.cancel)
+    else:
+        factor = factorise(matrix, **options)
 
     def solve(b: Array) -> Array:
         b = np.ascontiguousarray(b, dtype=float)
         return factor.solve(b) if b.ndim == 1 else factor.solve_many(b)
 
     return solve
+
+
+def _cancelled_by_ctrl_c(run: Callable[[], Any], cancel: Callable[[], None]) -> Any:
+    """The result of a long compiled call that would not see Ctrl-C before its end."""
+    with ThreadPoolExecutor(max_workers=1) as pool:
+        future = pool.submit(run)
+        try:
+            while not future.done():
+                wait([future], timeout=0.1)
+        except KeyboardInterrupt:
+            cancel()
+            raise
+        return future.result()
 
 
 def _pardiso(matrix: sparse.csc_array, threads: int) -> Solve:

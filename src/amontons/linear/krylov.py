@@ -62,8 +62,13 @@ class KrylovFactor:
 
         apply = sparse_linalg.LinearOperator(self.matrix.shape, self.inner.solve, dtype=float)
         x, info = sparse_linalg.cg(
-            self.matrix, b, rtol=self.options.tolerance, atol=0.0,
-            maxiter=self.options.max_iterations, M=apply, callback=count,
+            self.matrix,
+            b,
+            rtol=self.options.tolerance,
+            atol=0.0,
+            maxiter=self.options.max_iterations,
+            M=apply,
+            callback=count,
         )
         if info != 0 or not np.isfinite(x).all():
             raise SingularOperator(

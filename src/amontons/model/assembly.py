@@ -11,7 +11,7 @@ from scipy import sparse
 from ..contact import ContactRows, contact_nodes, nodal_contact, pair_contact
 from ..errors import InvalidInput
 from ..fem.elasticity import body_load, stiffness
-from ..fem.mesh import unknown
+from ..fem.mesh import Mesh, unknown
 from ..fem.surfaces import surface_load
 from .parts import Body, BodyForce, Contact, Fix, Traction
 from .rigid import Piece, near_nullspace, pieces
@@ -86,7 +86,7 @@ def discretise(
     parts = [stiffness(body.mesh, body.material).tocsr() for body in bodies]
     K = parts[0] if len(parts) == 1 else sparse.block_diag(parts, format="csr")
     prescribed = np.where(is_fixed, values, 0.0)
-    placed = tuple(_place(bodies, contact, is_fixed, offsets) for contact in contacts)
+    placed = tuple(_place(bodies, contact, values, offsets) for contact in contacts)
     whole_H = sparse.hstack([p.H for p in placed], format="csc")
     if not whole_H.shape[1]:
         raise InvalidInput(
@@ -195,10 +195,12 @@ def _add_body_force(
             out[offsets[k] : offsets[k + 1]] += part.ravel()
 
 
-def _place(
-    bodies: tuple[Body, ...], contact: Contact, is_fixed: NDArray[np.bool_], offsets: Index
-) -> Placed:
-    """Contacts of one pair without those whose normal the supports prescribe."""
+def _place(bodies: tuple[Body, ...], contact: Contact, values: Array, offsets: Index) -> Placed:
+    """Contacts of one pair without those whose normal the supports prescribe.
+
+    values (dofs,): prescribed displacements, NaN where free.
+    """
+    is_fixed = ~np.isnan(values)
     k, surface = locate(bodies, contact.slave)
     mesh = bodies[k].mesh
     size = int(offsets[-1])
@@ -215,11 +217,26 @@ def _place(
     H = sparse.csc_array(H)
     normal = sparse.csc_array(H[:, ::d]).multiply(~is_fixed[:, None])
     kept = np.sqrt(np.asarray(normal.power(2).sum(axis=0)).ravel()) > 1e-9
+    prescribed = np.where(is_fixed, values, 0.0)
+    _check_supported(mesh, contact, rows.at(~kept), (H[:, ::d].T @ prescribed)[~kept])
     points = mesh.points[contact_nodes(mesh, surface)[0]]
     kept &= _wanted(contact, points)[met]
     all_kept = met.copy()
     all_kept[met] = kept
     return Placed(k, all_kept, points, rows.at(kept), H[:, np.repeat(kept, d)])
+
+
+def _check_supported(mesh: Mesh, contact: Contact, rows: ContactRows, moved: Array) -> None:
+    """Raise InvalidInput when supports alone push a node into the obstacle."""
+    gap = rows.gap + moved
+    size = np.ptp(mesh.points, axis=0).max()
+    if gap.size and gap.min() < -SAME * size:
+        k = int(gap.argmin())
+        raise InvalidInput(
+            f"contact on {contact.slave!r}: supports hold the node at "
+            f"{rows.points[k].tolist()} and push it {-gap[k]:.3g} into the other side, where "
+            "no contact force can act; change the prescribed displacement or free the node"
+        )
 
 
 def _wanted(contact: Contact, points: Array) -> NDArray[np.bool_]:

@@ -18,9 +18,6 @@ METHODS: dict[str, type] = {
     "semismooth-newton": SemismoothNewton,
     "smoothing-newton": SmoothingNewton,
 }
-FITTING_GLOBAL = tuple(
-    solver.__name__ for solver in METHODS.values() if solver.form.value != "local"
-)
 
 __all__ = [
     "METHODS",

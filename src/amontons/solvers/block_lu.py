@@ -56,7 +56,7 @@ def analyse(blocks: BlockRows) -> Symbolic:
     return Symbolic(order, *_structure(order, start, later))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _count_bits(word):
     word = word - ((word >> np.uint64(1)) & np.uint64(0x5555555555555555))
     word = (word & np.uint64(0x3333333333333333)) + (
@@ -66,7 +66,7 @@ def _count_bits(word):
     return (word * np.uint64(0x0101010101010101)) >> np.uint64(56)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _minimum_degree(indptr, indices):
     """Order, and for each position the contacts (not positions) still connected to it."""
     n = len(indptr) - 1
@@ -126,7 +126,7 @@ def _minimum_degree(indptr, indices):
     return order, start, later[:filled].copy()
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _structure(order, start, later):
     """Columns of U by row and of L by row, as positions, both ascending."""
     n = len(order)
@@ -153,7 +153,7 @@ def _structure(order, start, later):
     return start, upper, lower_start, lower
 
 
-@njit(cache=True, fastmath={"contract"})
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _invert3(a, out):
     """3x3 inverse by cofactors; False when the block is singular."""
     c00 = a[1, 1] * a[2, 2] - a[1, 2] * a[2, 1]
@@ -175,7 +175,7 @@ def _invert3(a, out):
     return True
 
 
-@njit(cache=True, fastmath={"contract"})
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def factorise_inplace(  # noqa: PLR0913
     indptr,
     indices,
@@ -244,7 +244,7 @@ def factorise_inplace(  # noqa: PLR0913
     return True
 
 
-@njit(cache=True, fastmath={"contract"})
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def solve_inplace(order, upper_start, upper, lower_start, lower, U, L, inverse, b, x):  # noqa: PLR0913
     """x = (L U)^-1 b; b and x (nc, 3) in contact order."""
     n = len(order)

@@ -33,7 +33,7 @@ class LocalSolver(IntEnum):
     PROJECTION = 2
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _newton_row(A, b0, b1, b2, mu, rho, r0, r1, r2, F, J):  # noqa: PLR0913
     """F of Alart and Curnier at r, (3,), and its derivative in r, (3, 3)."""
     u0 = b0 + A[0, 0] * r0 + A[0, 1] * r1 + A[0, 2] * r2
@@ -60,7 +60,7 @@ def _newton_row(A, b0, b1, b2, mu, rho, r0, r1, r2, F, J):  # noqa: PLR0913
         J[2, c] = (1.0 if c == 2 else 0.0) - k * (d2 - e2 * along) - grow * e2
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _determinant(J, column, F):
     """Determinant of J with F in place of a column (1 to 3; 0: of J itself), for Cramer."""
     total = 0.0
@@ -73,7 +73,7 @@ def _determinant(J, column, F):
     return total
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def newton_contact(A, b0, b1, b2, mu, r0, r1, r2):  # noqa: PLR0913
     """(r_N, r_T1, r_T2) by Newton from (r0, r1, r2); exact where Newton does not converge."""
     g1, g2 = r1, r2
@@ -96,7 +96,7 @@ def newton_contact(A, b0, b1, b2, mu, r0, r1, r2):  # noqa: PLR0913
     return x0, x1, x2
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _modified_velocity(A, b0, b1, b2, mu, r0, r1, r2):  # noqa: PLR0913
     """û = u + mu |u_T| n at r."""
     u0 = b0 + A[0, 0] * r0 + A[0, 1] * r1 + A[0, 2] * r2
@@ -105,7 +105,7 @@ def _modified_velocity(A, b0, b1, b2, mu, r0, r1, r2):  # noqa: PLR0913
     return u0 + mu * math.sqrt(u1 * u1 + u2 * u2), u1, u2
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _projected(x0, x1, x2, mu):
     """Projection onto the cone."""
     t = math.sqrt(x1 * x1 + x2 * x2)
@@ -118,7 +118,7 @@ def _projected(x0, x1, x2, mu):
     return p0, k * x1, k * x2
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def projection_contact(A, b0, b1, b2, mu, r0, r1, r2):  # noqa: PLR0913
     """(r_N, r_T1, r_T2) by projections with an adapted rho from (r0, r1, r2)."""
     size = max(abs(A[0, 0]), abs(A[1, 1]), abs(A[2, 2]))

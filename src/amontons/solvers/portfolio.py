@@ -30,6 +30,7 @@ from ..problem import FrictionProblem
 from .base import Breakdown, Iterate, Target
 from .gauss_seidel import Acceleration, sweep_data, sweeps_inplace
 from .newton import SemismoothNewton
+from .race import Race
 from .smoothing import ProximalPoint, SmoothingNewton, Workspace
 
 Array = NDArray[np.float64]
@@ -37,6 +38,7 @@ FIRST_SWEEPS = 10  # plain sweeps that every problem gets first
 DEPTH = 10  # past sweeps that Anderson acceleration combines
 CHUNK = 20  # sweeps between two looks at their rate
 LONGEST = 6000  # sweeps after which Newton gets its chance whatever the rate promises
+WORTH_A_RACE = 300  # sweeps as dear as Newton, from which relaxed sweeps race first
 HOPELESS = 8.0  # sweeps that promise to cost this many times Newton are left at once
 NEWTON_STEPS = 120
 PATIENCE = 40  # Newton steps without halving the error
@@ -72,6 +74,7 @@ class Portfolio:
     def stages(self) -> Iterator[Iterate]:
         """All stages in the order of the module's text."""
         yield self._plain(FIRST_SWEEPS)
+        self.first = self.r.copy()
         yield from self._sweeping()
         if isinstance(self.problem.law, Tresca):
             yield from self._semismooth()
@@ -92,37 +95,36 @@ class Portfolio:
         return self._offer(x, count, "Gauss-Seidel")
 
     def _sweeping(self) -> Iterator[Iterate]:
-        """Accelerated and plain sweeps, whichever falls faster, while they are worth it."""
+        """Accelerated sweeps while they promise an end, then relaxed ones worth one Newton."""
         memory = Acceleration(self.kernel, self.r, DEPTH)
-        plain = self.r.copy()  # not from accelerated points: they keep the slow modes
-        promise = {True: math.inf, False: math.inf}  # cost up to the goal, by acceleration
-        last = {True: self.error, False: self.error}
-        done, spent, small = {True: 0, False: 0}, 0.0, 0.3 * self.goal
-        accelerate = True
-        while sum(done.values()) < LONGEST:
-            chunk = max(CHUNK, done[accelerate] // 4)
-            if accelerate:
-                count, change = memory.sweep(chunk, small)
-                iterate = self._offer(memory.r.copy(), count, "Anderson Gauss-Seidel")
-            else:
-                count = sweeps_inplace(*self.kernel, plain, chunk, small)
-                change = small if count < chunk else math.inf
-                iterate = self._offer(plain.copy(), count, "Gauss-Seidel")
+        done, spent, small, last = 0, 0.0, 0.3 * self.goal, self.error
+        newton = self._newton_cost()
+        while done < LONGEST:
+            count, change = memory.sweep(max(CHUNK, done // 4), small)
             small *= 0.1 if change <= small else 1.0
+            yield self._offer(memory.r.copy(), count, "Anderson Gauss-Seidel")
+            done, spent = done + count, spent + self.costs["accelerated"] * count
+            promise = self.costs["accelerated"] * self._sweeps_left(last, count)
+            last, newton = self.latest, self._newton_cost()
+            if done >= 2 * CHUNK and promise > (1.0 if spent > newton else HOPELESS) * newton:
+                break
+        left = newton / self.costs["sweep"]
+        while left > WORTH_A_RACE and self.error > self.goal:
+            iterate = self._relaxed(100)
+            left -= iterate.iterations
             yield iterate
-            cost = self.costs["accelerated" if accelerate else "sweep"]
-            promise[accelerate] = cost * self._sweeps_left(last[accelerate], count)
-            last[accelerate] = self.latest
-            done[accelerate] += count
-            spent += cost * count
-            best, newton = min(promise.values()), self._newton_cost()
-            if best > newton and done[True] >= 2 * CHUNK:
-                if not done[False]:  # plain sweeps win now and then: try them before leaving
-                    accelerate = False
-                    continue
-                if best > (1.0 if spent > newton else HOPELESS) * newton:
-                    return
-            accelerate = promise[True] <= promise[False]
+
+    def _relaxed(self, sweeps: int) -> Iterate:
+        """Sweeps of the race between relaxations (see `Race`)."""
+        track, count = self.race.run(sweeps, 0.1 * self.goal)
+        return self._offer(
+            track.r.copy(), count, f"Gauss-Seidel, relaxation {track.relaxation:g}"
+        )
+
+    @cached_property
+    def race(self) -> Race:
+        """Over-relaxed sweeps from the first point: accelerated ones keep the slow modes."""
+        return Race(self.problem, self.first)
 
     def _sweeps_left(self, before: float, count: int) -> float:
         """Sweeps to the goal at the rate of the last `count`, infinite without progress."""
@@ -133,17 +135,16 @@ class Portfolio:
         return left / rate if rate > 0 else math.inf
 
     def _patient_sweeps(self) -> Iterator[Iterate]:
-        """Plain sweeps worth what Newton has cost, ended when 1000 of them gain little."""
-        x = self.r.copy()
-        while self.budget > 0:
-            start, count = self.error, 0
-            for _ in range(10):
-                done = sweeps_inplace(*self.kernel, x, 100, 0.1 * self.goal)
-                count += done
-                yield self._offer(x.copy(), done, "Gauss-Seidel")
-            self.budget -= count * self.costs["sweep"]
-            if self.error > 0.7 * start:
-                break
+        """Relaxed sweeps worth what Newton has cost, until 2000 of them gain nothing."""
+        self.race.enter(self.r)
+        mark, count = self.error, 0
+        while self.budget > 0 and count < 2000 and self.error > self.goal:
+            iterate = self._relaxed(100)
+            count += iterate.iterations
+            self.budget -= iterate.iterations * self.costs["sweep"]
+            yield iterate
+            if self.error < 0.7 * mark:
+                mark, count = self.error, 0
         self.budget = 0.0
 
     @cached_property

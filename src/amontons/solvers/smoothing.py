@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 from ..blocks import spatial
 from ..cones import Tresca
 from ..errors import InvalidInput, UnsupportedForm
-from ..judge import contact_residual, natural_error
+from ..judge import PENETRATION, contact_residual, natural_error
 from ..problem import Form, FrictionProblem
 from .base import Breakdown, Iterate, Target, check_at_least, check_positive
 from .block_lu import Symbolic, analyse, factorise_inplace, solve_inplace
@@ -46,7 +46,7 @@ Array = NDArray[np.float64]
 PINNED = 1e16  # relative stiffness that keeps r_T = 0 where mu = 0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _split(l, eps):
     """s + l and s - l with s = sqrt(l^2 + 4 eps^2), the smaller one without cancellation."""
     s = math.sqrt(l * l + 4.0 * eps * eps)
@@ -57,7 +57,7 @@ def _split(l, eps):
     return 4.0 * eps * eps / b, b
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _smoothed(r, u, mu, rho, sigma, i):
     """F_sigma of contact i (three scalars, unit of r), and what its derivative needs."""
     eps = sigma * rho
@@ -78,7 +78,7 @@ def _smoothed(r, u, mu, rho, sigma, i):
     return f0, r[i, 1] - radial * c, r[i, 2] - radial * s, a1, b1, a2, b2, c, s
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _merit(r, u, mu, rho, sigma):
     """|F_sigma / rho| over all contacts, unit of u."""
     total = 0.0
@@ -89,7 +89,7 @@ def _merit(r, u, mu, rho, sigma):
     return math.sqrt(total)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _assemble(r, u, mu, rho, sigma, shift, prox, extra, rhs):  # noqa: PLR0913
     """Block diagonal and right-hand side of the Newton equation."""
     for i in range(len(mu)):
@@ -134,7 +134,7 @@ def _assemble(r, u, mu, rho, sigma, shift, prox, extra, rhs):  # noqa: PLR0913
         d[2, 2] += add
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _product(indptr, indices, data, prox, x, out):
     """out = (W + diag(prox)) x."""
     for i in range(len(prox)):
@@ -149,7 +149,7 @@ def _product(indptr, indices, data, prox, x, out):
         out[i, 0], out[i, 1], out[i, 2] = u0, u1, u2
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _law_error(r, u, mu, rho):
     """|(r - P(r - rho û)) / rho|, the judge's formula with u given."""
     total = 0.0
@@ -158,11 +158,11 @@ def _law_error(r, u, mu, rho):
             e0, e1, e2 = contact_residual(
                 r[i, 0], r[i, 1], r[i, 2], u[i, 0], u[i, 1], u[i, 2], rho[i], mu[i], False
             )
-            total += e0 * e0 + e1 * e1 + e2 * e2
+            total += max(e0 * e0 + e1 * e1 + e2 * e2, (PENETRATION * min(u[i, 0], 0.0)) ** 2)
     return math.sqrt(total)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def newton_inplace(  # noqa: PLR0913
     indptr, indices, data, q, mu, rho, order, upper_start, upper, lower_start, lower,
     prox, center, x, r, sigma, shift, tracking, shrink, goal, steps, patience,
