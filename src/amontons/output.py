@@ -6,8 +6,8 @@ import json
 import math
 import os
 import platform
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -89,26 +89,51 @@ def save(
 ) -> list[Path]:
     """Write all files of a solution into a folder, made if need be; returns their paths.
 
-    copy: where a second solution.json goes.  Nothing is renamed before all is written.
+    copy: where a second solution.json goes.  Nothing is renamed before all is written, and a
+    failure leaves no new folder.
     """
+    text = to_json(summary(output))  # before the first folder: it evaluates the solution
     writers: dict[str, Callable[[Output, Path], None]] = {
-        "solution.json": write_json, "solution.h5": write_h5,
+        "solution.json": lambda output, path: _write_text(path, text), "solution.h5": write_h5,
         "status.png": plot_status, "convergence.png": plot_convergence,
     }  # fmt: skip
     if output.model is not None:
         writers["solution.vtu"] = write_vtu
     folder = Path(folder)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as reason:
-        raise InvalidInput(f"{folder}: can not be made: {reason.strerror}") from None
     jobs = [(folder / name, writer) for name, writer in writers.items()]
     if copy is not None:
-        jobs.append((Path(copy), write_json))
+        jobs.append((Path(copy), writers["solution.json"]))
     with ExitStack() as stack:
+        stack.enter_context(_made(folder))
         for path, writer in jobs:
             writer(output, stack.enter_context(replacing(path)))
     return [path for path, _ in jobs]
+
+
+@contextmanager
+def _made(folder: Path) -> Iterator[None]:
+    """The folder, made with those above it; the new ones go again when the block fails."""
+    new = [part for part in (folder, *folder.parents) if not os.path.exists(part)]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as reason:
+        _remove_empty(new)
+        raise InvalidInput(f"{folder}: can not be made: {reason.strerror}") from None
+    try:
+        yield
+    except BaseException:
+        _remove_empty(new)
+        raise
+
+
+def _remove_empty(folders: list[Path]) -> None:
+    for folder in folders:
+        with suppress(OSError):
+            folder.rmdir()
+
+
+def _write_text(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
 
 
 # ----------------------------------------------------------------------------------- JSON
@@ -183,7 +208,7 @@ def to_json(data: Any) -> str:
 
 def write_json(output: Output, path: Path) -> None:
     """Write solution.json."""
-    path.write_text(to_json(summary(output)), encoding="utf-8")
+    _write_text(path, to_json(summary(output)))
 
 
 def describe(output: Output) -> str:

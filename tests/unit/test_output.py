@@ -159,3 +159,28 @@ def test_nothing_half_written(solution, tmp_path, monkeypatch):
     with pytest.raises(am.InvalidInput, match="No space left"):
         output.save(solution.output, tmp_path)
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == old
+
+
+@pytest.mark.parametrize("name", ["summary", "plot_status", "write_h5"])
+def test_a_failure_leaves_no_folder(solution, tmp_path, monkeypatch, name):
+    def fail(*arguments):
+        raise am.SingularOperator("no")
+
+    monkeypatch.setattr(f"amontons.output.{name}", fail)
+    with pytest.raises(am.SingularOperator):
+        output.save(solution.output, tmp_path / "new" / "deep")
+    assert not list(tmp_path.iterdir())
+
+
+def test_folder_that_can_not_be_made(solution, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(am.InvalidInput, match="can not be made"):
+        output.save(solution.output, tmp_path / "file" / "x")
+    with pytest.raises(am.InvalidInput, match="can not be made"):
+        output.save(solution.output, tmp_path / "new" / ("a" * 300))
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_fclib_error_may_be_unknown(monkeypatch):
+    monkeypatch.setattr(type(drive(one_contact_2d())), "fclib_error", None)
+    assert output.summary(output.Output(drive(one_contact_2d())))["fclib_error"] is None
