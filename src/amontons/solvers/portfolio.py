@@ -1,11 +1,11 @@
 """The portfolio on the Delassus form: what `Auto` runs there, one stage after another.
 
     Coulomb   10 Gauss-Seidel sweeps; sweeps with Anderson acceleration as long as their
-              measured rate promises an end before smoothing Newton would be there, or until they
-              have cost as much; where Newton is dear, relaxed sweeps in a race (`race`) worth
-              one Newton; semismooth Newton where W is dense (deformable bodies); smoothing
-              Newton from the best point and from zero; proximal point; relaxed sweeps worth the
-              cost of Newton so far; again from smoothing Newton
+              measured rate promises an end before smoothing Newton would be there, or until
+              they have cost as much; where Newton is dear, relaxed sweeps in a race (`race`)
+              worth one Newton; semismooth Newton where W is dense (deformable bodies);
+              smoothing Newton from the best point and from zero; proximal point; relaxed
+              sweeps worth the cost of Newton so far; again from smoothing Newton
     Tresca    the same sweeps, then semismooth Newton
 
 Every stage starts from the best reaction so far, and is dropped when it does not help.  Costs
