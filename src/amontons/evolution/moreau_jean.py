@@ -50,7 +50,7 @@ Mask = NDArray[np.bool_]
 Local = Callable[[FrictionProblem], FrictionProblem]
 Solve = Callable[[FrictionProblem, Iterate, Local | None], FrictionSolution]
 TOUCHING = 1e-9  # gaps below this part of the size of a contact's area count as closed
-CREATED = 0.1  # energy contacts may create in a step, relative to the total, per tolerance
+CREATED = 1.0  # energy contacts may create in a step, relative to the total, per tolerance
 W_LIMIT = 1e9  # bytes of W above which it is not formed
 
 
