@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import AmontonsError, FileFormatError, InvalidInput, MissingDependency
 from ..expressions import Expression
+from .evolution import Evolution, read_evolution, read_wall
 from .overrides import apply_overrides
 from .settings import LIMITS, Settings, make_solver, method_class
 from .tables import LARGEST, Table
@@ -23,7 +24,8 @@ if TYPE_CHECKING:
     from ..fem import LinearElastic, Mesh
     from ..model import Contact, Model
 
-TOP = ("title", "mesh", "material", "fix", "traction", "body_force", "contact", "solver")
+TOP = ("title", "mesh", "wall", "material", "fix", "traction", "body_force", "contact",
+       "solver", "evolution")  # fmt: skip
 MAX_NODES = 50_000_000  # of a box: a typing error must not fill the memory
 LATER = {  # words of the format that this version can not serve
     "neo-hookean": "large deformations are not available yet, use 'linear-elastic'",
@@ -35,12 +37,13 @@ LATER = {  # words of the format that this version can not serve
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A model, the settings of the [solver] table, and a title."""
+    """A model, the settings of the [solver] table, a title, and how it goes on in time."""
 
     model: Model
     settings: Settings
     title: str
     path: Path
+    evolution: Evolution | None = None
 
 
 def read_case(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Case:
@@ -52,7 +55,8 @@ def read_case(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Ca
     top = Table(str(path), "", apply_overrides(_load(path), overrides, str(path)))
     top.only(*TOP)
     title = top.text("title", path.stem if path.stem != "case" else path.parent.name)
-    return Case(_model(top, path, title), _settings(top), title, path)
+    model = _wall_model(top, title) if "wall" in top.data else _model(top, path, title)
+    return Case(model, _settings(top), title, path, _evolution(top))
 
 
 def _load(path: Path) -> dict[str, Any]:
@@ -85,13 +89,44 @@ def _model(top: Table, path: Path, title: str) -> Model:
     for table in top.tables("body_force"):
         table.only("value", "region")
         region = table.text("region") if "region" in table.data else None
-        loads.append(BodyForce(_vector(table, "value", mesh), region=region))
+        loads.append(BodyForce(_vector(table, "value", mesh.dim), region=region))
     if "contact" not in top.data:
         raise top.error("contact", "missing, expected at least one table [[contact]]")
     contacts = [_contact(table, mesh) for table in top.tables("contact")]
+    _refuse_repeated(top)
     with _Blame(top, ""):
         body = Body(mesh, material, order=order)
         return Model([body], supports=fixes, contacts=contacts, loads=loads, name=title)
+
+
+def _wall_model(top: Table, title: str) -> Model:
+    """The model of a case with [wall] in the place of [mesh] and [[contact]]."""
+    from ..model import BodyForce, Fix, Traction
+
+    for key in ("mesh", "contact"):
+        if key in top.data:
+            raise top.error(key, "not with [wall], which makes its meshes and contacts")
+    table = top.table("material")
+    table.only("default", "plate")
+    table.need("default", "a table")
+    materials = {name: _material(table.table(name)) for name in table.data}
+    with _Blame(top.table("wall"), ""):
+        wall = read_wall(top.table("wall"), materials)
+    dim = len(wall.size)
+    fixes = [_on_named(Fix, part, dim, free=True) for part in top.tables("fix")]
+    loads: list = [_on_named(Traction, part, dim) for part in top.tables("traction")]
+    for part in top.tables("body_force"):
+        part.only("value")
+        loads.append(BodyForce(_vector(part, "value", dim)))
+    with _Blame(top, ""):
+        return wall.model(fixes, loads, title)
+
+
+def _evolution(top: Table) -> Evolution | None:
+    if "evolution" not in top.data:
+        return None
+    with _Blame(top.table("evolution"), ""):
+        return read_evolution(top.table("evolution"))
 
 
 @dataclass(frozen=True)
@@ -213,6 +248,19 @@ def _contact(table: Table, mesh: Mesh) -> Contact:
         return Contact(slave, obstacle, mu=mu, tresca=tresca)
 
 
+def _refuse_repeated(top: Table) -> None:
+    """The same pair twice would carry its load twice, shared at random."""
+    seen: list[dict[str, Any]] = []
+    for table in top.tables("contact"):
+        pair = {key: table.data.get(key) for key in ("slave", "obstacle", "master")}
+        if pair in seen:
+            raise table.error(
+                "", f"the same slave and partner as in contact[{seen.index(pair)}]; "
+                "expected every pair once"
+            )  # fmt: skip
+        seen.append(pair)
+
+
 def _obstacle(table: Table, dim: int) -> Obstacle:
     from ..contact import LevelSet, Plane, Sphere
 
@@ -237,22 +285,25 @@ def _obstacle(table: Table, dim: int) -> Obstacle:
 
 # ------------------------------------------------------------------------------- values
 def _on_surface(kind: type, table: Table, mesh: Mesh, *, free: bool = False) -> Any:
-    table.only("on", "value")
-    on = table.text("on")
-    value = _vector(table, "value", mesh, free=free)
+    part = _on_named(kind, table, mesh.dim, free=free)
     with _Blame(table, "on"):
-        mesh.surface(on)
-    return kind(on, value)
+        mesh.surface(part.on)
+    return part
 
 
-def _vector(table: Table, key: str, mesh: Mesh, *, free: bool = False) -> list:
+def _on_named(kind: type, table: Table, dim: int, *, free: bool = False) -> Any:
+    table.only("on", "value")
+    return kind(table.text("on"), _vector(table, "value", dim, free=free))
+
+
+def _vector(table: Table, key: str, dim: int, *, free: bool = False) -> list:
     """One number, expression or, for supports, "free" (None) per component."""
     words = "numbers or expressions" + (' or "free"' if free else "")
-    values = table.need(key, f"a list of {mesh.dim} {words}")
-    if not isinstance(values, list) or len(values) != mesh.dim:
-        raise table.error(key, f"expected a list of {mesh.dim} {words}, got {values!r}")
+    values = table.need(key, f"a list of {dim} {words}")
+    if not isinstance(values, list) or len(values) != dim:
+        raise table.error(key, f"expected a list of {dim} {words}, got {values!r}")
     return [
-        None if free and value == "free" else _entry(table, f"{key}[{k}]", value, mesh.dim)
+        None if free and value == "free" else _entry(table, f"{key}[{k}]", value, dim)
         for k, value in enumerate(values)
     ]
 

@@ -133,6 +133,36 @@ def bench(**options: object) -> None:
     run(**options)  # type: ignore[arg-type]
 
 
+@main.command(
+    epilog="""\b
+Examples:
+  amontons run wall.toml -o out
+  amontons run wall.toml -o out --restart --set evolution.until=2
+"""
+)
+@click.argument("case", type=click.Path(path_type=Path))
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
+              help="Replace a value of the case, such as evolution.step=1e-3.")  # fmt: skip
+@click.option("--tolerance", type=float, metavar="X", help="Unit-free error of every step.")
+@click.option("-o", "--output", "folder", type=click.Path(path_type=Path), metavar="DIR",
+              help="Folder for the results. [name of the case with -results]")  # fmt: skip
+@click.option("--export-fclib", "export", type=click.Path(path_type=Path), metavar="DIR",
+              help="Write the discrete problem of every step as an FCLib file.")  # fmt: skip
+@click.option("--every", type=click.IntRange(min=1), default=10, show_default=True, metavar="N",
+              help="Write a VTK file, and the state, every N steps.")  # fmt: skip
+@click.option("--restart", is_flag=True, help="Go on from the state in DIR.")
+@click.option("--quiet", is_flag=True, help="No progress, no summary.")
+def run(**options: object) -> int:
+    """Follow a case in time: dynamics, or quasi-static steps.
+
+    CASE is a TOML case file with a table [evolution].  Writes steps.csv (energies), state.h5,
+    step-NNNNN.vtu and steps.pvd, which ParaView opens as a film, into DIR.
+    """
+    from .run import run as run_case
+
+    return run_case(**options)  # type: ignore[arg-type]
+
+
 @main.command()
 def examples() -> None:
     """List the built-in examples; solve one with `amontons solve example:NAME`."""

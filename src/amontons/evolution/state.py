@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InvalidInput
-from ..model import Fix, Model
-from ..model.assembly import prescribed_values
+from ..model import ContactFields, Fix, Model
+from ..model.assembly import locate, prescribed_values
 from ..model.values import VectorValue, vector_at
 from ..problem import FrictionProblem
 from ..solution import ContactStatus, FrictionSolution
@@ -96,6 +96,33 @@ class TimeStep:
         out = np.full(len(self.gap), int(ContactStatus.OPEN), dtype=np.int8)
         out[self.active] = self.solution.status
         return out
+
+    @cached_property
+    def sliding(self) -> NDArray[np.bool_]:
+        """True where the law lets a contact slide, (nc,)."""
+        out = np.zeros(len(self.gap), dtype=bool)
+        out[self.active] = self.solution.sliding
+        return out
+
+    @cached_property
+    def fields(self) -> ContactFields:
+        """Displacements, tractions and slip since the start, for writers and plots."""
+        placed = self.model.discretisation.placed
+        surfaces = [locate(self.model.bodies, c.slave) for c in self.model.contacts]
+        rows = [p.rows for p in placed]
+        frames = np.concatenate([r.frames for r in rows])
+        weights = np.concatenate([r.weights for r in rows])
+        force = np.einsum("ik,ikc->ic", self.state.force, frames)
+        traction = self.state.force / weights[:, None]
+        return ContactFields(
+            displacement=self.displacement, points=np.concatenate([r.points for r in rows]),
+            frames=frames, weights=weights, gap=self.gap, pressure=traction[:, 0],
+            shear=traction[:, 1:], slip=self.state.slip, force=force,
+            resultant=force.sum(axis=0),
+            body=np.concatenate([np.full(len(p.rows.nodes), p.body) for p in placed]),
+            node=np.concatenate([r.nodes for r in rows]),
+            facets=tuple((k, self.model.bodies[k].mesh.surface(name)) for k, name in surfaces),
+        )  # fmt: skip
 
     def resultant(self, pairs: Sequence[int] | None = None) -> Array:
         """Sum of the contact forces on the slaves of some (all) contact pairs, global axes."""

@@ -1,0 +1,163 @@
+"""`amontons run`: the steps of a case in time, written as they come, restartable."""
+
+from __future__ import annotations
+
+import csv
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import fields as fields_of
+from pathlib import Path
+
+import click
+
+from ..case import Case, read_case
+from ..checkpoint import export_fclib, load_state, save_state
+from ..errors import FileFormatError, NotConverged
+from ..evolution import Energies, State, TimeStep, evolve
+from ..files import replacing
+from ..solution import ContactStatus
+from ..vtk import write_model
+from .group import INTERRUPTED
+from .sources import with_flags
+from .terminal import check_folder
+
+WORKS = tuple(field.name for field in fields_of(Energies))
+COLUMNS = ("index", "time", "open", "slip", "stick", *WORKS, "defect", "iterations", "error",
+           "seconds")  # fmt: skip
+
+
+def run(
+    case: Path, overrides: Sequence[str], tolerance: float | None, folder: Path | None,
+    export: Path | None, every: int, restart: bool, quiet: bool,
+) -> int:  # fmt: skip
+    """Step and write; returns the exit code."""
+    if case.suffix.lower() != ".toml":
+        raise FileFormatError(f"{case}: expected a TOML case file (.toml)")
+    read = read_case(case, overrides)
+    if read.evolution is None:
+        raise FileFormatError(
+            f"{case}: evolution: missing, expected a table with kind, step, until"
+        )
+    folder = folder if folder is not None else Path(f"{case.stem}-results")
+    check_folder(folder)
+    if export is not None:
+        check_folder(export)
+    start = load_state(folder / "state.h5") if restart else None
+    settings = with_flags(read.settings, None, tolerance)
+    steps = evolve(
+        read.model, read.evolution.method, until=read.evolution.until, start=start,
+        solver=settings.solver(), tolerance=settings.tolerance,
+    )  # fmt: skip
+    steps = export_fclib(steps, export, case.stem) if export is not None else steps
+    return _follow(steps, read, folder, start, every, quiet)
+
+
+def _follow(
+    steps: Iterator[TimeStep], case: Case, folder: Path, start: State | None, every: int,
+    quiet: bool,
+) -> int:  # fmt: skip
+    """Take the steps; the state is written whenever a picture is, and at the end."""
+    assert case.evolution is not None
+    folder.mkdir(parents=True, exist_ok=True)
+    rows = _old_rows(folder / "steps.csv", start)
+    pictures = _old_pictures(folder, start)
+    last: TimeStep | None = None
+    try:
+        began = time.perf_counter()
+        for step in steps:
+            now = time.perf_counter()
+            rows.append(_row(step, now - began))
+            began, last = now, step
+            if step.state.index % every == 0:
+                pictures.append(_write(step, folder))
+                _save(step, rows, pictures, folder)
+            if not quiet:
+                _show(step, case.evolution.until, every)
+    except NotConverged as problem:
+        sys.stdout.flush()
+        click.echo(f"Not converged: {problem}", err=True)
+        code = 1
+    except KeyboardInterrupt:
+        click.echo("Interrupted; go on with --restart.", err=True)
+        code = INTERRUPTED
+    else:
+        code = 0
+    if last is not None:
+        if not pictures or pictures[-1][0] != last.time:
+            pictures.append(_write(last, folder))
+        _save(last, rows, pictures, folder)
+    if not quiet:
+        _summary(rows, folder)
+    return code
+
+
+def _row(step: TimeStep, seconds: float) -> list:
+    e, record = step.energies, step.solution.convergence
+    counts = [int((step.status == status).sum()) for status in ContactStatus]
+    return [step.state.index, step.time, *counts, *(getattr(e, name) for name in WORKS),
+            e.defect, record.iterations, record.error, seconds]  # fmt: skip
+
+
+def _old_rows(path: Path, start: State | None) -> list[list]:
+    """Rows of the evolution that is continued, up to its state."""
+    if start is None or not path.is_file():
+        return []
+    with path.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.reader(file))[1:]
+    return [row for row in rows if row and int(row[0]) <= start.index]
+
+
+def _old_pictures(folder: Path, start: State | None) -> list[tuple[float, str]]:
+    rows = _old_rows(folder / "steps.csv", start)
+    named = ((float(row[1]), f"step-{int(row[0]):05d}.vtu") for row in rows)
+    return [(when, name) for when, name in named if (folder / name).is_file()]
+
+
+def _write(step: TimeStep, folder: Path) -> tuple[float, str]:
+    """One VTK file of a step: its time and name."""
+    name = f"step-{step.state.index:05d}.vtu"
+    with replacing(folder / name) as temporary:
+        write_model(step.model, step.fields, step, temporary)  # type: ignore[arg-type]
+    return step.time, name
+
+
+def _save(
+    step: TimeStep, rows: list[list], pictures: list[tuple[float, str]], folder: Path
+) -> None:
+    """State, table of energies, and the list of pictures that ParaView opens."""
+    save_state(folder / "state.h5", step.state)
+    with replacing(folder / "steps.csv") as temporary:
+        with temporary.open("w", newline="", encoding="utf-8") as file:
+            csv.writer(file).writerows([COLUMNS, *rows])
+    entries = "\n".join(
+        f'    <DataSet timestep="{when:.12g}" file="{name}"/>' for when, name in pictures
+    )
+    text = (
+        '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
+        f"{entries}\n  </Collection>\n</VTKFile>\n"
+    )
+    with replacing(folder / "steps.pvd") as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def _show(step: TimeStep, until: float, every: int) -> None:
+    """A line per written step; on a terminal the steps between pass by on one line."""
+    if step.state.index % every == 0 or step.time >= until * (1 - 1e-9):
+        click.echo(f"{'' if not sys.stdout.isatty() else chr(13)}{step}")
+    elif sys.stdout.isatty():
+        click.echo(f"\rt = {step.time:.6g} of {until:.6g} ", nl=False)
+
+
+def _summary(rows: list[list], folder: Path) -> None:
+    """Sums of all works, and where the results are."""
+    if not rows:
+        return
+    sums = {name: sum(float(r[5 + k]) for r in rows) for k, name in enumerate(WORKS)}
+    click.echo(
+        f"{len(rows)} steps; work of loads {sums['loads']:.4g}, supports "
+        f"{sums['supports']:.4g}, contact {sums['contact']:.4g}; dissipated by damping "
+        f"{sums['damping']:.4g}, by the scheme {sums['numerical']:.4g}; "
+        f"gain {sums['gain']:.4g}, defect {sum(float(r[-4]) for r in rows):.1e}"
+    )
+    click.echo(f"results in {folder}/")
