@@ -6,7 +6,9 @@ without pyplot: no global state, no display needed.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +17,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from numpy.typing import NDArray
 
 from .solution import ContactStatus, Convergence, FrictionSolution
@@ -35,6 +37,8 @@ INK = "#333333"
 WIDE = 1e2  # ratio of largest to smallest reaction above which axes are logarithmic
 QUARTERS = {"quad9": ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3))}
 MAX_ARROWS = 400
+MAX_MAPS = 4  # pairs in 3D: each has a row of its own
+MAX_NAMES = 6  # pairs in 2D: side by side under their names
 ARROW_LENGTH = 2.2  # of the longest, in spacings of the arrows: neighbours stay apart
 
 
@@ -45,23 +49,70 @@ def status_figure(
     model: Model | None = None,
 ) -> Figure:
     """Status and pressure on the contact surface; without geometry, reactions in the cone."""
-    figure = Figure(figsize=(9.6, 4.6), dpi=150, layout="constrained")
-    left, right = figure.subplots(1, 2)
-    if fields is None or model is None:
-        _cone_plane(left, solution)
-        _ranked_reactions(right, solution)
-        markers = True
-    elif solution.problem.dimension == 2:
-        _profile(left, right, solution, fields)
-        markers = True
+    pairs = [] if fields is None or model is None else _pairs(solution, fields, model)
+    maps = solution.problem.dimension == 3 and 0 < len(pairs) <= MAX_MAPS
+    rows = len(pairs) if maps else 1
+    figure = Figure(figsize=(9.6, 0.4 + 4.2 * rows), dpi=150, layout="constrained")
+    panels = figure.subplots(rows, 2, squeeze=False)
+    if maps and model is not None:
+        for (left, right), pair in zip(panels, pairs, strict=True):
+            _surface_maps(figure, left, right, pair, model, named=rows > 1)
+    elif pairs and solution.problem.dimension == 2:
+        _profiles(*panels[0], pairs)
     else:
-        _surface_maps(figure, left, right, solution, fields, model)
-        markers = False
+        _cone_plane(panels[0, 0], solution)
+        _ranked_reactions(panels[0, 1], solution)
     figure.suptitle(title or solution.problem.name or "contact status", color=INK)
-    _legend(figure, solution, markers)
-    for axes in (left, right):
+    _legend(figure, solution, markers=not maps)
+    for axes in panels.flat:
         axes.spines[["top", "right"]].set_visible(False)
     return figure
+
+
+@dataclass(frozen=True, eq=False)
+class _Pair:
+    """The contacts of one slave surface with one obstacle or master; rows as in the fields."""
+
+    name: str
+    body: int
+    facets: tuple
+    status: NDArray[np.int8]
+    bound: Array  # of the shear traction
+    points: Array
+    frames: Array
+    gap: Array
+    slip: Array
+    pressure: Array
+    shear: Array
+    node: NDArray[np.int64]
+
+
+def _pairs(solution: FrictionSolution, fields: ContactFields, model: Model) -> list[_Pair]:
+    """The pairs of a model that have contacts, in its order."""
+    bound = solution.problem.law.bound(solution.r) / fields.weights
+    ends = np.cumsum([len(placed.rows.nodes) for placed in model.discretisation.placed])
+    found = []
+    for contact, (body, facets), rows in zip(
+        model.contacts, fields.facets, np.split(np.arange(len(bound)), ends[:-1]), strict=True
+    ):
+        if len(rows):
+            found.append(
+                _Pair(
+                    contact.slave,
+                    body,
+                    facets,
+                    solution.status[rows],
+                    bound[rows],
+                    fields.points[rows],
+                    fields.frames[rows],
+                    fields.gap[rows],
+                    fields.slip[rows],
+                    fields.pressure[rows],
+                    fields.shear[rows],
+                    fields.node[rows],
+                )  # fmt: skip
+            )
+    return found
 
 
 def _legend(figure: Figure, solution: FrictionSolution, markers: bool) -> None:
@@ -140,28 +191,50 @@ def _marker_size(count: int) -> float:
 
 
 # ----------------------------------------------------------------------------------- 2D
-def _profile(
-    left: Axes, right: Axes, solution: FrictionSolution, fields: ContactFields
-) -> None:
-    """Gap and slip (left), pressure and shear with its bound (right) along the surface."""
-    s = _arc(fields.points)
+def _profiles(left: Axes, right: Axes, pairs: list[_Pair]) -> None:
+    """Gap and slip (left), pressure and shear with its bound (right) along the surfaces.
+
+    Several pairs stand side by side, each with curves of its own.
+    """
+    start = 0.0
+    size = _marker_size(sum(len(pair.gap) for pair in pairs))
+    lengths = [float(np.ptp(_arc(pair.points))) for pair in pairs]
+    space = 0.08 * max(lengths)
+    for pair, length in zip(pairs, lengths, strict=True):
+        _profile(left, right, pair, start, size)
+        if start > 0:
+            for axes in (left, right):
+                axes.axvline(start - space / 2, color=INK, linewidth=0.6, alpha=0.4)
+        if 1 < len(pairs) <= MAX_NAMES:
+            for axes in (left, right):
+                axes.text(start + length / 2, 0.99, pair.name, ha="center", va="top", color=INK,
+                          transform=axes.get_xaxis_transform(), fontsize=9)  # fmt: skip
+        start += length + space
+    where = "position along the surface" if len(pairs) == 1 else "position along the surfaces"
+    left.set(xlabel=where, ylabel="length", title="Gap (marks) and slip (dashed)")
+    right.set(xlabel=where, ylabel="traction",
+              title="Pressure, shear (dashed), its bound (grey)")  # fmt: skip
+    if 1 < len(pairs) <= MAX_NAMES:  # room for the names
+        for axes in (left, right):
+            axes.margins(y=0.12)
+
+
+def _profile(left: Axes, right: Axes, pair: _Pair, start: float, size: float) -> None:
+    """The curves of one pair, its first contact at `start`."""
+    s = _arc(pair.points)
     order = np.argsort(s, kind="stable")
-    s = s[order]
-    left.plot(s, fields.gap[order], color=INK, linewidth=1)
-    left.plot(s, fields.slip[order, 0], color=INK, linewidth=1, linestyle="--")
+    s = start + s[order]
+    left.plot(s, pair.gap[order], color=INK, linewidth=1)
+    left.plot(s, pair.slip[order, 0], color=INK, linewidth=1, linestyle="--")
     for status in ContactStatus:
-        chosen = solution.status[order] == status
-        left.scatter(s[chosen], fields.gap[order][chosen], s=_marker_size(len(s)), zorder=3,
+        chosen = pair.status[order] == status
+        left.scatter(s[chosen], pair.gap[order][chosen], s=size, zorder=3,
                      marker=MARKERS[status], color=COLOURS[status], edgecolors=INK,
                      linewidths=0.3)  # fmt: skip
-    left.set(xlabel="position along the surface", ylabel="length",
-             title="Gap (marks) and slip (dashed)")  # fmt: skip
-    bound = solution.problem.law.bound(solution.r)[order] / fields.weights[order]
-    right.plot(s, fields.pressure[order], color=INK, linewidth=1.2)
+    bound = pair.bound[order]
+    right.plot(s, pair.pressure[order], color=INK, linewidth=1.2)
     right.fill_between(s, -bound, bound, color=INK, alpha=0.08, linewidth=0)
-    right.plot(s, fields.shear[order, 0], color="#D55E00", linewidth=1.2, linestyle="--")
-    right.set(xlabel="position along the surface", ylabel="traction",
-              title="Pressure, shear (dashed), its bound (grey)")  # fmt: skip
+    right.plot(s, pair.shear[order, 0], color="#D55E00", linewidth=1.2, linestyle="--")
 
 
 def _arc(points: Array) -> Array:
@@ -175,28 +248,29 @@ def _arc(points: Array) -> Array:
 
 # ----------------------------------------------------------------------------------- 3D
 def _surface_maps(
-    figure: Figure, left: Axes, right: Axes, solution: FrictionSolution,
-    fields: ContactFields, model: Model,
-) -> None:  # fmt: skip
+    figure: Figure, left: Axes, right: Axes, pair: _Pair, model: Model, *, named: bool
+) -> None:
     """The surface seen along its mean normal: status left, pressure and shear arrows right."""
-    origin, axes, names = _view(fields.points)
-    patches, owner = _node_patches(model, fields, origin, axes)
-    colours = np.array([COLOURS[status] for status in ContactStatus])[solution.status]
+    origin, axes, names = _view(pair.points)
+    patches, owner = _node_patches(model, pair, origin, axes)
+    colours = np.array([COLOURS[status] for status in ContactStatus])[pair.status]
     known = owner >= 0
     face = np.where(known, colours[np.maximum(owner, 0)], "#FFFFFF")
     left.add_collection(
         PolyCollection(patches, facecolors=face, edgecolors=face, linewidths=0.2)
     )
-    pressure = np.where(known, fields.pressure[np.maximum(owner, 0)], 0.0)
+    pressure = np.where(known, pair.pressure[np.maximum(owner, 0)], 0.0)
     shown = PolyCollection(patches, array=pressure, cmap="YlOrRd", edgecolors="face",
                            linewidths=0.2)  # fmt: skip
     right.add_collection(shown)
     figure.colorbar(shown, ax=right, label="pressure", shrink=0.85)
-    _shear_arrows(right, fields, origin, axes)
-    left.set_title("Contact status")
+    tips = _shear_arrows(right, pair, origin, axes)
+    place = f" on {pair.name}" if named else ""
+    left.set_title(f"Contact status{place}")
     right.set_title("Pressure, and shear on the slave (arrows)")
     for panel in (left, right):
         panel.set(aspect="equal", xlabel=names[0], ylabel=names[1])
+        panel.update_datalim(tips)  # no arrow leaves the frame; both panels show the same
         panel.autoscale_view()
 
 
@@ -213,21 +287,19 @@ def _view(points: Array) -> tuple[Array, Array, tuple[str, str]]:
 
 
 def _node_patches(
-    model: Model, fields: ContactFields, origin: Array, axes: Array
+    model: Model, pair: _Pair, origin: Array, axes: Array
 ) -> tuple[list[Array], NDArray[np.int64]]:
     """Facets cut into one patch per node, and the contact at that node or -1."""
     patches, owner = [], []
-    for body, blocks in fields.facets:
-        points = (model.bodies[body].mesh.points - origin) @ axes.T
-        contact = np.full(len(points), -1)
-        here = np.flatnonzero(fields.body == body)
-        contact[fields.node[here]] = here
-        for facets in blocks:
-            cut = _thirds if facets.kind == "tri6" else _quarters
-            for table in QUARTERS.get(facets.kind, [slice(None)]):
-                for patch, nodes in cut(points, facets.nodes[:, table]):
-                    patches.extend(patch)
-                    owner.append(contact[nodes])
+    points = (model.bodies[pair.body].mesh.points - origin) @ axes.T
+    contact = np.full(len(points), -1)
+    contact[pair.node] = np.arange(len(pair.node))
+    for facets in pair.facets:
+        cut = _thirds if facets.kind == "tri6" else _quarters
+        for table in QUARTERS.get(facets.kind, [slice(None)]):
+            for patch, nodes in cut(points, facets.nodes[:, table]):
+                patches.extend(patch)
+                owner.append(contact[nodes])
     return patches, np.concatenate(owner)
 
 
@@ -249,26 +321,38 @@ def _thirds(points: Array, nodes: NDArray[np.int64]) -> Patches:
         yield np.stack([corners[:, k], corners[:, k - 2], centre], axis=1), nodes[:, 3 + k]
 
 
-def _shear_arrows(axes: Axes, fields: ContactFields, origin: Array, view: Array) -> None:
-    """Shear tractions in global axes, at most MAX_ARROWS of them."""
-    shear = np.einsum("ik,ikc->ic", fields.shear, fields.frames[:, 1:]) @ view.T
+def _shear_arrows(axes: Axes, pair: _Pair, origin: Array, view: Array) -> Array:
+    """Shear tractions in global axes, at most MAX_ARROWS of them; returns their tips (k, 2)."""
+    shear = np.einsum("ik,ikc->ic", pair.shear, pair.frames[:, 1:]) @ view.T
     if not shear.any():
-        return
+        return np.empty((0, 2))
     stride = -(-len(shear) // MAX_ARROWS)
-    at, shear = ((fields.points - origin) @ view.T)[::stride], shear[::stride]
+    at, shear = ((pair.points - origin) @ view.T)[::stride], shear[::stride]
     spacing = np.sqrt(np.prod(np.maximum(np.ptp(at, axis=0), 1e-12)) / len(at))
     length = np.linalg.norm(shear, axis=1)
     shown = length > 1e-3 * length.max()
     at, shear = at[shown], shear[shown]
+    scale = length.max() / (ARROW_LENGTH * spacing)
     arrows = axes.quiver(at[:, 0], at[:, 1], shear[:, 0], shear[:, 1], color=INK, angles="xy",
-                         scale_units="xy", scale=length.max() / (ARROW_LENGTH * spacing),
-                         width=0.003, pivot="tail", clip_on=False)  # fmt: skip
-    arrows.set_in_layout(False)  # long arrows at the rim must not squeeze the map
+                         scale_units="xy", scale=scale, width=0.003, pivot="tail")  # fmt: skip
+    value = _round_below(float(length.max()))
+    axes.quiverkey(arrows, 0.86, -0.12, value, f"{value:g}", labelpos="S", color=INK,
+                   labelsep=0.05, fontproperties={"size": 9})  # fmt: skip
+    return at + shear / scale
+
+
+def _round_below(value: float) -> float:
+    """The largest of 1, 2, 5 times a power of ten that is not above a value > 0."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return float(max(k for k in (1, 2, 5) if k * power <= value * (1 + 1e-12))) * power
 
 
 # -------------------------------------------------------------------------- convergence
 def convergence_figure(record: Convergence, title: str = "") -> Figure:
-    """Error against iterations and against time, with the tolerance."""
+    """Error against iterations and against time, with the tolerance.
+
+    Time runs from the first iterate that was judged: what comes before is set-up.
+    """
     figure = Figure(figsize=(10, 4), dpi=150, layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
     error = np.array([step.error for step in record.history])
@@ -277,18 +361,23 @@ def convergence_figure(record: Convergence, title: str = "") -> Figure:
     ceiling = 3 * max(positive.max(initial=0.0), 10 * record.tolerance)
     error = np.where(np.isfinite(error), np.maximum(error, floor), np.nan)
     marker = "o" if len(error) <= 60 else ""
-    for axes, name, label in ((left, "iteration", "iterations"), (right, "seconds", "seconds")):
-        x = np.array([getattr(step, name) for step in record.history])
-        axes.set(xlim=(0, max(x.max(initial=0.0), 1e-9) * 1.03), ylim=(floor, ceiling),
-                 yscale="log")  # fmt: skip
+    seconds = np.array([step.seconds for step in record.history])
+    setup = float(seconds.min(initial=np.inf)) if len(seconds) else 0.0
+    iterations = np.array([step.iteration for step in record.history])
+    time = f"seconds after the first iterate (set-up before: {setup:.2g} s)"
+    for axes, x, label in ((left, iterations, "iterations"), (right, seconds - setup, time)):
+        last = max(x.max(initial=0.0), 1e-9)
+        axes.set(xlim=(-0.02 * last, 1.17 * last), ylim=(floor, ceiling), yscale="log")
         axes.plot(x, error, color=COLOURS[ContactStatus.STICK], marker=marker, markersize=4,
                       linewidth=1.2)  # fmt: skip
         axes.axhline(record.tolerance, color="#D55E00", linestyle="--", linewidth=1)
+        axes.text(0.995, record.tolerance * 1.15, "tolerance", ha="right", va="bottom",
+                  transform=axes.get_yaxis_transform(), color="#D55E00",
+                  fontsize=9)  # fmt: skip
         axes.set_xlabel(label)
         axes.grid(which="major", alpha=0.25)
         axes.spines[["top", "right"]].set_visible(False)
-    left.annotate("tolerance", (0.99, record.tolerance), xycoords=("axes fraction", "data"),
-                  ha="right", va="bottom", color="#D55E00", fontsize=9)  # fmt: skip
+    left.xaxis.set_major_locator(MaxNLocator(integer=True))
     left.set_ylabel(f"error ({record.measure.value} measure)")
     outcome = f"{record.outcome.name.lower().replace('_', ' ')} with {record.solver}"
     figure.suptitle(f"{title}: {outcome}" if title else outcome, color=INK)
@@ -306,16 +395,26 @@ def profile_figure(profiles: dict[float, tuple[Array, Array]], names: list[str])
     figure = Figure(figsize=(4.6 * count + 0.4, 3.8), dpi=150, layout="constrained")
     panels = figure.subplots(1, count, sharey=True, squeeze=False)[0]
     for axes, (tolerance, (tau, rho)) in zip(panels, profiles.items(), strict=True):
-        last = max(float(tau[-1]), 1.1)
+        last = 1.5 * max(float(tau[-1]), 1.1)
         for k, name in enumerate(names):
-            axes.step(np.append(tau, 1.5 * last), np.append(rho[k], rho[k, -1]), where="post",
+            axes.step(np.append(tau, last), np.append(rho[k], rho[k, -1]), where="post",
                       color=LINES[k % len(LINES)], linestyle=DASHES[k % len(DASHES)],
-                      label=name)  # fmt: skip
-        axes.set(xscale="log", xlim=(1, 1.5 * last), ylim=(0, 1.03),
+                      label=name, marker="o", markevery=[0], markersize=4,
+                      clip_on=False)  # fmt: skip
+        axes.set(xscale="log", xlim=(last**-0.04, last), ylim=(0, 1.03),
                  xlabel="time / best time", title=f"tolerance {tolerance:g}")  # fmt: skip
+        _plain_ticks(axes, last)
         axes.grid(alpha=0.25)
         axes.spines[["top", "right"]].set_visible(False)
     panels[0].set_ylabel("share of problems solved")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center",
                   ncols=min(len(names), 4), frameon=False)  # fmt: skip
     return figure
+
+
+def _plain_ticks(axes: Axes, last: float) -> None:
+    """Ticks 1, 2, 5, 10, … on a logarithmic axis of ratios; only powers of ten when long."""
+    steps = (1.0, 1.2, 1.5, 2.0) if last < 2.5 else (1.0, 2.0, 5.0) if last < 1e3 else (1.0,)
+    axes.xaxis.set_major_locator(LogLocator(subs=steps, numticks=20))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())

@@ -28,6 +28,9 @@ def write_model(
     traction and of the slip, CSTATUS 0 open, 1 slip, 2 stick and -1 off the contact surface,
     CSLIDING 0 or 1, CFORCE force on the slave in global axes.  Corners of triangles of second
     order are no contacts: the first four get the mean of the contacts around.
+
+    Where several pairs meet at a node, CFORCE, CPRESS and CSHEAR are those of the sum of their
+    forces, pressures and shear vectors; COPEN is the least, CSLIP, CSTATUS, CSLIDING the most.
     """
     pairs = list(zip(model.bodies, fields.displacement, strict=True))
     starts = np.cumsum([0, *(len(body.mesh.points) for body, _ in pairs)])
@@ -46,25 +49,38 @@ def _contact_fields(
     fields: ContactFields, solution: FrictionSolution, starts: NDArray[np.int64]
 ) -> dict[str, NDArray]:
     """Values per node of all bodies."""
-    node = starts[fields.body] + fields.node
-    values = {
-        "COPEN": fields.gap,
-        "CPRESS": fields.pressure,
-        "CSHEAR": np.linalg.norm(fields.shear, axis=1),
-        "CSLIP": np.linalg.norm(fields.slip, axis=1),
-        "CSTATUS": solution.status.astype(np.int32),
-        "CSLIDING": solution.sliding.astype(np.int32),
-        "CFORCE": _spatial(fields.force),
+    at = starts[fields.body] + fields.node
+    nodes, index = np.unique(at, return_inverse=True)
+    shear = np.einsum("ik,ikc->ic", fields.shear, fields.frames[:, 1:])  # global axes: they add
+    slip = np.linalg.norm(fields.slip, axis=1)
+    found = {
+        "COPEN": _gathered(np.minimum, fields.gap, index),
+        "CPRESS": _gathered(np.add, fields.pressure, index),
+        "CSHEAR": np.linalg.norm(_gathered(np.add, shear, index), axis=1),
+        "CSLIP": _gathered(np.maximum, slip, index),
+        "CSTATUS": _gathered(np.maximum, solution.status.astype(np.int32), index),
+        "CSLIDING": _gathered(np.maximum, solution.sliding.astype(np.int32), index),
+        "CFORCE": _spatial(_gathered(np.add, fields.force, index)),
     }
     out = {}
-    for name, given in values.items():
-        everywhere = np.zeros((starts[-1], *given.shape[1:]), dtype=given.dtype)
+    for name, values in found.items():
+        everywhere = np.zeros((starts[-1], *values.shape[1:]), dtype=values.dtype)
         if name == "CSTATUS":
             everywhere[:] = OFF
-        everywhere[node] = given
+        everywhere[nodes] = values
         out[name] = everywhere
     for name in ("COPEN", "CPRESS", "CSHEAR", "CSLIP"):
         out[name] = _with_corners(out[name], fields, starts)
+    return out
+
+
+def _gathered(combine: np.ufunc, values: NDArray, index: NDArray[np.int64]) -> NDArray:
+    """Values of the contacts at each node, combined; index (nc,): their place in the result."""
+    out = np.zeros((index.max(initial=-1) + 1, *values.shape[1:]), dtype=values.dtype)
+    out[index] = values  # one of them, to begin with
+    if combine is np.add:
+        out[:] = 0
+    combine.at(out, index, values)
     return out
 
 

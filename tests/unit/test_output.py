@@ -184,3 +184,48 @@ def test_folder_that_can_not_be_made(solution, tmp_path):
 def test_fclib_error_may_be_unknown(monkeypatch):
     monkeypatch.setattr(type(drive(one_contact_2d())), "fclib_error", None)
     assert output.summary(output.Output(drive(one_contact_2d())))["fclib_error"] is None
+
+
+def corner(dimension):
+    """A body pressed into a corner: contacts of two pairs at the nodes of its edge."""
+    body = am.Body(am.box((1,) * dimension, cells=3), am.LinearElastic(200, 0.3))
+    floor = am.Plane(normal=(0,) * (dimension - 1) + (1,))
+    wall = am.Plane(normal=(1,) + (0,) * (dimension - 1))
+    push = (0.0, -0.02) if dimension == 2 else (0.0, 0.0, -0.02)
+    return am.solve(
+        am.Model([body], supports=[am.Fix("top", push)],
+                 contacts=[am.Contact("bottom", floor, mu=0.3),
+                           am.Contact("left", wall, mu=0.3)])
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_vtu_of_several_contacts_at_a_node(dimension, tmp_path):
+    found = corner(dimension)
+    found.write(tmp_path / "a.vtu")
+    values = meshio.read(tmp_path / "a.vtu").point_data
+    total = values["CFORCE"].sum(axis=0)[:dimension]
+    np.testing.assert_allclose(total, found.resultant)
+    node = found.fields.node
+    twice = np.flatnonzero(np.bincount(node) == 2)
+    assert len(twice) == (1 if dimension == 2 else 4)
+    for k in twice:
+        here = node == k
+        shear = np.einsum("ik,ikc->c", found.shear[here], found.frames[here, 1:])
+        assert np.isclose(values["CPRESS"][k], found.pressure[here].sum())
+        assert np.isclose(values["CSHEAR"][k], np.linalg.norm(shear))
+        assert values["COPEN"][k] == found.gap[here].min()
+        assert values["CSTATUS"][k] == found.status[here].max()
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_figure_of_several_pairs(dimension):
+    found = corner(dimension)
+    figure = status_figure(found.solution, found.fields, "corner", found.model)
+    if dimension == 2:
+        left = figure.axes[0]
+        starts = [line.get_xdata() for line in left.lines[:4]]
+        assert all((np.diff(x) > 0).all() for x in starts)
+        assert {text.get_text() for text in left.texts} == {"bottom", "left"}
+    else:
+        assert sum(axes.get_title() == "Contact status on left" for axes in figure.axes) == 1

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 TOP = ("title", "mesh", "wall", "material", "fix", "traction", "body_force", "contact",
        "solver", "evolution")  # fmt: skip
-MAX_NODES = 50_000_000  # of a box: a typing error must not fill the memory
+MAX_NODES = 5_000_000  # of a box: a typing error must not fill the memory
 LATER = {  # words of the format that this version can not serve
     "neo-hookean": "large deformations are not available yet, use 'linear-elastic'",
     "ciarlet-geymonat": "large deformations are not available yet, use 'linear-elastic'",
@@ -163,7 +163,8 @@ def _mesh(table: Table, path: Path) -> Mesh:
         raise table.error("cells", f"expected a whole number >= 1, or {len(size)} of them, "
                           f"got {cells!r}")  # fmt: skip
     if math.prod(c + 1 for c in counts) > MAX_NODES:
-        raise table.error("cells", f"expected at most {MAX_NODES} nodes, got {cells!r}")
+        raise table.error("cells", f"expected at most {MAX_NODES} nodes, got {cells!r}; "
+                          "build larger models in Python")  # fmt: skip
     with _Blame(table, ""):
         return box(size, counts, table.text("kind") if "kind" in table.data else None)
 
