@@ -1,5 +1,6 @@
 """Every mistake ends in exit code 2, one clear message, and no file."""
 
+import os
 import shutil
 from pathlib import Path
 
@@ -192,6 +193,20 @@ FLAGS = {
     "bench method": (["bench", "good.hdf5", "--methods", "auto,newton"], ["newton"]),
     "bench tolerance": (["bench", "good.hdf5", "--tolerances", "1e-3,2"], ["2"]),
     "bench no methods": (["bench", "good.hdf5", "--methods", ","], ["methods"]),
+    "empty source": (["solve", ""], ["SOURCE", "empty"]),
+    "empty output": (["solve", "good.hdf5", "-o", ""], ["--output", "empty"]),
+    "empty json": (["solve", "good.hdf5", "--json", ""], ["--json", "empty"]),
+    "empty target": (["convert", "good.hdf5", ""], ["target", "empty"]),
+    "long source": (["solve", "a" * 5000 + ".toml"], ["aaa", "too long"]),
+    "long part": (["info", "a" * 300], ["aaa", "too long"]),
+    "long output": (["solve", "good.hdf5", "-o", "a" * 300], ["aaa", "too long"]),
+    "device": (["solve", "/dev/null"], ["/dev/null", "not a regular file"]),
+    "convert to itself": (["convert", "good.hdf5", "./good.hdf5"], ["this is the source"]),
+    "convert to a link": (["convert", "good.hdf5", "link.hdf5"], ["this is the source"]),
+    "convert to json": (["convert", "good.hdf5", "a.json"], ["a.json", ".hdf5"]),
+    "convert to vtu": (["convert", "case.toml", "a.vtu"], ["a.vtu", ".hdf5"]),
+    "convert to a case": (["convert", "case.toml", "case.toml"], ["case.toml", ".hdf5"]),
+    "bench suffix": (["bench", "good.hdf5", "--profile", "x.foo"], ["x.foo", ".png"]),
     "info": (["info", "gone.toml"], ["gone.toml"]),
 }
 
@@ -204,8 +219,17 @@ def test_broken_command(name, tmp_path, monkeypatch):
     (tmp_path / "folder").mkdir()
     write_fclib(box_tower(1), tmp_path / "good.hdf5")
     write_fclib(box_tower(1).condensed(), tmp_path / "local.hdf5")
+    (tmp_path / "link.hdf5").symlink_to("good.hdf5")
+    old = (tmp_path / "good.hdf5").read_bytes()
     arguments, words = FLAGS[name]
     check_refused(*run(arguments, tmp_path, monkeypatch), words)
+    assert (tmp_path / "good.hdf5").read_bytes() == old
+
+
+@pytest.mark.parametrize("name", ["pipe.toml", "pipe.hdf5"])
+def test_pipe_as_source(name, tmp_path, monkeypatch):
+    os.mkfifo(tmp_path / name)
+    check_refused(*run(["solve", name], tmp_path, monkeypatch), [name, "not a regular file"])
 
 
 def replaced(path, where, values):

@@ -53,7 +53,7 @@ Examples:
 @click.option("--max-iterations", type=click.IntRange(min=1), metavar="N",
               help="Stop after N iterations.")  # fmt: skip
 @click.option("--time-limit", type=float, metavar="SECONDS", help="Stop after that time.")
-@click.option("-o", "--output", "folder", type=click.Path(path_type=Path), metavar="DIR",
+@click.option("-o", "--output", "folder", metavar="DIR",
               help="Folder for the results. [name of the source with -results]")  # fmt: skip
 @click.option("--json", "json_copy", metavar="FILE",
               help="A copy of solution.json; - prints it and nothing else.")  # fmt: skip
@@ -92,7 +92,7 @@ Examples:
 """
 )
 @click.argument("source")
-@click.argument("target", type=click.Path(path_type=Path))
+@click.argument("target")
 @click.option("--form", type=click.Choice(["local", "global"]),
               help="local: W, q; global: M, H, f, w. [the form it has]")  # fmt: skip
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
@@ -119,7 +119,7 @@ Example:
               help="Errors to reach.")  # fmt: skip
 @click.option("--time-limit", type=float, default=60.0, show_default=True, metavar="SECONDS",
               help="For each solve; a method that misses it has failed.")  # fmt: skip
-@click.option("--profile", type=click.Path(path_type=Path), metavar="FILE.png",
+@click.option("--profile", metavar="FILE.png",
               help="Draw Dolan-Moré performance profiles.")  # fmt: skip
 @click.option("--json", "json_copy", metavar="FILE", help="All times as JSON; - prints them.")
 def bench(**options: object) -> None:

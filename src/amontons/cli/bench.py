@@ -42,11 +42,11 @@ class Timing:
 
 def run(
     files: Sequence[str], methods: str, tolerances: str, time_limit: float,
-    profile: Path | None, json_copy: str | None,
+    profile: str | None, json_copy: str | None,
 ) -> None:  # fmt: skip
     """Check all input, solve all, show."""
-    check_writable(profile)
-    check_writable(json_copy)
+    check_writable(profile, "--profile", output.FIGURES)
+    check_writable(json_copy, "--json")
     names = _words("methods", methods)
     goals = [_tolerance(text) for text in _words("tolerances", tolerances)]
     sources = {file: open_source(file) for file in files}
@@ -64,7 +64,7 @@ def run(
     if json_copy != "-":
         _show(timings, names, goals)
     if profile is not None:
-        _draw(timings, names, goals, profile)
+        _draw(timings, names, goals, Path(profile))
     if json_copy is not None:
         rows = [asdict(timing) for timing in timings]
         data = {"schema": SCHEMA, "versions": output.versions(), "results": rows}

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
-from pathlib import Path
 
 import click
 
-from ..errors import UnsupportedForm
+from ..errors import InvalidInput, UnsupportedForm
 from ..fclib import write_fclib
 from ..problem import Form
 from .sources import open_source
 from .terminal import check_writable
 
+SUFFIXES = (".hdf5", ".h5")
 
-def run(source: str, target: Path, form: str | None, overrides: Sequence[str]) -> None:
+
+def run(source: str, target: str, form: str | None, overrides: Sequence[str]) -> None:
     """Read, condense if asked to, write."""
-    check_writable(target)
+    check_writable(target, "target", SUFFIXES)
     opened = open_source(source, overrides)
+    if os.path.exists(target) and any(os.path.samefile(target, p) for p in opened.files):
+        raise InvalidInput(f"{target}: this is the source; expected the name of another file")
     problem = opened.discrete()
     wanted = Form(form) if form is not None else problem.form
     if wanted is Form.GLOBAL and problem.form is Form.DELASSUS:

@@ -21,7 +21,7 @@ RANK_LIMIT = 2000  # rows of W up to which its singular values are computed
 
 def run(source: str, overrides: Sequence[str], json_copy: str | None) -> None:
     """Print the table, or the JSON."""
-    check_writable(json_copy)
+    check_writable(json_copy, "--json")
     opened = open_source(source, overrides)
     facts = describe(opened.discrete())
     facts = {"name": opened.name, **facts}

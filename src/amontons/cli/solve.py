@@ -19,15 +19,14 @@ from .terminal import check_folder, check_writable
 
 def run(
     source: str, method: str | None, tolerance: float | None, overrides: Sequence[str],
-    max_iterations: int | None, time_limit: float | None, folder: Path | None,
+    max_iterations: int | None, time_limit: float | None, folder: str | None,
     json_copy: str | None, quiet: bool,
 ) -> int:  # fmt: skip
     """Solve and write; returns the exit code."""
     opened = open_source(source, overrides)
     settings = with_flags(opened.settings, method, tolerance, max_iterations, time_limit)
-    folder = folder if folder is not None else Path(f"{opened.name}-results")
-    check_folder(folder)
-    check_writable(json_copy)
+    place = check_folder(f"{opened.name}-results" if folder is None else folder)
+    check_writable(json_copy, "--json")
     began = time.perf_counter()
     opened.discrete()
     assembled = time.perf_counter() - began if opened.model is not None else 0.0
@@ -39,11 +38,11 @@ def run(
     )  # fmt: skip
     result = _output(opened, found, settings.method, assembled)
     copy = None if json_copy in (None, "-") else Path(str(json_copy))
-    output.save(result, folder, copy)
+    output.save(result, place, copy)
     if json_copy == "-":
         click.echo(output.to_json(output.summary(result)), nl=False)
     elif not quiet:
-        _report(result, folder)
+        _report(result, place)
     return _finish(found)
 
 

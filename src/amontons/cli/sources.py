@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import stat
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -34,6 +36,7 @@ class Source:
     from_fclib: bool = False
     settings: Settings = field(default_factory=Settings)
     file: str = ""  # for messages
+    files: tuple[Path, ...] = ()  # what it was read from
 
     @property
     def target(self) -> Model | FrictionProblem:
@@ -55,22 +58,46 @@ def open_source(text: str, overrides: Sequence[str] = ()) -> Source:
     """Read a SOURCE; overrides are those of --set."""
     if text.startswith("example:"):
         return _example(text.removeprefix("example:"), overrides)
+    if not text:
+        raise FileFormatError("SOURCE: expected a file or example:NAME, got an empty text")
     path = Path(text)
-    if path.is_dir() and (path / "solution.h5").is_file():
+    if os.path.isdir(path) and os.path.isfile(path / "solution.h5"):
         path = path / "solution.h5"
-    if path.is_dir():
-        raise FileFormatError(f"{path}: expected a case or FCLib file, this is a folder")
-    if not path.exists():
-        hint = "" if path.suffix else "; built-in examples are written example:NAME"
-        raise FileFormatError(f"{path}: no such file{hint}")
+    _check_is_plain(path)
     if path.suffix.lower() == ".toml":
         return _case(path, path.stem, overrides)
     return _fclib(path, overrides)
 
 
+def _check_is_plain(path: Path) -> None:
+    """Raise FileFormatError for what is missing, can not be there, or is no plain file."""
+    shown = f"{str(path)[:60]}…" if len(str(path)) > 200 else str(path)
+    try:
+        mode = path.stat().st_mode
+    except FileNotFoundError:
+        hint = "" if path.suffix else "; built-in examples are written example:NAME"
+        raise FileFormatError(f"{shown}: no such file{hint}") from None
+    except (OSError, ValueError) as reason:
+        why = getattr(reason, "strerror", None) or reason
+        raise FileFormatError(f"{shown}: can not be read: {why}") from None
+    if stat.S_ISDIR(mode):
+        raise FileFormatError(f"{shown}: expected a case or FCLib file, this is a folder")
+    if not stat.S_ISREG(mode):
+        raise FileFormatError(
+            f"{shown}: not a regular file; save what it gives to a file first"
+        )
+
+
 def _case(path: Path, name: str, overrides: Sequence[str]) -> Source:
     case = read_case(path, overrides)
-    return Source(name, case.title, model=case.model, settings=case.settings, file=str(path))
+    return Source(
+        name,
+        case.title,
+        model=case.model,
+        settings=case.settings,
+        file=str(path),
+        files=(path,),
+    )
 
 
 def _fclib(path: Path, overrides: Sequence[str]) -> Source:
@@ -94,7 +121,8 @@ def _fclib(path: Path, overrides: Sequence[str]) -> Source:
             f"{path}: the results of a model hold no problem to read; give the case file"
         ) from None
     settings = override_settings(Settings(), overrides)
-    return Source(path.stem, path.stem, problem=problem, from_fclib=True, settings=settings)
+    return Source(path.stem, path.stem, problem=problem, from_fclib=True, settings=settings,
+                  files=(path,))  # fmt: skip
 
 
 def override_settings(settings: Settings, overrides: Sequence[str]) -> Settings:

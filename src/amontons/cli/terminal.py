@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -41,21 +43,48 @@ def deliver_json(text: str, target: str | None) -> None:
             temporary.write_text(text, encoding="utf-8")
 
 
-def check_writable(target: Path | str | None) -> None:
+def check_writable(
+    target: Path | str | None, what: str = "file", suffixes: Sequence[str] = ()
+) -> None:
     """Raise InvalidInput before the work, not after it, when a file can not be written."""
     if target is None or str(target) == "-":
         return
+    if not str(target):
+        raise InvalidInput(f"{what}: expected the name of a file, got an empty text")
     path = Path(target)
-    if path.is_dir():
+    if suffixes and path.suffix.lower() not in suffixes:
+        raise InvalidInput(
+            f"{path}: expected a name that ends in {' or '.join(suffixes)}, got {path.suffix!r}"
+        )
+    if os.path.isdir(path):
         raise InvalidInput(f"{path}: expected the name of a file, this is a folder")
-    if not path.parent.is_dir():
+    if not os.path.isdir(path.parent):
         raise InvalidInput(f"{path}: the folder {path.parent} does not exist")
+    _check_name(path)
 
 
-def check_folder(path: Path) -> None:
-    """Raise InvalidInput when a results folder can not be made."""
+def _check_name(path: Path) -> None:
+    """Raise InvalidInput for a name that the file system can not hold."""
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return
+    except (OSError, ValueError) as reason:
+        shown = f"{str(path)[:60]}…" if len(str(path)) > 80 else str(path)
+        raise InvalidInput(
+            f"{shown}: can not be written: {getattr(reason, 'strerror', None) or reason}"
+        ) from None
+
+
+def check_folder(folder: str | Path) -> Path:
+    """The results folder; raises InvalidInput when it can not be made."""
+    if not str(folder):
+        raise InvalidInput("--output: expected the name of a folder, got an empty text")
+    path = Path(folder)
+    _check_name(path)
     for part in (path, *path.parents):
         if part.exists():
             if not part.is_dir():
                 raise InvalidInput(f"{path}: expected a folder, {part} is a file")
-            return
+            return path
+    return path
