@@ -7,6 +7,10 @@
 A sparse group holds m, n, nz, nzmax, p, i, x.  nz >= 0: triplets, p the columns and i the rows;
 nz = -1: compressed columns; -2: compressed rows.  Indices start at 0, duplicates are summed.
 
+A file that is read and written again keeps numbers, storage, texts byte for byte with their
+types, and the attributes of the groups info, W, M and H that are numbers or texts.  Dropped are
+other attributes and further datasets.
+
 Left out: bilateral constraints (G, b; V, R, s), which raise an error, and the groups `solution`
 and `guesses` of a file, which are not read: in the published files they are all zero.
 """
@@ -32,6 +36,7 @@ Index = NDArray[np.int64]
 GROUPS = {"fclib_local": Form.DELASSUS, "fclib_global": Form.GLOBAL}
 BILATERAL = {Form.DELASSUS: ("V", "R", "vectors/s"), Form.GLOBAL: ("G", "vectors/b")}
 TEXTS = ("title", "description", "math_info")
+WITH_ATTRIBUTES = ("info", "W", "M", "H")
 DEFLATE_LIMIT = 1032  # bytes that one stored byte can unpack to; more is a damaged header
 PACKED = 2000  # entries above which an array is compressed
 # all that h5py raises on damaged files; MemoryError: a shape that no machine holds
@@ -50,12 +55,23 @@ class StoredMatrix:
     x: NDArray
 
 
+@dataclass(frozen=True)
+class StoredText:
+    """A text of fixed length as it stands in the file; type in HDF5's encoding."""
+
+    type: bytes
+    shape: tuple[int, ...]
+    raw: bytes
+
+
 @dataclass(frozen=True, eq=False)
 class FclibProblem(FrictionProblem):
     """A problem read from a file, with what is needed to write that file again bit by bit."""
 
     texts: dict[str, bytes] = field(default_factory=dict, repr=False)
     stored: dict[str, StoredMatrix] = field(default_factory=dict, repr=False)
+    stored_texts: dict[str, StoredText] = field(default_factory=dict, repr=False)
+    attributes: dict[str, dict[str, NDArray | str]] = field(default_factory=dict, repr=False)
 
 
 # ------------------------------------------------------------------------------- reading
@@ -170,7 +186,11 @@ def _read(source: _Source) -> FclibProblem:
         where = f"{root}/vectors/mu"
         raise source.error(where, f"entry {bad[0]}: expected friction >= 0, got {mu[bad[0]]}")
     read = _read_local if form is Form.DELASSUS else _read_global
-    return replace(read(source, root, d, mu), texts=_texts(source, root))
+    group = source.file[root]
+    return replace(
+        read(source, root, d, mu), texts=_texts(source, root),
+        stored_texts=_stored_texts(group), attributes=_attributes(group),
+    )  # fmt: skip
 
 
 def _root(source: _Source) -> str:
@@ -251,6 +271,34 @@ def _texts(source: _Source, root: str) -> dict[str, bytes]:
         value = node[()] if node.shape == () else node[0]
         texts[name] = bytes(value) if isinstance(value, bytes) else str(value).encode()
     return texts
+
+
+def _stored_texts(root: h5py.Group) -> dict[str, StoredText]:
+    """The same texts with their types, checked before; not those of variable length."""
+    found = {}
+    for name in TEXTS:
+        node = root.get(f"info/{name}")
+        if node is not None and node.dtype.kind == "S":
+            values = np.empty(node.shape, dtype=node.dtype)
+            node.id.read(h5py.h5s.ALL, h5py.h5s.ALL, values, mtype=node.id.get_type())
+            found[name] = StoredText(node.id.get_type().encode(), node.shape, values.tobytes())
+    return found
+
+
+def _attributes(root: h5py.Group) -> dict[str, dict[str, NDArray | str]]:
+    """Attributes of the groups that we write, those that are numbers or texts."""
+    found: dict[str, dict[str, NDArray | str]] = {}
+    for where in WITH_ATTRIBUTES:
+        group = root.get(where)
+        if isinstance(group, h5py.Group):
+            for key in group.attrs:
+                if group.attrs.get_id(key).dtype.kind in "iufbSO":
+                    value = group.attrs[key]
+                    if isinstance(value, str | np.generic) or (
+                        isinstance(value, np.ndarray) and value.dtype.kind != "O"
+                    ):
+                        found.setdefault(where, {})[key] = value
+    return found
 
 
 # ------------------------------------------------------------------------ sparse matrices
@@ -365,7 +413,9 @@ def write_fclib(
         for name in ("M", "H", "W"):
             if getattr(problem, name) is not None:
                 _put_matrix(root.create_group(name), _storage(problem, name))
+                _put_attributes(root[name], problem)
         _put_texts(root.create_group("info"), problem, title, description)
+        _put_attributes(root["info"], problem)
         if solution is not None:
             _put_solution(file.create_group("solution"), solution)
 
@@ -417,12 +467,35 @@ def _put(group: h5py.Group, name: str, values: NDArray) -> None:
     group.create_dataset(name, data=values, **pack)
 
 
+def _put_attributes(group: h5py.Group, problem: FrictionProblem) -> None:
+    """The attributes that a group of this name had in the file."""
+    if isinstance(problem, FclibProblem):
+        group.attrs.update(problem.attributes.get(group.name.rpartition("/")[2], {}))
+
+
 def _put_texts(group: h5py.Group, problem: FrictionProblem, title: str, about: str) -> None:
-    """One byte more than the text, so that readers in C find its end."""
+    """Old texts as they were; new ones one byte longer, so that readers in C find the end."""
     texts = {"title": problem.name.encode(), "description": b"", "math_info": b"unknown"}
-    texts |= problem.texts if isinstance(problem, FclibProblem) else {}
+    old = problem.texts if isinstance(problem, FclibProblem) else {}
+    texts |= old
     for name, given in (("title", title), ("description", about)):
         if given:
             texts[name] = given.encode("utf-8", "surrogateescape")
     for name, text in texts.items():
-        group.create_dataset(name, data=np.array(text, dtype=f"S{len(text) + 1}"))
+        stored = problem.stored_texts.get(name) if isinstance(problem, FclibProblem) else None
+        if stored is not None and text == old.get(name):
+            _put_stored_text(group, name, stored)
+        else:
+            group.create_dataset(name, data=np.array(text, dtype=f"S{len(text) + 1}"))
+
+
+def _put_stored_text(group: h5py.Group, name: str, text: StoredText) -> None:
+    """Type with length and padding, shape and bytes as they were."""
+    kind = h5py.h5t.decode(text.type)
+    dataset = h5py.h5d.create(group.id, name.encode(), kind, _space(text.shape))
+    values = np.frombuffer(text.raw, dtype=f"S{kind.get_size()}").reshape(text.shape).copy()
+    dataset.write(h5py.h5s.ALL, h5py.h5s.ALL, values, mtype=kind)
+
+
+def _space(shape: tuple[int, ...]) -> h5py.h5s.SpaceID:
+    return h5py.h5s.create_simple(shape) if shape else h5py.h5s.create(h5py.h5s.SCALAR)

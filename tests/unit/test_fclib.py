@@ -220,3 +220,51 @@ def test_missing_file_and_folder(tmp_path):
         write_fclib(box_tower(1), tmp_path)
     with pytest.raises(InvalidInput, match="can not be written"):
         write_fclib(box_tower(1), tmp_path / "no" / "a.hdf5")
+
+
+def text_types(path):
+    with h5py.File(path) as file:
+        nodes = {name: file[f"fclib_global/info/{name}"] for name in ("title", "description")}
+        return {
+            name: (node.dtype, node.shape, node.id.get_type().get_strpad(), node[()])
+            for name, node in nodes.items()
+        }
+
+
+@pytest.mark.parametrize("padding", [h5py.h5t.STR_NULLTERM, h5py.h5t.STR_NULLPAD,
+                                     h5py.h5t.STR_SPACEPAD])  # fmt: skip
+def test_texts_keep_type_and_bytes(padding, tmp_path):
+    write_fclib(box_tower(1), tmp_path / "a.hdf5")
+    with h5py.File(tmp_path / "a.hdf5", "a") as file:
+        info = file["fclib_global/info"]
+        del info["title"], info["description"]
+        kind = h5py.h5t.TypeID.copy(h5py.h5t.C_S1)
+        kind.set_size(22)
+        kind.set_strpad(padding)
+        space = h5py.h5s.create(h5py.h5s.SCALAR)
+        node = h5py.h5d.create(info.id, b"title", kind, space)
+        node.write(h5py.h5s.ALL, h5py.h5s.ALL, np.array(b"a title of 22 letters!"), mtype=kind)
+        info["description"] = np.array([b"in one row"])
+    problem = read_fclib(tmp_path / "a.hdf5")
+    write_fclib(problem, tmp_path / "b.hdf5")
+    assert text_types(tmp_path / "a.hdf5") == text_types(tmp_path / "b.hdf5")
+    write_fclib(problem, tmp_path / "c.hdf5", title="other", description="in one row")
+    assert text_types(tmp_path / "c.hdf5")["title"][3] == b"other"
+    assert text_types(tmp_path / "c.hdf5")["description"][1] == (1,)
+
+
+def test_simple_attributes_of_info_and_matrices_survive(tmp_path):
+    write_fclib(box_tower(1), tmp_path / "a.hdf5")
+    simple = {"count": np.int32(3), "scale": 0.5, "unit": "m", "row": np.arange(3.0),
+              "letters": np.bytes_(b"abc")}  # fmt: skip
+    with h5py.File(tmp_path / "a.hdf5", "a") as file:
+        for where in ("info", "M"):
+            file[f"fclib_global/{where}"].attrs.update(simple)
+            file[f"fclib_global/{where}"].attrs["link"] = file.ref
+    write_fclib(read_fclib(tmp_path / "a.hdf5"), tmp_path / "b.hdf5")
+    with h5py.File(tmp_path / "b.hdf5") as file:
+        for where in ("info", "M"):
+            found = dict(file[f"fclib_global/{where}"].attrs)
+            assert found.keys() == simple.keys()
+            for key, value in simple.items():
+                np.testing.assert_array_equal(found[key], value)
