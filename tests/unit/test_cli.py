@@ -3,7 +3,6 @@
 import json
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
@@ -171,8 +170,6 @@ def test_version():
     assert am.__version__ in run("--version").stdout
 
 
-def test_start_up_is_immediate():
-    began = time.perf_counter()
+def test_start_up_loads_no_heavy_package():
     code = "import sys; from amontons.cli import main; assert 'numpy' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True)
-    assert time.perf_counter() - began < 2.0  # 0.1 s on an idle machine

@@ -1,6 +1,5 @@
 """Contact between bodies: projection against brute force, patch tests, left-out nodes."""
 
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -173,21 +172,6 @@ def test_two_pieces_of_one_mesh_touch():
     solution = am.drive(model.assemble())
     assert solution.converged
     assert (solution.r[:, 0] > 0).all()
-
-
-def test_the_cost_of_the_search_is_linear():
-    import time
-
-    def seconds(n):
-        lower, upper = am.box((1, 1), (n, 1)), am.box((1, 1), (n, 1), origin=(0, 1))
-        began = time.perf_counter()
-        rows = pair_contact(upper, "bottom", lower, "top")[0]
-        assert len(rows.nodes) == n + 1
-        return time.perf_counter() - began
-
-    seconds(100)
-    times = [min(seconds(n) for _ in range(2)) for n in (2000, 8000, 32000)]
-    assert all(later < 8 * sooner for sooner, later in pairwise(times))
 
 
 def test_unknown_masters_are_named():
