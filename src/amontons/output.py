@@ -213,7 +213,10 @@ def write_json(output: Output, path: Path) -> None:
 
 def describe(output: Output) -> str:
     """What a person wants to know, in a few lines."""
-    lines = [str(output.solution)]
+    text = str(output.solution)
+    if output.model is not None and not output.solution.problem.name:
+        text = f"{output.title or 'model'}: {text.partition(': ')[2]}"
+    lines = [text]
     if output.fields is not None:
         names = ("x", "y", "z")[: len(output.fields.resultant)]
         total = output.fields.resultant

@@ -46,6 +46,11 @@ class ModelSolution:
     def __dir__(self) -> list[str]:
         return sorted([*object.__dir__(self), *OF_SOLUTION, *OF_FIELDS])
 
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{count} {name}" for name, count in self.solution.counts.items())
+        outcome = self.solution.convergence.outcome.name.lower().replace("_", " ")
+        return f"<ModelSolution of {self.model.name or 'model'}: {counts}; {outcome}>"
+
     def __str__(self) -> str:
         return output.describe(self.output)
 
@@ -53,7 +58,11 @@ class ModelSolution:
     def output(self) -> output.Output:
         """What the writers need."""
         return output.Output(
-            self.solution, self.model, self.fields, assemble_seconds=self.assemble_seconds
+            self.solution,
+            self.model,
+            self.fields,
+            title=self.model.name or "model",
+            assemble_seconds=self.assemble_seconds,
         )
 
     def write(self, path: str | os.PathLike[str]) -> None:

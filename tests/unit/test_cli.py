@@ -57,6 +57,18 @@ def test_json_copy(folder):
     ).read_text()
 
 
+def test_words_are_those_of_the_command_line(folder):
+    assert "converged with auto" in run("solve", "tower.hdf5").stdout
+    result = run("solve", "tower.hdf5", "--method", "gauss-seidel")
+    assert "converged with gauss-seidel" in result.stdout
+
+
+def test_the_set_example_of_the_help_works(folder):
+    assert "solver.tolerance=1e-6" in run("solve", "--help").stdout
+    flags = ["--set", "mesh.cells=4", "--set", "solver.tolerance=1e-6", "--json", "-"]
+    assert json.loads(run("solve", "example:slab", *flags).stdout)["tolerance"] == 1e-6
+
+
 def test_quiet(folder):
     result = run("solve", "tower.hdf5", "--quiet")
     assert (result.exit_code, result.output) == (0, "")

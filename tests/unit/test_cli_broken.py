@@ -63,10 +63,10 @@ CASES = {
     "poisson half": ("0.3\n[[fix", "0.5\n[[fix", ["poisson", "0.5"]),
     "law later": ("young", 'law = "neo-hookean"\nyoung', ["neo-hookean", "not available"]),
     "law unknown": ("young", 'law = "linear"\nyoung', ["law", "linear-elastic"]),
-    "region unknown": ("material.default", "material.steel", ["steel"]),
+    "region unknown": ("material.default", "material.steel", ["material", "steel"]),
     "plane unknown": ("poisson", 'plane = "stresses"\npoisson', ["plane", "stress"]),
     "surface unknown": ('"top"', '"tip"', ["fix[0].on", "tip", "top"]),
-    "slave unknown": ('"bottom"', '"botom"', ["botom", "bottom"]),
+    "slave unknown": ('"bottom"', '"botom"', ["contact[0].slave", "botom", "bottom"]),
     "value too short": ('[0.01, "-0.02 + 0.001*x"]', "[0.01]", ["fix[0].value", "2"]),
     "value no list": ('[0.01, "-0.02 + 0.001*x"]', "0.01", ["fix[0].value"]),
     "value true": ("0.01,", "true,", ["fix[0].value[0]"]),
@@ -74,17 +74,18 @@ CASES = {
     "expression syntax": ("0.001*x", "0.001*", ["fix[0].value[1]"]),
     "expression name": ("0.001*x", "0.001*q", ["'q'"]),
     "expression z": ("0.001*x", "0.001*z", ["'z'", "2D"]),
-    "expression infinite": ("0.001*x", "0.001/x", ["0.001/x", "inf"]),
+    "expression infinite": ("0.001*x", "0.001/x", ["fix[0].value", "0.001/x", "inf"]),
     "expression huge": ("0.001*x", "9**9**9", ["9**9**9", "inf"]),
     "friction negative": ("coulomb = 0.3", "coulomb = -0.3", ["coulomb", "-0.3"]),
-    "friction negative somewhere": ("= 0.3 }", '= "x - 0.5" }', ["-0.5"]),
+    "friction negative somewhere": ("= 0.3 }", '= "x - 0.5" }',
+                                    ["contact[0].friction.coulomb", "-0.5"]),
     "friction text": ("coulomb = 0.3", 'coulomb = "rough"', ["rough"]),
     "friction both": ("coulomb = 0.3", "coulomb = 0.3, tresca = 1", ["friction", "either"]),
     "no friction": ("friction = { coulomb = 0.3 }", "", ["friction", "missing"]),
     "no obstacle": ("obstacle = { plane = { point = [0, 0], normal = [0, 1] } }", "",
                     ["contact[0]", "obstacle"]),
     "master": ("obstacle = { plane = { point = [0, 0], normal = [0, 1] } }", 'master = "topp"',
-               ["'topp'", "did you mean"]),
+               ["contact[0].master", "'topp'", "did you mean"]),
     "mortar": ('slave = "bottom"', 'slave = "bottom"\nmethod = "dual-mortar"',
                ["dual-mortar", "not available"]),
     "obstacle unknown": ("plane = {", "plain = {", ["obstacle.plain", "plane"]),
@@ -93,11 +94,11 @@ CASES = {
     "level set constant": ("plane = { point = [0, 0], normal = [0, 1] }", "level_set = 1.0",
                            ["level_set"]),
     "level set flat": ("plane = { point = [0, 0], normal = [0, 1] }", 'level_set = "0*x"',
-                       ["gradient"]),
+                       ["contact[0].obstacle", "gradient"]),
     "radius": ("plane = { point = [0, 0], normal = [0, 1] }",
                "sphere = { center = [0, -1], radius = -1 }", ["radius"]),
-    "method unknown": ('"auto"', '"gauss"', ["method", "gauss-seidel"]),
-    "solver key unknown": ("tolerance", "tolerence", ["tolerence", "no such field"]),
+    "method unknown": ('"auto"', '"gauss"', ["solver.method", "gauss-seidel"]),
+    "solver key unknown": ("tolerance", "tolerence", ["solver.tolerence", "auto has no"]),
     "tolerance zero": ("1e-8", "0", ["tolerance"]),
     "tolerance text": ("1e-8", '"small"', ["tolerance", "small"]),
     "table is a value": ("[solver]", "[other]", ["other", "unknown key"]),
@@ -139,13 +140,38 @@ def test_contact_given_twice(tmp_path, monkeypatch):
     check_refused(result, new, ["contact[0]", "contact[1]"])
 
 
+PARTS = {  # what is added to the case, and the key that the message must name
+    "supports clash": ('[[fix]]\non = "left"\nvalue = [0, 0.5]', "fix[1].value"),
+    "traction": ('[[traction]]\non = "left"\nvalue = [0, "log(x - 1)"]', "traction[0].value"),
+    "second force": ("[[body_force]]\nvalue = [0, 1]\n[[body_force]]\nvalue = [0, '1/y']",
+                     "body_force[1].value"),
+    "force region": ('[[body_force]]\nvalue = [0, 1]\nregion = "foo"', "body_force[0].region"),
+    "second friction": ('[[contact]]\nslave = "right"\nfriction = { coulomb = "0.5 - y" }\n'
+                        "obstacle = { plane = { point = [2, 0], normal = [-1, 0] } }",
+                        "contact[1].friction.coulomb"),
+    "second law": ('[[contact]]\nslave = "right"\nfriction = { tresca = 1 }\n'
+                   "obstacle = { plane = { point = [2, 0], normal = [-1, 0] } }",
+                   "contact[1].friction"),
+    "pushed": ('[[contact]]\nslave = "right"\nfriction = { coulomb = 1 }\n'
+               "obstacle = { plane = { point = [1, 0], normal = [-1, 0] } }", "contact[1]"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_key_of_what_shows_when_assembling(name, tmp_path, monkeypatch):
+    text, key = PARTS[name]
+    (tmp_path / "case.toml").write_text(CASE + "\n" + text)
+    result, new = run(["solve", "case.toml"], tmp_path, monkeypatch)
+    check_refused(result, new, [f"case.toml: {key}: "])
+
+
 def test_body_that_nothing_holds(tmp_path, monkeypatch):
     text = CASE.replace("value = [0.01", 'value = ["free"').replace(
         "coulomb = 0.3", "coulomb = 0"
     )
     (tmp_path / "case.toml").write_text(text)
     result, new = run(["solve", "case.toml"], tmp_path, monkeypatch)
-    check_refused(result, new, ["case.toml", "translation along x"])
+    check_refused(result, new, ["case.toml: fix", "translation along x"])
 
 
 FLAGS = {
@@ -160,7 +186,10 @@ FLAGS = {
     "tolerance word": (["solve", "good.hdf5", "--tolerance", "low"], ["low"]),
     "tolerance negative": (["solve", "good.hdf5", "--tolerance", "-1"], ["-1"]),
     "tolerance nan": (["solve", "good.hdf5", "--tolerance", "nan"], ["nan"]),
-    "method": (["solve", "good.hdf5", "--method", "gauss-siedel"], ["gauss-seidel"]),
+    "method": (
+        ["solve", "good.hdf5", "--method", "gauss-siedel"],
+        ["--method", "gauss-seidel"],
+    ),
     "method class": (["solve", "good.hdf5", "--method", "Auto"], ["'Auto'", "auto"]),
     "time": (["solve", "good.hdf5", "--time-limit", "0"], ["time-limit"]),
     "iterations": (["solve", "good.hdf5", "--max-iterations", "0"], ["max-iterations"]),
@@ -169,6 +198,10 @@ FLAGS = {
     "set field": (
         ["solve", "good.hdf5", "--method", "gauss-seidel", "--set", "solver.bach=3"],
         ["solver.bach", "batch"],
+    ),
+    "set field of no method": (
+        ["solve", "case.toml", "--set", "solver.batch=10"],
+        ["case.toml: solver.batch: auto", "gauss-seidel", "--method"],
     ),
     "set type": (
         ["solve", "good.hdf5", "--method", "gauss-seidel", "--set", "solver.batch=x"],

@@ -229,3 +229,10 @@ def test_figure_of_several_pairs(dimension):
         assert {text.get_text() for text in left.texts} == {"bottom", "left"}
     else:
         assert sum(axes.get_title() == "Contact status on left" for axes in figure.axes) == 1
+
+
+def test_words_of_a_model_without_a_name(tmp_path):
+    found = corner(2)
+    assert str(found).startswith("model: 7 contacts in 2D")
+    assert output.summary(found.output)["title"] == "model"
+    assert repr(found) == "<ModelSolution of model: 0 open, 3 slip, 4 stick; converged>"

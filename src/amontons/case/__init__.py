@@ -3,7 +3,9 @@
 Values are data: numbers, or expressions of `amontons.expressions`.  Unknown keys are errors.
 """
 
+from .blame import key_of
 from .build import Case, read_case
-from .settings import Settings, make_solver, method_class
+from .settings import Settings, in_words, make_solver, method_class
 
-__all__ = ["Case", "Settings", "make_solver", "method_class", "read_case"]
+__all__ = ["Case", "Settings", "in_words", "key_of", "make_solver", "method_class",
+           "read_case"]  # fmt: skip

@@ -94,8 +94,9 @@ def _model(top: Table, path: Path, title: str) -> Model:
         raise top.error("contact", "missing, expected at least one table [[contact]]")
     contacts = [_contact(table, mesh) for table in top.tables("contact")]
     _refuse_repeated(top)
-    with _Blame(top, ""):
+    with _Blame(top, "material"):
         body = Body(mesh, material, order=order)
+    with _Blame(top, "contact"):
         return Model([body], supports=fixes, contacts=contacts, loads=loads, name=title)
 
 
@@ -118,7 +119,7 @@ def _wall_model(top: Table, title: str) -> Model:
     for part in top.tables("body_force"):
         part.only("value")
         loads.append(BodyForce(_vector(part, "value", dim)))
-    with _Blame(top, ""):
+    with _Blame(top, "wall"):
         return wall.model(fixes, loads, title)
 
 
@@ -231,6 +232,10 @@ def _contact(table: Table, mesh: Mesh) -> Contact:
     table.only("slave", "obstacle", "master", "friction", "method")
     _available(table, "method", ("nodal",), ("dual-mortar", "nitsche"))
     slave = table.text("slave")
+    for key in ("slave", "master"):
+        if key in table.data:
+            with _Blame(table, key):
+                mesh.surface(table.text(key))
     if ("obstacle" in table.data) == ("master" in table.data):
         raise table.error("", "expected either obstacle or master")
     friction = table.table("friction")
@@ -250,9 +255,16 @@ def _contact(table: Table, mesh: Mesh) -> Contact:
 
 
 def _refuse_repeated(top: Table) -> None:
-    """The same pair twice would carry its load twice, shared at random."""
+    """The same pair twice would share its load at random; two laws do not fit one problem."""
     seen: list[dict[str, Any]] = []
-    for table in top.tables("contact"):
+    tables = top.tables("contact")
+    for table in tables:
+        law, first = (set(part.data["friction"]) for part in (table, tables[0]))
+        if law != first:
+            raise table.error(
+                "friction", f"expected {first.pop()} as in contact[0], one law for all, "
+                f"got {law.pop()}"
+            )  # fmt: skip
         pair = {key: table.data.get(key) for key in ("slave", "obstacle", "master")}
         if pair in seen:
             raise table.error(
@@ -339,9 +351,9 @@ def _settings(top: Table) -> Settings:
         raise table.error("time_limit", f"expected seconds > 0, got {seconds}")
     used = ("method", "tolerance", "time_limit", *LIMITS)
     options = {key: value for key, value in table.data.items() if key not in used}
-    with _Blame(table, ""):
+    with _Blame(table, "method"):
         method_class(method)
-    with _Blame(top, ""):
+    with _Blame(top, ""):  # its messages begin with solver.FIELD
         make_solver(method, options)
     limit = next((value for value in limits if value is not None), None)
     return Settings(method, tolerance, limit, seconds, options)

@@ -38,7 +38,7 @@ class Settings:
 def method_class(method: str) -> type:
     """The class behind a name in kebab-case."""
     if method not in METHODS:
-        raise InvalidInput(f"method: unknown method '{method}'{nearest(method, METHODS)}")
+        raise InvalidInput(f"unknown method '{method}'{nearest(method, METHODS)}")
     return METHODS[method]
 
 
@@ -49,14 +49,31 @@ def make_solver(method: str, options: dict[str, Any]) -> Solver:
     names = [f.name for f in dataclasses.fields(kind) if f.init]
     for name in options:
         if name not in names:
-            raise InvalidInput(
-                f"solver.{name}: {method} has no such field{nearest(name, names)}"
-            )
+            raise InvalidInput(f"solver.{name}: {_no_such_field(method, name, names)}")
     values = {name: _convert(name, value, hints[name]) for name, value in options.items()}
     try:
         return kind(**values)
     except InvalidInput as reason:
         raise InvalidInput(f"solver.{reason}") from None
+
+
+def _no_such_field(method: str, name: str, names: list[str]) -> str:
+    """What the method has instead, and which methods have the field."""
+    owners = [
+        other for other, kind in METHODS.items()
+        if any(f.name == name and f.init for f in dataclasses.fields(kind))
+    ]  # fmt: skip
+    text = f"{method} has no such field" if names else f"{method} has no fields"
+    if owners:
+        return f"{text}; '{name}' is a field of {', '.join(owners)}: choose with --method"
+    return text + (nearest(name, names) if names else "")
+
+
+def in_words(text: str) -> str:
+    """A message with the names of methods as on the command line."""
+    for name, kind in METHODS.items():
+        text = re.sub(rf"\b{kind.__name__}\b", name, text)
+    return text
 
 
 def _convert(name: str, value: Any, hint: Any) -> Any:

@@ -24,7 +24,7 @@ class Table:
     def error(self, key: str, message: str) -> FileFormatError:
         """A complaint about one key, or about the table itself when key is ""."""
         path = ".".join(part for part in (self.where, key) if part)
-        return FileFormatError(f"{self.file}: {path}: {message}")
+        return FileFormatError(": ".join(part for part in (self.file, path, message) if part))
 
     def only(self, *known: str) -> None:
         """Raise for the first key that is not known, naming the nearest."""

@@ -49,7 +49,7 @@ Examples:
 @click.option("--tolerance", type=float, metavar="X", help="Unit-free error to reach. [1e-8]")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
               help="Replace a value of the case, mesh.cells=32, or of the solver, "
-              "solver.batch=10; may be repeated.")  # fmt: skip
+              "solver.tolerance=1e-6; may be repeated.")  # fmt: skip
 @click.option("--max-iterations", type=click.IntRange(min=1), metavar="N",
               help="Stop after N iterations.")  # fmt: skip
 @click.option("--time-limit", type=float, metavar="SECONDS", help="Stop after that time.")
@@ -144,9 +144,9 @@ Examples:
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
               help="Replace a value of the case, such as evolution.step=1e-3.")  # fmt: skip
 @click.option("--tolerance", type=float, metavar="X", help="Unit-free error of every step.")
-@click.option("-o", "--output", "folder", type=click.Path(path_type=Path), metavar="DIR",
+@click.option("-o", "--output", "folder", metavar="DIR",
               help="Folder for the results. [name of the case with -results]")  # fmt: skip
-@click.option("--export-fclib", "export", type=click.Path(path_type=Path), metavar="DIR",
+@click.option("--export-fclib", "export", metavar="DIR",
               help="Write the discrete problem of every step as an FCLib file.")  # fmt: skip
 @click.option("--every", type=click.IntRange(min=1), default=10, show_default=True, metavar="N",
               help="Write a VTK file, and the state, every N steps.")  # fmt: skip

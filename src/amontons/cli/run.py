@@ -19,7 +19,7 @@ from ..files import replacing
 from ..solution import ContactStatus
 from ..vtk import write_model
 from .group import INTERRUPTED
-from .sources import with_flags
+from .sources import check_is_plain, naming_keys, with_flags
 from .terminal import check_folder
 
 WORKS = tuple(field.name for field in fields_of(Energies))
@@ -28,29 +28,30 @@ COLUMNS = ("index", "time", "open", "slip", "stick", *WORKS, "defect", "iteratio
 
 
 def run(
-    case: Path, overrides: Sequence[str], tolerance: float | None, folder: Path | None,
-    export: Path | None, every: int, restart: bool, quiet: bool,
+    case: Path, overrides: Sequence[str], tolerance: float | None, folder: str | None,
+    export: str | None, every: int, restart: bool, quiet: bool,
 ) -> int:  # fmt: skip
     """Step and write; returns the exit code."""
     if case.suffix.lower() != ".toml":
         raise FileFormatError(f"{case}: expected a TOML case file (.toml)")
+    check_is_plain(case)
     read = read_case(case, overrides)
     if read.evolution is None:
         raise FileFormatError(
             f"{case}: evolution: missing, expected a table with kind, step, until"
         )
-    folder = folder if folder is not None else Path(f"{case.stem}-results")
-    check_folder(folder)
-    if export is not None:
-        check_folder(export)
-    start = load_state(folder / "state.h5") if restart else None
+    place = check_folder(f"{case.stem}-results" if folder is None else folder)
+    exported = None if export is None else check_folder(export, "--export-fclib")
+    with naming_keys(read.model, str(case)):
+        _ = read.model.discretisation, read.model.law
+    start = load_state(place / "state.h5") if restart else None
     settings = with_flags(read.settings, None, tolerance)
     steps = evolve(
         read.model, read.evolution.method, until=read.evolution.until, start=start,
         solver=settings.solver(), tolerance=settings.tolerance,
     )  # fmt: skip
-    steps = export_fclib(steps, export, case.stem) if export is not None else steps
-    return _follow(steps, read, folder, start, every, quiet)
+    steps = export_fclib(steps, exported, case.stem) if exported is not None else steps
+    return _follow(steps, read, place, start, every, quiet)
 
 
 def _follow(

@@ -10,6 +10,8 @@ from pathlib import Path
 import click
 
 from .. import api, output
+from ..case import in_words
+from ..errors import InvalidInput, SingularOperator, UnsupportedForm
 from ..results import ModelSolution
 from ..solution import FrictionSolution, Outcome
 from .group import INTERRUPTED
@@ -31,11 +33,15 @@ def run(
     opened.discrete()
     assembled = time.perf_counter() - began if opened.model is not None else 0.0
     silent = quiet or json_copy == "-"
-    found = api.solve_any_form(
-        opened.target, settings.solver(), tolerance=settings.tolerance,
-        max_iterations=settings.max_iterations, time_limit=settings.time_limit,
-        callback=(lambda step, iterate: None) if silent else None,
-    )  # fmt: skip
+    try:
+        found = api.solve_any_form(
+            opened.target, settings.solver(), tolerance=settings.tolerance,
+            max_iterations=settings.max_iterations, time_limit=settings.time_limit,
+            callback=(lambda step, iterate: None) if silent else None,
+        )  # fmt: skip
+    except (UnsupportedForm, SingularOperator, InvalidInput) as reason:
+        text = f"{source}: --method {settings.method}: {in_words(str(reason))}"
+        raise type(reason)(text) from reason
     result = _output(opened, found, settings.method, assembled)
     copy = None if json_copy in (None, "-") else Path(str(json_copy))
     output.save(result, place, copy)
@@ -57,7 +63,7 @@ def _output(
 
 
 def _report(result: output.Output, folder: Path) -> None:
-    click.echo(output.describe(result))
+    click.echo(in_words(output.describe(result)))
     click.echo(f"results in {folder}/")
 
 
@@ -68,7 +74,7 @@ def _finish(found: FrictionSolution | ModelSolution) -> int:
         return 0
     sys.stdout.flush()
     name = record.outcome.name.lower().replace("_", " ")
-    detail = f" ({record.detail})" if record.detail else ""
+    detail = f" ({in_words(record.detail)})" if record.detail else ""
     click.echo(
         f"Not converged: {name}{detail}, error {record.error:.1e} > {record.tolerance:.0e}. "
         f"{record.outcome.advice}", err=True,

@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 import stat
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..case import Settings, make_solver, method_class, read_case
+from ..case import Settings, key_of, make_solver, method_class, read_case
 from ..case.overrides import split_override
 from ..case.settings import LIMITS
 from ..errors import FileFormatError, InvalidInput, SingularOperator
@@ -48,10 +49,18 @@ class Source:
         if self.problem is not None:
             return self.problem
         assert self.model is not None
-        try:
+        with naming_keys(self.model, self.file):
             return self.model.assemble()
-        except (InvalidInput, SingularOperator) as reason:
-            raise type(reason)(f"{self.file}: {reason}") from reason
+
+
+@contextmanager
+def naming_keys(model: Model, file: str) -> Iterator[None]:
+    """Name file and key in errors that only show when the model of a case is assembled."""
+    try:
+        yield
+    except (InvalidInput, SingularOperator) as reason:
+        key = key_of(model, reason, wall=len(model.bodies) > 1)
+        raise type(reason)(f"{file}: {key}: {reason}") from reason
 
 
 def open_source(text: str, overrides: Sequence[str] = ()) -> Source:
@@ -63,13 +72,13 @@ def open_source(text: str, overrides: Sequence[str] = ()) -> Source:
     path = Path(text)
     if os.path.isdir(path) and os.path.isfile(path / "solution.h5"):
         path = path / "solution.h5"
-    _check_is_plain(path)
+    check_is_plain(path)
     if path.suffix.lower() == ".toml":
         return _case(path, path.stem, overrides)
     return _fclib(path, overrides)
 
 
-def _check_is_plain(path: Path) -> None:
+def check_is_plain(path: Path) -> None:
     """Raise FileFormatError for what is missing, can not be there, or is no plain file."""
     shown = f"{str(path)[:60]}…" if len(str(path)) > 200 else str(path)
     try:
@@ -156,7 +165,10 @@ def with_flags(
 ) -> Settings:  # fmt: skip
     """Settings with the flags of the command line, which win; the solver is checked here."""
     if method is not None:
-        method_class(method)
+        try:
+            method_class(method)
+        except InvalidInput as reason:
+            raise InvalidInput(f"--method: {reason}") from None
         settings = replace(settings, method=method)
     for key, value in (("tolerance", tolerance), ("max_iterations", max_iterations),
                        ("time_limit", time_limit)):  # fmt: skip

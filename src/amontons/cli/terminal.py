@@ -76,10 +76,10 @@ def _check_name(path: Path) -> None:
         ) from None
 
 
-def check_folder(folder: str | Path) -> Path:
+def check_folder(folder: str, what: str = "--output") -> Path:
     """The results folder; raises InvalidInput when it can not be made."""
-    if not str(folder):
-        raise InvalidInput("--output: expected the name of a folder, got an empty text")
+    if not folder:
+        raise InvalidInput(f"{what}: expected the name of a folder, got an empty text")
     path = Path(folder)
     _check_name(path)
     for part in (path, *path.parents):
