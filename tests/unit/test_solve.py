@@ -238,3 +238,13 @@ def test_interrupt_in_the_first_factorisation_is_not_repeated(monkeypatch):
     assert solution.convergence.outcome is am.Outcome.STOPPED
     assert not solution.r.any()
     assert solution.counts["open"] == problem.contacts
+
+
+def test_a_stale_v_of_the_start_is_not_returned():
+    problem = FrictionProblem.from_global(
+        np.eye(3), np.eye(3), [-1.0, 0.0, 0.0], [[0, 0, 0]], [0.5]
+    )
+    solved = drive(problem)
+    again = drive(problem, start=Iterate(solved.r.copy(), np.full(3, 7.0)))
+    assert again.convergence.iterations == 0
+    np.testing.assert_allclose(again.v, solved.v, atol=1e-12)
