@@ -142,6 +142,7 @@ def test_contact_given_twice(tmp_path, monkeypatch):
 
 PARTS = {  # what is added to the case, and the key that the message must name
     "supports clash": ('[[fix]]\non = "left"\nvalue = [0, 0.5]', "fix[1].value"),
+    "all fixed": ('[[fix]]\non = "bottom"\nvalue = [0, 0]', "contact"),
     "traction": ('[[traction]]\non = "left"\nvalue = [0, "log(x - 1)"]', "traction[0].value"),
     "second force": ("[[body_force]]\nvalue = [0, 1]\n[[body_force]]\nvalue = [0, '1/y']",
                      "body_force[1].value"),

@@ -60,7 +60,8 @@ def naming_keys(model: Model, file: str) -> Iterator[None]:
         yield
     except (InvalidInput, SingularOperator) as reason:
         key = key_of(model, reason, wall=len(model.bodies) > 1)
-        raise type(reason)(f"{file}: {key}: {reason}") from reason
+        text = str(reason).removeprefix("supports: ").removeprefix("contacts: ")  # as the key
+        raise type(reason)(f"{file}: {key}: {text}") from reason
 
 
 def open_source(text: str, overrides: Sequence[str] = ()) -> Source:
