@@ -20,6 +20,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -71,7 +72,7 @@ class FclibProblem(FrictionProblem):
     texts: dict[str, bytes] = field(default_factory=dict, repr=False)
     stored: dict[str, StoredMatrix] = field(default_factory=dict, repr=False)
     stored_texts: dict[str, StoredText] = field(default_factory=dict, repr=False)
-    attributes: dict[str, dict[str, NDArray | str]] = field(default_factory=dict, repr=False)
+    attributes: dict[str, dict[str, Any]] = field(default_factory=dict, repr=False)
 
 
 # ------------------------------------------------------------------------------- reading
@@ -285,9 +286,9 @@ def _stored_texts(root: h5py.Group) -> dict[str, StoredText]:
     return found
 
 
-def _attributes(root: h5py.Group) -> dict[str, dict[str, NDArray | str]]:
+def _attributes(root: h5py.Group) -> dict[str, dict[str, Any]]:
     """Attributes of the groups that we write, those that are numbers or texts."""
-    found: dict[str, dict[str, NDArray | str]] = {}
+    found: dict[str, dict[str, Any]] = {}
     for where in WITH_ATTRIBUTES:
         group = root.get(where)
         if isinstance(group, h5py.Group):

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import AmontonsError, SingularOperator
 
 if TYPE_CHECKING:
-    from ..model import Contact, Model
+    from ..model import Body, Contact, Model
 
 
 def key_of(model: Model, error: AmontonsError, *, wall: bool = False) -> str:
@@ -20,22 +20,23 @@ def key_of(model: Model, error: AmontonsError, *, wall: bool = False) -> str:
     """
     from ..model.assembly import external_load, prescribed_values
 
-    offsets = np.cumsum([0, *(body.mesh.points.size for body in model.bodies)])
+    bodies = tuple(model.bodies)
+    offsets = np.cumsum([0, *(body.mesh.points.size for body in bodies)])
     for k in range(len(model.supports)):
         supports = tuple(model.supports[: k + 1])
-        if _fails(lambda s=supports: prescribed_values(model.bodies, s, offsets)):
+        if _fails(lambda s=supports: prescribed_values(bodies, s, offsets)):
             return f"fix[{k}].value"
     counts = {"traction": 0, "body_force": 0}
     for load in model.loads:
         kind = "traction" if hasattr(load, "on") else "body_force"
-        if _fails(lambda one=load: external_load(model.bodies, (one,), offsets)):
+        if _fails(lambda one=load: external_load(bodies, (one,), offsets)):
             region = getattr(load, "region", None) is not None and "region" in str(error)
             return f"{kind}[{counts[kind]}].{'region' if region else 'value'}"
         counts[kind] += 1
     if wall:
         return "wall"
     for k, contact in enumerate(model.contacts):
-        key = _key_of_contact(model, contact, str(error))
+        key = _key_of_contact(bodies, contact, str(error))
         if key is not None:
             return f"contact[{k}]{key}"
     if isinstance(error, SingularOperator) or str(error).startswith("supports"):
@@ -43,20 +44,20 @@ def key_of(model: Model, error: AmontonsError, *, wall: bool = False) -> str:
     return "contact"
 
 
-def _key_of_contact(model: Model, contact: Contact, message: str) -> str | None:
+def _key_of_contact(bodies: tuple[Body, ...], contact: Contact, message: str) -> str | None:
     """The part of a contact that can not be placed, "" for the contact itself, None if none."""
     from ..contact import contact_nodes, nodal_contact, pair_contact
     from ..model.assembly import locate
     from ..model.values import scalar_at
 
-    k, surface = locate(model.bodies, contact.slave)
-    mesh = model.bodies[k].mesh
-    if contact.obstacle is not None:
-        if _fails(lambda: nodal_contact(mesh, surface, contact.obstacle)):
+    k, surface = locate(bodies, contact.slave)
+    mesh, obstacle = bodies[k].mesh, contact.obstacle
+    if obstacle is not None:
+        if _fails(lambda: nodal_contact(mesh, surface, obstacle)):
             return ".slave" if message.startswith("surface") else ".obstacle"
-    else:
-        j, other = locate(model.bodies, contact.master)
-        if _fails(lambda: pair_contact(mesh, surface, model.bodies[j].mesh, other)):
+    elif contact.master is not None:
+        j, other = locate(bodies, contact.master)
+        if _fails(lambda: pair_contact(mesh, surface, bodies[j].mesh, other)):
             return ".slave" if message.startswith(f"surface {surface!r}") else ".master"
     name = contact.friction
     points = mesh.points[contact_nodes(mesh, surface)[0]]
