@@ -4,8 +4,9 @@
 
 One linear solve is the factorisation of the stiffness and one back substitution by the same
 solver (`amontons.Direct`); the nonlinear time is the whole of `drive(problem)` on a fresh
-problem: its own factorisation, judge and status included.  Best of three (one at level 5), compiled
-code warm; the factorisation takes its default number of threads on both sides, all else one.
+problem: its own factorisation, judge and status included.  Best of three (one at level 5),
+compiled code warm; the factorisation takes its default number of threads on both sides, all
+else one.
 
 Writes results/cube.md and results/cube.json beside this file.
 """
