@@ -1,10 +1,12 @@
 """Solvers of the discrete problem, one file per family; a new one is a file and a line here."""
 
+from .augmentation import RhoStrategy
 from .base import Breakdown, Iterate, Solver, Target
 from .compressed import CompressedDelassus
 from .functions import AlartCurnier, ComplementarityFunction, JeanMoreau, NaturalMap
 from .gauss_seidel import GaussSeidel
 from .hybrid import Auto, Hybrid
+from .line_search import Armijo, FullStep, GoldsteinPrice, LineSearch, NonMonotone
 from .local_contact import LocalSolver
 from .newton import SemismoothNewton
 from .smoothing import ProximalPoint, SmoothingNewton
@@ -22,17 +24,23 @@ METHODS: dict[str, type] = {
 __all__ = [
     "METHODS",
     "AlartCurnier",
+    "Armijo",
     "Auto",
     "Breakdown",
     "ComplementarityFunction",
     "CompressedDelassus",
+    "FullStep",
     "GaussSeidel",
+    "GoldsteinPrice",
     "Hybrid",
     "Iterate",
     "JeanMoreau",
+    "LineSearch",
     "LocalSolver",
     "NaturalMap",
+    "NonMonotone",
     "ProximalPoint",
+    "RhoStrategy",
     "SemismoothNewton",
     "SmoothingNewton",
     "Solver",

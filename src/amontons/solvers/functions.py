@@ -1,13 +1,19 @@
 """Complementarity functions: F(r, u) = 0 exactly when a contact obeys its law.
 
 Each gives F, unit of r, and one element of its generalised Jacobian, A = dF/dr and B = dF/du,
-shape (nc, d, d).  With x = r - rho u, [ABD] eqs. (8)-(10):
+shape (nc, d, d).  [ABD] eqs. (8)-(10):
 
     Alart-Curnier  F_N = r_N - x_N^+,  F_T = r_T - P_disk(mu x_N^+)(x_T)
     Jean-Moreau    the same with radius mu r_N^+
     natural map    F = r - P_K(r - rho û)
 
-Under Tresca's law the radius is the given bound and all three are the same function.
+with x_N = r_N - rho_N u_N and x_T = r_T - rho_T u_T: rho is (nc,), or (nc, 2) with columns
+rho_N and rho_T.  The natural map takes one rho per contact only: with two, x would have to be
+projected in another norm than Euclid's for F to vanish exactly at a solution.  Under Tresca's
+law the radius is the given bound and all three are the same function.
+
+Jacobians are chosen regular where the law leaves a choice: a contact without friction bound
+(open, or mu = 0) has the tangential row F_T = r_T, whatever u_T.
 
 [ABD] V. Acary, M. Brémond, F. Dubois, CSMA 2017 (see `gauss_seidel`).
 """
@@ -29,13 +35,14 @@ from ..cones import (
     project_disk_jacobian,
     with_de_saxce,
 )
+from ..errors import InvalidInput
 
 Array = NDArray[np.float64]
 Linearised = tuple[Array, Array, Array]
 
 
 class ComplementarityFunction(Protocol):
-    """F and its generalised Jacobian."""
+    """F and its generalised Jacobian; rho as in the module."""
 
     def residual(self, r: Array, u: Array, law: Law, rho: Array) -> Array:
         """F, (nc, d), unit of r."""
@@ -46,9 +53,14 @@ class ComplementarityFunction(Protocol):
         ...
 
 
+def columns(rho: Array, d: int) -> Array:
+    """rho for each component of a contact, (nc, 1) or (nc, d), from (nc,) or (nc, 2)."""
+    return rho[:, None] if rho.ndim == 1 else rho[:, [0] + [1] * (d - 1)]
+
+
 def _disk_function(r: Array, u: Array, rho: Array, radius: Array) -> Array:
     """r - (x_N^+, P_disk(radius)(x_T))."""
-    x = r - rho[:, None] * u
+    x = r - columns(rho, r.shape[1]) * u
     return r - np.column_stack([np.maximum(x[:, 0], 0), project_disk(x[:, 1:], radius)])
 
 
@@ -56,19 +68,31 @@ def _disk_linearised(  # noqa: PLR0913
     r: Array, u: Array, rho: Array, radius: Array, radius_r: Array, radius_u: Array
 ) -> Linearised:
     """`_disk_function` with the derivatives of the radius in r_N and u_N, (nc,)."""
-    x = r - rho[:, None] * u
     d = r.shape[1]
+    each = columns(rho, d)
+    x = r - each * u
     closed = (x[:, 0] > 0).astype(float)
     in_t, in_radius = project_disk_jacobian(x[:, 1:], radius)
+    in_t[radius == 0] = 0  # the disk is a point: exact, and regular also at x_T = 0
     A = np.zeros((len(r), d, d))
     B = np.zeros((len(r), d, d))
     A[:, 0, 0] = 1 - closed
-    B[:, 0, 0] = rho * closed
+    B[:, 0, 0] = each[:, 0] * closed
     A[:, 1:, 1:] = np.eye(d - 1) - in_t
-    B[:, 1:, 1:] = rho[:, None, None] * in_t
+    B[:, 1:, 1:] = each[:, -1, None, None] * in_t
     A[:, 1:, 0] = -in_radius * radius_r[:, None]
     B[:, 1:, 0] = -in_radius * radius_u[:, None]
     return _disk_function(r, u, rho, radius), A, B
+
+
+def _one_per_contact(rho: Array) -> Array:
+    """Raise InvalidInput unless rho is (nc,)."""
+    if rho.ndim != 1:
+        raise InvalidInput(
+            f"rho: the natural map needs one per contact, shape (nc,), got {rho.shape}; "
+            "use AlartCurnier or JeanMoreau for rho_N and rho_T apart"
+        )
+    return rho
 
 
 @dataclass(frozen=True)
@@ -87,9 +111,10 @@ class AlartCurnier:
         zero = np.zeros(len(r))
         if isinstance(law, Tresca):
             return law.limit, zero, zero
-        x = r[:, 0] - rho * u[:, 0]
+        normal = columns(rho, 2)[:, 0]
+        x = r[:, 0] - normal * u[:, 0]
         slope = np.where(x > 0, law.mu, 0.0)
-        return law.mu * np.maximum(x, 0), slope, -rho * slope
+        return law.mu * np.maximum(x, 0), slope, -normal * slope
 
 
 @dataclass(frozen=True)
@@ -113,10 +138,11 @@ class NaturalMap:
 
     def residual(self, r: Array, u: Array, law: Law, rho: Array) -> Array:
         """F, (nc, d), unit of r."""
-        return law.natural_map(r, u, rho)
+        return law.natural_map(r, u, _one_per_contact(rho))
 
     def linearise(self, r: Array, u: Array, law: Law, rho: Array) -> Linearised:
         """(F, A, B) at (r, u)."""
+        _one_per_contact(rho)
         if isinstance(law, Tresca):
             return AlartCurnier().linearise(r, u, law, rho)
         d = r.shape[1]

@@ -1,4 +1,4 @@
-"""Semismooth Newton: exact generalised Jacobians, non-monotone line search, both forms.
+"""Semismooth Newton: exact generalised Jacobians, a line search, both forms.
 
 With (F, A, B) of a complementarity function (`functions`):
 
@@ -12,19 +12,20 @@ E = H (H^T H)^-1 the stiffness of the contact unknowns alone, which is sparse:
 (A S + B) y = g, dr = S y.  The tolerance of GMRES follows the Newton residual ([EW]), so early
 steps are cheap.
 
-Merit function of the line search: |F / rho|, unit of u, against the largest of the last values.
-Contacts that can not react (W_ii = 0) keep r = 0.
+Merit function of the line search (`line_search`): |F / rho|, unit of u.  Where rho comes from:
+`augmentation`.  Contacts that can not react (W_ii = 0) keep r = 0.
 
+[ABD] V. Acary, M. Brémond, F. Dubois, CSMA 2017 (see `gauss_seidel`);
 [QS] L. Qi, J. Sun, "A nonsmooth version of Newton's method", Math. Program. 58 (1993);
 [EW] S. Eisenstat, H. Walker, "Choosing the forcing terms in an inexact Newton method",
-SIAM J. Sci. Comput. 17 (1996); [GLL] L. Grippo, F. Lampariello, S. Lucidi, "A nonmonotone
-line search technique for Newton's method", SIAM J. Numer. Anal. 23 (1986).
+SIAM J. Sci. Comput. 17 (1996).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -32,11 +33,13 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from ..errors import SingularOperator
+from ..errors import InvalidInput, SingularOperator
 from ..linear import Direct, LinearSolver
 from ..problem import Form, FrictionProblem
-from .base import Breakdown, Iterate, Target, check_at_least, check_positive
-from .functions import AlartCurnier, ComplementarityFunction, Linearised
+from .augmentation import RhoStrategy, augmentation, own_blocks
+from .base import Breakdown, Iterate, Target, check_positive
+from .functions import AlartCurnier, ComplementarityFunction, Linearised, NaturalMap, columns
+from .line_search import LineSearch, NonMonotone
 
 Array = NDArray[np.float64]
 DENSE_UNKNOWNS = (
@@ -74,55 +77,55 @@ class Linearisation(Protocol):
 
 @dataclass(frozen=True)
 class SemismoothNewton:
-    """Semismooth Newton with a non-monotone line search.
+    """Semismooth Newton with a line search, [ABD] eq. (11).
 
     linear: None takes the best for the form: LU of A + B W in the Delassus form,
     the Schur complement with one factor of M in the global form.  A LinearSolver given here
     factorises the whole system of the global form in each step.
+
+    The natural map needs one rho per contact, because the projection onto Coulomb's cone is
+    that of one norm; Alart-Curnier and Jean-Moreau take rho_N and rho_T apart.
     """
 
     form: ClassVar[Form] = Form.ANY
     function: ComplementarityFunction = field(default_factory=AlartCurnier)
     linear: LinearSolver | None = None
-    memory: int = 5  # merit values the line search may look back on; 1: monotone
-    halvings: int = 12  # of the step before it is taken as it is; 0: no line search
-    rho: float = 1.0  # augmentation parameter relative to 1 / |W_ii|
+    line_search: LineSearch = field(default_factory=NonMonotone)
+    rho: float = 1.0  # augmentation parameter relative to what the strategy gives
+    rho_strategy: RhoStrategy = RhoStrategy.PER_CONTACT
 
     def __post_init__(self) -> None:
-        check_at_least(1, memory=self.memory)
-        check_at_least(0, halvings=self.halvings)
         check_positive(rho=self.rho)
+        if self.rho_strategy.splits and isinstance(self.function, NaturalMap):
+            raise InvalidInput(
+                f"rho_strategy: the natural map projects onto the cone and needs one rho per "
+                f"contact, got {self.rho_strategy.value}; use per-contact or spectral, or the "
+                "function AlartCurnier or JeanMoreau"
+            )
 
     def iterates(
         self, problem: FrictionProblem, start: Iterate, target: Target
     ) -> Iterator[Iterate]:
         """Newton steps from `start`; raises Breakdown when a step can not be computed."""
         system = self._linearise(problem)
-        law = _Residual(self.function, problem, self.rho)
+        rho = augmentation(problem, self.rho_strategy, self.rho)
+        law = _Residual(self.function, problem, rho)
         state = system.state(Iterate(law.admissible(start.r), start.v))
         state = replace(state, r=law.admissible(state.r))
         values: list[float] = []
         forcing = FORCING[1]
         while True:
             linearised = law.linearise(state)
-            values = [*values, law.size(linearised[0])][-self.memory :]
+            values.append(law.size(linearised[0]))
             if len(values) > 1:  # [EW] choice 2
                 ratio = min(values[-1] / max(values[-2], np.finfo(float).tiny), 1.0)
                 forcing = float(np.clip(0.5 * ratio**2, *FORCING))
             step, count = system.step(state, linearised, forcing)
             if not np.isfinite(step.r).all():
                 raise Breakdown("the Newton step is not finite")
-            state = state.moved(self._length(law, state, step, max(values)), step)
+            merit = partial(_merit, law, state, step)
+            state = state.moved(self.line_search.length(merit, values), step)
             yield Iterate(state.r, state.v, linear_iterations=count)
-
-    def _length(self, law: _Residual, state: State, step: State, ceiling: float) -> float:
-        """[GLL] step length; the shortest when none helps, 1 without a line search."""
-        t = 1.0
-        for _ in range(self.halvings):
-            if law.size(law.evaluate(state.moved(t, step))) <= (1 - 1e-4 * t) * ceiling:
-                return t
-            t /= 2
-        return t
 
     def _linearise(self, problem: FrictionProblem) -> Linearisation:
         if problem.form is Form.DELASSUS:
@@ -130,6 +133,11 @@ class SemismoothNewton:
         if self.linear is not None:
             return Augmented(problem, self.linear)
         return SchurComplement.of(problem)
+
+
+def _merit(law: _Residual, state: State, step: State, t: float) -> float:
+    """|F / rho| after t times the step."""
+    return law.size(law.evaluate(state.moved(t, step)))
 
 
 class _Residual:
@@ -140,11 +148,11 @@ class _Residual:
     """
 
     def __init__(
-        self, function: ComplementarityFunction, problem: FrictionProblem, scale: float
+        self, function: ComplementarityFunction, problem: FrictionProblem, rho: Array
     ) -> None:
-        self.function, self.law = function, problem.law
+        self.function, self.law, self.rho = function, problem.law, rho
         self.able = _able(problem)
-        self.rho = scale * np.where(problem.rho > 0, problem.rho, 1.0)
+        self.rows = columns(rho, problem.dimension)
         self.blocked = (~self.able)[:, :, None] * np.eye(problem.dimension)
 
     def admissible(self, r: Array) -> Array:
@@ -163,16 +171,12 @@ class _Residual:
 
     def size(self, F: Array) -> float:
         """|F / rho|, unit of u."""
-        return float(np.linalg.norm(F / self.rho[:, None]))
+        return float(np.linalg.norm(F / self.rows))
 
 
 def _able(problem: FrictionProblem) -> NDArray[np.bool_]:
     """Directions, (nc, d), in which a reaction moves its own contact; none without a normal."""
-    if problem.form is Form.DELASSUS:
-        blocks = problem.blocks.diagonal_blocks
-    else:
-        blocks = problem.local_stiffness
-    own = np.diagonal(blocks, axis1=1, axis2=2)[:, : problem.dimension]
+    own = np.diagonal(own_blocks(problem), axis1=1, axis2=2)
     able = own > NO_STIFFNESS * own.max(axis=1, keepdims=True, initial=0.0)
     return able & able[:, :1]
 
@@ -217,6 +221,7 @@ def _dense_step(A: Array, B: Array, W, F: Array) -> Array:
     own = matrix.reshape(nc, d, nc, d)
     own[np.arange(nc), :, np.arange(nc), :] += A
     scale = np.abs(matrix).max(axis=1, keepdims=True)
+    scale[scale == 0] = 1.0  # a row of zeros is for least squares
     matrix, b = matrix / scale, -F.ravel() / scale[:, 0]
     try:
         dr = np.linalg.solve(matrix, b)
