@@ -19,7 +19,7 @@ _HOME = {
     "linear": ("AlgebraicMultigrid", "ConjugateGradient", "Direct"),
     "problem": ("Form", "FrictionProblem"),
     "solution": ("ContactStatus", "Convergence", "FrictionSolution", "Outcome"),
-    "solvers": ("AlartCurnier", "Armijo", "Auto", "CompressedDelassus", "FullStep",
+    "solvers": ("AlartCurnier", "Armijo", "Auto", "Batch", "CompressedDelassus", "FullStep",
                 "GaussSeidel", "GoldsteinPrice", "Hybrid", "JeanMoreau", "LocalSolver",
                 "NaturalMap", "NonMonotone", "ProximalPoint", "RhoStrategy",
                 "SemismoothNewton", "SmoothingNewton"),

@@ -4,7 +4,7 @@ from .augmentation import RhoStrategy
 from .base import Breakdown, Iterate, Solver, Target
 from .compressed import CompressedDelassus
 from .functions import AlartCurnier, ComplementarityFunction, JeanMoreau, NaturalMap
-from .gauss_seidel import GaussSeidel
+from .gauss_seidel import Batch, GaussSeidel
 from .hybrid import Auto, Hybrid
 from .line_search import Armijo, FullStep, GoldsteinPrice, LineSearch, NonMonotone
 from .local_contact import LocalSolver
@@ -26,6 +26,7 @@ __all__ = [
     "AlartCurnier",
     "Armijo",
     "Auto",
+    "Batch",
     "Breakdown",
     "ComplementarityFunction",
     "CompressedDelassus",

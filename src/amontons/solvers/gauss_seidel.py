@@ -2,7 +2,14 @@
 
     r_i <- r_i + relaxation (exact solution of contact i given all others - r_i)  [ABD] eq. (12)
 
-optionally with Anderson acceleration: the sweep G is a fixed-point map, and the next iterate is
+A judgement costs nearly as much as a sweep.  With batch=ADAPTIVE one is due only when
+
+    |r_{k+1} - r_k| / |r_{k+1}| < tau,                                            [ABD] eq. (14)
+
+where tau is adapted: from each judged sweep to the change at which the error, falling in
+proportion, will be the tolerance.
+
+Optionally with Anderson acceleration: the sweep G is a fixed-point map, and the next iterate is
 the combination of the last ones whose residual G(r) - r is smallest.  A mixed iterate may leave
 the cone; the next sweep brings it back, so only sweeps are ever handed out.
 
@@ -15,6 +22,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from enum import Enum
 from typing import Any, ClassVar
 
 import numpy as np
@@ -30,6 +38,8 @@ from .base import Iterate, Target, check_at_least
 from .local_contact import LocalSolver, newton_contact, projection_contact
 
 Array = NDArray[np.float64]
+FIRST = 10  # sweeps before criterion (14) is first compared with the error
+LONGEST = 100  # sweeps without an iterate at most: the driver has a clock and a callback
 EXACT, NEWTON = int(LocalSolver.EXACT), int(LocalSolver.NEWTON)
 
 
@@ -178,6 +188,49 @@ def anderson_inplace(  # noqa: PLR0913
     return sweeps, change
 
 
+@njit(cache=True, error_model="numpy")
+def sweeps_until_inplace(
+    indptr,
+    indices,
+    data,
+    q,
+    coefficient,
+    tresca,
+    diagonal,
+    local,
+    omega,
+    r,
+    before,
+    sweeps,
+    tau,
+):  # noqa: PLR0913
+    """Up to `sweeps` sweeps, fewer when [ABD] eq. (14) holds; returns (sweeps done, left side).
+
+    before (nc, 3) is working memory.
+    """
+    change = math.inf
+    for k in range(sweeps):
+        before[:, :] = r
+        sweep_inplace(
+            indptr, indices, data, q, coefficient, tresca, diagonal, local, omega, False, r
+        )
+        moved = size = 0.0
+        for i in range(len(coefficient)):
+            for j in range(3):
+                moved += (r[i, j] - before[i, j]) ** 2
+                size += r[i, j] ** 2
+        change = math.sqrt(moved / size) if size > 0.0 else math.sqrt(moved)
+        if change < tau or moved == 0.0:
+            return k + 1, change
+    return sweeps, change
+
+
+class Batch(Enum):
+    """When Gauss-Seidel hands out an iterate, other than after a number of sweeps."""
+
+    ADAPTIVE = "adaptive"
+
+
 @dataclass(eq=False)
 class Acceleration:
     """Anderson's memory between two calls: see `anderson_inplace`."""
@@ -205,19 +258,25 @@ class GaussSeidel:
     """NSGS on the Delassus form; one iterate per `batch` sweeps.
 
     anderson_depth > 0 accelerates: the window of past sweeps, 5 to 10 is usual.
+    batch=Batch.ADAPTIVE judges when the cheap criterion [ABD] eq. (14) says so.
     """
 
     form: ClassVar[Form] = Form.DELASSUS
     local: LocalSolver = LocalSolver.EXACT  # how one contact is solved
     relaxation: float = 1.0  # below 2; 1.3 to 1.6 is often much faster on packings
     anderson_depth: int = 0  # past sweeps that are combined; 0: plain sweeps
-    batch: int = 1  # sweeps between two judgements
+    batch: int | Batch = 1  # sweeps between two judgements
 
     def __post_init__(self) -> None:
         check_at_least(0, anderson_depth=self.anderson_depth)
         if not 0 < self.relaxation < 2:
             raise InvalidInput(f"relaxation: expected between 0 and 2, got {self.relaxation}")
-        check_at_least(1, batch=self.batch)
+        if not isinstance(self.batch, Batch):
+            check_at_least(1, batch=self.batch)
+        elif self.anderson_depth:
+            raise InvalidInput(
+                "batch: ADAPTIVE compares plain sweeps, with anderson_depth give a number"
+            )
 
     def iterates(
         self, problem: FrictionProblem, start: Iterate, target: Target
@@ -228,6 +287,9 @@ class GaussSeidel:
             raise UnsupportedForm(f"local={self.local.name}: needs Coulomb friction; use EXACT")
         kernel = sweep_data(problem, self.local, self.relaxation)
         r = spatial(start.r)
+        if isinstance(self.batch, Batch):
+            yield from _adaptive(problem, kernel, r, target)
+            return
         if self.anderson_depth:
             memory = Acceleration(kernel, r, self.anderson_depth)
             while True:
@@ -236,3 +298,19 @@ class GaussSeidel:
         while True:
             done = sweeps_inplace(*kernel, r, self.batch, 0.0)
             yield Iterate(r[:, :d].copy(), iterations=done)
+
+
+def _adaptive(
+    problem: FrictionProblem, kernel: tuple[Any, ...], r: Array, target: Target
+) -> Iterator[Iterate]:
+    """Sweeps from r, an iterate where [ABD] eq. (14) holds or after LONGEST of them."""
+    before, d = np.empty_like(r), problem.dimension
+    sweeps, tau = FIRST, target.tolerance
+    while True:
+        done, change = sweeps_until_inplace(*kernel, r, before, sweeps, tau)
+        iterate = Iterate(r[:, :d].copy(), iterations=done)
+        error = problem.error(iterate.r)
+        yield iterate  # whoever asks for more was not content
+        if 0 < error < math.inf:
+            tau = change * min(target.tolerance / error, 0.5)
+        sweeps = LONGEST
