@@ -37,11 +37,12 @@ def apply_overrides(
     data = copy.deepcopy(data)
     for text in overrides:
         path, value = split_override(text)
-        _set(data, path, value, f"{file}: --set {text}")
+        set_value(data, path, value, f"{file}: --set {text}")
     return data
 
 
-def _set(data: dict[str, Any], path: list[str], value: Any, blame: str) -> None:
+def set_value(data: dict[str, Any], path: list[str], value: Any, blame: str) -> None:
+    """Set one value of nested tables and lists in place; `blame` begins its complaints."""
     node: Any = data
     for k, part in enumerate(path):
         last = k == len(path) - 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 import stat
 import tomllib
@@ -13,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..case import Settings, key_of, make_solver, method_class, read_case
-from ..case.overrides import split_override
+from ..case.overrides import set_value, split_override
 from ..case.settings import LIMITS
 from ..errors import FileFormatError, InvalidInput, SingularOperator
 from ..expressions import nearest
@@ -139,7 +140,8 @@ def override_settings(settings: Settings, overrides: Sequence[str]) -> Settings:
     """Settings changed by `solver.field=value`; `make_solver` checks the fields."""
     for text in overrides:
         path, value = split_override(text)
-        if path[0] != "solver" or len(path) != 2:
+        named = path[1:2] and path[1] in (*LIMITS, "tolerance", "time_limit", "method")
+        if path[0] != "solver" or len(path) < 2 or (named and len(path) > 2):
             raise InvalidInput(
                 f"--set {text}: expected solver.FIELD=VALUE, as this is not a case file"
             )
@@ -156,7 +158,9 @@ def override_settings(settings: Settings, overrides: Sequence[str]) -> Settings:
             method_class(str(value))
             settings = replace(settings, method=str(value))
         else:
-            settings = replace(settings, options={**settings.options, key: value})
+            options = copy.deepcopy(settings.options)
+            set_value(options, path[1:], value, f"--set {text}")
+            settings = replace(settings, options=options)
     return settings
 
 
