@@ -113,6 +113,19 @@ def published_fclib_error(r: Array, u: Array, q: Array, law: Law) -> float:
     return float(np.linalg.norm(residual) / scale) if scale > 0 else 0.0
 
 
+def published_natural_error(r: Array, u: Array, q: Array, law: Law) -> float:
+    """|F_nat(r)| / |q| with F_nat = r - P_K(r - û), [ABD] eq. (13) with rho = 1.
+
+    The stopping criterion of that comparison; 0 where r = 0 solves a problem with q = 0, else
+    infinite there.  It adds newtons to metres as the FCLib error does, and never decides.
+
+    [ABD] V. Acary, M. Brémond, F. Dubois, CSMA 2017.
+    """
+    residual = float(np.linalg.norm(law.natural_map(r, u, np.ones(len(r)))))
+    scale = float(np.linalg.norm(q))
+    return residual / scale if scale > 0 else (0.0 if residual == 0 else math.inf)
+
+
 def max_penetration(u: Array) -> float:
     """Largest -u_N, unit of u; 0 when nothing penetrates."""
     return float(max(-u[:, 0].min(initial=0.0), 0.0))
@@ -131,5 +144,6 @@ __all__ = [
     "max_penetration",
     "natural_error",
     "published_fclib_error",
+    "published_natural_error",
     "scaled_residual",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import judge
+from .cones import Law
 from .errors import SingularOperator
 from .judge import Measure
 from .problem import FrictionProblem
@@ -140,6 +142,17 @@ class FrictionSolution:
         None where it is not defined: M is singular and there is no q, or the solve was stopped
         before M was factorised.
         """
+        return self._published(judge.published_fclib_error)
+
+    @property
+    def natural_error(self) -> float | None:
+        """|r - P_K(r - û)| / |q|, for comparison only; None as `fclib_error`.
+
+        V. Acary, M. Brémond, F. Dubois, CSMA 2017, eq. (13).
+        """
+        return self._published(judge.published_natural_error)
+
+    def _published(self, measure: Callable[[Array, Array, Array, Law], float]) -> float | None:
         p = self.problem
         if not self.convergence.history:
             return None
@@ -147,7 +160,7 @@ class FrictionSolution:
             q = p.free_velocity
         except SingularOperator:
             return None
-        return judge.published_fclib_error(self.r, self.u, q, p.law)
+        return measure(self.r, self.u, q, p.law)
 
     @property
     def max_penetration(self) -> float:
