@@ -22,7 +22,7 @@ _HOME = {
     "solvers": ("AlartCurnier", "Armijo", "Auto", "Batch", "CompressedDelassus", "FullStep",
                 "GaussSeidel", "GoldsteinPrice", "Hybrid", "JeanMoreau", "LocalSolver",
                 "NaturalMap", "NonMonotone", "ProximalPoint", "RhoStrategy",
-                "SemismoothNewton", "SmoothingNewton"),
+                "SemismoothNewton", "SmoothingNewton", "SweepOrder"),
     "solve": ("drive",),
     "fclib": ("read_fclib", "write_fclib"),
     "masonry": ("Bond", "Wall"),

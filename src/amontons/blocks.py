@@ -8,12 +8,14 @@ serves both dimensions.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
 Array = NDArray[np.float64]
+WELL_CONDITIONED = 1e-6  # |det A| / max|A|^3 from which A^-1 loses no digits that matter
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +34,27 @@ class BlockRows:
     def diagonal_blocks(self) -> Array:
         """W_ii, shape (nc, 3, 3)."""
         return self.data[self.diagonal]
+
+    @cached_property
+    def eliminated(self) -> Array:
+        """What the exact solution of one contact needs of W_ii = A, (nc, 17).
+
+        Columns: 0: 1 where A is well enough conditioned for its inverse to be used; 1-9: A^-1
+        by rows; 10-11: k = A_TN / A_NN; 12-15: A_TT - k A_NT by rows; 16: (trace |A|)^2.
+        """
+        A = self.diagonal_blocks
+        size = np.abs(A).max(axis=(1, 2), initial=0.0)
+        a = np.where(A[:, 0, 0] > 0, A[:, 0, 0], 1.0)
+        out = np.zeros((len(A), 17))
+        regular = (np.abs(np.linalg.det(A)) > WELL_CONDITIONED * size**3) & (A[:, 0, 0] > 0)
+        out[:, 0] = regular
+        out[regular, 1:10] = np.linalg.inv(A[regular]).reshape(-1, 9)
+        k = A[:, 1:, 0] / a[:, None]
+        out[:, 10:12] = k
+        out[:, 12:16] = (A[:, 1:, 1:] - k[:, :, None] * A[:, :1, 1:]).reshape(-1, 4)
+        out[:, 16] = np.abs(np.diagonal(A, axis1=1, axis2=2)).sum(axis=1) ** 2
+        out.flags.writeable = False
+        return out
 
     @property
     def density(self) -> float:

@@ -115,7 +115,7 @@ class FrictionProblem:
             W = _vector("W", W, (q.size, q.size))
         _expect("W", W.shape, (q.size, q.size))
         problem = cls(law, W=W, q=q, name=name)
-        _ = problem.kernel_data  # convert once, here, and not in the first solve
+        _ = problem.kernel_data, problem.blocks.eliminated  # once, not in the first solve
         return problem
 
     # ---------------------------------------------------------------- sizes and views

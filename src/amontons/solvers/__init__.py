@@ -10,6 +10,7 @@ from .line_search import Armijo, FullStep, GoldsteinPrice, LineSearch, NonMonoto
 from .local_contact import LocalSolver
 from .newton import SemismoothNewton
 from .smoothing import ProximalPoint, SmoothingNewton
+from .sweeps import SweepOrder
 
 METHODS: dict[str, type] = {
     "auto": Auto,
@@ -45,5 +46,6 @@ __all__ = [
     "SemismoothNewton",
     "SmoothingNewton",
     "Solver",
+    "SweepOrder",
     "Target",
 ]

@@ -29,17 +29,16 @@ from ..errors import SingularOperator
 from ..judge import natural_error
 from ..problem import FrictionProblem
 from .base import Breakdown, Iterate, Target
-from .gauss_seidel import Acceleration, sweep_data, sweeps_inplace
 from .newton import SemismoothNewton
 from .race import Race
 from .smoothing import ProximalPoint, SmoothingNewton, Workspace
+from .sweeps import Acceleration, SweepOrder, sweep_data, sweeps_inplace, watch_for
 
 Array = NDArray[np.float64]
 FIRST_SWEEPS = 10  # plain sweeps that every problem gets first
 DEPTH = 10  # past sweeps that Anderson acceleration combines
-CHUNK = 20  # sweeps between two looks at their rate
+CHUNK = 40  # sweeps between two looks at their rate
 LONGEST = 6000  # sweeps after which Newton gets its chance whatever the rate promises
-WORTH_A_RACE = 300  # sweeps as dear as Newton, from which relaxed sweeps race first
 HOPELESS = 8.0  # sweeps that promise to cost this many times Newton are left at once
 NEWTON_STEPS = 120
 PATIENCE = 40  # Newton steps without halving the error
@@ -47,13 +46,12 @@ SEMISMOOTH_CONTACTS = 600  # above, a dense factor costs more than it brings
 DENSE = 0.5  # share of blocks of W above which it comes from a mesh
 ROUNDS = 6  # repetitions of the last stages before Auto gives up
 # Nanoseconds measured on one core: only their ratios matter, and only roughly.
-SWEEP_BLOCK, SWEEP_CONTACT, HISTORY_CONTACT, PRODUCT, NEWTON_CONTACT = (
-    3.0,
-    90.0,
-    200.0,
-    5.4,
-    700.0,
-)
+SWEEP_BLOCK = 2.0
+SWEEP_CONTACT = 30.0
+HISTORY_CONTACT = 35.0
+PRODUCT = 5.4
+NEWTON_CONTACT = 500.0
+NEWTON_START, NEWTON_PER_DIGIT = 10, 6  # steps that smoothing Newton takes, typically
 
 
 @dataclass(eq=False)
@@ -68,14 +66,13 @@ class Portfolio:
     budget: float = 0.0  # cost of Newton steps not yet matched by sweeps
 
     def __post_init__(self) -> None:
+        self.start = self.r
         self.error = self._judge(self.r)
         self.goal = self.target.tolerance * self.problem.q_norm
-        self.kernel = sweep_data(self.problem)
+        self.data = sweep_data(self.problem, order=SweepOrder.APPROACH)
 
     def stages(self) -> Iterator[Iterate]:
         """All stages in the order of the module's text."""
-        yield self._plain(FIRST_SWEEPS)
-        self.first = self.r.copy()
         yield from self._sweeping()
         if isinstance(self.problem.law, Tresca):
             yield from self._semismooth()
@@ -90,34 +87,28 @@ class Portfolio:
             yield from self._patient_sweeps()
 
     # ---------------------------------------------------------------- stages
-    def _plain(self, sweeps: int) -> Iterate:
-        x = self.r.copy()
-        count = sweeps_inplace(*self.kernel, x, sweeps, 0.1 * self.goal)
-        return self._offer(x, count, "Gauss-Seidel")
-
     def _sweeping(self) -> Iterator[Iterate]:
         """Accelerated sweeps while they promise an end, then relaxed ones worth one Newton."""
-        memory = Acceleration(self.kernel, self.r, DEPTH)
-        done, spent, small, last = 0, 0.0, 0.3 * self.goal, self.error
-        newton = self._newton_cost()
+        memory = Acceleration(self.data, self.r, DEPTH)
+        done, spent, last = 0, 0.0, self.error
+        watch = watch_for(self.goal)
         while done < LONGEST:
-            count, change = memory.sweep(max(CHUNK, done // 4), small)
-            small *= 0.1 if change <= small else 1.0
-            yield self._offer(memory.r.copy(), count, "Anderson Gauss-Seidel")
+            count = memory.sweep(max(CHUNK, done // 4), watch)
+            yield self._offer(memory.r.copy(), count, "Anderson Gauss-Seidel", watch[2])
             done, spent = done + count, spent + self.costs["accelerated"] * count
             promise = self.costs["accelerated"] * self._sweeps_left(last, count)
             last, newton = self.latest, self._newton_cost()
-            if done >= 2 * CHUNK and promise > (1.0 if spent > newton else HOPELESS) * newton:
+            if promise > (1.0 if spent > newton else HOPELESS) * newton:
                 break
-        left = newton / self.costs["sweep"]
-        while left > WORTH_A_RACE and self.error > self.goal:
+        left = (self._newton_cost() - spent) / self.costs["sweep"]
+        while left > 0 and self.error > self.goal:
             iterate = self._relaxed(100)
             left -= iterate.iterations
             yield iterate
 
     def _relaxed(self, sweeps: int) -> Iterate:
         """Sweeps of the race between relaxations (see `Race`)."""
-        track, count = self.race.run(sweeps, 0.1 * self.goal)
+        track, count = self.race.run(sweeps, self.goal)
         return self._offer(
             track.r.copy(), count, f"Gauss-Seidel, relaxation {track.relaxation:g}"
         )
@@ -125,7 +116,9 @@ class Portfolio:
     @cached_property
     def race(self) -> Race:
         """Over-relaxed sweeps from the first point: accelerated ones keep the slow modes."""
-        return Race(self.problem, self.first)
+        r = spatial(self.start)
+        sweeps_inplace(self.data, r, FIRST_SWEEPS, watch_for(0.0))
+        return Race(self.problem, r)
 
     def _sweeps_left(self, before: float, count: int) -> float:
         """Sweeps to the goal at the rate of the last `count`, infinite without progress."""
@@ -167,9 +160,9 @@ class Portfolio:
         return {"sweep": sweep, "accelerated": sweep + history, "newton": newton}
 
     def _newton_cost(self) -> float:
-        """Nanoseconds that Newton will take: about three steps per digit, and a start."""
+        """Nanoseconds that Newton will take from here."""
         digits = math.log10(max(self.error / self.goal, 1.0))
-        return self.costs["newton"] * (6 + 3 * digits)
+        return self.costs["newton"] * (NEWTON_START + NEWTON_PER_DIGIT * digits)
 
     def _newton(self, round_: int) -> Iterator[Iterate]:
         """Smoothing Newton from the best point and from zero, in several variants."""
@@ -177,9 +170,9 @@ class Portfolio:
         nearby = max(self.error, self.goal) / root
         afar = 0.1 * self.problem.q_norm / root
         zero = np.zeros_like(self.r)
-        starts = [(self.r, nearby, 0.3), (zero, afar, 0.3)]
+        starts = [(self.r, 10 * nearby, 0.3), (zero, afar, 0.3)]
         if self.problem.contacts <= 300 or round_:  # variants are cheap there
-            starts += [(self.r, 10 * nearby, 0.5), (zero, 10 * afar, 0.5)]
+            starts += [(self.r, nearby, 0.3), (zero, 10 * afar, 0.5)]
         for origin, sigma, shrink in starts:
             count, _, _, found = self.work.newton(
                 origin.copy(), sigma, SmoothingNewton(shrink=shrink), goal=0.5 * self.goal,
@@ -223,9 +216,9 @@ class Portfolio:
     def _judge(self, r: Array) -> float:
         return natural_error(*self.problem.kernel_data, r)
 
-    def _offer(self, x: Array, iterations: int, stage: str) -> Iterate:
-        """Keep x if it is better, and hand out the best."""
-        self.latest = error = self._judge(x)
+    def _offer(self, x: Array, iterations: int, stage: str, error: float = math.inf) -> Iterate:
+        """Keep x if it is better, and hand out the best; error of x, unit of u, if known."""
+        self.latest = error = error if error < math.inf else self._judge(x)
         if error < self.error:
             self.r, self.error = x, error
         return Iterate(

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from ..judge import natural_error
 from ..problem import FrictionProblem
-from .gauss_seidel import sweep_data, sweeps_inplace
 from .local_contact import LocalSolver
+from .sweeps import Sweep, sweep_data, sweeps_inplace, watch_for
 
 Array = NDArray[np.float64]
 RELAXATIONS = (1.0, 1.6, 1.3, 0.9)
@@ -30,7 +30,7 @@ class Track:
     """Sweeps with one relaxation."""
 
     relaxation: float
-    kernel: tuple
+    data: Sweep
     r: Array
     error: float = math.inf
     done: int = 0
@@ -53,11 +53,11 @@ class Race:
             track.r, track.error, track.done = r.copy(), natural_error(*self.data, r), 0
             track.mark, track.tired = (0, math.inf), False
 
-    def run(self, sweeps: int, small: float) -> tuple[Track, int]:
-        """Some sweeps of one track, at most until one changes less than `small`."""
+    def run(self, sweeps: int, goal: float) -> tuple[Track, int]:
+        """Some sweeps of one track, at most until its error, unit of u, is `goal`."""
         track = self._next()
         wanted = min(sweeps, START - track.done) if track.done < START else sweeps
-        count = sweeps_inplace(*track.kernel, track.r, wanted, small)
+        count = sweeps_inplace(track.data, track.r, wanted, watch_for(goal))
         track.done += count
         track.error = natural_error(*self.data, track.r)
         if track.error < 0.5 * track.mark[1]:

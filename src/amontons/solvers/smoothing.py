@@ -40,7 +40,7 @@ from ..judge import PENETRATION, contact_residual, natural_error
 from ..problem import Form, FrictionProblem
 from .base import Breakdown, Iterate, Target, check_at_least, check_positive
 from .block_lu import Symbolic, analyse, factorise_inplace, solve_inplace
-from .gauss_seidel import sweep_data, sweep_inplace
+from .sweeps import sweep_data, sweep_inplace
 
 Array = NDArray[np.float64]
 PINNED = 1e16  # relative stiffness that keeps r_T = 0 where mu = 0
@@ -305,7 +305,7 @@ class Workspace:
         """Gauss-Seidel sweeps on r in place, alternating direction."""
         data = sweep_data(self.problem)
         for k in range(count):
-            sweep_inplace(*data, k % 2 == 1, r)
+            sweep_inplace(data, k % 2 == 1, r)
 
 
 @dataclass(frozen=True)
