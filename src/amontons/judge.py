@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from .cones import Law
 
 Array = NDArray[np.float64]
+EPSILON = float(np.finfo(float).eps)
 PENETRATION = 0.5  # share of a penetration that counts at least, whatever mu
 
 
@@ -89,6 +90,21 @@ def natural_error(indptr, indices, data, q, coefficient, tresca, rho, r):
     return math.sqrt(total) if math.isfinite(total) else math.inf
 
 
+@njit(cache=True, error_model="numpy")
+def rounding_error(rho, r):
+    """eps |r / rho|, unit of u: what rounding may hide in the velocities that reactions make.
+
+    Huge reactions that cancel, as of a body between two closing walls, swallow q, and with it
+    any error; r (nc, d), rho as in `natural_error`.
+    """
+    total = 0.0
+    for i in range(len(rho)):
+        if rho[i] > 0.0:
+            for k in range(r.shape[1]):
+                total += (r[i, k] / rho[i]) ** 2
+    return EPSILON * math.sqrt(total)
+
+
 def scaled_residual(r: Array, u: Array, law: Law, rho: Array) -> float:
     """NumPy form of `natural_error` with u given; unit of u."""
     if not (np.isfinite(r).all() and np.isfinite(u).all()):
@@ -145,5 +161,6 @@ __all__ = [
     "natural_error",
     "published_fclib_error",
     "published_natural_error",
+    "rounding_error",
     "scaled_residual",
 ]

@@ -339,6 +339,13 @@ class FrictionProblem:
         assert v is not None
         return self._residual_error(r, v)
 
+    def rounding(self, r: Array) -> float:
+        """What rounding alone may hide in `error`, unit-free: no smaller error can be known."""
+        if self.measure is Measure.EXACT:
+            p = self.condensed()
+            return _ratio(judge.rounding_error(p.rho, r), p.q_norm)
+        return _ratio(judge.rounding_error(self.rho, r), self._scales[1])
+
     def exact_error(self, r: Array) -> float:
         """The exact measure of the Delassus form."""
         rows = r if r.shape[1] == 3 and r.flags.c_contiguous else spatial(r)
