@@ -71,7 +71,9 @@ def augmentation(problem: FrictionProblem, strategy: RhoStrategy, factor: float)
     if strategy is RhoStrategy.GLOBAL:
         smallest = problem.rho[able].min() if able.any() else 1.0
         return np.full(problem.contacts, factor * smallest)
-    blocks = np.where(able[:, None, None], own_blocks(problem), np.eye(problem.dimension))
+    blocks = own_blocks(problem)
+    able = blocks.any(axis=(1, 2))
+    blocks = np.where(able[:, None, None], blocks, np.eye(problem.dimension))
     if strategy is RhoStrategy.SPECTRAL:
         largest, smallest = _singular_values(blocks)
         return factor / np.sqrt(smallest * largest)
