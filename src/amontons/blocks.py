@@ -101,8 +101,8 @@ def _embed(planar: Array, diagonal: NDArray[np.int32]) -> Array:
     """3x3 blocks of 2x2 ones; the second tangent gets the stiffness of the first."""
     data = np.zeros((len(planar), 3, 3))
     data[:, :2, :2] = planar
-    own = data[diagonal, 1, 1]
-    data[diagonal, 2, 2] = np.where(own > 0, own, 1.0)
+    normal, own = data[diagonal, 0, 0], data[diagonal, 1, 1]
+    data[diagonal, 2, 2] = np.where(own > 0, own, normal)  # a held tangent; 0: no reaction
     return data
 
 

@@ -34,7 +34,9 @@ def test_a_planar_contact_gets_a_decoupled_second_tangent():
     W = np.array([[2.0, 1.0], [1.0, 3.0]])
     block = block_rows(W, 2).diagonal_blocks[0]
     np.testing.assert_array_equal(block, [[2, 1, 0], [1, 3, 0], [0, 0, 3]])
-    assert block_rows(np.zeros((2, 2)), 2).diagonal_blocks[0, 2, 2] == 1
+    assert block_rows(np.zeros((2, 2)), 2).diagonal_blocks[0, 2, 2] == 0  # can not react
+    held = np.diag([1e-9, 0.0])  # in its own unit, whatever that is
+    assert block_rows(held, 2).diagonal_blocks[0, 2, 2] == 1e-9
 
 
 def test_spatial_is_a_copy():
