@@ -21,17 +21,21 @@ from scipy import sparse
 
 from . import judge
 from .blocks import BlockRows, block_rows, spatial
+from .condensation import Condensation
 from .cones import Coulomb, Law, Tresca
 from .errors import InvalidInput, SingularOperator, UnsupportedForm
 from .judge import Measure
 from .linear import ConjugateGradient, Direct, Factor, LinearSolver
+from .linear.bodies import Bodies, BodyFactor
 from .linear.small_blocks import block_diagonal_inverse
 
 Array = NDArray[np.float64]
 Matrix = sparse.csr_array | sparse.csc_array | Array
+LARGEST = 1e100  # entry in any unit: squares must stay finite, and 1 / LARGEST positive
 DENSE_LIMIT = 4e9  # bytes that condensed() may fill before it refuses
 DIRECT_LIMIT = 600_000  # unknowns of a mesh whose factor takes some 10 GB
-EXACT_WORK = 2e6  # n * nc * d up to which W is formed to judge a global problem with coupled M
+EXACT_WORK = 2e6  # n * nc * d up to which forming W costs nothing that matters
+CHEAP = 2.0  # work of W, relative to that of a compressed W, which is full and not exact
 
 
 class Form(Enum):
@@ -196,15 +200,36 @@ class FrictionProblem:
     def factor(self) -> Factor:
         """M prepared for solves, made once and shared by all variants of this problem.
 
-        A sparse factor; conjugate gradients with multigrid where the factor of a mesh would not
-        fit into memory (more than DIRECT_LIMIT unknowns, near_nullspace given).
+        A sparse factor, equal bodies sharing one; conjugate gradients with multigrid where the
+        factor of a mesh would not fit into memory (more than DIRECT_LIMIT unknowns in one body,
+        near_nullspace given).
         """
         self._need(Form.GLOBAL)
         M, modes = self.M, self.near_nullspace
         assert M is not None
-        iterative = self.unknowns > DIRECT_LIMIT and modes is not None
+        bodies = self.bodies
+        largest = max((m.shape[1] for m in bodies.members), default=0)
+        iterative = largest > DIRECT_LIMIT and modes is not None
+        if bodies.count > 1 and not iterative:
+            return self._kept("factor", (M,), lambda: bodies.factor(M))
         solver: LinearSolver = ConjugateGradient() if iterative else Direct()
         return self._kept("factor", (M,), lambda: solver.factor(M, modes))
+
+    @cached_property
+    def bodies(self) -> Bodies:
+        """The blocks into which M falls apart (global form only)."""
+        self._need(Form.GLOBAL)
+        M = self.M
+        assert M is not None
+        return self._kept("bodies", (M,), lambda: Bodies.of(M))
+
+    @cached_property
+    def _condensation(self) -> Condensation:
+        H = self.H
+        assert H is not None
+        return self._kept(
+            "condensation", (self.M, H), lambda: Condensation(self.bodies, H, self.dimension)
+        )
 
     @cached_property
     def small_blocks(self) -> sparse.csc_array | None:
@@ -221,11 +246,18 @@ class FrictionProblem:
 
     @cached_property
     def condensing_is_cheap(self) -> bool:
-        """True when W costs less than a few solves of the problem itself."""
-        return self.form is Form.DELASSUS or (
-            self.small_blocks is not None
-            or self.unknowns * self.contacts * self.dimension <= EXACT_WORK
-        )
+        """True when W is the best to solve with: it then also judges (`measure`).
+
+        For rigid bodies, small problems, and where it takes less work than CHEAP compressed W
+        and fits into memory; see `condensation` for the counts.
+        """
+        if self.form is Form.DELASSUS or self.small_blocks is not None:
+            return True
+        if self.unknowns * self.contacts * self.dimension <= EXACT_WORK:
+            return True
+        parts = self._condensation
+        fits = 8.0 * self.dimension**2 * parts.blocks <= DENSE_LIMIT
+        return fits and parts.work <= CHEAP * parts.compressed_work
 
     def condensed(self) -> FrictionProblem:
         """The Delassus form of this problem: W = H^T M^-1 H, q = H^T M^-1 f + w.
@@ -246,15 +278,31 @@ class FrictionProblem:
         inverse = self.small_blocks
         if inverse is not None:
             W: Matrix = (self.H.T @ (inverse @ self.H)).tocsr()
-        else:
-            if 8.0 * m * m > DENSE_LIMIT:
-                raise InvalidInput(
-                    f"condensed: W would take {8e-9 * m * m:.1f} GB for {self.contacts} "
-                    "contacts; solve the global form with SemismoothNewton, "
-                    "which does not form W"
-                )
-            W = self._dense_delassus()
-        return FrictionProblem.from_delassus(W, self.free_velocity, self.law)
+            return FrictionProblem.from_delassus(W, self.free_velocity, self.law)
+        several = self.bodies.count > 1 and isinstance(self.factor(), BodyFactor)
+        size = 8.0 * (self.dimension**2 * self._condensation.blocks if several else m * m)
+        if size > DENSE_LIMIT:
+            raise InvalidInput(
+                f"condensed: W would take {1e-9 * size:.1f} GB for {self.contacts} "
+                "contacts; solve the global form with SemismoothNewton, "
+                "which does not form W"
+            )
+        if several:
+            rows = self._condensation.delassus(self.factor())  # type: ignore[arg-type]
+            return self._from_blocks(rows, self.free_velocity, self.law)
+        return FrictionProblem.from_delassus(
+            self._dense_delassus(), self.free_velocity, self.law
+        )
+
+    @classmethod
+    def _from_blocks(cls, rows: BlockRows, q: Array, law: Law) -> FrictionProblem:
+        """The problem in Delassus form whose W is there in block rows."""
+        d = q.shape[1]
+        shape = (q.size, q.size)
+        tiles = sparse.bsr_array((rows.data[:, :d, :d], rows.indices, rows.indptr), shape=shape)
+        problem = cls(law, W=_read_only(tiles.tocsr()), q=q)
+        problem._kept("blocks", (problem.W,), lambda: rows)
+        return problem
 
     @cached_property
     def free_velocity(self) -> Array:
@@ -436,6 +484,16 @@ def _finite(name: str, values: Array) -> None:
         )
 
 
+def _squarable(name: str, values: Array) -> None:
+    """Refuse what is so large or small in all entries that its square is no number any more."""
+    size = float(np.abs(values).max(initial=0.0))
+    if size > LARGEST or 0 < size < 1 / LARGEST:
+        raise InvalidInput(
+            f"{name}: its largest entry is {size:.1e}, which can not be squared; use units in "
+            f"which it lies between {1 / LARGEST:g} and {LARGEST:g}"
+        )
+
+
 def _real(name: str, values: object) -> Array:
     """A float copy; rejects texts, ragged lists and complex numbers."""
     try:
@@ -454,6 +512,7 @@ def _vector(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
     array = _real(name, values)
     _expect(name, array.shape, shape)
     _finite(name, array)
+    _squarable(name, array)
     array.flags.writeable = False
     return array
 
@@ -466,6 +525,7 @@ def _contact_rows(name: str, values: ArrayLike, nc: int) -> Array:
     if array.ndim != 2 or array.shape[0] != nc or array.shape[1] not in (2, 3):
         raise InvalidInput(f"{name}: expected shape ({nc}, 2) or ({nc}, 3), got {array.shape}")
     _finite(name, array)
+    _squarable(name, array)
     array.flags.writeable = False
     return array
 
@@ -492,4 +552,5 @@ def _sparse(name: str, matrix: Matrix) -> sparse.csc_array:
         raise InvalidInput(
             f"{name}[{row}, {column}]: expected a finite number, got {out.data[bad[0]]}"
         )
+    _squarable(name, out.data)
     return _read_only(out)
