@@ -73,14 +73,35 @@ def block_rows(W: sparse.csr_array | Array, d: int) -> BlockRows:
     order = np.lexsort((columns, rows))
     rows, columns = rows[order].astype(np.int32), columns[order].astype(np.int32)
     indptr = np.searchsorted(rows, np.arange(nc + 1)).astype(np.int32)
-    indices = columns
     diagonal = np.flatnonzero(rows == columns).astype(np.int32)
-    data = np.ascontiguousarray(tiles[order])
-    if d == 2:
-        data = _embed(data, diagonal)
+    return embedded(indptr, columns, np.ascontiguousarray(tiles[order]), diagonal)
+
+
+def embedded(
+    indptr: NDArray[np.int32],
+    indices: NDArray[np.int32],
+    tiles: Array,
+    diagonal: NDArray[np.int32],
+) -> BlockRows:
+    """Block rows of sorted tiles (k, d, d), the diagonal among them; locks the arrays."""
+    data = _embed(tiles, diagonal) if tiles.shape[1] == 2 else tiles
     for array in (indptr, indices, data, diagonal):
         array.flags.writeable = False
     return BlockRows(indptr, indices, data, diagonal)
+
+
+def block_part(blocks: BlockRows, contacts: NDArray[np.int64]) -> BlockRows:
+    """The block rows of some contacts, given in ascending order."""
+    nc = len(blocks.diagonal)
+    number = np.full(nc, -1, dtype=np.int32)
+    number[contacts] = np.arange(len(contacts), dtype=np.int32)
+    rows = number[np.repeat(np.arange(nc), np.diff(blocks.indptr))]
+    columns = number[blocks.indices]
+    kept = (rows >= 0) & (columns >= 0)
+    rows, columns = rows[kept], columns[kept]
+    indptr = np.searchsorted(rows, np.arange(len(contacts) + 1)).astype(np.int32)
+    diagonal = np.flatnonzero(rows == columns).astype(np.int32)
+    return embedded(indptr, columns, blocks.data[kept], diagonal)
 
 
 def _sparse_tiles(W: sparse.csr_array, d: int) -> tuple[NDArray, NDArray, Array]:

@@ -11,7 +11,7 @@ import amontons
 
 PACKAGE = Path(amontons.__file__).parent
 ORDER = (
-    "errors < files < cones < linear < blocks < judge < problem < one_contact < status < "
+    "errors < files < cones < linear < blocks < condensation < judge < problem < one_contact < status < "
     "solution < solvers < solve < fem < contact < model < masonry < evolution < analysis "
     "< gallery < fclib < checkpoint < expressions < case < vtk < plots < output < results "
     "< report < api < cli"

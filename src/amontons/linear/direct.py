@@ -78,7 +78,7 @@ class Direct:
         for backend in chosen:
             try:
                 solve = _FACTORISE[backend](matrix, self.threads)
-                return DirectFactor(_checked(matrix, solve), backend)
+                return DirectFactor(checked(matrix, solve), backend)
             except (ArithmeticError, RuntimeError, MemoryError, ValueError) as error:
                 reasons.append(f"{backend.value}: {error}")
         raise SingularOperator(
@@ -100,7 +100,7 @@ class DirectFactor:
         return self.apply(b)
 
 
-def _checked(matrix: sparse.csc_array, solve: Solve) -> Solve:
+def checked(matrix: sparse.csc_array, solve: Solve) -> Solve:
     """`solve`, once refined where it is inexact, after a trial with a known solution.
 
     A singular matrix shows here, whatever the backend says; so do perturbed pivots, which
