@@ -41,7 +41,7 @@ CHUNK = 40  # sweeps between two looks at their rate
 LONGEST = 6000  # sweeps after which Newton gets its chance whatever the rate promises
 HOPELESS = 8.0  # sweeps that promise to cost this many times Newton are left at once
 NEWTON_STEPS = 120
-PATIENCE = 40  # Newton steps without halving the error
+PATIENCE = 20  # Newton steps without halving the error
 SEMISMOOTH_CONTACTS = 600  # above, a dense factor costs more than it brings
 DENSE = 0.5  # share of blocks of W above which it comes from a mesh
 ROUNDS = 6  # repetitions of the last stages before Auto gives up
@@ -51,7 +51,8 @@ SWEEP_CONTACT = 30.0
 HISTORY_CONTACT = 35.0
 PRODUCT = 5.4
 NEWTON_CONTACT = 500.0
-NEWTON_START, NEWTON_PER_DIGIT = 10, 6  # steps that smoothing Newton takes, typically
+NEWTON_START, NEWTON_PER_DIGIT = 20, 8  # steps that smoothing Newton takes, typically
+RACE_FIRST = 50.0  # sweeps that a Newton step costs, from which relaxed sweeps come first
 
 
 @dataclass(eq=False)
@@ -67,7 +68,7 @@ class Portfolio:
 
     def __post_init__(self) -> None:
         self.start = self.r
-        self.error = self._judge(self.r)
+        self.error = self._judge(self.r) if self.r.any() else math.inf
         self.goal = self.target.tolerance * self.problem.q_norm
         self.data = sweep_data(self.problem, order=SweepOrder.APPROACH)
 
@@ -101,7 +102,8 @@ class Portfolio:
             if promise > (1.0 if spent > newton else HOPELESS) * newton:
                 break
         left = (self._newton_cost() - spent) / self.costs["sweep"]
-        while left > 0 and self.error > self.goal:
+        race = self.costs["newton"] > RACE_FIRST * self.costs["sweep"]
+        while race and left > 0 and self.error > self.goal:
             iterate = self._relaxed(100)
             left -= iterate.iterations
             yield iterate
@@ -122,7 +124,9 @@ class Portfolio:
 
     def _sweeps_left(self, before: float, count: int) -> float:
         """Sweeps to the goal at the rate of the last `count`, infinite without progress."""
-        if not (math.isfinite(before) and math.isfinite(self.latest)):
+        if before == math.inf:  # no rate yet
+            return 0.0
+        if not math.isfinite(self.latest):
             return math.inf
         rate = math.log(max(before, 1e-300) / max(self.latest, 1e-300)) / count
         left = math.log(max(self.latest / self.goal, 1.0))
