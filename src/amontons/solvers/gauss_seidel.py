@@ -36,8 +36,8 @@ from .base import Iterate, Target, check_at_least
 from .local_contact import LocalSolver
 from .sweeps import (
     Acceleration,
-    SweepOrder,
     Sweep,
+    SweepOrder,
     sweep_data,
     sweeps_inplace,
     sweeps_until_inplace,
