@@ -13,7 +13,7 @@ import json
 import time
 import warnings
 from collections import Counter
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +27,13 @@ from amontons.errors import AmontonsError
 from amontons.problem import Form, FrictionProblem
 from amontons.solution import FrictionSolution
 
+NOTE = """\
+`Auto` and one other solver in turn, options too, solve each problem to 1e-8 (1e-6 in single
+precision); what comes back is checked without the package's own judge. Refused: the method does
+not fit the problem and says so. A finding is an exception, a warning, a number that is not
+finite, an answer called converged that is none or breaks a law, a change with units, order or
+frames, a limit overrun, and a solvable problem that Auto leaves.
+"""
 MARGIN = 1.0  # seconds that one compiled call may take beyond the limit
 ROUNDING = 1e-10  # relative difference of two evaluations of the same error
 SCALES = (2.0**20, 2.0**-14)  # length and force: exact in binary, so is what they lead to
@@ -265,8 +272,8 @@ def broken_laws(p: FrictionProblem, r: Array, e: Evidence, each: Array) -> list[
 def equivariance(case: Case, limit: float, iterations: int | None = None) -> list[str]:
     """In units apart by powers of two Auto must do the same, digit by digit.
 
-    Where W is singular reactions are not unique, and a rounding can lead to others: under-relaxed
-    sweeps take those of open contacts below the smallest normal number.
+    Where W is singular reactions are not unique, and a rounding can lead to others:
+    under-relaxed sweeps take those of open contacts below the smallest normal number.
     """
     if case.problem.form is not Form.DELASSUS:
         return []
@@ -341,13 +348,13 @@ def table(runs: list[Run]) -> list[str]:
         slowest = max(run.seconds for run in auto)
         solved = sum(run.outcome == "converged" for run in rest)
         lines.append(
-            f"| {family} | {len(auto)} | {solvable} | {len(good)} | {others(auto)} | "
-            f"{worst:.1e} | {slowest:.2g} s | {solved} of {len(rest)} | {others(rest)} |"
+            f"| {family} | {len(auto)} | {solvable} | {len(good)} | {unsolved(auto)} | "
+            f"{worst:.1e} | {slowest:.2g} s | {solved} of {len(rest)} | {unsolved(rest)} |"
         )
     return lines
 
 
-def others(runs: list[Run]) -> str:
+def unsolved(runs: list[Run]) -> str:
     """Outcomes other than converged, counted."""
     count = Counter(run.outcome for run in runs if run.outcome != "converged")
     return ", ".join(f"{n} {name.replace('_', ' ')}" for name, n in count.most_common()) or "-"
@@ -359,13 +366,20 @@ def report(runs: list[Run], command: str) -> str:
 
     machine = "; ".join(f"{key} {value}" for key, value in describe().items())
     lines = ["# A thousand unkind problems", "", f"Regenerate: `{command}`.", ""]
-    lines += [f"{machine}; one thread.", "", *(__doc__ or "").splitlines()[4:7], ""]
+    lines += [f"{machine}; one thread.", "", NOTE]
     lines += table(runs)
     found = [(run, text) for run in runs for text in run.findings]
     lines += ["", f"## Findings: {len(found)}", ""]
     lines += [f"- {run.number} {run.family}, {run.contacts} contacts in {run.dimension}D, "
               f"{run.solver}: {text}" for run, text in found]  # fmt: skip
     return "\n".join(lines) + "\n"
+
+
+def _short(value: object) -> object:
+    """Three digits of a number; null for infinity, which JSON has not."""
+    if isinstance(value, float):
+        return float(f"{value:.2e}") if np.isfinite(value) else None
+    return value
 
 
 def main() -> None:
@@ -385,8 +399,12 @@ def main() -> None:
     page = report(runs, f"python benchmarks/abuse.py --problems {options.problems} "
                   f"--seed {options.seed} --limit {options.limit:g}")  # fmt: skip
     (options.output / "abuse.md").write_text(page)
-    text = json.dumps([asdict(run) for run in runs], default=str)
-    (options.output / "abuse.json").write_text(text + "\n")
+    rows = [[_short(value) for value in asdict(run).values()] for run in runs]
+    lines = ",\n".join(json.dumps(row) for row in rows)
+    columns = json.dumps([f.name for f in fields(Run)])
+    (options.output / "abuse.json").write_text(
+        f'{{"columns": {columns}, "rows": [\n{lines}\n]}}\n'
+    )
     print(page)
 
 
