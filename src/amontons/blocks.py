@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numba import njit, uint64
 from numpy.typing import NDArray
 from scipy import sparse
 
@@ -102,6 +103,20 @@ def block_part(blocks: BlockRows, contacts: NDArray[np.int64]) -> BlockRows:
     indptr = np.searchsorted(rows, np.arange(len(contacts) + 1)).astype(np.int32)
     diagonal = np.flatnonzero(rows == columns).astype(np.int32)
     return embedded(indptr, columns, blocks.data[kept], diagonal)
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def velocity_inplace(indptr, indices, data, q, r, u):  # noqa: PLR0913
+    """u = W r + q by rows of blocks; q, r, u (nc, 3)."""
+    for i in range(len(q)):
+        u0, u1, u2 = q[i, 0], q[i, 1], q[i, 2]
+        for k in range(uint64(indptr[i]), uint64(indptr[i + 1])):
+            j = uint64(indices[k])  # unsigned: no test for negative indices in the loop
+            r0, r1, r2 = r[j, 0], r[j, 1], r[j, 2]
+            u0 += data[k, 0, 0] * r0 + data[k, 0, 1] * r1 + data[k, 0, 2] * r2
+            u1 += data[k, 1, 0] * r0 + data[k, 1, 1] * r1 + data[k, 1, 2] * r2
+            u2 += data[k, 2, 0] * r0 + data[k, 2, 1] * r1 + data[k, 2, 2] * r2
+        u[i, 0], u[i, 1], u[i, 2] = u0, u1, u2
 
 
 def _sparse_tiles(W: sparse.csr_array, d: int) -> tuple[NDArray, NDArray, Array]:

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from . import judge
-from .blocks import BlockRows, block_rows, spatial
+from .blocks import BlockRows, block_part, block_rows, spatial, velocity_inplace
 from .condensation import Condensation
 from .cones import Coulomb, Law, Tresca
 from .errors import InvalidInput, SingularOperator, UnsupportedForm
@@ -189,6 +189,27 @@ class FrictionProblem:
             entry = self._shared[name] = (sources, make())
         return entry[1]
 
+    def kept(self, name: str, make: Callable[[], Any]) -> Any:
+        """What a solver prepares of M, H or W alone, once for all variants of this problem.
+
+        make() is called when nothing of that name is kept for these matrices.
+        """
+        return self._kept(name, (self.M, self.H, self.W), make)
+
+    def restricted(self, contacts: NDArray[np.int64]) -> FrictionProblem:
+        """The Delassus form of some contacts, (k,) in ascending order; `whole` leads back."""
+        self._need(Form.DELASSUS)
+        assert self.q is not None
+        rows = block_part(self.blocks, contacts)
+        part = self._from_blocks(rows, self.q[contacts], self.law.at(contacts))
+        part._shared["whole"] = ((part.W,), (self, contacts))
+        return part
+
+    @property
+    def whole(self) -> tuple[FrictionProblem, NDArray[np.int64]]:
+        """The problem that this one is a part of, and its contacts there; else itself."""
+        return self._kept("whole", (self.W,), lambda: (self, np.arange(self.contacts)))
+
     def _need(self, form: Form) -> None:
         if self.form is not form:
             raise UnsupportedForm(
@@ -349,8 +370,10 @@ class FrictionProblem:
     def velocity(self, r: Array) -> tuple[Array, Array | None]:
         """(u, v) of reactions r, (nc, d); v is None in the Delassus form."""
         if self.form is Form.DELASSUS:
-            assert self.W is not None and self.q is not None
-            return (self.W @ r.ravel()).reshape(r.shape) + self.q, None
+            indptr, indices, data, q = self.kernel_data[:4]
+            u = np.empty_like(q)
+            velocity_inplace(indptr, indices, data, q, spatial(r), u)
+            return u[:, : self.dimension], None
         assert self.H is not None and self.f is not None
         v = self.solve_M(self.H @ r.ravel() + self.f)
         return self.local_velocity(v), v

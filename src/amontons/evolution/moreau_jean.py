@@ -101,6 +101,7 @@ class MovingModel:
             M_free, parts.H, np.zeros(len(parts.free)), np.zeros((nc, d)), self.motion.body.law,
             near_nullspace=parts.near_nullspace, name=model.name,
         )  # fmt: skip
+        self._last_part: tuple[Index, FrictionProblem] | None = None
         self._last_active: tuple[Index, FrictionProblem] = (np.arange(nc), self.base)
 
     def advance(self, state: State, time: float, solve: Solve) -> TimeStep:
@@ -167,25 +168,17 @@ class MovingModel:
         return self.method.condense and 8.0 * self.base.w.size**2 <= W_LIMIT  # type: ignore[union-attr]
 
     @cached_property
-    def _W(self) -> sparse.csr_array:
-        """W of all contacts, sparse: bodies do not see each other."""
-        return sparse.csr_array(self.base.condensed().W)
-
-    @cached_property
-    def _one_W(self) -> dict[bytes, sparse.csr_array]:
-        """W of the last active set, by the set."""
-        return {}
+    def _whole(self) -> FrictionProblem:
+        """The Delassus form of all contacts: formed once, with what solvers keep of it."""
+        return self.base.condensed()
 
     def _local_problem(self, problem: FrictionProblem) -> FrictionProblem:
         """The Delassus form of a problem of the last active set."""
-        active, key = self._last_active[0], self._last_active[0].tobytes()
-        if key not in self._one_W:
-            rows = _rows_of(active, self.base.dimension)
-            self._one_W.clear()
-            self._one_W[key] = self._W[rows][:, rows]
-        return FrictionProblem.from_delassus(
-            self._one_W[key], problem.free_velocity, problem.law, name=problem.name
-        )  # type: ignore[arg-type]
+        active = self._last_active[0]
+        if self._last_part is None or not np.array_equal(self._last_part[0], active):
+            self._last_part = (active, self._whole.restricted(active))
+        q = problem.free_velocity
+        return replace(self._last_part[1], q=q, law=problem.law, name=problem.name)
 
     def _creating(self, impulse: Array, v_theta: Array, energies: Energies) -> Mask:
         """Contacts whose impulse creates energy, (nc,); none if all together dissipate."""

@@ -24,8 +24,8 @@ from ..problem import Form, FrictionProblem
 from .base import Breakdown, Iterate, Solver, Target, check_at_least
 from .compressed import CompressedDelassus
 from .gauss_seidel import GaussSeidel
+from .inexact import DeformablePortfolio
 from .newton import SemismoothNewton
-from .portfolio import Portfolio
 
 STALLED = 20  # iterates without halving the error after which Auto changes the method
 
@@ -79,7 +79,9 @@ class Auto:
             whole = SemismoothNewton(linear=Direct())
             yield from _watched(whole, problem, start, target, [start])
         elif problem.condensing_is_cheap:
-            yield from Portfolio(problem.condensed(), target, spatial(start.r)).stages()
+            yield from DeformablePortfolio(
+                problem.condensed(), target, spatial(start.r)
+            ).stages()
         else:
             yield from self._on_meshes(problem, start, target)
 
@@ -93,7 +95,7 @@ class Auto:
             condensed = problem.condensed()
         except InvalidInput as reason:
             raise Breakdown(str(reason)) from reason
-        yield from Portfolio(condensed, target, spatial(best[0].r)).stages()
+        yield from DeformablePortfolio(condensed, target, spatial(best[0].r)).stages()
 
 
 def _regular(problem: FrictionProblem) -> bool:

@@ -1,0 +1,132 @@
+"""Semismooth Newton with approximate steps, for several deformable bodies in contact.
+
+The Newton equation is solved by GMRES, preconditioned by the LU of an earlier step or even of
+an earlier problem with the same W (`joints`): near the solution few contacts change their
+status.  The law, line search and convergence are those of `SemismoothNewton`, at a fraction of
+its factors.
+
+`DeformablePortfolio` is what `Auto` runs on such W:
+
+    accelerated sweeps    while they promise an end before Newton would be there
+    inexact Newton        until it stalls
+    the usual portfolio   then
+
+[EW] S. Eisenstat, H. Walker (see `newton`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from ..blocks import spatial
+from ..errors import SingularOperator
+from ..problem import Form, FrictionProblem
+from .base import Breakdown, Iterate
+from .functions import Linearised
+from .joints import Joints
+from .newton import Linearisation, SemismoothNewton, State
+from .portfolio import DEPTH, HISTORY_CONTACT, SWEEP_BLOCK, SWEEP_CONTACT, Portfolio
+from .sweeps import Acceleration, watch_for
+
+LOOSEST, TIGHTEST = 0.1, 1e-3  # relative tolerance of GMRES: a step more is cheaper than 1e-4
+CHUNK, LOOK = 40, 0.1  # sweeps between two looks at their rate: number, part of Newton's cost
+SLOWER = 1.5  # sweeps get slower than their first rate promises
+STALLED = 12  # Newton steps without halving the error after which it is left
+
+
+@dataclass(frozen=True)
+class InexactNewton(SemismoothNewton):
+    """`SemismoothNewton` on the Delassus form with GMRES and a kept block LU.
+
+    Meant for W of several deformable bodies; raises Breakdown where W has no large blocks.
+    """
+
+    form: ClassVar[Form] = Form.DELASSUS
+
+    def _linearise(self, problem: FrictionProblem) -> Linearisation:
+        whole, contacts = problem.whole
+        joints = Joints.of(whole)
+        if joints is None:
+            raise Breakdown("W has no large blocks: these are no joints of deformable bodies")
+        return _Preconditioned(problem, joints, contacts)
+
+
+@dataclass(frozen=True, eq=False)
+class _Preconditioned:
+    """Newton equation of some contacts of a problem by GMRES on all of them.
+
+    The others stay open, so one preconditioner serves every choice of contacts.
+    """
+
+    problem: FrictionProblem
+    joints: Joints
+    contacts: np.ndarray
+
+    def state(self, start: Iterate) -> State:
+        """r of the start and its velocity."""
+        return State(start.r, self.problem.velocity(start.r)[0])
+
+    def step(self, state: State, linearised: Linearised, forcing: float) -> tuple[State, int]:
+        """dr to the relative tolerance `forcing`, within bounds."""
+        d, shape = state.r.shape[1], (self.joints.nc, 3)
+        F = np.zeros(shape)
+        A, B = np.tile(np.eye(3), (shape[0], 1, 1)), np.zeros((*shape, 3))
+        F[self.contacts, :d] = linearised[0]
+        A[self.contacts, :d, :d], B[self.contacts, :d, :d] = linearised[1], linearised[2]
+        tolerance = float(np.clip(forcing, TIGHTEST, LOOSEST))
+        dr, count = self.joints.solve(A, B, -F, tolerance)
+        dr = dr[self.contacts, :d]
+        assert self.problem.W is not None
+        return State(dr, (self.problem.W @ dr.ravel()).reshape(dr.shape)), count
+
+
+@dataclass(eq=False)
+class DeformablePortfolio(Portfolio):
+    """`Portfolio` with the stages above before its own."""
+
+    def stages(self) -> Iterator[Iterate]:
+        """All stages in the order of the module's text."""
+        whole, _ = self.problem.whole
+        joints = Joints.of(whole)
+        if joints is not None:
+            yield from self._sweeps_before(joints)
+            yield from self._inexact()
+        yield from super().stages()
+
+    def _sweeps_before(self, joints: Joints) -> Iterator[Iterate]:
+        """Accelerated sweeps until they have cost, or promise to cost, more than Newton."""
+        contacts = self.problem.contacts
+        cost = SWEEP_BLOCK * len(self.problem.blocks.indices)
+        cost += (SWEEP_CONTACT + HISTORY_CONTACT) * contacts
+        memory, watch = Acceleration(self.data, self.r, DEPTH), watch_for(self.goal)
+        spent, last = 0.0, self.error
+        while True:
+            newton = joints.newton_cost(math.log10(max(min(self.error / self.goal, 1e12), 1.0)))
+            count = memory.sweep(int(np.clip(LOOK * newton / cost, 5, CHUNK)), watch)
+            yield self._offer(memory.r.copy(), count, "Anderson Gauss-Seidel", watch[2])
+            spent += cost * count
+            promise = cost * self._sweeps_left(last, count)
+            last = self.latest
+            if spent + SLOWER * promise > newton:
+                return
+
+    def _inexact(self) -> Iterator[Iterate]:
+        """Inexact Newton from the best point until it stalls."""
+        start = Iterate(self.r[:, : self.problem.dimension].copy())
+        mark, waited = self.error, 0
+        try:
+            for iterate in InexactNewton().iterates(self.problem, start, self.target):
+                found = self._offer(spatial(iterate.r), 1, "inexact Newton")
+                yield replace(found, linear_iterations=iterate.linear_iterations)
+                mark, waited = (
+                    (self.error, 0) if self.error < 0.5 * mark else (mark, waited + 1)
+                )
+                if waited > STALLED:
+                    return
+        except (Breakdown, SingularOperator):
+            return

@@ -1,0 +1,195 @@
+"""The Newton equation (A + B W) dr = b on deformable bodies, joint by joint.
+
+W of several deformable bodies is full within a body and empty between bodies that do not touch.
+Contacts with the same neighbours (those of a joint between two bodies) form a group, and W, in
+single precision, is a strip of dense blocks per group.  On it work
+
+    GMRES        the product with A + B W, bound by memory: strips in single precision
+    `Fronts`     a block LU of some earlier A + B W as preconditioner
+
+The LU stays until GMRES has spent as much as a new one takes; from one Newton step, or time
+step, to the next only few contacts change their status.  Both numbers are operation counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import linalg as sparse_linalg
+
+from ..blocks import BlockRows
+from ..linear.multifrontal import FrontLU, Fronts
+from ..problem import FrictionProblem
+
+Array = NDArray[np.float64]
+Single = NDArray[np.float32]
+Index = NDArray[np.int64]
+LARGE_GROUP = 6.0  # mean contacts of a group above which blocks are worth it
+KRYLOV = 80  # GMRES iterations of one solve
+SINGLE = 2e-6  # relative tolerance below which single precision can not go
+# Nanoseconds on one core, only their ratio matters: a dense operation, an entry read.
+FLOP, ENTRY = 0.04, 0.25
+
+
+@dataclass(eq=False)
+class Joints:
+    """W in strips by groups, and the preconditioner kept between solves.
+
+    contacts: (nc,) in the order of the groups; strips (3 k, 3 m) in single precision with their
+    column groups.
+    """
+
+    nc: int
+    contacts: Index
+    columns: list[list[int]]  # groups that a group is coupled with, itself among them
+    strips: list[Single]
+    fronts: Fronts
+    kept: FrontLU | None = None
+    spent: float = 0.0  # on GMRES since the last factor, nanoseconds
+    unknowns: Index = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.unknowns = (3 * self.contacts[:, None] + np.arange(3)).ravel()
+        self.places = [
+            dict(zip(columns, np.cumsum([0, *self.fronts.sizes[columns]]), strict=False))
+            for columns in self.columns
+        ]
+        rows = self.fronts.rows
+        self.gather = [np.concatenate([rows[h] for h in columns]) for columns in self.columns]
+
+    @classmethod
+    def of(cls, problem: FrictionProblem) -> Joints | None:
+        """The joints of a problem in Delassus form; None where groups are too small."""
+        return problem.kept("joints", lambda: cls._make(problem.blocks))
+
+    @classmethod
+    def _make(cls, blocks: BlockRows) -> Joints | None:
+        group = _groups(blocks)
+        count = group.max(initial=-1) + 1
+        if len(group) < LARGE_GROUP * count or count == 0:
+            return None
+        contacts = np.argsort(group, kind="stable")
+        sizes = np.bincount(group)
+        starts = np.concatenate([[0], np.cumsum(sizes)])
+        inside = np.empty(len(group), dtype=np.int64)
+        inside[contacts] = np.arange(len(group)) - starts[group[contacts]]
+        columns, strips = [], []
+        for g in range(count):
+            members = contacts[starts[g] : starts[g + 1]]
+            near = blocks.indices[blocks.indptr[members[0]] : blocks.indptr[members[0] + 1]]
+            groups = np.unique(group[near])
+            offset = np.zeros(count, dtype=np.int64)
+            offset[groups] = np.concatenate([[0], np.cumsum(sizes[groups])[:-1]])
+            at = offset[group[near]] + inside[near]
+            strip = np.zeros((len(members), int(sizes[groups].sum()), 3, 3), dtype=np.float32)
+            for k, i in enumerate(members):
+                strip[k, at] = blocks.data[blocks.indptr[i] : blocks.indptr[i + 1]]
+            strips.append(
+                np.ascontiguousarray(strip.swapaxes(1, 2)).reshape(3 * len(members), -1)
+            )
+            columns.append(groups.tolist())
+        near_sets = [set(c) - {g} for g, c in enumerate(columns)]
+        return cls(len(group), contacts, columns, strips, Fronts.of(3 * sizes, near_sets))
+
+    # ------------------------------------------------------------------ solves
+    def solve(self, A: Array, B: Array, b: Array, tolerance: float) -> tuple[Array, int]:
+        """dr with |(A + B W) dr - b| <= tolerance |b| if it can; and the GMRES iterations.
+
+        A, B (nc, 3, 3), b (nc, 3).  Raises SingularOperator when no factor can be made.
+        """
+        size = float(np.abs(b).max(initial=0.0))
+        if size == 0:
+            return np.zeros_like(b), 0
+        law = _Scaled(self, A, B)
+        if self.kept is None or self.spent > self.factor_cost:
+            self.renew(law)
+        flat = (b / size).astype(np.float32).ravel()[self.unknowns]
+        count = 0
+
+        def operator(y: Single) -> Single:
+            nonlocal count
+            count += 1
+            return law.product(self.kept.solve(y))  # type: ignore[union-attr]
+
+        matrix = sparse_linalg.LinearOperator(
+            2 * (flat.size,), matvec=operator, dtype=np.float32
+        )
+        y, _ = sparse_linalg.gmres(
+            matrix, flat, rtol=max(tolerance, SINGLE), atol=0.0, restart=KRYLOV, maxiter=1
+        )
+        dr = np.empty(3 * self.nc)
+        dr[self.unknowns] = self.kept.solve(y)  # type: ignore[union-attr]
+        self.spent += count * self.product_cost
+        return size * dr.reshape(b.shape), count
+
+    def newton_cost(self, digits: float) -> float:
+        """Nanoseconds that Newton takes for some digits, by what it took on walls."""
+        factors = 1.0 if self.kept is None else 0.5
+        return factors * self.factor_cost + (20 + 10 * digits) * self.product_cost
+
+    def renew(self, law: _Scaled) -> None:
+        """Factorise A + B W of now."""
+        self.kept, self.spent = self.fronts.factor(law.front), 0.0
+
+    @property
+    def factor_cost(self) -> float:
+        """Nanoseconds of a factor."""
+        return FLOP * self.fronts.flops
+
+    @property
+    def product_cost(self) -> float:
+        """Nanoseconds of an iteration of GMRES."""
+        return ENTRY * (self.fronts.entries + sum(strip.size for strip in self.strips))
+
+
+def _groups(blocks: BlockRows) -> Index:
+    """Number of the group of every contact: contacts with the same neighbours, (nc,)."""
+    nc = len(blocks.diagonal)
+    keys = np.random.default_rng(0).integers(0, 2**62, size=nc, dtype=np.int64)
+    if not len(blocks.indices):
+        return np.zeros(0, dtype=np.int64)
+    sums = np.add.reduceat(keys[blocks.indices], blocks.indptr[:-1].astype(np.int64))
+    return np.unique(sums, return_inverse=True)[1]
+
+
+class _Scaled:
+    """A + B W of one Newton step, in the order of the joints and in single precision."""
+
+    def __init__(self, joints: Joints, A: Array, B: Array) -> None:
+        self.joints = joints
+        self.A = A[joints.contacts].astype(np.float32)
+        self.B = B[joints.contacts].astype(np.float32)
+        self.ends = np.concatenate([[0], np.cumsum(joints.fronts.sizes // 3)])
+
+    def product(self, x: Single) -> Single:
+        """(A + B W) x."""
+        j = self.joints
+        Wx = np.concatenate([s @ x[c] for s, c in zip(j.strips, j.gather, strict=True)])
+        rows = np.matmul(self.A, x.reshape(-1, 3, 1)) + np.matmul(self.B, Wx.reshape(-1, 3, 1))
+        return rows.ravel()
+
+    def strip(self, g: int, others: Sequence[int]) -> Single:
+        """B_g W at some groups, (3 k, …), zero where nothing couples."""
+        j = self.joints
+        sizes = j.fronts.sizes[list(others)]
+        B = self.B[self.ends[g] : self.ends[g + 1]]
+        out = np.zeros((len(j.strips[g]), int(sizes.sum())), dtype=np.float32)
+        start = 0
+        for h, size in zip(others, sizes, strict=True):
+            if h in j.places[g]:
+                at = j.places[g][h]
+                out[:, start : start + size] = j.strips[g][:, at : at + size]
+            start += size
+        return np.matmul(B, out.reshape(len(B), 3, -1)).reshape(out.shape)
+
+    def front(self, g: int, border: Sequence[int]) -> tuple[Single, Single]:
+        """Rows and columns of the front of a group."""
+        rows = self.strip(g, [g, *border])
+        own = rows[:, : len(rows)].reshape(len(rows) // 3, 3, -1, 3)
+        k = np.arange(len(own))
+        own[k, :, k, :] += self.A[self.ends[g] : self.ends[g + 1]]
+        empty = np.empty((0, len(rows)), dtype=np.float32)
+        return rows, np.concatenate([empty, *(self.strip(h, [g]) for h in border)])
