@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import click
 
 from .. import __version__
@@ -137,11 +135,12 @@ def bench(**options: object) -> None:
 @main.command(
     epilog="""\b
 Examples:
+  amontons run example:wall --set wall.cells=[4,2,2] --pictures
   amontons run wall.toml -o out
   amontons run wall.toml -o out --restart --set evolution.until=2
 """
 )
-@click.argument("case", type=click.Path(path_type=Path))
+@click.argument("case")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
               help="Replace a value of the case, such as evolution.step=1e-3.")  # fmt: skip
 @click.option("--tolerance", type=float, metavar="X", help="Unit-free error of every step.")
@@ -151,13 +150,17 @@ Examples:
               help="Write the discrete problem of every step as an FCLib file.")  # fmt: skip
 @click.option("--every", type=click.IntRange(min=1), default=10, show_default=True, metavar="N",
               help="Write a VTK file, and the state, every N steps.")  # fmt: skip
+@click.option("--pictures", is_flag=True,
+              help="Draw the written steps, a film of them, and the energies.")  # fmt: skip
 @click.option("--restart", is_flag=True, help="Go on from the state in DIR.")
 @click.option("--quiet", is_flag=True, help="No progress, no summary.")
 def run(**options: object) -> int:
     """Follow a case in time: dynamics, or quasi-static steps.
 
-    CASE is a TOML case file with a table [evolution].  Writes steps.csv (energies), state.h5,
-    step-NNNNN.vtu and steps.pvd, which ParaView opens as a film, into DIR.
+    CASE is a TOML case file with a table [evolution], or example:NAME.  Writes into DIR:
+    steps.csv (energies), state.h5, step-NNNNN.vtu and steps.pvd, which ParaView opens as a film;
+    with --pictures also energy.png and, in pictures/, the deformed bodies with the status of
+    their joints and film.gif.
     """
     from .run import run as run_case
 
@@ -166,7 +169,7 @@ def run(**options: object) -> int:
 
 @main.command()
 def examples() -> None:
-    """List the built-in examples; solve one with `amontons solve example:NAME`."""
+    """List the built-in examples: `amontons solve example:NAME`, in time `amontons run`."""
     from .sources import examples as known
 
     width = max(len(name) for name in known())

@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import fields as fields_of
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -19,8 +20,11 @@ from ..files import replacing
 from ..solution import ContactStatus
 from ..vtk import write_model
 from .group import INTERRUPTED
-from .sources import check_is_plain, naming_keys, with_flags
+from .sources import case_file, naming_keys, with_flags
 from .terminal import check_folder
+
+if TYPE_CHECKING:
+    from ..plots import Frame
 
 WORKS = tuple(field.name for field in fields_of(Energies))
 COLUMNS = ("index", "time", "open", "slip", "stick", *WORKS, "defect", "iterations", "error",
@@ -28,21 +32,19 @@ COLUMNS = ("index", "time", "open", "slip", "stick", *WORKS, "defect", "iteratio
 
 
 def run(
-    case: Path, overrides: Sequence[str], tolerance: float | None, folder: str | None,
-    export: str | None, every: int, restart: bool, quiet: bool,
+    case: str, overrides: Sequence[str], tolerance: float | None, folder: str | None,
+    export: str | None, every: int, pictures: bool, restart: bool, quiet: bool,
 ) -> int:  # fmt: skip
     """Step and write; returns the exit code."""
-    if case.suffix.lower() != ".toml":
-        raise FileFormatError(f"{case}: expected a TOML case file (.toml)")
-    check_is_plain(case)
-    read = read_case(case, overrides)
+    path = case_file(case)
+    read = read_case(path, overrides)
     if read.evolution is None:
         raise FileFormatError(
-            f"{case}: evolution: missing, expected a table with kind, step, until"
+            f"{path}: evolution: missing, expected a table with kind, step, until"
         )
-    place = check_folder(f"{case.stem}-results" if folder is None else folder)
+    place = check_folder(f"{path.stem}-results" if folder is None else folder)
     exported = None if export is None else check_folder(export, "--export-fclib")
-    with naming_keys(read.model, str(case)):
+    with naming_keys(read.model, str(path)):
         _ = read.model.discretisation, read.model.law
     start = load_state(place / "state.h5") if restart else None
     settings = with_flags(read.settings, None, tolerance)
@@ -50,19 +52,19 @@ def run(
         read.model, read.evolution.method, until=read.evolution.until, start=start,
         solver=settings.solver(), tolerance=settings.tolerance,
     )  # fmt: skip
-    steps = export_fclib(steps, exported, case.stem) if exported is not None else steps
-    return _follow(steps, read, place, start, every, quiet)
+    steps = export_fclib(steps, exported, path.stem) if exported is not None else steps
+    return _follow(steps, read, place, start, every, pictures=pictures, quiet=quiet)
 
 
 def _follow(
     steps: Iterator[TimeStep], case: Case, folder: Path, start: State | None, every: int,
-    quiet: bool,
+    *, pictures: bool, quiet: bool,
 ) -> int:  # fmt: skip
     """Take the steps; the state is written whenever a picture is, and at the end."""
     assert case.evolution is not None
     folder.mkdir(parents=True, exist_ok=True)
     rows = _old_rows(folder / "steps.csv", start)
-    pictures = _old_pictures(folder, start)
+    written, frames = _old_pictures(folder, start), []
     last: TimeStep | None = None
     try:
         began = time.perf_counter()
@@ -71,8 +73,9 @@ def _follow(
             rows.append(_row(step, now - began))
             began, last = now, step
             if step.state.index % every == 0:
-                pictures.append(_write(step, folder))
-                _save(step, rows, pictures, folder)
+                written.append(_write(step, folder))
+                _save(step, rows, written, folder)
+                frames += _frames(step) if pictures else []
             if not quiet:
                 _show(step, case.evolution.until, every)
     except NotConverged as problem:
@@ -85,12 +88,32 @@ def _follow(
     else:
         code = 0
     if last is not None:
-        if not pictures or pictures[-1][0] != last.time:
-            pictures.append(_write(last, folder))
-        _save(last, rows, pictures, folder)
+        if not written or written[-1][0] != last.time:
+            written.append(_write(last, folder))
+            frames += _frames(last) if pictures else []
+        _save(last, rows, written, folder)
+        if pictures:
+            _draw(case, frames, rows, folder)
     if not quiet:
         _summary(rows, folder)
     return code
+
+
+def _frames(step: TimeStep) -> list[Frame]:
+    """The frame of a step, in a list; matplotlib loads here."""
+    from ..plots import Frame
+
+    return [Frame.of(step)]
+
+
+def _draw(case: Case, frames: list[Frame], rows: list[list], folder: Path) -> None:
+    """Pictures and film of the steps of this call, energies of all steps so far."""
+    from ..plots import draw_film, energy_figure
+
+    draw_film(case.model, frames, folder / "pictures")
+    works = [Energies(*map(float, row[5 : 5 + len(WORKS)])) for row in rows]
+    with replacing(folder / "energy.png") as temporary:
+        energy_figure([float(row[1]) for row in rows], works).savefig(temporary, format="png")
 
 
 def _row(step: TimeStep, seconds: float) -> list:

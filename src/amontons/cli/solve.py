@@ -11,7 +11,7 @@ import click
 
 from .. import api, output
 from ..case import in_words
-from ..errors import InvalidInput, SingularOperator, UnsupportedForm
+from ..errors import FileFormatError, InvalidInput, SingularOperator, UnsupportedForm
 from ..results import ModelSolution
 from ..solution import FrictionSolution, Outcome
 from .group import INTERRUPTED
@@ -26,6 +26,10 @@ def run(
 ) -> int:  # fmt: skip
     """Solve and write; returns the exit code."""
     opened = open_source(source, overrides)
+    if opened.in_time:
+        raise FileFormatError(
+            f"{source}: a case in time, it has [evolution]; use: amontons run {source}"
+        )
     settings = with_flags(opened.settings, method, tolerance, max_iterations, time_limit)
     place = check_folder(f"{opened.name}-results" if folder is None else folder)
     check_writable(json_copy, "--json")

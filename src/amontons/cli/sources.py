@@ -39,6 +39,7 @@ class Source:
     settings: Settings = field(default_factory=Settings)
     file: str = ""  # for messages
     files: tuple[Path, ...] = ()  # what it was read from
+    in_time: bool = False  # a case with [evolution]
 
     @property
     def target(self) -> Model | FrictionProblem:
@@ -108,7 +109,26 @@ def _case(path: Path, name: str, overrides: Sequence[str]) -> Source:
         settings=case.settings,
         file=str(path),
         files=(path,),
+        in_time=case.evolution is not None,
     )
+
+
+def case_file(text: str) -> Path:
+    """The case file that a CASE names: a path to one, or example:NAME."""
+    if text.startswith("example:"):
+        name = text.removeprefix("example:")
+        path = Path(str(DATA / f"{name}.toml"))
+        if not path.is_file():
+            cases = [
+                known.name[:-5] for known in DATA.iterdir() if known.name.endswith(".toml")
+            ]
+            raise InvalidInput(f"{text}: no such example of a case{nearest(name, cases)}")
+        return path
+    path = Path(text)
+    if path.suffix.lower() != ".toml":
+        raise FileFormatError(f"{text}: expected a TOML case file (.toml) or example:NAME")
+    check_is_plain(path)
+    return path
 
 
 def _fclib(path: Path, overrides: Sequence[str]) -> Source:

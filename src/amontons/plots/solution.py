@@ -20,10 +20,10 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from numpy.typing import NDArray
 
-from .solution import ContactStatus, Convergence, FrictionSolution
+from ..solution import ContactStatus, Convergence, FrictionSolution
 
 if TYPE_CHECKING:
-    from .model import ContactFields, Model
+    from ..model import ContactFields, Model
 
 Array = NDArray[np.float64]
 Patches = Iterator[tuple[Array, NDArray[np.int64]]]  # polygons (k, corners, 2) and their nodes

@@ -1,0 +1,15 @@
+"""Figures: of one solution, of a method's convergence, of steps in time, of many methods."""
+
+from .solution import COLOURS, convergence_figure, profile_figure, status_figure
+from .steps import Frame, draw_film, energy_figure, step_figure
+
+__all__ = [
+    "COLOURS",
+    "Frame",
+    "convergence_figure",
+    "draw_film",
+    "energy_figure",
+    "profile_figure",
+    "status_figure",
+    "step_figure",
+]
