@@ -234,6 +234,19 @@ def test_refused_values(make, field):
         make()
 
 
+def test_steps_that_run_away_end_without_a_warning():
+    """Full steps on a problem without solution: reactions grow until they overflow."""
+    H = np.array([[1.0, 0, -1, 0], [0, 1, 0, 1]])
+    problem = FrictionProblem.from_delassus(
+        H.T @ H + 1e-14 * np.eye(4), [[-1.0, 0.3], [-1.0, 0.2]], np.full(2, 0.5)
+    )
+    start = Iterate(np.full((2, 2), 1e150))
+    for function in FUNCTIONS:
+        solver = am.SemismoothNewton(function, line_search=FullStep(), rho=1e10)
+        found = drive(problem, solver, start=start, max_iterations=50)
+        assert np.isfinite(found.r).all()
+
+
 # ------------------------------------------------------- singular generalised Jacobians
 @pytest.mark.parametrize("function", FUNCTIONS, ids=lambda f: type(f).__name__)
 @pytest.mark.parametrize("mu", [0.0, 0.5])

@@ -113,19 +113,28 @@ class SemismoothNewton:
         state = system.state(Iterate(law.admissible(start.r), start.v))
         state = replace(state, r=law.admissible(state.r))
         values: list[float] = []
-        forcing = FORCING[1]
         while True:
-            linearised = law.linearise(state)
-            values.append(law.size(linearised[0]))
-            if len(values) > 1:  # [EW] choice 2
-                ratio = min(values[-1] / max(values[-2], np.finfo(float).tiny), 1.0)
-                forcing = float(np.clip(0.5 * ratio**2, *FORCING))
-            step, count = system.step(state, linearised, forcing)
-            if not np.isfinite(step.r).all():
-                raise Breakdown("the Newton step is not finite")
-            merit = partial(_merit, law, state, step)
-            state = state.moved(self.line_search.length(merit, values), step)
+            state, count = self._next(law, system, state, values)
             yield Iterate(state.r, state.v, linear_iterations=count)
+
+    @np.errstate(over="ignore", invalid="ignore")  # steps without a line search may run away
+    def _next(
+        self, law: _Residual, system: Linearisation, state: State, values: list[float]
+    ) -> tuple[State, int]:
+        """The state after one step, and its linear iterations; appends to the merit values."""
+        linearised = law.linearise(state)
+        values.append(law.size(linearised[0]))
+        forcing = FORCING[1]
+        if len(values) > 1:  # [EW] choice 2
+            ratio = min(values[-1] / max(values[-2], np.finfo(float).tiny), 1.0)
+            forcing = float(np.clip(0.5 * ratio**2, *FORCING))
+        if not np.isfinite(values[-1]):
+            raise Breakdown("the iterates grow without bound")
+        step, count = system.step(state, linearised, forcing)
+        if not np.isfinite(step.r).all():
+            raise Breakdown("the Newton step is not finite")
+        merit = partial(_merit, law, state, step)
+        return state.moved(self.line_search.length(merit, values), step), count
 
     def _linearise(self, problem: FrictionProblem) -> Linearisation:
         if problem.form is Form.DELASSUS:
