@@ -158,9 +158,9 @@ def run(**options: object) -> int:
     """Follow a case in time: dynamics, or quasi-static steps.
 
     CASE is a TOML case file with a table [evolution], or example:NAME.  Writes into DIR:
-    steps.csv (energies), state.h5, step-NNNNN.vtu and steps.pvd, which ParaView opens as a film;
-    with --pictures also energy.png and, in pictures/, the deformed bodies with the status of
-    their joints and film.gif.
+    steps.csv (energies), state.h5, step-NNNNN.vtu and steps.pvd, which ParaView opens as a
+    film; with --pictures also energy.png and, in pictures/, the deformed bodies with the status
+    of their joints and film.gif.
     """
     from .run import run as run_case
 
