@@ -23,7 +23,7 @@ import math
 from enum import Enum
 
 import numpy as np
-from numba import njit
+from numba import njit, uint64
 from numpy.typing import NDArray
 
 from .cones import Law
@@ -71,13 +71,12 @@ def natural_error(indptr, indices, data, q, coefficient, tresca, rho, r):
     total = 0.0
     for i in range(len(coefficient)):
         u0, u1, u2 = q[i, 0], q[i, 1], q[i, 2]
-        for k in range(indptr[i], indptr[i + 1]):
-            j = indices[k]
-            b = data[k]
+        for k in range(uint64(indptr[i]), uint64(indptr[i + 1])):
+            j = uint64(indices[k])  # unsigned: no test for negative indices in the loop
             r0, r1, r2 = r[j, 0], r[j, 1], r[j, 2]
-            u0 += b[0, 0] * r0 + b[0, 1] * r1 + b[0, 2] * r2
-            u1 += b[1, 0] * r0 + b[1, 1] * r1 + b[1, 2] * r2
-            u2 += b[2, 0] * r0 + b[2, 1] * r1 + b[2, 2] * r2
+            u0 += data[k, 0, 0] * r0 + data[k, 0, 1] * r1 + data[k, 0, 2] * r2
+            u1 += data[k, 1, 0] * r0 + data[k, 1, 1] * r1 + data[k, 1, 2] * r2
+            u2 += data[k, 2, 0] * r0 + data[k, 2, 1] * r1 + data[k, 2, 2] * r2
         if rho[i] > 0.0:
             e0, e1, e2 = contact_residual(
                 r[i, 0], r[i, 1], r[i, 2], u0, u1, u2, rho[i], coefficient[i], tresca

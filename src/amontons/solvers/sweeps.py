@@ -37,7 +37,8 @@ EXACT, NEWTON = int(LocalSolver.EXACT), int(LocalSolver.NEWTON)
 GOLDEN = 0.6180339887498949
 SLOWEST = 1e-9  # approach, relative to the fastest, below which contacts count as alike
 FIRST_JUDGED = 10.0  # change, in goals, at which the judge is asked first: sweeps may be quick
-SAFETY = 0.7  # of the change at which the judge is asked again
+SAFETY = 0.95  # of the change at which the judge is asked again
+SHIFT = 1e-13  # of the least-squares equations of Anderson acceleration, relative
 LEAST = 1e-3  # factor by which that change falls at most from one judgement to the next
 
 
@@ -139,7 +140,7 @@ def _content(s, r, change, watch):
     if error <= watch[0]:
         watch[2] = error
         return True
-    watch[1] = change * max(min(SAFETY * watch[0] / error, 0.5), LEAST)
+    watch[1] = change * max(min(SAFETY * watch[0] / error, 0.8), LEAST)
     return False
 
 
@@ -177,37 +178,36 @@ def sweeps_until_inplace(s, r, before, sweeps, tau):
 
 
 @njit(cache=True, error_model="numpy")
-def _least_squares(gram, target, k, weights):
-    """Solve (gram + tiny I) w = target for the leading k unknowns, by Gauss with pivots."""
-    a = gram[:k, :k].copy()
-    b = target[:k].copy()
-    shift = 0.0
+def _least_squares(gram, target, k, factor, weights):
+    """Solve (gram + tiny I) w = target for the leading k unknowns by L D L^T.
+
+    A direction that depends on earlier ones gets the weight zero; factor is working memory.
+    Returns False when all of gram is zero.
+    """
+    largest = 0.0
     for i in range(k):
-        shift = max(shift, a[i, i])
+        largest = max(largest, gram[i, i])
     for i in range(k):
-        a[i, i] += 1e-13 * shift
+        for j in range(i):
+            t = gram[i, j]
+            for l in range(j):
+                t -= factor[i, l] * factor[j, l] * factor[l, l]
+            factor[i, j] = t / factor[j, j]
+        pivot = gram[i, i] + SHIFT * largest
+        for l in range(i):
+            pivot -= factor[i, l] * factor[i, l] * factor[l, l]
+        factor[i, i] = pivot if pivot > 0.01 * SHIFT * largest else 1e300
     for i in range(k):
-        p = i
-        for j in range(i + 1, k):
-            if abs(a[j, i]) > abs(a[p, i]):
-                p = j
-        if a[p, i] == 0.0:
-            return False
-        if p != i:
-            for j in range(k):
-                a[i, j], a[p, j] = a[p, j], a[i, j]
-            b[i], b[p] = b[p], b[i]
-        for j in range(i + 1, k):
-            factor = a[j, i] / a[i, i]
-            for l in range(i, k):
-                a[j, l] -= factor * a[i, l]
-            b[j] -= factor * b[i]
+        t = target[i]
+        for l in range(i):
+            t -= factor[i, l] * weights[l]
+        weights[i] = t
     for i in range(k - 1, -1, -1):
-        total = b[i]
-        for j in range(i + 1, k):
-            total -= a[i, j] * weights[j]
-        weights[i] = total / a[i, i]
-    return True
+        t = weights[i] / factor[i, i]
+        for l in range(i + 1, k):
+            t -= factor[l, i] * weights[l]
+        weights[i] = t
+    return largest > 0.0
 
 
 @njit(cache=True, error_model="numpy", fastmath=True)
@@ -219,20 +219,21 @@ def _dot(a, b):
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
 def anderson_inplace(s, r, x, history, gram, count, sweeps, watch):  # noqa: PLR0913
     """Accelerated sweeps; r ends as the last plain sweep.  Returns sweeps done.
 
     x (nc, 3) is the next point to sweep from and history (2, depth + 1, 3 nc) holds differences
-    of G(r) and of the residual G(r) - r, the last row of each the values themselves; gram
-    (depth, depth) the products of the latter; count (2,) how many are stored and whether there
-    are values.  So a call goes on where the last one ended.  The history is dropped when the
-    residual doubles; `watch` as above.
+    of G(r) and of the residual f = G(r) - r, the last row of each the values themselves; gram
+    (depth + 1, depth) the products of the differences of f, and with f in the last row;
+    count (2,) how many are stored and whether there are values.  So a call goes on where the
+    last one ended.  The history is dropped when the residual doubles; `watch` as above.
     """
     depth = history.shape[1] - 1
     m = history.shape[2]
     steps, slopes = history[0], history[1]
-    target, weights = np.zeros(depth), np.zeros(depth)
+    image, residual, target = steps[depth], slopes[depth], gram[depth]
+    weights, factor = np.zeros(depth), np.zeros((depth, depth))
     g, xf = r.reshape(m), x.reshape(m)
     for k in range(sweeps):
         r[:, :] = x
@@ -242,26 +243,30 @@ def anderson_inplace(s, r, x, history, gram, count, sweeps, watch):  # noqa: PLR
         size = old_size = 0.0
         for i in range(m):
             size += (g[i] - xf[i]) ** 2
-            old_size += slopes[depth, i] ** 2
+            old_size += residual[i] ** 2
         if count[1] == 0 or size > 4.0 * old_size:
             count[0] = 0
+            for i in range(m):
+                residual[i] = g[i] - xf[i]
         else:
             slot = count[0] % depth
             count[0] += 1
+            step, slope = steps[slot], slopes[slot]
             for i in range(m):
-                steps[slot, i] = g[i] - steps[depth, i]
-                slopes[slot, i] = g[i] - xf[i] - slopes[depth, i]
+                f = g[i] - xf[i]
+                step[i], slope[i] = g[i] - image[i], f - residual[i]
+                residual[i] = f
             for a in range(min(count[0], depth)):
-                gram[a, slot] = gram[slot, a] = _dot(slopes[a], slopes[slot])
+                product = _dot(slopes[a], residual)
+                # slope = f - f_old: its products are differences of those with f
+                gram[a, slot] = gram[slot, a] = product - target[a]
+                target[a] = product
+            gram[slot, slot] = _dot(slope, slope)
         count[1] = 1
         filled = min(count[0], depth)
-        for i in range(m):
-            steps[depth, i] = g[i]
-            slopes[depth, i] = g[i] - xf[i]
-        x[:, :] = r
-        for a in range(filled):
-            target[a] = _dot(slopes[a], slopes[depth])
-        if filled > 0 and _least_squares(gram, target, filled, weights):
+        image[:] = g
+        xf[:] = g
+        if filled > 0 and _least_squares(gram, target, filled, factor, weights):
             for a in range(filled):
                 w, step = weights[a], steps[a]
                 for i in range(m):
@@ -290,7 +295,7 @@ class Acceleration:
         self.x = self.r.copy()
         self.r = self.r.copy()
         self.history = np.empty((2, self.depth + 1, self.r.size))
-        self.gram = np.zeros((self.depth, self.depth))
+        self.gram = np.zeros((self.depth + 1, self.depth))
         self.count = np.zeros(2, dtype=np.int64)
 
     def sweep(self, sweeps: int, watch: Array) -> int:
