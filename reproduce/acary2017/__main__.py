@@ -1,0 +1,142 @@
+"""`python -m reproduce.acary2017`: the command line; see `README.md` for what it found."""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # one thread, as the tables say
+os.environ.setdefault("RAYON_NUM_THREADS", "1")
+
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+
+from amontons.errors import AmontonsError
+from benchmarks.machine import describe
+
+from . import report, wall
+from .methods import NAMES
+
+PARTS = ("problems", "wall", "long", "fine", "fclib", "step", "pictures", "report")
+HERE = Path(__file__).parent
+EPILOG = f"""\b
+Parts, in their order (--only A,B takes some of them):
+  problems  simulate the walls and write their problems into the working folder
+  wall      every method on the 50 problems of the wall
+  long      NSGS-AC and NSN-AC at one instant with ten times the limit
+  fine      some methods on 2 problems of a finer wall (1930 of 2032 contacts are closed)
+  fclib     every method on the FCLib files
+  step      one warm-started time step against every solver of Siconos
+  pictures  the cracking joints, a film of them, the energy balance
+  report    tables and figures from the stored runs; always done at the end
+
+\b
+Examples:
+  python -m reproduce.acary2017 --quick              a tiny wall, a minute
+  python -m reproduce.acary2017                      all of it, most of an hour on one core
+  python -m reproduce.acary2017 --only wall,fclib --methods "Auto,Auto global"
+                                                     measure two columns again
+  python -m reproduce.acary2017 --only report        tables and figures only
+
+\b
+Methods: {", ".join(NAMES[:6])},
+  {", ".join(NAMES[6:])}.
+"""
+
+
+def _words(text: str | None, known: Sequence[str], option: str) -> list[str]:
+    """The words of an option, all of them if there is none; refuses unknown ones."""
+    if text is None:
+        return list(known)
+    words = [word.strip() for word in text.split(",") if word.strip()]
+    for word in words:
+        if word not in known:
+            raise click.UsageError(f"{option}: {word!r} is none of {', '.join(known)}")
+    return words
+
+
+@click.command(
+    epilog=EPILOG,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 96},
+)
+@click.option("--quick", is_flag=True, help="A tiny wall with 3 problems, into FOLDER/quick.")
+@click.option("--folder", type=click.Path(path_type=Path), default=Path("acary2017-results"),
+              show_default=True, help="For problems (120 MB) and pictures.")  # fmt: skip
+@click.option(
+    "--results", type=click.Path(path_type=Path), help="For tables and figures. [results/]"
+)
+@click.option("--only", metavar="A,B", help="Parts to do. [all]")
+@click.option(
+    "--methods", metavar="A,B", help="Methods to run; the others keep their stored runs."
+)
+@click.option("--limit", type=float, default=6.0, show_default=True, metavar="SECONDS",
+              help="Of processor time for one solve of the wall; a third of it for an FCLib "
+              "file, eight times as much on the finer wall.")  # fmt: skip
+@click.option("--shared", type=click.Path(path_type=Path), metavar="DIR",
+              help="Folder with data/fclib. [$AMONTONS_SHARED or ../shared]")  # fmt: skip
+@click.option("--siconos", default="/usr/bin/python3", show_default=True, metavar="PYTHON",
+              help="Python that has Siconos; without it no part step.")  # fmt: skip
+def main(
+    quick: bool, folder: Path, results: Path | None, only: str | None, methods: str | None,
+    limit: float, shared: Path | None, siconos: str,
+) -> None:  # fmt: skip
+    """Newton against Gauss-Seidel on a wall of elastic blocks, as in the paper of CSMA 2017.
+
+    Simulates the wall, solves 50 of its time steps with every method of the paper and ours,
+    draws the performance profiles and puts the paper's claims beside what was measured.
+    """
+    parts = _words(only, PARTS, "--only")
+    names = _words(methods, NAMES, "--methods")
+    if not limit > 0:
+        raise click.UsageError(f"--limit: expected seconds > 0, got {limit}")
+    place = folder / "quick" if quick else folder
+    out = results or (place / "results" if quick else HERE / "results")
+    data = (shared or Path(os.environ.get("AMONTONS_SHARED", "../shared"))) / "data" / "fclib"
+    try:
+        _do(parts, names, limit, quick, place, out, data, siconos)
+    except AmontonsError as reason:
+        raise click.ClickException(str(reason)) from reason
+
+
+def _do(
+    parts: list[str], names: list[str], limit: float, quick: bool, folder: Path, out: Path,
+    data: Path, siconos: str,
+) -> None:  # fmt: skip
+    """The parts in their order; each stores what it found before the next one starts."""
+    main_series, fine = (wall.QUICK, None) if quick else (wall.PAPER, wall.FINE)
+    problems = folder / "problems"
+    machine = describe()
+    if {"problems", "wall", "long"} & set(parts):
+        paths = wall.write_problems(main_series, problems, click.echo)
+        if "wall" in parts:
+            report.measure(out, "wall", paths, names, limit, machine)
+        if "long" in parts:
+            chosen = [name for name in names if name in report.LONG_METHODS]
+            later = paths[4 * len(main_series.steps) :][: len(main_series.steps)]
+            report.measure(out, "long", later, chosen, 10 * limit, machine)
+    if fine is not None and {"problems", "fine", "step"} & set(parts):
+        paths = wall.write_problems(fine, problems, click.echo)
+        if "fine" in parts:
+            chosen = [name for name in names if name in report.FINE_METHODS]
+            report.measure(out, "fine", paths, chosen, 8 * limit, machine)
+    if "fclib" in parts and not quick:
+        paths = sorted(data.glob("*.hdf5"), key=lambda path: path.stat().st_size)
+        if paths:
+            report.measure(out, "fclib", paths, names, limit / 3, machine)
+        else:
+            click.echo(f"fclib: no files in {data}; name its folder with --shared")
+    if "step" in parts:
+        if shutil.which(siconos):
+            report.against_siconos(out, main_series, fine, problems, siconos, limit, machine)
+        else:
+            click.echo(f"step: {siconos} is not there; name a Python with Siconos by --siconos")
+    if "pictures" in parts:
+        report.pictures(out, folder / "pictures", quick=quick)
+    report.write(out, quick=quick)
+    click.echo(f"results in {out}/")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,302 @@
+"""What the runs say: ratios, performance profiles, the paper's claims beside ours."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from amontons.analysis import performance_profile
+
+from .methods import HYBRID, METHODS, NAMES, NEWTON, PRINTED
+from .race import TOLERANCES, Runs, iterations, key, seconds
+
+REFERENCE = json.loads((Path(__file__).parent / "reference.json").read_text())
+PROFILED = TOLERANCES[1:]
+SWEEP_BLOCK, SWEEP_CONTACT = 18.0, 500.0  # operations of a sweep per 3x3 block and contact
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """Median over the problems of time(slow) / time(fast).
+
+    Where only one of them met the tolerance the other counts with the time limit: a bound.
+    at_least, at_most: the median is such a bound.  problems: those that at least one met.
+    """
+
+    value: float
+    at_least: bool
+    at_most: bool
+    problems: int
+
+    def __str__(self) -> str:
+        if not self.problems:
+            return "-"
+        sign = "≥ " if self.at_least else "≤ " if self.at_most else ""
+        return f"{sign}{_number(self.value)}"
+
+
+def ratio(runs: Runs, slow: str, fast: str, tolerance: float, limit: float) -> Ratio:
+    """See `Ratio`."""
+    found = []
+    for a, b in seconds(runs, (slow, fast), tolerance):
+        if math.isfinite(a) or math.isfinite(b):
+            bound = (not math.isfinite(a)) - (not math.isfinite(b))
+            found.append((min(a, limit) / min(b, limit), bound))
+    if not found:
+        return Ratio(math.nan, False, False, 0)
+    found.sort()
+    middle = [found[(len(found) - 1) // 2], found[len(found) // 2]]
+    value = math.sqrt(middle[0][0] * middle[1][0])
+    bounds = [bound for _, bound in middle]
+    return Ratio(value, max(bounds) > 0, min(bounds) < 0, len(found))
+
+
+def profile_ratio(runs: Runs, slow: str, fast: str, tolerance: float, share: float) -> float:
+    """Horizontal distance of two profiles at a share of the problems, as the paper reads it.
+
+    Infinite where the slow method does not reach the share, NaN where neither does.
+    """
+    tau, rho = performance_profile(seconds(runs, PRINTED, tolerance))
+    reached = []
+    for name in (slow, fast):
+        curve = rho[PRINTED.index(name)]
+        reached.append(tau[np.argmax(curve >= share)] if curve[-1] >= share else math.inf)
+    return math.nan if math.isinf(reached[1]) else float(reached[0] / reached[1])
+
+
+def solved(runs: Runs, name: str, tolerance: float) -> int:
+    """Problems on which a method met a tolerance."""
+    return sum(math.isfinite(row[0]) for row in seconds(runs, (name,), tolerance))
+
+
+def median_time(runs: Runs, name: str, tolerance: float) -> float:
+    """Median time, unsolved problems counting as infinite."""
+    return float(np.median(seconds(runs, (name,), tolerance)))
+
+
+# ------------------------------------------------------------------------------- claims
+@dataclass(frozen=True)
+class Claim:
+    """A sentence of the paper, the same from our runs, and whether they agree."""
+
+    text: str
+    paper: str
+    ours: str
+    agrees: bool
+    reason: str = ""
+
+
+def claims(runs: Runs, limit: float) -> list[Claim]:
+    """The paper's claims about the wall, in its order."""
+    found = [_close(runs, limit), _all_newton_faster(runs)]
+    found.append(_factor(runs, HYBRID, 1e-3, limit))
+    found += [_factor(runs, "NSN-AC", t, limit) for t in (1e-4, 1e-6)]
+    return [*found, _natural_map_slowest(runs), _hybrid(runs), _upk(runs, limit)]
+
+
+def _close(runs: Runs, limit: float) -> Claim:
+    found = ratio(runs, "NSGS-AC", "NSN-AC", 1e-2, limit)
+    return Claim(
+        "at 1e-2 Newton and Gauss-Seidel are close", "about 1",
+        f"NSGS-AC / NSN-AC {found}", 0.5 <= found.value <= 2,
+        "" if 0.5 <= found.value <= 2 else _costs_text(runs, 1e-2),
+    )  # fmt: skip
+
+
+def _all_newton_faster(runs: Runs) -> Claim:
+    times = {name: median_time(runs, name, 1e-3) for name in (*NEWTON, "NSGS-AC")}
+    agrees = all(times[name] < times["NSGS-AC"] for name in NEWTON)
+    return Claim(
+        "at 1e-3 all Newton methods are faster than Gauss-Seidel", "yes",
+        "median times " + ", ".join(f"{n} {_time(t)}" for n, t in times.items()), agrees,
+        "" if agrees else _costs_text(runs, 1e-3),
+    )  # fmt: skip
+
+
+def _factor(runs: Runs, newton: str, tolerance: float, limit: float) -> Claim:
+    wanted = REFERENCE["newton_over_gauss_seidel"][key(tolerance)]
+    found = ratio(runs, "NSGS-AC", newton, tolerance, limit)
+    drawn = profile_ratio(runs, "NSGS-AC", newton, tolerance, 0.5)
+    agrees = found.value >= wanted
+    read = "" if math.isnan(drawn) else f"; from the profiles at one half: {_number(drawn)}"
+    return Claim(
+        f"at {key(tolerance)} {newton} is ahead of NSGS-AC", f"{wanted} times",
+        f"{found} times{read}", agrees, "" if agrees else _costs_text(runs, tolerance),
+    )  # fmt: skip
+
+
+def _natural_map_slowest(runs: Runs) -> Claim:
+    times = {name: median_time(runs, name, 1e-6) for name in NEWTON}
+    return Claim(
+        "NSN-NM is the slowest of the Newton methods", "yes",
+        "median to 1e-6: " + ", ".join(f"{n} {_time(t)}" for n, t in times.items()),
+        max(times, key=lambda name: times[name]) == "NSN-NM",
+    )  # fmt: skip
+
+
+def _hybrid(runs: Runs) -> Claim:
+    times = {name: median_time(runs, name, 1e-6) for name in (*NEWTON, HYBRID)}
+    counts = {name: solved(runs, name, 1e-6) for name in PRINTED}
+    agrees = counts[HYBRID] == max(counts.values())
+    return Claim(
+        "the hybrid is the best and the most robust", "yes",
+        f"solved to 1e-6: {', '.join(f'{n} {c}' for n, c in counts.items())} of {len(runs)}; "
+        f"median time {_time(times[HYBRID])} against {_time(times['NSN-AC'])} of NSN-AC",
+        agrees and times[HYBRID] <= min(times.values()),
+    )  # fmt: skip
+
+
+def _upk(runs: Runs, limit: float) -> Claim:
+    found = ratio(runs, "NSGS-AC", "NSGS-FP-VI-UPK", 1e-6, limit)
+    sweeps = [np.array(iterations(runs, name, 1e-4)) for name in ("NSGS-AC", "NSGS-FP-VI-UPK")]
+    both = np.isfinite(sweeps[0]) & np.isfinite(sweeps[1])
+    same = float(np.median(sweeps[1][both] / sweeps[0][both])) if both.any() else math.nan
+    return Claim(
+        "at 1e-6 NSGS-FP-VI-UPK is faster than NSGS-AC", "yes",
+        f"NSGS-AC / NSGS-FP-VI-UPK {found}", found.value > 1,
+        f"both make the same sweeps (median ratio {_number(same)}): each contact is solved "
+        "exactly either way, ours by a few Newton steps and by up to 100 projections",
+    )  # fmt: skip
+
+
+# -------------------------------------------------------------------------------- costs
+def costs(runs: Runs, tolerance: float) -> dict[str, float]:
+    """Medians that explain a ratio: counts, seconds each, operations each."""
+    names = ("NSGS-AC", "NSN-AC")
+    times = np.array(seconds(runs, names, tolerance))
+    counts = np.array([iterations(runs, name, tolerance) for name in names]).T
+    with np.errstate(invalid="ignore"):
+        each = np.where(np.isfinite(times), times / counts, np.nan)
+    m = np.array([3.0 * entry["contacts"] for entry in runs.values()])
+    density = np.array([entry["density"] for entry in runs.values()])
+    sweep = SWEEP_BLOCK * density * (m / 3) ** 2 + SWEEP_CONTACT * m / 3
+    return {
+        "sweeps": float(np.median(counts[:, 0])),
+        "newton_steps": float(np.median(counts[:, 1])),
+        "sweep_seconds": _median(each[:, 0]),
+        "newton_seconds": _median(each[:, 1]),
+        "sweep_operations": float(np.median(sweep)),
+        "newton_operations": float(np.median(2 / 3 * m**3)),
+    }
+
+
+def _median(values: np.ndarray) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if known.size else math.nan
+
+
+def _costs_text(runs: Runs, tolerance: float) -> str:
+    c = costs(runs, tolerance)
+    worth = c["newton_seconds"] / c["sweep_seconds"]
+    sweeps = "more than the limit allows" if math.isinf(c["sweeps"]) else f"{c['sweeps']:.0f}"
+    return (
+        f"median {sweeps} sweeps of {_time(c['sweep_seconds'])} against "
+        f"{c['newton_steps']:.0f} Newton steps of {_time(c['newton_seconds'])}: a step costs "
+        f"as much as {worth:.0f} sweeps"
+    )
+
+
+# ------------------------------------------------------------------------------ Markdown
+def claims_table(found: Sequence[Claim]) -> str:
+    """The claims as Markdown."""
+    rows = ["| the paper says | paper | ours | |", "|---|---|---|---|"]
+    for claim in found:
+        verdict = "agrees" if claim.agrees else f"differs: {claim.reason}".rstrip(": ")
+        rows.append(f"| {claim.text} | {claim.paper} | {claim.ours} | {verdict} |")
+    return "\n".join(rows)
+
+
+def methods_table(runs: Runs) -> str:
+    """Problems solved and median time, by method and tolerance."""
+    head = [f"to {key(t)}: solved, median" for t in TOLERANCES]
+    rows = ["| method | " + " | ".join(head) + " | iterations to 1e-6 |"]
+    rows.append("|---|" + "---|" * (len(head) + 1))
+    for name in NAMES:
+        count = sum(name in entry["methods"] for entry in runs.values())
+        if not count:
+            continue
+        cells = [f"{solved(runs, name, t)}, {_time(median_time(runs, name, t))}"
+                 for t in TOLERANCES]  # fmt: skip
+        last = float(np.median(iterations(runs, name, TOLERANCES[-1])))
+        steps = "-" if math.isinf(last) else f"{last:.0f}"
+        rows.append(f"| {name} | " + " | ".join(cells) + f" | {steps} |")
+    return "\n".join(rows)
+
+
+def steps_table(runs: Runs, limit: float) -> str:
+    """The ratio by step size, with what makes it."""
+    groups: dict[str, Runs] = {}
+    for name, entry in runs.items():
+        groups.setdefault(name.split("-")[1], {})[name] = entry
+    rows = [
+        "| time step | problems | NSGS-AC / NSN-AC at 1e-3 | 1e-4 | 1e-6 | sweeps to 1e-4 | "
+        "Newton steps to 1e-4 | to 1e-6 | one sweep | one Newton step |",
+        "|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for step, group in groups.items():
+        ratios = [str(ratio(group, "NSGS-AC", "NSN-AC", t, limit)) for t in PROFILED]
+        c, tight = costs(group, 1e-4), costs(group, 1e-6)
+        rows.append(
+            f"| {step.removesuffix('ms')} ms | {len(group)} | {' | '.join(ratios)} | "
+            f"{_count(c['sweeps'])} | {_count(c['newton_steps'])} | "
+            f"{_count(tight['newton_steps'])} | "
+            f"{_time(c['sweep_seconds'])} | {_time(c['newton_seconds'])} |"
+        )
+    return "\n".join(rows)
+
+
+def legend() -> str:
+    """What the methods are."""
+    return "\n".join(f"- {method.name}: {method.text}." for method in METHODS)
+
+
+def record_of(runs: Runs, limit: float) -> dict[str, Any]:
+    """Ratios and what makes them, for the JSON."""
+    return {
+        "costs": {key(t): costs(runs, t) for t in TOLERANCES},
+        "ratios": {
+            key(t): vars(ratio(runs, "NSGS-AC", "NSN-AC", t, limit)) for t in TOLERANCES
+        },
+    }
+
+
+def measures_text(runs: Runs) -> str:
+    """How the published error (13) relates to the judge where NSN-AC solved a problem."""
+    pairs = [(run["error_13"], run["error"]) for entry in runs.values()
+             if (run := entry["methods"].get("NSN-AC")) and run["outcome"] == "converged"
+             and run["error"] and run["error_13"]]  # fmt: skip
+    if not pairs:
+        return ""
+    factors = np.array([a / b for a, b in pairs])
+    return (
+        f"The paper's error (13) of the solutions of NSN-AC is {factors.min():.1e} to "
+        f"{factors.max():.1e} times our judge's (median {np.median(factors):.1e}): it adds "
+        "newton seconds to metres per second, the judge scales each contact by its compliance."
+    )
+
+
+def middle(values: Sequence[float]) -> float:
+    """The median."""
+    return float(np.median(values))
+
+
+def _number(value: float) -> str:
+    if math.isinf(value):
+        return "∞"
+    return f"{value:.0f}" if value >= 10 else f"{value:.2g}"
+
+
+def _count(value: float) -> str:
+    return "over the limit" if math.isinf(value) else f"{value:.0f}"
+
+
+def _time(value: float) -> str:
+    if not math.isfinite(value):
+        return "-"
+    return f"{value:.2g} s" if value >= 1 else f"{1e3 * value:.2g} ms"

@@ -1,0 +1,216 @@
+"""`python -m reproduce.acary2017` on a tiny wall: problems, runs, tables, claims, pictures."""
+
+import json
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import amontons as am
+from amontons.analysis import performance_profile
+from amontons.evolution import Energies
+from amontons.plots import Frame, draw_film, energy_figure
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))  # the reproductions are not installed
+
+from reproduce.acary2017 import race, report, step, tables, wall  # noqa: E402
+from reproduce.acary2017.__main__ import main  # noqa: E402
+from reproduce.acary2017.methods import METHODS, NAMES, PRINTED  # noqa: E402
+
+
+@pytest.fixture(scope="module")
+def problems(tmp_path_factory):
+    return wall.write_problems(wall.QUICK, tmp_path_factory.mktemp("wall"), lambda text: None)
+
+
+@pytest.fixture(scope="module")
+def runs(problems):
+    return race.race(problems[1:], NAMES, 20.0, {}, lambda text: None)
+
+
+def made_up(**seconds):
+    """Runs with the given times to every tolerance, one list for each method."""
+    count = len(next(iter(seconds.values())))
+    out = {}
+    for k in range(count):
+        methods = {}
+        for name, times in seconds.items():
+            t = times[k]
+            met = {race.key(x): [t, 10] for x in race.TOLERANCES} if t else {}
+            methods[name.replace("_", "-")] = {"met": met, "outcome": "", "error": 1.0,
+                                               "error_13": 1.0}  # fmt: skip
+        out[f"wall-1ms-{k:04d}"] = {"contacts": 100, "density": 0.3, "methods": methods}
+    return out
+
+
+def test_problems_are_those_of_the_chosen_instants_with_a_warm_start(problems):
+    assert [path.name for path in problems] == [
+        "quick-5ms-0008.hdf5", "quick-5ms-0020.hdf5", "quick-5ms-0030.hdf5",
+    ]  # fmt: skip
+    for path in problems:
+        problem = am.read_fclib(path)
+        r = np.load(path.with_suffix(".npz"))["r"]
+        assert r.shape == (problem.contacts, 3)
+        cold = problem.condensed().error(np.zeros_like(r))
+        assert problem.condensed().error(r) < 0.2 * cold
+
+
+def test_the_series_of_the_paper_has_fifty_problems():
+    names = wall.PAPER.problems
+    assert len(set(names)) == 50
+    assert names[:2] == ["wall-1ms-0020.hdf5", "wall-2ms-0010.hdf5"]
+    assert names[-1] == "wall-20ms-0025.hdf5"
+
+
+def test_problems_that_are_there_are_kept(problems):
+    before = [path.stat().st_mtime_ns for path in problems]
+    wall.write_problems(wall.QUICK, problems[0].parent, lambda text: None)
+    assert [path.stat().st_mtime_ns for path in problems] == before
+
+
+def test_all_methods_solve_the_tiny_wall(runs):
+    for entry in runs.values():
+        for name, run in entry["methods"].items():
+            assert run["outcome"] == "converged", name
+            times = [run["met"][race.key(t)] for t in race.TOLERANCES]
+            assert times == sorted(times)
+
+
+def test_all_methods_find_the_same_velocities(problems):
+    problem = am.read_fclib(problems[1])
+    condensed = problem.condensed()
+    wanted = am.solve(condensed, tolerance=1e-10).u
+    for method in METHODS:
+        form = problem if method.on_global else condensed
+        found = am.solve(form, method.solver, tolerance=1e-8)
+        np.testing.assert_allclose(
+            condensed.velocity(found.r)[0], wanted, atol=1e-6 * condensed.q_norm,
+            err_msg=method.name,
+        )  # fmt: skip
+
+
+def test_profiles_are_shares(runs):
+    for tolerance in tables.PROFILED:
+        tau, rho = performance_profile(race.seconds(runs, PRINTED, tolerance))
+        assert tau[0] == 1
+        assert (rho >= 0).all() and (rho <= 1).all()
+        assert (np.diff(rho, axis=1) >= 0).all()
+        np.testing.assert_array_equal(rho[:, -1], 1)  # all are solved
+
+
+def test_ratio_is_the_median_and_knows_bounds():
+    done = made_up(NSGS_AC=[4.0, 6.0, 8.0], NSN_AC=[1.0, 1.0, 1.0])
+    assert str(tables.ratio(done, "NSGS-AC", "NSN-AC", 1e-6, 10.0)) == "6"
+    slow = made_up(NSGS_AC=[4.0, None, None], NSN_AC=[1.0, 1.0, 0.5])
+    assert str(tables.ratio(slow, "NSGS-AC", "NSN-AC", 1e-6, 10.0)) == "≥ 10"
+    broken = made_up(NSGS_AC=[4.0, 4.0, 4.0], NSN_AC=[None, None, 1.0])
+    assert str(tables.ratio(broken, "NSGS-AC", "NSN-AC", 1e-6, 10.0)) == "≤ 0.4"
+    nobody = made_up(NSGS_AC=[None], NSN_AC=[None])
+    assert str(tables.ratio(nobody, "NSGS-AC", "NSN-AC", 1e-6, 10.0)) == "-"
+
+
+def test_claims_follow_the_numbers():
+    newton = dict.fromkeys(("NSN_AC", "NSN_JM", "NSN_AC_HYBRID"), [1.0, 1.0])
+    far = made_up(
+        NSGS_AC=[50.0, 60.0], NSGS_FP_VI_UPK=[40.0, 40.0], NSN_NM=[2.0, 2.0], **newton
+    )
+    near = made_up(NSGS_AC=[1.5, 1.6], NSGS_FP_VI_UPK=[3.0, 3.0], NSN_NM=[0.5, 0.5], **newton)
+    agreed = [claim.agrees for claim in tables.claims(far, 100.0)]
+    assert agreed == [False, True, True, True, True, True, True, True]
+    differs = [claim.agrees for claim in tables.claims(near, 100.0)]
+    assert differs == [True, True, False, False, False, False, False, False]
+    text = tables.claims_table(tables.claims(near, 100.0))
+    assert "a step costs as much as" in text
+    assert text.count("\n") == 9
+
+
+def test_tables_have_a_row_for_every_method_and_step(runs):
+    page = tables.methods_table(runs)
+    rows = [row.split(" | ") for row in page.splitlines()]
+    assert {len(row) for row in rows if len(row) > 1} == {6}
+    assert [row[0].removeprefix("| ") for row in rows[2:]] == list(NAMES)
+    assert rows[2][1].startswith("2, ")
+    assert "| 5 ms | 2 |" in tables.steps_table(runs, 20.0)
+    c = tables.costs(runs, 1e-6)
+    assert c["sweeps"] > 20 * c["newton_steps"]
+    assert c["newton_operations"] > c["sweep_operations"]
+
+
+def test_command_measures_writes_and_refreshes_single_columns(tmp_path):
+    def run(*arguments):
+        done = CliRunner().invoke(main, ["--quick", "--folder", str(tmp_path), *arguments])
+        assert done.exit_code == 0, done.output
+        return done
+
+    run("--only", "problems,wall", "--methods", "NSN-AC,NSGS-AC,Auto", "--limit", "20")
+    place = tmp_path / "quick" / "results"
+    first = json.loads((place / "wall.json").read_text())
+    run("--only", "wall", "--methods", "Auto", "--limit", "20")
+    second = json.loads((place / "wall.json").read_text())
+    for stem, entry in first["runs"].items():
+        again = second["runs"][stem]["methods"]
+        assert again["NSGS-AC"] == entry["methods"]["NSGS-AC"]
+        assert set(again) == {"NSN-AC", "NSGS-AC", "Auto"}
+    page = (place / "results.md").read_text()
+    assert "python -m reproduce.acary2017 --quick" in page
+    assert (place / "profiles-wall.png").read_bytes().startswith(b"\x89PNG")
+    assert (
+        json.loads((place / "results.json").read_text())["wall"]["ratios"]["1e-06"]["value"] > 1
+    )
+
+
+def test_unknown_parts_and_methods_are_refused():
+    for option, word in (("--only", "walls"), ("--methods", "Newton"), ("--limit", "0")):
+        done = CliRunner().invoke(main, [option, word])
+        assert done.exit_code == 2
+        assert word in done.output
+
+
+def test_table_against_siconos_names_the_best():
+    entry = {
+        "contacts": 10, "unknowns": 99, "condensing": 0.5,
+        "ours": {"Auto": {"seconds": 0.01, "error": 1e-7}},
+        "ours_global": {"Auto": {"seconds": 0.2, "error": 1e-7}},
+        "siconos": {
+            "NSN_AC": {"seconds": 0.1, "error": 1e-8},
+            "GLOBAL_ADMM": {"seconds": 0.4, "error": 1e-8},
+            "HP": {"seconds": None, "why": "over 5 s"},
+        },
+    }  # fmt: skip
+    page = step.table({"wall": entry})
+    assert "| NSN_AC | 100 ms | 600 ms | 1.0e-08 |" in page
+    assert "| HP | - | - | over 5 s |" in page
+    assert "the best of Siconos NSN_AC 100 ms; ours / theirs 0.1." in page
+    assert "the best of Siconos GLOBAL_ADMM 400 ms; ours / theirs 0.5." in page
+
+
+def test_contact_of_the_tiny_wall_never_creates_energy_and_pictures_say_so(tmp_path):
+    case = wall.read_case(wall.CASE, ["wall.cells=[2,1,1]", "wall.rows=2"])
+    steps = list(am.evolve(case.model, am.MoreauJean(step=5e-3, theta=1), until=0.05,
+                           tolerance=1e-8))  # fmt: skip
+    energies = [s.energies for s in steps]
+    assert all(e.contact <= 1e-8 * (e.total + e.turnover) for e in energies)
+    titles = [a.get_title() for a in energy_figure([s.time for s in steps], energies).axes]
+    assert "never creates" in titles[1] or max(e.contact for e in energies) > 0
+    created = energy_figure([1.0, 2.0], [Energies(contact=-1.0), Energies(contact=1e-3)])
+    assert "Contact creates" in created.axes[1].get_title()
+    with pytest.raises(am.InvalidInput, match="energies"):
+        energy_figure([], [])
+    frames = [Frame.of(steps[4]), Frame.of(steps[-1])]
+    *pages, film = draw_film(case.model, frames, tmp_path)
+    assert len(pages) == 2
+    assert film.read_bytes().startswith(b"GIF89a")
+
+
+def test_reference_holds_the_numbers_of_the_paper():
+    assert tables.REFERENCE["newton_over_gauss_seidel"] == {
+        "0.001": 4,
+        "0.0001": 20,
+        "1e-06": 40,
+    }
+    assert math.isclose(tables.REFERENCE["wall"]["rows_of_H"] / 3, 688)
+    assert set(report.SETS) >= {"wall", "fclib"}
