@@ -124,13 +124,13 @@ def describe(modes: Array) -> str:
 
 
 def near_nullspace(parts: list[Piece], free: Index, dofs: int) -> Array:
-    """Rigid modes of every piece on the free dofs, (len(free), k): for multigrid."""
-    out = np.zeros((dofs, sum(piece.modes.shape[1] for piece in parts)))
-    column = 0
+    """Rigid modes of every piece on the free dofs, (len(free), 3 or 6): for multigrid.
+
+    Pieces share the columns: multigrid groups coupled nodes only, so it never mixes them.
+    """
+    out = np.zeros((dofs, max((piece.modes.shape[1] for piece in parts), default=0)))
     for piece in parts:
-        k = piece.modes.shape[1]
-        out[piece.dofs, column : column + k] = piece.modes
-        column += k
+        out[piece.dofs, : piece.modes.shape[1]] = piece.modes
     return out[free]
 
 

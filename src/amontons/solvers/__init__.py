@@ -6,6 +6,7 @@ from .compressed import CompressedDelassus
 from .functions import AlartCurnier, ComplementarityFunction, JeanMoreau, NaturalMap
 from .gauss_seidel import Batch, GaussSeidel
 from .hybrid import Auto, Hybrid
+from .inexact import InexactNewton
 from .line_search import Armijo, FullStep, GoldsteinPrice, LineSearch, NonMonotone
 from .local_contact import LocalSolver
 from .newton import SemismoothNewton
@@ -17,6 +18,7 @@ METHODS: dict[str, type] = {
     "compressed-delassus": CompressedDelassus,
     "gauss-seidel": GaussSeidel,
     "hybrid": Hybrid,
+    "inexact-newton": InexactNewton,
     "proximal-point": ProximalPoint,
     "semismooth-newton": SemismoothNewton,
     "smoothing-newton": SmoothingNewton,
@@ -35,6 +37,7 @@ __all__ = [
     "GaussSeidel",
     "GoldsteinPrice",
     "Hybrid",
+    "InexactNewton",
     "Iterate",
     "JeanMoreau",
     "LineSearch",

@@ -43,7 +43,7 @@ STALLED = 12  # Newton steps without halving the error after which it is left
 class InexactNewton(SemismoothNewton):
     """`SemismoothNewton` on the Delassus form with GMRES and a kept block LU.
 
-    Meant for W of several deformable bodies; raises Breakdown where W has no large blocks.
+    Meant for W of several deformable bodies; where W has no large blocks, the steps are exact.
     """
 
     form: ClassVar[Form] = Form.DELASSUS
@@ -52,7 +52,7 @@ class InexactNewton(SemismoothNewton):
         whole, contacts = problem.whole
         joints = Joints.of(whole)
         if joints is None:
-            raise Breakdown("W has no large blocks: these are no joints of deformable bodies")
+            return super()._linearise(problem)
         return _Preconditioned(problem, joints, contacts)
 
 
