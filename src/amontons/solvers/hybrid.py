@@ -1,11 +1,27 @@
 """Combinations: `Hybrid` runs one solver after another, `Auto` is what a plain `solve` runs.
 
     problem                         what Auto does
+    Delassus form, joints           `inexact`: accelerated sweeps, then inexact Newton with a
+                                    kept block LU; when that stalls as below.  Joints: contacts of
+                                    deformable bodies, in groups with the same neighbours
     Delassus form                   `portfolio`: sweeps, smoothing Newton, proximal point
-    global form, W cheap            the same on W = H^T M^-1 H (rigid bodies, small meshes)
+    global form, W cheap            the same on W = H^T M^-1 H
     global form, W dear             `CompressedDelassus`, then semismooth Newton without W, then
-                                    the portfolio on W after all if it fits into memory
+                                    the Delassus form after all if W fits into memory
     global form, M singular         semismooth Newton with a factor of the whole system
+
+When is W cheap (`FrictionProblem.condensing_is_cheap`; it then also judges)?
+
+    bodies of M                     W is formed
+    rigid, at most 48 unknowns      always: W is sparse
+    n nc d <= EXACT_WORK            always: small
+    deformable                      when it takes at most CHEAP times the work of a compressed W
+                                    (`condensation`) and its blocks fit into DENSE_LIMIT: walls
+                                    of many equal blocks yes, one meshed body of 10 000 unknowns
+                                    no
+
+Whether to sweep or to take Newton steps is decided while solving, from the measured rate of the
+sweeps and operation counts of Newton (`Joints.newton_cost`, `Portfolio.costs`).
 
 [ABD] V. Acary, M. Brémond, F. Dubois, CSMA 2017 (see `gauss_seidel`).
 """

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import linalg as sparse_linalg
 
-from ..blocks import BlockRows
+from ..blocks import BlockRows, block_part
 from ..linear.multifrontal import FrontLU, Fronts
 from ..problem import FrictionProblem
 
@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 Single = NDArray[np.float32]
 Index = NDArray[np.int64]
 LARGE_GROUP = 6.0  # mean contacts of a group above which blocks are worth it
+SINGULAR = 1e-9  # smallest eigenvalue of a group, relative to the largest: rigid bodies
+FEW = 40  # contacts below which anything is quick
 KRYLOV = 80  # GMRES iterations of one solve
 SINGLE = 2e-6  # relative tolerance below which single precision can not go
 # Nanoseconds on one core, only their ratio matters: a dense operation, an entry read.
@@ -67,9 +69,11 @@ class Joints:
 
     @classmethod
     def _make(cls, blocks: BlockRows) -> Joints | None:
+        if len(blocks.diagonal) < FEW:
+            return None
         group = _groups(blocks)
         count = group.max(initial=-1) + 1
-        if len(group) < LARGE_GROUP * count or count == 0:
+        if count < 2 or len(group) < LARGE_GROUP * count or not _regular(blocks, group):
             return None
         contacts = np.argsort(group, kind="stable")
         sizes = np.bincount(group)
@@ -153,6 +157,19 @@ def _groups(blocks: BlockRows) -> Index:
         return np.zeros(0, dtype=np.int64)
     sums = np.add.reduceat(keys[blocks.indices], blocks.indptr[:-1].astype(np.int64))
     return np.unique(sums, return_inverse=True)[1]
+
+
+def _regular(blocks: BlockRows, group: Index) -> bool:
+    """Whether W within the largest group is regular: between rigid bodies its rank is 6."""
+    members = np.flatnonzero(group == np.bincount(group).argmax())
+    own = block_part(blocks, members).data
+    if len(own) != len(members) ** 2:  # contacts of one group do not even see each other
+        return False
+    k = len(members)
+    full = own.reshape(k, k, 3, 3).swapaxes(1, 2).reshape(3 * k, 3 * k)
+    scale = np.sqrt(np.maximum(full.diagonal(), np.finfo(float).tiny))
+    sizes = np.linalg.eigvalsh(0.5 * (full + full.T) / np.outer(scale, scale))
+    return bool(sizes[0] > SINGULAR * sizes[-1])
 
 
 class _Scaled:
