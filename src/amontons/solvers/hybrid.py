@@ -2,8 +2,8 @@
 
     problem                         what Auto does
     Delassus form, joints           `inexact`: accelerated sweeps, then inexact Newton with a
-                                    kept block LU; when that stalls as below.  Joints: contacts of
-                                    deformable bodies, in groups with the same neighbours
+                                    kept block LU; when that stalls, as below.  Joints:
+                                    groups of contacts with the same neighbours, not rigid
     Delassus form                   `portfolio`: sweeps, smoothing Newton, proximal point
     global form, W cheap            the same on W = H^T M^-1 H
     global form, W dear             `CompressedDelassus`, then semismooth Newton without W, then
