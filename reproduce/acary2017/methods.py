@@ -49,6 +49,8 @@ METHODS = (
            "with a non-monotone line search"),
     Method("NSN-AC global", am.SemismoothNewton(linear=am.Direct(threads=1)),
            "line search, sparse LU of [M, -H; B Hᵀ, A], no W", on_global=True),
+    Method("NSN-AC inexact", am.InexactNewton(),
+           "line search, GMRES with a block LU that is kept while it serves"),
     Method("Auto", am.Auto(), "what `solve(problem)` runs, given W"),
     Method("Auto global", am.Auto(), "the same given M and H", on_global=True),
 )  # fmt: skip
