@@ -25,6 +25,7 @@ from amontons.solvers.base import Iterate
 from .methods import METHODS, Method
 
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-6)  # the paper's; the first is read only
+SHORT, REPEATS = 0.05, 3  # seconds below which a solve is repeated, and how often
 WAITING = 4.0  # the clock on the wall may run so many times longer than the processor's
 Runs = dict[str, dict[str, Any]]  # by problem; "methods" by name
 
@@ -32,6 +33,15 @@ Runs = dict[str, dict[str, Any]]  # by problem; "methods" by name
 def key(tolerance: float) -> str:
     """How a tolerance is written in the files of results."""
     return f"{tolerance:g}"
+
+
+def best_run(problem: am.FrictionProblem, method: Method, limit: float) -> dict[str, Any]:
+    """`one_run` from the problem as read; the quickest of some where it is short."""
+    found = one_run(_fresh(problem), method, limit)
+    for _ in range(REPEATS if found["seconds"] < SHORT else 0):
+        again = one_run(_fresh(problem), method, limit)
+        found = min(found, again, key=lambda run: run["seconds"])
+    return found
 
 
 def one_run(problem: am.FrictionProblem, method: Method, limit: float) -> dict[str, Any]:
@@ -104,9 +114,9 @@ def race(
             entry.setdefault("condensing", condensing)
         for method in chosen:
             if not method.on_global:
-                entry["methods"][method.name] = one_run(_fresh(condensed), method, limit)
+                entry["methods"][method.name] = best_run(condensed, method, limit)
             elif problem.form is am.Form.GLOBAL:
-                entry["methods"][method.name] = one_run(_fresh(problem), method, limit)
+                entry["methods"][method.name] = best_run(problem, method, limit)
         report(f"{path.stem}: " + ", ".join(
             f"{method.name} {_short(entry['methods'].get(method.name))}" for method in chosen
         ))  # fmt: skip

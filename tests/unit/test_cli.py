@@ -156,7 +156,11 @@ def test_bench(folder):
 
 
 def test_bench_counts_failures(folder):
-    result = run("bench", "random.hdf5", "--methods", "auto,gauss-seidel", "--tolerances",
+    wedged = am.FrictionProblem.from_delassus(
+        np.diag([0.0, 1.0, 1.0]), np.array([-1.0, 0.0, 0.0]), 0.5
+    )
+    write_fclib(wedged, "wedged.hdf5")  # nothing can open the contacts
+    result = run("bench", "wedged.hdf5", "--methods", "auto,gauss-seidel", "--tolerances",
                  "1e-6", "--time-limit", "1e-9", "--profile", "p.png", "--json",
                  "-")  # fmt: skip
     rows = json.loads(result.stdout)["results"]

@@ -106,7 +106,7 @@ class Fronts:
             for child, rest in waiting[g]:
                 rows_of = (place[h] + np.arange(self.sizes[h]) for h in self.borders[child])
                 at = np.concatenate(list(rows_of))
-                front[np.ix_(at, at)] += rest
+                _add(front, rest, at)
             waiting[g] = []
             try:
                 inverse = np.linalg.inv(front[:k, :k])
@@ -120,6 +120,18 @@ class Fronts:
             if border:
                 waiting[border[0]].append((g, front[k:, k:] - left[g] @ right[g]))
         return FrontLU(self, pivots, right, left)  # type: ignore[arg-type]
+
+
+def _add(front: Array, rest: Array, at: Index) -> None:
+    """front[at, at] += rest, run by run of neighbouring rows: slices beat index arrays."""
+    breaks = np.flatnonzero(np.diff(at) != 1) + 1
+    starts, ends = np.concatenate([[0], breaks]), np.concatenate([breaks, [len(at)]])
+    runs = [
+        (slice(at[a], at[b - 1] + 1), slice(a, b)) for a, b in zip(starts, ends, strict=True)
+    ]
+    for rows, i in runs:
+        for columns, j in runs:
+            front[rows, columns] += rest[i, j]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,7 @@ from .functions import AlartCurnier, ComplementarityFunction, JeanMoreau, Natura
 from .gauss_seidel import Batch, GaussSeidel
 from .hybrid import Auto, Hybrid
 from .inexact import InexactNewton
+from .interior_point import InteriorPoint
 from .line_search import Armijo, FullStep, GoldsteinPrice, LineSearch, NonMonotone
 from .local_contact import LocalSolver
 from .newton import SemismoothNewton
@@ -18,6 +19,7 @@ METHODS: dict[str, type] = {
     "compressed-delassus": CompressedDelassus,
     "gauss-seidel": GaussSeidel,
     "hybrid": Hybrid,
+    "interior-point": InteriorPoint,
     "inexact-newton": InexactNewton,
     "proximal-point": ProximalPoint,
     "semismooth-newton": SemismoothNewton,
@@ -37,6 +39,7 @@ __all__ = [
     "GaussSeidel",
     "GoldsteinPrice",
     "Hybrid",
+    "InteriorPoint",
     "InexactNewton",
     "Iterate",
     "JeanMoreau",

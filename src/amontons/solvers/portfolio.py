@@ -1,11 +1,12 @@
 """The portfolio on the Delassus form: what `Auto` runs there, one stage after another.
 
-    Coulomb   10 Gauss-Seidel sweeps; sweeps with Anderson acceleration as long as their
-              measured rate promises an end before smoothing Newton would be there, or until
-              they have cost as much; where Newton is dear, relaxed sweeps in a race (`race`)
+    Coulomb   Gauss-Seidel sweeps with Anderson acceleration as long as their measured rate
+              promises an end before smoothing Newton would be there, or until they have cost
+              as much; where Newton is dear, relaxed sweeps in a race (`race`)
               worth one Newton; semismooth Newton where W is dense (deformable bodies);
-              smoothing Newton from the best point and from zero; proximal point; relaxed
-              sweeps worth the cost of Newton so far; again from smoothing Newton
+              interior point on the convex relaxation, sweeps from there; smoothing Newton
+              from the best point and from zero; proximal point; relaxed sweeps worth the cost
+              of Newton so far; again from the interior point
     Tresca    the same sweeps, then semismooth Newton
 
 Every stage starts from the best reaction so far, and is dropped when it does not help.  Costs
@@ -29,6 +30,7 @@ from ..errors import SingularOperator
 from ..judge import natural_error
 from ..problem import FrictionProblem
 from .base import Breakdown, Iterate, Target
+from .interior_point import STAGE, InteriorPoint, sliding_speed
 from .newton import SemismoothNewton
 from .race import Race
 from .smoothing import ProximalPoint, SmoothingNewton, Workspace
@@ -41,6 +43,8 @@ CHUNK = 40  # sweeps between two looks at their rate
 LONGEST = 6000  # sweeps after which Newton gets its chance whatever the rate promises
 HOPELESS = 8.0  # sweeps that promise to cost this many times Newton are left at once
 NEWTON_STEPS = 120
+INTERIOR_STEPS = 60
+NEARLY = 30.0  # error, in goals, from which Newton alone is the shorter way
 PATIENCE = 20  # Newton steps without halving the error
 SEMISMOOTH_CONTACTS = 600  # above, a dense factor costs more than it brings
 DENSE = 0.5  # share of blocks of W above which it comes from a mesh
@@ -81,6 +85,8 @@ class Portfolio:
         if self.problem.blocks.density > DENSE:  # deformable bodies: W is regular
             yield from self._semismooth(steps=15)
         for round_ in range(ROUNDS):
+            if self.error > NEARLY * self.goal:
+                yield from self._interior_point(round_)
             yield from self._newton(round_)
             yield from self._proximal(round_)
             if round_ and self.problem.contacts <= SEMISMOOTH_CONTACTS:
@@ -184,6 +190,25 @@ class Portfolio:
             )  # fmt: skip
             self.budget += abs(count) * self.costs["newton"]
             yield self._offer(found, abs(count), "smoothing Newton")
+
+    def _interior_point(self, round_: int) -> Iterator[Iterate]:
+        """Convex relaxations and sweeps from them, until two of both bring nothing.
+
+        The first time without sliding: that of an unfinished reaction is mostly noise.
+        """
+        solver = InteriorPoint(steps=self._affordable(INTERIOR_STEPS))
+        slip = np.zeros(self.problem.contacts)
+        if round_:
+            slip = sliding_speed(self.problem, self.r[:, : self.problem.dimension])
+        mark, patience = self.error, 0
+        for iterate in solver.relaxations(self.work, slip, self.target):
+            if iterate.stage == STAGE:
+                self.budget += iterate.iterations * self.costs["newton"]
+            yield self._offer(spatial(iterate.r), iterate.iterations, iterate.stage)
+            patience = 0 if self.error < 0.1 * mark else patience + 1
+            mark = self.error if patience == 0 else mark
+            if patience == 4:
+                return
 
     def _proximal(self, round_: int) -> Iterator[Iterate]:
         """Proximal point while it makes progress."""
