@@ -120,8 +120,8 @@ def table(record):
     lines += [f"Regenerate: `python benchmarks/growth.py --limit {record['limit']:g}`.", ""]
     lines += ["; ".join(f"{k} {v}" for k, v in record["machine"].items()) + ".", ""]
     lines += [
-        "Cold start, global form, `solve(problem)`; each case in a process of its own. CPU time "
-        "leaves out most of what other programs did to it, the time limit does not.",
+        "Cold start, global form, `solve(problem)`; each case in a process of its own. CPU "
+        "time leaves out most of what other programs did to it, the time limit does not.",
         "", "| problem | contacts | unknowns | tolerance | solved | error | seconds | CPU s | "
         "peak GB | last stage |", "|---|---|---|---|---|---|---|---|---|---|",
     ]  # fmt: skip
