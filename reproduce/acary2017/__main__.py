@@ -38,11 +38,14 @@ Examples:
   python -m reproduce.acary2017                      all of it, most of an hour on one core
   python -m reproduce.acary2017 --only wall,fclib --methods "Auto,Auto global"
                                                      measure two columns again
+  python -m reproduce.acary2017 --only step --methods "Auto,Auto global"
+                                                     the same against the quickest of Siconos
   python -m reproduce.acary2017 --only report        tables and figures only
 
 \b
 Methods: {", ".join(NAMES[:6])},
-  {", ".join(NAMES[6:])}.
+  {", ".join(NAMES[6:10])},
+  {", ".join(NAMES[10:])}.
 """
 
 
@@ -129,7 +132,10 @@ def _do(
             click.echo(f"fclib: no files in {data}; name its folder with --shared")
     if "step" in parts:
         if shutil.which(siconos):
-            report.against_siconos(out, main_series, fine, problems, siconos, limit, machine)
+            again = None if set(names) == set(NAMES) else names
+            report.against_siconos(
+                out, main_series, fine, problems, siconos, limit, machine, again
+            )
         else:
             click.echo(f"step: {siconos} is not there; name a Python with Siconos by --siconos")
     if "pictures" in parts:

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import click
+import numpy as np
 
 import amontons as am
 from amontons.case import read_case
 from amontons.files import replacing
-from amontons.plots import Frame, draw_film, energy_figure
+from amontons.plots import SI, Frame, draw_film, energy_figure, series_figure
 
 from . import profiles, step, tables
 from .methods import HYBRID, PRINTED
@@ -23,7 +24,7 @@ OURS = (
     "NSN-AC",
     HYBRID,
     "NSGS-AC",
-    "NSN-AC line search",
+    "NSN-AC inexact",
     "NSN-AC global",
     "Auto",
     "Auto global",
@@ -36,7 +37,8 @@ SETS = {
     "fclib": "the FCLib files",
 }
 PROFILES = ("wall", "fclib")
-MAGNIFIED_EVERY = 25  # steps between two pictures
+PICTURE_EVERY = 25  # steps between two pictures
+SHOWN = 4  # pictures of the series
 COMMAND = "python -m reproduce.acary2017"
 
 
@@ -57,21 +59,27 @@ def measure(
 
 def against_siconos(
     out: Path, series: Series, fine: Series | None, problems: Path, python: str, cap: float,
-    machine: dict[str, str],
+    machine: dict[str, str], methods: Sequence[str] | None,
 ) -> None:  # fmt: skip
-    """The last problem of the smallest step of each wall, against Siconos."""
-    record = {"machine": machine, "cap": cap, "walls": {}}
+    """The last problem of the smallest step of each wall, against Siconos.
+
+    methods: those of ours to measure again, None for all and every solver of Siconos.
+    """
+    stored = load(out / "step.json").get("walls", {})
+    record = {"machine": machine, "cap": cap, "walls": dict(stored)}
     for chosen in (series, fine):
         if chosen is None:
             continue
         path = problems / chosen.names(chosen.steps[0])[-1]
         click.echo(f"{path.stem} against Siconos")
-        record["walls"][path.stem] = step.compare(path, python, cap, click.echo)
+        record["walls"][path.stem] = step.compare(
+            path, python, cap, click.echo, methods, stored.get(path.stem)
+        )
         store(out / "step.json", record)
 
 
 def pictures(out: Path, folder: Path, *, quick: bool) -> None:
-    """Frames into the working folder; four of them, the film and the energies into `out`."""
+    """Frames into the working folder; a series, the film and the energies into `out`."""
     small = ["wall.cells=[2,1,1]", "wall.rows=3", "evolution.until=0.1"] if quick else []
     case = read_case(CASE, small)
     assert case.evolution is not None
@@ -80,14 +88,18 @@ def pictures(out: Path, folder: Path, *, quick: bool) -> None:
                           tolerance=case.settings.tolerance):  # fmt: skip
         times.append(done.time)
         energies.append(done.energies)
-        if done.state.index % MAGNIFIED_EVERY == 0:
+        if done.state.index % PICTURE_EVERY == 0:
             frames.append(Frame.of(done))
-    *pages, film = draw_film(case.model, frames, folder)
+    *_, film = draw_film(case.model, frames, folder, units=SI)
     out.mkdir(parents=True, exist_ok=True)
     (out / "cracking.gif").write_bytes(film.read_bytes())
-    (out / "cracking.png").write_bytes(pages[-1].read_bytes())
-    with replacing(out / "energy.png") as temporary:
-        energy_figure(times, energies).savefig(temporary, format="png")
+    shown = [frames[k] for k in np.linspace(1, len(frames) - 1, SHOWN).round().astype(int)]
+    for name, figure in (
+        ("cracking", series_figure(case.model, shown, units=SI)),
+        ("energy", energy_figure(times, energies, units=SI)),
+    ):
+        with replacing(out / f"{name}.png") as temporary:
+            figure.savefig(temporary, format="png")
 
 
 # ----------------------------------------------------------------------------- the page

@@ -4,7 +4,8 @@ All start from the impulses of the step before and from the velocities these giv
 stops on its own error, so it is asked for the tolerance and for 1e-2 and 1e-4 of it; the
 fastest run whose reactions pass our judge counts.  Two clocks: *given W*, the solver alone, and
 *given M and H*, everything from the global form to the answer; a Siconos solver of the Delassus
-form is charged our own time to form W there.
+form is charged our own time to form W there.  A column of ours can be measured again beside the
+quickest solvers of Siconos only; the rows of the others stay.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import select
 import subprocess
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -39,9 +40,11 @@ GLOBAL = ("GLOBAL_NSN_AC", "GLOBAL_NSN_AC_WR", "GLOBAL_NSGS", "GLOBAL_NSGS_WR",
           "GLOBAL_NSGSV_WR", "GLOBAL_ADMM", "GLOBAL_ADMM_WR", "GLOBAL_IPM", "GLOBAL_PROX_WR",
           "GLOBAL_TFP_WR", "GLOBAL_DSFP_WR", "GLOBAL_ACLMFP", "GLOBAL_VI_FPP",
           "GLOBAL_VI_EG")  # fmt: skip
+QUICKEST = 5  # solvers of Siconos of each form that run again when ours do
 OURS = {
     "Auto": am.Auto(),
-    "NSN-AC": am.SemismoothNewton(),
+    "NSN-AC inexact": am.InexactNewton(),
+    "NSN-AC line search": am.SemismoothNewton(),
     "Gauss-Seidel, Anderson": am.GaussSeidel(anderson_depth=10, batch=10),
 }
 OURS_GLOBAL = {
@@ -51,28 +54,54 @@ OURS_GLOBAL = {
 
 
 def compare(
-    path: Path, python: str, cap: float, report: Callable[[str], None] = print
-) -> dict[str, Any]:
-    """Ours and theirs on one file of `write_problems`; cap: seconds for one run of Siconos."""
+    path: Path, python: str, cap: float, report: Callable[[str], None] = print,
+    methods: Sequence[str] | None = None, stored: dict[str, Any] | None = None,
+) -> dict[str, Any]:  # fmt: skip
+    """Ours and theirs on one file of `write_problems`; cap: seconds for one run of Siconos.
+
+    methods: those of ours to measure, all if None; with `stored`, the result of a call before,
+    they run beside the quickest solvers of Siconos only, and all other rows are kept.
+    """
     problem = am.read_fclib(path)
     began = time.process_time()
     condensed = problem.condensed()
     condensing = time.process_time() - began
     r = np.load(path.with_suffix(".npz"))["r"]
-    ours = {name: _ours(condensed, solver, r) for name, solver in OURS.items()}
-    whole = {name: _ours(problem, solver, r) for name, solver in OURS_GLOBAL.items()}
-    for name, row in (ours | whole).items():
-        report(f"  {name}: {row['seconds']:.3g} s, {row['outcome']}, error {row['error']:.1e}")
-    theirs = {}
+    kept = stored if methods is not None and stored is not None else {}
+    parts = []
+    for name, solvers, given in (
+        ("ours", OURS, condensed), ("ours_global", OURS_GLOBAL, problem),
+    ):  # fmt: skip
+        rows = dict(kept.get(name, {}))
+        for who, solver in solvers.items():
+            if methods is None or _column(name, who) in methods:
+                rows[who] = row = _ours(given, solver, r)
+                took = f"{row['seconds']:.3g} s, " if row["seconds"] is not None else ""
+                report(f"  {who}: {took}{row['outcome']}, error {row['error']:.1e}")
+        parts.append(rows)
+    theirs = dict(kept.get("siconos", {}))
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "problem.npz"
         _write(file, problem, condensed, r)
-        for name in (*LOCAL, *GLOBAL):
+        for name in _quickest(theirs) if theirs else (*LOCAL, *GLOBAL):
             theirs[name] = best = _worker(condensed, python, file, name, cap)
             report(f"  Siconos {name}: {_said(best)}")
     sizes = {"contacts": problem.contacts, "unknowns": problem.unknowns}
-    return sizes | {"condensing": condensing, "ours": ours, "ours_global": whole,
+    return sizes | {"condensing": condensing, "ours": parts[0], "ours_global": parts[1],
                     "siconos": theirs}  # fmt: skip
+
+
+def _column(form: str, who: str) -> str:
+    """The name of a solver of ours in `methods`."""
+    return f"{who} global" if form == "ours_global" and who == "Auto" else who
+
+
+def _quickest(theirs: dict[str, dict[str, Any]]) -> list[str]:
+    """The quickest solvers of a stored run, of each form."""
+    solved = sorted((n for n, row in theirs.items() if row["seconds"] is not None),
+                    key=lambda n: theirs[n]["seconds"])  # fmt: skip
+    local = [n for n in solved if n in LOCAL]
+    return local[:QUICKEST] + [n for n in solved if n not in LOCAL][:QUICKEST]
 
 
 def _ours(problem: am.FrictionProblem, solver: Any, r: np.ndarray) -> dict[str, Any]:

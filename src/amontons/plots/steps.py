@@ -38,6 +38,23 @@ SECONDS = 0.25  # of one picture of a film
 LAST = 2.0  # seconds for which a film rests on its last picture
 
 
+@dataclass(frozen=True)
+class Units:
+    """What the axes say; empty where only the reader knows."""
+
+    length: str = ""
+    time: str = ""
+    energy: str = ""
+
+
+UNKNOWN, SI = Units(), Units("m", "s", "J")
+
+
+def _with(name: str, unit: str) -> str:
+    """The label of an axis."""
+    return f"{name} in {unit}" if unit else name
+
+
 @dataclass(frozen=True, eq=False)
 class Frame:
     """What a picture of a step needs: time, displacement per body, status of all contacts."""
@@ -131,10 +148,7 @@ def _edges(nodes: Index) -> Index:
 
 def magnification(scene: Scene, frames: Sequence[Frame]) -> float:
     """A round factor that makes the largest displacement a visible part of the picture."""
-    largest = max(
-        (np.abs(u[:, list(scene.axes)]).max() for f in frames for u in f.displacement),
-        default=0.0,
-    )
+    largest = _room(scene, frames)
     if largest == 0:
         return 1.0
     factor = SHOWN * scene.size / largest
@@ -143,8 +157,9 @@ def magnification(scene: Scene, frames: Sequence[Frame]) -> float:
 
 
 def step_figure(
-    model: Model | Scene, frame: Frame, *, magnify: float = 1.0, room: float = 0.0
-) -> Figure:
+    model: Model | Scene, frame: Frame, *, magnify: float = 1.0, room: float = 0.0,
+    units: Units = UNKNOWN,
+) -> Figure:  # fmt: skip
     """The deformed bodies, their joints coloured by status.
 
     magnify: factor on displacements; room: magnified displacement that must fit in, unit of
@@ -153,6 +168,52 @@ def step_figure(
     scene = model if isinstance(model, Scene) else Scene(model)
     figure = Figure(figsize=(7.6, 6.4), dpi=110, layout="constrained")
     axes = figure.subplots()
+    _draw_step(axes, scene, frame, magnify, room, units)
+    axes.set_title(f"{_moment(frame, units)}, displacements × {magnify:g}")
+    labels = {s: f"{s.name.lower()}: {int((frame.status == s).sum())}" for s in ContactStatus}
+    _joint_legend(figure, labels)
+    return figure
+
+
+def series_figure(
+    model: Model | Scene, frames: Sequence[Frame], *, units: Units = UNKNOWN
+) -> Figure:
+    """Some steps side by side, magnified alike; raises InvalidInput when there is none."""
+    if not frames:
+        raise InvalidInput("frames: expected at least one, got none")
+    scene = model if isinstance(model, Scene) else Scene(model)
+    factor, room = magnification(scene, frames), _room(scene, frames)
+    figure = Figure(figsize=(3.4 * len(frames) + 0.5, 4.9), dpi=120, layout="constrained")
+    panels = figure.subplots(1, len(frames), sharey=True, squeeze=False)[0]
+    for axes, frame in zip(panels, frames, strict=True):
+        _draw_step(axes, scene, frame, factor, factor * room, units)
+        shares = [int((frame.status == s).sum()) for s in ContactStatus]
+        counted = ", ".join(
+            f"{n} {s.name.lower()}" for n, s in zip(shares, ContactStatus, strict=True)
+        )
+        axes.set_title(f"{_moment(frame, units)}\n{counted}", fontsize=10)
+        axes.label_outer()
+    _joint_legend(figure, {s: s.name.lower() for s in ContactStatus})
+    figure.suptitle(f"Joints by status of their contacts, displacements × {factor:g}")
+    return figure
+
+
+def _moment(frame: Frame, units: Units) -> str:
+    return f"t = {frame.time:.4g} {units.time}".rstrip()
+
+
+def _room(scene: Scene, frames: Sequence[Frame]) -> float:
+    """The largest displacement in the plane of the picture, unit of length."""
+    return max(
+        (float(np.abs(u[:, list(scene.axes)]).max()) for f in frames for u in f.displacement),
+        default=0.0,
+    )
+
+
+def _draw_step(
+    axes: Axes, scene: Scene, frame: Frame, magnify: float, room: float, units: Units
+) -> None:
+    """Deformed sides and joints in one frame for all steps."""
     moved = [
         (body.mesh.points + magnify * u)[:, list(scene.axes)]
         for body, u in zip(scene.model.bodies, frame.displacement, strict=True)
@@ -167,19 +228,18 @@ def step_figure(
     start = np.concatenate([b.mesh.points[:, list(scene.axes)] for b in scene.model.bodies])
     margin = room + 0.02 * scene.size
     low, high = start.min(axis=0) - margin, start.max(axis=0) + margin
-    names = "xyz"
+    x, y = ("xyz"[k] for k in scene.axes)
+    length = units.length or "unit of length"
     axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]),
-             xlabel=f"${names[scene.axes[0]]}$, unit of length",
-             ylabel=f"${names[scene.axes[1]]}$, unit of length",
-             title=f"t = {frame.time:.4g}, displacements × {magnify:g}")  # fmt: skip
+             xlabel=f"${x}$ in {length}", ylabel=f"${y}$ in {length}")  # fmt: skip
     axes.spines[["top", "right"]].set_visible(False)
+
+
+def _joint_legend(figure: Figure, labels: dict[ContactStatus, str]) -> None:
     handles = [
-        Line2D([], [], color=JOINTS[s], linewidth=4,
-               label=f"{s.name.lower()}: {int((frame.status == s).sum())}")
-        for s in ContactStatus
-    ]  # fmt: skip
+        Line2D([], [], color=JOINTS[s], linewidth=4, label=text) for s, text in labels.items()
+    ]
     figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
-    return figure
 
 
 def _draw_joints(axes: Axes, scene: Scene, frame: Frame, moved: list[Array]) -> None:
@@ -200,8 +260,9 @@ def _draw_joints(axes: Axes, scene: Scene, frame: Frame, moved: list[Array]) -> 
 
 
 def draw_film(
-    model: Model, frames: Sequence[Frame], folder: str | os.PathLike[str], name: str = "step"
-) -> list[Path]:
+    model: Model, frames: Sequence[Frame], folder: str | os.PathLike[str], name: str = "step",
+    *, units: Units = UNKNOWN,
+) -> list[Path]:  # fmt: skip
     """One PNG for each frame, FOLDER/NAME-00001.png and so on, and FOLDER/film.gif of them all.
 
     Returns the paths, the film last.
@@ -210,13 +271,10 @@ def draw_film(
     folder.mkdir(parents=True, exist_ok=True)
     scene = Scene(model)
     factor = magnification(scene, frames)
-    room = factor * max(
-        (float(np.abs(u[:, list(scene.axes)]).max()) for f in frames for u in f.displacement),
-        default=0.0,
-    )
+    room = factor * _room(scene, frames)
     paths, images = [], []
     for k, frame in enumerate(frames, start=1):
-        figure = step_figure(scene, frame, magnify=factor, room=room)
+        figure = step_figure(scene, frame, magnify=factor, room=room, units=units)
         path = folder / f"{name}-{k:05d}.png"
         with replacing(path) as temporary:
             figure.savefig(temporary, format="png")
@@ -240,7 +298,9 @@ def _image(figure: Figure) -> Image.Image:
 
 
 # ----------------------------------------------------------------------------- energies
-def energy_figure(times: Sequence[float], energies: Sequence[Energies]) -> Figure:
+def energy_figure(
+    times: Sequence[float], energies: Sequence[Energies], *, units: Units = UNKNOWN
+) -> Figure:
     """Where the work went: sums since the start (left), work of contact per step (right).
 
     One entry for each step; raises InvalidInput when there is none.
@@ -259,14 +319,15 @@ def energy_figure(times: Sequence[float], energies: Sequence[Energies]) -> Figur
     stored += total("gain")[0] - stored[0]  # relative to the start
     dissipated = -total("contact")
     lost = total("damping") + total("numerical")
-    figure = Figure(figsize=(10.4, 4.2), dpi=130, layout="constrained")
+    figure = Figure(figsize=(10.8, 4.4), dpi=130, layout="constrained")
     left, right = figure.subplots(1, 2)
     left.stackplot(t, stored, lost, dissipated, colors=("#56B4E9", "#BBBBBB", "#E69F00"),
-                   labels=("stored (kinetic + elastic)", "dissipated by scheme and damping",
+                   labels=("stored (kinetic + elastic)", "lost in time scheme and damping",
                            "dissipated by contact and friction"))  # fmt: skip
     left.plot(t, put_in, color=INK, linewidth=1.6, linestyle="--",
               label="work of loads and supports")  # fmt: skip
-    left.set(xlabel="time", ylabel="energy, work", title="Energy balance since the start",
+    left.set(xlabel=_with("time", units.time), ylabel=_with("energy, work", units.energy),
+             title="Energy balance since the start",
              xlim=(min(t.min(), 0.0), t.max()))  # fmt: skip
     work = np.array([e.contact for e in energies])
     defect = np.abs([e.defect for e in energies])
@@ -276,8 +337,10 @@ def energy_figure(times: Sequence[float], energies: Sequence[Energies]) -> Figur
         right.plot(t[gained], work[gained], "x", color="#D55E00", label="gained from contact")
     right.plot(t, defect, color=INK, linewidth=0.8, label="|defect of the balance|")
     created = "creates" if gained.any() else "never creates"
-    title = f"Contact {created} energy: largest work {work.max():.1e}"
-    right.set(xlabel="time", ylabel="work in a step", title=title, yscale="log",
+    largest = f"{work.max():.1e} {units.energy}".rstrip()
+    right.set(xlabel=_with("time", units.time), yscale="log",
+              ylabel=_with("work in a step", units.energy),
+              title=f"Contact {created} energy: largest work {largest}",
               xlim=left.get_xlim())  # fmt: skip
     for axes in (left, right):
         handles = axes.get_legend_handles_labels()

@@ -8,7 +8,8 @@ its factors.
 `DeformablePortfolio` is what `Auto` runs on such W:
 
     accelerated sweeps    while they promise an end before Newton would be there
-    inexact Newton        until it stalls
+    inexact Newton        with full steps until it stalls: from the best point, from the start;
+                          then with a line search, which is what stalls near a swept point
     the usual portfolio   then
 
 [EW] S. Eisenstat, H. Walker (see `newton`).
@@ -22,6 +23,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..blocks import spatial
 from ..errors import SingularOperator
@@ -29,14 +31,16 @@ from ..problem import Form, FrictionProblem
 from .base import Breakdown, Iterate
 from .functions import Linearised
 from .joints import Joints
+from .line_search import FullStep
 from .newton import Linearisation, SemismoothNewton, State
 from .portfolio import DEPTH, HISTORY_CONTACT, SWEEP_BLOCK, SWEEP_CONTACT, Portfolio
 from .sweeps import Acceleration, watch_for
 
-LOOSEST, TIGHTEST = 0.1, 1e-3  # relative tolerance of GMRES: a step more is cheaper than 1e-4
+Array = NDArray[np.float64]
+LOOSEST, TIGHTEST = 1e-3, 1e-4  # relative tolerance of GMRES: looser ones misled cold starts
 CHUNK, LOOK = 40, 0.1  # sweeps between two looks at their rate: number, part of Newton's cost
 SLOWER = 1.5  # sweeps get slower than their first rate promises
-STALLED = 12  # Newton steps without halving the error after which it is left
+STALLED = 8  # Newton steps without halving the error after which it is left
 
 
 @dataclass(frozen=True)
@@ -54,6 +58,9 @@ class InexactNewton(SemismoothNewton):
         if joints is None:
             return super()._linearise(problem)
         return _Preconditioned(problem, joints, contacts)
+
+
+FULL = InexactNewton(line_search=FullStep())
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +102,8 @@ class DeformablePortfolio(Portfolio):
         joints = Joints.of(whole)
         if joints is not None:
             yield from self._sweeps_before(joints)
-            yield from self._inexact()
+            for solver, r in ((FULL, self.r), (FULL, self.start), (InexactNewton(), self.start)):
+                yield from self._inexact(solver, r)
         yield from super().stages()
 
     def _sweeps_before(self, joints: Joints) -> Iterator[Iterate]:
@@ -115,17 +123,16 @@ class DeformablePortfolio(Portfolio):
             if spent + SLOWER * promise > newton:
                 return
 
-    def _inexact(self) -> Iterator[Iterate]:
-        """Inexact Newton from the best point until it stalls."""
-        start = Iterate(self.r[:, : self.problem.dimension].copy())
-        mark, waited = self.error, 0
+    def _inexact(self, solver: InexactNewton, r: Array) -> Iterator[Iterate]:
+        """Inexact Newton from r until it stalls."""
+        start = Iterate(r[:, : self.problem.dimension].copy())
+        mark, waited = math.inf, 0
         try:
-            for iterate in InexactNewton().iterates(self.problem, start, self.target):
+            for iterate in solver.iterates(self.problem, start, self.target):
                 found = self._offer(spatial(iterate.r), 1, "inexact Newton")
                 yield replace(found, linear_iterations=iterate.linear_iterations)
-                mark, waited = (
-                    (self.error, 0) if self.error < 0.5 * mark else (mark, waited + 1)
-                )
+                latest = self.latest
+                mark, waited = (latest, 0) if latest < 0.5 * mark else (mark, waited + 1)
                 if waited > STALLED:
                     return
         except (Breakdown, SingularOperator):

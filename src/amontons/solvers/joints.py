@@ -31,6 +31,7 @@ LARGE_GROUP = 6.0  # mean contacts of a group above which blocks are worth it
 SINGULAR = 1e-9  # smallest eigenvalue of a group, relative to the largest: rigid bodies
 FEW = 40  # contacts below which anything is quick
 KRYLOV = 80  # GMRES iterations of one solve
+PATIENCE, WORTH = 8, 0.4  # GMRES iterations with a kept factor: number, part of a new one's cost
 SINGLE = 2e-6  # relative tolerance below which single precision can not go
 # Nanoseconds on one core, only their ratio matters: a dense operation, an entry read.
 FLOP, ENTRY = 0.04, 0.25
@@ -108,26 +109,45 @@ class Joints:
         if size == 0:
             return np.zeros_like(b), 0
         law = _Scaled(self, A, B)
-        if self.kept is None or self.spent > self.factor_cost:
-            self.renew(law)
         flat = (b / size).astype(np.float32).ravel()[self.unknowns]
-        count = 0
+        x, total = np.zeros_like(flat), 0
+        patience = int(np.clip(WORTH * self.factor_cost / self.product_cost, PATIENCE, KRYLOV))
+        if self.kept is not None and self.spent <= self.factor_cost:
+            x, total, done = self._gmres(law, flat, tolerance, patience)
+            if done:
+                return self._in_order(size, x, b.shape), total
+        self.renew(law)  # too much has changed since the kept factor
+        left = flat - law.product(x) if total else flat
+        scale = float(np.linalg.norm(left)) / float(np.linalg.norm(flat))
+        if scale > 0:
+            dx, count, _ = self._gmres(law, left, min(tolerance / scale, 0.5), KRYLOV)
+            x, total = x + dx, total + count
+        return self._in_order(size, x, b.shape), total
+
+    def _gmres(
+        self, law: _Scaled, b: Single, tolerance: float, limit: int
+    ) -> tuple[Single, int, bool]:
+        """x with |(A + B W) x - b| <= tolerance |b|, iterations, and whether it holds."""
+        kept, count = self.kept, 0
+        assert kept is not None
 
         def operator(y: Single) -> Single:
             nonlocal count
             count += 1
-            return law.product(self.kept.solve(y))  # type: ignore[union-attr]
+            return law.product(kept.solve(y))
 
-        matrix = sparse_linalg.LinearOperator(
-            2 * (flat.size,), matvec=operator, dtype=np.float32
+        matrix = sparse_linalg.LinearOperator(2 * (b.size,), matvec=operator, dtype=np.float32)
+        y, failed = sparse_linalg.gmres(
+            matrix, b, rtol=max(tolerance, SINGLE), atol=0.0, restart=limit, maxiter=1
         )
-        y, _ = sparse_linalg.gmres(
-            matrix, flat, rtol=max(tolerance, SINGLE), atol=0.0, restart=KRYLOV, maxiter=1
-        )
-        dr = np.empty(3 * self.nc)
-        dr[self.unknowns] = self.kept.solve(y)  # type: ignore[union-attr]
         self.spent += count * self.product_cost
-        return size * dr.reshape(b.shape), count
+        return kept.solve(y), count, not failed
+
+    def _in_order(self, size: float, x: Single, shape: tuple[int, ...]) -> Array:
+        """size x in the order of the contacts."""
+        dr = np.empty(3 * self.nc)
+        dr[self.unknowns] = x
+        return size * dr.reshape(shape)
 
     def newton_cost(self, digits: float) -> float:
         """Nanoseconds that Newton takes for some digits, by what it took on walls."""
