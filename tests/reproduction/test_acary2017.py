@@ -12,7 +12,7 @@ from click.testing import CliRunner
 import amontons as am
 from amontons.analysis import performance_profile
 from amontons.evolution import Energies
-from amontons.plots import Frame, draw_film, energy_figure
+from amontons.plots import SI, Frame, draw_film, energy_figure, series_figure
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))  # the reproductions are not installed
@@ -188,6 +188,28 @@ def test_table_against_siconos_names_the_best():
     assert "the best of Siconos GLOBAL_ADMM 400 ms; ours / theirs 0.5." in page
 
 
+def test_one_column_against_siconos_runs_again_beside_the_quickest_only(problems, monkeypatch):
+    asked = []
+
+    def worker(condensed, python, file, solver, cap):
+        asked.append(solver)
+        return {"seconds": 2.0, "error": 1e-8}
+
+    monkeypatch.setattr(step, "_worker", worker)
+    stored = {
+        "ours": {"NSN-AC line search": {"seconds": 7.0}},
+        "ours_global": {},
+        "siconos": {name: {"seconds": 1.0 + k} for k, name in enumerate(step.LOCAL)}
+        | {"GLOBAL_NSN_AC": {"seconds": 9.0}, "GLOBAL_IPM": {"seconds": None}},
+    }
+    found = step.compare(problems[0], "", 1.0, lambda text: None, ["Auto global"], stored)
+    assert asked == [*step.LOCAL[: step.QUICKEST], "GLOBAL_NSN_AC"]
+    assert found["ours"] == stored["ours"]
+    assert found["ours_global"]["Auto"]["outcome"] == "converged"
+    assert found["siconos"]["NSGS"]["seconds"] == 2.0
+    assert found["siconos"]["NSN_NM"] == stored["siconos"]["NSN_NM"]
+
+
 def test_contact_of_the_tiny_wall_never_creates_energy_and_pictures_say_so(tmp_path):
     case = wall.read_case(wall.CASE, ["wall.cells=[2,1,1]", "wall.rows=2"])
     steps = list(am.evolve(case.model, am.MoreauJean(step=5e-3, theta=1), until=0.05,
@@ -204,6 +226,12 @@ def test_contact_of_the_tiny_wall_never_creates_energy_and_pictures_say_so(tmp_p
     *pages, film = draw_film(case.model, frames, tmp_path)
     assert len(pages) == 2
     assert film.read_bytes().startswith(b"GIF89a")
+    panels = series_figure(case.model, frames, units=SI).axes
+    assert [axes.get_title().split("\n")[0] for axes in panels] == ["t = 0.025 s", "t = 0.05 s"]
+    assert panels[0].get_ylabel() == "$z$ in m"
+    assert energy_figure([1.0], energies[:1], units=SI).axes[0].get_ylabel().endswith("in J")
+    with pytest.raises(am.InvalidInput, match="frames"):
+        series_figure(case.model, [])
 
 
 def test_reference_holds_the_numbers_of_the_paper():

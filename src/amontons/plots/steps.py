@@ -32,7 +32,9 @@ Index = NDArray[np.int64]
 STONE, EDGE = "#F1EDE6", "#B9B2A6"
 JOINTS = {ContactStatus.OPEN: "#CC79A7", ContactStatus.SLIP: "#E69F00",
           ContactStatus.STICK: "#0072B2"}  # fmt: skip
-SHOWN = 0.06  # size that the largest displacement gets, relative to the whole
+WIDTHS = {ContactStatus.OPEN: 3.6, ContactStatus.SLIP: 2.6,
+          ContactStatus.STICK: 1.3}  # fmt: skip  # points: told apart without colour too
+SHOWN = 0.12  # size that the largest displacement gets, relative to the whole
 FRONT = 1e-6  # part of the depth within which nodes lie on the side that is seen
 SECONDS = 0.25  # of one picture of a film
 LAST = 2.0  # seconds for which a film rests on its last picture
@@ -183,7 +185,7 @@ def series_figure(
         raise InvalidInput("frames: expected at least one, got none")
     scene = model if isinstance(model, Scene) else Scene(model)
     factor, room = magnification(scene, frames), _room(scene, frames)
-    figure = Figure(figsize=(3.4 * len(frames) + 0.5, 4.9), dpi=120, layout="constrained")
+    figure = Figure(figsize=(3.4 * len(frames) + 0.5, 5.1), dpi=120, layout="constrained")
     panels = figure.subplots(1, len(frames), sharey=True, squeeze=False)[0]
     for axes, frame in zip(panels, frames, strict=True):
         _draw_step(axes, scene, frame, factor, factor * room, units)
@@ -194,7 +196,7 @@ def series_figure(
         axes.set_title(f"{_moment(frame, units)}\n{counted}", fontsize=10)
         axes.label_outer()
     _joint_legend(figure, {s: s.name.lower() for s in ContactStatus})
-    figure.suptitle(f"Joints by status of their contacts, displacements × {factor:g}")
+    figure.suptitle(f"Joints by status of their contacts, displacements × {factor:g}\n")
     return figure
 
 
@@ -237,7 +239,8 @@ def _draw_step(
 
 def _joint_legend(figure: Figure, labels: dict[ContactStatus, str]) -> None:
     handles = [
-        Line2D([], [], color=JOINTS[s], linewidth=4, label=text) for s, text in labels.items()
+        Line2D([], [], color=JOINTS[s], linewidth=1.5 * WIDTHS[s], label=text)
+        for s, text in labels.items()
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
 
@@ -255,7 +258,9 @@ def _draw_joints(axes: Axes, scene: Scene, frame: Frame, moved: list[Array]) -> 
                 halves[int(s)].extend(half[status == s])
     for s in (ContactStatus.STICK, ContactStatus.SLIP, ContactStatus.OPEN):
         axes.add_collection(
-            LineCollection(halves[int(s)], colors=JOINTS[s], linewidths=2.6, capstyle="round")
+            LineCollection(
+                halves[int(s)], colors=JOINTS[s], linewidths=WIDTHS[s], capstyle="round"
+            )
         )
 
 
