@@ -102,8 +102,9 @@ class DeformablePortfolio(Portfolio):
         joints = Joints.of(whole)
         if joints is not None:
             yield from self._sweeps_before(joints)
-            for solver, r in ((FULL, self.r), (FULL, self.start), (InexactNewton(), self.start)):
-                yield from self._inexact(solver, r)
+            yield from self._inexact(FULL, self.r)
+            yield from self._inexact(FULL, self.start)
+            yield from self._inexact(InexactNewton(), self.start)
         yield from super().stages()
 
     def _sweeps_before(self, joints: Joints) -> Iterator[Iterate]:

@@ -31,7 +31,7 @@ LARGE_GROUP = 6.0  # mean contacts of a group above which blocks are worth it
 SINGULAR = 1e-9  # smallest eigenvalue of a group, relative to the largest: rigid bodies
 FEW = 40  # contacts below which anything is quick
 KRYLOV = 80  # GMRES iterations of one solve
-PATIENCE, WORTH = 8, 0.4  # GMRES iterations with a kept factor: number, part of a new one's cost
+PATIENCE, WORTH = 8, 0.4  # GMRES with a kept factor: iterations, part of a new one's cost
 SINGLE = 2e-6  # relative tolerance below which single precision can not go
 # Nanoseconds on one core, only their ratio matters: a dense operation, an entry read.
 FLOP, ENTRY = 0.04, 0.25
