@@ -9,6 +9,7 @@ from amontons.solvers.base import Solver
 
 SWEEPS = 10  # between two judgements: a judgement costs nearly a sweep, as (13) in the paper
 FULL = am.FullStep()
+LONGER = {"NSGS-AC": 4.0}  # times the limit on the wall, so that ratios are more than bounds
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,10 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import amontons as am
@@ -27,6 +28,7 @@ from .methods import METHODS, Method
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-6)  # the paper's; the first is read only
 SHORT, REPEATS = 0.05, 3  # seconds below which a solve is repeated, and how often
 WAITING = 4.0  # the clock on the wall may run so many times longer than the processor's
+NOBODY: Mapping[str, float] = MappingProxyType({})
 Runs = dict[str, dict[str, Any]]  # by problem; "methods" by name
 
 
@@ -76,6 +78,7 @@ def one_run(problem: am.FrictionProblem, method: Method, limit: float) -> dict[s
         "error_13": published if published is not None else math.nan,
         "iterations": found.convergence.iterations,
         "seconds": clock[-1] if clock else 0.0,
+        "limit": limit,
         "counts": found.counts,
         "met": met,
     }
@@ -91,11 +94,12 @@ def _fresh(problem: am.FrictionProblem) -> am.FrictionProblem:
 
 def race(
     paths: Iterable[Path], methods: Sequence[str], limit: float, runs: Runs,
-    report: Callable[[str], None] = print,
+    report: Callable[[str], None] = print, longer: Mapping[str, float] = NOBODY,
 ) -> Runs:  # fmt: skip
     """Run the named methods on all files; `runs` is completed and returned.
 
-    limit: seconds for one solve.  A method of the global form is left out where a file has W.
+    limit: seconds for one solve; longer: factors on it by method.  A method of the global form
+    is left out where a file has W.
     """
     chosen = [method for method in METHODS if method.name in methods]
     warmed = False
@@ -113,10 +117,11 @@ def race(
         if problem.form is am.Form.GLOBAL:
             entry.setdefault("condensing", condensing)
         for method in chosen:
+            allowed = limit * longer.get(method.name, 1.0)
             if not method.on_global:
-                entry["methods"][method.name] = best_run(condensed, method, limit)
+                entry["methods"][method.name] = best_run(condensed, method, allowed)
             elif problem.form is am.Form.GLOBAL:
-                entry["methods"][method.name] = best_run(problem, method, limit)
+                entry["methods"][method.name] = best_run(problem, method, allowed)
         report(f"{path.stem}: " + ", ".join(
             f"{method.name} {_short(entry['methods'].get(method.name))}" for method in chosen
         ))  # fmt: skip
@@ -151,6 +156,14 @@ def seconds(runs: Runs, names: Sequence[str], tolerance: float) -> list[list[flo
          for name in names]
         for entry in runs.values()
     ]  # fmt: skip
+
+
+def limits(runs: Runs, names: Sequence[str], limit: float) -> list[list[float]]:
+    """Limits that the runs had, (problems, methods); `limit` where none is stored."""
+    return [
+        [entry["methods"].get(name, {}).get("limit", limit) for name in names]
+        for entry in runs.values()
+    ]
 
 
 def iterations(runs: Runs, name: str, tolerance: float) -> list[float]:

@@ -107,6 +107,9 @@ def test_ratio_is_the_median_and_knows_bounds():
     assert str(tables.ratio(done, "NSGS-AC", "NSN-AC", 1e-6, 10.0)) == "6"
     slow = made_up(NSGS_AC=[4.0, None, None], NSN_AC=[1.0, 1.0, 0.5])
     assert str(tables.ratio(slow, "NSGS-AC", "NSN-AC", 1e-6, 10.0)) == "≥ 10"
+    for entry in slow.values():
+        entry["methods"]["NSGS-AC"]["limit"] = 30.0
+    assert str(tables.ratio(slow, "NSGS-AC", "NSN-AC", 1e-6, 10.0)) == "≥ 30"
     broken = made_up(NSGS_AC=[4.0, 4.0, 4.0], NSN_AC=[None, None, 1.0])
     assert str(tables.ratio(broken, "NSGS-AC", "NSN-AC", 1e-6, 10.0)) == "≤ 0.4"
     nobody = made_up(NSGS_AC=[None], NSN_AC=[None])
@@ -126,6 +129,10 @@ def test_claims_follow_the_numbers():
     text = tables.claims_table(tables.claims(near, 100.0))
     assert "a step costs as much as" in text
     assert text.count("\n") == 9
+    few = made_up(**{name.replace("-", "_"): [1.0, None] for name in PRINTED})
+    assert tables.most_robust(few, "two").agrees
+    few["wall-1ms-0000"]["methods"]["NSN-AC-HYBRID"]["met"] = {}
+    assert not tables.most_robust(few, "two").agrees
 
 
 def test_tables_have_a_row_for_every_method_and_step(runs):
@@ -137,7 +144,7 @@ def test_tables_have_a_row_for_every_method_and_step(runs):
     assert "| 5 ms | 2 |" in tables.steps_table(runs, 20.0)
     c = tables.costs(runs, 1e-6)
     assert c["sweeps"] > 20 * c["newton_steps"]
-    assert c["newton_operations"] > c["sweep_operations"]
+    assert c["dense_lu_operations"] > c["sweep_operations"]
 
 
 def test_command_measures_writes_and_refreshes_single_columns(tmp_path):
