@@ -188,8 +188,8 @@ def _hybrid(runs: Runs) -> Claim:
         f"median time {_time(times[HYBRID])} against {_time(times['NSN-AC'])} of NSN-AC",
         agrees and times[HYBRID] <= min(times.values()),
         ("as robust as any, but not the quickest: " if agrees else "")
-        + f"after {HYBRID_SWEEPS} sweeps Newton makes {more:+.0f} steps beside those from r = 0 "
-        "(median of the difference)",
+        + f"after {HYBRID_SWEEPS} sweeps Newton makes {more:+.0f} steps beside those from "
+        "r = 0 (median of the difference)",
     )  # fmt: skip
 
 
