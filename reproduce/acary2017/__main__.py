@@ -34,7 +34,7 @@ Parts, in their order (--only A,B takes some of them):
 
 \b
 Examples:
-  python -m reproduce.acary2017 --quick              a tiny wall, a minute
+  python -m reproduce.acary2017 --quick              a tiny wall, two minutes
   python -m reproduce.acary2017                      all of it, most of an hour on one core
   python -m reproduce.acary2017 --only wall,fclib --methods "Auto,Auto global"
                                                      measure two columns again

@@ -34,8 +34,8 @@ RETIGHTEN = (1.0, 1e-2, 1e-4)
 LONG = 5.0  # seconds above which our own solve is not repeated
 START_UP = 60.0  # seconds for a worker to read its problem
 LOCAL = ("NSGS", "NSGS_UPK", "NSGSV", "NSN_AC", "NSN_AC_TEST", "NSN_FB", "NSN_NM", "ADMM",
-         "PROX", "TFP", "DSFP", "VI_FPP", "VI_EG", "FPP", "EG", "HP", "SOCLCP", "ACLMFP", "PFP",
-         "NCPGlockerFBNewton")  # fmt: skip
+         "PROX", "TFP", "DSFP", "VI_FPP", "VI_EG", "FPP", "EG", "HP", "SOCLCP", "ACLMFP",
+         "PFP")  # fmt: skip
 GLOBAL = ("GLOBAL_NSN_AC", "GLOBAL_NSN_AC_WR", "GLOBAL_NSGS", "GLOBAL_NSGS_WR",
           "GLOBAL_NSGSV_WR", "GLOBAL_ADMM", "GLOBAL_ADMM_WR", "GLOBAL_IPM", "GLOBAL_PROX_WR",
           "GLOBAL_TFP_WR", "GLOBAL_DSFP_WR", "GLOBAL_ACLMFP", "GLOBAL_VI_FPP",
