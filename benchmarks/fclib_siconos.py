@@ -1,10 +1,13 @@
-"""`solve(problem)` against every cone solver of Siconos on FCLib files, in one run.
+"""`solve(problem)` against every cone solver of Siconos, in one run.
 
-    python benchmarks/fclib_siconos.py [FOLDER] [--siconos /usr/bin/python3] [--cap 6]
+    python benchmarks/fclib_siconos.py [FOLDER] [--seed 2026] [--siconos /usr/bin/python3]
+
+The problems: the FCLib files of a folder, and walls and packings made here from a seed, on
+which nobody has tuned anything (--walls, --packings: how many; change --seed for others).
 
 Both sides get the Delassus form; the clock starts after it stands.  Ours is the whole of
-`drive(problem)`, judge and status included, best of five warm runs, one thread.  Siconos is
-its driver call, best of five, started from r = 0 with six solvers, asked for each tolerance
+`drive(problem)`, judge and status included, best of 5 to 50 warm runs, one thread.  Siconos is
+its driver call, best of as many, started from r = 0 with six solvers, asked for each tolerance
 and for 1e-2 and 1e-4 of it, because it stops on another error; the fastest run whose answer
 passes our judge counts, chosen in hindsight for each file and tolerance.  Longer runs than the
 cap end.
@@ -25,6 +28,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from generated import packings, walls
 from machine import describe
 from scipy import sparse
 
@@ -33,7 +37,8 @@ from amontons.solve import drive
 
 HERE = Path(__file__).parent
 SOLVERS = ("NSGS", "NSGS_UPK", "NSN_AC", "NSN_FB", "NSN_NM", "ADMM")
-TOLERANCES = (1e-3, 1e-6, 1e-8)
+TOLERANCES = (1e-3, 1e-6, 1e-8, 1e-10)
+GROUPS = ("FCLib files", "walls", "packings")
 RETIGHTEN = (1.0, 1e-2, 1e-4)
 COMPARED = 20  # contacts from which a ratio counts
 COUNTED_SECONDS = 2e-4  # peers quicker than this measure the call and not the solver
@@ -43,7 +48,8 @@ def ours(problem, tolerance, limit):
     """Best time, error and stage of `drive` at its defaults."""
     best = np.inf
     solution = drive(problem, tolerance=tolerance, time_limit=limit)
-    for _ in range(5 if solution.convergence.seconds < 1 else 1):
+    seconds = solution.convergence.seconds
+    for _ in range(int(np.clip(0.1 / seconds, 5, 50)) if seconds < 1 else 1):
         started = time.perf_counter()
         solution = drive(problem, tolerance=tolerance, time_limit=limit)
         best = min(best, time.perf_counter() - started)
@@ -110,7 +116,7 @@ def compare(problem, python, cap, limit):
 
 
 def summarise(results):
-    """Geometric mean, worst ratio and number of files per tolerance."""
+    """Geometric mean, worst ratio and number of problems per tolerance."""
     out = {}
     for tolerance in TOLERANCES:
         key = f"{tolerance:g}"
@@ -132,15 +138,15 @@ def summarise(results):
     return out
 
 
-HEADER = """# `solve(problem)` against Siconos on FCLib files
+HEADER = """# `solve(problem)` against Siconos
 
-Regenerate: `python benchmarks/fclib_siconos.py FOLDER`.
+Regenerate: `python benchmarks/fclib_siconos.py FOLDER{options}`.
 
-{machine}; one thread.
+{machine}; one thread.  Siconos: the fastest of six solvers in hindsight, problem by problem.
 
-| tolerance | files compared | geometric mean ours/Siconos | worst | solved by amontons \
+| problems | tolerance | compared | geometric mean ours/Siconos | worst | solved by amontons \
 | solved by Siconos | slowest below 20 contacts |
-|---|---|---|---|---|---|---|
+|---|---|---|---|---|---|---|---|
 """
 CAPTION = """
 Milliseconds, ours / Siconos (its solver); `-` not solved within the cap; an unsolved run of
@@ -149,24 +155,26 @@ ours shows the error reached.
 """
 
 
-def table(results, summary, machine):
+def table(results, summaries, machine, options):
     """The result as a Markdown page."""
     rows = []
-    for key, s in summary.items():
-        mean = "-" if s["geometric_mean"] is None else f"{s['geometric_mean']:.3f}"
-        worst = "-" if s["worst"] is None else f"{s['worst']:.2f}"
-        solved = f"{s['solved_by_amontons']} of {s['files']} | {s['solved_by_siconos']}"
-        small = f"{s['slowest_below_20_contacts_ms']:.2f} ms"
-        rows.append(
-            f"| {key} | {s['files_compared']} | {mean} | {worst} | {solved} | {small} |"
-        )
-    files = ["| file | contacts | " + " | ".join(f"{t:g}" for t in TOLERANCES) + " |"]
+    for group, summary in summaries.items():
+        for key, s in summary.items():
+            mean = "-" if s["geometric_mean"] is None else f"{s['geometric_mean']:.3f}"
+            worst = "-" if s["worst"] is None else f"{s['worst']:.2f}"
+            solved = f"{s['solved_by_amontons']} of {s['files']} | {s['solved_by_siconos']}"
+            small = f"{s['slowest_below_20_contacts_ms']:.2f} ms"
+            compared = s["files_compared"]
+            rows.append(
+                f"| {group} | {key} | {compared} | {mean} | {worst} | {solved} | {small} |"
+            )
+    files = ["| problem | contacts | " + " | ".join(f"{t:g}" for t in TOLERANCES) + " |"]
     files += ["|---|---|" + "---|" * len(TOLERANCES)]
     for name, entry in results.items():
         cells = [_cell(entry["tolerances"][f"{t:g}"]) for t in TOLERANCES]
         files.append(f"| {name} | {entry['contacts']} | " + " | ".join(cells) + " |")
     where = "; ".join(f"{k} {v}" for k, v in machine.items())
-    head = HEADER.replace("\\\n", "").format(machine=where)
+    head = HEADER.replace("\\\n", "").format(machine=where, options=options)
     return head + "\n".join(rows) + "\n" + CAPTION + "\n".join(files) + "\n"
 
 
@@ -186,23 +194,42 @@ def main():
     parser.add_argument("--siconos", default="/usr/bin/python3", help="Python that has Siconos")
     parser.add_argument("--cap", type=float, default=6.0, help="seconds for one run of Siconos")
     parser.add_argument("--limit", type=float, default=60.0, help="seconds for one run of ours")
-    parser.add_argument("--only", default="", help="part of the file name")
+    parser.add_argument("--only", default="", help="part of the name of a problem")
+    parser.add_argument("--walls", type=int, default=10, help="number of walls")
+    parser.add_argument("--packings", type=int, default=15, help="number of packings")
+    parser.add_argument("--seed", type=int, default=2026, help="of walls and packings")
     options = parser.parse_args()
     results = {}
-    for path in sorted(options.folder.glob("*.hdf5"), key=lambda p: p.stat().st_size):
-        if options.only not in path.name:
-            continue
-        problem = am.read_fclib(path).condensed()
-        results[path.stem] = compare(problem, options.siconos, options.cap, options.limit)
-        print(
-            path.stem, [_cell(x) for x in results[path.stem]["tolerances"].values()], flush=True
-        )
-    summary, machine = summarise(results), describe()
+    for group, name, problem in _problems(options):
+        found = compare(problem, options.siconos, options.cap, options.limit)
+        results[name] = {"group": group, **found}
+        print(name, [_cell(x) for x in found["tolerances"].values()], flush=True)
+    machine = describe()
+    summaries = {
+        group: summarise({n: r for n, r in results.items() if r["group"] == group})
+        for group in GROUPS
+        if any(r["group"] == group for r in results.values())
+    }
+    print(json.dumps(summaries, indent=1))
+    if options.only:
+        return
     (HERE / "results").mkdir(exist_ok=True)
-    record = {"machine": machine, "summary": summary, "files": results}
+    record = {"machine": machine, "summary": summaries, "files": results}
+    chosen = f" --seed {options.seed} --walls {options.walls} --packings {options.packings}"
     (HERE / "results/fclib_siconos.json").write_text(json.dumps(record, indent=1))
-    (HERE / "results/fclib_siconos.md").write_text(table(results, summary, machine))
-    print(json.dumps(summary, indent=1))
+    (HERE / "results/fclib_siconos.md").write_text(table(results, summaries, machine, chosen))
+
+
+def _problems(options):
+    """(group, name, problem in Delassus form) of all that is compared."""
+    for path in sorted(options.folder.glob("*.hdf5"), key=lambda p: p.stat().st_size):
+        if options.only in path.stem:
+            yield GROUPS[0], path.stem, am.read_fclib(path).condensed()
+    made = walls(options.walls, options.seed), packings(options.packings, options.seed)
+    for group, problems in zip(GROUPS[1:], made, strict=True):
+        for name, problem in problems:
+            if options.only in name:
+                yield group, name, problem.condensed()
 
 
 if __name__ == "__main__":

@@ -6,7 +6,8 @@
               worth one Newton; semismooth Newton where W is dense (deformable bodies);
               interior point on the convex relaxation, sweeps from there; smoothing Newton
               from the best point and from zero; proximal point; relaxed sweeps worth the cost
-              of Newton so far; again from the interior point
+              of Newton so far; every method alone from the start; again from the interior
+              point, the methods alone from a disturbed reaction
     Tresca    the same sweeps, then semismooth Newton
 
 Every stage starts from the best reaction so far, and is dropped when it does not help.  Costs
@@ -29,7 +30,9 @@ from ..cones import Tresca
 from ..errors import SingularOperator
 from ..judge import natural_error
 from ..problem import FrictionProblem
-from .base import Breakdown, Iterate, Target
+from .base import Breakdown, Iterate, Solver, Target
+from .functions import JeanMoreau, NaturalMap
+from .gauss_seidel import GaussSeidel
 from .interior_point import STAGE, InteriorPoint, sliding_speed
 from .newton import SemismoothNewton
 from .race import Race
@@ -48,7 +51,7 @@ NEARLY = 30.0  # error, in goals, from which Newton alone is the shorter way
 PATIENCE = 20  # Newton steps without halving the error
 SEMISMOOTH_CONTACTS = 600  # above, a dense factor costs more than it brings
 DENSE = 0.5  # share of blocks of W above which it comes from a mesh
-ROUNDS = 6  # repetitions of the last stages before Auto gives up
+ROUNDS = 12  # repetitions of the last stages before Auto gives up
 # Nanoseconds measured on one core: only their ratios matter, and only roughly.
 SWEEP_BLOCK = 2.0
 SWEEP_CONTACT = 30.0
@@ -57,6 +60,17 @@ PRODUCT = 5.4
 NEWTON_CONTACT = 500.0
 NEWTON_START, NEWTON_PER_DIGIT = 20, 8  # steps that smoothing Newton takes, typically
 RACE_FIRST = 50.0  # sweeps that a Newton step costs, from which relaxed sweeps come first
+# Methods from the start, and the iterates without halving their error after which they end.
+ALONE_SMALL: tuple[tuple[Solver, int], ...] = (
+    (SemismoothNewton(function=NaturalMap()), 15),
+    (SemismoothNewton(function=JeanMoreau()), 15),
+)
+ALONE: tuple[tuple[Solver, int], ...] = (
+    (SmoothingNewton(), PATIENCE),
+    (ProximalPoint(), 25),
+    (InteriorPoint(), 8),
+    (GaussSeidel(batch=500), 4),
+)
 
 
 @dataclass(eq=False)
@@ -92,6 +106,7 @@ class Portfolio:
             if round_ and self.problem.contacts <= SEMISMOOTH_CONTACTS:
                 yield from self._semismooth(steps=15)
             yield from self._patient_sweeps()
+            yield from self._alone(round_)
 
     # ---------------------------------------------------------------- stages
     def _sweeping(self) -> Iterator[Iterate]:
@@ -222,6 +237,31 @@ class Portfolio:
             mark = min(mark, self.error) if patience == 0 else mark
             if patience > 25:
                 return
+
+    def _alone(self, round_: int) -> Iterator[Iterate]:
+        """Every method by itself, from the start and then from disturbed best reactions.
+
+        The best reaction may be a trap in which whatever starts from it stays.
+        """
+        r = self.start
+        if round_:
+            random = np.random.default_rng(round_)
+            r = self.r * random.uniform(0.0, 2.0, (len(self.r), 1))
+        start = Iterate(r[:, : self.problem.dimension].copy())
+        small = self.problem.contacts <= SEMISMOOTH_CONTACTS
+        for solver, patience in (ALONE_SMALL if small else ()) + ALONE:
+            least, waited = math.inf, 0
+            try:
+                for iterate in solver.iterates(self.problem, start, self.target):
+                    yield self._offer(
+                        spatial(iterate.r), iterate.iterations, type(solver).__name__
+                    )
+                    halved = self.latest < 0.5 * least
+                    least, waited = (self.latest, 0) if halved else (least, waited + 1)
+                    if waited > patience:
+                        break
+            except (Breakdown, SingularOperator):
+                continue
 
     def _semismooth(self, steps: int = 60) -> Iterator[Iterate]:
         start = Iterate(self.r[:, : self.problem.dimension].copy())
