@@ -64,7 +64,7 @@ def against_siconos(
     out: Path, series: Series, fine: Series | None, problems: Path, python: str, cap: float,
     machine: dict[str, str], methods: Sequence[str] | None,
 ) -> None:  # fmt: skip
-    """The last problem of the smallest step of each wall, against Siconos.
+    """The last problem of the smallest and of the middle step of each wall, against Siconos.
 
     methods: those of ours to measure again, None for all and every solver of Siconos.
     """
@@ -73,12 +73,13 @@ def against_siconos(
     for chosen in (series, fine):
         if chosen is None:
             continue
-        path = problems / chosen.names(chosen.steps[0])[-1]
-        click.echo(f"{path.stem} against Siconos")
-        record["walls"][path.stem] = step.compare(
-            path, python, cap, click.echo, methods, stored.get(path.stem)
-        )
-        store(out / "step.json", record)
+        for size in dict.fromkeys((chosen.steps[0], chosen.steps[len(chosen.steps) // 2])):
+            path = problems / chosen.names(size)[-1]
+            click.echo(f"{path.stem} against Siconos")
+            record["walls"][path.stem] = step.compare(
+                path, python, cap, click.echo, methods, stored.get(path.stem)
+            )
+            store(out / "step.json", record)
 
 
 def pictures(out: Path, folder: Path, *, quick: bool) -> None:
@@ -178,7 +179,8 @@ limit, and `≥` or `≤` says so.
 {methods}"""
 STEP_TEXT = """Warm start from the impulses of the step before, tolerance 1e-6 by our judge,
 processor seconds of one thread.  *Given W*: the solver alone.  *Given M and H*: from the file
-to the answer; solvers of the Delassus form are charged the time that we need to form W."""
+to the answer; solvers of the Delassus form are charged the time that we need to form W.  A
+problem has the contacts that are closed or about to close, of 685 and 2032."""
 PICTURES = """## The cracking joints
 
 ![Status of the joints](cracking.png)

@@ -203,34 +203,47 @@ def _block(name: str, entry: dict[str, Any]) -> str:
         total = whole["seconds"] if whole else None if given is None else given + forming
         error = (whole or local)["error"]
         rows.append(f"| **{who}** | {_cell(given)} | {_cell(total)} | {error:.1e} |")
-    for who, row in sorted(theirs.items(), key=lambda x: x[1]["seconds"] or math.inf):
+    solved = {who: row for who, row in theirs.items() if row["seconds"] is not None}
+    for who, row in sorted(solved.items(), key=lambda x: x[1]["seconds"]):
         given = None if who.startswith("GLOBAL_") else row["seconds"]
         total = row["seconds"] if given is None else given + forming
-        said = _said(row) if row["seconds"] is None else f"{row['error']:.1e}"
-        rows.append(f"| {who} | {_cell(given)} | {_cell(total)} | {said} |")
-    return "\n".join([*rows, "", *_verdict(entry)])
+        rows.append(f"| {who} | {_cell(given)} | {_cell(total)} | {row['error']:.1e} |")
+    failed: dict[str, list[str]] = {}
+    for who, row in theirs.items():
+        if who not in solved:
+            failed.setdefault(row["why"], []).append(who)
+    missing = [f"Siconos, {why}: {', '.join(names)}." for why, names in failed.items()]
+    return "\n".join([*rows, "", "\n\n".join([*missing, *_verdict(entry)])])
 
 
 def _verdict(entry: dict[str, Any]) -> list[str]:
     """Ours against the best of theirs, on both clocks."""
-    solved = {s: r["seconds"] for s, r in entry["siconos"].items() if r["seconds"] is not None}
-    local = {s: t for s, t in solved.items() if not s.startswith("GLOBAL_")}
-    whole = {s: t for s, t in solved.items() if s not in local}
-    whole |= {f"{s} and W": t + entry["condensing"] for s, t in local.items()}
+    forming = entry["condensing"]
+    local, theirs = _solved(entry["ours"]), _solved(entry["siconos"])
+    peers = {s: t for s, t in theirs.items() if not s.startswith("GLOBAL_")}
+    whole = {f"{s} and W": t + forming for s, t in local.items()}
+    whole |= _solved(entry["ours_global"])
+    others = {s if s not in peers else f"{s} and W": t + forming * (s in peers)
+              for s, t in theirs.items()}  # fmt: skip
     lines = []
-    for clock, ours, theirs in (("W", "ours", local), ("M and H", "ours_global", whole)):
-        mine = {n: r["seconds"] for n, r in entry[ours].items() if r["seconds"] is not None}
-        if mine and theirs:
-            best, peer = min(mine, key=mine.__getitem__), min(theirs, key=theirs.__getitem__)
+    for clock, mine, rivals in (("W", local, peers), ("M and H", whole, others)):
+        if mine and rivals:
+            best, peer = min(mine, key=mine.__getitem__), min(rivals, key=rivals.__getitem__)
+            auto, quickest = mine.get("Auto", math.inf), rivals[peer]
             lines.append(
-                f"Given {clock}: Auto {_cell(mine.get('Auto'))}, our best {best} "
-                f"{_cell(mine[best])}; the best of Siconos {peer} {_cell(theirs[peer])}; "
-                f"ours / theirs {mine[best] / theirs[peer]:.2g}."
+                f"Given {clock}: the best of Siconos is {peer}, {_cell(quickest)}; Auto takes "
+                f"{_cell(auto)}, {auto / quickest:.2g} of it, and our best, {best}, "
+                f"{_cell(mine[best])}, {mine[best] / quickest:.2g} of it."
             )
-    return ["\n\n".join(lines)]
+    return lines
+
+
+def _solved(rows: dict[str, dict[str, Any]]) -> dict[str, float]:
+    """Seconds of those that met the tolerance."""
+    return {name: row["seconds"] for name, row in rows.items() if row["seconds"] is not None}
 
 
 def _cell(value: float | None) -> str:
-    if value is None:
+    if value is None or math.isinf(value):
         return "-"
     return f"{value:.3g} s" if value >= 1 else f"{1e3 * value:.3g} ms"
