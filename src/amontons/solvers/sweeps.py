@@ -125,7 +125,7 @@ def sweep_inplace(s, backward, r):
         else:
             x0, x1, x2 = projection_contact(A, b0, b1, b2, c, r0, r1, r2)
         d0, d1, d2 = x0 - r0, x1 - r1, x2 - r2
-        w = s.relaxation
+        w = s.relaxation if x0 > 0.0 else 1.0  # open at once: else r fades into denormals
         r[i, 0], r[i, 1], r[i, 2] = r0 + w * d0, r1 + w * d1, r2 + w * d2
         change += e[16] * (d0 * d0 + d1 * d1 + d2 * d2)
     return math.sqrt(change)
