@@ -275,7 +275,8 @@ class Workspace:
         """Order and analyse W once; raises UnsupportedForm under Tresca's law."""
         if isinstance(problem.law, Tresca):
             raise UnsupportedForm(
-                "smoothing Newton needs Coulomb friction; use SemismoothNewton or GaussSeidel"
+                "smoothing Newton and interior point need Coulomb friction, not Tresca's; use "
+                "SemismoothNewton or GaussSeidel"
             )
         return cls(problem, analyse(problem.blocks))
 
