@@ -19,15 +19,15 @@ from benchmarks.machine import describe
 from . import report, wall
 from .methods import LONGER, NAMES
 
-PARTS = ("problems", "wall", "long", "fine", "fclib", "step", "pictures", "report")
+PARTS = ("problems", "wall", "fine", "fclib", "siconos", "step", "pictures", "report")
 HERE = Path(__file__).parent
 EPILOG = f"""\b
 Parts, in their order (--only A,B takes some of them):
   problems  simulate the walls and write their problems into the working folder
   wall      every method on the 50 problems of the wall
-  long      NSGS-AC and NSN-AC at one instant with ten times the limit
   fine      some methods on 2 problems of a finer wall (1930 of 2032 contacts are closed)
   fclib     every method on the FCLib files
+  siconos   NSGS and NSN_AC of Siconos on the problems of one instant
   step      one warm-started time step against every solver of Siconos
   pictures  the cracking joints, a film of them, the energy balance
   report    tables and figures from the stored runs; always done at the end
@@ -81,7 +81,7 @@ def _words(text: str | None, known: Sequence[str], option: str) -> list[str]:
 @click.option("--shared", type=click.Path(path_type=Path), metavar="DIR",
               help="Folder with data/fclib. [$AMONTONS_SHARED or ../shared]")  # fmt: skip
 @click.option("--siconos", default="/usr/bin/python3", show_default=True, metavar="PYTHON",
-              help="Python that has Siconos; without it no part step.")  # fmt: skip
+              help="Python that has Siconos; else no parts siconos and step.")  # fmt: skip
 def main(
     quick: bool, folder: Path, results: Path | None, only: str | None, methods: str | None,
     limit: float, shared: Path | None, siconos: str,
@@ -112,14 +112,13 @@ def _do(
     main_series, fine = (wall.QUICK, None) if quick else (wall.PAPER, wall.FINE)
     problems = folder / "problems"
     machine = describe()
-    if {"problems", "wall", "long"} & set(parts):
+    if {"problems", "wall", "siconos"} & set(parts):
         paths = wall.write_problems(main_series, problems, click.echo)
         if "wall" in parts:
             report.measure(out, "wall", paths, names, limit, machine, LONGER)
-        if "long" in parts:
-            chosen = [name for name in names if name in report.LONG_METHODS]
-            later = paths[4 * len(main_series.steps) :][: len(main_series.steps)]
-            report.measure(out, "long", later, chosen, 10 * limit, machine)
+        if "siconos" in parts and shutil.which(siconos):
+            later = paths[4 * len(main_series.steps) :][: len(main_series.steps)] or paths[:1]
+            report.ratio_of_siconos(out, later, siconos, 4 * limit, machine)
     if fine is not None and {"problems", "fine", "step"} & set(parts):
         paths = wall.write_problems(fine, problems, click.echo)
         if "fine" in parts:

@@ -27,7 +27,8 @@ import amontons as am
 from amontons.solve import drive
 from amontons.solvers.base import Iterate
 
-from .race import _fresh
+from .race import _fresh, key
+from .tables import said
 
 TOLERANCE = 1e-6
 RETIGHTEN = (1.0, 1e-2, 1e-4)
@@ -40,6 +41,7 @@ GLOBAL = ("GLOBAL_NSN_AC", "GLOBAL_NSN_AC_WR", "GLOBAL_NSGS", "GLOBAL_NSGS_WR",
           "GLOBAL_NSGSV_WR", "GLOBAL_ADMM", "GLOBAL_ADMM_WR", "GLOBAL_IPM", "GLOBAL_PROX_WR",
           "GLOBAL_TFP_WR", "GLOBAL_DSFP_WR", "GLOBAL_ACLMFP", "GLOBAL_VI_FPP",
           "GLOBAL_VI_EG")  # fmt: skip
+RIVALS = ("NSGS", "NSN_AC")
 QUICKEST = 5  # solvers of Siconos of each form that run again when ours do
 OURS = {
     "Auto": am.Auto(),
@@ -91,6 +93,43 @@ def compare(
                     "siconos": theirs}  # fmt: skip
 
 
+def cold(
+    path: Path, python: str, cap: float, tolerances: Sequence[float],
+    report: Callable[[str], None] = print,
+) -> dict[str, dict[str, dict[str, Any]]]:  # fmt: skip
+    """NSGS and NSN_AC of Siconos from r = 0: rows of `compare` by solver and tolerance."""
+    problem = am.read_fclib(path)
+    condensed = problem.condensed()
+    found: dict[str, dict[str, dict[str, Any]]] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "problem.npz"
+        _write(file, problem, condensed, np.zeros((problem.contacts, 3)))
+        for name in RIVALS:
+            found[name] = rows = {
+                key(t): _worker(condensed, python, file, name, cap, t) for t in tolerances
+            }
+            said = ", ".join(f"{t} {_said(row)}" for t, row in rows.items())
+            report(f"{path.stem}: Siconos {name}: {said}")
+    return found
+
+
+def cold_table(record: dict[str, Any]) -> str:
+    """Markdown: how far NSN_AC is ahead of NSGS, both of Siconos."""
+    names = list(next(iter(record["runs"].values()))["NSGS"])
+    columns = " | ".join(f"NSGS, NSN_AC, ratio at {said(float(t))}" for t in names)
+    rows = [f"| problem | {columns} |", "|---|" + "---|" * len(names)]
+    for stem, found in record["runs"].items():
+        cells = []
+        for t in names:
+            slow, fast = (found[who][t]["seconds"] for who in RIVALS)
+            bound = "≥ " if slow is None else ""
+            ratio = (slow or record["cap"]) / fast if fast else math.nan
+            over = f"{bound}{_cell(slow or record['cap'])}"
+            cells.append(f"{over}, {_cell(fast)}, {bound}{ratio:.2g}" if fast else "-")
+        rows.append(f"| {stem} | {' | '.join(cells)} |")
+    return "\n".join(rows)
+
+
 def _column(form: str, who: str) -> str:
     """The name of a solver of ours in `methods`."""
     return f"{who} global" if form == "ours_global" and who == "Auto" else who
@@ -139,10 +178,11 @@ def _write(
 
 
 def _worker(
-    condensed: am.FrictionProblem, python: str, file: Path, solver: str, cap: float
-) -> dict[str, Any]:
+    condensed: am.FrictionProblem, python: str, file: Path, solver: str, cap: float,
+    tolerance: float = TOLERANCE,
+) -> dict[str, Any]:  # fmt: skip
     """The best run of one solver that passes our judge, or why there is none."""
-    asked = ",".join(f"{TOLERANCE * k:g}" for k in RETIGHTEN)
+    asked = ",".join(f"{tolerance * k:g}" for k in RETIGHTEN)
     script = str(Path(__file__).parent / "siconos_worker.py")
     process = subprocess.Popen([python, script, str(file), solver, asked],
                                stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
@@ -159,11 +199,11 @@ def _worker(
             continue
         r = np.array(found.pop("r")).reshape(-1, 3)
         runs.append({**found, "error": condensed.exact_error(r)})
-        if runs[-1]["error"] <= TOLERANCE or found["seconds"] > cap:
+        if runs[-1]["error"] <= tolerance or found["seconds"] > cap:
             break  # a tighter one takes no less
     process.kill()
     process.wait()
-    passing = [x for x in runs if x["error"] <= TOLERANCE]
+    passing = [x for x in runs if x["error"] <= tolerance]
     if passing:
         return min(passing, key=lambda x: x["seconds"])
     if runs:

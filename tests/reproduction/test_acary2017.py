@@ -196,6 +196,15 @@ def test_table_against_siconos_names_the_best():
     assert "is GLOBAL_ADMM, 400 ms; Auto takes 200 ms, 0.5 of it" in page
 
 
+def test_ratio_within_siconos_is_a_bound_where_gauss_seidel_did_not_end():
+    record = {"cap": 24.0, "runs": {"wall-5ms-0055": {
+        "NSGS": {"0.0001": {"seconds": 3.0}, "1e-06": {"seconds": None}},
+        "NSN_AC": {"0.0001": {"seconds": 1.0}, "1e-06": {"seconds": 2.0}},
+    }}}  # fmt: skip
+    page = step.cold_table(record)
+    assert "| wall-5ms-0055 | 3 s, 1 s, 3 | ≥ 24 s, 2 s, ≥ 12 |" in page
+
+
 def test_one_column_against_siconos_runs_again_beside_the_quickest_only(problems, monkeypatch):
     asked = []
 
