@@ -33,7 +33,7 @@ _HOME = {
     "results": ("ModelSolution",),
     "api": ("solve",),
     "analysis": ("performance_profile",),
-    "fem": ("Mesh", "box", "mesh_shape", "read_cad", "read_mesh"),
+    "fem": ("Mesh", "box", "mesh_shape", "read_cad", "read_mesh", "refined"),
     "contact": ("LevelSet", "Plane", "Sphere"),
     "model": ("Body", "BodyForce", "Contact", "ContactFields", "Fix", "LinearElastic", "Model",
               "Traction"),

@@ -9,7 +9,7 @@ v are n displacements or velocities; r and u are (nc, d) in the local frames, ro
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
@@ -27,6 +27,7 @@ from .errors import InvalidInput, SingularOperator, UnsupportedForm
 from .judge import Measure
 from .linear import ConjugateGradient, Direct, Factor, LinearSolver
 from .linear.bodies import Bodies, BodyFactor
+from .linear.levels import Levels, checked_levels
 from .linear.small_blocks import block_diagonal_inverse
 
 Array = NDArray[np.float64]
@@ -53,6 +54,8 @@ class FrictionProblem:
     Build it with `from_global` or `from_delassus`; both check every shape and number.
     near_nullspace, (n, k), are the rigid modes of the bodies: multigrid uses them.
     u_scale, one number in the unit of u, replaces |u_ref| in the residual measure.
+    levels (global form): prolongations of v from coarser spaces, finest first, levels[0] with n
+    rows, levels[1] with as many as levels[0] has columns, …: geometric multigrid uses them.
     """
 
     law: Law
@@ -63,6 +66,7 @@ class FrictionProblem:
     W: Matrix | None = None
     q: Array | None = None
     near_nullspace: Array | None = None
+    levels: Levels = ()
     load_scale: float | None = None
     u_scale: float | None = None
     name: str = ""
@@ -79,6 +83,7 @@ class FrictionProblem:
         mu: ArrayLike | Law,
         *,
         near_nullspace: Array | None = None,
+        levels: Sequence[sparse.csr_array] = (),
         load_scale: float | None = None,
         u_scale: float | None = None,
         name: str = "",
@@ -101,7 +106,8 @@ class FrictionProblem:
                 f"near_nullspace: expected {n} rows, got {near_nullspace.shape[0]}"
             )
         return cls(law, M=M, H=H, f=f, w=w, near_nullspace=near_nullspace,
-                   load_scale=load_scale, u_scale=u_scale, name=name)  # fmt: skip
+                   levels=checked_levels(levels, n), load_scale=load_scale,
+                   u_scale=u_scale, name=name)  # fmt: skip
 
     @classmethod
     def from_delassus(

@@ -171,10 +171,22 @@ def _mesh(table: Table, path: Path) -> Mesh:
 
 
 def _mesh_file(table: Table, path: Path) -> Mesh:
+    """The mesh of a mesh file or CAD file, refined if asked for."""
+    from ..fem import refined
+
+    table.only("file", "size", "order", "refine")
+    times = table.whole("refine", 0, minimum=0)
+    mesh = _read_file(table, path)
+    if mesh.cell_count * 2 ** (mesh.dim * times) > MAX_NODES:
+        raise table.error("refine", f"expected at most {MAX_NODES} cells, got {times}; "
+                          "build larger models in Python")  # fmt: skip
+    return refined(mesh, times)
+
+
+def _read_file(table: Table, path: Path) -> Mesh:
     """The mesh of a mesh file, or of a CAD file, which needs a size of cells."""
     from ..fem import is_cad, read_cad, read_mesh
 
-    table.only("file", "size", "order")
     name = path.parent / table.text("file")
     if not name.is_file():
         raise table.error("file", f"no such file: {name}")

@@ -99,7 +99,7 @@ class MovingModel:
         M_free = self.M_hat[parts.free][:, parts.free]
         self.base = FrictionProblem.from_global(
             M_free, parts.H, np.zeros(len(parts.free)), np.zeros((nc, d)), self.motion.body.law,
-            near_nullspace=parts.near_nullspace, name=model.name,
+            near_nullspace=parts.near_nullspace, levels=parts.levels, name=model.name,
         )  # fmt: skip
         self._last_part: tuple[Index, FrictionProblem] | None = None
         self._last_active: tuple[Index, FrictionProblem] = (np.arange(nc), self.base)

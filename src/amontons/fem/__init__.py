@@ -7,7 +7,8 @@ from .facets import Cells, Facets
 from .mesh import Mesh
 from .order import second_order
 from .read import is_cad, read_mesh
+from .refine import refined
 
 __all__ = ["Cells", "Facets", "LinearElastic", "Mesh", "box", "cell_stress", "is_cad",
-           "mesh_shape", "read_cad", "read_mesh", "second_order", "stiffness",
+           "mesh_shape", "read_cad", "read_mesh", "refined", "second_order", "stiffness",
            "von_mises"]  # fmt: skip

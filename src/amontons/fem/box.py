@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 from itertools import permutations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from ..errors import InvalidInput
 from .cells import FACET_KIND
@@ -31,7 +33,8 @@ def box(
 
     cells: number per direction, one for all or one each.  kind: "hex" or "tet", in 2D "quad" or
     "tri" (the first is the default).  Surfaces left/right (x), front/back (y), bottom/top (z);
-    in 2D left/right (x), bottom/top (y).  Region "default".
+    in 2D left/right (x), bottom/top (y).  Region "default".  While all numbers of cells are
+    even, the box of half as many is a coarser level, see `Mesh`.
 
     >>> box((1, 1, 1), cells=2).points.shape
     (27, 3)
@@ -48,7 +51,8 @@ def box(
     nodes = cube if kind in ("hex", "quad") else _simplices(cube, dim)
     block = Cells(kind, nodes)
     surfaces = _sides(unit, block, dim)
-    return Mesh(start + unit * lengths, (block,), surfaces, grid=counts)
+    levels = _levels(counts, kind)
+    return Mesh(start + unit * lengths, (block,), surfaces, grid=counts, levels=levels)
 
 
 def _checked(
@@ -89,6 +93,33 @@ def _simplices(cube: Index, dim: int) -> Index:
         path = np.cumsum([0, *(1 << axis for axis in order)])
         pieces.append(cube[:, [position[p] for p in path]])
     return np.stack(pieces, axis=1).reshape(-1, dim + 1)
+
+
+def _levels(counts: tuple[int, ...], kind: str) -> tuple[sparse.csr_array, ...]:
+    """Prolongations between the boxes of half, a quarter, … as many cells, finest first."""
+    out = []
+    while all(n % 2 == 0 for n in counts):
+        low, high = (
+            [_neighbour(n, step) for n in reversed(counts)] for step in (0, 1)
+        )  # x runs fastest: its factor is the last
+        if kind in ("hex", "quad"):
+            level = _product([0.5 * (a + b) for a, b in zip(low, high, strict=True)])
+        else:  # new nodes halve edges, which all run from low to high corners
+            level = 0.5 * (_product(low) + _product(high))
+        out.append(sparse.csr_array(level))
+        counts = tuple(n // 2 for n in counts)
+    return tuple(out)
+
+
+def _neighbour(cells: int, step: int) -> sparse.csr_array:
+    """On a line: the coarse node below (step 0) or above (1) every fine node."""
+    fine = np.arange(cells + 1)
+    entries = (np.ones(cells + 1), (fine, (fine + step) // 2))
+    return sparse.coo_array(entries, shape=(cells + 1, cells // 2 + 1)).tocsr()
+
+
+def _product(factors: list[sparse.csr_array]) -> sparse.csr_array:
+    return reduce(lambda a, b: sparse.kron(a, b, format="csr"), factors)
 
 
 def _sides(unit: Array, block: Cells, dim: int) -> dict[str, tuple[Facets, ...]]:

@@ -8,8 +8,10 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from ..errors import InvalidInput
+from ..linear.levels import checked_levels
 from .cells import CELLS
 from .check import checked_cells
 from .facets import Cells, Facets, boundary, oriented
@@ -25,6 +27,9 @@ class Mesh:
     points (n, dim), unit of length; cells: blocks by kind and region; surfaces: name -> facets.
     Every point belongs to a cell; inverted cells are turned, degenerate ones rejected.
     grid: cells per direction if the mesh is a structured box (multigrid makes use of it).
+    levels: prolongations of nodal values, finest first: levels[0] has shape (n, nodes of the
+    next coarser mesh), levels[1] leads from the one after that to it, and so on; every coarse
+    node is a node of this mesh.  `box`, `refined` and `second_order` fill them.
     """
 
     points: Array
@@ -32,6 +37,7 @@ class Mesh:
     surfaces: dict[str, tuple[Facets, ...]] = field(default_factory=dict)
     grid: tuple[int, ...] | None = None
     name: str = ""
+    levels: tuple[sparse.csr_array, ...] = ()
 
     def __post_init__(self) -> None:
         points = np.array(self.points, dtype=float)
@@ -51,6 +57,7 @@ class Mesh:
         self._check_use()
         surfaces = {k: oriented(blocks, v, k, points) for k, v in self.surfaces.items()}
         object.__setattr__(self, "surfaces", surfaces)
+        object.__setattr__(self, "levels", checked_levels(self.levels, len(points)))
 
     def _check_use(self) -> None:
         if not self.cells:

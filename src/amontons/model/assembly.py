@@ -13,6 +13,7 @@ from ..errors import InvalidInput
 from ..fem.elasticity import body_load, stiffness
 from ..fem.mesh import Mesh, unknown
 from ..fem.surfaces import surface_load
+from ..linear.levels import Levels, free_levels
 from .parts import Body, BodyForce, Contact, Fix, Traction
 from .rigid import Piece, near_nullspace, pieces
 from .values import vector_at
@@ -42,7 +43,8 @@ class Discretisation:
 
     K (dofs, dofs): stiffness of the whole model; free (n,), fixed: its dofs; prescribed
     (dofs,), load (n,): force on the free dofs with the prescribed values lifted in; gap (nc,);
-    carried (nc, d): part of the local displacement that the supports prescribe.
+    carried (nc, d): part of the local displacement that the supports prescribe; levels:
+    prolongations of the free dofs from coarser meshes, finest first.
     """
 
     offsets: Index
@@ -58,6 +60,7 @@ class Discretisation:
     placed: tuple[Placed, ...]
     parts: list[Piece]
     whole_H: sparse.csc_array
+    levels: Levels = ()
 
     @property
     def dofs(self) -> int:
@@ -108,6 +111,9 @@ def discretise(
             for piece in pieces(body.mesh, body.name, int(offsets[k]))
         ],
         whole_H=whole_H,
+        levels=free_levels(
+            [b.mesh.levels for b in bodies], [len(b.mesh.points) for b in bodies], d, is_fixed
+        ),
     )  # fmt: skip
 
 

@@ -110,7 +110,7 @@ class Model:
         loose = self._loose_but_held(parts, law)
         base = FrictionProblem.from_global(
             parts.M, parts.H, f, w, law, near_nullspace=parts.near_nullspace,
-            load_scale=_load_size(parts, f, w), name=self.name,
+            levels=parts.levels, load_scale=_load_size(parts, f, w), name=self.name,
             u_scale=_bonded_size(parts, f, w) if loose else None,
         )  # fmt: skip
         first = self._shared.setdefault("problem", base)

@@ -1,0 +1,79 @@
+"""Prolongations between nested levels: checks, and from nodal values to free unknowns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..errors import InvalidInput
+
+Levels = tuple[sparse.csr_array, ...]
+Mask = NDArray[np.bool_]
+ONE = 1e-12  # distance from 1 of the entry of a fine node that is a coarse node
+
+
+def checked_levels(levels: Sequence[sparse.csr_array], size: int) -> Levels:
+    """Read-only CSR matrices that fit together, the first with `size` rows."""
+    out = []
+    for k, level in enumerate(levels):
+        if not sparse.issparse(level) or level.ndim != 2 or level.shape[0] != size:
+            found = getattr(level, "shape", type(level).__name__)
+            raise InvalidInput(
+                f"levels[{k}]: expected a sparse matrix with {size} rows, got {found}"
+            )
+        if level.shape[1] > size or not np.isfinite(level.data).all():
+            raise InvalidInput(
+                f"levels[{k}]: expected finite entries and at most {size} columns, got shape "
+                f"{level.shape}"
+            )
+        matrix = sparse.csr_array(level)
+        for array in (matrix.data, matrix.indices, matrix.indptr):
+            array.flags.writeable = False
+        out.append(matrix)
+        size = level.shape[1]
+    return tuple(out)
+
+
+def free_levels(
+    bodies: Sequence[Levels], nodes: Sequence[int], dim: int, fixed: Mask
+) -> Levels:
+    """Prolongations of the free unknowns of several bodies, finest first.
+
+    bodies: nodal levels of every body, () for a body without; nodes: its numbers of nodes.
+    fixed, (dofs,), body by body and node by node: unknowns that supports prescribe; coarse ones
+    that sit on them are left out too.  A body that has run out of levels keeps its unknowns
+    while others coarsen.
+    """
+    out: list[sparse.csr_array] = []
+    sizes = list(nodes)
+    for depth in range(max((len(levels) for levels in bodies), default=0)):
+        parts = [
+            levels[depth] if depth < len(levels) else sparse.eye_array(size, format="csr")
+            for levels, size in zip(bodies, sizes, strict=True)
+        ]
+        nodal = parts[0] if len(parts) == 1 else sparse.block_diag(parts, format="csr")
+        coarse_fixed = fixed.reshape(-1, dim)[_fine_node(nodal)].ravel()
+        if coarse_fixed.all():
+            break
+        level = sparse.kron(nodal, sparse.eye_array(dim), format="csr")
+        out.append(sparse.csr_array(level[~fixed][:, ~coarse_fixed]))
+        fixed, sizes = coarse_fixed, [part.shape[1] for part in parts]
+    return tuple(out)
+
+
+def _fine_node(level: sparse.csr_array) -> NDArray[np.int64]:
+    """The fine node that every coarse node sits on, (coarse nodes,)."""
+    start = level.indptr[:-1][np.diff(level.indptr) == 1]
+    rows = np.flatnonzero(np.diff(level.indptr) == 1)
+    own = np.abs(level.data[start] - 1) < ONE
+    node = np.full(level.shape[1], -1)
+    node[level.indices[start[own]]] = rows[own]
+    if (node < 0).any():
+        raise InvalidInput(
+            f"levels: coarse node {int(np.flatnonzero(node < 0)[0])} is no node of the finer "
+            "mesh"
+        )
+    return node
