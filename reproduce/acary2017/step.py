@@ -32,6 +32,7 @@ from .tables import said
 
 TOLERANCE = 1e-6
 RETIGHTEN = (1.0, 1e-2, 1e-4)
+FINELY = (1.0, 0.5, 0.2, 0.05, 1e-2)  # where a tighter run may take seconds more
 LONG = 5.0  # seconds above which our own solve is not repeated
 START_UP = 60.0  # seconds for a worker to read its problem
 LOCAL = ("NSGS", "NSGS_UPK", "NSGSV", "NSN_AC", "NSN_AC_TEST", "NSN_FB", "NSN_NM", "ADMM",
@@ -106,7 +107,8 @@ def cold(
         _write(file, problem, condensed, np.zeros((problem.contacts, 3)))
         for name in RIVALS:
             found[name] = rows = {
-                key(t): _worker(condensed, python, file, name, cap, t) for t in tolerances
+                key(t): _worker(condensed, python, file, name, cap, t, FINELY)
+                for t in tolerances
             }
             said = ", ".join(f"{t} {_said(row)}" for t, row in rows.items())
             report(f"{path.stem}: Siconos {name}: {said}")
@@ -179,16 +181,16 @@ def _write(
 
 def _worker(
     condensed: am.FrictionProblem, python: str, file: Path, solver: str, cap: float,
-    tolerance: float = TOLERANCE,
+    tolerance: float = TOLERANCE, retighten: Sequence[float] = RETIGHTEN,
 ) -> dict[str, Any]:  # fmt: skip
     """The best run of one solver that passes our judge, or why there is none."""
-    asked = ",".join(f"{tolerance * k:g}" for k in RETIGHTEN)
+    asked = ",".join(f"{tolerance * k:g}" for k in retighten)
     script = str(Path(__file__).parent / "siconos_worker.py")
     process = subprocess.Popen([python, script, str(file), solver, asked],
                                stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
                                text=True)  # fmt: skip
     runs, why = [], "ended without an answer"
-    for k in range(len(RETIGHTEN) + 1):
+    for k in range(len(retighten) + 1):
         ready, _, _ = select.select([process.stdout], [], [], cap if k else START_UP)
         line = process.stdout.readline() if ready else ""
         if not line:
