@@ -121,15 +121,38 @@ def cold_table(record: dict[str, Any]) -> str:
     columns = " | ".join(f"NSGS, NSN_AC, ratio at {said(float(t))}" for t in names)
     rows = [f"| problem | {columns} |", "|---|" + "---|" * len(names)]
     for stem, found in record["runs"].items():
-        cells = []
-        for t in names:
-            slow, fast = (found[who][t]["seconds"] for who in RIVALS)
-            bound = "≥ " if slow is None else ""
-            ratio = (slow or record["cap"]) / fast if fast else math.nan
-            over = f"{bound}{_cell(slow or record['cap'])}"
-            cells.append(f"{over}, {_cell(fast)}, {bound}{ratio:.2g}" if fast else "-")
+        cells = [_cold_cell(found, t, record["cap"]) for t in names]
         rows.append(f"| {stem} | {' | '.join(cells)} |")
     return "\n".join(rows)
+
+
+def cold_medians(record: dict[str, Any]) -> str:
+    """The medians of the table in a sentence."""
+    parts = []
+    for t in next(iter(record["runs"].values()))["NSGS"]:
+        found = sorted(x for run in record["runs"].values()
+                       if (x := _cold_ratio(run, t, record["cap"])) is not None)  # fmt: skip
+        if found:
+            value, bound = found[len(found) // 2]
+            parts.append(f"{'≥ ' if bound else ''}{value:.2g} times at {said(float(t))}")
+    return ", ".join(parts)
+
+
+def _cold_ratio(
+    found: dict[str, dict[str, dict[str, Any]]], tolerance: str, cap: float
+) -> tuple[float, bool] | None:
+    """NSGS / NSN_AC and whether it is a lower bound; None where NSN_AC failed."""
+    slow, fast = (found[who][tolerance]["seconds"] for who in RIVALS)
+    return ((slow or cap) / fast, slow is None) if fast else None
+
+
+def _cold_cell(found: dict[str, dict[str, dict[str, Any]]], tolerance: str, cap: float) -> str:
+    ratio = _cold_ratio(found, tolerance, cap)
+    if ratio is None:
+        return "-"
+    slow, fast = (found[who][tolerance]["seconds"] for who in RIVALS)
+    sign = "≥ " if ratio[1] else ""
+    return f"{sign}{_cell(slow or cap)}, {_cell(fast)}, {sign}{ratio[0]:.2g}"
 
 
 def _column(form: str, who: str) -> str:

@@ -203,6 +203,7 @@ def test_ratio_within_siconos_is_a_bound_where_gauss_seidel_did_not_end():
     }}}  # fmt: skip
     page = step.cold_table(record)
     assert "| wall-5ms-0055 | 3 s, 1 s, 3 | ≥ 24 s, 2 s, ≥ 12 |" in page
+    assert step.cold_medians(record) == "3 times at 1e-4, ≥ 12 times at 1e-6"
 
 
 def test_one_column_against_siconos_runs_again_beside_the_quickest_only(problems, monkeypatch):
