@@ -144,6 +144,8 @@ def _embed(planar: Array, diagonal: NDArray[np.int32]) -> Array:
 
 def spatial(x: Array) -> Array:
     """A writable copy of contact rows (nc, d) as (nc, 3); in 2D the second tangent is zero."""
+    if x.shape[1] == 3:
+        return np.array(x, dtype=float, order="C")
     out = np.zeros((len(x), 3))
     out[:, : x.shape[1]] = x
     return out

@@ -62,12 +62,37 @@ def contact_residual(r0, r1, r2, u0, u1, u2, rho, coefficient, tresca):  # noqa:
 
 
 @njit(cache=True, error_model="numpy")
+def _all_zero(r):
+    for i in range(len(r)):
+        if r[i, 0] != 0.0 or r[i, 1] != 0.0 or r[i, 2] != 0.0:
+            return False
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def _error_at_rest(q, coefficient, tresca, rho):
+    """`natural_error` of r = 0, where every cold start is judged: no product with W."""
+    total = 0.0
+    for i in range(len(q)):
+        e0 = e1 = e2 = 0.0
+        if rho[i] > 0.0:
+            e0, e1, e2 = contact_residual(
+                0.0, 0.0, 0.0, q[i, 0], q[i, 1], q[i, 2], rho[i], coefficient[i], tresca
+            )
+        scale = PENETRATION if rho[i] > 0.0 else 1.0
+        total += max(e0 * e0 + e1 * e1 + e2 * e2, (scale * min(q[i, 0], 0.0)) ** 2)
+    return math.sqrt(total) if math.isfinite(total) else math.inf
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def natural_error(indptr, indices, data, q, coefficient, tresca, rho, r):
     """Euclidean norm of the scaled natural map, unit of u, with u = W r + q formed here.
 
     Rows of 3x3 blocks; q, r (nc, 3); rho (nc,), 0 where a contact can not react.  Not a number
     in r gives infinity, never a small error.
     """
+    if _all_zero(r):
+        return _error_at_rest(q, coefficient, tresca, rho)
     total = 0.0
     for i in range(len(coefficient)):
         u0, u1, u2 = q[i, 0], q[i, 1], q[i, 2]

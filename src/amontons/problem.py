@@ -129,17 +129,17 @@ class FrictionProblem:
         return problem
 
     # ---------------------------------------------------------------- sizes and views
-    @property
+    @cached_property
     def form(self) -> Form:
         """GLOBAL or DELASSUS."""
         return Form.DELASSUS if self.W is not None else Form.GLOBAL
 
-    @property
+    @cached_property
     def contacts(self) -> int:
         """Number of contacts nc."""
         return len(self.law.coefficient)
 
-    @property
+    @cached_property
     def dimension(self) -> int:
         """2 or 3."""
         rows = self.q if self.q is not None else self.w

@@ -75,7 +75,7 @@ def sweep_data(
     """Sweeps of a problem in Delassus form."""
     b = problem.blocks
     _, _, _, q, coefficient, tresca, rho = problem.kernel_data
-    visits = _by_approach(q) if order is SweepOrder.APPROACH else np.arange(problem.contacts)
+    visits = _by_approach(q) if order is SweepOrder.APPROACH else np.arange(len(q))
     return Sweep(
         b.indptr, b.indices, b.data, q, coefficient, tresca, rho, b.diagonal, b.eliminated,
         visits, int(local), float(relaxation),
