@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +44,8 @@ class Outcome(Enum):
         return self.value
 
 
-class Step(NamedTuple):
+@dataclass(frozen=True)
+class Step:
     """One line of the history: what the driver saw after an iterate."""
 
     iteration: int
