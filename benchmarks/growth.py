@@ -200,10 +200,9 @@ def main():
         "rows": rows,
         "exponents": exponents,
     }
-    if options.only is None:
-        (HERE / "results/growth.json").write_text(json.dumps(record, indent=1) + "\n")
-        (HERE / "results/growth.md").write_text(table(record))
-        draw(record, HERE / "results/growth.png")
+    stored.write_text(json.dumps(record, indent=1) + "\n")
+    (HERE / "results/growth.md").write_text(table(record))
+    draw(record, HERE / "results/growth.png")
     print(table(record))
 
 
