@@ -75,6 +75,8 @@ def test_title_defaults_to_the_name(write):
         ("cells = [2, 3, 2]", 'cells = 2\nkind = "tet"'),
         ("young = 200", 'law = "linear-elastic"\ndensity = 7.8\nyoung = 200'),
         ('slave = "bottom"', 'slave = "bottom"\nmethod = "nodal"'),
+        ('slave = "bottom"', 'slave = "bottom"\nmethod = "mortar"'),
+        ('slave = "bottom"', 'slave = "bottom"\nmethod = "dual-mortar"'),
     ],
 )
 def test_variants_assemble(write, old, new):

@@ -30,8 +30,7 @@ MAX_NODES = 5_000_000  # of a box: a typing error must not fill the memory
 LATER = {  # words of the format that this version can not serve
     "neo-hookean": "large deformations are not available yet, use 'linear-elastic'",
     "ciarlet-geymonat": "large deformations are not available yet, use 'linear-elastic'",
-    "dual-mortar": "mortar contact is not available yet, use 'nodal'",
-    "nitsche": "Nitsche's method is not available yet, use 'nodal'",
+    "nitsche": "Nitsche's method is not available yet, use 'nodal' or 'mortar'",
 }
 
 
@@ -242,7 +241,7 @@ def _contact(table: Table, mesh: Mesh) -> Contact:
     from ..model import Contact
 
     table.only("slave", "obstacle", "master", "friction", "method")
-    _available(table, "method", ("nodal",), ("dual-mortar", "nitsche"))
+    method = _available(table, "method", ("nodal", "mortar", "dual-mortar"), ("nitsche",))
     slave = table.text("slave")
     for key in ("slave", "master"):
         if key in table.data:
@@ -261,9 +260,10 @@ def _contact(table: Table, mesh: Mesh) -> Contact:
     mu, tresca = (value, None) if key == "coulomb" else (None, value)
     with _Blame(table, ""):
         if "master" in table.data:
-            return Contact(slave, master=table.text("master"), mu=mu, tresca=tresca)
+            master = table.text("master")
+            return Contact(slave, master=master, mu=mu, tresca=tresca, method=method)
         obstacle = _obstacle(table.table("obstacle"), mesh.dim)
-        return Contact(slave, obstacle, mu=mu, tresca=tresca)
+        return Contact(slave, obstacle, mu=mu, tresca=tresca, method=method)
 
 
 def _refuse_repeated(top: Table) -> None:

@@ -1,8 +1,9 @@
 """Contact: obstacles, local frames, and the matrices that tie contacts to nodes."""
 
 from .geometry import LevelSet, Obstacle, Plane, Sphere, frames
+from .mortar import mortar_contact, mortar_obstacle
 from .nodal import ContactRows, contact_nodes, nodal_contact
 from .pairs import pair_contact
 
 __all__ = ["ContactRows", "LevelSet", "Obstacle", "Plane", "Sphere", "contact_nodes", "frames",
-           "nodal_contact", "pair_contact"]  # fmt: skip
+           "mortar_contact", "mortar_obstacle", "nodal_contact", "pair_contact"]  # fmt: skip

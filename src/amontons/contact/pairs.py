@@ -140,7 +140,7 @@ def project(
             continue
         x = coordinates[facets.nodes[facet]]
         at, n = _closest(points[point], x, facets.kind)
-        value = _shapes(facets.kind, at)
+        value = shapes(facets.kind, at)
         foot = np.einsum("ka,kac->kc", value, x)
         across = points[point] - foot
         distance = np.linalg.norm(across, axis=1)
@@ -246,7 +246,7 @@ def _first_of_smallest(group: Index, value: Array) -> Index:
     return order[first]
 
 
-def _shapes(kind: str, at: Array) -> Array:
+def shapes(kind: str, at: Array) -> Array:
     """Shape functions at one reference point per facet, (k, nodes)."""
     if kind == "line":
         return np.concatenate([1 - at, at], axis=1)
@@ -298,12 +298,12 @@ def _on_quadrilateral(points: Array, x: Array) -> Array:
     halves = [_on_triangle(points, x[:, [0, 1, 2]]), _on_triangle(points, x[:, [0, 2, 3]])]
     starts = [np.stack([h[:, 0] + h[:, 1], h[:, 1]], axis=1) for h in halves[:1]]
     starts.append(np.stack([halves[1][:, 0], halves[1].sum(axis=1)], axis=1))
-    feet = [np.einsum("ka,kac->kc", _shapes("quad", s), x) - points for s in starts]
+    feet = [np.einsum("ka,kac->kc", shapes("quad", s), x) - points for s in starts]
     nearer = np.linalg.norm(feet[0], axis=1) <= np.linalg.norm(feet[1], axis=1)
     at = np.clip(np.where(nearer[:, None], *starts), 0, 1)
     for _ in range(NEWTON):
         a, b = _slopes(x, at)
-        rest = points - np.einsum("ka,kac->kc", _shapes("quad", at), x)
+        rest = points - np.einsum("ka,kac->kc", shapes("quad", at), x)
         new = _box_step(a, b, rest, at)
         moved = np.abs(new - at).max(initial=0.0)
         at = new

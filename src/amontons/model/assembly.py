@@ -8,7 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..contact import ContactRows, contact_nodes, nodal_contact, pair_contact
+from ..contact import (
+    ContactRows,
+    contact_nodes,
+    mortar_contact,
+    mortar_obstacle,
+    nodal_contact,
+    pair_contact,
+)
 from ..errors import InvalidInput
 from ..fem.elasticity import body_load, stiffness
 from ..fem.mesh import Mesh, unknown
@@ -209,18 +216,8 @@ def _place(bodies: tuple[Body, ...], contact: Contact, values: Array, offsets: I
     is_fixed = ~np.isnan(values)
     k, surface = locate(bodies, contact.slave)
     mesh = bodies[k].mesh
-    size = int(offsets[-1])
-    if contact.master is None:
-        assert contact.obstacle is not None
-        rows = nodal_contact(mesh, surface, contact.obstacle)
-        met = np.ones(len(rows.nodes), dtype=bool)
-        H = _shifted(rows.H, int(offsets[k]), size)
-    else:
-        j, other = locate(bodies, contact.master)
-        rows, on_master, met = pair_contact(mesh, surface, bodies[j].mesh, other)
-        H = _shifted(rows.H, int(offsets[k]), size) + _shifted(on_master, int(offsets[j]), size)
+    rows, H, met = _met(bodies, contact, values, offsets)
     d = mesh.dim
-    H = sparse.csc_array(H)
     normal = sparse.csc_array(H[:, ::d]).multiply(~is_fixed[:, None])
     kept = np.sqrt(np.asarray(normal.power(2).sum(axis=0)).ravel()) > 1e-9
     prescribed = np.where(is_fixed, values, 0.0)
@@ -230,6 +227,34 @@ def _place(bodies: tuple[Body, ...], contact: Contact, values: Array, offsets: I
     all_kept = met.copy()
     all_kept[met] = kept
     return Placed(k, all_kept, points, rows.at(kept), H[:, np.repeat(kept, d)])
+
+
+def _met(
+    bodies: tuple[Body, ...], contact: Contact, values: Array, offsets: Index
+) -> tuple[ContactRows, sparse.csc_array, NDArray[np.bool_]]:
+    """Contacts of one pair, their H in the dofs of the model, and which slave nodes meet."""
+    k, surface = locate(bodies, contact.slave)
+    slave, size = bodies[k].mesh, int(offsets[-1])
+    mortar = contact.method == "mortar"
+    given = [v.reshape(-1, slave.dim) for v in np.split(values, offsets[1:-1])]
+    if contact.obstacle is not None:
+        rows = nodal_contact(slave, surface, contact.obstacle)
+        met = np.ones(len(rows.nodes), dtype=bool)
+        if mortar:
+            _check_held(slave, contact, rows, given[k][rows.nodes])
+            rows, met = mortar_obstacle(slave, surface, contact.obstacle, prescribed=given[k])
+        return rows, _shifted(rows.H, int(offsets[k]), size), met
+    assert contact.master is not None
+    j, other = locate(bodies, contact.master)
+    master = bodies[j].mesh
+    if mortar:
+        rows, on_master, met = mortar_contact(
+            slave, surface, master, other, prescribed=given[k], master_prescribed=given[j]
+        )
+    else:
+        rows, on_master, met = pair_contact(slave, surface, master, other)
+    H = _shifted(rows.H, int(offsets[k]), size) + _shifted(on_master, int(offsets[j]), size)
+    return rows, sparse.csc_array(H), met
 
 
 def _check_supported(mesh: Mesh, contact: Contact, rows: ContactRows, moved: Array) -> None:
@@ -243,6 +268,14 @@ def _check_supported(mesh: Mesh, contact: Contact, rows: ContactRows, moved: Arr
             f"{rows.points[k].tolist()} and push it {-gap[k]:.3g} into the other side, where "
             "no contact force can act; change the prescribed displacement or free the node"
         )
+
+
+def _check_held(mesh: Mesh, contact: Contact, rows: ContactRows, given: Array) -> None:
+    """The same for nodes that supports hold, before mortar leaves out their multipliers."""
+    normal = rows.frames[:, 0]
+    held = np.linalg.norm(normal * np.isnan(given), axis=1) < 1e-9
+    moved = np.einsum("pc,pc->p", normal, np.nan_to_num(given))
+    _check_supported(mesh, contact, rows.at(held), moved[held])
 
 
 def _wanted(contact: Contact, points: Array) -> NDArray[np.bool_]:

@@ -19,7 +19,7 @@ from ..fem.order import second_order
 from .values import ScalarValue, VectorValue
 
 Array = NDArray[np.float64]
-METHODS = ("nodal",)
+METHODS = ("nodal", "mortar")  # "dual-mortar" is another name of the latter
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +85,9 @@ class Contact:
 
     master: another surface, of any body; slave nodes without a facet of it in front of them are
     left out.
+    method: "nodal", every slave node against the closest point of the other side, or "mortar",
+    averages with dual basis functions, exact also for a uniform pressure between meshes that do
+    not match.
 
     Either mu, the coefficient of Coulomb friction, or tresca, the largest shear traction (a
     stress): a number, one number per slave node, or a function of points (n, dim) -> (n,).
@@ -108,6 +111,8 @@ class Contact:
             raise InvalidInput(
                 f"contact on {self.slave!r}: expected either an obstacle or a master surface"
             )
+        if self.method == "dual-mortar":
+            object.__setattr__(self, "method", "mortar")
         if self.method not in METHODS:
             raise InvalidInput(
                 f"method: expected one of {', '.join(METHODS)}, got {self.method!r}"

@@ -1,0 +1,50 @@
+"""Dual basis functions: biorthogonal to the shape functions of the slave surface.
+
+On every facet psi_q = sum_s A_qs phi_s with A = D M^-1, M_rs = int phi_r phi_s and D_r = int
+phi_r, all integrals over that part of the facet that faces the other side ([PW] section 4: the
+consistent treatment of the rim).  Nodes without a multiplier leave their share to the others of
+the facet: then phi_s + (mean of those left out) takes the place of phi_s.  Always
+
+    int psi_q phi_r = delta_qr int phi_r  for nodes q, r with multiplier,    sum_q psi_q = 1.
+
+[PW] A. Popp, B. Wohlmuth, M. Gee, W. Wall, "Dual quadratic mortar finite element methods for 3D
+finite deformation contact", SIAM J. Sci. Comput. 34 (2012) B421-B446.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+
+def dual_functions(mass: Array, kept: Mask, real: Mask) -> Array:
+    """Coefficients of psi in phi on every facet, (f, a, a): row q is psi_q, zero if not kept.
+
+    mass (f, a, a): int phi_r phi_s; kept (f, a): nodes with multiplier, at least one on each
+    facet; real (f, a): False for the slots that a facet with fewer nodes leaves empty.
+    """
+    share = (real & ~kept) / np.maximum(kept.sum(axis=1), 1)[:, None]
+    shared = kept[:, :, None] * share[:, None, :] + np.eye(mass.shape[1]) * kept[:, :, None]
+    both = kept[:, :, None] & kept[:, None, :]
+    moment = np.where(both, shared @ mass, 0.0)
+    size = np.sqrt(np.where(kept, np.einsum("faa->fa", mass), 1.0))
+    scaled = moment / (size[:, :, None] * size[:, None, :])
+    scaled += np.eye(mass.shape[1]) * ~kept[:, :, None]
+    inverse = np.linalg.inv(scaled) / (size[:, :, None] * size[:, None, :])
+    weight = np.where(kept, mass.sum(axis=1), 0.0)
+    return weight[:, :, None] * np.where(both, inverse, 0.0) @ shared
+
+
+def nodes_with_multiplier(nodes: Index, real: Mask, unwanted: Mask) -> Mask:
+    """Which nodes (n,) carry a multiplier: all but the unwanted that have a neighbour to do so.
+
+    nodes (f, a) of the facets that take part; a facet of unwanted nodes only keeps them.
+    """
+    kept = ~unwanted
+    alone = ~(kept[nodes] & real).any(axis=1)
+    kept[nodes[alone][real[alone]]] = True
+    return kept

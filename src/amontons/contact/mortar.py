@@ -1,0 +1,284 @@
+"""Dual mortar contact: gaps and displacements compared on average, one average per slave node.
+
+With the dual basis psi of the slave surface ([HSW] section 2, see `dual`) and
+
+    D_p = int psi_p phi_p,    M_pq = int psi_p phi_q^master,
+
+    u_p = R_p (v_p - sum_q (M_pq / D_p) v_q) + [gap_p, 0, 0],    gap_p = (1 / D_p) int g psi_p,
+
+R_p with rows n, t1(, t2), n out of the master into the slave, g > 0 where they are apart.  The
+reaction r_p = D_p lambda_p is a nodal force, lambda_p a traction.  All integrals are sums over
+segments: a uniform pressure then passes between flat meshes that do not match, and the forces
+on both sides cancel.  Small strains: all is taken once, in the reference configuration.
+
+No multiplier is there for nodes that supports hold in the normal direction, and for those of
+which hardly anything faces the other side; their neighbours take their share, and feel their
+displacement: u_p then has the term R_p (int psi_p phi_s / D_p) v_s of such a node s.
+Components of the displacement that supports hold on both sides (planes of symmetry) are left
+out of u, and of the normals.
+
+[HSW] S. Hüeber, G. Stadler, B. Wohlmuth, "A primal-dual active set algorithm for
+three-dimensional contact problems with Coulomb friction", SIAM J. Sci. Comput. 30 (2008).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..errors import InvalidInput
+from ..fem.cells import CELLS
+from ..fem.mesh import Mesh
+from ..fem.surfaces import nodal_normals, nodal_weights
+from .clipping import line_rule, square_rule, triangle_rule
+from .dual import dual_functions, nodes_with_multiplier
+from .geometry import Obstacle, frames
+from .nodal import ContactRows, check_exterior, contact_nodes
+from .overlap import winding_number
+from .pairs import KINDS, MAX_NODES
+from .segments import Segments, Surface, is_deep, nearest, segments
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+NO_MOTION = 0.1  # free part of an averaged normal below which supports hold the node in it
+EXACT = 1e-9  # the same for the normals of obstacles
+HARDLY = 0.1  # covered part of a node's weight below which it gets no multiplier
+ROUNDING = 1e-14  # averages below this are zeros with rounding errors
+SAME = 1e-12  # prescribed values that differ by less, relative to the largest, agree
+BESIDE = 1e-3  # of a facet: how far outside of it a point is asked for
+RULES = {"line": line_rule(4), "tri": triangle_rule(4), "quad": square_rule(4)}
+
+
+def mortar_obstacle(
+    mesh: Mesh, surface: str, obstacle: Obstacle, *, prescribed: Array | None = None
+) -> tuple[ContactRows, Mask]:
+    """Contacts of a surface with a rigid obstacle in the mesh's own dofs, and found.
+
+    prescribed (n, dim): displacements that supports prescribe, NaN where free (default: all).
+    found, (slave nodes,): nodes with a multiplier; only these have rows.
+    """
+    check_exterior(mesh, surface)
+    slave = Surface.of(mesh.points, mesh.surface(surface), surface)
+    n, dim = mesh.points.shape
+    normals = np.zeros((n, dim))
+    on = np.unique(slave.nodes)
+    normals[on] = obstacle.normals(mesh.points[on])
+    mass, moment = _against(slave, obstacle)
+    held = _held(normals, _values(prescribed, mesh), EXACT)
+    average = _Average.of(slave, np.arange(len(slave.nodes)), mass, held)
+    total = _scatter(n, slave.nodes, np.einsum("fqa,fa->fq", average.psi, moment))
+    nodes = average.nodes
+    rows = average.rows(frames(normals[nodes]), total[nodes] / average.weights, None)
+    return rows, np.isin(contact_nodes(mesh, surface)[0], nodes)
+
+
+def mortar_contact(
+    slave: Mesh,
+    surface: str,
+    master: Mesh,
+    master_surface: str,
+    *,
+    prescribed: Array | None = None,
+    master_prescribed: Array | None = None,
+) -> tuple[ContactRows, sparse.csc_array, Mask]:
+    """Contacts of a slave with a master surface: rows, their part on the master, and found.
+
+    As `pair_contact`: rows.H in the dofs of the slave mesh, the second matrix (n_master, nc d)
+    in those of the master; found, (slave nodes,): nodes with a multiplier.  prescribed,
+    master_prescribed (n, dim): displacements that supports prescribe, NaN where free.
+    Raises InvalidInput when the bodies do not face each other, for a surface in contact with
+    itself, and for facets without area.  Cost linear in the facets.
+    """
+    check_exterior(slave, surface)
+    check_exterior(master, master_surface)
+    _check_different(slave, surface, master, master_surface)
+    over = Surface.of(slave.points, slave.surface(surface), surface)
+    under = Surface.of(master.points, master.surface(master_surface), master_surface)
+    parts = _in_front(over, under, master, joined=slave is master)
+    if not len(parts.slave):
+        raise InvalidInput(
+            f"contact of {surface!r} with {master_surface!r}: no slave facet has a master "
+            "facet in front of it"
+        )
+    normals = -nodal_normals(slave.points, over.blocks)
+    facets, of = np.unique(parts.slave, return_inverse=True)
+    mass = np.zeros((len(facets), MAX_NODES, MAX_NODES))
+    np.add.at(mass, of, parts.mass)
+    values, on_master = _values(prescribed, slave), _values(master_prescribed, master)
+    held = _held(normals, values, NO_MOTION)
+    average = _Average.of(over, facets, mass, held)
+    across = average.onto(parts, of, under)
+    fixed = _held_together(average.nodes, across, values, on_master)
+    axes = frames(_within(normals[average.nodes], fixed))
+    apart = average.onto_slave @ slave.points - across @ master.points
+    gap = np.einsum("pc,pc->p", axes[:, 0], apart)
+    rows = average.rows(axes, gap, fixed)
+    found = np.isin(contact_nodes(slave, surface)[0], average.nodes)
+    return rows, -coupled_columns(across, axes, fixed), found
+
+
+@dataclass(frozen=True, eq=False)
+class _Average:
+    """Averages of nodal values over the slave surface, one for each node with multiplier.
+
+    nodes (nc,); weights (nc,): D_p; psi (f, 4, 4): dual functions on the facets that take part;
+    onto_slave (nc, n): 1 at the node, its average of others without multiplier besides.
+    """
+
+    points: Array
+    facet_nodes: Index
+    nodes: Index
+    weights: Array
+    psi: Array
+    onto_slave: sparse.csr_array
+
+    @classmethod
+    def of(cls, surface: Surface, facets: Index, mass: Array, held: Mask) -> _Average:
+        """From int phi phi (f, 4, 4) on some facets (f,); held (n,): no multiplier wanted."""
+        n = len(surface.points)
+        nodes, real = surface.nodes[facets], surface.real[facets]
+        whole = nodal_weights(surface.points, surface.blocks)
+        hardly = _scatter(n, nodes, mass.sum(axis=2)) < HARDLY * whole
+        kept = nodes_with_multiplier(nodes, real, held | hardly)
+        psi = dual_functions(mass, kept[nodes] & real, real)
+        chosen = np.unique(nodes[kept[nodes] & real])
+        product = _between(nodes, psi @ mass, nodes, (n, n))[chosen]
+        weights = _scatter(n, nodes, np.einsum("faa->fa", psi @ mass))[chosen]
+        extra = product @ sparse.diags_array(np.where(kept, 0.0, 1.0))
+        own = sparse.csr_array(
+            (np.ones(len(chosen)), (np.arange(len(chosen)), chosen)), shape=(len(chosen), n)
+        )
+        return cls(surface.points, nodes, chosen, weights, psi,
+                   own + _cleaned(extra, weights))  # fmt: skip
+
+    def onto(self, parts: Segments, of: Index, master: Surface) -> sparse.csr_array:
+        """Averages of the master's nodal values, (nc, n_master); of: facet of every segment."""
+        shape = (len(self.points), len(master.points))
+        moments = self.psi[of] @ parts.cross
+        product = _between(self.facet_nodes[of], moments, master.nodes[parts.master], shape)
+        return _cleaned(product[self.nodes], self.weights)
+
+    def rows(self, axes: Array, gap: Array, fixed: Mask | None) -> ContactRows:
+        """Contacts with given frames and gaps, in the dofs of the slave."""
+        fixed = np.zeros(axes.shape[:2], dtype=bool) if fixed is None else fixed
+        H = coupled_columns(self.onto_slave, axes, fixed)
+        return ContactRows(self.nodes, self.points[self.nodes], self.weights, gap, axes, H)
+
+
+def coupled_columns(weights: sparse.csr_array, axes: Array, fixed: Mask) -> sparse.csc_array:
+    """H (n d, nc d) of averages weights (nc, n), seen in frames (nc, d, d).
+
+    fixed (nc, d): components that do not count.
+    """
+    entries = weights.tocoo()
+    contact, node = entries.coords
+    d = axes.shape[1]
+    values = entries.data[:, None, None] * (axes * ~fixed[:, None, :])[contact]
+    rows = np.broadcast_to((node[:, None] * d + np.arange(d))[:, None, :], values.shape)
+    columns = np.broadcast_to((contact[:, None] * d + np.arange(d))[:, :, None], values.shape)
+    shape = (weights.shape[1] * d, weights.shape[0] * d)
+    out = sparse.coo_array(
+        (values.ravel(), (rows.ravel(), columns.ravel())), shape=shape
+    ).tocsc()
+    out.eliminate_zeros()
+    return out
+
+
+# -------------------------------------------------------------------- the two sides
+def _check_different(slave: Mesh, surface: str, master: Mesh, master_surface: str) -> None:
+    if slave is not master:
+        return
+    seen = {tuple(sorted(f)) for b in slave.surface(surface) for f in b.nodes.tolist()}
+    other = {tuple(sorted(f)) for b in slave.surface(master_surface) for f in b.nodes.tolist()}
+    if both := len(seen & other):
+        raise InvalidInput(
+            f"contact of {surface!r} with {master_surface!r}: {both} facets are on both sides, "
+            "a surface can not be its own master; name the two sides as separate surfaces"
+        )
+
+
+def _in_front(over: Surface, under: Surface, master: Mesh, *, joined: bool) -> Segments:
+    """Segments that count: the nearest, and deep ones only where the bodies really overlap."""
+    every = segments(over, under, joined=joined)
+    deep = is_deep(over, under, every)
+    facets = np.unique(every.slave[deep])
+    beside = over.centre[facets] + BESIDE * over.radius[facets, None] * over.normal[facets]
+    low, high = master.bounding_box()
+    inside = ((beside > low) & (beside < high)).all(axis=1)
+    for k in np.flatnonzero(inside):
+        inside[k] = winding_number(master, beside[k]) > 0.5
+    counts = ~deep | np.isin(every.slave, facets[inside])
+    return nearest(over, every.at(counts))
+
+
+def _against(slave: Surface, obstacle: Obstacle) -> tuple[Array, Array]:
+    """int phi phi (f, 4, 4) and int g phi (f, 4) of whole facets, g the obstacle's gap."""
+    mass = np.zeros((len(slave.nodes), MAX_NODES, MAX_NODES))
+    moment = np.zeros((len(slave.nodes), MAX_NODES))
+    for n in np.unique(slave.corners):
+        cell, of = CELLS[KINDS[n - 2]], np.flatnonzero(slave.corners == n)
+        x = slave.points[slave.nodes[of, :n]]
+        for at, weight in zip(*RULES[cell.kind], strict=True):
+            jac, phi = cell.jacobians(x, at), cell.shape(at)
+            area = weight * np.sqrt(np.linalg.det(np.swapaxes(jac, 1, 2) @ jac))
+            mass[of, :n, :n] += area[:, None, None] * np.outer(phi, phi)
+            gap = obstacle.gap(np.einsum("a,kac->kc", phi, x))
+            moment[of, :n] += (area * gap)[:, None] * phi
+    return mass, moment
+
+
+# -------------------------------------------------------------------- supports
+def _values(prescribed: Array | None, mesh: Mesh) -> Array:
+    return np.full(mesh.points.shape, np.nan) if prescribed is None else prescribed
+
+
+def _held(normals: Array, prescribed: Array, threshold: float) -> Mask:
+    """Nodes (n,) that supports hold in the direction of their normal."""
+    free = np.isnan(prescribed)
+    return np.linalg.norm(normals * free, axis=1) < threshold
+
+
+def _held_together(
+    nodes: Index, across: sparse.csr_array, prescribed: Array, master: Array
+) -> Mask:
+    """Components (nc, d) with the same prescribed value at the slave and a node opposite."""
+    contact, node = across.tocoo().coords
+    size = np.nanmax(np.abs(np.concatenate([prescribed, master, np.zeros_like(master[:1])])))
+    with np.errstate(invalid="ignore"):
+        agree = np.abs(prescribed[nodes[contact]] - master[node]) <= SAME * size
+    out = np.zeros((len(nodes), prescribed.shape[1]), dtype=bool)
+    np.logical_or.at(out, contact, agree)
+    return out
+
+
+def _within(normals: Array, fixed: Mask) -> Array:
+    """Unit normals without their fixed components (nc, d), where something is left of them."""
+    inside = normals * ~fixed
+    length = np.linalg.norm(inside, axis=1)
+    able = length > NO_MOTION
+    return np.where(able[:, None], inside / np.where(able, length, 1.0)[:, None], normals)
+
+
+# -------------------------------------------------------------------- sums over facets
+def _scatter(n: int, nodes: Index, values: Array) -> Array:
+    """Sums (n,) of values (f, a) at nodes (f, a)."""
+    return np.bincount(nodes.ravel(), values.ravel(), minlength=n)
+
+
+def _between(rows: Index, values: Array, columns: Index, shape: tuple) -> sparse.csr_array:
+    """Sum of blocks (f, a, b) at nodes rows (f, a) and columns (f, b)."""
+    where = (np.broadcast_to(rows[:, :, None], values.shape).ravel(),
+             np.broadcast_to(columns[:, None, :], values.shape).ravel())  # fmt: skip
+    return sparse.coo_array((values.ravel(), where), shape=shape).tocsr()
+
+
+def _cleaned(product: sparse.csr_array, weights: Array) -> sparse.csr_array:
+    """Rows over their weights, without rounding errors of zero."""
+    out = sparse.csr_array(sparse.diags_array(1 / weights) @ product)
+    out.data[np.abs(out.data) < ROUNDING] = 0.0
+    out.eliminate_zeros()
+    return out

@@ -1,0 +1,308 @@
+"""Segments: the parts of slave facets that face one master facet each, and integrals on them.
+
+Both facets are projected along the slave facet's normal onto the plane through its centre, and
+the intersection is triangulated ([PL]).  Quadrilaterals and triangles in 3D, lines in 2D; all
+pairs at once, with a search whose cost grows with the number of facets.
+
+[PL] M. Puso, T. Laursen, "A mortar segment-to-segment contact method for large deformation
+solid mechanics", Comput. Methods Appl. Mech. Engrg. 193 (2004) 601-629.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from ..errors import InvalidInput
+from ..fem.facets import Facets
+from ..fem.surfaces import facet_areas, facet_normals, nodal_normals
+from .clipping import clip, line_rule, quadrature
+from .geometry import frames
+from .pairs import AROUND, DEEP, KINDS, MAX_NODES, shapes
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+EDGEWISE = 0.1  # cosine of the angle between facets below which they do not face each other
+FLAT_FACET = 1e-12  # area, relative to the square of the longest side, of a degenerate facet
+SLIVER = 1e-8  # part of a facet; biorthogonal functions on less are lost in rounding
+TWICE = 1e-6  # coverage above 1 by less is rounding
+AFFINE = 1e-9  # sides of a parallelogram differ by less, relative to its size
+CHUNK = 2000  # slave facets at a time, for memory
+NEWTON = 30  # steps to the reference point of a quadrilateral
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Facets of all kinds of a surface in one table, with nodes (f, 4) padded by the last.
+
+    corners (f,): how many are real; centre, normal (f, dim), outward; radius, area (f,).
+    """
+
+    points: Array
+    nodes: Index
+    corners: Index
+    centre: Array
+    normal: Array
+    radius: Array
+    area: Array
+    blocks: tuple[Facets, ...]
+
+    @classmethod
+    def of(cls, points: Array, facets: tuple[Facets, ...], name: str) -> Surface:
+        """The table; raises InvalidInput for facets of second order or without area."""
+        if other := {block.kind for block in facets} - set(KINDS):
+            raise InvalidInput(
+                f"surface {name!r}: expected facets of first order, got {other.pop()!r}"
+            )
+        blocks = tuple(block for block in facets if len(block.nodes))
+        nodes = np.concatenate([_padded(block.nodes) for block in blocks])
+        corners = np.concatenate([np.full(len(b.nodes), b.nodes.shape[1]) for b in blocks])
+        area = np.concatenate([facet_areas(points, block) for block in blocks])
+        normal = np.concatenate([facet_normals(points, block) for block in blocks])
+        length = np.linalg.norm(normal, axis=1)
+        x = points[nodes]
+        real = np.arange(MAX_NODES) < corners[:, None]
+        centre = np.einsum("fa,fac->fc", real / corners[:, None], x)
+        radius = np.linalg.norm(x - centre[:, None], axis=2).max(axis=1)
+        power = points.shape[1] - 1
+        bad = np.flatnonzero(np.minimum(area, length) <= FLAT_FACET * radius**power)
+        if bad.size:
+            where = nodes[bad[0], : corners[bad[0]]]
+            raise InvalidInput(
+                f"surface {name!r}: the facet with nodes {where.tolist()} near "
+                f"{centre[bad[0]].tolist()} has no area; {bad.size} such facets, expected none"
+            )
+        return cls(
+            points, nodes, corners, centre, normal / length[:, None], radius, area, blocks
+        )
+
+    @property
+    def real(self) -> Mask:
+        """Which slots of nodes are real, (f, 4)."""
+        return np.arange(MAX_NODES) < self.corners[:, None]
+
+
+@dataclass(frozen=True, eq=False)
+class Segments:
+    """Integrals on k segments: facets slave, master (k,); a, b are slots of their nodes.
+
+    mass (k, a, b): int phi_a phi_b; cross (k, a, b): int phi_a phi_b^master; area (k,);
+    gap (k,): mean distance along the slave's normal, < 0 where they overlap.
+    """
+
+    slave: Index
+    master: Index
+    mass: Array
+    cross: Array
+    area: Array
+    gap: Array
+
+    def at(self, chosen: Index | Mask) -> Segments:
+        """A selection of these segments."""
+        return Segments(self.slave[chosen], self.master[chosen], self.mass[chosen],
+                        self.cross[chosen], self.area[chosen], self.gap[chosen])  # fmt: skip
+
+
+def segments(slave: Surface, master: Surface, *, joined: bool = False) -> Segments:
+    """All segments of two surfaces that face each other.
+
+    joined: both are in one mesh, with common numbers; facets that share a node are no pair.
+    """
+    found = []
+    for chunk, facet in _candidates(slave, master):
+        if joined:
+            same = slave.nodes[chunk][:, :, None] == master.nodes[facet][:, None, :]
+            apart = ~same.any(axis=(1, 2))
+            chunk, facet = chunk[apart], facet[apart]
+        found += list(_integrated(slave, master, chunk, facet))
+    return _joined(found)
+
+
+def is_deep(slave: Surface, master: Surface, every: Segments) -> Mask:
+    """Segments (k,) that overlap by more than the larger facet: perhaps through the body."""
+    size = np.maximum(slave.radius[every.slave], master.radius[every.master])
+    return every.gap < -DEEP * size
+
+
+def nearest(slave: Surface, every: Segments) -> Segments:
+    """Without the parts behind others: the nearest segments that cover each facet once."""
+    order = np.lexsort((np.abs(every.gap), every.slave))
+    area = every.area[order]
+    covered = np.cumsum(area)
+    first = np.ones(len(order), dtype=bool)
+    first[1:] = np.diff(every.slave[order]) > 0
+    before = np.maximum.accumulate(np.where(first, covered - area, 0.0))
+    kept = covered - before <= (1 + TWICE) * slave.area[every.slave[order]]
+    return every.at(np.sort(order[kept]))
+
+
+def _padded(nodes: Index) -> Index:
+    missing = MAX_NODES - nodes.shape[1]
+    return np.concatenate([nodes, np.repeat(nodes[:, -1:], missing, axis=1)], axis=1)
+
+
+def _joined(parts: list[Segments]) -> Segments:
+    names = ("slave", "master", "mass", "cross", "area", "gap")
+    empty = Segments(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64),
+                     np.zeros((0, MAX_NODES, MAX_NODES)), np.zeros((0, MAX_NODES, MAX_NODES)),
+                     np.zeros(0), np.zeros(0))  # fmt: skip
+    return Segments(*(np.concatenate([getattr(p, n) for p in [empty, *parts]]) for n in names))
+
+
+# -------------------------------------------------------------------- search
+def _candidates(slave: Surface, master: Surface) -> Iterator[tuple[Index, Index]]:
+    """Pairs of facets that may face each other, a chunk of slave facets at a time."""
+    nodes = np.unique(master.nodes)
+    normals = nodal_normals(master.points, master.blocks)[nodes]
+    tree = cKDTree(master.points[nodes])
+    label = np.floor(np.log2(master.radius))
+    classes = [np.flatnonzero(label == value) for value in np.unique(label)]
+    trees = [(cKDTree(master.centre[c]), c, master.radius[c].max()) for c in classes]
+    for start in range(0, len(slave.nodes), CHUNK):
+        chunk = np.arange(start, min(start + CHUNK, len(slave.nodes)))
+        foot, beside = _feet(slave.centre[chunk], slave.normal[chunk], tree, normals)
+        reach = 2 * slave.radius[chunk] + beside
+        for centres, members, size in trees:
+            lists = centres.query_ball_point(foot, reach + size, return_sorted=True)
+            counts = np.array([len(one) for one in lists])
+            if not counts.any():
+                continue
+            facet = members[np.concatenate([np.asarray(f, dtype=np.int64) for f in lists if f])]
+            of = np.repeat(chunk, counts)
+            cosine = np.einsum("kc,kc->k", slave.normal[of], master.normal[facet])
+            facing = cosine < -EDGEWISE
+            yield of[facing], facet[facing]
+
+
+def _feet(centre: Array, normal: Array, tree: cKDTree, normals: Array) -> tuple[Array, Array]:
+    """Points (k, dim) in front of the facets about where the other side is; by how much beside.
+
+    The closest node that faces the facet gives the depth, then the one closest to that point.
+    """
+    foot, beside = centre, np.zeros(len(centre))
+    for _ in range(2):
+        distance, near = tree.query(foot, k=min(AROUND, tree.n))
+        distance, near = distance.reshape(len(foot), -1), near.reshape(len(foot), -1)
+        faces = np.einsum("kjc,kc->kj", normals[near], normal) < 0
+        first = np.where(faces.any(axis=1), faces.argmax(axis=1), faces.shape[1] - 1)
+        node = tree.data[near[np.arange(len(near)), first]]
+        depth = np.einsum("kc,kc->k", node - centre, normal)
+        foot = centre + depth[:, None] * normal
+        beside = np.linalg.norm(node - foot, axis=1)
+    return foot, beside
+
+
+# -------------------------------------------------------------------- integrals
+def _integrated(slave: Surface, master: Surface, of: Index, facet: Index) -> Iterator[Segments]:
+    """Segments of given pairs, by kinds of facets."""
+    axes = frames(slave.normal[of])[:, 1:]
+    for n in np.unique(slave.corners[of]):
+        for m in np.unique(master.corners[facet]):
+            both = (slave.corners[of] == n) & (master.corners[facet] == m)
+            s, t, e = of[both], facet[both], axes[both]
+            origin = slave.centre[s][:, None]
+            x = np.einsum("kac,kec->kae", slave.points[slave.nodes[s, :n]] - origin, e)
+            y = np.einsum("kac,kec->kae", master.points[master.nodes[t, :m]] - origin, e)
+            near = ((x.max(axis=1) > y.min(axis=1)) & (x.min(axis=1) < y.max(axis=1))).all(
+                axis=1
+            )
+            x, y, s, t = x[near], y[near], s[near], t[near]
+            segment, phi, psi, weight = (_on_lines if n == 2 else _on_polygons)(x, y)
+            yield _summed(slave, master, s, t, segment, phi, psi, weight)
+
+
+def _on_lines(x: Array, y: Array) -> tuple[Index, Array, Array, Array]:
+    """Pair (t,), shape functions (t, q, 2) of slave and master, weights (t, q) on overlaps."""
+    x, y = x[:, :, 0], y[:, :, 0]
+    low = np.maximum(x.min(axis=1), y.min(axis=1))
+    high = np.minimum(x.max(axis=1), y.max(axis=1))
+    pair = np.flatnonzero(high > low)
+    x, y, low, high = x[pair], y[pair], low[pair], high[pair]
+    at, weight = line_rule(3)
+    where = low[:, None] + (high - low)[:, None] * at[:, 0]
+    functions = []
+    for ends in (x, y):
+        share = (where - ends[:, :1]) / (ends[:, 1:] - ends[:, :1])
+        functions.append(np.stack([1 - share, share], axis=2))
+    return pair, functions[0], functions[1], (high - low)[:, None] * weight
+
+
+def _on_polygons(x: Array, y: Array) -> tuple[Index, Array, Array, Array]:
+    """Pair (t,), shape functions (t, q, a) of slave and master, weights (t, q) on triangles."""
+    corners, count = clip(y[:, ::-1], x)  # seen from the slave, the master turns the other way
+    points = 3 if _is_affine(x) and _is_affine(y) else 5
+    pair, where, weight = quadrature(corners, count, points)
+    phi, psi = (_functions(z[pair], where) for z in (x, y))
+    return pair, phi, psi, weight
+
+
+def _functions(x: Array, where: Array) -> Array:
+    """Shape functions (t, q, a) of polygons x (t, a, 2) at points (t, q, 2)."""
+    at = _reference(x, where).reshape(-1, 2)
+    return shapes(KINDS[x.shape[1] - 2], at).reshape(*where.shape[:2], x.shape[1])
+
+
+def _is_affine(x: Array) -> bool:
+    """True when all polygons (k, a, 2) are triangles or parallelograms."""
+    if x.shape[1] == 3:
+        return True
+    bent = np.abs(x[:, 0] - x[:, 1] + x[:, 2] - x[:, 3]).max(initial=0.0, axis=1)
+    return bool((bent <= AFFINE * np.abs(x).max(axis=(1, 2), initial=0.0)).all())
+
+
+def _reference(x: Array, where: Array) -> Array:
+    """Reference coordinates (t, q, 2) of points in triangles or quadrilaterals x (t, a, 2)."""
+    if x.shape[1] == 3:
+        slopes = np.stack([x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]], axis=2)
+        inverse = _inverse(slopes)
+        return np.einsum("tij,tqj->tqi", inverse, where - x[:, None, 0])
+    a, b, c = (
+        x[:, None, 1] - x[:, None, 0],
+        x[:, None, 3] - x[:, None, 0],
+        (x[:, None, 0] - x[:, None, 1] + x[:, None, 2] - x[:, None, 3]),
+    )
+    at = np.full(where.shape, 0.5)
+    for _ in range(NEWTON):
+        s, t = at[..., :1], at[..., 1:]
+        rest = where - x[:, None, 0] - s * a - t * b - s * t * c
+        step = np.einsum(
+            "tqij,tqj->tqi", _inverse(np.stack([a + t * c, b + s * c], axis=3)), rest
+        )
+        at = at + step
+        if np.abs(step).max(initial=0.0) < 1e-14:
+            break
+    return at
+
+
+def _inverse(matrices: Array) -> Array:
+    """Inverses of (…, 2, 2), written out for speed."""
+    (a, b), (c, d) = (
+        (matrices[..., i, 0] for i in (0, 1)),
+        (matrices[..., i, 1] for i in (0, 1)),
+    )
+    rows = np.stack([np.stack([d, -c], axis=-1), np.stack([-b, a], axis=-1)], axis=-2)
+    return rows / (a * d - b * c)[..., None, None]
+
+
+def _summed(
+    slave: Surface, master: Surface, of: Index, facet: Index,
+    pair: Index, phi: Array, psi: Array, weight: Array,
+) -> Segments:  # fmt: skip
+    """Integrals of the pairs that have a segment; slivers are left out."""
+    k, n, m = len(of), phi.shape[2], psi.shape[2]
+    mass, cross = np.zeros((k, MAX_NODES, MAX_NODES)), np.zeros((k, MAX_NODES, MAX_NODES))
+    weighted = weight[:, :, None] * phi
+    np.add.at(mass[:, :n, :n], pair, np.swapaxes(weighted, 1, 2) @ phi)
+    np.add.at(cross[:, :n, :m], pair, np.swapaxes(weighted, 1, 2) @ psi)
+    area = mass.sum(axis=(1, 2))
+    on_slave = np.einsum("ka,kac->kc", mass.sum(axis=2), slave.points[slave.nodes[of]])
+    on_master = np.einsum("kb,kbc->kc", cross.sum(axis=1), master.points[master.nodes[facet]])
+    gap = np.einsum("kc,kc->k", on_master - on_slave, slave.normal[of])
+    gap /= np.where(area > 0, area, 1.0)
+    kept = area > SLIVER * slave.area[of]
+    return Segments(of, facet, mass, cross, area, gap).at(kept)

@@ -1,0 +1,371 @@
+"""Dual mortar contact: clipping, dual functions, patch tests, balance of forces, rims."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import amontons as am
+from amontons.contact.clipping import clip, quadrature
+from amontons.contact.dual import dual_functions, nodes_with_multiplier
+from amontons.contact.mortar import mortar_contact, mortar_obstacle
+from amontons.contact.nodal import nodal_contact
+from amontons.contact.overlap import winding_number
+from amontons.contact.segments import Surface
+from amontons.fem.elasticity import cell_stress
+from amontons.fem.facets import Cells, Facets
+from amontons.one_sided import one_sided
+
+SOFT = am.LinearElastic(young=100, poisson=0.0)
+RUBBER = am.LinearElastic(young=100, poisson=0.3)
+
+
+def areas(subject, window):
+    corners, count = clip(subject, window)
+    polygon, _, weight = quadrature(corners, count, 2)
+    return np.bincount(polygon, weight.sum(axis=1), minlength=len(subject))
+
+
+def polygons(rng, k, n):
+    angle = np.sort(rng.uniform(0, 2 * np.pi, (k, n)), axis=1)
+    return np.stack([np.cos(angle), np.sin(angle)], axis=2)
+
+
+@pytest.mark.parametrize(("n", "m"), [(3, 3), (3, 4), (4, 3), (4, 4)])
+def test_parts_of_a_polygon_add_up_to_it(n, m):
+    """Cut by the cells of a grid; and whoever is the window, the area is the same."""
+    rng = np.random.default_rng(n + 4 * m)
+    subject = polygons(rng, 30, n)
+    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) / 2
+    corner = np.stack(np.meshgrid(*[np.arange(-1, 1, 0.5)] * 2), axis=-1).reshape(-1, 1, 2)
+    total = sum(areas(subject, np.tile(corner[k] + square, (30, 1, 1))) for k in range(16))
+    whole = areas(subject, np.tile(4 * square[None] - 1, (30, 1, 1)) * 1.0)
+    np.testing.assert_allclose(total, whole, atol=1e-14)
+    other = polygons(rng, 30, m) + 0.3
+    np.testing.assert_allclose(areas(subject, other), areas(other, subject), atol=1e-14)
+    assert (areas(subject, other) > 0.01).any()
+
+
+def test_dual_functions_are_biorthogonal_and_add_up_to_one():
+    rng = np.random.default_rng(0)
+    root = rng.uniform(0.1, 1, (5, 4, 6))  # shape functions at six points that add up to one
+    phi = root / root.sum(axis=1, keepdims=True)
+    mass = phi @ np.swapaxes(phi, 1, 2)
+    real = np.ones((5, 4), dtype=bool)
+    kept = np.array([[1, 1, 1, 1], [1, 1, 0, 1], [0, 1, 0, 1], [0, 0, 1, 0], [1, 0, 0, 1]]) > 0
+    psi = dual_functions(mass, kept, real)
+    np.testing.assert_allclose(psi.sum(axis=1) @ np.ones(4), 4, atol=1e-11)
+    np.testing.assert_allclose(np.einsum("fqa,fax->fx", psi, phi), 1, atol=1e-11)
+    product = psi @ mass
+    for f in range(5):
+        part = product[f][np.ix_(kept[f], kept[f])]
+        np.testing.assert_allclose(part, np.diag(mass[f].sum(axis=1)[kept[f]]), atol=1e-11)
+        assert not psi[f][~kept[f]].any()
+
+
+def test_unwanted_nodes_keep_their_multiplier_when_they_are_alone():
+    nodes = np.array([[0, 1], [2, 3]])
+    real = np.ones((2, 2), dtype=bool)
+    kept = nodes_with_multiplier(nodes, real, np.array([False, True, True, True]))
+    assert kept.tolist() == [True, False, True, True]
+
+
+def distorted(mesh, amount=0.12, seed=0):
+    """The same box with its inner points moved, faces and edges in themselves."""
+    rng = np.random.default_rng(seed)
+    low, high = mesh.bounding_box()
+    grid = (high - low) / np.array(mesh.grid)
+    shift = amount * grid * rng.uniform(-1, 1, mesh.points.shape)
+    shift[(mesh.points == low) | (mesh.points == high)] = 0
+    return am.Mesh(mesh.points + shift, mesh.cells, mesh.surfaces)
+
+
+def two_blocks(dim, lower, upper, kinds=(None, None), *, change=None, material=SOFT, **parts):
+    """Two blocks on each other, pressed from above until the pressure is 1."""
+    size, up = (1,) * dim, (0,) * (dim - 1) + (1,)
+    low = am.box(size, lower, kinds[0])
+    high = am.box(size, upper, kinds[1], origin=up)
+    if change:
+        low, high = change(low), change(high)
+    bodies = [am.Body(low, material, name="lower"), am.Body(high, material, name="upper")]
+    push = (0,) * (dim - 1) + (-0.02,)
+    model = {
+        "supports": [am.Fix("upper.top", push), am.Fix("lower.bottom", 0)],
+        "contacts": [am.Contact("upper.bottom", master="lower.top", mu=0.5, method="mortar")],
+    }
+    return am.Model(bodies, **(model | parts))
+
+
+MESHES = [
+    (2, 3, 4, ("quad", "quad")), (2, 5, 2, ("tri", "quad")),
+    (2, (3, 1), (7, 2), ("quad", "tri")),
+    (3, (2, 3, 1), (3, 2, 1), ("hex", "hex")), (3, 2, (4, 4, 2), ("hex", "hex")),
+    (3, (2, 2, 1), 3, ("hex", "tet")), (3, 3, (2, 1, 2), ("tet", "hex")),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("dim", "lower", "upper", "kinds"), MESHES)
+def test_uniform_pressure_passes_meshes_that_do_not_match(dim, lower, upper, kinds):
+    model = two_blocks(dim, lower, upper, kinds)
+    solution = am.solve(model, tolerance=1e-12)
+    np.testing.assert_allclose(solution.pressure, 1, rtol=1e-10)
+    np.testing.assert_allclose(solution.shear, 0, atol=1e-10)
+    for body, displacement in zip(model.bodies, solution.displacement, strict=True):
+        stress = cell_stress(body.mesh, body.material, displacement)
+        np.testing.assert_allclose(stress[:, dim - 1, dim - 1], -1, rtol=1e-10)
+    assert one_sided(model.assemble()) is not None
+
+
+def test_uniform_pressure_passes_distorted_quadrilaterals():
+    """Their shape functions are rational on the plane: exact up to the quadrature."""
+    model = two_blocks(3, (3, 3, 1), (2, 4, 1), change=distorted)
+    solution = am.solve(model, tolerance=1e-12)
+    np.testing.assert_allclose(solution.pressure, 1, rtol=2e-7)
+
+
+def blocks_apart(dim, shift, lower=3, upper=4, kinds=(None, None)):
+    low = am.box((1,) * dim, (lower,) * (dim - 1) + (1,), kinds[0])
+    high = am.box((1,) * dim, (upper,) * (dim - 1) + (1,), kinds[1], origin=(*shift, 1))
+    return low, high
+
+
+@pytest.mark.parametrize("kinds", [("hex", "hex"), ("hex", "tet")])
+@pytest.mark.parametrize("overhang", [1e-9, 1e-6, 1e-3, 0.03, 0.12, 0.2, 0.5])
+def test_forces_and_moments_balance_on_a_partly_covered_surface(overhang, kinds):
+    """A traction of one on what is covered: its resultant, on both sides, and no moment."""
+    shift = (overhang, 0.7 * overhang)
+    low, high = blocks_apart(3, shift, kinds=kinds)
+    rows, on_master, _ = mortar_contact(high, "bottom", low, "top")
+    points = np.concatenate([high.points, low.points])
+    H = np.vstack([rows.H.toarray(), on_master.toarray()])
+    for axis in np.eye(3):
+        np.testing.assert_allclose(H.T @ np.tile(axis, len(points)), 0, atol=5e-14)
+        np.testing.assert_allclose(H.T @ np.cross(axis, points).ravel(), 0, atol=5e-14)
+    traction = np.zeros((len(rows.nodes), 3))
+    traction[:, 0] = 1
+    force = (H @ (rows.weights[:, None] * traction).ravel()).reshape(-1, 3)
+    area = (1 - shift[0]) * (1 - shift[1])
+    np.testing.assert_allclose(force[: len(high.points), 2].sum(), area, rtol=1e-7)
+    centre = force[len(high.points) :, 2] @ low.points[:, :2]
+    expected = -area * (1 + np.array(shift)) / 2
+    np.testing.assert_allclose(centre, expected, rtol=1e-7)
+    np.testing.assert_allclose(rows.gap, 0, atol=1e-13)
+    assert abs(H).max() < 5
+
+
+def test_action_is_reaction_on_curved_surfaces():
+    """Forces cancel to rounding on surfaces with gaps between them, too."""
+    low, high = blocks_apart(3, (0, 0), 5, 4)
+    waves = [0.1 * np.sin(3 * m.points[:, :1]) * (m.points[:, 2:] == 1) for m in (low, high)]
+    low, high = (
+        am.Mesh(m.points + [0, 0, 1] * wave, m.cells, m.surfaces)
+        for m, wave in zip((low, high), waves, strict=True)
+    )
+    rows, on_master, found = mortar_contact(high, "bottom", low, "top")
+    assert found.all()
+    for axis in np.eye(3):
+        push = rows.H.T @ np.tile(axis, 50) + on_master.T @ np.tile(axis, 72)
+        np.testing.assert_allclose(push, 0, atol=1e-14)
+    np.testing.assert_allclose(rows.frames[:, 0, 2] > 0.8, True)
+    assert 1e-4 < abs(rows.gap).max() < 0.02
+
+
+def test_gaps_have_the_signs_of_nodal_contact():
+    low, high = blocks_apart(2, (0.0,))
+    for rise in (0.2, -0.1):
+        moved = am.Mesh(high.points + [0, rise], high.cells, high.surfaces)
+        rows = mortar_contact(moved, "bottom", low, "top")[0]
+        np.testing.assert_allclose(rows.gap, rise)
+        np.testing.assert_allclose(rows.frames, [[[0, 1], [1, 0]]] * 5, atol=1e-15)
+        np.testing.assert_allclose(rows.weights, [0.125, 0.25, 0.25, 0.25, 0.125])
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_obstacles_push_on_average(dim):
+    """Against a plane mortar is nodal; to a ball the mean gap is smaller than the nodal."""
+    up = (0,) * (dim - 1) + (1,)
+    mesh = am.box((1,) * dim, 3)
+    nodal = nodal_contact(mesh, "bottom", am.Plane((*up[:-1], 2), (0,) * (dim - 1) + (-0.1,)))
+    rows, found = mortar_obstacle(
+        mesh, "bottom", am.Plane((*up[:-1], 2), (0,) * (dim - 1) + (-0.1,))
+    )
+    assert found.all()
+    for name in ("nodes", "weights", "gap", "frames"):
+        np.testing.assert_allclose(getattr(rows, name), getattr(nodal, name), atol=1e-15)
+    np.testing.assert_allclose(rows.H.toarray(), nodal.H.toarray(), atol=1e-15)
+    ball = am.Sphere((0.5,) * (dim - 1) + (-2,), 1.9)
+    off = mortar_obstacle(mesh, "bottom", ball)[0].gap - nodal_contact(mesh, "bottom", ball).gap
+    curvature = (
+        dim - 1
+    ) / 2  # of the gap, over h^2: int psi (x - x_p)^2 / D_p = -h^2 / 6 inside
+    assert off.min() < -0.5 * curvature * (1 / 3) ** 2 / 6 / 2
+    assert off.min() > -curvature * (1 / 3) ** 2 / 6
+
+
+def pressed(rotation=None, length=1.0, force=1.0):
+    """A block with a round foot pushed and dragged on another, in other units and axes."""
+    low, high = blocks_apart(3, (0.1, 0.15), 4, 3)
+    turn = np.eye(3) if rotation is None else rotation.as_matrix()
+    round_foot = (high.points[:, 2:] == 1) * [0, 0, 0.05]
+    rise = round_foot * ((high.points[:, :2] - 0.6) ** 2).sum(axis=1, keepdims=True)
+    material = am.LinearElastic(young=100 * force / length**2, poisson=0.3)
+    bodies = [
+        am.Body(am.Mesh(length * points @ turn.T, m.cells, m.surfaces), material, name=name)
+        for m, points, name in ((low, low.points, "lower"), (high, high.points + rise, "upper"))
+    ]
+    move = tuple(length * turn @ [0.01, 0.002, -0.05])
+    return am.Model(
+        bodies,
+        [am.Fix("lower.bottom", 0), am.Fix("upper.top", move)],
+        [am.Contact("upper.bottom", master="lower.top", mu=0.3, method="mortar")],
+    )
+
+
+def test_results_depend_on_neither_axes_nor_units():
+    rotation = Rotation.from_rotvec([0.3, -1.1, 0.7])
+    plain = am.solve(pressed(), tolerance=1e-11)
+    assert min(plain.counts.values()) > 0
+    turned = am.solve(pressed(rotation), tolerance=1e-11)
+    size = abs(plain.pressure).max()
+    np.testing.assert_allclose(turned.pressure, plain.pressure, atol=1e-8 * size)
+    np.testing.assert_allclose(
+        turned.force, plain.force @ rotation.as_matrix().T, atol=1e-8 * abs(plain.force).max()
+    )
+    scaled = am.solve(pressed(length=1e3, force=1e-4), tolerance=1e-11)
+    np.testing.assert_allclose(1e10 * scaled.pressure, plain.pressure, atol=1e-8 * size)
+    np.testing.assert_allclose(1e-3 * scaled.gap, plain.gap, atol=1e-9)
+
+
+def half_or_whole(dim, half):
+    """A soft block with a round foot on another one; x < 0 is left out in the half."""
+    cells = (lambda n: (n, 2)) if dim == 2 else (lambda n: (n, 2, 1))
+
+    def block(n, height, name):
+        width, start = (1, 0) if half else (2, -1)
+        rest = (0,) * (dim - 2)
+        mesh = am.box((width, *[1] * (dim - 1)), (n if half else 2 * n, *cells(n)[1:]),
+                      origin=(start, *rest, height))  # fmt: skip
+        points = mesh.points.copy()
+        if name == "upper":
+            points[:, -1] += 0.02 * points[:, 0] ** 2 * (points[:, -1] == 1)
+        return am.Body(am.Mesh(points, mesh.cells, mesh.surfaces), RUBBER, name=name)
+
+    rest = (None,) * (dim - 2)
+    supports = [am.Fix("lower.bottom", 0), am.Fix("upper.top", (0, *(0,) * (dim - 2), -0.05))]
+    if half:
+        supports += [am.Fix(f"{b}.left", (0, *rest, None)) for b in ("lower", "upper")]
+    contact = am.Contact("upper.bottom", master="lower.top", mu=0.2, method="mortar")
+    return am.Model([block(3, 0, "lower"), block(4, 1, "upper")], supports, [contact])
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_half_a_model_gives_half_of_the_solution(dim):
+    model = half_or_whole(dim, True)
+    half, whole = (
+        am.solve(model, tolerance=1e-11),
+        am.solve(half_or_whole(dim, False), tolerance=1e-11),
+    )
+    np.testing.assert_allclose(half.resultant[-1], whole.resultant[-1] / 2, rtol=1e-8)
+    size = whole.pressure.max()
+    for x, pressure in zip(half.points, half.pressure, strict=True):
+        same = np.linalg.norm(whole.points - x, axis=1) < 1e-9
+        np.testing.assert_allclose(whole.pressure[same], pressure, atol=1e-7 * size)
+    basis = one_sided(model.assemble())
+    assert (basis.dofs < 0).sum() == (1 if dim == 2 else 3)
+
+
+def test_nodes_that_supports_hold_leave_their_share_to_others():
+    """A side of the slave is held: uniform traction still arrives, on fewer multipliers."""
+    supports = [am.Fix("lower.bottom", 0), am.Fix("upper.left", (0, 0, -0.02))]
+    model = two_blocks(3, 3, (4, 3, 2), supports=supports)
+    held = model.discretisation
+    rows = held.placed[0].rows
+    assert rows.points[:, 0].min() == 0.25
+    assert len(rows.nodes) == 16
+    traction = np.zeros((16, 3))
+    traction[:, 0] = 1
+    force = (held.whole_H @ (rows.weights[:, None] * traction).ravel()).reshape(-1, 3)
+    split = held.offsets[1] // 3
+    np.testing.assert_allclose(force[:split, 2].sum(), -1)  # all of it on the master
+    np.testing.assert_allclose(force.sum(axis=0), 0, atol=1e-14)
+    solution = am.solve(model)
+    assert solution.converged
+    assert one_sided(model.assemble()) is not None
+
+
+def test_one_slave_meets_two_bodies():
+    left = am.Body(am.box((1, 1), (3, 2)), SOFT, name="left")
+    right = am.Body(am.box((1, 1), (5, 2), origin=(1, 0)), SOFT, name="right")
+    beam = am.Body(am.box((2, 1), (7, 2), origin=(0, 1)), SOFT, name="beam")
+    model = am.Model(
+        [left, right, beam],
+        [am.Fix("left.bottom", 0), am.Fix("right.bottom", 0), am.Fix("beam.top", (0, None))],
+        [am.Contact("beam.bottom", master=f"{side}.top", mu=0.3, method="mortar")
+         for side in ("left", "right")],
+        [am.Traction("beam.top", (0, -1))],
+    )  # fmt: skip
+    solution = am.solve(model)
+    np.testing.assert_allclose(solution.resultant, (0, 2), atol=1e-7)
+    np.testing.assert_allclose(solution.pressure, 1, atol=0.02)
+
+
+def test_an_overlap_deeper_than_a_facet_is_found():
+    """0.3 deep with facets of 0.1; but the far side of a body is not in contact."""
+    low = am.box((1, 1), (10, 10))
+    high = am.box((1, 1), (8, 8), origin=(0, 0.7))
+    rows, _, found = mortar_contact(high, "bottom", low, "top")
+    assert found.all()
+    np.testing.assert_allclose(rows.gap, -0.3)
+    solid, over = am.box((1, 1, 1), 4), am.box((1, 1, 1), 3, origin=(0, 0, 0.4))
+    np.testing.assert_allclose(mortar_contact(over, "bottom", solid, "top")[0].gap, -0.6)
+    with pytest.raises(am.InvalidInput, match="no slave facet has a master facet"):
+        mortar_contact(low, "bottom", low, "top")
+
+
+def test_winding_number():
+    for mesh in (am.box((1, 1), 2, "tri"), am.box((1, 1, 1), 2, "tet"), am.box((1, 1, 1), 2)):
+        assert winding_number(mesh, np.full(mesh.dim, 0.3)) == pytest.approx(1)
+        assert winding_number(mesh, np.full(mesh.dim, 1.3)) == pytest.approx(0, abs=1e-12)
+
+
+def test_bad_surfaces_are_named():
+    low, high = blocks_apart(3, (0, 0))
+    with pytest.raises(am.InvalidInput, match="a surface can not be its own master"):
+        mortar_contact(low, "top", low, "top")
+    with pytest.raises(am.InvalidInput, match="no slave facet has a master facet in front"):
+        mortar_contact(high, "top", low, "top")
+    away = am.Mesh(high.points + [3, 0, 0], high.cells, high.surfaces)
+    with pytest.raises(am.InvalidInput, match="no slave facet has a master facet in front"):
+        mortar_contact(away, "bottom", low, "top")
+    second = am.Body(high, SOFT, order=2).mesh
+    with pytest.raises(am.InvalidInput, match="facets of first order"):
+        mortar_contact(second, "bottom", low, "top")
+
+
+def test_facets_without_area_are_named():
+    """Meshes do not accept such cells; another source of facets might have them."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [1 + 1e-13, 1e-13, 0], [0.5, 0.2, 1.0]])
+    with pytest.raises(am.InvalidInput, match=r"'foot'.*nodes \[0, 1, 2\].*no area"):
+        Surface.of(points, (Facets("tri", np.array([[0, 1, 2]])),), "foot")
+
+
+def test_two_pieces_of_one_mesh():
+    a, b = am.box((1, 1), 2), am.box((1, 1), 3, origin=(0, 1))
+    n = len(a.points)
+    surfaces = {
+        "floor": a.surfaces["bottom"], "low": a.surfaces["top"],
+        "high": tuple(Facets(f.kind, f.nodes + n) for f in b.surfaces["bottom"]),
+    }  # fmt: skip
+    cells = (Cells("quad", np.concatenate([a.cells[0].nodes, b.cells[0].nodes + n])),)
+    mesh = am.Mesh(np.concatenate([a.points, b.points]), cells, surfaces)
+    rows, on_master, found = mortar_contact(mesh, "high", mesh, "low")
+    assert found.all()
+    np.testing.assert_allclose(
+        (rows.H + on_master).T @ np.ones(mesh.points.size), 0, atol=1e-14
+    )
+
+
+def test_supports_may_not_push_into_an_obstacle():
+    mesh = am.Body(am.box((1, 1), 3), SOFT)
+    contact = am.Contact("bottom", am.Plane((0, 1)), mu=0.3, method="mortar")
+    with pytest.raises(am.InvalidInput, match=r"supports hold the node.*push it 0.1"):
+        am.Model([mesh], [am.Fix("left", (0, -0.1))], [contact]).assemble()
