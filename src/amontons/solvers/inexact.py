@@ -8,8 +8,9 @@ its factors.
 `DeformablePortfolio` is what `Auto` runs on such W:
 
     accelerated sweeps    while they promise an end before Newton would be there
-    inexact Newton        with full steps until it stalls: from the best point, from the start;
-                          then with a line search, which is what stalls near a swept point
+    inexact Newton        with full steps until it stalls: from the start, from where it takes
+                          fewer steps than from a swept point; from the best point; from the
+                          start with a line search
     the usual portfolio   then
 
 [EW] S. Eisenstat, H. Walker (see `newton`).
@@ -102,8 +103,8 @@ class DeformablePortfolio(Portfolio):
         joints = Joints.of(whole)
         if joints is not None:
             yield from self._sweeps_before(joints)
-            yield from self._inexact(FULL, self.r)
             yield from self._inexact(FULL, self.start)
+            yield from self._inexact(FULL, self.r)
             yield from self._inexact(InexactNewton(), self.start)
         yield from super().stages()
 
