@@ -57,12 +57,7 @@ class Condensation:
         ):
             copies, n = members.shape
             whole += copies * float(n) ** FILL
-            inside = np.zeros(n)
-            inside[seen] = 1.0
-            pattern = sparse.csr_array(abs(matrix))
-            for _ in range(SLAB_LAYERS):
-                inside = (pattern @ inside > 0).astype(float)
-            slab += copies * inside.sum() ** FILL
+            slab += copies * float(_within(matrix, seen, SLAB_LAYERS)) ** FILL
         return self.d * self.nc * slab + WHOLE_SOLVES * whole
 
     # ------------------------------------------------------------------ W
@@ -124,3 +119,18 @@ class Condensation:
             unit[columns, np.arange(len(columns))] = 1.0
             C[:, first : first + SOLVE_COLUMNS] = solve(unit)[seen]
         return C
+
+
+def _within(matrix: sparse.csc_array, start: Index, layers: int) -> int:
+    """How many unknowns a matrix couples with those at `start` in so many steps."""
+    inside = np.zeros(matrix.shape[0], dtype=bool)
+    inside[start] = True
+    newest = np.asarray(start)
+    for _ in range(layers):
+        first, count = matrix.indptr[newest], np.diff(matrix.indptr)[newest]
+        ends = np.cumsum(count)
+        at = np.arange(ends[-1] if len(ends) else 0) + np.repeat(first - ends + count, count)
+        near = matrix.indices[at]
+        newest = np.unique(near[~inside[near]])
+        inside[newest] = True
+    return int(inside.sum())

@@ -27,6 +27,8 @@ from .errors import InvalidInput, SingularOperator, UnsupportedForm
 from .judge import Measure
 from .linear import ConjugateGradient, Direct, Factor, LinearSolver
 from .linear.bodies import Bodies, BodyFactor
+from .linear.geometric import prepared
+from .linear.hierarchy import Hierarchy
 from .linear.levels import Levels, checked_levels
 from .linear.small_blocks import block_diagonal_inverse
 
@@ -36,6 +38,7 @@ LARGEST = 1e100  # entry in any unit: squares must stay finite, and 1 / LARGEST 
 DENSE_LIMIT = 4e9  # bytes that condensed() may fill before it refuses
 DIRECT_LIMIT = 600_000  # unknowns of a mesh whose factor takes some 10 GB
 EXACT_WORK = 2e6  # n * nc * d up to which forming W costs nothing that matters
+ESTIMATED = 9_000  # unknowns of a mesh above which the size of u is taken from a coarse level
 CHEAP = 2.0  # work of W, relative to that of a compressed W, which is full and not exact
 
 
@@ -56,6 +59,8 @@ class FrictionProblem:
     u_scale, one number in the unit of u, replaces |u_ref| in the residual measure.
     levels (global form): prolongations of v from coarser spaces, finest first, levels[0] with n
     rows, levels[1] with as many as levels[0] has columns, …: geometric multigrid uses them.
+    guess, (n,): some v near the solution, such as prescribed displacements continued into the
+    bodies: iterative solvers start there.
     """
 
     law: Law
@@ -67,6 +72,7 @@ class FrictionProblem:
     q: Array | None = None
     near_nullspace: Array | None = None
     levels: Levels = ()
+    guess: Array | None = None
     load_scale: float | None = None
     u_scale: float | None = None
     name: str = ""
@@ -84,6 +90,7 @@ class FrictionProblem:
         *,
         near_nullspace: Array | None = None,
         levels: Sequence[sparse.csr_array] = (),
+        guess: ArrayLike | None = None,
         load_scale: float | None = None,
         u_scale: float | None = None,
         name: str = "",
@@ -105,8 +112,10 @@ class FrictionProblem:
             raise InvalidInput(
                 f"near_nullspace: expected {n} rows, got {near_nullspace.shape[0]}"
             )
+        if guess is not None:
+            guess = _vector("guess", guess, (n,))
         return cls(law, M=M, H=H, f=f, w=w, near_nullspace=near_nullspace,
-                   levels=checked_levels(levels, n), load_scale=load_scale,
+                   levels=checked_levels(levels, n), guess=guess, load_scale=load_scale,
                    u_scale=u_scale, name=name)  # fmt: skip
 
     @classmethod
@@ -271,14 +280,19 @@ class FrictionProblem:
         inverse = self.small_blocks
         return inverse @ b if inverse is not None else self.factor().solve(b)
 
-    @cached_property
+    @property
     def condensing_is_cheap(self) -> bool:
         """True when W is the best to solve with: it then also judges (`measure`).
 
         For rigid bodies, small problems, and where it takes less work than CHEAP compressed W
         and fits into memory; see `condensation` for the counts.
         """
-        if self.form is Form.DELASSUS or self.small_blocks is not None:
+        if self.form is Form.DELASSUS:
+            return True
+        return self._kept("cheap", (self.M, self.H), self._condensing_is_cheap)
+
+    def _condensing_is_cheap(self) -> bool:
+        if self.small_blocks is not None:
             return True
         if self.unknowns * self.contacts * self.dimension <= EXACT_WORK:
             return True
@@ -368,7 +382,7 @@ class FrictionProblem:
     def with_load(self, load: ArrayLike) -> FrictionProblem:
         """The same problem with another f (global form) or q (Delassus form)."""
         if self.form is Form.GLOBAL:
-            return replace(self, f=_vector("f", load, (self.unknowns,)))
+            return replace(self, f=_vector("f", load, (self.unknowns,)), guess=None)
         q = _contact_rows("q", load, self.contacts)
         _expect("q", q.shape, (self.contacts, self.dimension))
         return replace(self, q=q)
@@ -421,7 +435,7 @@ class FrictionProblem:
         if self.measure is Measure.EXACT:
             p = self.condensed()
             return _ratio(judge.rounding_error(p.rho, r), p.q_norm)
-        return _ratio(judge.rounding_error(self.rho, r), self._scales[1])
+        return _ratio(judge.rounding_error(self.rho, r), self.scales[1])
 
     def exact_error(self, r: Array) -> float:
         """The exact measure of the Delassus form."""
@@ -436,19 +450,26 @@ class FrictionProblem:
         u = self.local_velocity(v)
         balance = np.linalg.norm(self.M @ v - self.H @ r.ravel() - self.f)
         law = judge.scaled_residual(r, u, self.law, self.rho)
-        load, reference = self._scales
+        load, reference = self.scales
         error = max(_ratio(balance, load), _ratio(law, reference))
         return float(error) if np.isfinite(error) else np.inf
 
-    @cached_property
+    @property
     def local_stiffness(self) -> Array:
         """H_i^T D^-1 H_i, (nc, d, d), D the block diagonal of M: a cheap stand-in for W_ii."""
         self._need(Form.GLOBAL)
+        return self._kept("local stiffness", (self.M, self.H), self._local_stiffness)
+
+    def _local_stiffness(self) -> Array:
         assert self.M is not None and self.H is not None
         d, n = self.dimension, self.unknowns
-        inverse = _node_blocks_inverse(self.M, d if n % d == 0 else 1)
-        product = sparse.csc_array(inverse @ self.H)
-        full = (sparse.csr_array(self.H.T) @ product).tobsr((d, d))
+        size = d if n % d == 0 else 1
+        touched = np.unique(self.H.indices // size)  # the blocks that H sees
+        index = (touched[:, None] * size + np.arange(size)).ravel()
+        H = sparse.csr_array(self.H)[index]
+        inverse = _node_blocks_inverse(self.M[:, index].tocsr()[index], size)
+        product = sparse.csc_array(inverse @ H)
+        full = (sparse.csr_array(H.T) @ product).tobsr((d, d))
         out = np.zeros((self.contacts, d, d))
         rows = np.repeat(np.arange(self.contacts), np.diff(full.indptr))
         own = rows == full.indices
@@ -464,17 +485,38 @@ class FrictionProblem:
         return np.where(size > 0, 1 / np.where(size > 0, size, 1.0), 0.0)
 
     @cached_property
-    def _scales(self) -> tuple[float, float]:
-        """Sizes of the load and of u for the residual measure."""
+    def scales(self) -> tuple[float, float]:
+        """Sizes of the load and of u for the residual measure (global form only)."""
         assert self.f is not None and self.w is not None
         load = self.load_scale if self.load_scale is not None else float(np.linalg.norm(self.f))
         if self.u_scale is not None:
             return load, self.u_scale
         try:
-            free = self.free_velocity
+            free = self._free_size()
         except SingularOperator:
-            free = self.w
-        return load, float(np.linalg.norm(free))
+            free = float(np.linalg.norm(self.w))
+        return load, free
+
+    def _free_size(self) -> float:
+        """|u| without reactions; of large meshes from a coarse level, to some per cent."""
+        large = self.unknowns > ESTIMATED and (self.levels or self.near_nullspace is not None)
+        hierarchy = self.hierarchy if large else None
+        if hierarchy is None:
+            return float(np.linalg.norm(self.free_velocity))
+        assert self.f is not None and self.M is not None
+        v = self.guess if self.guess is not None else np.zeros(self.unknowns)
+        rest = self.f - self.M @ v if self.guess is not None else self.f
+        nodes = hierarchy.nodes
+        v = v + nodes.gather(hierarchy.estimate(nodes.spread(rest), ESTIMATED // 9))
+        return float(np.linalg.norm(self.local_velocity(v)))
+
+    @property
+    def hierarchy(self) -> Hierarchy | None:
+        """Multigrid levels of M, made once; None where the unknowns do not come in nodes."""
+        self._need(Form.GLOBAL)
+        M, levels, modes = self.M, self.levels, self.near_nullspace
+        assert M is not None
+        return self._kept("hierarchy", (M,), lambda: prepared(M, levels, modes, self.dimension))
 
 
 def _ratio(size: float, scale: float) -> float:

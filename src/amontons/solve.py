@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -131,7 +131,7 @@ def _run(
 ) -> tuple[Outcome, str]:
     """The loop; returns why it ended."""
     try:
-        step = watch.judge(start)
+        step = watch.judge(_with_motion(watch.problem, start))
         if step.error <= target.tolerance:
             return Outcome.CONVERGED, ""
         for iterate in solver.iterates(watch.problem, start, target):
@@ -225,6 +225,14 @@ def _start(problem: FrictionProblem, start: Iterate | FrictionSolution | None) -
     if start.v is not None and problem.form is Form.GLOBAL and start.v.size != n:
         raise InvalidInput(f"start: expected v of {n} entries, got {start.v.size}")
     return Iterate(r, start.v, 0)
+
+
+def _with_motion(problem: FrictionProblem, start: Iterate) -> Iterate:
+    """The start with some v where finding that of its r would cost a linear solve."""
+    if start.v is not None or problem.measure is not Measure.RESIDUAL:
+        return start
+    guess = problem.guess
+    return replace(start, v=guess if guess is not None else np.zeros(problem.unknowns))
 
 
 def _check_number(name: str, value: object) -> None:

@@ -2,7 +2,15 @@
 
 from .base import Factor, LinearSolver
 from .direct import Direct
+from .geometric import GeometricMultigrid
 from .krylov import ConjugateGradient
 from .multigrid import AlgebraicMultigrid
 
-__all__ = ["AlgebraicMultigrid", "ConjugateGradient", "Direct", "Factor", "LinearSolver"]
+__all__ = [
+    "AlgebraicMultigrid",
+    "ConjugateGradient",
+    "Direct",
+    "Factor",
+    "GeometricMultigrid",
+    "LinearSolver",
+]

@@ -40,6 +40,8 @@ class Bodies:
     def of(cls, matrix: sparse.csc_array) -> Bodies:
         """The bodies of a square matrix."""
         count, label = connected_components(matrix, directed=False)
+        if count == 1:
+            return cls([np.arange(matrix.shape[0])[None]], [matrix])
         order = np.argsort(label, kind="stable")
         ends = np.cumsum(np.bincount(label, minlength=count))
         rows = sparse.csr_array(matrix)[order]

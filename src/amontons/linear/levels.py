@@ -50,22 +50,51 @@ def free_levels(
     out: list[sparse.csr_array] = []
     sizes = list(nodes)
     for depth in range(max((len(levels) for levels in bodies), default=0)):
-        parts = [
-            levels[depth] if depth < len(levels) else sparse.eye_array(size, format="csr")
-            for levels, size in zip(bodies, sizes, strict=True)
-        ]
-        nodal = parts[0] if len(parts) == 1 else sparse.block_diag(parts, format="csr")
-        coarse_fixed = fixed.reshape(-1, dim)[_fine_node(nodal)].ravel()
+        nodal = _nodal(bodies, sizes, depth)
+        coarse_fixed = fixed.reshape(-1, dim)[fine_unknown(nodal)].ravel()
         if coarse_fixed.all():
             break
         level = sparse.kron(nodal, sparse.eye_array(dim), format="csr")
         out.append(sparse.csr_array(level[~fixed][:, ~coarse_fixed]))
-        fixed, sizes = coarse_fixed, [part.shape[1] for part in parts]
+        fixed = coarse_fixed
     return tuple(out)
 
 
-def _fine_node(level: sparse.csr_array) -> NDArray[np.int64]:
-    """The fine node that every coarse node sits on, (coarse nodes,)."""
+def _nodal(bodies: Sequence[Levels], sizes: list[int], depth: int) -> sparse.csr_array:
+    """Level `depth` of all bodies; sizes: their numbers of nodes there, then on the next."""
+    parts = [
+        levels[depth] if depth < len(levels) else sparse.eye_array(size, format="csr")
+        for levels, size in zip(bodies, sizes, strict=True)
+    ]
+    sizes[:] = [part.shape[1] for part in parts]
+    return parts[0] if len(parts) == 1 else sparse.block_diag(parts, format="csr")
+
+
+def continued(
+    bodies: Sequence[Levels], nodes: Sequence[int], values: NDArray[np.float64], fixed: Mask
+) -> NDArray[np.float64]:
+    """Prescribed values (dofs,) continued smoothly to the other dofs, through all levels.
+
+    On the coarsest level they are zero elsewhere; every finer level interpolates and puts in
+    what is prescribed there.  bodies, nodes and fixed as in `free_levels`.
+    """
+    sizes = list(nodes)
+    dim = len(values) // max(sum(sizes), 1)
+    shown = [(np.where(fixed, values, 0.0).reshape(-1, dim), fixed.reshape(-1, dim))]
+    steps = []
+    for depth in range(max((len(levels) for levels in bodies), default=0)):
+        steps.append(_nodal(bodies, sizes, depth))
+        given, held = shown[-1]
+        own = fine_unknown(steps[-1])
+        shown.append((given[own], held[own]))
+    out = shown[-1][0]
+    for step, (given, held) in zip(reversed(steps), reversed(shown[:-1]), strict=True):
+        out = np.where(held, given, step @ out)
+    return out.ravel()
+
+
+def fine_unknown(level: sparse.csr_array) -> NDArray[np.int64]:
+    """The fine node, or unknown, that every coarse one sits on, (coarse ones,)."""
     start = level.indptr[:-1][np.diff(level.indptr) == 1]
     rows = np.flatnonzero(np.diff(level.indptr) == 1)
     own = np.abs(level.data[start] - 1) < ONE

@@ -20,7 +20,7 @@ from ..errors import InvalidInput
 from ..fem.elasticity import body_load, stiffness
 from ..fem.mesh import Mesh, unknown
 from ..fem.surfaces import surface_load
-from ..linear.levels import Levels, free_levels
+from ..linear.levels import Levels, continued, free_levels
 from .parts import Body, BodyForce, Contact, Fix, Traction
 from .rigid import Piece, near_nullspace, pieces
 from .values import vector_at
@@ -51,7 +51,8 @@ class Discretisation:
     K (dofs, dofs): stiffness of the whole model; free (n,), fixed: its dofs; prescribed
     (dofs,), load (n,): force on the free dofs with the prescribed values lifted in; gap (nc,);
     carried (nc, d): part of the local displacement that the supports prescribe; levels:
-    prolongations of the free dofs from coarser meshes, finest first.
+    prolongations of the free dofs from coarser meshes, finest first; nodal_levels: of the
+    nodes, body by body.
     """
 
     offsets: Index
@@ -68,6 +69,16 @@ class Discretisation:
     parts: list[Piece]
     whole_H: sparse.csc_array
     levels: Levels = ()
+    nodal_levels: tuple[Levels, ...] = ()
+
+    def continued(self, prescribed: Array) -> Array | None:
+        """Prescribed values (dofs,) continued into the bodies, (n,); None without levels."""
+        if not any(self.nodal_levels):
+            return None
+        counts = np.diff(self.offsets) // self.placed[0].rows.points.shape[1]
+        fixed = np.zeros(self.dofs, dtype=bool)
+        fixed[self.fixed] = True
+        return continued(self.nodal_levels, counts.tolist(), prescribed, fixed)[self.free]
 
     @property
     def dofs(self) -> int:
@@ -121,6 +132,7 @@ def discretise(
         levels=free_levels(
             [b.mesh.levels for b in bodies], [len(b.mesh.points) for b in bodies], d, is_fixed
         ),
+        nodal_levels=tuple(body.mesh.levels for body in bodies),
     )  # fmt: skip
 
 

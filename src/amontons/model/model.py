@@ -90,7 +90,9 @@ class Model:
         parts = self.discretisation
         w = self.load_factor * parts.carried
         w[:, 0] += parts.gap
-        return self._discrete(self.load_factor * parts.load, w)
+        return self._discrete(
+            self.load_factor * parts.load, w, self.load_factor * parts.prescribed
+        )
 
     def increment(self, load: Array, prescribed: Array, before: Array) -> FrictionProblem:
         """The discrete problem of a quasi-static step, with friction on the new slip only.
@@ -102,15 +104,19 @@ class Model:
         w = (parts.whole_H.T @ prescribed).reshape(parts.carried.shape)
         w[:, 0] += parts.gap
         w[:, 1:] -= before
-        return self._discrete((load - parts.K @ prescribed)[parts.free], w)
+        return self._discrete((load - parts.K @ prescribed)[parts.free], w, prescribed)
 
-    def _discrete(self, f: Array, w: Array) -> FrictionProblem:
-        """The problem with a load f and local values w; shares its matrices with others."""
+    def _discrete(self, f: Array, w: Array, prescribed: Array) -> FrictionProblem:
+        """The problem with a load f and local values w; shares its matrices with others.
+
+        prescribed (dofs,): the values on the fixed dofs that f and w contain already.
+        """
         parts, law = self.discretisation, self.law
         loose = self._loose_but_held(parts, law)
         base = FrictionProblem.from_global(
             parts.M, parts.H, f, w, law, near_nullspace=parts.near_nullspace,
-            levels=parts.levels, load_scale=_load_size(parts, f, w), name=self.name,
+            levels=parts.levels, guess=parts.continued(prescribed), name=self.name,
+            load_scale=_load_size(parts, f, w),
             u_scale=_bonded_size(parts, f, w) if loose else None,
         )  # fmt: skip
         first = self._shared.setdefault("problem", base)

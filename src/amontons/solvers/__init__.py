@@ -3,6 +3,7 @@
 from .augmentation import RhoStrategy
 from .base import Breakdown, Iterate, Solver, Target
 from .compressed import CompressedDelassus
+from .contact_multigrid import ContactMultigrid
 from .functions import AlartCurnier, ComplementarityFunction, JeanMoreau, NaturalMap
 from .gauss_seidel import Batch, GaussSeidel
 from .hybrid import Auto, Hybrid
@@ -17,6 +18,7 @@ from .sweeps import SweepOrder
 METHODS: dict[str, type] = {
     "auto": Auto,
     "compressed-delassus": CompressedDelassus,
+    "contact-multigrid": ContactMultigrid,
     "gauss-seidel": GaussSeidel,
     "hybrid": Hybrid,
     "interior-point": InteriorPoint,
@@ -35,6 +37,7 @@ __all__ = [
     "Breakdown",
     "ComplementarityFunction",
     "CompressedDelassus",
+    "ContactMultigrid",
     "FullStep",
     "GaussSeidel",
     "GoldsteinPrice",

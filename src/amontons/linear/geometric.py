@@ -1,0 +1,99 @@
+"""Conjugate gradients preconditioned by multigrid on given levels, or on algebraic ones."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..errors import InvalidInput, SingularOperator
+from .hierarchy import Hierarchy, Nodes, components
+from .levels import Levels
+from .node_blocks import NodeBlocks
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class GeometricMultigrid:
+    """CG with one symmetric V(1,1) cycle of block Gauss-Seidel per iteration.
+
+    levels: prolongations of the unknowns, finest first, as in `FrictionProblem.levels`; levels
+    of smoothed aggregation follow where they end too early.  dimension: unknowns per node.
+    """
+
+    levels: Levels = ()
+    dimension: int = 3
+    tolerance: float = 1e-11  # relative residual
+    max_iterations: int = 200
+
+    def __post_init__(self) -> None:
+        if not 0 < self.tolerance < 1:
+            raise InvalidInput(f"tolerance: expected between 0 and 1, got {self.tolerance}")
+        if self.dimension not in (2, 3):
+            raise InvalidInput(f"dimension: expected 2 or 3, got {self.dimension}")
+        if self.max_iterations < 1:
+            raise InvalidInput(
+                f"max_iterations: expected at least 1, got {self.max_iterations}"
+            )
+
+    def factor(
+        self, matrix: sparse.csc_array, near_nullspace: Array | None = None
+    ) -> MultigridFactor:
+        """Levels of a symmetric positive definite matrix, (n, n).
+
+        Raises InvalidInput where its unknowns do not come in nodes: near_nullspace tells.
+        """
+        n = matrix.shape[0]
+        hierarchy = prepared(matrix, self.levels, near_nullspace, self.dimension)
+        if hierarchy is None:
+            raise InvalidInput(
+                f"matrix: its {n} unknowns do not come in nodes of {self.dimension}; pass the "
+                "rigid modes as near_nullspace, translations first"
+            )
+        return MultigridFactor(hierarchy, hierarchy.nodes, self)
+
+
+def prepared(
+    matrix: sparse.csc_array, levels: Levels, modes: Array | None, dimension: int
+) -> Hierarchy | None:
+    """All levels of a matrix (n, n); None where its unknowns do not come in nodes.
+
+    modes (n, k): rigid modes, translations first; without them n is a multiple of dimension.
+    """
+    component = components(modes, matrix.shape[0], dimension)
+    if component is None:
+        return None
+    nodes = Nodes.of(component)
+    A = NodeBlocks.from_sparse(matrix, None if nodes.plain else nodes.place, nodes.count)
+    return Hierarchy.of(A, component, levels, modes)
+
+
+@dataclass
+class MultigridFactor:
+    """Prepared levels."""
+
+    hierarchy: Hierarchy
+    nodes: Nodes
+    options: GeometricMultigrid
+    exact: bool = field(default=False, init=False)
+    iterations: int = field(default=0, init=False)
+
+    def solve(self, b: Array) -> Array:
+        """The solution x of A x = b to the options' tolerance, shape of b."""
+        columns = b.reshape(len(b), -1)
+        out = [self._solve_one(columns[:, k]) for k in range(columns.shape[1])]
+        return np.column_stack(out).reshape(b.shape)
+
+    def _solve_one(self, b: Array) -> Array:
+        most = self.options.max_iterations
+        x, count = self.hierarchy.solve(0, self.nodes.spread(b), self.options.tolerance, most)
+        self.iterations += min(count, most)
+        if count > most or not np.isfinite(x).all():
+            raise SingularOperator(
+                f"multigrid: no convergence in {most} iterations; is the matrix symmetric "
+                "positive definite?"
+            )
+        return self.nodes.gather(x)

@@ -1,0 +1,273 @@
+"""Levels of node blocks for multigrid: given prolongations first, algebraic ones below them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numba import njit, uint64
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import linalg as sparse_linalg
+
+from .node_blocks import NodeBlocks, first_sweep, row_product, sweep
+from .transfer import Transfer
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+COARSEST = 120  # nodes of the level that is solved directly, at most
+SMALL = 1e-10  # singular values of the coarsest matrix below this part of the largest rest
+
+
+@dataclass(frozen=True, eq=False)
+class Nodes:
+    """Which node and component an unknown is: place (n,), three to a node; count of nodes."""
+
+    place: Index
+    count: int
+
+    @classmethod
+    def of(cls, component: Index) -> Nodes:
+        """Unknowns in ascending order of nodes and components; component (n,), 0 to 2."""
+        starts = np.ones(len(component), dtype=np.int64)
+        starts[1:] = component[1:] <= component[:-1]
+        node = np.cumsum(starts) - 1
+        return cls(3 * node + component, int(node[-1]) + 1 if len(node) else 0)
+
+    @property
+    def plain(self) -> bool:
+        """True when every node has its three components."""
+        return 3 * self.count == len(self.place)
+
+    @property
+    def idle(self) -> Index:
+        """Places without an unknown."""
+        used = np.ones(3 * self.count, dtype=bool)
+        used[self.place] = False
+        return np.flatnonzero(used)
+
+    def spread(self, x: Array) -> Array:
+        """Values of the unknowns (n,) at the nodes, (count, 3), zero at idle places."""
+        if self.plain:
+            return np.array(x, dtype=float).reshape(-1, 3)
+        out = np.zeros(3 * self.count)
+        out[self.place] = x
+        return out.reshape(-1, 3)
+
+    def gather(self, x: Array) -> Array:
+        """The inverse of `spread`."""
+        return x.reshape(-1).copy() if self.plain else x.reshape(-1)[self.place]
+
+
+def components(modes: Array | None, n: int, d: int) -> Index | None:
+    """Direction of every unknown, (n,), from the translations among the rigid modes (n, k).
+
+    None where they do not tell.
+    """
+    if modes is None:
+        return np.arange(n) % d if n % d == 0 else None
+    translations = np.abs(modes[:, :d])
+    out = translations.argmax(axis=1)
+    unit = np.isclose(translations.sum(axis=1), 1.0) & np.isclose(translations.max(axis=1), 1.0)
+    return out.astype(np.int64) if unit.all() else None
+
+
+def transfers(
+    levels: Sequence[sparse.csr_array], component: Index
+) -> tuple[list[Transfer], list[Nodes]]:
+    """Given prolongations of unknowns as transfers between nodes, finest first."""
+    nodes, out = [Nodes.of(component)], []
+    for level in levels:
+        coo = sparse.coo_array(level)
+        if not coo.shape[1]:
+            break
+        coarse_component = np.zeros(coo.shape[1], dtype=np.int64)
+        order = np.argsort(np.abs(coo.data), kind="stable")
+        coarse_component[coo.coords[1][order]] = component[coo.coords[0][order]]
+        coarse = Nodes.of(coarse_component)
+        fine = nodes[-1]
+        shape = (3 * fine.count, 3 * coarse.count)
+        entries = (coo.data, (fine.place[coo.coords[0]], coarse.place[coo.coords[1]]))
+        tiles = sparse.coo_array(entries, shape=shape).tobsr((3, 3))
+        out.append(Transfer.of(tiles, fine.idle, coarse.idle))
+        nodes.append(coarse)
+        component = coarse_component
+    return out, nodes
+
+
+@dataclass(eq=False)
+class Level:
+    """One level: its matrix and the transfer to the next coarser one (None: the coarsest)."""
+
+    A: NodeBlocks
+    P: Transfer | None = None
+    x: Array = field(init=False)
+    b: Array = field(init=False)
+    r: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.x, self.b, self.r = (np.zeros((self.A.nodes, 3)) for _ in range(3))
+
+
+@dataclass(eq=False)
+class Hierarchy:
+    """All levels, finest first, and the inverse of the coarsest matrix.
+
+    geometric: number of levels that come from the given prolongations, the finest included.
+    owner may change coarse matrices for its purpose; undo then makes them those of A again.
+    """
+
+    levels: list[Level]
+    geometric: int
+    nodes: Nodes
+    coarse_inverse: Array = field(init=False)
+    owner: object = None
+    undo: Callable[[], None] | None = None
+
+    def __post_init__(self) -> None:
+        self.invert_coarsest()
+
+    @classmethod
+    def of(
+        cls,
+        A: NodeBlocks,
+        component: Index,
+        prolongations: Sequence[sparse.csr_array],
+        modes: Array | None,
+    ) -> Hierarchy:
+        """Galerkin levels below A; modes (n, k): near-nullspace for the algebraic ones."""
+        given, nodes = transfers(prolongations, component)
+        levels = [Level(A)]
+        for P in given:
+            if levels[-1].A.nodes <= 8:
+                break
+            levels[-1].P = P
+            levels.append(Level(P.galerkin(levels[-1].A)))
+        geometric = len(levels)
+        if levels[-1].A.nodes > COARSEST:
+            candidates = _coarse_modes(levels, nodes[0], modes)
+            for P in algebraic(levels[-1].A, candidates):
+                levels[-1].P = P
+                levels.append(Level(P.galerkin(levels[-1].A)))
+        return cls(levels, geometric, nodes[0])
+
+    def invert_coarsest(self) -> None:
+        """The inverse of the coarsest matrix, a pseudo-inverse where it is singular."""
+        A = self.levels[-1].A.dense()
+        self.coarse_inverse = np.linalg.pinv(A, rcond=SMALL) if A.size else A
+
+    def reclaim(self) -> None:
+        """Take the coarse matrices back from their owner, as those of A."""
+        if self.undo is not None:
+            self.undo()
+        self.owner = self.undo = None
+
+    def solve(self, k: int, b: Array, tolerance: float, most: int) -> tuple[Array, int]:
+        """(x, iterations) of CG on level k for A x = b with one cycle as preconditioner.
+
+        Ends when |b - A x| <= tolerance |b|, or after `most` iterations.
+        """
+        r = b.copy()
+        x, p, z, Ap = (np.zeros_like(r) for _ in range(4))
+        A, old, goal = self.levels[k].A, 1.0, tolerance * np.linalg.norm(b)
+        for count in range(most):
+            if np.linalg.norm(r) <= goal:
+                return x, count
+            self.cycle(k, r, z)
+            new = np.vdot(r, z)
+            p *= new / old
+            p += z
+            old = new
+            A.times(p, Ap)
+            step = new / np.vdot(p, Ap)
+            x += step * p
+            r -= step * Ap
+        return x, most if np.linalg.norm(r) <= goal else most + 1
+
+    def estimate(self, b: Array, size: int) -> Array:
+        """x of A x = b, (nodes, 3), from the first level of at most `size` nodes alone."""
+        self.reclaim()
+        k, loads = 0, [b]
+        while self.levels[k].A.nodes > size and self.levels[k].P is not None:
+            coarse = np.zeros((self.levels[k + 1].A.nodes, 3))
+            self.levels[k].P.restrict(loads[-1].copy(), coarse)  # type: ignore[union-attr]
+            loads.append(coarse)
+            k += 1
+        x = self.solve(k, loads[-1], 1e-3, 30)[0]
+        for level in reversed(self.levels[:k]):
+            fine = np.zeros((level.A.nodes, 3))
+            level.P.add(x, fine)  # type: ignore[union-attr]
+            x = fine
+        return x
+
+    def cycle(self, k: int, b: Array, x: Array) -> None:
+        """x = one V(1,1) cycle from zero on level k for A x = b; symmetric if A is."""
+        level = self.levels[k]
+        if level.P is None:
+            x[:] = (self.coarse_inverse @ b.reshape(-1)).reshape(-1, 3)
+            return
+        A, coarse = level.A, self.levels[k + 1]
+        first_sweep(A.indptr, A.indices, A.data, A.inverse, b, x)
+        _upper_residual(A.indptr, A.indices, A.data, x, level.r)
+        level.P.restrict(level.r, coarse.b)
+        self.cycle(k + 1, coarse.b, coarse.x)
+        level.P.add(coarse.x, x)
+        sweep(A.indptr, A.indices, A.data, A.inverse, b, x, _nothing(A.nodes), True)
+
+
+_FREE: dict[int, NDArray[np.bool_]] = {}
+
+
+def _nothing(n: int) -> NDArray[np.bool_]:
+    """A mask that holds no node, kept by size."""
+    if n not in _FREE:
+        _FREE[n] = np.zeros(n, dtype=bool)
+    return _FREE[n]
+
+
+def _coarse_modes(levels: list[Level], nodes: Nodes, modes: Array | None) -> Array:
+    """Near-nullspace at the nodes of the coarsest level, (3 count, k), by least squares."""
+    if modes is None:
+        return np.tile(np.eye(3), (levels[-1].A.nodes, 1))
+    values = np.stack(
+        [nodes.spread(modes[:, k]).ravel() for k in range(modes.shape[1])], axis=1
+    )
+    for level in levels[:-1]:
+        assert level.P is not None
+        P = level.P.matrix()
+        normal = sparse.csc_array(P.T @ P + 1e-14 * sparse.eye_array(P.shape[1]))
+        values = sparse_linalg.splu(normal).solve(P.T @ values)
+    return values
+
+
+def algebraic(A: NodeBlocks, modes: Array) -> list[Transfer]:
+    """Smoothed aggregation (pyamg) below A; modes (3 nodes, k), k made a multiple of 3."""
+    import pyamg
+
+    n = 3 * A.nodes
+    tiles = sparse.bsr_matrix((A.data, A.indices, A.indptr), shape=(n, n))
+    modes = np.column_stack([modes, np.zeros((n, -modes.shape[1] % 3))])
+    hierarchy = pyamg.smoothed_aggregation_solver(
+        tiles, B=modes, improve_candidates=None, max_coarse=3 * COARSEST,
+        presmoother=None, postsmoother=None,
+    )  # fmt: skip
+    none = np.empty(0, dtype=np.int64)
+    out, idle = [], np.flatnonzero(tiles.diagonal() == 0)
+    for level in hierarchy.levels[:-1]:
+        blocks = sparse.bsr_array(level.P.tobsr((3, 3)))
+        out.append(Transfer.of(blocks, idle, none))
+        idle = none
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def _upper_residual(indptr, indices, data, x, out):
+    """b - A x after `first_sweep`: minus the upper triangle times x."""
+    for i in range(len(indptr) - 1):
+        last = uint64(indptr[i + 1])
+        first = last
+        while first > uint64(indptr[i]) and indices[first - uint64(1)] > i:
+            first -= uint64(1)
+        s0, s1, s2 = row_product(indices, data, x, first, last)
+        out[i, 0], out[i, 1], out[i, 2] = -s0, -s1, -s2

@@ -1,0 +1,188 @@
+"""A matrix in rows of 3x3 blocks, one row per node, and the compiled loops of multigrid on it.
+
+Unknowns without a node of their own kind are padding: a 2D node has an idle third component, a
+node that a support holds in one direction has that component idle, each with a one on the
+diagonal.  So every compiled loop is written for blocks of 3x3 only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit, uint64
+from numpy.typing import NDArray
+from scipy import sparse
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+DEAD = 1e-10  # directions of a diagonal block weaker than this, relative to their size, rest
+
+
+@dataclass(eq=False)
+class NodeBlocks:
+    """indptr (n + 1,), indices (k,) ascending in a row, data (k, 3, 3), inverse (n, 3, 3).
+
+    inverse: of the diagonal blocks; zero in directions without stiffness.
+    """
+
+    indptr: NDArray[np.int32]
+    indices: NDArray[np.int32]
+    data: Array
+    inverse: Array
+
+    @classmethod
+    def of(cls, indptr: Index, indices: Index, data: Array) -> NodeBlocks:
+        """With the diagonal blocks inverted."""
+        matrix = cls(
+            indptr.astype(np.int32), indices.astype(np.int32), data, np.empty((0, 3, 3))
+        )
+        diagonal = data[matrix.diagonal()]
+        matrix.inverse = block_inverse(diagonal, np.abs(diagonal).max(axis=(1, 2), initial=0))
+        return matrix
+
+    @classmethod
+    def from_sparse(cls, matrix: sparse.sparray, place: Index | None, nodes: int) -> NodeBlocks:
+        """The blocks of a scalar matrix (n, n) whose unknown i sits at place[i] of 3 nodes.
+
+        place None: unknown i at i.  Padding gets ones on the diagonal.
+        """
+        if place is None:
+            tiles = sparse.csr_array(matrix).tobsr((3, 3))
+        else:
+            coo = matrix.tocoo()
+            idle = np.setdiff1d(np.arange(3 * nodes), place)
+            rows = np.concatenate([place[coo.coords[0]], idle])
+            columns = np.concatenate([place[coo.coords[1]], idle])
+            values = np.concatenate([coo.data, np.ones(len(idle))])
+            shape = (3 * nodes, 3 * nodes)
+            tiles = sparse.coo_array((values, (rows, columns)), shape=shape).tobsr((3, 3))
+        tiles = with_diagonal(tiles)
+        return cls.of(tiles.indptr, tiles.indices, tiles.data)
+
+    @property
+    def nodes(self) -> int:
+        """Number of block rows."""
+        return len(self.indptr) - 1
+
+    def diagonal(self) -> Index:
+        """Places of the diagonal blocks in data, (nodes,)."""
+        rows = np.repeat(np.arange(self.nodes), np.diff(self.indptr))
+        return np.flatnonzero(rows == self.indices)
+
+    def dense(self) -> Array:
+        """The whole matrix, (3 n, 3 n)."""
+        n = 3 * self.nodes
+        return sparse.bsr_array((self.data, self.indices, self.indptr), shape=(n, n)).toarray()
+
+    def times(self, x: Array, out: Array) -> None:
+        """out = A x, both (nodes, 3)."""
+        product(self.indptr, self.indices, self.data, x, out)
+
+
+def with_diagonal(tiles: sparse.bsr_array) -> sparse.bsr_array:
+    """The same blocks, sorted, with every diagonal block stored even if zero."""
+    tiles.sort_indices()
+    rows = np.repeat(np.arange(len(tiles.indptr) - 1), np.diff(tiles.indptr))
+    missing = np.setdiff1d(np.arange(len(tiles.indptr) - 1), rows[rows == tiles.indices])
+    if not missing.size:
+        return tiles
+    rows = np.concatenate([rows, missing])
+    columns = np.concatenate([tiles.indices, missing])
+    data = np.concatenate([tiles.data, np.zeros((len(missing), 3, 3))])
+    order = np.lexsort((columns, rows))
+    counts = np.bincount(rows, minlength=len(tiles.indptr) - 1)
+    indptr = np.concatenate([[0], np.cumsum(counts)])
+    return sparse.bsr_array((data[order], columns[order], indptr), shape=tiles.shape)
+
+
+def block_inverse(blocks: Array, size: Array) -> Array:
+    """Inverses of blocks (k, 3, 3); directions weaker than DEAD * size (k,) rest."""
+    out = np.empty_like(blocks)
+    _invert_blocks(blocks, size, out)
+    doubtful = np.flatnonzero(np.isnan(out[:, 0, 0]))
+    if doubtful.size:
+        left, s, right = np.linalg.svd(blocks[doubtful])
+        alive = s > DEAD * size[doubtful, None]
+        with np.errstate(divide="ignore"):
+            weights = np.where(alive, 1 / np.where(alive, s, 1.0), 0.0)
+        out[doubtful] = np.einsum("kji,kj,klj->kil", right, weights, left)
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def _invert_blocks(blocks, size, out):
+    """Inverses by cofactors; nan marks blocks that are singular or nearly so."""
+    for k in range(len(blocks)):
+        a = blocks[k]
+        for i in range(3):
+            i1, i2 = (i + 1) % 3, (i + 2) % 3
+            for j in range(3):
+                j1, j2 = (j + 1) % 3, (j + 2) % 3
+                out[k, j, i] = a[i1, j1] * a[i2, j2] - a[i1, j2] * a[i2, j1]
+        det = a[0, 0] * out[k, 0, 0] + a[0, 1] * out[k, 1, 0] + a[0, 2] * out[k, 2, 0]
+        if abs(det) > 1e-7 * size[k] ** 3:
+            for i in range(3):
+                for j in range(3):
+                    out[k, i, j] /= det
+        else:
+            out[k, 0, 0] = np.nan
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"}, inline="always")
+def row_product(indices, data, x, first, last):
+    """Sum of data[k] x[indices[k]] for first <= k < last; three numbers."""
+    s0, s1, s2 = 0.0, 0.0, 0.0
+    for k in range(first, last):
+        j = uint64(indices[k])
+        x0, x1, x2 = x[j, 0], x[j, 1], x[j, 2]
+        s0 += data[k, 0, 0] * x0 + data[k, 0, 1] * x1 + data[k, 0, 2] * x2
+        s1 += data[k, 1, 0] * x0 + data[k, 1, 1] * x1 + data[k, 1, 2] * x2
+        s2 += data[k, 2, 0] * x0 + data[k, 2, 1] * x1 + data[k, 2, 2] * x2
+    return s0, s1, s2
+
+
+@njit(cache=True, error_model="numpy")
+def product(indptr, indices, data, x, out):
+    """out = A x."""
+    for i in range(len(indptr) - 1):
+        out[i, 0], out[i, 1], out[i, 2] = row_product(
+            indices, data, x, uint64(indptr[i]), uint64(indptr[i + 1])
+        )
+
+
+@njit(cache=True, error_model="numpy")
+def residual(indptr, indices, data, x, b, out):
+    """out = b - A x."""
+    for i in range(len(indptr) - 1):
+        s0, s1, s2 = row_product(indices, data, x, uint64(indptr[i]), uint64(indptr[i + 1]))
+        out[i, 0], out[i, 1], out[i, 2] = b[i, 0] - s0, b[i, 1] - s1, b[i, 2] - s2
+
+
+@njit(cache=True, error_model="numpy")
+def sweep(indptr, indices, data, inverse, b, x, held, backward):  # noqa: PLR0913
+    """One block Gauss-Seidel sweep on A x = b over all nodes that are not held."""
+    n = len(indptr) - 1
+    for step in range(n):
+        i = uint64(n - 1 - step if backward else step)
+        if held[i]:
+            continue
+        s0, s1, s2 = row_product(indices, data, x, uint64(indptr[i]), uint64(indptr[i + 1]))
+        r0, r1, r2 = b[i, 0] - s0, b[i, 1] - s1, b[i, 2] - s2
+        x[i, 0] += inverse[i, 0, 0] * r0 + inverse[i, 0, 1] * r1 + inverse[i, 0, 2] * r2
+        x[i, 1] += inverse[i, 1, 0] * r0 + inverse[i, 1, 1] * r1 + inverse[i, 1, 2] * r2
+        x[i, 2] += inverse[i, 2, 0] * r0 + inverse[i, 2, 1] * r1 + inverse[i, 2, 2] * r2
+
+
+@njit(cache=True, error_model="numpy")
+def first_sweep(indptr, indices, data, inverse, b, x):  # noqa: PLR0913
+    """A forward sweep from x = 0, which reads only the lower triangle."""
+    for i in range(len(indptr) - 1):
+        last = uint64(indptr[i])
+        while last < uint64(indptr[i + 1]) and indices[last] < i:
+            last += uint64(1)
+        s0, s1, s2 = row_product(indices, data, x, uint64(indptr[i]), last)
+        r0, r1, r2 = b[i, 0] - s0, b[i, 1] - s1, b[i, 2] - s2
+        x[i, 0] = inverse[i, 0, 0] * r0 + inverse[i, 0, 1] * r1 + inverse[i, 0, 2] * r2
+        x[i, 1] = inverse[i, 1, 0] * r0 + inverse[i, 1, 1] * r1 + inverse[i, 1, 2] * r2
+        x[i, 2] = inverse[i, 2, 0] * r0 + inverse[i, 2, 1] * r1 + inverse[i, 2, 2] * r2

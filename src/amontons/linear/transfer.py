@@ -1,0 +1,273 @@
+"""Prolongations between node-block levels, and Galerkin products with them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit, uint64
+from numpy.typing import NDArray
+from scipy import sparse
+
+from .node_blocks import NodeBlocks, with_diagonal
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Transfer:
+    """Rows of fine nodes, entries of coarse ones: weights (k,), or blocks (k, 3, 3).
+
+    With weights a component goes to the same component: x_i = sum_j w_ij x_j.  idle, (m,): flat
+    places of fine padding, which receives nothing.
+    """
+
+    indptr: NDArray[np.int32]
+    indices: NDArray[np.int32]
+    weights: Array
+    blocks: Array
+    idle: Index
+    coarse_idle: Index
+    coarse: int
+
+    @classmethod
+    def of(cls, tiles: sparse.bsr_array, idle: Index, coarse_idle: Index) -> Transfer:
+        """From 3x3 blocks; to weights where every block is one on the components in use."""
+        tiles.sort_indices()
+        used, used_coarse = np.ones(tiles.shape[0], bool), np.ones(tiles.shape[1], bool)
+        used[idle], used_coarse[coarse_idle] = False, False
+        rows = np.repeat(np.arange(tiles.shape[0] // 3), np.diff(tiles.indptr))
+        both = used.reshape(-1, 3)[rows] & used_coarse.reshape(-1, 3)[tiles.indices]
+        diagonal = np.einsum("kii->ki", tiles.data)
+        weights = np.abs(diagonal).max(axis=1, initial=0.0)
+        plain = np.eye(3) * (weights[:, None] * both)[:, None, :]
+        empty = np.empty((0, 3, 3))
+        scalar = np.array_equal(plain, tiles.data)
+        return cls(
+            tiles.indptr.astype(np.int32),
+            tiles.indices.astype(np.int32),
+            weights if scalar else np.empty(0),
+            empty if scalar else np.ascontiguousarray(tiles.data),
+            np.asarray(idle, dtype=np.int64),
+            np.asarray(coarse_idle, dtype=np.int64),
+            tiles.shape[1] // 3,
+        )
+
+    @property
+    def fine(self) -> int:
+        """Number of fine nodes."""
+        return len(self.indptr) - 1
+
+    def scalar(self) -> sparse.csr_array:
+        """The weights as a matrix (fine, coarse), or the size of the blocks."""
+        values = (
+            self.weights
+            if len(self.weights)
+            else np.abs(self.blocks).max(axis=(1, 2), initial=0)
+        )
+        shape = (self.fine, self.coarse)
+        return sparse.csr_array((values, self.indices, self.indptr), shape=shape)
+
+    def matrix(self) -> sparse.csr_array:
+        """As a matrix of scalars, (3 fine, 3 coarse)."""
+        if not len(self.blocks):
+            return sparse.kron(self.scalar(), sparse.eye_array(3), format="csr")
+        shape = (3 * self.fine, 3 * self.coarse)
+        return sparse.bsr_array((self.blocks, self.indices, self.indptr), shape=shape).tocsr()
+
+    def add(self, coarse: Array, fine: Array) -> None:
+        """fine += P coarse, (nodes, 3)."""
+        if len(self.blocks):
+            _add_blocks(self.indptr, self.indices, self.blocks, coarse, fine)
+        else:
+            _add(self.indptr, self.indices, self.weights, coarse, fine)
+        if self.idle.size:
+            fine.reshape(-1)[self.idle] = 0.0
+
+    def restrict(self, fine: Array, coarse: Array) -> None:
+        """coarse = P^T fine; padding of both is left out."""
+        if self.idle.size:
+            fine.reshape(-1)[self.idle] = 0.0
+        coarse[:] = 0.0
+        if len(self.blocks):
+            _restrict_blocks(self.indptr, self.indices, self.blocks, fine, coarse)
+        else:
+            _restrict(self.indptr, self.indices, self.weights, fine, coarse)
+        if self.coarse_idle.size:
+            coarse.reshape(-1)[self.coarse_idle] = 0.0
+
+    def galerkin(self, A: NodeBlocks) -> NodeBlocks:
+        """P^T A P with ones on the diagonal of coarse padding."""
+        return _galerkin_blocks(self, A) if len(self.blocks) else _galerkin(self, A)
+
+
+def _galerkin_blocks(P: Transfer, A: NodeBlocks) -> NodeBlocks:
+    tiles = sparse.bsr_array((P.blocks, P.indices, P.indptr), shape=(3 * P.fine, 3 * P.coarse))
+    matrix = sparse.bsr_array((A.data, A.indices, A.indptr), shape=(3 * A.nodes, 3 * A.nodes))
+    coarse = (tiles.T.tobsr((3, 3)) @ (matrix @ tiles)).tobsr((3, 3))
+    coarse = with_diagonal(coarse)
+    data = coarse.data
+    _set_idle(coarse.indptr, coarse.indices, data, _mask(P.coarse_idle, P.coarse))
+    return NodeBlocks.of(coarse.indptr, coarse.indices, data)
+
+
+def _mask(idle: Index, nodes: int) -> NDArray[np.bool_]:
+    mask = np.zeros(3 * nodes, dtype=bool)
+    mask[idle] = True
+    return mask.reshape(nodes, 3)
+
+
+def _galerkin(P: Transfer, A: NodeBlocks) -> NodeBlocks:
+    fine_idle = _mask(P.idle, P.fine)
+    ptr, idx, data = _times_weights(
+        A.indptr, A.indices, A.data, P.indptr, P.indices, P.weights, P.coarse,
+        fine_idle, bool(P.idle.size),
+    )  # fmt: skip
+    T = P.scalar().T.tocsr()
+    ptr, idx, data = _weights_times(
+        T.indptr, T.indices, T.data, ptr, idx, data, P.coarse, fine_idle, bool(P.idle.size)
+    )
+    _sort_rows(ptr, idx, data)
+    _set_idle(ptr, idx, data, _mask(P.coarse_idle, P.coarse))
+    return NodeBlocks.of(ptr, idx, data)
+
+
+@njit(cache=True)
+def _set_idle(indptr, indices, data, idle):
+    """Rows and columns of padding become those of the identity."""
+    for i in range(len(indptr) - 1):
+        for k in range(indptr[i], indptr[i + 1]):
+            j = indices[k]
+            for a in range(3):
+                for b in range(3):
+                    if idle[i, a] or idle[j, b]:
+                        data[k, a, b] = 1.0 if i == j and a == b else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _count(left_ptr, left_idx, right_ptr, right_idx, columns):
+    """Row pointers of the product of two patterns."""
+    n = len(left_ptr) - 1
+    mark = np.full(columns, -1, np.int64)
+    out = np.zeros(n + 1, np.int64)
+    for i in range(n):
+        count = 0
+        for k in range(left_ptr[i], left_ptr[i + 1]):
+            m = left_idx[k]
+            for t in range(right_ptr[m], right_ptr[m + 1]):
+                j = right_idx[t]
+                if mark[j] != i:
+                    mark[j] = i
+                    count += 1
+        out[i + 1] = out[i] + count
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def _times_weights(ptr, idx, data, p_ptr, p_idx, p_weight, columns, idle, any_idle):  # noqa: PLR0913
+    """A P for blocks A and weights P; columns of A at idle places count as zero."""
+    out_ptr = _count(ptr, idx, p_ptr, p_idx, columns)
+    out_idx = np.empty(out_ptr[-1], np.int32)
+    out = np.zeros((out_ptr[-1], 3, 3))
+    slot = np.full(columns, -1, np.int64)
+    for i in range(len(ptr) - 1):
+        used = out_ptr[i]
+        for k in range(ptr[i], ptr[i + 1]):
+            m = idx[k]
+            for t in range(p_ptr[m], p_ptr[m + 1]):
+                j, w = p_idx[t], p_weight[t]
+                s = slot[j]
+                if s < out_ptr[i]:
+                    s = used
+                    slot[j] = used
+                    out_idx[used] = j
+                    used += 1
+                for b in range(3):
+                    if any_idle and idle[m, b]:
+                        continue
+                    for a in range(3):
+                        out[s, a, b] += w * data[k, a, b]
+    return out_ptr, out_idx, out
+
+
+@njit(cache=True, error_model="numpy")
+def _weights_times(t_ptr, t_idx, t_weight, ptr, idx, data, columns, idle, any_idle):  # noqa: PLR0913
+    """T B for weights T and blocks B; rows of B at idle places count as zero."""
+    out_ptr = _count(t_ptr, t_idx, ptr, idx, columns)
+    out_idx = np.empty(out_ptr[-1], np.int32)
+    out = np.zeros((out_ptr[-1], 3, 3))
+    slot = np.full(columns, -1, np.int64)
+    for i in range(len(t_ptr) - 1):
+        used = out_ptr[i]
+        for t in range(t_ptr[i], t_ptr[i + 1]):
+            m, w = t_idx[t], t_weight[t]
+            for k in range(ptr[m], ptr[m + 1]):
+                j = idx[k]
+                s = slot[j]
+                if s < out_ptr[i]:
+                    s = used
+                    slot[j] = used
+                    out_idx[used] = j
+                    used += 1
+                for a in range(3):
+                    if any_idle and idle[m, a]:
+                        continue
+                    for b in range(3):
+                        out[s, a, b] += w * data[k, a, b]
+    return out_ptr, out_idx, out
+
+
+@njit(cache=True)
+def _sort_rows(ptr, idx, data):
+    """Columns of every row in ascending order, in place."""
+    for i in range(len(ptr) - 1):
+        first, last = ptr[i], ptr[i + 1]
+        order = np.argsort(idx[first:last])
+        idx[first:last] = idx[first:last][order]
+        data[first:last] = data[first:last][order]
+
+
+@njit(cache=True, error_model="numpy")
+def _add(indptr, indices, weights, coarse, fine):
+    for i in range(len(indptr) - 1):
+        s0, s1, s2 = 0.0, 0.0, 0.0
+        for k in range(uint64(indptr[i]), uint64(indptr[i + 1])):
+            j, w = uint64(indices[k]), weights[k]
+            s0 += w * coarse[j, 0]
+            s1 += w * coarse[j, 1]
+            s2 += w * coarse[j, 2]
+        fine[i, 0] += s0
+        fine[i, 1] += s1
+        fine[i, 2] += s2
+
+
+@njit(cache=True, error_model="numpy")
+def _restrict(indptr, indices, weights, fine, coarse):
+    for i in range(len(indptr) - 1):
+        x0, x1, x2 = fine[i, 0], fine[i, 1], fine[i, 2]
+        for k in range(uint64(indptr[i]), uint64(indptr[i + 1])):
+            j, w = uint64(indices[k]), weights[k]
+            coarse[j, 0] += w * x0
+            coarse[j, 1] += w * x1
+            coarse[j, 2] += w * x2
+
+
+@njit(cache=True, error_model="numpy")
+def _add_blocks(indptr, indices, blocks, coarse, fine):
+    for i in range(len(indptr) - 1):
+        for k in range(indptr[i], indptr[i + 1]):
+            j = indices[k]
+            for a in range(3):
+                for b in range(3):
+                    fine[i, a] += blocks[k, a, b] * coarse[j, b]
+
+
+@njit(cache=True, error_model="numpy")
+def _restrict_blocks(indptr, indices, blocks, fine, coarse):
+    for i in range(len(indptr) - 1):
+        for k in range(indptr[i], indptr[i + 1]):
+            j = indices[k]
+            for a in range(3):
+                for b in range(3):
+                    coarse[j, b] += blocks[k, a, b] * fine[i, a]

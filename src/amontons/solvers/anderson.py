@@ -1,0 +1,81 @@
+"""Anderson acceleration of a fixed-point iteration on long vectors, with a short memory."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+RANK = 1e-12  # singular values of the scaled Gram matrix dropped, relative to the largest
+
+
+class Anderson:
+    """Combines the last `depth` steps x -> g(x) so that the steps nearly cancel."""
+
+    def __init__(self, size: int, depth: int) -> None:
+        self.depth = depth
+        self.steps = np.zeros((depth, size))  # differences of g(x) - x
+        self.images = np.zeros((depth, size))  # differences of g(x)
+        self.last_step, self.last_image = np.zeros(size), np.zeros(size)
+        self.gram = np.zeros((depth, depth))
+        self.count = -1  # differences stored so far; -1: not even a step
+
+    def forget(self) -> None:
+        """Start again from the next step."""
+        self.count = -1
+
+    def mix(self, x: Array, image: Array) -> None:
+        """image = g(x) becomes the next point, in place; x and image flat."""
+        if self.depth == 0:
+            return
+        slot = max(self.count, 0) % self.depth
+        used = min(self.count + 1, self.depth) if self.count >= 0 else 0
+        dots = np.zeros(self.depth)
+        row = np.zeros(self.depth)
+        _record(x, image, self.last_step, self.last_image, self.steps, self.images, slot, used,
+                row, dots)  # fmt: skip
+        self.count += 1
+        if not used:
+            return
+        self.gram[slot, :used] = self.gram[:used, slot] = row[:used]
+        scale = 1 / np.sqrt(np.maximum(np.diag(self.gram)[:used], np.finfo(float).tiny))
+        gram = self.gram[:used, :used] * np.outer(scale, scale)
+        if not (np.isfinite(gram).all() and np.isfinite(dots).all()):
+            return
+        weights = scale * (np.linalg.pinv(gram, rcond=RANK, hermitian=True)
+                           @ (scale * dots[:used]))  # fmt: skip
+        _combine(image, self.images, weights)
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def _record(x, image, last_step, last_image, steps, images, slot, used, row, dots):  # noqa: PLR0913
+    """Store the newest differences; row: their products with all steps, dots: with g(x) - x."""
+    CHUNK = 4096
+    for first in range(0, len(x), CHUNK):
+        last = min(first + CHUNK, len(x))
+        for i in range(first, last):
+            step = image[i] - x[i]
+            if used:
+                steps[slot, i] = step - last_step[i]
+                images[slot, i] = image[i] - last_image[i]
+            last_step[i] = step
+            last_image[i] = image[i]
+        for k in range(used):
+            a, b = 0.0, 0.0
+            for i in range(first, last):
+                a += steps[k, i] * steps[slot, i]
+                b += steps[k, i] * last_step[i]
+            row[k] += a
+            dots[k] += b
+
+
+@njit(cache=True, error_model="numpy")
+def _combine(image, images, weights):
+    CHUNK = 4096
+    for first in range(0, len(image), CHUNK):
+        last = min(first + CHUNK, len(image))
+        for k in range(len(weights)):
+            w = weights[k]
+            for i in range(first, last):
+                image[i] -= w * images[k, i]

@@ -1,0 +1,258 @@
+"""Coarse levels that see the states of the contacts: a Galerkin tangent changed near them only.
+
+The tangent on the finest level is A' = W^T A V + L (`contact_nodes`).  With D_0 = A' - A, which
+has entries only in rows and columns of contact nodes, the coarse matrices are
+
+    A_k' = A_k + D_k,    D_k = P^T D_(k-1) P,
+
+so that an update touches the entries near the surface and nothing else.  Directions that the
+contacts hold altogether have neither row nor column left; they rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from ..linear.hierarchy import SMALL, Hierarchy
+from ..linear.node_blocks import NodeBlocks, block_inverse
+from ..linear.transfer import Transfer
+from .contact_nodes import ContactNodes
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+@dataclass(eq=False)
+class Near:
+    """Entries of one level that the contacts change, m of them.
+
+    slots (m,): their places in the data of A; row, column (m,); target: for every pair of
+    parents of row and column of every entry, the entry of the next level (places in its Near);
+    own (k,): which entries are diagonal blocks; idle: masks of row and column padding.
+    """
+
+    slots: Index
+    row: Index
+    column: Index
+    base: Array
+    own: Index
+    base_inverse: Array
+    size: Array
+    row_idle: NDArray[np.bool_]
+    column_idle: NDArray[np.bool_]
+    target: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, np.int32))
+
+    @classmethod
+    def of(cls, A: NodeBlocks, slots: Index, idle: NDArray[np.bool_]) -> Near:
+        """The entries at slots (m,), ascending."""
+        row = np.searchsorted(A.indptr, slots, side="right") - 1
+        column = A.indices[slots].astype(np.int64)
+        own = np.flatnonzero(row == column)
+        base = A.data[slots]
+        size = np.abs(base[own]).max(axis=(1, 2), initial=0.0)
+        return cls(slots, row, column, base, own, A.inverse[row[own]], size, idle[row],
+                   idle[column])  # fmt: skip
+
+    def restore(self, A: NodeBlocks) -> None:
+        """The matrix without contacts."""
+        A.data[self.slots] = self.base
+        A.inverse[self.row[self.own]] = self.base_inverse
+
+    def put(self, A: NodeBlocks, change: Array) -> None:
+        """The matrix with a change (m, 3, 3) of these entries."""
+        changed = self.base + change
+        A.data[self.slots] = changed
+        A.inverse[self.row[self.own]] = block_inverse(changed[self.own], self.size)
+
+    def mask(self, change: Array) -> None:
+        """Leave out padding."""
+        if self.row_idle.any() or self.column_idle.any():
+            change[self.row_idle] = 0.0
+            change.swapaxes(1, 2)[self.column_idle] = 0.0
+
+
+class Truncation:
+    """All Near of a hierarchy whose contact nodes on the geometric levels are given."""
+
+    def __init__(self, hierarchy: Hierarchy, contacts: list[Index]) -> None:
+        self.hierarchy = hierarchy
+        self.near: list[Near] = []
+        slots = np.empty(0, dtype=np.int64)
+        for k, level in enumerate(hierarchy.levels):
+            if k < len(contacts):
+                slots = np.union1d(slots, _touching(level.A, contacts[k]))
+            idle = np.zeros(3 * level.A.nodes, dtype=bool)
+            if level.P is not None:
+                idle[level.P.idle] = True
+            elif k:
+                idle[hierarchy.levels[k - 1].P.coarse_idle] = True  # type: ignore[union-attr]
+            near = Near.of(level.A, slots, idle.reshape(-1, 3))
+            self.near.append(near)
+            if level.P is not None:
+                coarse = hierarchy.levels[k + 1].A
+                found = _parents(level.P, near, coarse)
+                slots = np.unique(found)
+                near.target = found  # places in data for now
+        for k in range(len(self.near) - 1):
+            near = self.near[k]
+            near.target = np.searchsorted(self.near[k + 1].slots, near.target).astype(np.int32)
+
+    def change(self, k: int, contacts: ContactNodes, V: Array, W: Array, L: Array) -> Array:
+        """D on level k, (m, 3, 3), for contacts at nodes of that level."""
+        near = self.near[k]
+        number = np.full(self.hierarchy.levels[k].A.nodes, -1, dtype=np.int64)
+        number[contacts.node] = np.arange(len(contacts.node))
+        out = np.zeros_like(near.base)
+        _change(number[near.row], number[near.column], near.base, V, W, L, out)
+        near.mask(out)
+        return out
+
+    def install(self, k: int, change: Array) -> None:
+        """Coarse levels below k for a change on level k, which itself stays as it is."""
+        levels = self.hierarchy.levels
+        for j in range(k, len(levels) - 1):
+            coarse = np.zeros_like(self.near[j + 1].base)
+            P, near = levels[j].P, self.near[j]
+            assert P is not None
+            if len(P.blocks):
+                _galerkin_blocks(P.indptr, P.blocks, near.row, near.column, near.target,
+                                 change, coarse)  # fmt: skip
+            else:
+                _galerkin(P.indptr, P.weights, near.row, near.column, near.target, change,
+                          coarse)  # fmt: skip
+            self.near[j + 1].mask(coarse)
+            self.near[j + 1].put(levels[j + 1].A, coarse)
+            change = coarse
+        self.hierarchy.invert_coarsest()
+
+    def solve(self, k: int, change: Array, b: Array) -> Array:
+        """The solution of the tangent on level k, the coarsest one; b (nodes, 3)."""
+        A, near = self.hierarchy.levels[k].A, self.near[k]
+        matrix = A.dense().reshape(A.nodes, 3, A.nodes, 3)
+        np.add.at(matrix, (near.row, slice(None), near.column), change)
+        inverse = np.linalg.pinv(matrix.reshape(3 * A.nodes, 3 * A.nodes), rcond=SMALL)
+        return (inverse @ b.reshape(-1)).reshape(b.shape)
+
+    def restore(self) -> None:
+        """All levels without contacts."""
+        for near, level in zip(self.near, self.hierarchy.levels, strict=True):
+            near.restore(level.A)
+
+
+def _touching(A: NodeBlocks, nodes: Index) -> Index:
+    """Places of all entries in rows or columns of these nodes, ascending."""
+    inside = np.zeros(A.nodes, dtype=bool)
+    inside[nodes] = True
+    return _places(A.indptr, A.indices, inside)
+
+
+@njit(cache=True)
+def _places(indptr, indices, inside):
+    count = 0
+    for i in range(len(indptr) - 1):
+        for k in range(indptr[i], indptr[i + 1]):
+            if inside[i] or inside[indices[k]]:
+                count += 1
+    out = np.empty(count, np.int64)
+    count = 0
+    for i in range(len(indptr) - 1):
+        for k in range(indptr[i], indptr[i + 1]):
+            if inside[i] or inside[indices[k]]:
+                out[count] = k
+                count += 1
+    return out
+
+
+def _parents(P: Transfer, near: Near, coarse: NodeBlocks) -> Index:
+    """Place in the coarse data of every pair of parents of every entry."""
+    counts = np.diff(P.indptr).astype(np.int64)
+    total = int((counts[near.row] * counts[near.column]).sum())
+    return _parent_places(
+        P.indptr, P.indices, near.row, near.column, coarse.indptr, coarse.indices, total
+    )
+
+
+@njit(cache=True)
+def _parent_places(p_ptr, p_idx, row, column, indptr, indices, total):  # noqa: PLR0913
+    out = np.empty(total, np.int64)
+    at = 0
+    for e in range(len(row)):
+        i, j = row[e], column[e]
+        for a in range(p_ptr[i], p_ptr[i + 1]):
+            first, last = indptr[p_idx[a]], indptr[p_idx[a] + 1]
+            for b in range(p_ptr[j], p_ptr[j + 1]):
+                out[at] = first + np.searchsorted(indices[first:last], p_idx[b])
+                at += 1
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def _change(row, column, base, V, W, L, out):  # noqa: PLR0913
+    """W_i^T A V_j (+ L_i) - A for entries between contacts i and j, -1 where there is none."""
+    half = np.empty((3, 3))
+    for e in range(len(row)):
+        i, j = row[e], column[e]
+        if i < 0 and j < 0:
+            continue
+        A, D = base[e], out[e]
+        for a in range(3):
+            for b in range(3):
+                if j >= 0:
+                    half[a, b] = (
+                        A[a, 0] * V[j, 0, b] + A[a, 1] * V[j, 1, b] + A[a, 2] * V[j, 2, b]
+                    )
+                else:
+                    half[a, b] = A[a, b]
+        for a in range(3):
+            for b in range(3):
+                if i >= 0:
+                    D[a, b] = (
+                        W[i, 0, a] * half[0, b] + W[i, 1, a] * half[1, b]
+                        + W[i, 2, a] * half[2, b] - A[a, b]
+                    )  # fmt: skip
+                else:
+                    D[a, b] = half[a, b] - A[a, b]
+                if i == j:
+                    D[a, b] += L[i, a, b]
+
+
+@njit(cache=True, error_model="numpy")
+def _galerkin(p_ptr, weights, row, column, target, change, coarse):  # noqa: PLR0913
+    at = 0
+    for e in range(len(row)):
+        i, j = row[e], column[e]
+        for a in range(p_ptr[i], p_ptr[i + 1]):
+            for b in range(p_ptr[j], p_ptr[j + 1]):
+                w, t = weights[a] * weights[b], target[at]
+                at += 1
+                for m in range(3):
+                    for n in range(3):
+                        coarse[t, m, n] += w * change[e, m, n]
+
+
+@njit(cache=True, error_model="numpy")
+def _galerkin_blocks(p_ptr, blocks, row, column, target, change, coarse):  # noqa: PLR0913
+    at = 0
+    half = np.empty((3, 3))
+    for e in range(len(row)):
+        i, j = row[e], column[e]
+        for a in range(p_ptr[i], p_ptr[i + 1]):
+            Q = blocks[a]
+            for m in range(3):
+                for n in range(3):
+                    half[m, n] = (
+                        Q[0, m] * change[e, 0, n] + Q[1, m] * change[e, 1, n]
+                        + Q[2, m] * change[e, 2, n]
+                    )  # fmt: skip
+            for b in range(p_ptr[j], p_ptr[j + 1]):
+                R, t = blocks[b], target[at]
+                at += 1
+                for m in range(3):
+                    for n in range(3):
+                        coarse[t, m, n] += (
+                            half[m, 0] * R[0, n] + half[m, 1] * R[1, n] + half[m, 2] * R[2, n]
+                        )
