@@ -1,5 +1,8 @@
 """Solvers of the discrete problem, one file per family; a new one is a file and a line here."""
 
+from .active_conditions import Modification
+from .active_multigrid import CycleShape, MultigridCycle
+from .active_set import ActiveSet, ActiveSetIterate, FrictionBound
 from .augmentation import RhoStrategy
 from .base import Breakdown, Iterate, Solver, Target
 from .compressed import CompressedDelassus
@@ -16,6 +19,7 @@ from .smoothing import ProximalPoint, SmoothingNewton
 from .sweeps import SweepOrder
 
 METHODS: dict[str, type] = {
+    "active-set": ActiveSet,
     "auto": Auto,
     "compressed-delassus": CompressedDelassus,
     "contact-multigrid": ContactMultigrid,
@@ -30,6 +34,8 @@ METHODS: dict[str, type] = {
 
 __all__ = [
     "METHODS",
+    "ActiveSet",
+    "ActiveSetIterate",
     "AlartCurnier",
     "Armijo",
     "Auto",
@@ -38,6 +44,8 @@ __all__ = [
     "ComplementarityFunction",
     "CompressedDelassus",
     "ContactMultigrid",
+    "CycleShape",
+    "FrictionBound",
     "FullStep",
     "GaussSeidel",
     "GoldsteinPrice",
@@ -48,6 +56,8 @@ __all__ = [
     "JeanMoreau",
     "LineSearch",
     "LocalSolver",
+    "Modification",
+    "MultigridCycle",
     "NaturalMap",
     "NonMonotone",
     "ProximalPoint",

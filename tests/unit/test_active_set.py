@@ -1,0 +1,254 @@
+"""Active sets: linearised conditions, multigrid against the direct solver, many models."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import amontons as am
+from amontons.errors import InvalidInput
+from amontons.solve import drive
+from amontons.solvers.active_conditions import (
+    Modification,
+    Settings,
+    newton_conditions,
+    robin,
+)
+from amontons.solvers.active_set import Cycles, Saddle
+
+LAW = am.LinearElastic(200, 0.3)
+FIXED = am.FrictionBound.FIXED_POINT
+
+
+def complementarity(lam, u, g, c):
+    """(3.1)."""
+    s = lam + c * u
+    return max(g, np.linalg.norm(s)) * lam - g * s
+
+
+def full(r, u, mu, c):
+    """(7.1), in our signs: r, u (3,)."""
+    pressure = r[0] - c[0] * u[0]
+    s = -r[1:] + c[1] * u[1:]
+    size = max(mu * pressure, np.linalg.norm(s))
+    return size * -r[1:] - mu * max(0, pressure) * s
+
+
+def derivative(function, x):
+    """Central differences, (out, in)."""
+    steps = 1e-6 * np.eye(len(x))
+    return np.stack([(function(x + e) - function(x - e)) / 2e-6 for e in steps], axis=1)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_first_modification_is_newton_near_a_solution(seed):
+    rng = np.random.default_rng(seed)
+    g, c = 2.0, 3.0
+    direction = rng.normal(size=2)
+    lam = g * direction / np.linalg.norm(direction)
+    u = 0.3 * lam + 0.05 * rng.normal(size=2)
+    lam = lam / (1 + 0.1 * rng.random())  # feasible, so (3.11) changes nothing
+    part = robin(lam[None], u[None], np.array([g]), np.array([c]), Modification.FIRST)
+    new_u = rng.normal(size=2)
+    new_lam = part.L[0] @ new_u - part.rhs[0]
+    at = np.concatenate([lam, u])
+    J = derivative(lambda x: complementarity(x[:2], x[2:], g, c), at)
+    step = np.concatenate([new_lam, new_u]) - at
+    np.testing.assert_allclose(J @ step, -complementarity(lam, u, g, c), atol=1e-7)
+
+
+@pytest.mark.parametrize("stick", [True, False])
+def test_newton_conditions_are_the_derivative_of_7_1(stick):
+    rng = np.random.default_rng(2)
+    c, mu = np.array([5.0, 3.0]), 0.7
+    lam = np.array([0.4, 0.2]) if stick else np.array([1.1, 0.6])
+    r = np.array([2.0, *-lam])
+    u = np.array([0.01, *(0.01 * lam if stick else 0.4 * lam + [0.02, -0.03])])
+    given = newton_conditions(
+        r[None], u[None], np.array([mu]), Settings(c[:1], c[1:], Modification.FIRST)
+    )
+    assert given.tangential[0] != stick
+    new_u = np.array([0.0, *rng.normal(size=2)])  # u_N = 0 as (4.1) asks
+    A = given.G_r[0, 1:]
+    free = given.b[0, 1:] - given.G_u[0, 1:] @ new_u
+    if stick:  # any r that meets the rows
+        new_r = np.array([0.0, *rng.normal(size=2)])
+        new_u[1:] = given.b[0, 1:] - A @ new_r
+    else:
+        new_r = np.array([rng.normal(), 0, 0])
+        new_r[1:] = free - A[:, 0] * new_r[0]
+    J = derivative(lambda x: full(x[:3], x[3:], mu, c), np.concatenate([r, u]))
+    step = np.concatenate([new_r - r, new_u - u])
+    np.testing.assert_allclose(J @ step, -full(r, u, mu, c), atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", Modification)
+def test_modified_conditions_stay_regular_far_from_a_solution(kind):
+    rng = np.random.default_rng(0)
+    lam, u = 5 * rng.normal(size=(2, 400, 2))
+    c, g = np.full(400, 2.0), 0.5 * np.linalg.norm(lam + 2 * u, axis=1)
+    L = robin(lam, u, g, c, kind).L
+    assert np.linalg.eigvals(L).real.min() > -1e-9
+    if kind is not Modification.FIRST:
+        np.testing.assert_allclose(L, L.transpose(0, 2, 1), atol=1e-8 * np.abs(L).max())
+
+
+def cube(cells=4, mu=0.6, supports=(), **body):
+    fixes = [am.Fix("top", lambda x: (0, 0.1, 0.03 - 0.1 * x[0])), *supports]
+    return am.Model(
+        [am.Body(am.box((1, 1, 1), cells, **body), LAW)],
+        supports=fixes,
+        contacts=[am.Contact("bottom", am.Plane((0, 0, 1)), mu=mu)],
+    )
+
+
+def sphere():
+    return am.Model(
+        [am.Body(am.box((1, 1, 1), 4, origin=(-0.5, -0.5, 0)), LAW)],
+        supports=[am.Fix("top", (0.02, 0, -0.08))],
+        contacts=[am.Contact("bottom", am.Sphere((0, 0, -2), 2), mu=0.4)],
+    )
+
+
+def planar():
+    return am.Model(
+        [am.Body(am.box((2, 1), (8, 4)), LAW)],
+        supports=[am.Fix("top", (0.05, -0.03))],
+        contacts=[am.Contact("bottom", am.Plane((0, 1)), mu=0.3)],
+    )
+
+
+def two_bodies():
+    lower = am.Body(am.box((1, 1, 1), 3, origin=(0, 0, -1)), LAW, name="lower")
+    upper = am.Body(am.box((0.8, 0.8, 1), 4, origin=(0.1, 0.1, 0)), LAW, name="upper")
+    return am.Model(
+        [upper, lower],
+        supports=[am.Fix("upper.top", (0.01, 0, -0.02)), am.Fix("lower.bottom", (0, 0, 0))],
+        contacts=[am.Contact("upper.bottom", master="lower.top", mu=0.3)],
+    )
+
+
+MODELS = {
+    "cube": cube(),
+    "tetrahedra": cube(kind="tet"),
+    "held": cube(supports=[am.Fix("left", (0, None, None))]),
+    "frictionless": cube(mu=0.0),
+    "sphere": sphere(),
+    "planar": planar(),
+    "bodies": two_bodies(),
+}
+OPTIONS = {
+    "newton": am.ActiveSet(),
+    "fixed-point": am.ActiveSet(bound=FIXED, bound_steps=None),
+    "second": am.ActiveSet(modification=Modification.SECOND),
+    "third": am.ActiveSet(modification=Modification.THIRD),
+    "exact-cycles": am.ActiveSet(bound=FIXED, multigrid=am.MultigridCycle()),
+    "one-cycle": am.ActiveSet(bound=FIXED, multigrid=am.MultigridCycle(), cycles=1),
+    "v": am.ActiveSet(bound=FIXED, multigrid=am.MultigridCycle(am.CycleShape.V, 2), cycles=2),
+    "f": am.ActiveSet(
+        bound=FIXED, multigrid=am.MultigridCycle(am.CycleShape.F), cycles=1, nested=True
+    ),
+}
+
+
+@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("option", OPTIONS)
+def test_all_strategies_solve_all_models(name, option):
+    problem = MODELS[name].assemble()
+    solution = drive(problem, OPTIONS[option], tolerance=1e-9, max_iterations=150)
+    assert solution.converged, str(solution.convergence)
+    other = problem.kept("reference", lambda: drive(problem, tolerance=1e-10))
+    np.testing.assert_allclose(solution.r, other.r, atol=1e-6 * np.abs(other.r).max())
+    assert solution.pattern == other.pattern
+
+
+@pytest.mark.parametrize("name", ["cube", "sphere", "planar", "bodies", "held"])
+def test_a_tresca_bound(name):
+    base = MODELS[name].assemble()
+    law = am.Tresca(np.linspace(0, 0.3, base.contacts))
+    problem = replace(base, law=law)
+    exact = drive(problem, am.ActiveSet(), tolerance=1e-10, max_iterations=50)
+    cycles = am.ActiveSet(bound=FIXED, multigrid=am.MultigridCycle(), cycles=1)
+    inexact = drive(problem, cycles, tolerance=1e-10, max_iterations=100)
+    assert exact.converged and inexact.converged
+    np.testing.assert_allclose(inexact.r, exact.r, atol=1e-7 * np.abs(exact.r).max())
+
+
+@pytest.mark.parametrize("name", ["cube", "sphere", "planar", "bodies", "held"])
+def test_cycles_solve_the_problem_that_the_direct_solver_solves(name):
+    problem = MODELS[name].assemble()
+    solver = am.ActiveSet(bound=FIXED, multigrid=am.MultigridCycle())
+    steps = [], []
+    for out, option in zip(steps, (solver, am.ActiveSet(bound=FIXED)), strict=True):
+        start = am.solvers.Iterate(np.zeros((problem.contacts, problem.dimension)))
+        for _, found in zip(range(4), option.iterates(problem, start, None), strict=False):
+            out.append(found)
+    assert isinstance(solver._system(problem), Cycles)
+    assert isinstance(am.ActiveSet()._system(problem), Saddle)
+    for one, other in zip(*steps, strict=True):
+        np.testing.assert_array_equal(one.normal, other.normal)
+        np.testing.assert_allclose(one.r, other.r, atol=1e-8 * max(np.abs(other.r).max(), 1))
+        np.testing.assert_allclose(one.v, other.v, atol=1e-9)
+
+
+def test_full_newton_needs_a_fraction_of_the_steps():
+    problem = cube(2, mu=1.0).assemble()
+    counts = [
+        drive(problem, am.ActiveSet(bound=bound), tolerance=1e-10).convergence.iterations
+        for bound in (am.FrictionBound.NEWTON, FIXED)
+    ]
+    assert 2 * counts[0] <= counts[1]
+
+
+def test_a_nested_start_finds_the_sets_earlier():
+    problem = cube(8).assemble()
+    counts = []
+    for nested in (True, False):
+        patterns = []
+        solver = am.ActiveSet(
+            bound=FIXED, multigrid=am.MultigridCycle(), cycles=1, nested=nested
+        )
+
+        def note(step, iterate, seen=patterns):
+            seen.append(
+                (iterate.normal & ~iterate.tangential).sum() + 1000 * iterate.normal.sum()
+            )
+
+        drive(problem, solver, tolerance=1e-10, callback=note, max_iterations=100)
+        counts.append(sum(p != patterns[-1] for p in patterns))
+    assert counts[0] < counts[1]
+
+
+def test_a_body_that_only_contact_holds():
+    model = am.Model(
+        [am.Body(am.box((1, 1), 4), LAW)],
+        supports=[am.Fix("left", (0, None))],
+        contacts=[am.Contact("bottom", am.Plane((0, 1)), mu=0.2)],
+        loads=[am.Traction("top", (0, -1))],
+    )
+    solution = drive(model.assemble(), am.ActiveSet(), tolerance=1e-9)
+    assert solution.converged, str(solution.convergence)
+
+
+def test_bad_options_are_named():
+    with pytest.raises(InvalidInput, match="c_normal"):
+        am.ActiveSet(c_normal=-1.0)
+    with pytest.raises(InvalidInput, match="bound_steps"):
+        am.ActiveSet(bound_steps=0)
+    with pytest.raises(InvalidInput, match="cycles"):
+        am.ActiveSet(cycles=1)
+    with pytest.raises(InvalidInput, match="fixed-point"):
+        am.ActiveSet(multigrid=am.MultigridCycle())
+    with pytest.raises(InvalidInput, match="smoothing"):
+        am.MultigridCycle(smoothing=0)
+    with pytest.raises(InvalidInput, match="shape"):
+        am.MultigridCycle(shape="w")
+
+
+def test_cycles_say_where_they_do_not_apply():
+    problem = am.FrictionProblem.from_global(
+        np.eye(4), np.ones((4, 2)), np.zeros(4), [[-1.0, 0.1]], [0.3]
+    )
+    solver = am.ActiveSet(bound=FIXED, multigrid=am.MultigridCycle(), cycles=1)
+    assert "slave node" in drive(problem, solver).convergence.detail
+    assert drive(problem, am.ActiveSet()).convergence.iterations > 0
