@@ -59,6 +59,7 @@ HISTORY_CONTACT = 35.0
 PRODUCT = 5.4
 NEWTON_CONTACT = 500.0
 NEWTON_START, NEWTON_PER_DIGIT = 20, 8  # steps that smoothing Newton takes, typically
+RACE_PATIENCE = 250  # times 100 sweeps without progress; fewer than the driver allows
 RACE_FIRST = 50.0  # sweeps that a Newton step costs, from which relaxed sweeps come first
 # Methods from the start, and the iterates without halving their error after which they end.
 ALONE_SMALL: tuple[tuple[Solver, int], ...] = (
@@ -124,10 +125,12 @@ class Portfolio:
                 break
         left = (self._newton_cost() - spent) / self.costs["sweep"]
         race = self.costs["newton"] > RACE_FIRST * self.costs["sweep"]
-        while race and left > 0 and self.error > self.goal:
+        mark, waited = self.error, 0
+        while race and left > 0 and self.error > self.goal and waited < RACE_PATIENCE:
             iterate = self._relaxed(100)
             left -= iterate.iterations
             yield iterate
+            mark, waited = (self.error, 0) if self.error < 0.7 * mark else (mark, waited + 1)
 
     def _relaxed(self, sweeps: int) -> Iterate:
         """Sweeps of the race between relaxations (see `Race`)."""
