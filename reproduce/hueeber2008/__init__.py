@@ -1,0 +1,1 @@
+"""The tables and figures of hueeber2008, computed again: see `README.md`."""

@@ -1,0 +1,154 @@
+"""`python -m reproduce.hueeber2008`: the command line; see `README.md` for what it found."""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+
+from amontons.errors import AmontonsError
+from amontons.files import replacing
+from benchmarks.machine import describe
+
+from . import cube, figures, tables
+from .runs import Run
+
+HERE = Path(__file__).parent
+PARTS = ("table4.1", "table4.2", "table4.3", "figure4.3", "table5.1", "newton")
+REFERENCE = json.loads((HERE / "reference.json").read_text())
+RESULTANTS = HERE.parents[1] / "tests/data/cube.json"
+
+
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.argument("parts", nargs=-1, metavar="[PART]...")
+@click.option("--levels", default="0,1,2,3,4,5", show_default=True,
+              help="Levels of refinement; figures are drawn on the finest.")  # fmt: skip
+@click.option(
+    "--results", type=click.Path(path_type=Path), help="For tables and figures. [results/]"
+)
+def main(parts: tuple[str, ...], levels: str, results: Path | None) -> None:
+    r"""Active sets and multigrid for contact with friction, as in the paper of 2008.
+
+    \b
+    PART is one of table4.1, table4.2, table4.3, figure4.3, table5.1, newton; all of them by
+    default.  Numbers of other parts stay as they are stored.
+    """
+    for part in parts:
+        if part not in PARTS:
+            raise click.UsageError(f"PART: {part!r} is none of {', '.join(PARTS)}")
+    try:
+        chosen = sorted({int(x) for x in levels.split(",")})
+    except ValueError as error:
+        raise click.UsageError(f"--levels: expected numbers, got {levels!r}") from error
+    if not chosen or chosen[0] < 0 or chosen[-1] > 5:
+        raise click.UsageError(f"--levels: expected numbers from 0 to 5, got {levels!r}")
+    out = results or HERE / "results"
+    out.mkdir(parents=True, exist_ok=True)
+    try:
+        for part in parts or PARTS:
+            click.echo(f"{part} …")
+            store(out, part, WORK[part](chosen, out))
+    except AmontonsError as reason:
+        raise click.ClickException(str(reason)) from reason
+    text = page(load(out))
+    with replacing(out / "results.md") as path:
+        path.write_text(text)
+    click.echo(text)
+
+
+def store(out: Path, part: str, runs: dict) -> None:
+    """Put the numbers of a part beside those of the others."""
+    record = load(out)
+    record["machine"] = describe()
+    record[part] = runs
+    with replacing(out / "results.json") as path:
+        path.write_text(json.dumps(record) + "\n")
+
+
+def load(out: Path) -> dict:
+    """What is stored."""
+    target = out / "results.json"
+    return json.loads(target.read_text()) if target.exists() else {}
+
+
+def page(record: dict) -> str:
+    """All tables of what is stored."""
+    lines = ["# hueeber2008: results", "", "Regenerate: `python -m reproduce.hueeber2008`.", ""]
+    lines += ["; ".join(f"{k} {v}" for k, v in record["machine"].items()) + ".", ""]
+    makers: dict[str, Callable] = {
+        "table4.1": tables.table41, "table4.2": tables.table42, "table4.3": tables.table43,
+        "table5.1": tables.table51,
+    }  # fmt: skip
+    for part, make in makers.items():
+        if part in record:
+            lines += make(record[part], REFERENCE[part])
+    if "table5.1" in record:
+        known = json.loads(RESULTANTS.read_text()) if RESULTANTS.exists() else {}
+        lines += tables.resultants(record["table5.1"]["zero"], known)
+    if {"newton", "table5.1"} <= record.keys():
+        lines += tables.newton(record["newton"], record["table5.1"]["zero"])
+    for name in ("figure4.2", "figure4.3", "figure5.1", "figure5.2", "figure5.3"):
+        lines += [f"![{name}]({name}.png)", ""]
+    return "\n".join(lines)
+
+
+def _records(runs: dict[str, Run]) -> dict:
+    return {level: run.record() for level, run in runs.items()}
+
+
+def _table41(levels: list[int], out: Path) -> dict:
+    runs = cube.table41(levels)
+    last = levels[-1]
+    figures.status(
+        runs[str(last)].solution, cube.contact_points(last), last, out / "figure4.2.png"
+    )
+    return _records(runs)
+
+
+def _table42(levels: list[int], out: Path) -> dict:
+    return {name: _records(runs) for name, runs in cube.table42(levels).items()}
+
+
+def _table43(levels: list[int], out: Path) -> dict:
+    return {name: _records(runs) for name, runs in cube.table43(levels).items()}
+
+
+def _figure43(levels: list[int], out: Path) -> dict:
+    runs = cube.figure43(levels[-1])
+    figures.modifications(runs, levels[-1], out / "figure4.3.png")
+    return _records(runs)
+
+
+def _table51(levels: list[int], out: Path) -> dict:
+    runs = cube.table51(levels)
+    record = {name: _records(found) for name, found in runs.items()}
+    for level, run in runs["zero"].items():
+        fields = cube.model(int(level)).recover(run.solution)
+        record["zero"][level] |= {
+            "counts": run.solution.counts, "resultant": [float(x) for x in fields.resultant],
+        }  # fmt: skip
+    last = levels[-1]
+    solution, points = runs["zero"][str(last)].solution, cube.contact_points(last)
+    figures.status(solution, points, last, out / "figure5.2.png")
+    figures.bound(solution, points, out / "figure5.1.png")
+    figures.sets(runs["zero"], out / "figure5.3.png")
+    return record
+
+
+def _newton(levels: list[int], out: Path) -> dict:
+    return _records(cube.newton([k for k in levels if k < 5]))
+
+
+WORK: dict[str, Callable[[list[int], Path], dict]] = {
+    "table4.1": _table41, "table4.2": _table42, "table4.3": _table43, "figure4.3": _figure43,
+    "table5.1": _table51, "newton": _newton,
+}  # fmt: skip
+
+if __name__ == "__main__":
+    main()

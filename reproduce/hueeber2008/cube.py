@@ -1,0 +1,117 @@
+"""Sections 4 and 5: the cube on a rigid plane, with Tresca and with Coulomb friction."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+import amontons as am
+
+from .runs import INEXACT, NESTED, Run, fixed_point, run
+
+MODIFICATIONS = (am.Modification.FIRST, am.Modification.SECOND, am.Modification.THIRD)
+NODE = (0.0625, 1.0, 0.0)  # of figure 4.3
+
+
+@cache
+def model(level: int) -> am.Model:
+    """The cube with 2^level elements an edge, friction 1."""
+    block = am.Body(am.box((1, 1, 1), cells=2**level), am.LinearElastic(young=200, poisson=0.3))
+    return am.Model(
+        [block],
+        supports=[am.Fix("top", lambda x: (0, 0.2, 0.06 - 0.15 * x[0]))],
+        contacts=[am.Contact("bottom", am.Plane(normal=(0, 0, 1)), mu=1.0)],
+    )
+
+
+@cache
+def coulomb(level: int) -> am.FrictionProblem:
+    """Section 5.1."""
+    return model(level).assemble()
+
+
+@cache
+def tresca(level: int) -> am.FrictionProblem:
+    """Section 4.1: g = 800 x y (1 - x) (1 - y).
+
+    The bound of a node is the integral of g times its dual basis function; with the nodal basis
+    function, as the paper's formula has it, Table 4.1 does not come out.
+    """
+    n = 2**level
+    where = np.rint(n * contact_points(level)[:, :2]).astype(int)
+    moments = _dual_moments(n)
+    return replace(coulomb(level), law=am.Tresca(800 * moments[where].prod(axis=1)))
+
+
+def contact_points(level: int) -> np.ndarray:
+    """Points of the contacts, (nc, 3), in the order of the problem."""
+    return np.concatenate([p.rows.points for p in model(level).discretisation.placed])
+
+
+def _dual_moments(n: int) -> np.ndarray:
+    """Integrals of t (1 - t) psi_i over [0, 1] with n elements, psi dual to hat functions."""
+    at, weights = np.polynomial.legendre.leggauss(3)
+    s, weights = (at + 1) / 2, weights / (2 * n)
+    out = np.zeros(n + 1)
+    for e in range(n):
+        t = (e + s) / n
+        out[e] += (t * (1 - t) * weights) @ (2 - 3 * s)
+        out[e + 1] += (t * (1 - t) * weights) @ (3 * s - 1)
+    return out
+
+
+def table41(levels: list[int]) -> dict[str, Run]:
+    """Exact Algorithm 1 from zero with (3.11), tolerance 1e-9."""
+    return {str(k): run(tresca(k), fixed_point(), 1e-9) for k in levels}
+
+
+def table42(levels: list[int]) -> dict[str, dict[str, Run]]:
+    """Exact, inexact and nested strategy, tolerance 1e-10."""
+    options = {"exact": {}, "inexact": INEXACT, "nested": NESTED}
+    return {
+        name: {str(k): run(tresca(k), fixed_point(**given), 1e-10) for k in levels if k}
+        for name, given in options.items()
+    }
+
+
+def table43(levels: list[int]) -> dict[str, dict[str, Run]]:
+    """Inexact strategy for c_tau from 1 to 10 000, tolerance 1e-10."""
+    return {
+        str(c): {
+            str(k): run(tresca(k), fixed_point(c_tangential=float(c), **INEXACT), 1e-10)
+            for k in levels
+            if k
+        }
+        for c in (1, 10, 100, 1000, 10000)
+    }
+
+
+def table51(levels: list[int]) -> dict[str, dict[str, Run]]:
+    """Algorithm 2 with m = k_f = 1 for Coulomb friction, tolerance 1e-10."""
+    return {
+        name: {str(k): run(coulomb(k), fixed_point(**given), 1e-10) for k in levels}
+        for name, given in (("zero", INEXACT), ("nested", NESTED))
+    }
+
+
+def newton(levels: list[int]) -> dict[str, Run]:
+    """The full Newton method of section 7 on the Coulomb cube, direct solver."""
+    return {
+        str(k): run(coulomb(k), am.ActiveSet(c_normal=100.0, c_tangential=100.0), 1e-10)
+        for k in levels
+    }
+
+
+def figure43(level: int) -> dict[str, Run]:
+    """The three modifications from u = (1, 1, 0), lambda = (-1, -1, 0), tolerance 1e-14."""
+    problem = tresca(level)
+    v = np.tile([1.0, 1.0, 0.0], problem.unknowns // 3)
+    frames = np.concatenate([p.rows.frames for p in model(level).discretisation.placed])
+    r = -np.einsum("kij,j->ki", frames, [-1.0, -1.0, 0.0])
+    start = am.solvers.Iterate(r, v)
+    return {
+        kind.value: run(problem, fixed_point(modification=kind), 1e-14, start=start, limit=40)
+        for kind in MODIFICATIONS
+    }

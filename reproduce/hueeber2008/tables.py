@@ -1,0 +1,114 @@
+"""Ours, the paper's, the difference: every table as Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+Record = Mapping[str, dict]
+
+
+def history(run: dict) -> str:
+    """|A_n| / |A_tau| for k = 2, 3, … as Table 4.1 prints them."""
+    pairs = zip(run["normal"][1:], run["tangential"][1:], strict=True)
+    return " ".join(f"{a}/{b}" for a, b in pairs)
+
+
+def table41(runs: Record, paper: Mapping[str, str]) -> list[str]:
+    """Every entry of Table 4.1."""
+    lines = ["## Table 4.1: active nodes |A_n| / |A_tau|, Tresca, exact", "",
+             "| level | ours, k = 2, 3, … | paper | same |", "|---|---|---|---|"]  # fmt: skip
+    for level, run in runs.items():
+        ours, theirs = history(run), paper[level]
+        verdict = "yes" if ours == theirs else _first_difference(ours, theirs)
+        lines.append(f"| {level} | {ours} | {theirs} | {verdict} |")
+    return [*lines, ""]
+
+
+def _first_difference(ours: str, theirs: str) -> str:
+    one, two = ours.split(), theirs.split()
+    for k, (a, b) in enumerate(zip(one, two, strict=False)):
+        if a != b:
+            return f"**no**, first at k = {k + 2}"
+    return f"sets yes, {len(one)} steps against {len(two)}"
+
+
+def table42(runs: Mapping[str, Record], paper: Mapping[str, Mapping[str, list]]) -> list[str]:
+    """K_l and multigrid steps of the three strategies."""
+    lines = ["## Table 4.2: K_l and multigrid steps, ours (paper)", "",
+             "| level | " + " | ".join(f"K_l {n} | steps {n}" for n in runs) + " |",
+             "|---" * (1 + 2 * len(runs)) + "|"]  # fmt: skip
+    for level in next(iter(runs.values())):
+        cells = []
+        for name, rows in runs.items():
+            K, steps = paper[name][level]
+            run = rows[level]
+            cells += [f"{run['K']} ({K})", f"{run['cycles']} ({steps})"]
+        lines.append(f"| {level} | " + " | ".join(cells) + " |")
+    return [*lines, ""]
+
+
+def table43(runs: Mapping[str, Record], paper: Mapping[str, Mapping[str, list]]) -> list[str]:
+    """K_l and multigrid steps for values of c_tau."""
+    lines = ["## Table 4.3: K_l and multigrid steps for c_tau, inexact, ours (paper)", "",
+             "| level | " + " | ".join(f"c = {c}" for c in runs) + " |",
+             "|---" * (1 + len(runs)) + "|"]  # fmt: skip
+    for level in next(iter(runs.values())):
+        cells = []
+        for c, rows in runs.items():
+            run, theirs = rows[level], paper[c][level]
+            ours = f"{run['K']}, {run['cycles']}" if run["finished"] else "none in 120"
+            cells.append(f"{ours} ({_pair(theirs)})")
+        lines.append(f"| {level} | " + " | ".join(cells) + " |")
+    return [*lines, ""]
+
+
+def _pair(theirs: list | None) -> str:
+    return "none" if theirs is None else f"{theirs[0]}, {theirs[1]}"
+
+
+def table51(runs: Mapping[str, Record], paper: Mapping[str, Mapping[str, list]]) -> list[str]:
+    """K_l and k_max of Algorithm 2."""
+    heads = "K_l zero | k_max zero | K_l nested | k_max nested | in contact / slipping"
+    lines = ["## Table 5.1: K_l and k_max, Coulomb, m = k_f = 1, ours (paper)", "",
+             f"| level | {heads} |", "|---|---|---|---|---|---|"]  # fmt: skip
+    for level, zero in runs["zero"].items():
+        cells = []
+        for name in ("zero", "nested"):
+            run, (K, steps) = runs[name][level], paper[name][level]
+            cells += [f"{run['K']} ({K})", f"{run['steps']} ({steps})"]
+        counts = zero["counts"]
+        cells.append(f"{counts['slip'] + counts['stick']} / {counts['slip']}")
+        lines.append(f"| {level} | " + " | ".join(cells) + " |")
+    return [*lines, ""]
+
+
+def newton(runs: Record, fixed: Record) -> list[str]:
+    """Full Newton beside the fixed point, on the cube."""
+    lines = ["## Full Newton (7.1)-(7.3) on the Coulomb cube, to a change of 1e-10", "",
+             "| level | steps, Newton | steps, fixed point | last changes of Newton |",
+             "|---|---|---|---|"]  # fmt: skip
+    for level, run in runs.items():
+        last = ", ".join(f"{x:.1e}" for x in run["changes"][-5:])
+        lines.append(f"| {level} | {run['steps']} | {fixed[level]['steps']} | {last} |")
+    return [*lines, ""]
+
+
+def resultants(runs: Record, reference: Mapping[str, dict]) -> list[str]:
+    """Final counts and resultants against an independent computation."""
+    lines = ["## Coulomb cube: resultants against an independent computation", "",
+             "| level | in contact / slipping | force on the plane | largest difference |",
+             "|---|---|---|---|"]  # fmt: skip
+    for level, run in runs.items():
+        ours = run["resultant"]
+        given = reference.get(f"level{level}")
+        off = "-"
+        if given:
+            size = max(abs(x) for x in given["resultant"])
+            apart = max(abs(a - b) for a, b in zip(ours, given["resultant"], strict=True))
+            off = f"{apart / size:.1e}"
+        counts = run["counts"]
+        lines.append(
+            f"| {level} | {counts['slip'] + counts['stick']} / {counts['slip']} | "
+            f"{', '.join(f'{x:.6f}' for x in ours)} | {off} |"
+        )
+    return [*lines, ""]
