@@ -147,7 +147,11 @@ def _prepare(problem: FrictionProblem) -> ContactLevels:
 
 
 def _in_basis(hierarchy: Hierarchy, basis: OneSided) -> Hierarchy:
-    """Another finest level, T' M T and T^-1 P: the coarse matrices stay the same."""
+    """Another finest level, T' M T and T^-1 P.
+
+    The coarse matrices keep their values but are formed again: now they store the couplings
+    between bodies, zero until contacts hold.
+    """
     nodes, finest = hierarchy.nodes, hierarchy.levels[0]
     place = None if nodes.plain else nodes.place
     level = Level(NodeBlocks.from_sparse(basis.M, place, nodes.count))
@@ -159,7 +163,12 @@ def _in_basis(hierarchy: Hierarchy, basis: OneSided) -> Hierarchy:
         P = finest.P.matrix()
         tiles = sparse.bsr_array((P - spread @ P).tobsr((3, 3)))
         level.P = Transfer.of(tiles, finest.P.idle, finest.P.coarse_idle)
-    return Hierarchy([level, *hierarchy.levels[1:]], hierarchy.geometric, nodes)
+    levels = [level]
+    for old in hierarchy.levels[1:]:
+        P = levels[-1].P
+        assert P is not None
+        levels.append(Level(P.galerkin(levels[-1].A), old.P))
+    return Hierarchy(levels, hierarchy.geometric, nodes)
 
 
 def _positive(A: NodeBlocks) -> bool:

@@ -6,9 +6,13 @@
                                     groups of contacts with the same neighbours, not rigid
     Delassus form                   `portfolio`: sweeps, smoothing Newton, proximal point
     global form, W cheap            the same on W = H^T M^-1 H
+    global form, mesh, W dear       `ContactMultigrid`, from MESH unknowns on, its bodies held or
+                                    not; when it breaks down or stalls, as below
     global form, W dear             `CompressedDelassus`, then semismooth Newton without W, then
                                     the Delassus form after all if W fits into memory
     global form, M singular         semismooth Newton with a factor of the whole system
+
+A mesh is what has levels or rigid modes (`FrictionProblem.levels`, `near_nullspace`).
 
 When is W cheap (`FrictionProblem.condensing_is_cheap`; it then also judges)?
 
@@ -33,16 +37,21 @@ from dataclasses import dataclass, field
 from itertools import islice
 from typing import ClassVar
 
+import numpy as np
+
 from ..blocks import spatial
 from ..errors import InvalidInput, SingularOperator
+from ..judge import Measure
 from ..linear import Direct
 from ..problem import Form, FrictionProblem
 from .base import Breakdown, Iterate, Solver, Target, check_at_least
 from .compressed import CompressedDelassus
+from .contact_multigrid import ContactMultigrid
 from .gauss_seidel import GaussSeidel
 from .inexact import DeformablePortfolio
 from .newton import SemismoothNewton
 
+MESH = 3_000  # unknowns of a mesh from which multigrid beats a factorisation
 STALLED = 20  # iterates without halving the error after which Auto changes the method
 
 
@@ -91,20 +100,22 @@ class Auto:
         """Iterates of one method after another, until nothing is left to try."""
         if problem.contacts == 0:
             return
+        best = [start]
+        if _worth_multigrid(problem):
+            yield from _watched(ContactMultigrid(), problem, start, target, best)
         if problem.form is Form.GLOBAL and not _regular(problem):
             whole = SemismoothNewton(linear=Direct())
-            yield from _watched(whole, problem, start, target, [start])
+            yield from _watched(whole, problem, best[0], target, best)
         elif problem.condensing_is_cheap:
             yield from DeformablePortfolio(
                 problem.condensed(), target, spatial(start.r)
             ).stages()
         else:
-            yield from self._on_meshes(problem, start, target)
+            yield from self._on_meshes(problem, target, best)
 
     def _on_meshes(
-        self, problem: FrictionProblem, start: Iterate, target: Target
+        self, problem: FrictionProblem, target: Target, best: list[Iterate]
     ) -> Iterator[Iterate]:
-        best = [start]
         for solver in (CompressedDelassus(), SemismoothNewton()):
             yield from _watched(solver, problem, best[0], target, best)
         try:
@@ -112,6 +123,14 @@ class Auto:
         except InvalidInput as reason:
             raise Breakdown(str(reason)) from reason
         yield from DeformablePortfolio(condensed, target, spatial(best[0].r)).stages()
+
+
+def _worth_multigrid(problem: FrictionProblem) -> bool:
+    """True for meshes on which a factorisation takes longer than some cycles."""
+    if problem.form is not Form.GLOBAL or problem.unknowns < MESH:
+        return False
+    mesh = bool(problem.levels) or problem.near_nullspace is not None
+    return mesh and not problem.condensing_is_cheap
 
 
 def _regular(problem: FrictionProblem) -> bool:
@@ -131,7 +150,8 @@ def _watched(
     best: list[Iterate],
 ) -> Iterator[Iterate]:
     """Iterates of a solver until it breaks down or stalls; best[0] becomes the best of them."""
-    error = problem.error(start.r, start.v)
+    known = start.v is not None or problem.measure is Measure.EXACT
+    error = problem.error(start.r, start.v) if known else np.inf  # v would cost a linear solve
     mark, waited = error, 0
     try:
         for iterate in solver.iterates(problem, start, target):

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ..linear.hierarchy import SMALL, Hierarchy
 from ..linear.node_blocks import NodeBlocks, block_inverse
 from ..linear.transfer import Transfer
+from .base import Breakdown
 from .contact_nodes import ContactNodes
 
 Array = NDArray[np.float64]
@@ -171,9 +172,12 @@ def _parents(P: Transfer, near: Near, coarse: NodeBlocks) -> Index:
     """Place in the coarse data of every pair of parents of every entry."""
     counts = np.diff(P.indptr).astype(np.int64)
     total = int((counts[near.row] * counts[near.column]).sum())
-    return _parent_places(
+    places = _parent_places(
         P.indptr, P.indices, near.row, near.column, coarse.indptr, coarse.indices, total
     )
+    if places.min(initial=0) < 0:
+        raise Breakdown("contact multigrid: a coarse matrix lacks couplings near the contact")
+    return places
 
 
 @njit(cache=True)
@@ -185,7 +189,8 @@ def _parent_places(p_ptr, p_idx, row, column, indptr, indices, total):  # noqa: 
         for a in range(p_ptr[i], p_ptr[i + 1]):
             first, last = indptr[p_idx[a]], indptr[p_idx[a] + 1]
             for b in range(p_ptr[j], p_ptr[j + 1]):
-                out[at] = first + np.searchsorted(indices[first:last], p_idx[b])
+                place = first + np.searchsorted(indices[first:last], p_idx[b])
+                out[at] = place if place < last and indices[place] == p_idx[b] else -1
                 at += 1
     return out
 
