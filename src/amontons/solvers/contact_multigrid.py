@@ -53,7 +53,7 @@ class ContactMultigrid:
     """
 
     form: ClassVar[Form] = Form.GLOBAL
-    depth: int = 3
+    depth: int = 5
     nested: bool = True
     coarse_tolerance: float = 1e-3
     update_ratio: float = 0.03

@@ -6,7 +6,7 @@
                                     groups of contacts with the same neighbours, not rigid
     Delassus form                   `portfolio`: sweeps, smoothing Newton, proximal point
     global form, W cheap            the same on W = H^T M^-1 H
-    global form, mesh, W dear       `ContactMultigrid`, from MESH unknowns on, its bodies held or
+    global form, mesh, W dear       `ContactMultigrid` from MESH unknowns on, bodies held or
                                     not; when it breaks down or stalls, as below
     global form, W dear             `CompressedDelassus`, then semismooth Newton without W, then
                                     the Delassus form after all if W fits into memory
