@@ -264,11 +264,11 @@ def test_half_a_model_gives_half_of_the_solution(dim):
         am.solve(model, tolerance=1e-11),
         am.solve(half_or_whole(dim, False), tolerance=1e-11),
     )
-    np.testing.assert_allclose(half.resultant[-1], whole.resultant[-1] / 2, rtol=1e-8)
+    np.testing.assert_allclose(half.resultant[-1], whole.resultant[-1] / 2, rtol=1e-6)
     size = whole.pressure.max()
     for x, pressure in zip(half.points, half.pressure, strict=True):
         same = np.linalg.norm(whole.points - x, axis=1) < 1e-9
-        np.testing.assert_allclose(whole.pressure[same], pressure, atol=1e-7 * size)
+        np.testing.assert_allclose(whole.pressure[same], pressure, atol=1e-5 * size)
     basis = one_sided(model.assemble())
     assert (basis.dofs < 0).sum() == (1 if dim == 2 else 3)
 

@@ -9,7 +9,8 @@ With the dual basis psi of the slave surface ([HSW] section 2, see `dual`) and
 R_p with rows n, t1(, t2), n out of the master into the slave, g > 0 where they are apart.  The
 reaction r_p = D_p lambda_p is a nodal force, lambda_p a traction.  All integrals are sums over
 segments: a uniform pressure then passes between flat meshes that do not match, and the forces
-on both sides cancel.  Small strains: all is taken once, in the reference configuration.
+on both sides cancel.  g is the gap of the curved surfaces (`curvature`), all else is of the
+facets.  Small strains: all is taken once, in the reference configuration.
 
 No multiplier is there for nodes that supports hold in the normal direction, and for those of
 which hardly anything faces the other side; their neighbours take their share, and feel their
@@ -34,6 +35,7 @@ from ..fem.cells import CELLS
 from ..fem.mesh import Mesh
 from ..fem.surfaces import nodal_normals, nodal_weights
 from .clipping import line_rule, square_rule, triangle_rule
+from .curvature import heights
 from .dual import dual_functions, nodes_with_multiplier
 from .geometry import Obstacle, frames
 from .nodal import ContactRows, check_exterior, contact_nodes
@@ -70,9 +72,9 @@ def mortar_obstacle(
     mass, moment = _against(slave, obstacle)
     held = _held(normals, _values(prescribed, mesh), EXACT)
     average = _Average.of(slave, np.arange(len(slave.nodes)), mass, held)
-    total = _scatter(n, slave.nodes, np.einsum("fqa,fa->fq", average.psi, moment))
     nodes = average.nodes
-    rows = average.rows(frames(normals[nodes]), total[nodes] / average.weights, None)
+    gap = average.of_moments(np.arange(len(moment)), moment[:, :, None])[:, 0]
+    rows = average.rows(frames(normals[nodes]), gap, None)
     return rows, np.isin(contact_nodes(mesh, surface)[0], nodes)
 
 
@@ -115,6 +117,7 @@ def mortar_contact(
     fixed = _held_together(average.nodes, across, values, on_master)
     axes = frames(_within(normals[average.nodes], fixed))
     apart = average.onto_slave @ slave.points - across @ master.points
+    apart += average.of_moments(of, parts.bulge)
     gap = np.einsum("pc,pc->p", axes[:, 0], apart)
     rows = average.rows(axes, gap, fixed)
     found = np.isin(contact_nodes(slave, surface)[0], average.nodes)
@@ -161,6 +164,12 @@ class _Average:
         moments = self.psi[of] @ parts.cross
         product = _between(self.facet_nodes[of], moments, master.nodes[parts.master], shape)
         return _cleaned(product[self.nodes], self.weights)
+
+    def of_moments(self, of: Index, moments: Array) -> Array:
+        """Averages (nc, c) of a field given as int phi_a field (k, 4, c); of: facets (k,)."""
+        values, where, n = self.psi[of] @ moments, self.facet_nodes[of], len(self.points)
+        sums = [_scatter(n, where, values[:, :, c]) for c in range(values.shape[2])]
+        return np.stack(sums, axis=1)[self.nodes] / self.weights[:, None]
 
     def rows(self, axes: Array, gap: Array, fixed: Mask | None) -> ContactRows:
         """Contacts with given frames and gaps, in the dofs of the slave."""
@@ -226,7 +235,8 @@ def _against(slave: Surface, obstacle: Obstacle) -> tuple[Array, Array]:
             jac, phi = cell.jacobians(x, at), cell.shape(at)
             area = weight * np.sqrt(np.linalg.det(np.swapaxes(jac, 1, 2) @ jac))
             mass[of, :n, :n] += area[:, None, None] * np.outer(phi, phi)
-            gap = obstacle.gap(np.einsum("a,kac->kc", phi, x))
+            height = heights(np.broadcast_to(phi, (len(of), 1, n)), slave.slopes[of, :n], x)
+            gap = obstacle.gap(phi @ x + height * slave.normal[of])
             moment[of, :n] += (area * gap)[:, None] * phi
     return mass, moment
 

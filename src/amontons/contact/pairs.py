@@ -7,8 +7,8 @@ Node to facet: with the shape functions N_a of the facet at the closest point,
 n being the facet's outward normal there, from master to slave.  Small strains: pairs, gaps and
 normals are taken once, in the reference configuration.
 
-Left out: mortar coupling.  Meshes that match pass the patch test exactly, others up to the
-size of the facets.
+Meshes that match pass the patch test exactly, others up to the size of the facets; see `mortar`
+for what does better.
 """
 
 from __future__ import annotations

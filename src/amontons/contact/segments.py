@@ -11,7 +11,7 @@ solid mechanics", Comput. Methods Appl. Mech. Engrg. 193 (2004) 601-629.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from ..errors import InvalidInput
 from ..fem.facets import Facets
 from ..fem.surfaces import facet_areas, facet_normals, nodal_normals
 from .clipping import clip, line_rule, quadrature
+from .curvature import heights, slopes
 from .geometry import frames
 from .pairs import AROUND, DEEP, KINDS, MAX_NODES, shapes
 
@@ -40,7 +41,8 @@ NEWTON = 30  # steps to the reference point of a quadrilateral
 class Surface:
     """Facets of all kinds of a surface in one table, with nodes (f, 4) padded by the last.
 
-    corners (f,): how many are real; centre, normal (f, dim), outward; radius, area (f,).
+    corners (f,): how many are real; centre, normal (f, dim), outward; radius, area (f,);
+    slopes (f, 4, dim): of the curved surface that the facets stand for, see `curvature`.
     """
 
     points: Array
@@ -50,6 +52,7 @@ class Surface:
     normal: Array
     radius: Array
     area: Array
+    slopes: Array
     blocks: tuple[Facets, ...]
 
     @classmethod
@@ -77,9 +80,9 @@ class Surface:
                 f"surface {name!r}: the facet with nodes {where.tolist()} near "
                 f"{centre[bad[0]].tolist()} has no area; {bad.size} such facets, expected none"
             )
-        return cls(
-            points, nodes, corners, centre, normal / length[:, None], radius, area, blocks
-        )
+        normal = normal / length[:, None]
+        curved = slopes(points, blocks, nodes, real, normal)
+        return cls(points, nodes, corners, centre, normal, radius, area, curved, blocks)
 
     @property
     def real(self) -> Mask:
@@ -91,21 +94,23 @@ class Surface:
 class Segments:
     """Integrals on k segments: facets slave, master (k,); a, b are slots of their nodes.
 
-    mass (k, a, b): int phi_a phi_b; cross (k, a, b): int phi_a phi_b^master; area (k,);
-    gap (k,): mean distance along the slave's normal, < 0 where they overlap.
+    mass (k, a, b): int phi_a phi_b; cross (k, a, b): int phi_a phi_b^master; bulge (k, a, dim):
+    int phi_a times how far the curved slave lies outside of its facet, less the same of the
+    master, as vectors; area (k,); gap (k,): mean distance of the facets along the slave's
+    normal, < 0 where they overlap.
     """
 
     slave: Index
     master: Index
     mass: Array
     cross: Array
+    bulge: Array
     area: Array
     gap: Array
 
     def at(self, chosen: Index | Mask) -> Segments:
         """A selection of these segments."""
-        return Segments(self.slave[chosen], self.master[chosen], self.mass[chosen],
-                        self.cross[chosen], self.area[chosen], self.gap[chosen])  # fmt: skip
+        return Segments(*(getattr(self, one.name)[chosen] for one in fields(self)))
 
 
 def segments(slave: Surface, master: Surface, *, joined: bool = False) -> Segments:
@@ -120,7 +125,7 @@ def segments(slave: Surface, master: Surface, *, joined: bool = False) -> Segmen
             apart = ~same.any(axis=(1, 2))
             chunk, facet = chunk[apart], facet[apart]
         found += list(_integrated(slave, master, chunk, facet))
-    return _joined(found)
+    return _joined(found, slave.points.shape[1])
 
 
 def is_deep(slave: Surface, master: Surface, every: Segments) -> Mask:
@@ -146,12 +151,15 @@ def _padded(nodes: Index) -> Index:
     return np.concatenate([nodes, np.repeat(nodes[:, -1:], missing, axis=1)], axis=1)
 
 
-def _joined(parts: list[Segments]) -> Segments:
-    names = ("slave", "master", "mass", "cross", "area", "gap")
-    empty = Segments(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64),
-                     np.zeros((0, MAX_NODES, MAX_NODES)), np.zeros((0, MAX_NODES, MAX_NODES)),
-                     np.zeros(0), np.zeros(0))  # fmt: skip
-    return Segments(*(np.concatenate([getattr(p, n) for p in [empty, *parts]]) for n in names))
+def _joined(parts: list[Segments], dim: int) -> Segments:
+    none, square = np.zeros(0, dtype=np.int64), np.zeros((0, MAX_NODES, MAX_NODES))
+    empty = Segments(
+        none, none, square, square, np.zeros((0, MAX_NODES, dim)), np.zeros(0), np.zeros(0)
+    )
+    every = [empty, *parts]
+    return Segments(
+        *(np.concatenate([getattr(part, one.name) for part in every]) for one in fields(empty))
+    )
 
 
 # -------------------------------------------------------------------- search
@@ -296,13 +304,24 @@ def _summed(
     """Integrals of the pairs that have a segment; slivers are left out."""
     k, n, m = len(of), phi.shape[2], psi.shape[2]
     mass, cross = np.zeros((k, MAX_NODES, MAX_NODES)), np.zeros((k, MAX_NODES, MAX_NODES))
-    weighted = weight[:, :, None] * phi
-    np.add.at(mass[:, :n, :n], pair, np.swapaxes(weighted, 1, 2) @ phi)
-    np.add.at(cross[:, :n, :m], pair, np.swapaxes(weighted, 1, 2) @ psi)
+    bulge = np.zeros((k, MAX_NODES, slave.points.shape[1]))
+    weighted = np.swapaxes(weight[:, :, None] * phi, 1, 2)
+    np.add.at(mass[:, :n, :n], pair, weighted @ phi)
+    np.add.at(cross[:, :n, :m], pair, weighted @ psi)
+    for side, facets, values, sign in ((slave, of, phi, 1), (master, facet, psi, -1)):
+        outside = _outside(side, facets[pair], values)
+        np.add.at(bulge[:, :n], pair, sign * (weighted @ outside))
     area = mass.sum(axis=(1, 2))
     on_slave = np.einsum("ka,kac->kc", mass.sum(axis=2), slave.points[slave.nodes[of]])
     on_master = np.einsum("kb,kbc->kc", cross.sum(axis=1), master.points[master.nodes[facet]])
     gap = np.einsum("kc,kc->k", on_master - on_slave, slave.normal[of])
     gap /= np.where(area > 0, area, 1.0)
     kept = area > SLIVER * slave.area[of]
-    return Segments(of, facet, mass, cross, area, gap).at(kept)
+    return Segments(of, facet, mass, cross, bulge, area, gap).at(kept)
+
+
+def _outside(side: Surface, facets: Index, values: Array) -> Array:
+    """Vectors (t, q, dim) from facets (t,) to the curved surface; values (t, q, a): phi."""
+    n = values.shape[2]
+    x, slope = side.points[side.nodes[facets, :n]], side.slopes[facets, :n]
+    return heights(values, slope, x)[:, :, None] * side.normal[facets, None]
