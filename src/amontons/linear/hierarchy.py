@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from .node_blocks import NodeBlocks, first_sweep, row_product, sweep
+from .node_blocks import DEAD, NodeBlocks, first_sweep, row_product, sweep
 from .transfer import Transfer
 
 Array = NDArray[np.float64]
@@ -124,6 +124,7 @@ class Hierarchy:
     coarse_inverse: Array = field(init=False)
     owner: object = None
     undo: Callable[[], None] | None = None
+    coarse_size: Array | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
         self.invert_coarsest()
@@ -154,8 +155,11 @@ class Hierarchy:
 
     def invert_coarsest(self) -> None:
         """The inverse of the coarsest matrix, a pseudo-inverse where it is singular."""
-        A = self.levels[-1].A.dense()
-        self.coarse_inverse = np.linalg.pinv(A, rcond=SMALL) if A.size else A
+        A = self.levels[-1].A
+        diagonal = A.data[A.diagonal()]
+        if self.coarse_size is None:
+            self.coarse_size = np.abs(diagonal).max(axis=(1, 2), initial=0.0)
+        self.coarse_inverse = inverse_at_rest(A.dense(), diagonal, self.coarse_size)
 
     def reclaim(self) -> None:
         """Take the coarse matrices back from their owner, as those of A."""
@@ -216,6 +220,27 @@ class Hierarchy:
         sweep(A.indptr, A.indices, A.data, A.inverse, b, x, _nothing(A.nodes), True)
 
 
+def inverse_at_rest(A: Array, diagonal: Array, size: Array) -> Array:
+    """Inverse of A (3 n, 3 n) on the directions in which its diagonal blocks have stiffness.
+
+    diagonal (n, 3, 3); size (n,): their usual size.  A pseudo-inverse where that is singular.
+    """
+    if not A.size:
+        return A
+    left, s, right = np.linalg.svd(diagonal)
+    dead = s <= DEAD * size[:, None]
+    k = np.arange(len(diagonal))
+    whole = A.reshape(len(k), 3, len(k), 3).copy()
+    whole[k, :, k, :] += size[:, None, None] * ((left * dead[:, None, :]) @ right)
+    whole = whole.reshape(A.shape)
+    try:
+        out = np.linalg.inv(whole)
+    except np.linalg.LinAlgError:
+        return np.linalg.pinv(A, rcond=SMALL)
+    regular = np.abs(out).max() * np.abs(whole).max() * SMALL < 1
+    return out if regular else np.linalg.pinv(A, rcond=SMALL)
+
+
 _FREE: dict[int, NDArray[np.bool_]] = {}
 
 
@@ -249,7 +274,7 @@ def algebraic(A: NodeBlocks, modes: Array) -> list[Transfer]:
     tiles = sparse.bsr_matrix((A.data, A.indices, A.indptr), shape=(n, n))
     modes = np.column_stack([modes, np.zeros((n, -modes.shape[1] % 3))])
     hierarchy = pyamg.smoothed_aggregation_solver(
-        tiles, B=modes, improve_candidates=None, max_coarse=3 * COARSEST,
+        tiles, B=modes, improve_candidates=None, max_coarse=COARSEST // 2,
         presmoother=None, postsmoother=None,
     )  # fmt: skip
     none = np.empty(0, dtype=np.int64)

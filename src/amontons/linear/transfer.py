@@ -40,7 +40,8 @@ class Transfer:
         rows = np.repeat(np.arange(tiles.shape[0] // 3), np.diff(tiles.indptr))
         both = used.reshape(-1, 3)[rows] & used_coarse.reshape(-1, 3)[tiles.indices]
         diagonal = np.einsum("kii->ki", tiles.data)
-        weights = np.abs(diagonal).max(axis=1, initial=0.0)
+        largest = np.abs(diagonal).argmax(axis=1)
+        weights = diagonal[np.arange(len(diagonal)), largest]
         plain = np.eye(3) * (weights[:, None] * both)[:, None, :]
         empty = np.empty((0, 3, 3))
         scalar = np.array_equal(plain, tiles.data)

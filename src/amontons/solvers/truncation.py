@@ -11,13 +11,13 @@ contacts hold altogether have neither row nor column left; they rest.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
+from numba import njit, uint64
 from numpy.typing import NDArray
 
-from ..linear.hierarchy import SMALL, Hierarchy
+from ..linear.hierarchy import Hierarchy, inverse_at_rest
 from ..linear.node_blocks import NodeBlocks, block_inverse
 from ..linear.transfer import Transfer
 from .base import Breakdown
@@ -31,9 +31,9 @@ Index = NDArray[np.int64]
 class Near:
     """Entries of one level that the contacts change, m of them.
 
-    slots (m,): their places in the data of A; row, column (m,); target: for every pair of
-    parents of row and column of every entry, the entry of the next level (places in its Near);
-    own (k,): which entries are diagonal blocks; idle: masks of row and column padding.
+    slots (m,): their places in the data of A; row, column (m,); base (m, 3, 3): without
+    contacts; own (k,): which entries are diagonal blocks, base_inverse and size: of these;
+    row_idle, column_idle (m, 3): padding.
     """
 
     slots: Index
@@ -45,7 +45,6 @@ class Near:
     size: Array
     row_idle: NDArray[np.bool_]
     column_idle: NDArray[np.bool_]
-    target: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, np.int32))
 
     @classmethod
     def of(cls, A: NodeBlocks, slots: Index, idle: NDArray[np.bool_]) -> Near:
@@ -82,6 +81,7 @@ class Truncation:
     def __init__(self, hierarchy: Hierarchy, contacts: list[Index]) -> None:
         self.hierarchy = hierarchy
         self.near: list[Near] = []
+        self.products: list[Product] = []
         slots = np.empty(0, dtype=np.int64)
         for k, level in enumerate(hierarchy.levels):
             if k < len(contacts):
@@ -95,12 +95,11 @@ class Truncation:
             self.near.append(near)
             if level.P is not None:
                 coarse = hierarchy.levels[k + 1].A
-                found = _parents(level.P, near, coarse)
-                slots = np.unique(found)
-                near.target = found  # places in data for now
-        for k in range(len(self.near) - 1):
-            near = self.near[k]
-            near.target = np.searchsorted(self.near[k + 1].slots, near.target).astype(np.int32)
+                self.products.append(Product.of(level.P, near, coarse))
+                slots = np.unique(self.products[-1].target)
+        for k, product in enumerate(self.products):
+            places = np.searchsorted(self.near[k + 1].slots, product.target)
+            product.target = places.astype(np.int32)
 
     def change(self, k: int, contacts: ContactNodes, V: Array, W: Array, L: Array) -> Array:
         """D on level k, (m, 3, 3), for contacts at nodes of that level."""
@@ -117,14 +116,9 @@ class Truncation:
         levels = self.hierarchy.levels
         for j in range(k, len(levels) - 1):
             coarse = np.zeros_like(self.near[j + 1].base)
-            P, near = levels[j].P, self.near[j]
+            P, product = levels[j].P, self.products[j]
             assert P is not None
-            if len(P.blocks):
-                _galerkin_blocks(P.indptr, P.blocks, near.row, near.column, near.target,
-                                 change, coarse)  # fmt: skip
-            else:
-                _galerkin(P.indptr, P.weights, near.row, near.column, near.target, change,
-                          coarse)  # fmt: skip
+            product.apply(P, self.near[j], change, coarse)
             self.near[j + 1].mask(coarse)
             self.near[j + 1].put(levels[j + 1].A, coarse)
             change = coarse
@@ -135,7 +129,10 @@ class Truncation:
         A, near = self.hierarchy.levels[k].A, self.near[k]
         matrix = A.dense().reshape(A.nodes, 3, A.nodes, 3)
         np.add.at(matrix, (near.row, slice(None), near.column), change)
-        inverse = np.linalg.pinv(matrix.reshape(3 * A.nodes, 3 * A.nodes), rcond=SMALL)
+        whole = matrix.reshape(3 * A.nodes, 3 * A.nodes)
+        size = np.abs(A.data[A.diagonal()]).max(axis=(1, 2))
+        index = np.arange(A.nodes)
+        inverse = inverse_at_rest(whole, matrix[index, :, index, :], size)
         return (inverse @ b.reshape(-1)).reshape(b.shape)
 
     def restore(self) -> None:
@@ -168,30 +165,74 @@ def _places(indptr, indices, inside):
     return out
 
 
-def _parents(P: Transfer, near: Near, coarse: NodeBlocks) -> Index:
-    """Place in the coarse data of every pair of parents of every entry."""
-    counts = np.diff(P.indptr).astype(np.int64)
-    total = int((counts[near.row] * counts[near.column]).sum())
-    places = _parent_places(
-        P.indptr, P.indices, near.row, near.column, coarse.indptr, coarse.indices, total
-    )
-    if places.min(initial=0) < 0:
-        raise Breakdown("contact multigrid: a coarse matrix lacks couplings near the contact")
-    return places
+@dataclass(eq=False)
+class Product:
+    """Where the terms of P^T D P go: first half = D P, then P^T half.
+
+    half (t,): for every entry and every parent of its column, the entry of D P; row (h,): the
+    fine rows of these; target: for every entry of D P and every parent of its row, the entry of
+    the coarse Near.
+    """
+
+    half: NDArray[np.int32]
+    row: NDArray[np.int32]
+    target: NDArray[np.int32]
+
+    @classmethod
+    def of(cls, P: Transfer, near: Near, coarse: NodeBlocks) -> Product:
+        """With targets as places in the data of the coarse matrix for now."""
+        counts = np.diff(P.indptr).astype(np.int64)
+        half, row, column = _first_half(
+            P.indptr, P.indices, near.row, near.column, int(counts[near.column].sum()), P.coarse
+        )
+        places = _second_half(P.indptr, P.indices, row, column, coarse.indptr, coarse.indices,
+                              int(counts[row].sum()))  # fmt: skip
+        if places.min(initial=0) < 0:
+            raise Breakdown("contact multigrid: a coarse matrix lacks couplings near contacts")
+        return cls(half, row, places)
+
+    def apply(self, P: Transfer, near: Near, change: Array, coarse: Array) -> None:
+        """coarse += P^T change P."""
+        half = np.zeros((len(self.row), 3, 3))
+        if len(P.blocks):
+            _half_blocks(P.indptr, P.blocks, near.column, self.half, change, half)
+            _rest_blocks(P.indptr, P.blocks, self.row, self.target, half, coarse)
+        else:
+            _half(P.indptr, P.weights, near.column, self.half, change, half)
+            _rest(P.indptr, P.weights, self.row, self.target, half, coarse)
 
 
 @njit(cache=True)
-def _parent_places(p_ptr, p_idx, row, column, indptr, indices, total):  # noqa: PLR0913
+def _first_half(p_ptr, p_idx, row, column, total, coarse):  # noqa: PLR0913
+    half = np.empty(total, np.int32)
+    rows, columns = np.empty(total, np.int32), np.empty(total, np.int32)
+    mark = np.full(coarse, -1, np.int64)
+    at, count, first = 0, 0, 0
+    for e in range(len(row)):
+        if e > 0 and row[e] != row[e - 1]:
+            first = count
+        j = column[e]
+        for b in range(p_ptr[j], p_ptr[j + 1]):
+            parent = p_idx[b]
+            if mark[parent] < first:
+                mark[parent] = count
+                rows[count], columns[count] = row[e], parent
+                count += 1
+            half[at] = mark[parent]
+            at += 1
+    return half, rows[:count].copy(), columns[:count].copy()
+
+
+@njit(cache=True)
+def _second_half(p_ptr, p_idx, row, column, indptr, indices, total):  # noqa: PLR0913
     out = np.empty(total, np.int64)
     at = 0
-    for e in range(len(row)):
-        i, j = row[e], column[e]
-        for a in range(p_ptr[i], p_ptr[i + 1]):
+    for h in range(len(row)):
+        for a in range(p_ptr[row[h]], p_ptr[row[h] + 1]):
             first, last = indptr[p_idx[a]], indptr[p_idx[a] + 1]
-            for b in range(p_ptr[j], p_ptr[j + 1]):
-                place = first + np.searchsorted(indices[first:last], p_idx[b])
-                out[at] = place if place < last and indices[place] == p_idx[b] else -1
-                at += 1
+            place = first + np.searchsorted(indices[first:last], column[h])
+            out[at] = place if place < last and indices[place] == column[h] else -1
+            at += 1
     return out
 
 
@@ -226,38 +267,58 @@ def _change(row, column, base, V, W, L, out):  # noqa: PLR0913
 
 
 @njit(cache=True, error_model="numpy")
-def _galerkin(p_ptr, weights, row, column, target, change, coarse):  # noqa: PLR0913
+def _half(p_ptr, weights, column, place, change, half):  # noqa: PLR0913
     at = 0
-    for e in range(len(row)):
-        i, j = row[e], column[e]
-        for a in range(p_ptr[i], p_ptr[i + 1]):
-            for b in range(p_ptr[j], p_ptr[j + 1]):
-                w, t = weights[a] * weights[b], target[at]
-                at += 1
-                for m in range(3):
-                    for n in range(3):
-                        coarse[t, m, n] += w * change[e, m, n]
+    for e in range(len(column)):
+        j = column[e]
+        for b in range(p_ptr[j], p_ptr[j + 1]):
+            w, t = weights[b], uint64(place[at])
+            at += 1
+            for m in range(3):
+                for n in range(3):
+                    half[t, m, n] += w * change[e, m, n]
 
 
 @njit(cache=True, error_model="numpy")
-def _galerkin_blocks(p_ptr, blocks, row, column, target, change, coarse):  # noqa: PLR0913
+def _rest(p_ptr, weights, row, place, half, coarse):  # noqa: PLR0913
     at = 0
-    half = np.empty((3, 3))
-    for e in range(len(row)):
-        i, j = row[e], column[e]
+    for h in range(len(row)):
+        i = row[h]
         for a in range(p_ptr[i], p_ptr[i + 1]):
-            Q = blocks[a]
+            w, t = weights[a], uint64(place[at])
+            at += 1
             for m in range(3):
                 for n in range(3):
-                    half[m, n] = (
-                        Q[0, m] * change[e, 0, n] + Q[1, m] * change[e, 1, n]
-                        + Q[2, m] * change[e, 2, n]
+                    coarse[t, m, n] += w * half[h, m, n]
+
+
+@njit(cache=True, error_model="numpy")
+def _half_blocks(p_ptr, blocks, column, place, change, half):  # noqa: PLR0913
+    at = 0
+    for e in range(len(column)):
+        j = column[e]
+        for b in range(p_ptr[j], p_ptr[j + 1]):
+            R, t = blocks[b], uint64(place[at])
+            at += 1
+            for m in range(3):
+                for n in range(3):
+                    half[t, m, n] += (
+                        change[e, m, 0] * R[0, n] + change[e, m, 1] * R[1, n]
+                        + change[e, m, 2] * R[2, n]
                     )  # fmt: skip
-            for b in range(p_ptr[j], p_ptr[j + 1]):
-                R, t = blocks[b], target[at]
-                at += 1
-                for m in range(3):
-                    for n in range(3):
-                        coarse[t, m, n] += (
-                            half[m, 0] * R[0, n] + half[m, 1] * R[1, n] + half[m, 2] * R[2, n]
-                        )
+
+
+@njit(cache=True, error_model="numpy")
+def _rest_blocks(p_ptr, blocks, row, place, half, coarse):  # noqa: PLR0913
+    at = 0
+    for h in range(len(row)):
+        i = row[h]
+        for a in range(p_ptr[i], p_ptr[i + 1]):
+            Q, t = blocks[a], uint64(place[at])
+            at += 1
+            for m in range(3):
+                for n in range(3):
+                    coarse[t, m, n] += (
+                        Q[0, m] * half[h, 0, n] + Q[1, m] * half[h, 1, n]
+                        + Q[2, m] * half[h, 2, n]
+                    )  # fmt: skip
