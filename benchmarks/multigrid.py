@@ -1,0 +1,231 @@
+"""Contact multigrid on the Coulomb cube of hueeber2008, against one linear elasticity solve.
+
+    python benchmarks/multigrid.py [--levels 3,4,5,6] [--repeats 3]
+
+Linear solve: the cube with its contact face clamped, conjugate gradients with one V(1,1) cycle
+of `GeometricMultigrid`, zero start, to the same relative residual.  Contact: the whole of
+`drive(problem, ContactMultigrid())`, cold start, the nested start and all evaluations of the
+judge included.  Levels, node blocks and what else depends on the matrices alone are prepared
+before on both sides; compiled code is warm.  CPU seconds of one thread, best of the repeats.
+
+Writes results/multigrid.md and results/multigrid.json beside this file.
+"""
+
+import os
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import argparse
+import json
+import resource
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from machine import describe
+
+import amontons as am
+from amontons.solve import drive
+
+HERE = Path(__file__).parent
+REFERENCE = json.loads((HERE.parent / "tests/data/cube.json").read_text())
+TOLERANCES = (1e-8, 1e-10)
+FRICTION = (0.1, 0.3, 1.0, 3.0)
+
+
+def cube(level, mu=1.0, clamped=False):
+    """The model with 2^level elements an edge; clamped: the contact face held too."""
+    supports = [am.Fix("top", lambda x: (0, 0.2, 0.06 - 0.15 * x[0]))]
+    if clamped:  # a contact that never closes, for the model to have one
+        supports.append(am.Fix("bottom", (0, 0, 0)))
+    on, below = ("left", -10) if clamped else ("bottom", 0)
+    obstacle = am.Plane((0, 0, 1), (0, 0, below))
+    return am.Model(
+        [am.Body(am.box((1, 1, 1), cells=2**level), am.LinearElastic(young=200, poisson=0.3))],
+        supports=supports,
+        contacts=[am.Contact(on, obstacle, mu=mu)],
+    )
+
+
+def stacked(cells, method="mortar"):
+    """Two blocks whose meshes do not match, pressed and dragged."""
+    lower = am.box((1, 1, 0.5), cells=(6 * cells, 6 * cells, 2 * cells))
+    upper = am.box((0.8, 0.8, 0.5), (4 * cells, 4 * cells, 2 * cells), origin=(0.1, 0.1, 0.5))
+    return am.Model(
+        [am.Body(lower, am.LinearElastic(80, 0.3), "lower"),
+         am.Body(upper, am.LinearElastic(50, 0.2), "upper")],
+        supports=[am.Fix("lower.bottom", (0, 0, 0)), am.Fix("upper.top", (0.02, 0, -0.03))],
+        contacts=[am.Contact("upper.bottom", master="lower.top", mu=0.3, method=method)],
+    )  # fmt: skip
+
+
+def best(repeats, run):
+    """(CPU seconds, result) of the quickest of some runs; one more run before warms up."""
+    run()
+    times = []
+    for _ in range(repeats):
+        started = time.process_time()
+        result = run()
+        times.append(time.process_time() - started)
+    return min(times), result
+
+
+def linear(problem, levels, repeats):
+    """Seconds and iterations to every tolerance of one linear solve."""
+    factor = am.GeometricMultigrid(levels, dimension=problem.dimension).factor(
+        problem.M, problem.near_nullspace
+    )
+    out = {}
+    for tolerance in TOLERANCES:
+        factor.options = am.GeometricMultigrid(tolerance=tolerance)
+        before = factor.iterations
+        seconds, _ = best(repeats, lambda: factor.solve(problem.f))
+        out[tolerance] = (seconds, (factor.iterations - before) // (repeats + 1))
+    return out
+
+
+def contact(problem, tolerance, repeats, **options):
+    """Seconds and solution of the whole contact solve, from matrices prepared before."""
+    solver = am.ContactMultigrid(**options)
+    return best(repeats, lambda: drive(replace(problem), solver, tolerance=tolerance))
+
+
+def cube_row(level, repeats, algebraic=False):
+    """Everything on one level; algebraic: without the levels of the mesh."""
+    clamped = cube(level, clamped=True).assemble()
+    reference = linear(clamped, () if algebraic else clamped.levels, repeats)
+    del clamped
+    model = cube(level)
+    problem = model.assemble()
+    if algebraic:
+        problem = replace(problem, levels=(), guess=None, _shared={})
+    row = {"level": level, "unknowns": problem.unknowns, "contacts": problem.contacts}
+    for tolerance in TOLERANCES:
+        seconds, solution = contact(problem, tolerance, repeats)
+        linear_seconds, iterations = reference[tolerance]
+        row[f"{tolerance:.0e}"] = {
+            "linear_seconds": linear_seconds, "linear_iterations": iterations,
+            "seconds": seconds, "cycles": solution.convergence.iterations,
+            "ratio": seconds / linear_seconds, "error": solution.convergence.error,
+            "outcome": solution.convergence.outcome.name.lower(),
+        }  # fmt: skip
+    slip, stick = solution.counts["slip"], solution.counts["stick"]
+    row |= {"contact": slip + stick, "slip": slip}
+    row["resultant"] = [float(x) for x in model.recover(solution).resultant]
+    row["peak_gb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+    return row
+
+
+def stacked_row(cells, repeats):
+    """Two bodies against one linear solve of both, not in contact."""
+    problem = stacked(cells).assemble()
+    reference = linear(problem, problem.levels, repeats)
+    row = {"unknowns": problem.unknowns, "contacts": problem.contacts}
+    for tolerance in TOLERANCES:
+        seconds, solution = contact(problem, tolerance, repeats)
+        row[f"{tolerance:.0e}"] = {
+            "linear_iterations": reference[tolerance][1],
+            "cycles": solution.convergence.iterations,
+            "ratio": seconds / reference[tolerance][0],
+            "outcome": solution.convergence.outcome.name.lower(),
+        }
+    return row
+
+
+def friction_rows(level):
+    """Cycles for some friction coefficients."""
+    problem = cube(level).assemble()
+    rows = []
+    for mu in FRICTION:
+        found = [
+            drive(problem.with_mu(mu), am.ContactMultigrid(), tolerance=t) for t in TOLERANCES
+        ]
+        rows.append({
+            "mu": mu, "counts": found[-1].counts,
+            "cycles": [s.convergence.iterations for s in found],
+            "outcomes": [s.convergence.outcome.name.lower() for s in found],
+        })  # fmt: skip
+    return rows
+
+
+def page(record):
+    """The results as Markdown."""
+    machine = "; ".join(f"{k} {v}" for k, v in record["machine"].items())
+    lines = ["# Contact multigrid against one linear solve", ""]
+    lines += [f"Regenerate: `python benchmarks/multigrid.py`.  {machine}.", "", _text(), ""]
+    lines += _cube_table(record["cube"], "## The Coulomb cube, levels of the mesh")
+    lines += _cube_table(record["algebraic"], "## Without levels: smoothed aggregation")
+    lines += [f"## Friction, level {record['friction_level']}", ""]
+    lines += ["| mu | open / slip / stick | cycles to 1e-8 | to 1e-10 |", "|---|---|---|---|"]
+    for row in record["friction"]:
+        counts = " / ".join(str(row["counts"][k]) for k in ("open", "slip", "stick"))
+        cycles = " | ".join(
+            f"{c}" if o == "converged" else o
+            for c, o in zip(row["cycles"], row["outcomes"], strict=True)
+        )
+        lines.append(f"| {row['mu']} | {counts} | {cycles} |")
+    lines += ["", "## Two bodies, dual mortar on meshes that do not match", "",
+              "| unknowns | contacts | to | linear iterations | cycles | ratio |",
+              "|---|---|---|---|---|---|"]  # fmt: skip
+    for row in record["mortar"]:
+        for tolerance in TOLERANCES:
+            part = row[f"{tolerance:.0e}"]
+            lines.append(
+                f"| {row['unknowns']} | {row['contacts']} | {tolerance:.0e} | "
+                f"{part['linear_iterations']} | {part['cycles']} | {part['ratio']:.2f} |"
+            )
+    return "\n".join(lines) + "\n"
+
+
+def _text():
+    return " ".join(__doc__.split("\n\n")[2].split())
+
+
+def _cube_table(rows, title):
+    lines = [title, "",
+             "| level | unknowns | contact / slip | reference | resultant off | to | linear: "
+             "iterations, s | contact: cycles, s | ratio |", "|" + "---|" * 9]  # fmt: skip
+    for row in rows:
+        reference = REFERENCE.get(f"level{row['level']}")
+        expected, off = "-", "-"
+        if reference:
+            expected = f"{reference['contact']} / {reference['slip']}"
+            plane = np.array(reference["resultant"])
+            off = (
+                f"{np.abs(np.array(row['resultant']) - plane).max() / np.abs(plane).max():.0e}"
+            )
+        for tolerance in TOLERANCES:
+            part = row[f"{tolerance:.0e}"]
+            lines.append(
+                f"| {row['level']} | {row['unknowns']} | {row['contact']} / {row['slip']} | "
+                f"{expected} | {off} | {tolerance:.0e} | {part['linear_iterations']}, "
+                f"{part['linear_seconds']:.3g} | {part['cycles']}, {part['seconds']:.3g} | "
+                f"{part['ratio']:.2f} |"
+            )
+    return [*lines, ""]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--levels", default="1,2,3,4,5,6")
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--friction-level", type=int, default=5)
+    given = parser.parse_args()
+    levels = [int(x) for x in given.levels.split(",")]
+    cube_row(2, 1)  # compile
+    record = {"machine": describe(), "friction_level": given.friction_level}
+    record["cube"] = [cube_row(level, given.repeats) for level in levels]
+    record["algebraic"] = [
+        cube_row(level, given.repeats, algebraic=True) for level in levels if 3 <= level <= 5
+    ]
+    record["friction"] = friction_rows(given.friction_level)
+    record["mortar"] = [stacked_row(cells, given.repeats) for cells in (2, 4)]
+    (HERE / "results/multigrid.json").write_text(json.dumps(record, indent=1) + "\n")
+    text = page(record)
+    (HERE / "results/multigrid.md").write_text(text)
+    print(text)
+
+
+if __name__ == "__main__":
+    main()
