@@ -67,10 +67,11 @@ ALONE_SMALL: tuple[tuple[Solver, int], ...] = (
     (SemismoothNewton(function=JeanMoreau()), 15),
 )
 ALONE: tuple[tuple[Solver, int], ...] = (
-    (SmoothingNewton(), PATIENCE),
+    (SmoothingNewton(batch=5), 6),
     (ProximalPoint(), 25),
     (InteriorPoint(), 8),
-    (GaussSeidel(batch=500), 4),
+    (GaussSeidel(batch=2000, relaxation=1.3), 40),
+    (GaussSeidel(batch=2000, relaxation=0.9), 40),
 )
 
 
@@ -107,7 +108,8 @@ class Portfolio:
             if round_ and self.problem.contacts <= SEMISMOOTH_CONTACTS:
                 yield from self._semismooth(steps=15)
             yield from self._patient_sweeps()
-            yield from self._alone(round_)
+            if round_ % 2 == 0:
+                yield from self._alone(round_)
 
     # ---------------------------------------------------------------- stages
     def _sweeping(self) -> Iterator[Iterate]:

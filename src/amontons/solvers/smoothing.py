@@ -44,6 +44,7 @@ from .sweeps import sweep_data, sweep_inplace
 
 Array = NDArray[np.float64]
 PINNED = 1e16  # relative stiffness that keeps r_T = 0 where mu = 0
+SMALLEST = 1e-18  # smoothing relative to |q|, far below rounding; smaller ones become denormal
 
 
 @njit(cache=True, error_model="numpy")
@@ -188,7 +189,10 @@ def newton_inplace(  # noqa: PLR0913
     count = last_gain = 0
     milestone = best
     root = math.sqrt(nc)
-    floor = 1e-3 * goal / root
+    size = 0.0
+    for i in range(nc):
+        size += q[i, 0] ** 2 + q[i, 1] ** 2 + q[i, 2] ** 2
+    floor = max(1e-3 * goal, SMALLEST * math.sqrt(size)) / root
     value = _merit(x, u, mu, rho, sigma)
     recent = np.full(4, value)
     while count < steps and best > goal and count - last_gain <= patience:
