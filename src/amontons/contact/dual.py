@@ -39,12 +39,19 @@ def dual_functions(mass: Array, kept: Mask, real: Mask) -> Array:
     return weight[:, :, None] * np.where(both, inverse, 0.0) @ shared
 
 
-def nodes_with_multiplier(nodes: Index, real: Mask, unwanted: Mask) -> Mask:
-    """Which nodes (n,) carry a multiplier: all but the unwanted that have a neighbour to do so.
+def nodes_with_multiplier(
+    nodes: Index, real: Mask, held: Mask, hardly: Mask, reached: Array
+) -> Mask:
+    """Which nodes (n,) carry a multiplier: on each facet that takes part at least one.
 
-    nodes (f, a) of the facets that take part; a facet of unwanted nodes only keeps them.
+    nodes (f, a) of these facets; held (n,) by supports and hardly (n,) covered: unwanted, but
+    where facets have no others held ones carry it, else the node with the largest part
+    reached (n,) of its weight.
     """
-    kept = ~unwanted
+    kept = ~held & ~hardly
     alone = ~(kept[nodes] & real).any(axis=1)
-    kept[nodes[alone][real[alone]]] = True
+    kept[nodes[alone][(real & ~hardly[nodes])[alone]]] = True
+    alone = ~(kept[nodes] & real).any(axis=1)
+    best = np.where(real, reached[nodes], -1.0)[alone].argmax(axis=1)
+    kept[nodes[alone][np.arange(len(best)), best]] = True
     return kept

@@ -145,8 +145,8 @@ class _Average:
         n = len(surface.points)
         nodes, real = surface.nodes[facets], surface.real[facets]
         whole = nodal_weights(surface.points, surface.blocks)
-        hardly = _scatter(n, nodes, mass.sum(axis=2)) < HARDLY * whole
-        kept = nodes_with_multiplier(nodes, real, held | hardly)
+        reached = _scatter(n, nodes, mass.sum(axis=2)) / np.where(whole > 0, whole, 1.0)
+        kept = nodes_with_multiplier(nodes, real, held, reached < HARDLY, reached)
         psi = dual_functions(mass, kept[nodes] & real, real)
         chosen = np.unique(nodes[kept[nodes] & real])
         product = _between(nodes, psi @ mass, nodes, (n, n))[chosen]
