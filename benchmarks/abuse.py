@@ -398,6 +398,7 @@ def main() -> None:
     runs = abuse_all(options.problems, options.seed, limit=options.limit)
     page = report(runs, f"python benchmarks/abuse.py --problems {options.problems} "
                   f"--seed {options.seed} --limit {options.limit:g}")  # fmt: skip
+    options.output.mkdir(parents=True, exist_ok=True)
     (options.output / "abuse.md").write_text(page)
     rows = [[_short(value) for value in asdict(run).values()] for run in runs]
     lines = ",\n".join(json.dumps(row) for row in rows)
