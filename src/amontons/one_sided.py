@@ -82,6 +82,7 @@ def one_sided(problem: FrictionProblem) -> OneSided | None:
     if basis is None:
         return None
     M, H, dofs, frames, coupling = basis
+    assert problem.f is not None
     plain = OneSided(M, H, problem.f, dofs, frames, problem.levels,
                      problem.near_nullspace, coupling)  # fmt: skip
     if coupling is None:

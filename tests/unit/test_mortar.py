@@ -440,3 +440,15 @@ def test_closed_surfaces():
     assert found.all()
     np.testing.assert_allclose(rows.gap, 0.02, atol=3e-4)  # facets alone: 1e-2
     np.testing.assert_allclose(rows.weights.sum(), 42 * np.sin(np.pi / 21), rtol=1e-3)
+
+
+def test_forces_balance_the_load_of_a_body_held_by_contact_alone():
+    """Also on a rim where some nodes have no multiplier and others act on them."""
+    low, high = blocks_apart(3, (0.23, 0.1), 4, 3)
+    bodies = [am.Body(low, RUBBER, name="lower"), am.Body(high, RUBBER, name="upper")]
+    contact = am.Contact("upper.bottom", master="lower.top", mu=0.3, method="mortar")
+    load = am.Traction("upper.top", (0.05, 0.02, -1))
+    model = am.Model(bodies, [am.Fix("lower.bottom", 0)], [contact], [load])
+    assert len(model.discretisation.placed[0].rows.nodes) == 12
+    solution = am.drive(model.assemble(), tolerance=1e-10)
+    np.testing.assert_allclose(model.recover(solution).resultant, (-0.05, -0.02, 1), atol=1e-8)

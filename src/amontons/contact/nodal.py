@@ -6,6 +6,7 @@ shape function over the surface, it is a traction.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,12 +38,29 @@ class ContactRows:
     frames: Array
     H: sparse.csc_array
 
+    def force(self, r: Array) -> Array:
+        """Forces on the slave in global axes, (nc, d), of reactions r (nc, d) in the frames.
+
+        Averages may act on several nodes: their sum, so that all forces balance the loads.
+        """
+        nc, d = r.shape
+        rows = self.H.tocsr()
+        sums = np.stack([np.asarray(rows[c::d].sum(axis=0)).ravel() for c in range(d)], axis=1)
+        return np.einsum("pkc,pk->pc", sums.reshape(nc, d, d), r)
+
     def at(self, kept: NDArray[np.bool_]) -> ContactRows:
         """A selection of these contacts."""
         columns = np.repeat(kept, self.points.shape[1])
         return ContactRows(self.nodes[kept], self.points[kept], self.weights[kept],
                            self.gap[kept], self.frames[kept],
                            sparse.csc_array(self.H[:, columns]))  # fmt: skip
+
+
+def forces(pairs: Sequence[ContactRows], r: Array) -> Array:
+    """Forces on the slaves in global axes, (nc, d), of the reactions r of several pairs."""
+    ends = np.cumsum([len(rows.nodes) for rows in pairs])[:-1]
+    parts = zip(pairs, np.split(r, ends), strict=True)
+    return np.concatenate([rows.force(part) for rows, part in parts])
 
 
 def nodal_contact(mesh: Mesh, surface: str, obstacle: Obstacle) -> ContactRows:

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..contact import forces
 from ..errors import InvalidInput
 from ..model import ContactFields, Fix, Model
 from ..model.assembly import locate, prescribed_values
@@ -112,7 +113,7 @@ class TimeStep:
         rows = [p.rows for p in placed]
         frames = np.concatenate([r.frames for r in rows])
         weights = np.concatenate([r.weights for r in rows])
-        force = np.einsum("ik,ikc->ic", self.state.force, frames)
+        force = forces(rows, self.state.force)
         traction = self.state.force / weights[:, None]
         return ContactFields(
             displacement=self.displacement, points=np.concatenate([r.points for r in rows]),
@@ -131,7 +132,7 @@ class TimeStep:
         total = np.zeros(self.model.dimension)
         for k in range(len(placed)) if pairs is None else pairs:
             force = self.state.force[ends[k] : ends[k + 1]]
-            total += np.einsum("ik,ikc->c", force, placed[k].rows.frames)
+            total += placed[k].rows.force(force).sum(axis=0)
         return total
 
     def __str__(self) -> str:

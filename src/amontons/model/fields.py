@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..contact import forces
 from ..errors import InvalidInput
 from ..fem import Facets
 from ..solution import FrictionSolution
@@ -66,7 +67,7 @@ def recover_fields(
         )
     v = solution.v
     weights = np.concatenate([r.weights for r in rows])
-    force = np.einsum("ik,ikc->ic", solution.r, frames)
+    force = forces(rows, solution.r)
     traction = solution.r / weights[:, None]
     return ContactFields(
         displacement=_by_body(bodies, parts, v, factor),
