@@ -11,16 +11,23 @@ from collections.abc import Callable
 from pathlib import Path
 
 import click
+import numpy as np
 
+import amontons as am
 from amontons.errors import AmontonsError
 from amontons.files import replacing
 from benchmarks.machine import describe
 
-from . import cube, figures, tables
+from . import bodies, cube, figures, tables
 from .runs import Run
 
 HERE = Path(__file__).parent
-PARTS = ("table4.1", "table4.2", "table4.3", "figure4.3", "table5.1", "newton")
+CUBE = ("table4.1", "table4.2", "table4.3", "figure4.3", "table5.1", "newton")
+PARTS = (*CUBE, "table6.1", "section6", "section7")
+FIGURES = (
+    "4.1", "4.2", "4.3", "5.1a", "5.1b", "5.2", "5.3", "6.1", "6.2", "6.3-0.2", "6.3-0.4",
+    "6.3-0.6", "6.4", "6.5", "6.6a", "6.6b", "7.1", "7.2a", "7.2b", "7.3",
+)  # fmt: skip
 REFERENCE = json.loads((HERE / "reference.json").read_text())
 RESULTANTS = HERE.parents[1] / "tests/data/cube.json"
 
@@ -36,8 +43,9 @@ def main(parts: tuple[str, ...], levels: str, results: Path | None) -> None:
     r"""Active sets and multigrid for contact with friction, as in the paper of 2008.
 
     \b
-    PART is one of table4.1, table4.2, table4.3, figure4.3, table5.1, newton; all of them by
-    default.  Numbers of other parts stay as they are stored.
+    PART is one of table4.1, table4.2, table4.3, figure4.3, table5.1, newton (the cube),
+    table6.1, section6 (the shell, up to level 3), section7 (ring and tool, coarse up to level
+    2); all of them by default.  Numbers of other parts stay as they are stored.
     """
     for part in parts:
         if part not in PARTS:
@@ -93,8 +101,11 @@ def page(record: dict) -> str:
         lines += tables.resultants(record["table5.1"]["zero"], known)
     if {"newton", "table5.1"} <= record.keys():
         lines += tables.newton(record["newton"], record["table5.1"]["zero"])
-    for name in ("figure4.2", "figure4.3", "figure5.1", "figure5.2", "figure5.3"):
-        lines += [f"![{name}]({name}.png)", ""]
+    if "table6.1" in record:
+        lines += tables.table61(record["table6.1"], REFERENCE["table6.1"])
+    if "section7" in record:
+        lines += tables.section7(record["section7"])
+    lines += [f"![Figure {name}](figure{name}.png)\n" for name in FIGURES]
     return "\n".join(lines)
 
 
@@ -105,10 +116,20 @@ def _records(runs: dict[str, Run]) -> dict:
 def _table41(levels: list[int], out: Path) -> dict:
     runs = cube.table41(levels)
     last = levels[-1]
-    figures.status(
-        runs[str(last)].solution, cube.contact_points(last), last, out / "figure4.2.png"
-    )
+    _cube_figures(runs[str(last)].solution, last, out / "figure4.2.png", out / "figure4.1.png")
     return _records(runs)
+
+
+def _cube_figures(
+    solution: am.FrictionSolution, level: int, contact: Path, deformed: Path
+) -> None:
+    """Status of the nodes and the deformed cube, both on the face z = 0."""
+    points = cube.contact_points(level)[:, :2]
+    figures.status(
+        cube.model(level), solution, points, np.eye(3)[:2], 1.5 * 2.0**-level, contact,
+        ((0.55, 1.02), (0.55, 1.02)),
+    )  # fmt: skip
+    figures.deformed(cube.model(level), solution, deformed)
 
 
 def _table42(levels: list[int], out: Path) -> dict:
@@ -135,8 +156,8 @@ def _table51(levels: list[int], out: Path) -> dict:
         }  # fmt: skip
     last = levels[-1]
     solution, points = runs["zero"][str(last)].solution, cube.contact_points(last)
-    figures.status(solution, points, last, out / "figure5.2.png")
-    figures.bound(solution, points, out / "figure5.1.png")
+    _cube_figures(solution, last, out / "figure5.2.png", out / "figure5.1a.png")
+    figures.bound(solution, points, out / "figure5.1b.png")
     figures.sets(runs["zero"], out / "figure5.3.png")
     return record
 
@@ -147,7 +168,8 @@ def _newton(levels: list[int], out: Path) -> dict:
 
 WORK: dict[str, Callable[[list[int], Path], dict]] = {
     "table4.1": _table41, "table4.2": _table42, "table4.3": _table43, "figure4.3": _figure43,
-    "table5.1": _table51, "newton": _newton,
+    "table5.1": _table51, "newton": _newton, "table6.1": bodies.table61,
+    "section6": bodies.section6, "section7": bodies.section7,
 }  # fmt: skip
 
 if __name__ == "__main__":

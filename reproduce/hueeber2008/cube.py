@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 
 import amontons as am
+from amontons.solvers import Iterate
 
 from .runs import INEXACT, NESTED, Run, fixed_point, run
 
@@ -110,7 +111,7 @@ def figure43(level: int) -> dict[str, Run]:
     v = np.tile([1.0, 1.0, 0.0], problem.unknowns // 3)
     frames = np.concatenate([p.rows.frames for p in model(level).discretisation.placed])
     r = -np.einsum("kij,j->ki", frames, [-1.0, -1.0, 0.0])
-    start = am.solvers.Iterate(r, v)
+    start = Iterate(r, v)
     return {
         kind.value: run(problem, fixed_point(modification=kind), 1e-14, start=start, limit=40)
         for kind in MODIFICATIONS

@@ -1,4 +1,4 @@
-"""Figures 4.2, 4.3, 5.1 (right), 5.2 and 5.3 with our numbers."""
+"""The figures of the paper with our numbers."""
 
 from __future__ import annotations
 
@@ -9,56 +9,164 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 import amontons as am
+from amontons.fem import Cells, cell_stress, von_mises
 
 from . import cube
 from .runs import Run
 
 OPEN, SLIP, STICK = "#9aa5b1", "#d9480f", "#1c6dd0"
+DPI = 110
 STYLES = ("-", "--", ":")
 
 
-def tangents(level: int, rows: np.ndarray) -> np.ndarray:
-    """Local vectors (nc, 3) in x and y, (nc, 2), for the plane z = 0."""
-    frames = np.concatenate([p.rows.frames for p in cube.model(level).discretisation.placed])
-    return np.einsum("kij,ki->kj", frames[:, 1:], rows[:, 1:])[:, :2]
+Cut = tuple[tuple[float, float], tuple[float, float]] | None
 
 
-def status(solution: am.FrictionSolution, points: np.ndarray, level: int, path: Path) -> None:
-    """Nodes by status, slip as lines, traction as arrows: figures 4.2 and 5.2."""
-    slip, pull = tangents(level, solution.u), -tangents(level, solution.r)
+def in_plane(model: am.Model, rows: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    """Tangential local vectors (nc, 3) along two directions (nc, 2, 3): (nc, 2)."""
+    frames = np.concatenate([p.rows.frames for p in model.discretisation.placed])
+    vectors = np.einsum("kij,ki->kj", frames[:, 1:], rows[:, 1:])
+    return np.einsum("kaj,kj->ka", np.broadcast_to(axes, (len(rows), 2, 3)), vectors)
+
+
+def status(
+    model: am.Model, solution: am.FrictionSolution, points: np.ndarray, axes: np.ndarray,
+    scale: float, path: Path, cut: Cut, words: tuple[str, str] = ("x", "y"),
+) -> None:  # fmt: skip
+    """Nodes by status, slip as lines, traction as arrows: figures 4.2, 5.2, 6.2, 6.3, 7.2.
+
+    points (nc, 2) and axes (nc, 2, 3) or (2, 3): where nodes are drawn and along what; scale:
+    length of the longest line, and of the longest arrow.
+    """
+    slip, pull = in_plane(model, solution.u, axes), -in_plane(model, solution.r, axes)
     pressure = np.maximum(solution.r[:, 0], 0)
-    closed = solution.status != am.ContactStatus.OPEN
     size = 4 + 60 * pressure / max(pressure.max(), 1e-300)
+    closed = solution.status != am.ContactStatus.OPEN
+    moved = solution.sliding & (closed | isinstance(solution.problem.law, am.Tresca))
+    pulled = np.linalg.norm(pull, axis=1) > 1e-9 * max(np.abs(pull).max(), 1e-300)
     figure, both = plt.subplots(1, 2, figsize=(13, 6.4), width_ratios=(1.15, 1))
-    for axes, cut in zip(both, (None, ((0.55, 1.02), (0.55, 1.02))), strict=True):
-        big = 1.0 if cut is None else 4.0
-        for name, mask, colour in (
-            ("open, slides", ~closed & solution.sliding, "#c9b458"),
-            ("open", ~closed & ~solution.sliding, OPEN),
-            ("closed, slides", closed & solution.sliding, SLIP),
-            ("closed, sticks", closed & ~solution.sliding, STICK),
-        ):
+    for frame, shown in zip(both, (None, cut), strict=True):
+        for name, mask, colour in _kinds(solution, closed):
             if mask.any():
-                axes.scatter(*points[mask, :2].T, s=big * size[mask], color=colour,
-                             label=f"{name} ({mask.sum()})", zorder=2)  # fmt: skip
-        scale = 1.5 * 2.0**-level
-        line = slip * scale / max(np.linalg.norm(slip, axis=1).max(), 1e-300)
-        moved = solution.sliding & (closed | isinstance(solution.problem.law, am.Tresca))
-        ends = np.stack([points[moved, :2], points[moved, :2] + line[moved]], axis=1)
-        axes.add_collection(matplotlib.collections.LineCollection(ends, colors="0.15", lw=0.8))
-        arrows = np.linalg.norm(pull, axis=1) > 1e-9 * max(np.abs(pull).max(), 1e-300)
+                frame.scatter(*points[mask].T, s=(4 if shown else 1) * size[mask], color=colour,
+                              label=f"{name} ({mask.sum()})", zorder=2)  # fmt: skip
+        line = slip * scale / max(np.linalg.norm(slip[moved], axis=1).max(initial=0), 1e-300)
+        ends = np.stack([points[moved], points[moved] + line[moved]], axis=1)
+        frame.add_collection(matplotlib.collections.LineCollection(ends, colors="0.15", lw=0.9))
         unit = pull * scale / max(np.linalg.norm(pull, axis=1).max(), 1e-300)
-        axes.quiver(*points[arrows, :2].T, *unit[arrows].T, angles="xy", scale_units="xy",
-                    scale=1, width=0.0022, color="#2b8a3e", zorder=3)  # fmt: skip
-        axes.set(xlabel="x", aspect="equal", title="" if cut is None else "cut-out")
-        if cut is not None:
-            axes.set(xlim=cut[0], ylim=cut[1])
-    both[0].set_ylabel("y")
+        frame.quiver(*points[pulled].T, *unit[pulled].T, angles="xy", scale_units="xy",
+                     scale=1, width=0.0022, color="#2b8a3e", zorder=3)  # fmt: skip
+        wide, high = np.ptp(points, axis=0)
+        shape = "equal" if shown or wide < 3 * high else "auto"  # a belt would be a line
+        frame.set(xlabel=words[0], aspect=shape, title="cut-out" if shown else "")
+        if shown:
+            frame.set(xlim=shown[0], ylim=shown[1])
+    both[0].set_ylabel(words[1])
     both[0].legend(loc="upper center", bbox_to_anchor=(0.5, -0.08), ncol=4, frameon=False)
-    both[0].set_title("size: normal force; line: slip; arrow: traction on the plane")
-    figure.savefig(path, dpi=110, bbox_inches="tight")
+    both[0].set_title("size: normal force; line: slip; arrow: traction on the other side")
+    figure.savefig(path, dpi=DPI, bbox_inches="tight")
+    plt.close(figure)
+
+
+def _kinds(solution: am.FrictionSolution, closed: np.ndarray) -> list:
+    """(name, which, colour) of the kinds of nodes."""
+    sliding = solution.sliding
+    if not isinstance(solution.problem.law, am.Tresca):
+        sliding = sliding & closed  # an open node has nothing to slide against
+    return [
+        ("open, slides", ~closed & sliding, "#c9b458"), ("open", ~closed & ~sliding, OPEN),
+        ("closed, slides", closed & sliding, SLIP),
+        ("closed, sticks", closed & ~sliding, STICK),
+    ]  # fmt: skip
+
+
+def deformed(
+    model: am.Model, solution: am.FrictionSolution, path: Path,
+    view: tuple[float, float] = (22, -60), keep=None,
+) -> None:  # fmt: skip
+    """Surfaces of the deformed bodies coloured by von Mises stress: figures 4.1, 5.1, 6.1, 7.1.
+
+    keep(points) -> mask of cells by their centres: a cut through the bodies.
+    """
+    fields = model.recover(solution)
+    figure = plt.figure(figsize=(7, 5.4))
+    axes = figure.add_subplot(projection="3d")
+    patches, values = [], []
+    for body, moved in zip(model.bodies, fields.displacement, strict=True):
+        mesh = body.mesh
+        stress = von_mises(cell_stress(mesh, body.material, moved))
+        (block,) = mesh.cells
+        kept = np.ones(len(block.nodes), dtype=bool)
+        if keep is not None:
+            kept = keep(mesh.points[block.nodes].mean(axis=1))
+        nodal = np.zeros(len(mesh.points))
+        np.add.at(nodal, block.nodes, stress[:, None])
+        nodal /= np.bincount(block.nodes.ravel(), minlength=len(nodal))
+        used, local = np.unique(block.nodes[kept], return_inverse=True)
+        part = am.Mesh(mesh.points[used], (Cells("hex", local.reshape(-1, 8)),))
+        for facets in part.boundary:
+            nodes = used[facets.nodes]
+            patches.append((mesh.points + moved)[nodes])
+            values.append(nodal[nodes].mean(axis=1))
+    values = np.concatenate(values)
+    colours = plt.Normalize(0, np.quantile(values, 0.995))
+    faces = np.concatenate(patches)
+    axes.add_collection3d(
+        Poly3DCollection(faces, facecolors=plt.cm.viridis(colours(values)), edgecolors="0.3",
+                         linewidths=0.1)
+    )  # fmt: skip
+    low, high = faces.min(axis=(0, 1)), faces.max(axis=(0, 1))
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    axes.set_box_aspect(high - low)
+    axes.view_init(*view)
+    figure.colorbar(plt.cm.ScalarMappable(colours, "viridis"), ax=axes, shrink=0.7, pad=0.12,
+                    label="von Mises stress")  # fmt: skip
+    figure.savefig(path, dpi=DPI, bbox_inches="tight")
+    plt.close(figure)
+
+
+def radial(solutions: dict, radius: np.ndarray, path: Path) -> None:
+    """Normal and tangential traction and the bound over the distance: figure 6.4.
+
+    solutions: {mu: (solution, weights)}, radius (nc,).
+    """
+    figure, axes = plt.subplots(1, len(solutions), figsize=(4.4 * len(solutions), 3.8))
+    for frame, (mu, (solution, weights)) in zip(
+        np.atleast_1d(axes), solutions.items(), strict=True
+    ):
+        normal = solution.r[:, 0] / weights
+        shear = np.linalg.norm(solution.r[:, 1:], axis=1) / weights
+        frame.plot(radius, normal, ".", ms=4, color=STICK, label="$\\lambda_n$")
+        frame.plot(radius, shear, ".", ms=4, color=SLIP, label="$|\\lambda_\\tau|$")
+        frame.plot(radius, float(mu) * normal, ".", ms=2, color="0.6", label="$F \\lambda_n$")
+        frame.set(xlabel="distance from the middle", title=f"F = {mu}")
+        frame.legend(frameon=False)
+    figure.tight_layout()
+    figure.savefig(path, dpi=DPI)
+    plt.close(figure)
+
+
+def newton(runs: dict[str, dict[str, Run]], path: Path) -> None:
+    """Relative error of lambda, fixed point against full Newton: figures 7.2 and 7.3.
+
+    runs: {title: {method: run}}.
+    """
+    figure, axes = plt.subplots(1, len(runs), figsize=(4.4 * len(runs), 3.8), squeeze=False)
+    for frame, (title, methods) in zip(axes[0], runs.items(), strict=True):
+        best = methods["newton"].iterates[-1].r
+        for (name, run), style in zip(methods.items(), ("-o", "--s"), strict=True):
+            error = np.array([np.linalg.norm(it.r - best) for it in run.iterates])
+            error /= np.linalg.norm(best)
+            shown = error > 0
+            frame.semilogy(np.flatnonzero(shown) + 1, error[shown], style, ms=3, label=name)
+        frame.set(xlabel="step k", title=title)
+        frame.legend(frameon=False)
+    axes[0, 0].set_ylabel("$|\\lambda^k - \\lambda^*| / |\\lambda^*|$")
+    figure.tight_layout()
+    figure.savefig(path, dpi=DPI)
     plt.close(figure)
 
 
@@ -77,7 +185,7 @@ def sets(runs: dict[str, Run], path: Path) -> None:
     for axes in grid.flat[len(runs) :]:
         axes.set_visible(False)
     figure.tight_layout()
-    figure.savefig(path, dpi=110)
+    figure.savefig(path, dpi=DPI)
     plt.close(figure)
 
 
@@ -98,7 +206,7 @@ def modifications(runs: dict[str, Run], level: int, path: Path) -> None:
         axes.set(xlabel="step k", title=title)
         axes.legend(frameon=False, title="modification")
     figure.tight_layout()
-    figure.savefig(path, dpi=110)
+    figure.savefig(path, dpi=DPI)
     plt.close(figure)
 
 
@@ -116,5 +224,5 @@ def bound(solution: am.FrictionSolution, points: np.ndarray, path: Path) -> None
     axes.set(xlabel="x", ylabel="y", zlabel="force at a node")
     axes.set_title("surface: $|\\lambda_\\tau|$; dots: friction bound")
     axes.view_init(28, -125)
-    figure.savefig(path, dpi=110, bbox_inches="tight")
+    figure.savefig(path, dpi=DPI, bbox_inches="tight")
     plt.close(figure)

@@ -112,3 +112,35 @@ def resultants(runs: Record, reference: Mapping[str, dict]) -> list[str]:
             f"{', '.join(f'{x:.6f}' for x in ours)} | {off} |"
         )
     return [*lines, ""]
+
+
+def table61(runs: Mapping[str, Mapping[str, Record]], paper: Mapping[str, dict]) -> list[str]:
+    """K_l and k_max of the shell for three coefficients of friction."""
+    friction = list(runs["zero"])
+    lines = []
+    for name in ("zero", "nested"):
+        heads = [f"{what}, F = {mu}" for what in ("K_l", "k_max") for mu in friction]
+        lines += [f"## Table 6.1, {name}: K_l and k_max, ours (paper)", ""]
+        lines += ["| level | " + " | ".join(heads) + " |", "|---" * (1 + len(heads)) + "|"]
+        for level in runs[name][friction[0]]:
+            found = [runs[name][mu][level] for mu in friction]
+            ours = [run["K"] for run in found] + [run["steps"] for run in found]
+            pairs = zip(ours, paper[name][level], strict=True)
+            lines.append(f"| {level} | " + " | ".join(f"{a} ({b})" for a, b in pairs) + " |")
+        lines.append("")
+    return lines
+
+
+def section7(runs: Mapping[str, Record]) -> list[str]:
+    """Steps of full Newton and of the fixed point with two bodies."""
+    title = "## Section 7: full Newton against the fixed point, to a change of 1e-9"
+    lines = [title, "",
+             "| example | steps, Newton | steps, fixed point | last changes of Newton | rate "
+             "of the fixed point |", "|---|---|---|---|---|"]  # fmt: skip
+    for name, both in runs.items():
+        newton, fixed = both["newton"], both["fixed-point"]
+        last = ", ".join(f"{x:.1e}" for x in newton["changes"][-4:])
+        tail = fixed["changes"][-5:]
+        rate = (tail[-1] / tail[0]) ** (1 / (len(tail) - 1))
+        lines.append(f"| {name} | {newton['steps']} | {fixed['steps']} | {last} | {rate:.2f} |")
+    return [*lines, ""]
