@@ -396,7 +396,7 @@ def write_fclib(
     description means the old text.  Raises UnsupportedForm for Tresca friction, which FCLib
     does not know.
     """
-    mu = problem.mu
+    mu, problem = problem.mu, problem.assembled()
     if solution is not None and solution.r.shape != (problem.contacts, problem.dimension):
         raise InvalidInput(
             f"solution: expected r of shape {(problem.contacts, problem.dimension)}, "

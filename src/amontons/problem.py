@@ -25,9 +25,10 @@ from .condensation import Condensation
 from .cones import Coulomb, Law, Tresca
 from .errors import InvalidInput, SingularOperator, UnsupportedForm
 from .judge import Measure
-from .linear import ConjugateGradient, Direct, Factor, LinearSolver
+from .linear import ConjugateGradient, Direct, Factor, GeometricMultigrid, LinearSolver
 from .linear.bodies import Bodies, BodyFactor
 from .linear.geometric import prepared
+from .linear.grid_matrix import GridMatrix
 from .linear.hierarchy import Hierarchy
 from .linear.levels import Levels, checked_levels
 from .linear.small_blocks import block_diagonal_inverse
@@ -102,7 +103,7 @@ class FrictionProblem:
         """
         law = _law(mu)
         nc = len(law.coefficient)
-        M, H = _sparse("M", M), _sparse("H", H)
+        M, H = M if isinstance(M, GridMatrix) else _sparse("M", M), _sparse("H", H)
         n = M.shape[0]
         _expect("M", M.shape, (n, n))
         f = _vector("f", f, (n,))
@@ -243,6 +244,8 @@ class FrictionProblem:
         self._need(Form.GLOBAL)
         M, modes = self.M, self.near_nullspace
         assert M is not None
+        if isinstance(M, GridMatrix):
+            return self._kept("factor", (M,), lambda: GeometricMultigrid().factor(M))  # type: ignore[arg-type]
         bodies = self.bodies
         largest = max((m.shape[1] for m in bodies.members), default=0)
         iterative = largest > DIRECT_LIMIT and modes is not None
@@ -250,6 +253,13 @@ class FrictionProblem:
             return self._kept("factor", (M,), lambda: bodies.factor(M))
         solver: LinearSolver = ConjugateGradient() if iterative else Direct()
         return self._kept("factor", (M,), lambda: solver.factor(M, modes))
+
+    def assembled(self) -> FrictionProblem:
+        """The same problem with M as a stored matrix, for solvers that need its entries."""
+        if not isinstance(self.M, GridMatrix):
+            return self
+        M = self.M
+        return replace(self, M=self._kept("stored", (M,), M.tocsc))
 
     @cached_property
     def bodies(self) -> Bodies:
@@ -277,7 +287,7 @@ class FrictionProblem:
 
     def solve_M(self, b: Array) -> Array:
         """M^-1 b, b of shape (n,) or (n, k)."""
-        inverse = self.small_blocks
+        inverse = None if isinstance(self.M, GridMatrix) else self.small_blocks
         return inverse @ b if inverse is not None else self.factor().solve(b)
 
     @property
@@ -292,6 +302,8 @@ class FrictionProblem:
         return self._kept("cheap", (self.M, self.H), self._condensing_is_cheap)
 
     def _condensing_is_cheap(self) -> bool:
+        if isinstance(self.M, GridMatrix):
+            return False
         if self.small_blocks is not None:
             return True
         if self.unknowns * self.contacts * self.dimension <= EXACT_WORK:
@@ -467,7 +479,9 @@ class FrictionProblem:
         touched = np.unique(self.H.indices // size)  # the blocks that H sees
         index = (touched[:, None] * size + np.arange(size)).ravel()
         H = sparse.csr_array(self.H)[index]
-        inverse = _node_blocks_inverse(self.M[:, index].tocsr()[index], size)
+        M = self.M
+        part = M.part(index) if isinstance(M, GridMatrix) else M[:, index].tocsr()[index]
+        inverse = _node_blocks_inverse(part, size)
         product = sparse.csc_array(inverse @ H)
         full = (sparse.csr_array(H.T) @ product).tobsr((d, d))
         out = np.zeros((self.contacts, d, d))

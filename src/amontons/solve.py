@@ -108,6 +108,8 @@ def drive(
             f"{type(solver).__name__} needs the {solver.form.value} form, the problem is "
             f"{problem_form}; use {hint}"
         )
+    if not getattr(solver, "matrix_free", False):
+        problem = problem.assembled()
     watch = _Watch(problem, tolerance)
     deadline = watch.started + (time_limit if time_limit is not None else np.inf)
     outcome, detail = _run(

@@ -33,6 +33,7 @@ def run(source: str, overrides: Sequence[str], json_copy: str | None) -> None:
 
 def describe(problem: FrictionProblem) -> dict[str, Any]:
     """Facts about a problem by name; W is looked at only where it is cheap to form."""
+    problem = problem.assembled()
     facts: dict[str, Any] = {
         "form": problem.form.value, "dimension": problem.dimension,
         "contacts": problem.contacts, "unknowns": problem.unknowns,

@@ -90,7 +90,7 @@ class MovingModel:
             self.motion.body, method.mass_damping, method.stiffness_damping, method.lumped
         )
         h, theta = method.step, method.theta
-        self.M, self.C, self.K = inertia.M, inertia.C, parts.K
+        self.M, self.C, self.K = inertia.M, inertia.C, parts.stored_stiffness
         self.M_hat = sparse.csr_array(self.M + theta * h * self.C + theta**2 * h**2 * self.K)
         self.closed = TOUCHING * np.concatenate([p.rows.weights for p in parts.placed]) ** (
             1 / (model.dimension - 1)

@@ -91,6 +91,7 @@ class Inertia:
         blocks = [mass(body.mesh, body.material) for body in self.model.bodies]
         M = sparse.csr_array(sparse.block_diag(blocks, format="csr"))
         M = lumped(M) if self.is_lumped else M
-        C = self.mass_damping * M + self.stiffness_damping * self.model.discretisation.K
+        K = self.model.discretisation.stored_stiffness
+        C = self.mass_damping * M + self.stiffness_damping * K
         object.__setattr__(self, "M", M)
         object.__setattr__(self, "C", sparse.csr_array(C))

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..errors import InvalidInput, SingularOperator
+from .grid_matrix import GridMatrix
 from .hierarchy import Hierarchy, Nodes, components
 from .levels import Levels
 from .node_blocks import NodeBlocks
@@ -63,6 +64,8 @@ def prepared(
 
     modes (n, k): rigid modes, translations first; without them n is a multiple of dimension.
     """
+    if isinstance(matrix, GridMatrix):
+        return matrix.hierarchy
     component = components(modes, matrix.shape[0], dimension)
     if component is None:
         return None
@@ -89,6 +92,7 @@ class MultigridFactor:
 
     def _solve_one(self, b: Array) -> Array:
         most = self.options.max_iterations
+        self.hierarchy.reclaim()
         x, count = self.hierarchy.solve(0, self.nodes.spread(b), self.options.tolerance, most)
         self.iterations += min(count, most)
         if count > most or not np.isfinite(x).all():

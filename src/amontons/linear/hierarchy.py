@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numba import njit, uint64
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from .node_blocks import DEAD, NodeBlocks, first_sweep, row_product, sweep
+from .grid import GridBlocks
+from .node_blocks import DEAD, NodeBlocks
 from .transfer import Transfer
 
 Array = NDArray[np.float64]
@@ -100,7 +100,7 @@ def transfers(
 class Level:
     """One level: its matrix and the transfer to the next coarser one (None: the coarsest)."""
 
-    A: NodeBlocks
+    A: NodeBlocks | GridBlocks
     P: Transfer | None = None
     x: Array = field(init=False)
     b: Array = field(init=False)
@@ -139,19 +139,34 @@ class Hierarchy:
     ) -> Hierarchy:
         """Galerkin levels below A; modes (n, k): near-nullspace for the algebraic ones."""
         given, nodes = transfers(prolongations, component)
+        return cls.on(A, nodes[0], given, modes)
+
+    @classmethod
+    def on(
+        cls,
+        A: NodeBlocks | GridBlocks,
+        nodes: Nodes,
+        given: Sequence[Transfer],
+        modes: Array | None,
+    ) -> Hierarchy:
+        """The same for transfers between nodes."""
         levels = [Level(A)]
         for P in given:
-            if levels[-1].A.nodes <= 8:
+            finest = levels[-1].A
+            if finest.nodes <= 8:
                 break
             levels[-1].P = P
-            levels.append(Level(P.galerkin(levels[-1].A)))
+            if isinstance(finest, GridBlocks):
+                levels.append(Level(finest.coarse(P.coarse_used)))
+            else:
+                levels.append(Level(P.galerkin(finest)))
         geometric = len(levels)
         if levels[-1].A.nodes > COARSEST:
-            candidates = _coarse_modes(levels, nodes[0], modes)
+            candidates = _coarse_modes(levels, nodes, modes)
             for P in algebraic(levels[-1].A, candidates):
                 levels[-1].P = P
                 levels.append(Level(P.galerkin(levels[-1].A)))
-        return cls(levels, geometric, nodes[0])
+        return cls(levels, geometric, nodes)
 
     def invert_coarsest(self) -> None:
         """The inverse of the coarsest matrix, a pseudo-inverse where it is singular."""
@@ -212,12 +227,11 @@ class Hierarchy:
             x[:] = (self.coarse_inverse @ b.reshape(-1)).reshape(-1, 3)
             return
         A, coarse = level.A, self.levels[k + 1]
-        first_sweep(A.indptr, A.indices, A.data, A.inverse, b, x)
-        _upper_residual(A.indptr, A.indices, A.data, x, level.r)
+        A.first_smooth(b, x, level.r)
         level.P.restrict(level.r, coarse.b)
         self.cycle(k + 1, coarse.b, coarse.x)
         level.P.add(coarse.x, x)
-        sweep(A.indptr, A.indices, A.data, A.inverse, b, x, _nothing(A.nodes), True)
+        A.smooth(b, x, _nothing(A.nodes), True)
 
 
 def inverse_at_rest(A: Array, diagonal: Array, size: Array) -> Array:
@@ -284,15 +298,3 @@ def algebraic(A: NodeBlocks, modes: Array) -> list[Transfer]:
         out.append(Transfer.of(blocks, idle, none))
         idle = none
     return out
-
-
-@njit(cache=True, error_model="numpy")
-def _upper_residual(indptr, indices, data, x, out):
-    """b - A x after `first_sweep`: minus the upper triangle times x."""
-    for i in range(len(indptr) - 1):
-        last = uint64(indptr[i + 1])
-        first = last
-        while first > uint64(indptr[i]) and indices[first - uint64(1)] > i:
-            first -= uint64(1)
-        s0, s1, s2 = row_product(indices, data, x, first, last)
-        out[i, 0], out[i, 1], out[i, 2] = -s0, -s1, -s2

@@ -70,6 +70,28 @@ class NodeBlocks:
         rows = np.repeat(np.arange(self.nodes), np.diff(self.indptr))
         return np.flatnonzero(rows == self.indices)
 
+    def entries(self, node: Index) -> tuple[Index, Index, NDArray[np.int32], Array]:
+        """Rows of some nodes (k,): first and last entry of each, columns, blocks."""
+        first = self.indptr[node].astype(np.int64)
+        return first, self.indptr[node + 1].astype(np.int64), self.indices, self.data
+
+    def inverse_at(self, node: Index) -> Array:
+        """Inverses of the diagonal blocks of some nodes, (k, 3, 3)."""
+        return self.inverse[node]
+
+    def residual(self, x: Array, b: Array, out: Array) -> None:
+        """out = b - A x."""
+        residual(self.indptr, self.indices, self.data, x, b, out)
+
+    def smooth(self, b: Array, x: Array, held: NDArray[np.bool_], backward: bool) -> None:
+        """A block Gauss-Seidel sweep on A x = b over the nodes that are not held."""
+        sweep(self.indptr, self.indices, self.data, self.inverse, b, x, held, backward)
+
+    def first_smooth(self, b: Array, x: Array, r: Array) -> None:
+        """A forward sweep from x = 0, and r = b - A x."""
+        first_sweep(self.indptr, self.indices, self.data, self.inverse, b, x)
+        _upper_residual(self.indptr, self.indices, self.data, x, r)
+
     def dense(self) -> Array:
         """The whole matrix, (3 n, 3 n)."""
         n = 3 * self.nodes
@@ -186,3 +208,15 @@ def first_sweep(indptr, indices, data, inverse, b, x):  # noqa: PLR0913
         x[i, 0] = inverse[i, 0, 0] * r0 + inverse[i, 0, 1] * r1 + inverse[i, 0, 2] * r2
         x[i, 1] = inverse[i, 1, 0] * r0 + inverse[i, 1, 1] * r1 + inverse[i, 1, 2] * r2
         x[i, 2] = inverse[i, 2, 0] * r0 + inverse[i, 2, 1] * r1 + inverse[i, 2, 2] * r2
+
+
+@njit(cache=True, error_model="numpy")
+def _upper_residual(indptr, indices, data, x, out):
+    """b - A x after `first_sweep`: minus the upper triangle times x."""
+    for i in range(len(indptr) - 1):
+        last = uint64(indptr[i + 1])
+        first = last
+        while first > uint64(indptr[i]) and indices[first - uint64(1)] > i:
+            first -= uint64(1)
+        s0, s1, s2 = row_product(indices, data, x, first, last)
+        out[i, 0], out[i, 1], out[i, 2] = -s0, -s1, -s2

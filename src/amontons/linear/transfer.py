@@ -55,6 +55,24 @@ class Transfer:
             tiles.shape[1] // 3,
         )
 
+    @classmethod
+    def nodal(cls, level: sparse.csr_array, idle: Index, coarse_idle: Index) -> Transfer:
+        """From a prolongation of nodal values, whose arrays it shares."""
+        return cls(
+            level.indptr.astype(np.int32, copy=False),
+            level.indices.astype(np.int32, copy=False),
+            level.data,
+            np.empty((0, 3, 3)),
+            idle,
+            coarse_idle,
+            level.shape[1],
+        )
+
+    @property
+    def coarse_used(self) -> NDArray[np.uint8]:
+        """1 for coarse unknowns, 0 for padding, (coarse, 3)."""
+        return (~_mask(self.coarse_idle, self.coarse)).astype(np.uint8)
+
     @property
     def fine(self) -> int:
         """Number of fine nodes."""

@@ -17,9 +17,11 @@ from ..contact import (
     pair_contact,
 )
 from ..errors import InvalidInput
-from ..fem.elasticity import body_load, stiffness
+from ..fem.box import box
+from ..fem.elasticity import LinearElastic, body_load, stiffness
 from ..fem.mesh import Mesh, unknown
 from ..fem.surfaces import surface_load
+from ..linear.grid_matrix import GridMatrix
 from ..linear.levels import Levels, continued, free_levels
 from .parts import Body, BodyForce, Contact, Fix, Traction
 from .rigid import Piece, near_nullspace, pieces
@@ -27,6 +29,7 @@ from .values import vector_at
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+GRID_FROM = 500_000  # dofs of a box of equal cells from which its stiffness is not stored
 SAME = 1e-12  # prescribed values that differ by less, relative to the largest, agree
 
 
@@ -48,19 +51,19 @@ class Placed:
 class Discretisation:
     """All arrays of a model at load factor 1, whatever the friction.
 
-    K (dofs, dofs): stiffness of the whole model; free (n,), fixed: its dofs; prescribed
-    (dofs,), load (n,): force on the free dofs with the prescribed values lifted in; gap (nc,);
-    carried (nc, d): part of the local displacement that the supports prescribe; levels:
-    prolongations of the free dofs from coarser meshes, finest first; nodal_levels: of the
-    nodes, body by body.
+    K (dofs, dofs): stiffness of the whole model, an operator for one large box; free (n,),
+    fixed: its dofs; prescribed (dofs,), load (n,): force on the free dofs with the prescribed
+    values lifted in; gap (nc,); carried (nc, d): part of the local displacement that the
+    supports prescribe; levels: prolongations of the free dofs from coarser meshes, finest first
+    (none where K is an operator, which has its own); nodal_levels: of the nodes, body by body.
     """
 
     offsets: Index
-    K: sparse.csr_array
+    K: sparse.csr_array | GridMatrix
     free: Index
     fixed: Index
     prescribed: Array
-    M: sparse.csc_array
+    M: sparse.csc_array | GridMatrix
     H: sparse.csc_array
     load: Array
     gap: Array
@@ -86,6 +89,11 @@ class Discretisation:
         return len(self.prescribed)
 
     @property
+    def stored_stiffness(self) -> sparse.csr_array:
+        """K with its entries, also where it is an operator."""
+        return sparse.csr_array(self.K.tocsc()) if isinstance(self.K, GridMatrix) else self.K
+
+    @property
     def near_nullspace(self) -> Array:
         """Rigid modes on the free dofs, (n, k)."""
         return near_nullspace(self.parts, self.free, self.dofs)
@@ -104,8 +112,10 @@ def discretise(
     free, fixed = np.flatnonzero(~is_fixed), np.flatnonzero(is_fixed)
     if not free.size:
         raise InvalidInput("supports: every degree of freedom is fixed, nothing left to solve")
-    parts = [stiffness(body.mesh, body.material).tocsr() for body in bodies]
-    K = parts[0] if len(parts) == 1 else sparse.block_diag(parts, format="csr")
+    K = _grid(bodies)
+    if K is None:
+        parts = [stiffness(body.mesh, body.material).tocsr() for body in bodies]
+        K = parts[0] if len(parts) == 1 else sparse.block_diag(parts, format="csr")
     prescribed = np.where(is_fixed, values, 0.0)
     placed = tuple(_place(bodies, contact, values, offsets) for contact in contacts)
     whole_H = sparse.hstack([p.H for p in placed], format="csc")
@@ -117,7 +127,7 @@ def discretise(
     d = bodies[0].mesh.dim
     return Discretisation(
         offsets, K, free, fixed, prescribed,
-        M=sparse.csc_array(K[free][:, free]),
+        M=K.on(free) if isinstance(K, GridMatrix) else sparse.csc_array(K[free][:, free]),
         H=sparse.csc_array(whole_H.tocsr()[free]),
         load=(load - K @ prescribed)[free],
         gap=np.concatenate([p.rows.gap for p in placed]),
@@ -129,11 +139,28 @@ def discretise(
             for piece in pieces(body.mesh, body.name, int(offsets[k]))
         ],
         whole_H=whole_H,
-        levels=free_levels(
+        levels=()
+        if isinstance(K, GridMatrix)  # which has its own
+        else free_levels(
             [b.mesh.levels for b in bodies], [len(b.mesh.points) for b in bodies], d, is_fixed
         ),
         nodal_levels=tuple(body.mesh.levels for body in bodies),
     )  # fmt: skip
+
+
+def _grid(bodies: tuple[Body, ...]) -> GridMatrix | None:
+    """The stiffness as an operator for one large box of equal hexahedra, of one material."""
+    body, mesh = bodies[0], bodies[0].mesh
+    uniform = len(mesh.cells) == 1 and isinstance(body.material, LinearElastic)
+    if len(bodies) > 1 or not uniform or mesh.grid is None or mesh.cells[0].kind != "hex":
+        return None
+    if mesh.points.size < GRID_FROM or not mesh.levels:
+        return None
+    low, high = mesh.bounding_box()
+    cell = box((high - low) / mesh.grid, cells=1)
+    dofs = (cell.cells[0].nodes[0][:, None] * 3 + np.arange(3)).ravel()
+    element = stiffness(cell, body.material).toarray()[np.ix_(dofs, dofs)]
+    return GridMatrix(mesh.grid, element, np.arange(mesh.points.size), mesh.levels)
 
 
 def locate(bodies: tuple[Body, ...], on: str) -> tuple[int, str]:

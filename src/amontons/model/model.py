@@ -14,6 +14,7 @@ from scipy import sparse
 from ..cones import Coulomb, Law, Tresca
 from ..errors import InvalidInput
 from ..linear import Direct
+from ..linear.grid_matrix import GridMatrix
 from ..problem import FrictionProblem
 from ..solution import FrictionSolution
 from .assembly import Discretisation, discretise, locate
@@ -198,9 +199,10 @@ def _bonded_size(parts: Discretisation, f: Array, w: Array) -> float:
 
     It replaces the size without contact, which is infinite where contact alone holds a body.
     """
-    H = parts.H
-    stiffness = sparse.diags_array(abs(H).T @ parts.M.diagonal())
-    bonded = sparse.csc_array(parts.M + H @ stiffness @ H.T)
+    H, M = parts.H, parts.M
+    stiffness = sparse.diags_array(abs(H).T @ M.diagonal())
+    stored = M.tocsc() if isinstance(M, GridMatrix) else M
+    bonded = sparse.csc_array(stored + H @ stiffness @ H.T)
     v = Direct().factor(bonded).solve(f - H @ (stiffness @ w.ravel()))
     return float(np.linalg.norm(H.T @ v + w.ravel()))
 

@@ -7,7 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-RANK = 1e-12  # singular values of the scaled Gram matrix dropped, relative to the largest
+RANK = 1e-13  # is added to the diagonal of the scaled Gram matrix
 
 
 class Anderson:
@@ -43,8 +43,7 @@ class Anderson:
         gram = self.gram[:used, :used] * np.outer(scale, scale)
         if not (np.isfinite(gram).all() and np.isfinite(dots).all()):
             return
-        weights = scale * (np.linalg.pinv(gram, rcond=RANK, hermitian=True)
-                           @ (scale * dots[:used]))  # fmt: skip
+        weights = scale * np.linalg.solve(gram + RANK * np.eye(used), scale * dots[:used])
         _combine(image, self.images, weights)
 
 

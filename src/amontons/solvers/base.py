@@ -48,7 +48,11 @@ class Target:
 
 
 class Solver(Protocol):
-    """Options as fields; `iterates` yields until the driver stops asking."""
+    """Options as fields; `iterates` yields until the driver stops asking.
+
+    A solver with a class variable matrix_free = True also takes problems whose M is an operator
+    (`GridMatrix`); for others the driver assembles it.
+    """
 
     form: ClassVar[Form]
 

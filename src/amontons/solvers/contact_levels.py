@@ -137,7 +137,7 @@ def _prepare(problem: FrictionProblem) -> ContactLevels:
     contacts = ContactNodes.of(basis, hierarchy.nodes, A)
     if contacts is None:
         raise Breakdown("contact multigrid: the contacts do not sit on nodes of their own")
-    if not (np.isfinite(A.inverse).all() and _positive(A)):
+    if isinstance(A, NodeBlocks) and not (np.isfinite(A.inverse).all() and _positive(A)):
         raise Breakdown("contact multigrid: M has a diagonal block that is not positive")
     coarse = _coarse_contacts(hierarchy, contacts)
     touched = [contacts.node, *(c.node for _, c in coarse)]
@@ -192,7 +192,7 @@ def _coarse_contacts(
         if not found.any() or len(np.unique(parent[found])) < found.sum():
             break
         kept = kept[found]
-        contacts = contacts.at(found, parent[found], A.inverse)
+        contacts = contacts.at(found, parent[found], A)
         out.append((kept, contacts))
     return out
 

@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UnsupportedForm
-from ..linear.node_blocks import residual, sweep
+from ..linear.grid import GridBlocks
 from ..problem import Form, FrictionProblem
 from .anderson import Anderson
 from .base import Breakdown, Iterate, Target, check_at_least, check_positive
@@ -40,6 +40,7 @@ from .contact_nodes import ContactNodes
 Array = NDArray[np.float64]
 MANY = 0.01  # share of contacts that change their state above which Anderson forgets
 GROWTH = 1e3  # of the error over the best one that counts as divergence
+GRID_DEPTH = 3  # past cycles to mix at most where M is not stored
 CLOSE = 0.9  # share of the tolerance at which an iterate is handed to the judge
 
 
@@ -53,6 +54,7 @@ class ContactMultigrid:
     """
 
     form: ClassVar[Form] = Form.GLOBAL
+    matrix_free: ClassVar[bool] = True  # M may be an operator
     depth: int = 5
     nested: bool = True
     coarse_tolerance: float = 1e-3
@@ -141,7 +143,10 @@ class _Run:
 
     def cycles(self, x: Array) -> Iterator[float]:
         """Errors of x, (nodes, 3), which is improved in place between them."""
-        mixing = Anderson(x.size, self.options.depth)
+        depth = self.options.depth
+        if isinstance(self.level.A, GridBlocks):  # whose cycles are as cheap as the mixing
+            depth = min(depth, GRID_DEPTH)
+        mixing = Anderson(x.size, depth)
         before = np.empty_like(x)
         best = at_update = mark = np.inf
         waited = 0
@@ -150,7 +155,7 @@ class _Run:
             before[:] = x
             self.smooth(x, backward=False)
             for _ in range(self.options.contact_sweeps):
-                self.contacts.sweep(self.level.A, self.f, x)
+                self.contacts.sweep(self.f, x)
             changed = int(np.count_nonzero(self.contacts.state != self.states))
             error = self.error(x)
             yield error
@@ -164,7 +169,7 @@ class _Run:
                 self.renew()
                 at_update = error
             self.correct(x)
-            self.contacts.sweep(self.level.A, self.f, x, backward=True)
+            self.contacts.sweep(self.f, x, backward=True)
             self.smooth(x, backward=True)
             if changed > MANY * len(self.contacts.node):
                 mixing.forget()
@@ -172,13 +177,11 @@ class _Run:
 
     def smooth(self, x: Array, backward: bool) -> None:
         """One sweep in the bulk."""
-        A = self.level.A
-        sweep(A.indptr, A.indices, A.data, A.inverse, self.f, x, self.held, backward)
+        self.level.A.smooth(self.f, x, self.held, backward)
 
     def error(self, x: Array) -> float:
         """What the judge will say, from the residual of x, which is kept."""
-        A = self.level.A
-        residual(A.indptr, A.indices, A.data, x, self.f, self.r)
+        self.level.A.residual(x, self.f, self.r)
         law = self.contacts.natural_map(x, self.r)
         kept = self.r[self.contacts.node]
         self.r[self.contacts.node] = 0.0

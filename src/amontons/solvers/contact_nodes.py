@@ -30,6 +30,7 @@ from numba import njit, uint64
 from numpy.typing import NDArray
 
 from ..judge import contact_residual
+from ..linear.grid import GridBlocks
 from ..linear.hierarchy import Nodes
 from ..linear.node_blocks import NodeBlocks, row_product
 from ..one_contact import OPEN, SLIP, solve_contact
@@ -47,7 +48,8 @@ class ContactNodes:
     """Contacts at nodes: node (nc,), H (nc, 3, 3), w (nc, 3), coefficient (nc,), Tresca or not.
 
     inverse, compliance, to_reaction (nc, 3, 3): A_pp^-1, H^T A_pp^-1 H and H^-1; rho (nc,): of
-    the judge.  State of the iteration: r, u (nc, 3), and state (nc,) of the last local solves.
+    the judge; rows: of the matrix, see `NodeBlocks.entries`.  State of the iteration: r, u
+    (nc, 3), and state (nc,) of the last local solves.
     """
 
     node: Index
@@ -56,6 +58,7 @@ class ContactNodes:
     compliance: Array
     to_reaction: Array
     rho: Array
+    rows: tuple[Index, Index, NDArray[np.int32], Array]
     w: Array = field(default_factory=lambda: np.zeros((0, 3)))
     coefficient: Array = field(default_factory=lambda: np.zeros(0))
     tresca: bool = False
@@ -68,24 +71,28 @@ class ContactNodes:
         self.state = np.full(len(self.node), -1, dtype=np.int8)
 
     @classmethod
-    def at_nodes(cls, node: Index, H: Array, inverse: Array) -> ContactNodes:
-        """Contacts without a law; inverse: A_pp^-1 of these nodes."""
+    def at_nodes(cls, node: Index, H: Array, A: NodeBlocks | GridBlocks) -> ContactNodes:
+        """Contacts without a law at nodes of a level with matrix A."""
+        inverse = A.inverse_at(node)
         compliance = np.einsum("kai,kab,kbj->kij", H, inverse, H)
         size = np.linalg.norm(compliance, 2, axis=(1, 2)) if len(node) else np.zeros(0)
         k, i = np.nonzero(np.abs(H).max(axis=1, initial=0.0) == 0)  # the second tangent in 2D
         compliance[k, i, i] = 1.0
-        return cls(node, H, inverse, compliance, np.linalg.pinv(H), 1 / size)
+        rows = A.entries(node)
+        return cls(node, H, inverse, compliance, np.linalg.pinv(H), 1 / size, rows)
 
-    def at(self, chosen: NDArray[np.bool_], node: Index, inverse: Array) -> ContactNodes:
-        """Some of the contacts at nodes (k,) of another level, given its inverse blocks."""
-        return ContactNodes.at_nodes(node, self.H[chosen], inverse[node])
+    def at(self, chosen: NDArray[np.bool_], node: Index, A: NodeBlocks) -> ContactNodes:
+        """Some of the contacts at nodes (k,) of another level."""
+        return ContactNodes.at_nodes(node, self.H[chosen], A)
 
     def with_law(self, w: Array, coefficient: Array, tresca: bool, rho: Array) -> ContactNodes:
         """The contacts under a law, without states."""
         return replace(self, w=w, coefficient=coefficient, tresca=tresca, rho=rho)
 
     @classmethod
-    def of(cls, basis: OneSided, nodes: Nodes, A: NodeBlocks) -> ContactNodes | None:
+    def of(
+        cls, basis: OneSided, nodes: Nodes, A: NodeBlocks | GridBlocks
+    ) -> ContactNodes | None:
         """From the one-sided basis; None where a contact is spread over several nodes."""
         nc, d = basis.dofs.shape
         held = basis.dofs == HELD
@@ -97,12 +104,12 @@ class ContactNodes:
         for slot in range(d):
             rows = np.flatnonzero(~held[:, slot])
             H[rows, place[rows, slot] % 3, :d] = basis.frames[rows, :, slot]
-        return cls.at_nodes(node, H, A.inverse[node])
+        return cls.at_nodes(node, H, A)
 
-    def sweep(self, A: NodeBlocks, f: Array, x: Array, backward: bool = False) -> None:
+    def sweep(self, f: Array, x: Array, backward: bool = False) -> None:
         """Solve every contact once in turn; r, u and state are those of these solves."""
         _sweep(
-            A.indptr, A.indices, A.data, self.node, self.H, self.inverse, self.compliance,
+            *self.rows, self.node, self.H, self.inverse, self.compliance,
             self.w, self.coefficient, self.tresca, f, x, self.r, self.u, self.state, backward,
         )  # fmt: skip
 
@@ -136,13 +143,13 @@ class ContactNodes:
 
 
 @njit(cache=True, error_model="numpy")
-def _sweep(indptr, indices, data, node, H, inverse, compliance, w, coefficient, tresca,
+def _sweep(first, last, indices, data, node, H, inverse, compliance, w, coefficient, tresca,
            f, x, r, u, state, backward):  # noqa: PLR0913 # fmt: skip
     y, b = np.empty(3), np.empty(3)
     for step in range(len(node)):
         c = len(node) - 1 - step if backward else step
         p = node[c]
-        s0, s1, s2 = row_product(indices, data, x, uint64(indptr[p]), uint64(indptr[p + 1]))
+        s0, s1, s2 = row_product(indices, data, x, uint64(first[c]), uint64(last[c]))
         g0, g1, g2 = f[p, 0] - s0, f[p, 1] - s1, f[p, 2] - s2
         for i in range(3):
             y[i] = x[p, i] + (

@@ -93,6 +93,7 @@ class Auto:
     """Tries, watches the error, switches; see the table of this module."""
 
     form: ClassVar[Form] = Form.ANY
+    matrix_free: ClassVar[bool] = True
 
     def iterates(
         self, problem: FrictionProblem, start: Iterate, target: Target
@@ -103,6 +104,7 @@ class Auto:
         best = [start]
         if _worth_multigrid(problem):
             yield from _watched(ContactMultigrid(), problem, start, target, best)
+        problem = problem.assembled()
         if problem.form is Form.GLOBAL and not _regular(problem):
             whole = SemismoothNewton(linear=Direct())
             yield from _watched(whole, problem, best[0], target, best)

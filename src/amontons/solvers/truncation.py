@@ -17,6 +17,7 @@ import numpy as np
 from numba import njit, uint64
 from numpy.typing import NDArray
 
+from ..linear.grid import GridBlocks
 from ..linear.hierarchy import Hierarchy, inverse_at_rest
 from ..linear.node_blocks import NodeBlocks, block_inverse
 from ..linear.transfer import Transfer
@@ -57,6 +58,22 @@ class Near:
         return cls(slots, row, column, base, own, A.inverse[row[own]], size, idle[row],
                    idle[column])  # fmt: skip
 
+    @classmethod
+    def of_grid(cls, A: GridBlocks, nodes: Index, idle: NDArray[np.bool_]) -> Near:
+        """Rows and columns of contact nodes of a matrix that is not stored, nor changed."""
+        first, last, columns, data = A.entries(np.sort(nodes))
+        row = np.repeat(np.sort(nodes), last - first)
+        column = columns.astype(np.int64)
+        other = ~np.isin(column, nodes)
+        whole = np.concatenate([data, data[other].swapaxes(1, 2)])
+        row, column = (
+            np.concatenate([row, column[other]]),
+            np.concatenate([column, row[other]]),
+        )
+        order = np.lexsort((column, row))
+        row, column, none = row[order], column[order], np.empty(0, dtype=np.int64)
+        return cls(none, row, column, whole[order], none, none, none, idle[row], idle[column])
+
     def restore(self, A: NodeBlocks) -> None:
         """The matrix without contacts."""
         A.data[self.slots] = self.base
@@ -84,14 +101,19 @@ class Truncation:
         self.products: list[Product] = []
         slots = np.empty(0, dtype=np.int64)
         for k, level in enumerate(hierarchy.levels):
-            if k < len(contacts):
+            grid = isinstance(level.A, GridBlocks)
+            if k < len(contacts) and not grid:
                 slots = np.union1d(slots, _touching(level.A, contacts[k]))
             idle = np.zeros(3 * level.A.nodes, dtype=bool)
             if level.P is not None:
                 idle[level.P.idle] = True
             elif k:
                 idle[hierarchy.levels[k - 1].P.coarse_idle] = True  # type: ignore[union-attr]
-            near = Near.of(level.A, slots, idle.reshape(-1, 3))
+            idle = idle.reshape(-1, 3)
+            if grid:
+                near = Near.of_grid(level.A, contacts[k], idle)
+            else:
+                near = Near.of(level.A, slots, idle)
             self.near.append(near)
             if level.P is not None:
                 coarse = hierarchy.levels[k + 1].A
@@ -138,7 +160,8 @@ class Truncation:
     def restore(self) -> None:
         """All levels without contacts."""
         for near, level in zip(self.near, self.hierarchy.levels, strict=True):
-            near.restore(level.A)
+            if isinstance(level.A, NodeBlocks):
+                near.restore(level.A)
 
 
 def _touching(A: NodeBlocks, nodes: Index) -> Index:
