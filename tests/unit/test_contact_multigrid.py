@@ -79,6 +79,15 @@ def two_bodies(method):
     )
 
 
+def loose(gap=0.05):
+    """A block that nothing but contact can hold, above the ground."""
+    return am.Model(
+        [am.Body(am.box((1, 1, 1), cells=6), am.LinearElastic(200, 0.3))],
+        loads=[am.Traction("top", (0.5, 0.2, -3.0))],
+        contacts=[am.Contact("bottom", am.Plane((0, 0, 1), (0, 0, -gap)), mu=0.5)],
+    )
+
+
 MODELS = {
     "cube": lambda: cube(4),
     "tetrahedra": lambda: cube(4, kind="tet"),
@@ -124,6 +133,15 @@ def test_cycles_do_not_depend_on_friction(mu):
     solution = drive(cube(8, mu).assemble(), ContactMultigrid(), tolerance=1e-10)
     assert solution.converged
     assert solution.convergence.iterations <= 20
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.05, 2.0])
+def test_a_body_held_by_contact_alone(gap):
+    problem = loose(gap).assemble()
+    solution = drive(problem, ContactMultigrid(), tolerance=1e-8)
+    assert solution.converged, str(solution)
+    pushed = problem.H @ solution.r.ravel() + problem.f
+    assert np.abs(problem.near_nullspace.T @ pushed).max() < 1e-6 * np.abs(problem.f).sum()
 
 
 def test_without_levels_coarse_ones_are_made():

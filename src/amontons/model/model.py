@@ -114,11 +114,13 @@ class Model:
         """
         parts, law = self.discretisation, self.law
         loose = self._loose_but_held(parts, law)
+        guess, size = parts.continued(prescribed), None
+        if loose:
+            guess, size = _bonded(parts, f, w)
         base = FrictionProblem.from_global(
             parts.M, parts.H, f, w, law, near_nullspace=parts.near_nullspace,
-            levels=parts.levels, guess=parts.continued(prescribed), name=self.name,
-            load_scale=_load_size(parts, f, w),
-            u_scale=_bonded_size(parts, f, w) if loose else None,
+            levels=parts.levels, guess=guess, name=self.name,
+            load_scale=_load_size(parts, f, w), u_scale=size,
         )  # fmt: skip
         first = self._shared.setdefault("problem", base)
         return replace(base, M=first.M, H=first.H, _shared=first._shared)  # one factor for all
@@ -194,17 +196,17 @@ def _load_size(parts: Discretisation, f: Array, w: Array) -> float:
     )
 
 
-def _bonded_size(parts: Discretisation, f: Array, w: Array) -> float:
-    """Size of local displacements when springs as stiff as the nodes bond all contacts.
+def _bonded(parts: Discretisation, f: Array, w: Array) -> tuple[Array, float]:
+    """v, and size of u, when springs as stiff as the nodes bond all contacts.
 
-    It replaces the size without contact, which is infinite where contact alone holds a body.
+    They replace those without contact, which do not exist where contact alone holds a body.
     """
     H, M = parts.H, parts.M
     stiffness = sparse.diags_array(abs(H).T @ M.diagonal())
     stored = M.tocsc() if isinstance(M, GridMatrix) else M
     bonded = sparse.csc_array(stored + H @ stiffness @ H.T)
     v = Direct().factor(bonded).solve(f - H @ (stiffness @ w.ravel()))
-    return float(np.linalg.norm(H.T @ v + w.ravel()))
+    return v, float(np.linalg.norm(H.T @ v + w.ravel()))
 
 
 def _tuple_of(name: str, values: object, kind: object) -> tuple:

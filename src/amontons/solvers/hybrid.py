@@ -43,6 +43,7 @@ from ..blocks import spatial
 from ..errors import InvalidInput, SingularOperator
 from ..judge import Measure
 from ..linear import Direct
+from ..linear.distributed import DistributedMatrix
 from ..problem import Form, FrictionProblem
 from .base import Breakdown, Iterate, Solver, Target, check_at_least
 from .compressed import CompressedDelassus
@@ -107,7 +108,7 @@ class Auto:
         problem = problem.assembled()
         if problem.form is Form.GLOBAL and not _regular(problem):
             whole = SemismoothNewton(linear=Direct())
-            yield from _watched(whole, problem, best[0], target, best)
+            yield from _watched(whole, problem, start, target, best)
         elif problem.condensing_is_cheap:
             yield from DeformablePortfolio(
                 problem.condensed(), target, spatial(start.r)
@@ -131,6 +132,8 @@ def _worth_multigrid(problem: FrictionProblem) -> bool:
     """True for meshes on which a factorisation takes longer than some cycles."""
     if problem.form is not Form.GLOBAL or problem.unknowns < MESH:
         return False
+    if isinstance(problem.M, DistributedMatrix):
+        return False  # its levels would have to be spread too
     mesh = bool(problem.levels) or problem.near_nullspace is not None
     return mesh and not problem.condensing_is_cheap
 
