@@ -13,12 +13,13 @@ PACKAGE = Path(amontons.__file__).parent
 ORDER = (
     "errors < files < cones < linear < blocks < condensation < judge < problem < one_sided "
     "< one_contact < status < solution < solvers < solve < fem < contact < model < masonry "
-    "< granular < evolution < analysis < gallery < fclib < checkpoint < expressions < case "
+    "< granular < hild < evolution < analysis < gallery < fclib < checkpoint < expressions < case "
     "< vtk < plots < output < results < report < api < cli"
 ).split(" < ")
 ALONE = {  # package: the file or folder that imports it, one for each kind of file
     "ngsolve": "fem", "netgen": "fem", "pyamg": "linear", "matplotlib": "plots", "click": "cli",
     "rslab": "linear", "pypardiso": "linear",
+    "petsc4py": "linear", "mpi4py": "linear", "pymetis": "fem",
     "meshio": "fem vtk",  # reads meshes, writes pictures
     "h5py": "fclib output checkpoint",  # the exchange format, our results, our states
 }  # fmt: skip
@@ -80,7 +81,9 @@ def modules_after(code):
 
 def test_importing_the_package_is_light():
     loaded = modules_after("import amontons")
-    assert not loaded & {"numpy", "scipy", "numba", "ngsolve", "matplotlib", "h5py", "pyamg"}
+    assert not loaded & {
+        "numpy", "scipy", "numba", "ngsolve", "matplotlib", "h5py", "pyamg", "mpi4py"
+    }  # fmt: skip
 
 
 def test_discrete_problems_need_no_mesh_library():
