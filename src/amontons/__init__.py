@@ -16,7 +16,8 @@ _HOME = {
     "errors": ("AmontonsError", "FileFormatError", "Interrupted", "InvalidInput",
                "MissingDependency", "NotConverged", "SingularOperator", "UnsupportedForm"),
     "cones": ("Coulomb", "Tresca"),
-    "linear": ("AlgebraicMultigrid", "ConjugateGradient", "Direct", "GeometricMultigrid"),
+    "linear": ("AlgebraicMultigrid", "ConjugateGradient", "Direct", "GeometricMultigrid",
+               "Petsc"),
     "problem": ("Form", "FrictionProblem"),
     "solution": ("ContactStatus", "Convergence", "FrictionSolution", "Outcome"),
     "solvers": ("ActiveSet", "AlartCurnier", "Armijo", "Auto", "Batch", "CompressedDelassus",
@@ -38,7 +39,7 @@ _HOME = {
     "fem": ("Mesh", "box", "mesh_shape", "read_cad", "read_mesh", "refined"),
     "contact": ("LevelSet", "Plane", "Sphere"),
     "model": ("Body", "BodyForce", "Contact", "ContactFields", "Fix", "LinearElastic", "Model",
-              "Traction"),
+              "Traction", "distributed"),
 }  # fmt: skip
 _MODULE = {name: module for module, names in _HOME.items() for name in names}
 

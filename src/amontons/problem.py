@@ -27,6 +27,7 @@ from .errors import InvalidInput, SingularOperator, UnsupportedForm
 from .judge import Measure
 from .linear import ConjugateGradient, Direct, Factor, GeometricMultigrid, LinearSolver
 from .linear.bodies import Bodies, BodyFactor
+from .linear.distributed import DistributedMatrix
 from .linear.geometric import prepared
 from .linear.grid_matrix import GridMatrix
 from .linear.hierarchy import Hierarchy
@@ -36,6 +37,7 @@ from .linear.small_blocks import block_diagonal_inverse
 Array = NDArray[np.float64]
 Matrix = sparse.csr_array | sparse.csc_array | Array
 LARGEST = 1e100  # entry in any unit: squares must stay finite, and 1 / LARGEST positive
+OPERATORS = (GridMatrix, DistributedMatrix)  # which M may be instead of a stored matrix
 DENSE_LIMIT = 4e9  # bytes that condensed() may fill before it refuses
 DIRECT_LIMIT = 600_000  # unknowns of a mesh whose factor takes some 10 GB
 EXACT_WORK = 2e6  # n * nc * d up to which forming W costs nothing that matters
@@ -103,7 +105,7 @@ class FrictionProblem:
         """
         law = _law(mu)
         nc = len(law.coefficient)
-        M, H = M if isinstance(M, GridMatrix) else _sparse("M", M), _sparse("H", H)
+        M, H = M if isinstance(M, OPERATORS) else _sparse("M", M), _sparse("H", H)
         n = M.shape[0]
         _expect("M", M.shape, (n, n))
         f = _vector("f", f, (n,))
@@ -246,6 +248,8 @@ class FrictionProblem:
         assert M is not None
         if isinstance(M, GridMatrix):
             return self._kept("factor", (M,), lambda: GeometricMultigrid().factor(M))  # type: ignore[arg-type]
+        if isinstance(M, DistributedMatrix):
+            return self._kept("factor", (M,), M.factor)
         bodies = self.bodies
         largest = max((m.shape[1] for m in bodies.members), default=0)
         iterative = largest > DIRECT_LIMIT and modes is not None
@@ -283,11 +287,13 @@ class FrictionProblem:
         self._need(Form.GLOBAL)
         M = self.M
         assert M is not None
+        if isinstance(M, OPERATORS):
+            return None
         return self._kept("inverse", (M,), lambda: block_diagonal_inverse(M))
 
     def solve_M(self, b: Array) -> Array:
         """M^-1 b, b of shape (n,) or (n, k)."""
-        inverse = None if isinstance(self.M, GridMatrix) else self.small_blocks
+        inverse = self.small_blocks
         return inverse @ b if inverse is not None else self.factor().solve(b)
 
     @property
@@ -302,7 +308,7 @@ class FrictionProblem:
         return self._kept("cheap", (self.M, self.H), self._condensing_is_cheap)
 
     def _condensing_is_cheap(self) -> bool:
-        if isinstance(self.M, GridMatrix):
+        if isinstance(self.M, OPERATORS):
             return False
         if self.small_blocks is not None:
             return True
@@ -332,7 +338,7 @@ class FrictionProblem:
         if inverse is not None:
             W: Matrix = (self.H.T @ (inverse @ self.H)).tocsr()
             return FrictionProblem.from_delassus(W, self.free_velocity, self.law)
-        several = self.bodies.count > 1 and isinstance(self.factor(), BodyFactor)
+        several = isinstance(self.factor(), BodyFactor)
         size = 8.0 * (self.dimension**2 * self._condensation.blocks if several else m * m)
         if size > DENSE_LIMIT:
             raise InvalidInput(
@@ -480,7 +486,7 @@ class FrictionProblem:
         index = (touched[:, None] * size + np.arange(size)).ravel()
         H = sparse.csr_array(self.H)[index]
         M = self.M
-        part = M.part(index) if isinstance(M, GridMatrix) else M[:, index].tocsr()[index]
+        part = M.part(index) if isinstance(M, OPERATORS) else M[:, index].tocsr()[index]
         inverse = _node_blocks_inverse(part, size)
         product = sparse.csc_array(inverse @ H)
         full = (sparse.csr_array(H.T) @ product).tobsr((d, d))
@@ -513,8 +519,9 @@ class FrictionProblem:
 
     def _free_size(self) -> float:
         """|u| without reactions; of large meshes from a coarse level, to some per cent."""
-        large = self.unknowns > ESTIMATED and (self.levels or self.near_nullspace is not None)
-        hierarchy = self.hierarchy if large else None
+        large = self.unknowns > ESTIMATED and not isinstance(self.M, DistributedMatrix)
+        nested = self.levels or self.near_nullspace is not None
+        hierarchy = self.hierarchy if large and nested else None
         if hierarchy is None:
             return float(np.linalg.norm(self.free_velocity))
         assert self.f is not None and self.M is not None

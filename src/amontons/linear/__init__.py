@@ -5,6 +5,7 @@ from .direct import Direct
 from .geometric import GeometricMultigrid
 from .krylov import ConjugateGradient
 from .multigrid import AlgebraicMultigrid
+from .petsc import Petsc
 
 __all__ = [
     "AlgebraicMultigrid",
@@ -13,4 +14,5 @@ __all__ = [
     "Factor",
     "GeometricMultigrid",
     "LinearSolver",
+    "Petsc",
 ]

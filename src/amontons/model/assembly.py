@@ -21,6 +21,7 @@ from ..fem.box import box
 from ..fem.elasticity import LinearElastic, body_load, stiffness
 from ..fem.mesh import Mesh, unknown
 from ..fem.surfaces import surface_load
+from ..linear.distributed import DistributedMatrix
 from ..linear.grid_matrix import GridMatrix
 from ..linear.levels import Levels, continued, free_levels
 from .parts import Body, BodyForce, Contact, Fix, Traction
@@ -59,11 +60,11 @@ class Discretisation:
     """
 
     offsets: Index
-    K: sparse.csr_array | GridMatrix
+    K: sparse.csr_array | GridMatrix | DistributedMatrix
     free: Index
     fixed: Index
     prescribed: Array
-    M: sparse.csc_array | GridMatrix
+    M: sparse.csc_array | GridMatrix | DistributedMatrix
     H: sparse.csc_array
     load: Array
     gap: Array
@@ -104,18 +105,17 @@ def discretise(
     supports: tuple[Fix, ...],
     loads: tuple[Traction | BodyForce, ...],
     contacts: tuple[Contact, ...],
+    K: DistributedMatrix | None = None,
 ) -> Discretisation:
-    """Assemble everything that depends on neither friction nor load factor."""
+    """Assemble everything that depends on neither friction nor load factor; K if not given."""
     offsets = np.cumsum([0, *(body.mesh.points.size for body in bodies)])
     values = prescribed_values(bodies, supports, offsets)
     is_fixed = ~np.isnan(values)
     free, fixed = np.flatnonzero(~is_fixed), np.flatnonzero(is_fixed)
     if not free.size:
         raise InvalidInput("supports: every degree of freedom is fixed, nothing left to solve")
-    K = _grid(bodies)
     if K is None:
-        parts = [stiffness(body.mesh, body.material).tocsr() for body in bodies]
-        K = parts[0] if len(parts) == 1 else sparse.block_diag(parts, format="csr")
+        K = _stiffness(bodies)
     prescribed = np.where(is_fixed, values, 0.0)
     placed = tuple(_place(bodies, contact, values, offsets) for contact in contacts)
     whole_H = sparse.hstack([p.H for p in placed], format="csc")
@@ -127,7 +127,7 @@ def discretise(
     d = bodies[0].mesh.dim
     return Discretisation(
         offsets, K, free, fixed, prescribed,
-        M=K.on(free) if isinstance(K, GridMatrix) else sparse.csc_array(K[free][:, free]),
+        M=sparse.csc_array(K[free][:, free]) if sparse.issparse(K) else K.on(free),
         H=sparse.csc_array(whole_H.tocsr()[free]),
         load=(load - K @ prescribed)[free],
         gap=np.concatenate([p.rows.gap for p in placed]),
@@ -140,12 +140,21 @@ def discretise(
         ],
         whole_H=whole_H,
         levels=()
-        if isinstance(K, GridMatrix)  # which has its own
+        if not sparse.issparse(K)  # operators have their own, or none
         else free_levels(
             [b.mesh.levels for b in bodies], [len(b.mesh.points) for b in bodies], d, is_fixed
         ),
         nodal_levels=tuple(body.mesh.levels for body in bodies),
     )  # fmt: skip
+
+
+def _stiffness(bodies: tuple[Body, ...]) -> sparse.csr_array | GridMatrix:
+    """Of all bodies: stored, or an operator for one large box."""
+    grid = _grid(bodies)
+    if grid is not None:
+        return grid
+    parts = [stiffness(body.mesh, body.material).tocsr() for body in bodies]
+    return parts[0] if len(parts) == 1 else sparse.block_diag(parts, format="csr")
 
 
 def _grid(bodies: tuple[Body, ...]) -> GridMatrix | None:

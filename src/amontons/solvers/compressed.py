@@ -36,6 +36,7 @@ from scipy import sparse
 
 from ..blocks import spatial
 from ..linear import Direct
+from ..linear.distributed import DistributedMatrix
 from ..problem import DENSE_LIMIT, Form, FrictionProblem
 from .base import Breakdown, Iterate, Target, check_at_least, check_positive
 from .portfolio import Portfolio
@@ -97,7 +98,8 @@ def _check_fits(problem: FrictionProblem) -> None:
     m = problem.contacts * problem.dimension
     M = problem.M
     assert M is not None
-    if abs(M - M.T).max() > 1e-12 * abs(M).max():
+    spread = isinstance(M, DistributedMatrix)  # a stiffness, symmetric by construction
+    if not spread and abs(M - M.T).max() > 1e-12 * abs(M).max():
         raise Breakdown("M is not symmetric, its far field has no Nyström approximation")
     if 2 * 8.0 * m * m > DENSE_LIMIT:
         raise Breakdown(f"the compressed W would take {16e-9 * m * m:.1f} GB")
@@ -166,14 +168,11 @@ class _FarField:
 def _near_field(problem: FrictionProblem, layers: int) -> Array:
     """H_s^T M_s^-1 H_s with M_s the unknowns within `layers` couplings of the contact."""
     assert problem.M is not None and problem.H is not None
-    M, H = sparse.csr_array(problem.M), sparse.csc_array(problem.H)
-    inside = np.zeros(M.shape[0], dtype=bool)
+    H = sparse.csc_array(problem.H)
+    inside = np.zeros(H.shape[0], dtype=bool)
     inside[H.indices] = True
-    pattern = sparse.csr_array((np.ones(M.nnz), M.indices, M.indptr), shape=M.shape)
-    for _ in range(layers):
-        inside = pattern @ inside.astype(float) > 0
-    index = np.flatnonzero(inside)
-    slab = Direct().factor(sparse.csc_array(M[index][:, index]))
+    index, part = _slab(problem.M, inside, layers)
+    slab = Direct().factor(sparse.csc_array(part))
     Hs = sparse.csc_array(sparse.csr_array(problem.H)[index])
     m = H.shape[1]
     W = np.empty((m, m))
@@ -181,6 +180,23 @@ def _near_field(problem: FrictionProblem, layers: int) -> Array:
         columns = Hs[:, first : first + SOLVE_COLUMNS].toarray()
         W[:, first : first + SOLVE_COLUMNS] = Hs.T @ slab.solve(columns)
     return 0.5 * (W + W.T)
+
+
+def _slab(
+    M: sparse.csc_array | DistributedMatrix, inside: NDArray[np.bool_], layers: int
+) -> tuple[NDArray[np.int64], sparse.csr_array]:
+    """Unknowns within `layers` couplings of those inside, (n,), and their rows and columns."""
+    if isinstance(M, DistributedMatrix):
+        for _ in range(layers):
+            inside = M.coupled(inside)
+        index = np.flatnonzero(inside)
+        return index, M.part(index)
+    rows = sparse.csr_array(M)
+    pattern = sparse.csr_array((np.ones(rows.nnz), rows.indices, rows.indptr), shape=M.shape)
+    for _ in range(layers):
+        inside = pattern @ inside.astype(float) > 0
+    index = np.flatnonzero(inside)
+    return index, rows[index][:, index]
 
 
 @dataclass
