@@ -49,7 +49,7 @@ class Conditions:
 
 @dataclass(frozen=True, eq=False)
 class Robin:
-    """-lambda + L u = rhs, (nc, t, t) and (nc, t), and v of (7.3), with alpha and beta (nc,)."""
+    """-lambda + L u = rhs, (nc, t, t) and (nc, t); v of (7.3); alpha and beta (nc,)."""
 
     L: Array
     rhs: Array
