@@ -53,7 +53,7 @@ def coarser(fine: FrictionProblem) -> Coarser | None:
     """The problem that a coarser mesh would give; None without one, or between two bodies.
 
     Stiffness and load are Galerkin products, contacts those fine ones at coarse nodes with
-    their gaps and frames; bounds of Tresca friction are summed with the interpolation's weights.
+    their gaps and frames; Tresca's bounds are summed with the weights of interpolation.
     """
     basis = one_sided(fine)
     if basis is None or basis.coupling is not None or not fine.levels:
