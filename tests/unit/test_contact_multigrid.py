@@ -144,6 +144,24 @@ def test_a_body_held_by_contact_alone(gap):
     assert np.abs(problem.near_nullspace.T @ pushed).max() < 1e-6 * np.abs(problem.f).sum()
 
 
+@pytest.mark.parametrize("method", ["nodal", "mortar"])
+def test_coarse_levels_of_two_bodies_have_contacts_of_their_own(method):
+    problem = two_bodies(method).assemble()
+    levels = ContactLevels.of(problem)
+    assert [len(contacts.node) for _, contacts in levels.coarse] == [9]
+    # the coarse space is that of the meshes: v is interpolated from its values at coarse nodes
+    finest, P = levels.hierarchy.levels[0], problem.levels[0]
+    coarse = np.random.default_rng(1).standard_normal((finest.P.coarse, 3))
+    coarse.reshape(-1)[finest.P.coarse_idle] = 0.0
+    fine = np.zeros((finest.A.nodes, 3))
+    finest.P.add(coarse, fine)
+    v = levels.displacement(fine)
+    same, place = (P == 1).nonzero()
+    values = np.zeros(P.shape[1])
+    values[place] = v[same]
+    assert np.abs(P @ values - v).max() < 1e-12
+
+
 def test_without_levels_coarse_ones_are_made():
     problem = replace(cube(8).assemble(), levels=(), guess=None)
     solution = drive(problem, ContactMultigrid(), tolerance=1e-8)

@@ -13,6 +13,7 @@ from .node_blocks import NodeBlocks, with_diagonal
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+ROUNDING = 1e-13  # of weights, which are of size 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +45,7 @@ class Transfer:
         weights = diagonal[np.arange(len(diagonal)), largest]
         plain = np.eye(3) * (weights[:, None] * both)[:, None, :]
         empty = np.empty((0, 3, 3))
-        scalar = np.array_equal(plain, tiles.data)
+        scalar = np.abs(plain - tiles.data).max(initial=0.0) <= ROUNDING
         return cls(
             tiles.indptr.astype(np.int32),
             tiles.indices.astype(np.int32),
@@ -94,6 +95,15 @@ class Transfer:
             return sparse.kron(self.scalar(), sparse.eye_array(3), format="csr")
         shape = (3 * self.fine, 3 * self.coarse)
         return sparse.bsr_array((self.blocks, self.indices, self.indptr), shape=shape).tocsr()
+
+    def masked(self) -> sparse.csr_array:
+        """The same with nothing at padding."""
+        used = [np.ones(3 * n) for n in (self.fine, self.coarse)]
+        used[0][self.idle], used[1][self.coarse_idle] = 0.0, 0.0
+        left, right = (sparse.diags_array(x) for x in used)
+        out = sparse.csr_array(left @ self.matrix() @ right)
+        out.eliminate_zeros()
+        return out
 
     def add(self, coarse: Array, fine: Array) -> None:
         """fine += P coarse, (nodes, 3)."""

@@ -21,6 +21,7 @@ from .truncation import Truncation
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 TINY = float(np.finfo(float).tiny)
+ROUNDING = 1e-13  # of the weights of a prolongation
 
 
 @dataclass(eq=False)
@@ -147,28 +148,61 @@ def _prepare(problem: FrictionProblem) -> ContactLevels:
 
 
 def _in_basis(hierarchy: Hierarchy, basis: OneSided) -> Hierarchy:
-    """Another finest level, T' M T and T^-1 P.
+    """Levels in one-sided bases: T' M T, and T^-1 P T_c with such a basis T_c of each level.
 
-    The coarse matrices keep their values but are formed again: now they store the couplings
-    between bodies, zero until contacts hold.
+    A contact whose slave node is one of the coarse level too sees there the coarse values of
+    the master side at its place, so that it has one node of its own on every level.
     """
-    nodes, finest = hierarchy.nodes, hierarchy.levels[0]
+    nodes = hierarchy.nodes
     place = None if nodes.plain else nodes.place
-    level = Level(NodeBlocks.from_sparse(basis.M, place, nodes.count))
-    if finest.P is not None:
-        size = 3 * nodes.count
-        C = basis.coupling.tocoo()  # type: ignore[union-attr]
-        entries = (C.data, (nodes.place[C.coords[0]], nodes.place[C.coords[1]]))
-        spread = sparse.coo_array(entries, shape=(size, size)).tocsr()
-        P = finest.P.matrix()
-        tiles = sparse.bsr_array((P - spread @ P).tobsr((3, 3)))
-        level.P = Transfer.of(tiles, finest.P.idle, finest.P.coarse_idle)
-    levels = [level]
-    for old in hierarchy.levels[1:]:
-        P = levels[-1].P
+    levels = [Level(NodeBlocks.from_sparse(basis.M, place, nodes.count))]
+    size = 3 * nodes.count
+    C = basis.coupling.tocoo()  # type: ignore[union-attr]
+    entries = (C.data, (nodes.place[C.coords[0]], nodes.place[C.coords[1]]))
+    coupling = sparse.coo_array(entries, shape=(size, size)).tocsr()
+    for k, old in enumerate(hierarchy.levels[1:]):
+        P = hierarchy.levels[k].P
         assert P is not None
+        if coupling.nnz:
+            P, coupling = _between_bases(P, coupling, geometric=k + 1 < hierarchy.geometric)
+        levels[-1].P = P
         levels.append(Level(P.galerkin(levels[-1].A), old.P))
     return Hierarchy(levels, hierarchy.geometric, nodes)
+
+
+def _between_bases(
+    P: Transfer, coupling: sparse.csr_array, geometric: bool
+) -> tuple[Transfer, sparse.csr_array]:
+    """((I - S C) P (I + S_c C_c), S_c C_c) for S C, (3 fine, 3 fine), of the finer level.
+
+    S_c C_c, (3 coarse, 3 coarse), are the rows of S C P at the nodes of both levels.
+    """
+    matrix = P.masked()
+    below = sparse.csr_array(coupling @ matrix)
+    coarse = sparse.csr_array((matrix.shape[1],) * 2)
+    if geometric:
+        node = np.unique(coupling.tocoo().coords[0] // 3)
+        parent = _parent(P, node)
+        node, parent = node[parent >= 0], parent[parent >= 0]
+        slot = np.arange(3)
+        pick = sparse.coo_array(
+            (
+                np.ones(3 * len(node)),
+                ((3 * parent[:, None] + slot).ravel(), (3 * node[:, None] + slot).ravel()),
+            ),
+            shape=(matrix.shape[1], matrix.shape[0]),
+        ).tocsr()
+        found = sparse.csr_array(pick @ below)
+        if not (found @ found).nnz:  # else a master node is a slave itself on the coarse level
+            coarse = found
+    out = matrix - below
+    if coarse.nnz:
+        out = out + out @ coarse
+    out = sparse.csr_array(out)
+    out.data[np.abs(out.data) < ROUNDING] = 0.0
+    out.eliminate_zeros()
+    tiles = sparse.bsr_array(out.tobsr((3, 3)))
+    return Transfer.of(tiles, P.idle, P.coarse_idle), coarse
 
 
 def _positive(A: NodeBlocks) -> bool:
