@@ -74,7 +74,7 @@ class Share:
     def call(self, name: str, *given: Any) -> Any:
         """Let all processes do a method of this class; the first one calls."""
         self._task((name, given))
-        return getattr(self, name)(*given)
+        return self._do(name, given)
 
     def _task(self, task: Any) -> Any:
         """Hand a task to all."""
@@ -84,13 +84,18 @@ class Share:
         return self.comm.bcast(task)
 
     def _serve(self) -> None:
+        while (task := self._task(None)) is not None:
+            self._do(*task)
+
+    def _do(self, name: str, given: tuple) -> Any:
+        """One task; all processes end when one fails, as the others wait for it."""
         try:
-            while (task := self._task(None)) is not None:
-                name, given = task
-                getattr(self, name)(*given)
-        except BaseException:  # the leader waits for us: nothing can go on
-            traceback.print_exc()
-            self.comm.Abort(1)
+            return getattr(self, name)(*given)
+        except BaseException:
+            if self.comm.size > 1:
+                traceback.print_exc()
+                self.comm.Abort(1)
+            raise
 
     # ------------------------------------------------------------------ tasks
     def times(self, v: Array) -> Array | None:
