@@ -17,6 +17,7 @@ from .solve import Callback, drive
 from .solvers.base import Iterate, Solver
 
 if TYPE_CHECKING:
+    from .analysis.enumerate import Solutions
     from .model import Model
 
 Start = Iterate | FrictionSolution | ModelSolution | None
@@ -53,6 +54,23 @@ def solve(problem, solver=None, *, tolerance=1e-8, max_iterations=None, time_lim
     if check:
         raise_unless_converged(result)
     return result
+
+
+def all_solutions(
+    problem: FrictionProblem | Model, *, time_limit: float | None = None
+) -> Solutions:
+    """All solutions of a 2D Coulomb problem, and whether there can be no other.
+
+    time_limit: seconds, after which the list may lack some.  The search takes milliseconds for
+    ten contacts and grows exponentially: some ten contacts with much friction, some fifty with
+    little.  Raises UnsupportedForm in 3D and under Tresca's law.
+    """
+    if not (isinstance(problem, FrictionProblem) or hasattr(problem, "assemble")):
+        raise InvalidInput(f"problem: expected a Model or a FrictionProblem, got {problem!r}")
+    discrete = problem if isinstance(problem, FrictionProblem) else problem.assemble()
+    from .analysis.enumerate import enumerate_solutions
+
+    return enumerate_solutions(discrete, time_limit=time_limit)
 
 
 def solve_any_form(

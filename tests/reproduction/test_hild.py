@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+import amontons as am
 from amontons.case import read_case
 from amontons.cli.sources import DATA
 from amontons.errors import InvalidInput
@@ -83,6 +84,44 @@ def test_listed_solutions_solve_our_problem_on_every_mesh(shared):
                     r = np.empty((int(n), 2))
                     r[order] = np.reshape(solution["r"], (-1, 2))[:, ::-1]
                     assert problem.with_mu(float(mu)).error(r) < 1e-8
+
+
+def test_all_listed_solutions_are_found_and_no_other(shared):
+    data = json.loads((shared / "reference" / "rey" / "enumeration.json").read_text())
+    for meshes in data["families"].values():
+        for listed in meshes.values():
+            mesh = mesh_of_triangle(listed["nodes"], listed["triangles"])
+            problem = hild_triangle(mesh).assemble().condensed()
+            order, _ = sorted_contacts(mesh)
+            for mu, solutions in listed["solutions"].items():
+                found = am.all_solutions(problem.with_mu(float(mu)))
+                assert found.complete
+                words = {"".join(np.array(list(s.pattern))[order]) for s in found.solutions}
+                assert words == {s["word"] for s in solutions}
+                by_word = {s["word"]: np.reshape(s["r"], (-1, 2)) for s in solutions}
+                for s in found.solutions:
+                    word = "".join(np.array(list(s.pattern))[order])
+                    assert s.r[order, ::-1] == pytest.approx(by_word[word], abs=1e-8)
+
+
+def test_counts_over_friction_are_those_listed(shared):
+    data = json.loads((shared / "reference" / "rey" / "enumeration.json").read_text())
+    for meshes in data["families"].values():
+        for listed in meshes.values():
+            mesh = mesh_of_triangle(listed["nodes"], listed["triangles"])
+            problem = hild_triangle(mesh).assemble().condensed()
+            for first, last, count in listed["runs_mu_from_to_count"]:
+                for mu in {first, last}:
+                    found = am.all_solutions(problem.with_mu(mu))
+                    assert (len(found), found.complete) == (count, True), (mesh, mu)
+
+
+@pytest.mark.parametrize(("n", "mu", "count"), [(10, 3.5, 3), (10, 4.8, 3), (15, 3.5, 3)])
+def test_larger_triangles_are_finished_with_proof(n, mu, count):
+    found = am.all_solutions(hild_triangle(n, mu=mu))
+    assert found.complete
+    assert len(found) == count
+    assert sum(s.orientation for s in found.solutions) == 1
 
 
 def test_bad_input_is_refused():

@@ -174,7 +174,7 @@ def test_examples_are_listed():
 
 
 @pytest.mark.parametrize(
-    "command", [[], ["solve"], ["info"], ["convert"], ["bench"], ["examples"]]
+    "command", [[], ["solve"], ["info"], ["convert"], ["bench"], ["enumerate"], ["examples"]]
 )
 def test_help(command):
     result = run(*command, "--help")
@@ -189,3 +189,21 @@ def test_version():
 def test_start_up_loads_no_heavy_package():
     code = "import sys; from amontons.cli import main; assert 'numpy' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_enumerate_lists_all_solutions():
+    result = run("enumerate", "example:hild", "--json", "-")
+    assert result.exit_code == 0
+    data = json.loads(result.stdout)
+    assert data["complete"] is True
+    assert sorted(s["pattern"].count("f") for s in data["solutions"]) == [0, 0, 8]
+    assert all(s["error"] < 1e-8 for s in data["solutions"])
+    table = run("enumerate", "example:hild", "--mu", "2", "--set", "mesh.refine=1").stdout
+    assert "ff " in table
+    assert "1 solution; there is no other" in table
+
+
+def test_enumerate_says_what_it_can_not_do():
+    assert "2D" in run("enumerate", "example:tower").stderr
+    assert run("enumerate", "example:tower").exit_code == 2
+    assert "--mu" in run("enumerate", "example:hild", "--mu", "-1").stderr

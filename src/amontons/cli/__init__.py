@@ -133,6 +133,36 @@ def bench(**options: object) -> None:
 
 
 @main.command(
+    "enumerate",
+    epilog="""\b
+Examples:
+  amontons enumerate example:hild             three solutions, and proof that there is no other
+  amontons enumerate example:hild --mu 2 --set mesh.refine=4
+  amontons enumerate problem.hdf5 --json - | jq .complete
+
+\b
+Exit codes: 0 the list is complete, 1 there may be others, 2 bad input.
+""",
+)
+@click.argument("source")
+@click.option("--mu", type=float, metavar="X", help="Friction coefficient of all contacts.")
+@click.option("--time-limit", type=float, metavar="SECONDS",
+              help="Stop after that time; the list may then lack some.")  # fmt: skip
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
+              help="Replace a value of the case.")  # fmt: skip
+@click.option("--json", "json_copy", metavar="FILE", help="The same as JSON; - prints it.")
+def enumerate_solutions(**options: object) -> int:
+    """Find all solutions of a 2D problem with Coulomb friction, and prove that these are all.
+
+    SOURCE is a TOML case file, an FCLib HDF5 file, or example:NAME.  Patterns list the contacts
+    in order: f free, s stick, + or - slip.
+    """
+    from .enumerate import run as run_enumerate
+
+    return run_enumerate(**options)  # type: ignore[arg-type]
+
+
+@main.command(
     epilog="""\b
 Examples:
   amontons run example:wall --set wall.cells=[4,2,2] --pictures

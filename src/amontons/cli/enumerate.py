@@ -1,0 +1,73 @@
+"""`amontons enumerate`: all solutions of a problem, and whether there can be others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import click
+import numpy as np
+
+from ..analysis.enumerate import Solutions
+from ..api import all_solutions
+from ..errors import InvalidInput
+from ..output import to_json, versions
+from .sources import open_source
+from .terminal import check_writable, deliver_json, show_table
+
+SCHEMA = "amontons/enumerate/1"
+INCOMPLETE = 1  # exit code
+SHOWN = 60  # contacts of a pattern that a table shows
+
+
+def run(
+    source: str, overrides: Sequence[str], mu: float | None, time_limit: float | None,
+    json_copy: str | None,
+) -> int:  # fmt: skip
+    """Search, show; the exit code."""
+    check_writable(json_copy, "--json")
+    opened = open_source(source, overrides)
+    problem = opened.discrete()
+    if mu is not None:
+        if not (np.isfinite(mu) and mu >= 0):
+            raise InvalidInput(f"--mu: expected a friction coefficient >= 0, got {mu}")
+        problem = problem.with_mu(mu)
+    found = all_solutions(problem, time_limit=time_limit)
+    if json_copy != "-":
+        _show(opened.title, found)
+    if json_copy is not None:
+        deliver_json(to_json(record(found)), json_copy)
+    return 0 if found.complete else INCOMPLETE
+
+
+def record(found: Solutions) -> dict[str, Any]:
+    """What the JSON file holds."""
+    solutions = [
+        {"pattern": s.pattern, "touching": list(s.touching), "r": s.r.tolist(),
+         "u": s.u.tolist(), "error": s.error, "orientation": s.orientation,
+         "freedom": s.freedom}
+        for s in found.solutions
+    ]  # fmt: skip
+    return {"schema": SCHEMA, "complete": found.complete, "reason": found.reason,
+            "examined": found.examined, "seconds": found.seconds, "solutions": solutions,
+            "versions": versions()}  # fmt: skip
+
+
+def _show(title: str, found: Solutions) -> None:
+    rows = []
+    for s in found.solutions:
+        word = s.pattern if len(s.pattern) <= SHOWN else f"{s.pattern[: SHOWN - 1]}…"
+        counts = [
+            str(sum(s.pattern.count(letter) for letter in part)) for part in ("f", "s", "+-")
+        ]
+        kind = "isolated" if s.freedom == 0 else f"a set of dimension {s.freedom}"
+        rows.append([word, *counts, f"{s.orientation:+d}", f"{s.error:.1e}", kind])
+    show_table(
+        title,
+        ["pattern", "open", "stick", "slip", "orientation", "error", ""],
+        rows,
+    )
+    count = f"{len(found)} solution" + ("s" if len(found) != 1 else "")
+    sure = "there is no other" if found.complete else "there may be others"
+    click.echo(f"{count}; {sure}: {found.reason} ({found.examined} partial patterns, "
+               f"{found.seconds:.3g} s)")  # fmt: skip
