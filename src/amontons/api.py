@@ -57,11 +57,13 @@ def solve(problem, solver=None, *, tolerance=1e-8, max_iterations=None, time_lim
 
 
 def all_solutions(
-    problem: FrictionProblem | Model, *, time_limit: float | None = None
-) -> Solutions:
+    problem: FrictionProblem | Model, *, time_limit: float | None = None,
+    keep_proof: bool = False,
+) -> Solutions:  # fmt: skip
     """All solutions of a 2D Coulomb problem, and whether there can be no other.
 
-    time_limit: seconds, after which the list may lack some.  The search takes milliseconds for
+    time_limit: seconds, after which the list may lack some.  keep_proof: keep the multipliers
+    that exclude all other patterns, in `Solutions.proof`.  The search takes milliseconds for
     ten contacts and grows exponentially: some ten contacts with much friction, some fifty with
     little.  Raises UnsupportedForm in 3D and under Tresca's law.
     """
@@ -70,7 +72,7 @@ def all_solutions(
     discrete = problem if isinstance(problem, FrictionProblem) else problem.assemble()
     from .analysis.enumerate import enumerate_solutions
 
-    return enumerate_solutions(discrete, time_limit=time_limit)
+    return enumerate_solutions(discrete, time_limit=time_limit, keep_proof=keep_proof)
 
 
 def solve_any_form(

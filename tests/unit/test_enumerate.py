@@ -1,6 +1,7 @@
 """All solutions of small 2D problems, against every pattern solved one by one."""
 
 import itertools
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -219,3 +220,96 @@ def test_bad_input_is_refused():
         enumerate_solutions(one_contact_2d(), time_limit=-1)
     with pytest.raises(am.InvalidInput, match="expected a Model"):
         am.all_solutions(3)
+
+
+# ------------------------------------------- a checker that shares no code with the search
+SIGNS = {  # allowed signs of a, b, u_N, u_T, where r = a (1, mu) + b (1, -mu)
+    ".": ("+", "+", "+", "*"), "c": ("+", "+", "0", "*"), "f": ("0", "0", "+", "*"),
+    "s": ("+", "+", "0", "0"), "+": ("+", "0", "0", "-"), "-": ("0", "+", "0", "+"),
+}  # fmt: skip
+STANDS_FOR = {".": "fs+-", "c": "s+-"}
+
+
+def largest_value(direction, centre, shape, radius):
+    """Maximum of direction . z over the ellipsoid centre + radius shape^(1/2) ball."""
+    return direction @ centre + radius * np.sqrt(direction @ shape @ direction)
+
+
+def box(W, q, mu):
+    """Ranges of a, b, u_N, u_T in r W r + q r <= 0, and a little more, (nc, 4, 2)."""
+    inverse = np.linalg.inv(W)
+    centre, radius = -inverse @ q / 2, np.sqrt(q @ inverse @ q) / 2
+    out = np.empty((len(mu), 4, 2))
+    for i, coefficient in enumerate(mu):
+        n, t = np.eye(len(q))[2 * i : 2 * i + 2]
+        a, b = (n + t / coefficient) / 2, (n - t / coefficient) / 2
+        for k, (direction, shift) in enumerate(
+            [(a, 0), (b, 0), (W @ n, q @ n), (W @ t, q @ t)]
+        ):
+            out[i, k, 0] = shift - largest_value(-direction, centre, inverse, radius)
+            out[i, k, 1] = shift + largest_value(direction, centre, inverse, radius)
+    room = 1e-7 * np.abs(out).sum(axis=2)  # far above rounding here
+    return out + room[..., None] * [-1, 1]
+
+
+def excluded(W, q, mu, bounds, word, y):
+    """In exact arithmetic: y u - (W y) r, with the signs of `word`, is never y q."""
+    exact = [[Fraction(x) for x in row] for row in W]
+    y, m = [Fraction(x) for x in y], len(q)
+    pull = [-sum(exact[k][j] * y[k] for k in range(m)) for j in range(m)]
+    least = most = Fraction(0)
+    for i, letter in enumerate(word):
+        slope, (n, t) = Fraction(mu[i]), (2 * i, 2 * i + 1)
+        weights = (pull[n] + slope * pull[t], pull[n] - slope * pull[t], y[n], y[t])
+        for k, (weight, sign) in enumerate(zip(weights, SIGNS[letter], strict=True)):
+            low, high = (Fraction(x) for x in bounds[i, k])
+            low = max(low, 0) if sign in "0+" else low
+            high = min(high, 0) if sign in "0-" else high
+            if low > high:
+                return True
+            least += min(weight * high, weight * low)
+            most += max(weight * high, weight * low)
+    right = sum(a * Fraction(b) for a, b in zip(y, q, strict=True))
+    return not least <= right <= most
+
+
+def check(problem):
+    """Every pattern is a listed solution or excluded by multipliers that hold."""
+    found = am.all_solutions(problem, keep_proof=True)
+    W, q, mu = problem.W, problem.q.ravel(), problem.mu
+    bounds = box(W, q, mu)
+    covered = {w for s in found.solutions for w in (s.pattern, *s.touching)}
+    for word, y in zip(found.proof.patterns, found.proof.multipliers, strict=True):
+        assert excluded(W, q, mu, bounds, word, y.ravel()), word
+        choices = (STANDS_FOR.get(letter, letter) for letter in word)
+        covered |= {"".join(letters) for letters in itertools.product(*choices)}
+    assert len(covered) == 4 ** len(mu)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_proofs_are_accepted_by_a_separate_checker(seed):
+    W, q, mu = coupled_problem(seed)
+    check(am.FrictionProblem.from_delassus(W, q, mu))
+
+
+def test_the_proof_for_the_triangle_is_accepted():
+    local = hild_triangle(5, mu=3.5).assemble().condensed()
+    check(am.FrictionProblem.from_delassus(local.W.toarray(), local.q, local.mu))
+
+
+def test_the_checker_refuses_a_wrong_proof():
+    W, q, mu = coupled_problem(2)
+    found = am.all_solutions(am.FrictionProblem.from_delassus(W, q, mu), keep_proof=True)
+    bounds, word = box(W, q.ravel(), mu), found.solutions[0].pattern
+    for y in found.proof.multipliers:
+        assert not excluded(W, q.ravel(), mu, bounds, word, y.ravel())
+
+
+def test_energy_is_that_above_the_state_without_contact():
+    model = hild_triangle(3, mu=3.5)
+    problem = model.assemble()
+    free = problem.velocity(np.zeros((3, 2)))[1]
+    for solution in am.all_solutions(model).solutions:
+        v = problem.velocity(solution.r)[1]
+        potential = [x @ (problem.M @ x) / 2 - problem.f @ x for x in (v, free)]
+        assert solution.energy == pytest.approx(potential[0] - potential[1], abs=1e-9)

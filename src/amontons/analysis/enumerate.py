@@ -3,11 +3,6 @@
 Every contact is free, sticks, or slips in one of two directions; each of the 4^nc patterns
 makes the problem linear.  `pattern_search` excludes most patterns in large groups; here the
 problem is prepared for it, and what remains is solved pattern by pattern.
-
-Scaled variables: r sqrt|W_ii| and u / sqrt|W_ii|, divided by |q / sqrt|W_ii||.  Every solution
-dissipates, r u <= 0, so r W r + q r <= 0: where W is positive definite that ellipsoid bounds
-all reactions and velocities beforehand, and the proofs hold without further assumption; so
-they do where W is singular but no reaction in the cone has W r = 0.
 """
 
 from __future__ import annotations
@@ -18,21 +13,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 
 from ..errors import InvalidInput, UnsupportedForm
 from ..problem import FrictionProblem
 from . import pattern_search as search
+from .scaled_problem import REACH, SAME, ScaledProblem, States
 
 Array = NDArray[np.float64]
-States = NDArray[np.int8]
-LETTERS = {search.OPEN: "f", search.STICK: "s", search.SLIP_PLUS: "+", search.SLIP_MINUS: "-",
+LETTERS = {search.OPEN_OR_CLOSED: ".", search.CLOSED: "c", search.OPEN: "f",
+           search.STICK: "s", search.SLIP_PLUS: "+", search.SLIP_MINUS: "-",
            search.FRICTIONLESS: "+"}  # fmt: skip
-DEFINITE = 1e-10  # smallest eigenvalue of a positive definite scaled W, relative to the largest
-REACH = 1e6  # size of scaled reactions up to which proofs hold where W is singular
-SINGULAR = 1e-11  # smallest singular value of a piece that has an isolated solution, relative
-SAME = 1e-8  # scaled distance of two solutions that count as one
-SLACK = 1e-9  # violation of the law by a solution, in scaled variables, that counts as none
 NODES = 2000  # patterns between two looks at the clock
 
 
@@ -43,8 +33,9 @@ class PieceSolution:
     pattern: status of every contact, f free, s stick, slip + (r_T = mu r_N) or -.  touching:
     further patterns that the same solution has, being on their border.  r, u (nc, 2).
     error: by the judge.  orientation: sign of the determinant of the piece, 1 as without
-    friction, 0 where it is singular.  freedom: dimension of the set of solutions on this
-    piece, 0 for an isolated one; r is then a point inside.
+    friction, 0 where it is singular.  energy: r W r / 2, the potential energy above that of
+    the state without contact.  freedom: dimension of the set of solutions on this piece, 0 for
+    an isolated one; r is then a point inside.
     """
 
     pattern: str
@@ -53,7 +44,22 @@ class PieceSolution:
     u: Array
     error: float
     orientation: int
+    energy: float
     freedom: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Proof:
+    """Why the patterns that are no solutions are none; anyone can check it with W, q and mu.
+
+    patterns: each excluded with all that it stands for, . for an undecided contact (not in
+    tension, u_N >= 0) and c for a closed one (u_N = 0), else as in `PieceSolution`.
+    multipliers (k, nc, 2): for the y of its pattern no r and u, with the signs of the pattern
+    and in the ellipsoid r W r + q r <= 0, have y u - (W^T y) r = y q.
+    """
+
+    patterns: tuple[str, ...]
+    multipliers: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +74,7 @@ class Solutions:
     reason: str
     examined: int
     seconds: float
+    proof: Proof | None = None
 
     def __len__(self) -> int:
         return len(self.solutions)
@@ -84,12 +91,14 @@ class Solutions:
 
 
 def enumerate_solutions(
-    problem: FrictionProblem, *, time_limit: float | None = None, tolerance: float = 1e-8
-) -> Solutions:
+    problem: FrictionProblem, *, time_limit: float | None = None, tolerance: float = 1e-8,
+    keep_proof: bool = False,
+) -> Solutions:  # fmt: skip
     """All solutions of a 2D Coulomb problem; the global form is condensed.
 
     time_limit: seconds, after which the list is not complete.  tolerance: error by the judge
-    that a solution may have.  Raises UnsupportedForm in 3D and under Tresca's law.
+    that a solution may have.  keep_proof: fill `Solutions.proof`.  Raises
+    UnsupportedForm in 3D and under Tresca's law.
     """
     if time_limit is not None and not time_limit > 0:
         raise InvalidInput(f"time_limit: expected seconds > 0, got {time_limit!r}")
@@ -100,11 +109,12 @@ def enumerate_solutions(
     local = problem.condensed()
     if local.q_norm == 0:
         r = np.zeros((local.contacts, 2))
-        rest = PieceSolution("f" * local.contacts, (), r, r.copy(), 0.0, 1)
+        rest = PieceSolution("f" * local.contacts, (), r, r.copy(), 0.0, 1, 0.0)
         reason = "q is zero: only r = 0 can be judged, others were not looked for"
         return Solutions((rest,), local.contacts == 0, reason, 0, 0.0)
-    piece = _Scaled(local)
-    found, undecided, examined, stopped = _collect(piece, began, time_limit, tolerance)
+    piece = ScaledProblem(local)
+    cuts: list[Cut] | None = [] if keep_proof else None
+    found, undecided, examined, stopped = _collect(piece, began, time_limit, tolerance, cuts)
     reason = "every other pattern is excluded"
     if stopped:
         reason = f"stopped after {time_limit:g} s"
@@ -114,193 +124,32 @@ def enumerate_solutions(
         reason = f"W is singular: reactions above {REACH:g} times the size of q / W may exist"
     complete = not stopped and not undecided and piece.bounded
     solutions = tuple(_merged(piece, found))
-    return Solutions(solutions, complete, reason, examined, time.perf_counter() - began)
-
-
-class _Scaled:
-    """The problem in scaled variables, u = A x + c, and the box of all solutions."""
-
-    def __init__(self, problem: FrictionProblem) -> None:
-        assert problem.W is not None and problem.q is not None
-        self.problem, self.mu = problem, problem.mu
-        nc = self.contacts = problem.contacts
-        W = problem.W if isinstance(problem.W, np.ndarray) else problem.W.toarray()
-        own = np.arange(nc)
-        size = np.linalg.norm(W.reshape(nc, 2, nc, 2)[own, :, own], 2, axis=(1, 2))
-        self.reacts = size > 0
-        root = np.repeat(np.sqrt(np.where(self.reacts, size, 1.0)), 2)
-        self.unit = float(np.linalg.norm(problem.q.ravel() / root))
-        self.to_r, self.to_u = self.unit / root, self.unit * root
-        self.W = W / root / root[:, None]
-        self.c = problem.q.ravel() / self.to_u
-        generators = np.zeros((2 * nc, 2 * nc))  # r = generators x
-        shrink = 1 / np.maximum(self.mu, 1.0)
-        for i in range(nc):
-            generators[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = shrink[i] * np.array(
-                [[1.0, 1.0], [self.mu[i], -self.mu[i]]]
-            )
-        self.generators = generators
-        self.A = self.W @ generators
-        self.low, self.high = self._box(shrink)
-
-    def _box(self, shrink: Array) -> tuple[Array, Array]:
-        """Bounds of a, b, u_N, u_T of every contact, (4 nc,) each."""
-        W = (self.W + self.W.T) / 2
-        values = np.linalg.eigvalsh(W)
-        if values[0] <= DEFINITE * values[-1]:
-            semidefinite = values[0] >= -DEFINITE * values[-1]
-            size = self._cone_bound(W) if semidefinite else np.inf
-            self.bounded = size < REACH
-            return self._wide_box(min(size, REACH))
-        self.bounded = True
-        inverse = np.linalg.inv(W)
-        centre = -inverse @ self.c / 2
-        radius = np.sqrt(-self.c @ centre / 2)
-        mu = np.where(self.mu > 0, self.mu, np.inf)
-        low, high = np.empty((2, self.contacts, 4))
-        for i in range(self.contacts):
-            part = slice(2 * i, 2 * i + 2)
-            along = np.array([[0.5, 0.5 / mu[i]], [0.5, -0.5 / mu[i]]]) / shrink[i]
-            if self.mu[i] == 0:
-                along[0] = [1.0, 0.0]  # a is r_N, b is zero
-            middle = along @ centre[part]
-            reach = radius * np.sqrt(np.diag(along @ inverse[part, part] @ along.T))
-            low[i, :2], high[i, :2] = middle - reach, middle + reach
-        # u is bounded through r, whatever the symmetry of W
-        centre_u = self.W @ centre + self.c
-        root = np.linalg.cholesky(inverse)
-        reach_u = radius * np.linalg.norm(self.W @ root, axis=1)
-        low[:, 2:] = (centre_u - reach_u).reshape(-1, 2)
-        high[:, 2:] = (centre_u + reach_u).reshape(-1, 2)
-        room = 1e-5 * (np.abs(low) + np.abs(high))  # rounding of the inverse, by DEFINITE
-        return (low - room).ravel(), (high + room).ravel()
-
-    def _cone_bound(self, W: Array) -> float:
-        """Bound of the sum of all a and b where no reaction in the cone has W r = 0, else inf.
-
-        With A^T y >= 1/2 it is S <= 2 y W r <= 2 |y|_W |r|_W, and |r|_W^2 <= -q r <= Q S.
-        """
-        m = 2 * self.contacts
-        able = np.repeat(self.reacts, 2)
-        left = -np.hstack([self.A.T, -self.A.T])[able]
-        answer = linprog(np.ones(2 * m), left, -np.ones(len(left)), method="highs")
-        if not answer.success:
-            return np.inf
-        y = answer.x[:m] - answer.x[m:]
-        if (self.A.T @ y)[able].min(initial=1.0) < 0.5 or np.abs(self.W - W).max() > 1e-12:
-            return np.inf
-        Q = max(0.0, -float((self.generators.T @ self.c)[able].min(initial=0.0)))
-        return 4 * float(y @ W @ y) * Q * (1 + 1e-6) + 1e-6
-
-    def _wide_box(self, size: float) -> tuple[Array, Array]:
-        """Bounds of all variables where the reactions are bounded by their sum alone."""
-        reach_u = np.abs(self.A).max(axis=1, initial=0.0) * size
-        low, high = np.zeros((2, self.contacts, 4))
-        high[:, :2] = size
-        low[:, 2:] = (self.c - reach_u).reshape(-1, 2)
-        high[:, 2:] = (self.c + reach_u).reshape(-1, 2)
-        return low.ravel(), high.ravel()
-
-    # ---------------------------------------------------------------- one pattern
-    def system(self, states: States) -> tuple[Array, Array]:
-        """(r = R y, rows E of u that vanish): the linear system E (W R y + c) = 0."""
-        columns, rows = [], []
-        for i, state in enumerate(states):
-            n, t = 2 * i, 2 * i + 1
-            slope = {search.SLIP_PLUS: self.mu[i], search.SLIP_MINUS: -self.mu[i]}
-            if state == search.OPEN:
-                continue
-            rows.append(n)
-            columns.append({n: 1.0, t: slope.get(state, 0.0)})
-            if state == search.STICK:
-                rows.append(t)
-                columns.append({t: 1.0})
-        R = np.zeros((2 * self.contacts, len(columns)))
-        for k, column in enumerate(columns):
-            R[list(column), k] = list(column.values())
-        return R, np.array(rows, dtype=int)
-
-    def slacks(self, states: States, r: Array, u: Array) -> Array:
-        """What must be >= 0 on a piece, for r and u flat or with directions in columns."""
-        rows = []
-        for i, state in enumerate(states):
-            n, t, mu = 2 * i, 2 * i + 1, self.mu[i]
-            if state == search.OPEN:
-                rows.append(u[n])
-            elif state == search.STICK:
-                rows += [mu * r[n] - r[t], mu * r[n] + r[t]]
-            else:
-                rows.append(r[n])
-                if state == search.SLIP_PLUS:
-                    rows.append(-u[t])
-                elif state == search.SLIP_MINUS:
-                    rows.append(u[t])
-        return np.array(rows)
-
-    def holds(self, states: States, r: Array, u: Array) -> bool:
-        """True where r, u lie on the closed piece."""
-        R, rows = self.system(states)
-        outside = r - R @ np.linalg.lstsq(R, r, rcond=None)[0] if R.size else r
-        off = max(np.abs(u[rows]).max(initial=0), np.abs(outside).max(initial=0))
-        return off <= SAME and self.slacks(states, r, u).min() >= -SAME
-
-    def solve(self, states: States) -> tuple[Array, int, int] | None:
-        """(r, orientation, freedom) on the piece of a pattern, None without a solution."""
-        R, rows = self.system(states)
-        E = (self.W @ R)[rows]
-        if not len(rows):
-            r = np.zeros(2 * self.contacts)
-            return (r, 1, 0) if self.slacks(states, r, self.c).min() >= -SLACK else None
-        left, values, right = np.linalg.svd(E)
-        rank = int((values > SINGULAR * max(values[0], 1.0)).sum())
-        if rank == len(rows):
-            r = R @ np.linalg.solve(E, -self.c[rows])
-            sign = int(np.linalg.slogdet(E)[0])
-            fits = self.slacks(states, r, self.W @ r + self.c).min() >= -SLACK
-            return (r, sign, 0) if fits else None
-        if np.abs(left[:, rank:].T @ self.c[rows]).max() > SLACK:
-            return None
-        y = -right[:rank].T @ ((left[:, :rank].T @ self.c[rows]) / values[:rank])
-        return self._inside(states, R @ y, R @ right[rank:].T)
-
-    def _inside(
-        self, states: States, r: Array, directions: Array
-    ) -> tuple[Array, int, int] | None:
-        """A point inside the solutions r + directions t on a singular piece.
-
-        Homogeneous in (t, scale), so that one linear program finds every slack that can be
-        positive; those that can not reduce the dimension.
-        """
-        k = directions.shape[1]
-        G = self.slacks(states, directions, self.W @ directions)
-        g = self.slacks(states, r, self.W @ r + self.c)
-        left = np.hstack([-G, -g[:, None], np.eye(len(g))])
-        bounds = [(None, None)] * k + [(1, None)] + [(0, 1)] * len(g)
-        cost = np.concatenate([np.zeros(k + 1), -np.ones(len(g))])
-        answer = linprog(cost, left, np.full(len(g), SLACK), bounds=bounds, method="highs")
-        if not answer.success:
-            return None
-        tight = answer.x[k + 1 :] < 0.5
-        freedom = k - (np.linalg.matrix_rank(G[tight], tol=SAME) if tight.any() else 0)
-        return r + directions @ (answer.x[:k] / answer.x[k]), 0, int(freedom)
+    return Solutions(
+        solutions, complete, reason, examined, time.perf_counter() - began, _proof(piece, cuts)
+    )
 
 
 # ------------------------------------------------------------------- the search
 Found = tuple[States, Array, Array, float, int, int]
+Cut = tuple[States, Array]  # pattern and multipliers
 
 
 def _collect(
-    piece: _Scaled, began: float, time_limit: float | None, tolerance: float
+    piece: ScaledProblem,
+    began: float,
+    time_limit: float | None,
+    tolerance: float,
+    cuts: list[Cut] | None,
 ) -> tuple[list[Found], int, int, bool]:
     """(solutions with their patterns, undecided patterns, nodes, stopped by the clock?)."""
     found: list[Found] = []
     undecided = examined = 0
-    for leaves, nodes, done in _leaves(piece):
+    for leaves, nodes, done in _leaves(piece, cuts):
         examined += nodes
         for states in leaves:
             answer = piece.solve(states)
             if answer is None:
-                undecided += not _excluded(piece, states)
+                undecided += not piece.excluded(states)
                 continue
             r, orientation, freedom = answer
             u = piece.W @ r + piece.c
@@ -314,44 +163,28 @@ def _collect(
     return found, undecided, examined, False
 
 
-def _leaves(piece: _Scaled) -> Iterator[tuple[States, int, bool]]:
+def _leaves(piece: ScaledProblem, cuts: list[Cut] | None) -> Iterator[tuple[States, int, bool]]:
     """(complete patterns that the search could not exclude, nodes, done?) in turns."""
     nc = piece.contacts
     m, levels = 2 * nc, 2 * nc + 2
     D = np.empty((levels, m, m + 1))
     basic, nonbasic = np.empty((2, levels, m), dtype=np.int64)
     states, turn = np.empty((levels, nc), dtype=np.int8), np.zeros((levels, 3), dtype=np.int64)
-    leaves = np.empty((NODES, nc), dtype=np.int8)
+    leaves, cut = np.empty((2, NODES, nc), dtype=np.int8)
+    proofs = np.empty((NODES, m))
     search.start_inplace(D, basic, nonbasic, states, piece.A, piece.c)
-    reason, level = search.BUDGET, 0
-    while reason != search.DONE:
-        reason, level, nodes, count = search.search_inplace(
+    done, level = False, 0
+    while not done:
+        done, level, nodes, count, excluded = search.search_inplace(
             piece.A, piece.c, piece.low, piece.high, piece.reacts, piece.mu > 0,
-            D, basic, nonbasic, states, turn, level, NODES, leaves,
+            D, basic, nonbasic, states, turn, level, leaves, cut, proofs,
         )  # fmt: skip
-        yield leaves[:count].copy(), nodes, reason == search.DONE
+        if cuts is not None:
+            cuts += zip(cut[:excluded].copy(), proofs[:excluded].copy(), strict=True)
+        yield leaves[:count].copy(), nodes, done
 
 
-def _excluded(piece: _Scaled, states: States) -> bool:
-    """True when a pattern has no solution by a margin far above rounding.
-
-    Only for the few patterns that the search left: a well-conditioned system whose only
-    solution violates the law.
-    """
-    R, rows = piece.system(states)
-    if not len(rows):
-        return bool(piece.slacks(states, 0 * piece.c, piece.c).min() < -SLACK)
-    E = (piece.W @ R)[rows]
-    values = np.linalg.svd(E, compute_uv=False)
-    if values[-1] <= SINGULAR * max(values[0], 1.0):
-        return False
-    r = R @ np.linalg.solve(E, -piece.c[rows])
-    rounding = len(rows) * np.finfo(float).eps * values[0] / values[-1] * np.abs(r).max()
-    worst = -piece.slacks(states, r, piece.W @ r + piece.c).min()
-    return bool(worst > 100 * rounding * (1 + piece.mu.max()) + SLACK)
-
-
-def _merged(piece: _Scaled, found: list[Found]) -> Iterator[PieceSolution]:
+def _merged(piece: ScaledProblem, found: list[Found]) -> Iterator[PieceSolution]:
     """One entry per solution: sets first, then isolated ones that are not in them."""
     kept: list[tuple[Found, list[str]]] = []
     for item in sorted(found, key=lambda f: (-f[5], -int((f[0] == search.STICK).sum()))):
@@ -367,8 +200,18 @@ def _merged(piece: _Scaled, found: list[Found]) -> Iterator[PieceSolution]:
     for (states, r, _, error, orientation, freedom), touching in kept:
         reaction = (r * piece.to_r).reshape(-1, 2)
         velocity = piece.problem.velocity(reaction)[0]
+        energy = float(r @ piece.W @ r) / 2 * piece.unit**2
         yield PieceSolution(_word(states), tuple(touching), reaction, np.array(velocity), error,
-                            orientation, freedom)  # fmt: skip
+                            orientation, energy, freedom)  # fmt: skip
+
+
+def _proof(piece: ScaledProblem, cuts: list[Cut] | None) -> Proof | None:
+    """What the search left, in the units of the problem."""
+    if cuts is None:
+        return None
+    rows = [y / piece.to_u for _, y in cuts]
+    multipliers = np.array(rows).reshape(-1, piece.contacts, 2)
+    return Proof(tuple(_word(states) for states, _ in cuts), multipliers)
 
 
 def _word(states: States) -> str:

@@ -33,7 +33,6 @@ PIVOT = 1e-9  # smallest entry that is divided by
 RENEWAL = 40  # pivots after which rounding is taken out of a dictionary
 EPSILON = float(np.finfo(float).eps)
 INFEASIBLE, FEASIBLE, UNDECIDED = 0, 1, 2
-DONE, BUDGET, FULL = 0, 1, 2  # why `search_inplace` returned
 
 
 @njit(cache=True)
@@ -173,10 +172,11 @@ def _renew_inplace(D, basic, nonbasic, A, c):
 
 
 @njit(cache=True)
-def _feasible_inplace(D, basic, nonbasic, states, A, c, low, high, age):
+def _feasible_inplace(D, basic, nonbasic, states, A, c, low, high, age, proof):  # noqa: PLR0913
     """Look for values within the bounds of these states: FEASIBLE, INFEASIBLE or UNDECIDED.
 
-    age: pivots since the dictionary was computed anew; returned as the second value.
+    age: pivots since the dictionary was computed anew; returned as the second value.  proof
+    (m,): the multipliers where the answer is INFEASIBLE.
     """
     m = len(basic)
     fresh = False
@@ -194,6 +194,8 @@ def _feasible_inplace(D, basic, nonbasic, states, A, c, low, high, age):
         if iteration % 4 == 0 or j < 0:
             y = _row_multipliers(D, basic, nonbasic, i, m)
             if _proved(y, A, c, states, low, high):
+                for k in range(m):
+                    proof[k] = y[k]
                 return INFEASIBLE, age
         if j < 0 and fresh:
             return UNDECIDED, age
@@ -261,20 +263,19 @@ def _copy_inplace(D, basic, nonbasic, states, level):
 
 @njit(cache=True)
 def search_inplace(  # noqa: PLR0913
-    A, c, low, high, reacts, frictional, D, basic, nonbasic, states, turn, level, budget, leaves
-):
-    """Go on from `level` for at most `budget` nodes: (reason, level, nodes, leaves found).
+    A, c, low, high, reacts, frictional, D, basic, nonbasic, states, turn, level, leaves,
+    cut, proofs,
+):  # fmt: skip
+    """Go on from `level` for at most len(leaves) nodes: (done?, level, nodes, leaves, cuts).
 
     D, basic, nonbasic, states: one dictionary and pattern per level; turn (levels, 3): contact
     that a level branches on, its next child, and the age of its dictionary.  leaves (k, nc)
-    takes complete patterns.
+    takes complete patterns; cut (k, nc) and proofs (k, m) the excluded ones and multipliers.
     """
-    nodes = found = 0
+    nodes = found = cuts = 0
     while level >= 0:
-        if nodes >= budget:
-            return BUDGET, level, nodes, found
-        if found == len(leaves):
-            return FULL, level, nodes, found
+        if nodes >= len(leaves):
+            return False, level, nodes, found, cuts
         p = turn[level, 0]
         state = _child(states[level, p], turn[level, 1], reacts[p], frictional[p])
         if state < 0:
@@ -287,10 +288,13 @@ def search_inplace(  # noqa: PLR0913
         nodes += 1
         answer, turn[level, 2] = _feasible_inplace(
             D[level], basic[level], nonbasic[level], states[level], A, c, low, high,
-            turn[level - 1, 2],
+            turn[level - 1, 2], proofs[cuts],
         )  # fmt: skip
         following = -1
-        if answer != INFEASIBLE:
+        if answer == INFEASIBLE:
+            cut[cuts] = states[level]
+            cuts += 1
+        else:
             following = _most_violated(D[level], basic[level], states[level])
             if following < 0:
                 leaves[found] = states[level]
@@ -299,4 +303,4 @@ def search_inplace(  # noqa: PLR0913
             level -= 1
         else:
             turn[level, 0], turn[level, 1] = following, 0
-    return DONE, level, nodes, found
+    return True, level, nodes, found, cuts

@@ -44,7 +44,7 @@ def record(found: Solutions) -> dict[str, Any]:
     """What the JSON file holds."""
     solutions = [
         {"pattern": s.pattern, "touching": list(s.touching), "r": s.r.tolist(),
-         "u": s.u.tolist(), "error": s.error, "orientation": s.orientation,
+         "u": s.u.tolist(), "error": s.error, "orientation": s.orientation, "energy": s.energy,
          "freedom": s.freedom}
         for s in found.solutions
     ]  # fmt: skip
@@ -61,10 +61,12 @@ def _show(title: str, found: Solutions) -> None:
             str(sum(s.pattern.count(letter) for letter in part)) for part in ("f", "s", "+-")
         ]
         kind = "isolated" if s.freedom == 0 else f"a set of dimension {s.freedom}"
-        rows.append([word, *counts, f"{s.orientation:+d}", f"{s.error:.1e}", kind])
+        rows.append(
+            [word, *counts, f"{s.orientation:+d}", f"{s.energy:.5g}", f"{s.error:.1e}", kind]
+        )
     show_table(
         title,
-        ["pattern", "open", "stick", "slip", "orientation", "error", ""],
+        ["pattern", "open", "stick", "slip", "orientation", "energy", "error", ""],
         rows,
     )
     count = f"{len(found)} solution" + ("s" if len(found) != 1 else "")
