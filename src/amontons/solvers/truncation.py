@@ -158,8 +158,8 @@ class Truncation:
         return (inverse @ b.reshape(-1)).reshape(b.shape)
 
     def restore(self) -> None:
-        """All levels without contacts."""
-        for near, level in zip(self.near, self.hierarchy.levels, strict=True):
+        """All levels without contacts; the finest is never changed."""
+        for near, level in zip(self.near[1:], self.hierarchy.levels[1:], strict=True):
             if isinstance(level.A, NodeBlocks):
                 near.restore(level.A)
 
