@@ -215,17 +215,21 @@ def test_parts_use_the_factor_of_the_whole(wall):
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-def test_auto_takes_inexact_newton_on_walls(dim, monkeypatch):
+@pytest.mark.parametrize(("work", "name"), [(0, "inexact Newton"), (1e6, "semismooth Newton")])
+def test_auto_takes_newton_on_walls(dim, work, name, monkeypatch):
+    """Inexact, or exact where an LU in blocks is little work."""
     problem = one_step(dim, rows=4)
+    monkeypatch.setattr(inexact, "EXACT_WORK", work)
     monkeypatch.setattr(inexact, "CHUNK", 5)  # sweeps alone would do on a wall so small
     monkeypatch.setattr(Joints, "newton_cost", lambda self, digits: 0.0)
     solution = am.drive(problem, tolerance=1e-9)
     assert solution.converged
-    assert solution.convergence.detail == "inexact Newton"
+    assert solution.convergence.detail == name
 
 
 def test_where_newton_stalls_the_portfolio_goes_on(wall, monkeypatch):
     monkeypatch.setattr(Joints, "newton_cost", lambda self, digits: 0.0)
+    monkeypatch.setattr(inexact, "EXACT_WORK", 0)
     monkeypatch.setattr(inexact.InexactNewton, "iterates", lambda *_: iter(()))
     solution = am.drive(wall, tolerance=1e-8)
     assert solution.converged

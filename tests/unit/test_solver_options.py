@@ -18,6 +18,7 @@ from amontons.solvers.base import Iterate, Target
 from amontons.solvers.functions import AlartCurnier, JeanMoreau, NaturalMap
 from amontons.solvers.gauss_seidel import LONGEST, Batch
 from amontons.solvers.line_search import Armijo, FullStep, GoldsteinPrice, NonMonotone
+from amontons.solvers.newton import Condensed, block_diagonal
 
 TOLERANCE = 1e-9
 SPLIT = [RhoStrategy.SPLIT, RhoStrategy.SPLIT_CONDITION]
@@ -462,3 +463,24 @@ def test_in_a_case_file(tmp_path):
     )
     with pytest.raises(FileFormatError, match="solver.line_search.halvings: expected at least"):
         am.read_case(path, ["solver.line_search.halvings=0"])
+
+
+def test_newton_step_by_blocks_is_the_dense_one():
+    """(A + B W) dr = -F in blocks against a dense solve, in 2D and 3D."""
+    random = np.random.default_rng(7)
+    for d in (2, 3):
+        nc = 12
+        root = random.normal(size=(nc * d, nc * d))
+        problem = am.FrictionProblem.from_delassus(
+            root @ root.T, random.normal(size=(nc, d)), np.full(nc, 0.5)
+        )
+        F = random.normal(size=(nc, d))
+        A = np.eye(d) + 0.1 * random.normal(size=(nc, d, d))
+        B = 0.3 * random.normal(size=(nc, d, d))
+        matrix = block_diagonal(A).toarray() + block_diagonal(B).toarray() @ problem.W
+        dr = Condensed(problem)._by_blocks(F, A, B)
+        np.testing.assert_allclose(
+            dr.ravel(), np.linalg.solve(matrix, -F.ravel()), rtol=1e-6, atol=1e-8
+        )
+        singular = Condensed(problem)._by_blocks(F, 0 * A, 0 * B)
+        assert singular is None

@@ -274,3 +274,42 @@ def solve_inplace(order, upper_start, upper, lower_start, lower, U, L, inverse, 
     for p in range(n):
         i = order[p]
         x[i, 0], x[i, 1], x[i, 2] = y[p, 0], y[p, 1], y[p, 2]
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def newton_step_inplace(  # noqa: PLR0913
+    indptr, indices, data, A, B, F, order, upper_start, upper, lower_start, lower, dr
+):  # fmt: skip
+    """Solve (A + B W) dr = -F by block LU; all (nc, 3, 3) and (nc, 3).
+
+    Returns the largest residual relative to the largest entry of F; infinite when a pivot is
+    singular.
+    """
+    nc = len(F)
+    rows = np.empty_like(data)
+    for i in range(nc):
+        b = B[i]
+        for k in range(indptr[i], indptr[i + 1]):
+            w, out = data[k], rows[k]
+            for a in range(3):
+                for c in range(3):
+                    out[a, c] = b[a, 0] * w[0, c] + b[a, 1] * w[1, c] + b[a, 2] * w[2, c]
+    U, L = np.empty((len(upper), 3, 3)), np.empty((len(upper), 3, 3))
+    inverse, work = np.empty((nc, 3, 3)), np.zeros((nc, 3, 3))
+    if not factorise_inplace(
+        indptr, indices, rows, A, order, upper_start, upper, lower_start, lower,
+        U, L, inverse, work,
+    ):  # fmt: skip
+        return np.inf
+    solve_inplace(order, upper_start, upper, lower_start, lower, U, L, inverse, -F, dr)
+    worst = size = 0.0
+    for i in range(nc):
+        for a in range(3):
+            t = F[i, a] + A[i, a, 0] * dr[i, 0] + A[i, a, 1] * dr[i, 1] + A[i, a, 2] * dr[i, 2]
+            for k in range(indptr[i], indptr[i + 1]):
+                j, w = indices[k], rows[k]
+                t += w[a, 0] * dr[j, 0] + w[a, 1] * dr[j, 1] + w[a, 2] * dr[j, 2]
+            if not abs(t) <= worst:
+                worst = abs(t)
+            size = max(size, abs(F[i, a]))
+    return worst / size if size > 0.0 else 0.0

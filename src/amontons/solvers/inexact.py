@@ -10,7 +10,7 @@ its factors.
     accelerated sweeps    while they promise an end before Newton would be there
     inexact Newton        with full steps until it stalls: from the start, from where it takes
                           fewer steps than from a swept point; from the best point; from the
-                          start with a line search
+                          start with a line search.  Exact where an LU in blocks is quick
     the usual portfolio   then
 
 [EW] S. Eisenstat, H. Walker (see `newton`).
@@ -33,7 +33,7 @@ from .base import Breakdown, Iterate
 from .functions import Linearised
 from .joints import Joints
 from .line_search import FullStep
-from .newton import Linearisation, SemismoothNewton, State
+from .newton import Condensed, Linearisation, SemismoothNewton, State
 from .portfolio import DEPTH, HISTORY_CONTACT, SWEEP_BLOCK, SWEEP_CONTACT, Portfolio
 from .sweeps import Acceleration, watch_for
 
@@ -41,6 +41,7 @@ Array = NDArray[np.float64]
 LOOSEST, TIGHTEST = 1e-3, 1e-4  # relative tolerance of GMRES: looser ones misled cold starts
 CHUNK, LOOK = 40, 0.1  # sweeps between two looks at their rate: number, part of Newton's cost
 SLOWER = 1.5  # sweeps get slower than their first rate promises
+EXACT_WORK = 1e6  # products of blocks in an LU up to which an exact step costs no more
 STALLED = 8  # Newton steps without halving the error after which it is left
 
 
@@ -59,9 +60,6 @@ class InexactNewton(SemismoothNewton):
         if joints is None:
             return super()._linearise(problem)
         return _Preconditioned(problem, joints, contacts)
-
-
-FULL = InexactNewton(line_search=FullStep())
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,9 +101,13 @@ class DeformablePortfolio(Portfolio):
         joints = Joints.of(whole)
         if joints is not None:
             yield from self._sweeps_before(joints)
-            yield from self._inexact(FULL, self.start)
-            yield from self._inexact(FULL, self.r)
-            yield from self._inexact(InexactNewton(), self.start)
+            kind = InexactNewton
+            if Condensed.in_blocks(self.problem, EXACT_WORK):
+                kind = SemismoothNewton
+            full = kind(line_search=FullStep())
+            yield from self._inexact(full, self.start)
+            yield from self._inexact(full, self.r)
+            yield from self._inexact(kind(), self.start)
         yield from super().stages()
 
     def _sweeps_before(self, joints: Joints) -> Iterator[Iterate]:
@@ -125,13 +127,14 @@ class DeformablePortfolio(Portfolio):
             if spent + SLOWER * promise > newton:
                 return
 
-    def _inexact(self, solver: InexactNewton, r: Array) -> Iterator[Iterate]:
-        """Inexact Newton from r until it stalls."""
+    def _inexact(self, solver: SemismoothNewton, r: Array) -> Iterator[Iterate]:
+        """Newton from r until it stalls."""
+        name = "inexact Newton" if isinstance(solver, InexactNewton) else "semismooth Newton"
         start = Iterate(r[:, : self.problem.dimension].copy())
         mark, waited = math.inf, 0
         try:
             for iterate in solver.iterates(self.problem, start, self.target):
-                found = self._offer(spatial(iterate.r), 1, "inexact Newton")
+                found = self._offer(spatial(iterate.r), 1, name)
                 yield replace(found, linear_iterations=iterate.linear_iterations)
                 latest = self.latest
                 mark, waited = (latest, 0) if latest < 0.5 * mark else (mark, waited + 1)

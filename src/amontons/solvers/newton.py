@@ -38,6 +38,7 @@ from ..linear import Direct, LinearSolver
 from ..problem import Form, FrictionProblem
 from .augmentation import RhoStrategy, augmentation, own_blocks
 from .base import Breakdown, Iterate, Target, check_positive
+from .block_lu import Symbolic, analyse, newton_step_inplace
 from .functions import AlartCurnier, ComplementarityFunction, Linearised, NaturalMap, columns
 from .line_search import LineSearch, NonMonotone
 
@@ -45,6 +46,9 @@ Array = NDArray[np.float64]
 DENSE_UNKNOWNS = (
     1200  # reactions up to which a dense factor of A + B W is quicker than a sparse
 )
+BLOCK_CONTACTS = 1000  # above, minimum degree itself would take long
+BLOCK_WORK, BLOCK_SHARE = 4e6, 0.25  # products of blocks: number, part of those of a full W
+TRUSTED = 1e-6  # residual of a step, relative to F, up to which an LU in blocks is believed
 NO_STIFFNESS = 1e-13  # relative compliance below which a direction can not react
 FORCING = (1e-10, 0.1)  # smallest and largest relative tolerance of GMRES
 
@@ -210,16 +214,48 @@ class Condensed:
         return State(start.r, self.problem.velocity(start.r)[0])
 
     def step(self, state: State, linearised: Linearised, forcing: float) -> tuple[State, int]:
-        """A dense factor for few reactions or a full W, else a sparse one."""
+        """A factor in blocks where that is least work, a dense one for a full W, or sparse."""
         F, A, B = linearised
         W = self.problem.W
         assert W is not None
-        if sparse.issparse(W) and F.size > DENSE_UNKNOWNS:
+        dr = self._by_blocks(F, A, B) if self.in_blocks(self.problem) else None
+        if dr is not None:
+            pass
+        elif sparse.issparse(W) and F.size > DENSE_UNKNOWNS:
             matrix = block_diagonal(A) + block_diagonal(B) @ W
             dr = Direct().factor(sparse.csc_array(matrix)).solve(-F.ravel())
         else:
             dr = _dense_step(A, B, W, F)
-        return State(dr.reshape(F.shape), (W @ dr).reshape(F.shape)), 0
+        return State(dr.reshape(F.shape), (W @ dr.ravel()).reshape(F.shape)), 0
+
+    @staticmethod
+    def in_blocks(problem: FrictionProblem, most: float = BLOCK_WORK) -> bool:
+        """Whether an LU in blocks of contacts is less work than a dense one and than `most`."""
+        nc = problem.contacts
+        if nc > BLOCK_CONTACTS or nc < 2:
+            return False
+        work = symbolic(problem).products
+        return work <= min(most, BLOCK_SHARE * nc**3)
+
+    def _by_blocks(self, F: Array, A: Array, B: Array) -> Array | None:
+        """dr (nc, d) by block LU; None where its pivots, taken in order, are too small."""
+        nc, d = F.shape
+        rows, own, law = np.zeros((nc, 3)), np.tile(np.eye(3), (nc, 1, 1)), np.zeros((nc, 3, 3))
+        rows[:, :d], own[:, :d, :d], law[:, :d, :d] = F, A, B
+        dr = np.empty((nc, 3))
+        blocks = self.problem.blocks
+        with np.errstate(all="ignore"):
+            residual = newton_step_inplace(
+                blocks.indptr, blocks.indices, blocks.data, own, law, rows,
+                *symbolic(self.problem).arrays, dr,
+            )  # fmt: skip
+        good = residual <= TRUSTED and np.isfinite(dr).all()
+        return np.ascontiguousarray(dr[:, :d]) if good else None
+
+
+def symbolic(problem: FrictionProblem) -> Symbolic:
+    """Order and fill of W in blocks, analysed once."""
+    return problem.kept("symbolic", lambda: analyse(problem.blocks))
 
 
 def _dense_step(A: Array, B: Array, W, F: Array) -> Array:

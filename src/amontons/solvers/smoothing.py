@@ -282,7 +282,7 @@ class Workspace:
                 "smoothing Newton and interior point need Coulomb friction, not Tresca's; use "
                 "SemismoothNewton or GaussSeidel"
             )
-        return cls(problem, analyse(problem.blocks))
+        return cls(problem, problem.kept("symbolic", lambda: analyse(problem.blocks)))
 
     def newton(  # noqa: PLR0913
         self, x: Array, sigma: float, options: SmoothingNewton, *, goal: float, steps: int,

@@ -97,6 +97,7 @@ class Truncation:
 
     def __init__(self, hierarchy: Hierarchy, contacts: list[Index]) -> None:
         self.hierarchy = hierarchy
+        self.coarse_inverse = hierarchy.coarse_inverse  # without contacts
         self.near: list[Near] = []
         self.products: list[Product] = []
         slots = np.empty(0, dtype=np.int64)
@@ -162,6 +163,7 @@ class Truncation:
         for near, level in zip(self.near[1:], self.hierarchy.levels[1:], strict=True):
             if isinstance(level.A, NodeBlocks):
                 near.restore(level.A)
+        self.hierarchy.coarse_inverse = self.coarse_inverse
 
 
 def _touching(A: NodeBlocks, nodes: Index) -> Index:
