@@ -189,6 +189,7 @@ def test_the_clock_stops_the_search(monkeypatch):
     found = am.all_solutions(hild_triangle(6, mu=3.5), time_limit=1e-9)
     assert not found.complete
     assert "stopped" in found.reason
+    assert found.examined < 100
     assert am.all_solutions(hild_triangle(6, mu=3.5)).complete
 
 
@@ -212,6 +213,9 @@ def test_proofs_hold_up_when_checked_from_the_problem():
 def test_bad_input_is_refused():
     with pytest.raises(am.UnsupportedForm, match="2D"):
         am.all_solutions(random_delassus(0, 2, 3))
+    many = am.FrictionProblem.from_delassus(np.eye(402), np.ones((201, 2)), np.ones(201))
+    with pytest.raises(am.InvalidInput, match="at most 200, got 201"):
+        am.all_solutions(many)
     with pytest.raises(am.UnsupportedForm, match="Tresca"):
         am.all_solutions(
             am.FrictionProblem.from_delassus(np.eye(2), [[-1.0, 0]], am.Tresca([1.0]))

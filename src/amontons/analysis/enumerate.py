@@ -23,7 +23,8 @@ Array = NDArray[np.float64]
 LETTERS = {search.OPEN_OR_CLOSED: ".", search.CLOSED: "c", search.OPEN: "f",
            search.STICK: "s", search.SLIP_PLUS: "+", search.SLIP_MINUS: "-",
            search.FRICTIONLESS: "+"}  # fmt: skip
-NODES = 2000  # patterns between two looks at the clock
+NODES = 2000  # patterns between two looks at the clock, up to 20 contacts
+CONTACTS = 200  # up to which the dictionaries of all levels need less than 0.6 GB
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +105,11 @@ def enumerate_solutions(
         raise InvalidInput(f"time_limit: expected seconds > 0, got {time_limit!r}")
     if problem.dimension != 2:
         raise UnsupportedForm("all solutions: expected a 2D problem, this one is in 3D")
+    if problem.contacts > CONTACTS:
+        raise InvalidInput(
+            f"contacts: expected at most {CONTACTS}, got {problem.contacts}; the search grows "
+            "exponentially, take a coarser mesh"
+        )
     _ = problem.mu
     began = time.perf_counter()
     local = problem.condensed()
@@ -170,8 +176,9 @@ def _leaves(piece: ScaledProblem, cuts: list[Cut] | None) -> Iterator[tuple[Stat
     D = np.empty((levels, m, m + 1))
     basic, nonbasic = np.empty((2, levels, m), dtype=np.int64)
     states, turn = np.empty((levels, nc), dtype=np.int8), np.zeros((levels, 3), dtype=np.int64)
-    leaves, cut = np.empty((2, NODES, nc), dtype=np.int8)
-    proofs = np.empty((NODES, m))
+    nodes = max(20, NODES * 20**2 // max(20, nc) ** 2)  # a node costs some nc^2 and more
+    leaves, cut = np.empty((2, nodes, nc), dtype=np.int8)
+    proofs = np.empty((nodes, m))
     search.start_inplace(D, basic, nonbasic, states, piece.A, piece.c)
     done, level = False, 0
     while not done:
