@@ -162,6 +162,21 @@ def test_coarse_levels_of_two_bodies_have_contacts_of_their_own(method):
     assert np.abs(P @ values - v).max() < 1e-12
 
 
+def test_linear_solves_find_their_coarse_levels_again():
+    problem = cube(4).assemble()
+    hierarchy = problem.hierarchy
+    matrices = [level.A.data.copy() for level in hierarchy.levels]
+    inverse = hierarchy.coarse_inverse.copy()
+    assert drive(problem, ContactMultigrid(), tolerance=1e-8).converged
+    assert np.abs(hierarchy.coarse_inverse - inverse).max() > 0
+    hierarchy.reclaim()
+    assert np.array_equal(hierarchy.coarse_inverse, inverse)
+    assert all(
+        np.array_equal(level.A.data, data)
+        for level, data in zip(hierarchy.levels, matrices, strict=True)
+    )
+
+
 def test_without_levels_coarse_ones_are_made():
     problem = replace(cube(8).assemble(), levels=(), guess=None)
     solution = drive(problem, ContactMultigrid(), tolerance=1e-8)
