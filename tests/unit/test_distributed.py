@@ -126,6 +126,8 @@ def test_contact_needs_no_more_than_products_solves_and_some_rows(solver, monkey
     np.testing.assert_allclose(found.v, expected.v, atol=1e-7 * abs(expected.v).max())
     with pytest.raises(UnsupportedForm, match="CompressedDelassus"):
         np.asarray(K)
+    with pytest.raises(UnsupportedForm, match="CompressedDelassus"):
+        am.drive(twin.assemble(), am.SemismoothNewton(linear=am.Direct()))
 
 
 def test_bodies_held_by_contact_alone_are_refused():
@@ -178,14 +180,14 @@ def test_two_processes_find_the_answer_of_one(tmp_path):
         pytest.skip(f"not installed: {needs}; see docs/distributed.md")
     done = subprocess.run([sys.executable, "-c", SERIAL], capture_output=True, text=True)
     assert done.stdout.strip() == "fine", done.stderr
-    for kind in ("cube", "blocks"):
+    for kind, level in (("cube", 2), ("blocks", 1)):
         saved = tmp_path / f"{kind}.npz"
-        command = [mpirun, "-n", "2", sys.executable, str(EXAMPLE), kind, "--level", "2",
+        command = [mpirun, "-n", "2", sys.executable, str(EXAMPLE), kind, "--level", str(level),
                    "--save", str(saved)]  # fmt: skip
         done = subprocess.run(command, capture_output=True, text=True, timeout=300)
         assert done.returncode == 0, done.stderr
         record, found = json.loads(done.stdout), np.load(saved)
-        expected = am.drive(getattr(example(), kind)(2).assemble(), tolerance=1e-9)
+        expected = am.drive(getattr(example(), kind)(level).assemble(), tolerance=1e-9)
         assert record["outcome"] == "converged"
         assert record["counts"] == expected.counts
         for name in ("r", "v"):

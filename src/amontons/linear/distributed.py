@@ -212,6 +212,9 @@ class DistributedMatrix:
             "CompressedDelassus or Auto, or problem.condensed() with a solver of the local form"
         )
 
+    def __add__(self, other: object) -> Array:
+        return self.__array__()
+
     def on(self, free: Index) -> DistributedMatrix:
         """The rows and columns of some of all unknowns."""
         return DistributedMatrix(self.share, free, self.solver)
