@@ -42,6 +42,7 @@ DENSE_LIMIT = 4e9  # bytes that condensed() may fill before it refuses
 DIRECT_LIMIT = 600_000  # unknowns of a mesh whose factor takes some 10 GB
 EXACT_WORK = 2e6  # n * nc * d up to which forming W costs nothing that matters
 ESTIMATED = 9_000  # unknowns of a mesh above which the size of u is taken from a coarse level
+LARGE_BODY = 10_000  # unknowns of a body with levels from which multigrid is the way
 CHEAP = 2.0  # work of W, relative to that of a compressed W, which is full and not exact
 
 
@@ -301,7 +302,8 @@ class FrictionProblem:
         """True when W is the best to solve with: it then also judges (`measure`).
 
         For rigid bodies, small problems, and where it takes less work than CHEAP compressed W
-        and fits into memory; see `condensation` for the counts.
+        and fits into memory; see `condensation` for the counts.  Not where a body is large and
+        its mesh has levels: contact multigrid then solves before W stands.
         """
         if self.form is Form.DELASSUS:
             return True
@@ -314,6 +316,9 @@ class FrictionProblem:
             return True
         if self.unknowns * self.contacts * self.dimension <= EXACT_WORK:
             return True
+        largest = max((m.shape[1] for m in self.bodies.members), default=0)
+        if self.levels and largest >= LARGE_BODY:
+            return False
         parts = self._condensation
         fits = 8.0 * self.dimension**2 * parts.blocks <= DENSE_LIMIT
         return fits and parts.work <= CHEAP * parts.compressed_work

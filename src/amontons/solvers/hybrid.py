@@ -22,7 +22,7 @@ When is W cheap (`FrictionProblem.condensing_is_cheap`; it then also judges)?
     deformable                      when it takes at most CHEAP times the work of a compressed W
                                     (`condensation`) and its blocks fit into DENSE_LIMIT: walls
                                     of many equal blocks yes, one meshed body of 10 000 unknowns
-                                    no
+                                    no; never where a body of LARGE_BODY unknowns has levels
 
 Whether to sweep or to take Newton steps is decided while solving, from the measured rate of the
 sweeps and operation counts of Newton (`Joints.newton_cost`, `Portfolio.costs`).
