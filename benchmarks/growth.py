@@ -156,7 +156,7 @@ def draw(record, path):
         axis.set(xscale="log", yscale="log", xlabel="contacts", ylabel=text)
         axis.grid(alpha=0.3)
     axes[0].legend(title="problem, tolerance", fontsize=8, title_fontsize=8)
-    figure.suptitle("Growth with the problem; hollow: not solved in time", fontsize=10)
+    figure.suptitle("Growth with the problem; hollow: not solved", fontsize=10)
     figure.savefig(path, dpi=130)
 
 

@@ -252,8 +252,7 @@ class FrictionProblem:
         if isinstance(M, DistributedMatrix):
             return self._kept("factor", (M,), M.factor)
         bodies = self.bodies
-        largest = max((m.shape[1] for m in bodies.members), default=0)
-        iterative = largest > DIRECT_LIMIT and modes is not None
+        iterative = bodies.largest > DIRECT_LIMIT and modes is not None
         if bodies.count > 1 and not iterative:
             return self._kept("factor", (M,), lambda: bodies.factor(M))
         solver: LinearSolver = ConjugateGradient() if iterative else Direct()
@@ -316,8 +315,7 @@ class FrictionProblem:
             return True
         if self.unknowns * self.contacts * self.dimension <= EXACT_WORK:
             return True
-        largest = max((m.shape[1] for m in self.bodies.members), default=0)
-        if self.levels and largest >= LARGE_BODY:
+        if self.levels and self.bodies.largest >= LARGE_BODY:
             return False
         parts = self._condensation
         fits = 8.0 * self.dimension**2 * parts.blocks <= DENSE_LIMIT

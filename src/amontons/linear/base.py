@@ -2,13 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..errors import InvalidInput
+
 Array = NDArray[np.float64]
+
+
+def check_stopping(tolerance: float, max_iterations: int) -> None:
+    """Raise InvalidInput for options of an iterative solver that can not be meant."""
+    if not 0 < tolerance < 1:
+        raise InvalidInput(f"tolerance: expected between 0 and 1, got {tolerance}")
+    if max_iterations < 1:
+        raise InvalidInput(f"max_iterations: expected at least 1, got {max_iterations}")
+
+
+def by_columns(solve: Callable[[Array], Array], b: Array) -> Array:
+    """`solve` of every column of b, (n,) or (n, k), in the shape of b."""
+    columns = b.reshape(len(b), -1)
+    out = np.empty(columns.shape)
+    for k in range(columns.shape[1]):
+        out[:, k] = solve(columns[:, k])
+    return out.reshape(b.shape)
 
 
 class Factor(Protocol):

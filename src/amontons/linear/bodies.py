@@ -67,6 +67,11 @@ class Bodies:
         return cls([np.array(m) for m in members], matrices)
 
     @property
+    def largest(self) -> int:
+        """Unknowns of the largest body."""
+        return max((m.shape[1] for m in self.members), default=0)
+
+    @property
     def count(self) -> int:
         """Number of bodies."""
         return sum(len(m) for m in self.members)

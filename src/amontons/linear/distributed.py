@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..errors import UnsupportedForm
+from .base import by_columns
 from .petsc import Petsc, check_converged, krylov, petsc
 
 Array = NDArray[np.float64]
@@ -256,15 +257,14 @@ class DistributedFactor:
 
     def solve(self, b: Array) -> Array:
         """The solution x of A x = b to the options' tolerance, shape of b."""
-        columns = b.reshape(len(b), -1)
-        out = np.empty(columns.shape)
+        return by_columns(self._solve_one, b)
+
+    def _solve_one(self, b: Array) -> Array:
         prepared = self.share.prepared[self.number]
-        for k in range(columns.shape[1]):
-            right = np.zeros(self.share.size)
-            right[self.place] = columns[:, k]
-            prepared.whole.array = right
-            self.share.call("solve", self.number)
-            check_converged(prepared.ksp, self.options)
-            self.iterations += prepared.ksp.getIterationNumber()
-            out[:, k] = prepared.whole.array_r[self.place]
-        return out.reshape(b.shape)
+        right = np.zeros(self.share.size)
+        right[self.place] = b
+        prepared.whole.array = right
+        self.share.call("solve", self.number)
+        check_converged(prepared.ksp, self.options)
+        self.iterations += prepared.ksp.getIterationNumber()
+        return prepared.whole.array_r[self.place]

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..errors import InvalidInput, SingularOperator
+from .base import by_columns, check_stopping
 from .grid_matrix import GridMatrix
 from .hierarchy import Hierarchy, Nodes, components
 from .levels import Levels
@@ -31,14 +32,9 @@ class GeometricMultigrid:
     max_iterations: int = 200
 
     def __post_init__(self) -> None:
-        if not 0 < self.tolerance < 1:
-            raise InvalidInput(f"tolerance: expected between 0 and 1, got {self.tolerance}")
+        check_stopping(self.tolerance, self.max_iterations)
         if self.dimension not in (2, 3):
             raise InvalidInput(f"dimension: expected 2 or 3, got {self.dimension}")
-        if self.max_iterations < 1:
-            raise InvalidInput(
-                f"max_iterations: expected at least 1, got {self.max_iterations}"
-            )
 
     def factor(
         self, matrix: sparse.csc_array, near_nullspace: Array | None = None
@@ -86,9 +82,7 @@ class MultigridFactor:
 
     def solve(self, b: Array) -> Array:
         """The solution x of A x = b to the options' tolerance, shape of b."""
-        columns = b.reshape(len(b), -1)
-        out = [self._solve_one(columns[:, k]) for k in range(columns.shape[1])]
-        return np.column_stack(out).reshape(b.shape)
+        return by_columns(self._solve_one, b)
 
     def _solve_one(self, b: Array) -> Array:
         most = self.options.max_iterations

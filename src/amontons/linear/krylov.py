@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from ..errors import InvalidInput, SingularOperator
-from .base import Factor, LinearSolver
+from ..errors import SingularOperator
+from .base import Factor, LinearSolver, by_columns, check_stopping
 from .multigrid import AlgebraicMultigrid
 
 Array = NDArray[np.float64]
@@ -25,12 +25,7 @@ class ConjugateGradient:
     max_iterations: int = 500
 
     def __post_init__(self) -> None:
-        if not 0 < self.tolerance < 1:
-            raise InvalidInput(f"tolerance: expected between 0 and 1, got {self.tolerance}")
-        if self.max_iterations < 1:
-            raise InvalidInput(
-                f"max_iterations: expected at least 1, got {self.max_iterations}"
-            )
+        check_stopping(self.tolerance, self.max_iterations)
 
     def factor(
         self, matrix: sparse.csc_array, near_nullspace: Array | None = None
@@ -52,9 +47,7 @@ class KrylovFactor:
 
     def solve(self, b: Array) -> Array:
         """The solution x of A x = b to the options' tolerance, shape of b."""
-        columns = b.reshape(len(b), -1)
-        out = np.column_stack([self._solve_one(columns[:, k]) for k in range(columns.shape[1])])
-        return out.reshape(b.shape)
+        return by_columns(self._solve_one, b)
 
     def _solve_one(self, b: Array) -> Array:
         def count(_: Array) -> None:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..errors import InvalidInput, MissingDependency, SingularOperator
+from .base import by_columns, check_stopping
 
 Array = NDArray[np.float64]
 PREFIX = "amontons_"
@@ -28,12 +29,7 @@ class Petsc:
     max_iterations: int = 500
 
     def __post_init__(self) -> None:
-        if not 0 < self.tolerance < 1:
-            raise InvalidInput(f"tolerance: expected between 0 and 1, got {self.tolerance}")
-        if self.max_iterations < 1:
-            raise InvalidInput(
-                f"max_iterations: expected at least 1, got {self.max_iterations}"
-            )
+        check_stopping(self.tolerance, self.max_iterations)
 
     def factor(
         self, matrix: sparse.csc_array, near_nullspace: Array | None = None
@@ -66,16 +62,16 @@ class PetscFactor:
 
     def solve(self, b: Array) -> Array:
         """The solution x of A x = b to the options' tolerance, shape of b."""
-        columns = b.reshape(len(b), -1)
-        out = np.empty(columns.shape)
         x, right = self.ksp.getOperators()[0].createVecs()
-        for k in range(columns.shape[1]):
-            right.array = columns[:, k]
+
+        def solve_one(column: Array) -> Array:
+            right.array = column
             self.ksp.solve(right, x)
             self.iterations += self.ksp.getIterationNumber()
             check_converged(self.ksp, self.options)
-            out[:, k] = x.array_r
-        return out.reshape(b.shape)
+            return x.array_r
+
+        return by_columns(solve_one, b)
 
 
 def krylov(A: Any, options: Petsc) -> Any:

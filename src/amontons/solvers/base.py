@@ -47,6 +47,28 @@ class Target:
         return self.deadline - time.perf_counter()
 
 
+@dataclass
+class Patience:
+    """Notices that errors no longer fall.
+
+    It is over after more than `most` errors in a row none of which was below `factor` times the
+    last one that counted, `mark`.
+    """
+
+    most: int
+    factor: float = 0.5
+    mark: float = np.inf
+    waited: int = 0
+
+    def over(self, error: float) -> bool:
+        """Take note of the next error."""
+        if error < self.factor * self.mark:
+            self.mark, self.waited = error, 0
+        else:
+            self.waited += 1
+        return self.waited > self.most
+
+
 class Solver(Protocol):
     """Options as fields; `iterates` yields until the driver stops asking.
 

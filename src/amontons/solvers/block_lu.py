@@ -16,6 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from ..blocks import BlockRows
+from ..problem import FrictionProblem
 
 Index = NDArray[np.int32]
 
@@ -33,6 +34,11 @@ class Symbolic:
     upper: Index
     lower_start: Index
     lower: Index
+
+    @classmethod
+    def of(cls, problem: FrictionProblem) -> Symbolic:
+        """Order and fill of W, analysed once for all variants of a problem."""
+        return problem.kept("symbolic", lambda: analyse(problem.blocks))
 
     @property
     def arrays(self) -> tuple[Any, ...]:

@@ -33,7 +33,7 @@ from ..errors import UnsupportedForm
 from ..linear.grid import GridBlocks
 from ..problem import Form, FrictionProblem
 from .anderson import Anderson
-from .base import Breakdown, Iterate, Target, check_at_least, check_positive
+from .base import Breakdown, Iterate, Patience, Target, check_at_least, check_positive
 from .contact_levels import ContactLevels
 from .contact_nodes import ContactNodes
 
@@ -148,8 +148,8 @@ class _Run:
             depth = min(depth, GRID_DEPTH)
         mixing = Anderson(x.size, depth)
         before = np.empty_like(x)
-        best = at_update = mark = np.inf
-        waited = 0
+        best = at_update = np.inf
+        patience = Patience(self.options.patience)
         self.levels.take(self)
         while True:
             before[:] = x
@@ -162,8 +162,7 @@ class _Run:
             if not np.isfinite(error) or error > GROWTH * best:
                 raise Breakdown("contact multigrid: the cycles diverge")
             best = min(best, error)
-            mark, waited = (error, 0) if error < 0.5 * mark else (mark, waited + 1)
-            if waited > self.options.patience:
+            if patience.over(error):
                 raise Breakdown("contact multigrid: the cycles have stalled")
             if changed or error < self.options.update_ratio * at_update:
                 self.renew()

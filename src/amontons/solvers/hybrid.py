@@ -45,7 +45,7 @@ from ..judge import Measure
 from ..linear import Direct
 from ..linear.distributed import DistributedMatrix
 from ..problem import Form, FrictionProblem
-from .base import Breakdown, Iterate, Solver, Target, check_at_least
+from .base import Breakdown, Iterate, Patience, Solver, Target, check_at_least
 from .compressed import CompressedDelassus
 from .contact_multigrid import ContactMultigrid
 from .gauss_seidel import GaussSeidel
@@ -157,15 +157,15 @@ def _watched(
     """Iterates of a solver until it breaks down or stalls; best[0] becomes the best of them."""
     known = start.v is not None or problem.measure is Measure.EXACT
     error = problem.error(start.r, start.v) if known else np.inf  # v would cost a linear solve
-    mark, waited = error, 0
+    patience = Patience(STALLED, mark=error)
     try:
         for iterate in solver.iterates(problem, start, target):
             new = problem.error(iterate.r, iterate.v)
             if new < error:
                 error, best[0] = new, iterate
-            mark, waited = (error, 0) if error < 0.5 * mark else (mark, waited + 1)
+            stalled = patience.over(error)
             yield iterate
-            if waited > STALLED:
+            if stalled:
                 return
     except (Breakdown, SingularOperator):
         return

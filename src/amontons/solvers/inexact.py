@@ -29,12 +29,12 @@ from numpy.typing import NDArray
 from ..blocks import spatial
 from ..errors import SingularOperator
 from ..problem import Form, FrictionProblem
-from .base import Breakdown, Iterate
+from .base import Breakdown, Iterate, Patience
 from .functions import Linearised
 from .joints import Joints
 from .line_search import FullStep
 from .newton import Condensed, Linearisation, SemismoothNewton, State
-from .portfolio import DEPTH, HISTORY_CONTACT, SWEEP_BLOCK, SWEEP_CONTACT, Portfolio
+from .portfolio import DEPTH, Portfolio
 from .sweeps import Acceleration, watch_for
 
 Array = NDArray[np.float64]
@@ -112,9 +112,7 @@ class DeformablePortfolio(Portfolio):
 
     def _sweeps_before(self, joints: Joints) -> Iterator[Iterate]:
         """Accelerated sweeps until they have cost, or promise to cost, more than Newton."""
-        contacts = self.problem.contacts
-        cost = SWEEP_BLOCK * len(self.problem.blocks.indices)
-        cost += (SWEEP_CONTACT + HISTORY_CONTACT) * contacts
+        cost = self.accelerated_cost
         memory, watch = Acceleration(self.data, self.r, DEPTH), watch_for(self.goal)
         spent, last = 0.0, self.error
         while True:
@@ -131,14 +129,12 @@ class DeformablePortfolio(Portfolio):
         """Newton from r until it stalls."""
         name = "inexact Newton" if isinstance(solver, InexactNewton) else "semismooth Newton"
         start = Iterate(r[:, : self.problem.dimension].copy())
-        mark, waited = math.inf, 0
+        patience = Patience(STALLED)
         try:
             for iterate in solver.iterates(self.problem, start, self.target):
                 found = self._offer(spatial(iterate.r), 1, name)
                 yield replace(found, linear_iterations=iterate.linear_iterations)
-                latest = self.latest
-                mark, waited = (latest, 0) if latest < 0.5 * mark else (mark, waited + 1)
-                if waited > STALLED:
+                if patience.over(self.latest):
                     return
         except (Breakdown, SingularOperator):
             return

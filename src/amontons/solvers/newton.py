@@ -38,7 +38,7 @@ from ..linear import Direct, LinearSolver
 from ..problem import Form, FrictionProblem
 from .augmentation import RhoStrategy, augmentation, own_blocks
 from .base import Breakdown, Iterate, Target, check_positive
-from .block_lu import Symbolic, analyse, newton_step_inplace
+from .block_lu import Symbolic, newton_step_inplace
 from .functions import AlartCurnier, ComplementarityFunction, Linearised, NaturalMap, columns
 from .line_search import LineSearch, NonMonotone
 
@@ -219,13 +219,9 @@ class Condensed:
         W = self.problem.W
         assert W is not None
         dr = self._by_blocks(F, A, B) if self.in_blocks(self.problem) else None
-        if dr is not None:
-            pass
-        elif sparse.issparse(W) and F.size > DENSE_UNKNOWNS:
-            matrix = block_diagonal(A) + block_diagonal(B) @ W
-            dr = Direct().factor(sparse.csc_array(matrix)).solve(-F.ravel())
-        else:
-            dr = _dense_step(A, B, W, F)
+        if dr is None:
+            large = sparse.issparse(W) and F.size > DENSE_UNKNOWNS
+            dr = _sparse_step(A, B, W, F) if large else _dense_step(A, B, W, F)
         return State(dr.reshape(F.shape), (W @ dr.ravel()).reshape(F.shape)), 0
 
     @staticmethod
@@ -234,7 +230,7 @@ class Condensed:
         nc = problem.contacts
         if nc > BLOCK_CONTACTS or nc < 2:
             return False
-        work = symbolic(problem).products
+        work = Symbolic.of(problem).products
         return work <= min(most, BLOCK_SHARE * nc**3)
 
     def _by_blocks(self, F: Array, A: Array, B: Array) -> Array | None:
@@ -247,15 +243,16 @@ class Condensed:
         with np.errstate(all="ignore"):
             residual = newton_step_inplace(
                 blocks.indptr, blocks.indices, blocks.data, own, law, rows,
-                *symbolic(self.problem).arrays, dr,
+                *Symbolic.of(self.problem).arrays, dr,
             )  # fmt: skip
         good = residual <= TRUSTED and np.isfinite(dr).all()
         return np.ascontiguousarray(dr[:, :d]) if good else None
 
 
-def symbolic(problem: FrictionProblem) -> Symbolic:
-    """Order and fill of W in blocks, analysed once."""
-    return problem.kept("symbolic", lambda: analyse(problem.blocks))
+def _sparse_step(A: Array, B: Array, W: sparse.csr_array, F: Array) -> Array:
+    """Solution of (A + B W) dr = -F by a sparse factor."""
+    matrix = block_diagonal(A) + block_diagonal(B) @ W
+    return Direct().factor(sparse.csc_array(matrix)).solve(-F.ravel())
 
 
 def _dense_step(A: Array, B: Array, W, F: Array) -> Array:

@@ -30,7 +30,7 @@ from ..cones import Tresca
 from ..errors import SingularOperator
 from ..judge import natural_error
 from ..problem import FrictionProblem
-from .base import Breakdown, Iterate, Solver, Target
+from .base import Breakdown, Iterate, Patience, Solver, Target
 from .functions import JeanMoreau, NaturalMap
 from .gauss_seidel import GaussSeidel
 from .interior_point import STAGE, InteriorPoint, sliding_speed
@@ -59,7 +59,7 @@ HISTORY_CONTACT = 35.0
 PRODUCT = 5.4
 NEWTON_CONTACT = 500.0
 NEWTON_START, NEWTON_PER_DIGIT = 20, 8  # steps that smoothing Newton takes, typically
-RACE_PATIENCE = 250  # times 100 sweeps without progress; fewer than the driver allows
+RACE_PATIENCE = 249  # times 100 sweeps without progress; fewer than the driver allows
 RACE_FIRST = 50.0  # sweeps that a Newton step costs, from which relaxed sweeps come first
 # Methods from the start, and the iterates without halving their error after which they end.
 ALONE_SMALL: tuple[tuple[Solver, int], ...] = (
@@ -127,18 +127,19 @@ class Portfolio:
                 break
         left = (self._newton_cost() - spent) / self.costs["sweep"]
         race = self.costs["newton"] > RACE_FIRST * self.costs["sweep"]
-        mark, waited = self.error, 0
-        while race and left > 0 and self.error > self.goal and waited < RACE_PATIENCE:
+        patience = Patience(RACE_PATIENCE, 0.7, self.error)
+        while race and left > 0 and self.error > self.goal:
             iterate = self._relaxed(100)
             left -= iterate.iterations
             yield iterate
-            mark, waited = (self.error, 0) if self.error < 0.7 * mark else (mark, waited + 1)
+            if patience.over(self.error):
+                return
 
     def _relaxed(self, sweeps: int) -> Iterate:
         """Sweeps of the race between relaxations (see `Race`)."""
         track, count = self.race.run(sweeps, self.goal)
         return self._offer(
-            track.r.copy(), count, f"Gauss-Seidel, relaxation {track.relaxation:g}"
+            track.r.copy(), count, f"Gauss-Seidel, relaxation {track.relaxation:g}", track.error
         )
 
     @cached_property
@@ -180,14 +181,27 @@ class Portfolio:
     def costs(self) -> dict[str, float]:
         """Nanoseconds of a sweep, an accelerated sweep and a Newton step, by operations."""
         blocks, contacts = len(self.problem.blocks.indices), self.problem.contacts
-        sweep = SWEEP_BLOCK * blocks + SWEEP_CONTACT * contacts
         if isinstance(self.problem.law, Tresca):
             newton = 0.3 * float(3 * contacts) ** 3
         else:
             newton = PRODUCT * self.work.symbolic.products + NEWTON_CONTACT * contacts
             newton += 2 * SWEEP_BLOCK * blocks
-        history = HISTORY_CONTACT * contacts
-        return {"sweep": sweep, "accelerated": sweep + history, "newton": newton}
+        return {
+            "sweep": self.sweep_cost,
+            "accelerated": self.accelerated_cost,
+            "newton": newton,
+        }
+
+    @property
+    def sweep_cost(self) -> float:
+        """Nanoseconds of a sweep."""
+        blocks, contacts = len(self.problem.blocks.indices), self.problem.contacts
+        return SWEEP_BLOCK * blocks + SWEEP_CONTACT * contacts
+
+    @property
+    def accelerated_cost(self) -> float:
+        """Nanoseconds of an accelerated sweep."""
+        return self.sweep_cost + HISTORY_CONTACT * self.problem.contacts
 
     def _newton_cost(self) -> float:
         """Nanoseconds that Newton will take from here."""
@@ -220,27 +234,23 @@ class Portfolio:
         slip = np.zeros(self.problem.contacts)
         if round_:
             slip = sliding_speed(self.problem, self.r[:, : self.problem.dimension])
-        mark, patience = self.error, 0
+        patience = Patience(3, 0.1, self.error)
         for iterate in solver.relaxations(self.work, slip, self.target):
             if iterate.stage == STAGE:
                 self.budget += iterate.iterations * self.costs["newton"]
             yield self._offer(spatial(iterate.r), iterate.iterations, iterate.stage)
-            patience = 0 if self.error < 0.1 * mark else patience + 1
-            mark = self.error if patience == 0 else mark
-            if patience == 4:
+            if patience.over(self.error):
                 return
 
     def _proximal(self, round_: int) -> Iterator[Iterate]:
         """Proximal point while it makes progress."""
         x = self.r.copy()
         self.work.sweeps(x, 10)
-        mark, patience = self.error, 0
+        patience = Patience(25, mark=self.error)
         for iterate in ProximalPoint(alpha=1e-2 * 0.1**round_).steps(self.work, x):
             self.budget += iterate.iterations * self.costs["newton"]
             yield self._offer(spatial(iterate.r), iterate.iterations, "proximal point")
-            patience = 0 if self.error < 0.5 * mark else patience + 1
-            mark = min(mark, self.error) if patience == 0 else mark
-            if patience > 25:
+            if patience.over(self.error):
                 return
 
     def _alone(self, round_: int) -> Iterator[Iterate]:
@@ -254,16 +264,14 @@ class Portfolio:
             r = self.r * random.uniform(0.0, 2.0, (len(self.r), 1))
         start = Iterate(r[:, : self.problem.dimension].copy())
         small = self.problem.contacts <= SEMISMOOTH_CONTACTS
-        for solver, patience in (ALONE_SMALL if small else ()) + ALONE:
-            least, waited = math.inf, 0
+        for solver, most in (ALONE_SMALL if small else ()) + ALONE:
+            patience = Patience(most)
             try:
                 for iterate in solver.iterates(self.problem, start, self.target):
                     yield self._offer(
                         spatial(iterate.r), iterate.iterations, type(solver).__name__
                     )
-                    halved = self.latest < 0.5 * least
-                    least, waited = (self.latest, 0) if halved else (least, waited + 1)
-                    if waited > patience:
+                    if patience.over(self.latest):
                         break
             except (Breakdown, SingularOperator):
                 continue

@@ -39,7 +39,7 @@ from ..errors import InvalidInput, UnsupportedForm
 from ..judge import PENETRATION, contact_residual, natural_error
 from ..problem import Form, FrictionProblem
 from .base import Breakdown, Iterate, Target, check_at_least, check_positive
-from .block_lu import Symbolic, analyse, factorise_inplace, solve_inplace
+from .block_lu import Symbolic, factorise_inplace, solve_inplace
 from .sweeps import sweep_data, sweep_inplace
 
 Array = NDArray[np.float64]
@@ -282,7 +282,7 @@ class Workspace:
                 "smoothing Newton and interior point need Coulomb friction, not Tresca's; use "
                 "SemismoothNewton or GaussSeidel"
             )
-        return cls(problem, problem.kept("symbolic", lambda: analyse(problem.blocks)))
+        return cls(problem, Symbolic.of(problem))
 
     def newton(  # noqa: PLR0913
         self, x: Array, sigma: float, options: SmoothingNewton, *, goal: float, steps: int,

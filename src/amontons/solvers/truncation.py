@@ -223,8 +223,8 @@ class Product:
             _half_blocks(P.indptr, P.blocks, near.column, self.half, change, half)
             _rest_blocks(P.indptr, P.blocks, self.row, self.target, half, coarse)
         else:
-            _half(P.indptr, P.weights, near.column, self.half, change, half)
-            _rest(P.indptr, P.weights, self.row, self.target, half, coarse)
+            _spread(P.indptr, P.weights, near.column, self.half, change, half)
+            _spread(P.indptr, P.weights, self.row, self.target, half, coarse)
 
 
 @njit(cache=True)
@@ -292,29 +292,17 @@ def _change(row, column, base, V, W, L, out):  # noqa: PLR0913
 
 
 @njit(cache=True, error_model="numpy")
-def _half(p_ptr, weights, column, place, change, half):  # noqa: PLR0913
+def _spread(p_ptr, weights, node, place, blocks, out):  # noqa: PLR0913
+    """Add the blocks, each times the weights of its node, at their places in out."""
     at = 0
-    for e in range(len(column)):
-        j = column[e]
-        for b in range(p_ptr[j], p_ptr[j + 1]):
+    for e in range(len(node)):
+        i = node[e]
+        for b in range(p_ptr[i], p_ptr[i + 1]):
             w, t = weights[b], uint64(place[at])
             at += 1
             for m in range(3):
                 for n in range(3):
-                    half[t, m, n] += w * change[e, m, n]
-
-
-@njit(cache=True, error_model="numpy")
-def _rest(p_ptr, weights, row, place, half, coarse):  # noqa: PLR0913
-    at = 0
-    for h in range(len(row)):
-        i = row[h]
-        for a in range(p_ptr[i], p_ptr[i + 1]):
-            w, t = weights[a], uint64(place[at])
-            at += 1
-            for m in range(3):
-                for n in range(3):
-                    coarse[t, m, n] += w * half[h, m, n]
+                    out[t, m, n] += w * blocks[e, m, n]
 
 
 @njit(cache=True, error_model="numpy")
