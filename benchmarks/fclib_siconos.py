@@ -218,7 +218,8 @@ def main():
     }
     print(json.dumps(summaries, indent=1))
     record = {"machine": machine, "summary": summaries, "files": results}
-    chosen = f" --seed {options.seed} --walls {options.walls} --packings {options.packings}"
+    chosen = f" --cap {options.cap:g} --seed {options.seed} --walls {options.walls}"
+    chosen += f" --packings {options.packings}"
     stored.write_text(json.dumps(record, indent=1))
     (HERE / "results/fclib_siconos.md").write_text(table(results, summaries, machine, chosen))
 
