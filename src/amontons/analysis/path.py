@@ -1,0 +1,328 @@
+"""Solution curves of residual(y, p) = 0: what continuation follows, and what it returns.
+
+y are n unknowns and p is one parameter; the residual is continuous and piecewise smooth: at
+every (y, p) it agrees with one of finitely many smooth selection functions.  `piece` names the
+one that is active.  Curves are measured in the weighted norm of [LR] section 2.2,
+
+    |(y, p)|_w^2 = p^2 + weight |y|^2,   weight = 1 / n unless the problem says otherwise.
+
+[LR] T. Ligurský, Y. Renard, "A continuation problem for computing solutions of discretised
+evolution problems with application to plane quasi-static contact problems with friction",
+Comput. Methods Appl. Mech. Engrg. 280 (2014).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+Array = NDArray[np.float64]
+Matrix = Array | sparse.sparray
+
+
+@runtime_checkable
+class PathProblem(Protocol):
+    """n equations in n unknowns y (n,) and a parameter p: what continuation follows.
+
+    A problem may also have, and continuation then makes use of it,
+    - `weight`, a float: kappa of the weighted norm;
+    - `switches(y, p)`, (k,): functions whose signs tell the piece, so that an event is the zero
+      of one of them;
+    - `pieces(y, p, tolerance)`: the names of all pieces that meet at a point, and
+      `jacobian_of(piece, y, p)`: the first-order system needs both;
+    - `describe(y, p)`, a dict of numbers and words: columns of the table of a branch.
+    """
+
+    def residual(self, y: Array, p: float) -> Array:
+        """The residual, (n,)."""
+        ...
+
+    def jacobian(self, y: Array, p: float) -> tuple[Matrix, Array]:
+        """Derivatives by y, (n, n) dense or sparse, and by p, (n,), of one active piece."""
+        ...
+
+    def piece(self, y: Array, p: float) -> Hashable | NDArray[Any]:
+        """Which selection function is active: anything hashable, or an array of integers."""
+        ...
+
+
+class EventKind(Enum):
+    """What happens at a point of a branch; the names in lower case are those in JSON."""
+
+    FOLD = "The parameter turns back."
+    STATUS = "The branch enters another piece."
+    BRANCH = "More than two one-sided branches meet here."
+    END = "The branch stops here, for the reason given."
+
+
+class Stop(Enum):
+    """Why a branch ends; the value is one sentence for the user."""
+
+    INTERVAL = "The end of the interval was reached."
+    CLOSED = "The branch closed: it came back to where it began."
+    JOINED = "The branch ran into one that had been followed before."
+    UNBOUNDED = "The solutions run to infinity at one value of the parameter."
+    DEAD_END = "No other one-sided branch leaves this point."
+    BRANCHES = "Several branches leave this point; they are listed in the event."
+    SINGULAR = "The tangent is not unique here and the first-order system did not help."
+    STEP_TOO_SMALL = (
+        "The corrector fails at the smallest step: allow a smaller one, or looser tolerances."
+    )
+    LOST = "The corrector fails here and no tangent switch leads on."
+    MAX_POINTS = "The number of points allowed is used up; go on from the last one."
+    TIME_LIMIT = "The time allowed is used up; go on from the last point."
+    STOPPED = "Stopped on request; go on from the last point."
+    NOT_STARTED = "This direction was not followed."
+
+    @property
+    def advice(self) -> str:
+        """What it means, and what can be done."""
+        return self.value
+
+
+@dataclass(frozen=True, eq=False)
+class Event:
+    """Something that happens on a branch, at a precisely located point.
+
+    before, after: names of the pieces on the two sides, in the sense of the branch.  smooth:
+    True for a fold inside of a piece.  directions, (k, n + 1), rows (y', p'): all one-sided
+    tangents at a branch point.  stop: for the kind END.
+    """
+
+    kind: EventKind
+    parameter: float
+    state: Array
+    arclength: float = 0.0
+    before: Hashable = None
+    after: Hashable = None
+    smooth: bool = False
+    directions: Array | None = None
+    stop: Stop | None = None
+    detail: str = ""
+
+    def record(self) -> dict[str, Any]:
+        """What the JSON file holds."""
+        out: dict[str, Any] = {
+            "kind": self.kind.name.lower(),
+            "parameter": self.parameter,
+            "arclength": self.arclength,
+        }
+        if self.kind is EventKind.FOLD:
+            out["smooth"] = self.smooth
+        for name in ("before", "after"):
+            value = getattr(self, name)
+            if isinstance(value, str):
+                out[name] = value
+        if self.directions is not None:
+            out["branches"] = len(self.directions)
+        if self.stop is not None:
+            out["stop"] = self.stop.name.lower()
+        if self.detail:
+            out["detail"] = self.detail
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """One point of a branch, with all that is needed to go on from there.
+
+    direction, rate: the tangent (y', p') in the sense of travel, of weighted length 1;
+    step: the length of the next step, 0 where there is none.
+    """
+
+    parameter: float
+    state: Array
+    direction: Array
+    rate: float
+    piece: Hashable
+    arclength: float = 0.0
+    step: float = 0.0
+
+    def reversed(self) -> Point:
+        """The same point, to go the other way."""
+        return Point(self.parameter, self.state, -self.direction, -self.rate, self.piece,
+                     -self.arclength, self.step)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """A solution curve as a table: points in order, the events on it, and why it ends.
+
+    states (points, n), parameter, arclength (points,): arclength is 0 at the start and negative
+    before it.  linear: the curve is straight between two points, so that `at` is exact.
+    """
+
+    problem: PathProblem
+    points: tuple[Point, ...]
+    events: tuple[Event, ...]
+    stops: tuple[Stop, Stop]
+    linear: bool = False
+    seconds: float = 0.0
+    name: str = "parameter"
+    closed: bool = field(default=False)
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def __iter__(self) -> Iterator[Point]:
+        return iter(self.points)
+
+    def __getitem__(self, index: int) -> Point:
+        return self.points[index]
+
+    @property
+    def parameter(self) -> Array:
+        """Values of the parameter, (points,)."""
+        return np.array([point.parameter for point in self.points])
+
+    @property
+    def arclength(self) -> Array:
+        """Distance along the branch from its start, (points,)."""
+        return np.array([point.arclength for point in self.points])
+
+    @property
+    def states(self) -> Array:
+        """The unknowns, (points, n)."""
+        return np.array([point.state for point in self.points])
+
+    @property
+    def status(self) -> tuple[Hashable, ...]:
+        """Names of the pieces at the points."""
+        return tuple(point.piece for point in self.points)
+
+    @property
+    def solutions(self) -> list[Any]:
+        """The points as solutions of the problem, where it knows what these are; else y."""
+        made = getattr(self.problem, "solution", None)
+        return [
+            point.state if made is None else made(point.state, point.parameter)
+            for point in self.points
+        ]
+
+    @property
+    def folds(self) -> tuple[Event, ...]:
+        """The events where the parameter turns back."""
+        return tuple(event for event in self.events if event.kind is EventKind.FOLD)
+
+    def table(self) -> list[dict[str, Any]]:
+        """One row per point: parameter, arclength, and what the problem tells of it."""
+        tell = getattr(self.problem, "describe", None)
+        return [
+            {"parameter": point.parameter, "arclength": point.arclength,
+             **({} if tell is None else tell(point.state, point.parameter))}
+            for point in self.points
+        ]  # fmt: skip
+
+    def at(self, parameter: float) -> list[Array]:
+        """The states where the branch passes that value, in order along it.
+
+        Exact on straight pieces; else a chord's point corrected by Newton steps at fixed
+        parameter (a point where that fails is left out).
+        """
+        found: list[Array] = []
+        for a, b in zip(self.points, self.points[1:], strict=False):
+            if (a.parameter - parameter) * (b.parameter - parameter) > 0:
+                continue
+            if a.parameter == b.parameter:
+                continue
+            t = (parameter - a.parameter) / (b.parameter - a.parameter)
+            guess = a.state + t * (b.state - a.state)
+            state = guess if self.linear else corrected(self.problem, guess, parameter)
+            if state is not None and not any(same(state, other) for other in found):
+                found.append(state)
+        return found
+
+    def record(self) -> dict[str, Any]:
+        """What the JSON file holds: `points` and `events`."""
+        return {
+            "points": self.table(),
+            "events": [event.record() for event in self.events],
+            "stops": [stop.name.lower() for stop in self.stops],
+            "closed": self.closed,
+        }
+
+    def __str__(self) -> str:
+        low, high = self.parameter.min(initial=np.inf), self.parameter.max(initial=-np.inf)
+        folds = ", ".join(f"{event.parameter:.10g}" for event in self.folds) or "none"
+        changes = sum(event.kind is EventKind.STATUS for event in self.events)
+        return (
+            f"branch of {len(self)} points, {self.name} {low:.6g} … {high:.6g}; "
+            f"folds: {folds}; {changes} changes of status; ends: "
+            + ", ".join(stop.name.lower().replace("_", " ") for stop in self.stops)
+        )
+
+
+def weight_of(problem: PathProblem, n: int) -> float:
+    """kappa of the weighted norm: the problem's, or 1 / n."""
+    given = getattr(problem, "weight", None)
+    return 1.0 / max(n, 1) if given is None else float(given)
+
+
+def name_of(piece: Hashable | NDArray[Any]) -> Hashable:
+    """A hashable name of a piece."""
+    return piece.tobytes() if isinstance(piece, np.ndarray) else piece
+
+
+def same(a: Array, b: Array, tolerance: float = 1e-9) -> bool:
+    """True for states that differ by rounding only."""
+    return bool(np.abs(a - b).max(initial=0) <= tolerance * max(1.0, np.abs(a).max(initial=0)))
+
+
+def corrected(
+    problem: PathProblem, y: Array, p: float, *, tolerance: float = 1e-12, steps: int = 25
+) -> Array | None:
+    """y after Newton steps at a fixed parameter, None where they do not converge.
+
+    tolerance bounds the last step, relative to the size of y.
+    """
+    for _ in range(steps):
+        jacobian, _ = problem.jacobian(y, p)
+        try:
+            change = solve_linear(jacobian, -problem.residual(y, p))
+        except np.linalg.LinAlgError:
+            return None
+        if not np.isfinite(change).all():
+            return None
+        y = y + change
+        if np.abs(change).max(initial=0) <= tolerance * max(1.0, np.abs(y).max(initial=0)):
+            return y
+    return None
+
+
+def solve_linear(matrix: Matrix, right: Array) -> Array:
+    """The solution of a dense or sparse system, raises LinAlgError where there is none."""
+    if isinstance(matrix, np.ndarray):
+        return np.linalg.solve(matrix, right)
+    from scipy.sparse.linalg import splu
+
+    try:
+        return splu(sparse.csc_array(matrix)).solve(right)
+    except RuntimeError as reason:  # "Factor is exactly singular"
+        raise np.linalg.LinAlgError(str(reason)) from reason
+
+
+def joined(
+    problem: PathProblem,
+    back: tuple[Sequence[Point], Sequence[Event], Stop],
+    forth: tuple[Sequence[Point], Sequence[Event], Stop],
+    **options: Any,
+) -> Branch:
+    """One branch from its two halves, which share their first point; back is turned round."""
+    points = [point.reversed() for point in list(back[0])[:0:-1]] + list(forth[0])
+    events = [turned(event) for event in list(back[1])[::-1]] + list(forth[1])
+    return Branch(problem, tuple(points), tuple(events), (back[2], forth[2]), **options)
+
+
+def turned(event: Event) -> Event:
+    """The event as seen when the branch is travelled the other way."""
+    values: Mapping[str, Any] = {
+        name: getattr(event, name)
+        for name in ("kind", "parameter", "state", "smooth", "directions", "stop", "detail")
+    }
+    return Event(**values, arclength=-event.arclength, before=event.after, after=event.before)
