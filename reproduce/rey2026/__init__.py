@@ -1,0 +1,1 @@
+"""The tables and figures of rey2026, computed again: see `README.md`."""

@@ -1,0 +1,96 @@
+"""`python -m reproduce.rey2026`: the command line; see `README.md` for what it found."""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from types import ModuleType
+
+import click
+
+from amontons.errors import AmontonsError
+from amontons.files import replacing
+from benchmarks.machine import describe
+
+from . import alart_curnier, report
+
+HERE = Path(__file__).parent
+PAPER: dict[str, dict] = json.loads((HERE / "paper.json").read_text())
+# Each module has cells(table): a row of Cell per entry of table["values"], in it one per entry of
+# table["columns"]; and counts(table, draws, seed): {kind: [a number per entry of "values"]}.
+ALGORITHMS: dict[str, ModuleType] = {"alart_curnier": alart_curnier}
+TABLES = [name for name, table in PAPER.items() if table.get("algorithm") in ALGORITHMS]
+PARTS = tuple(TABLES)
+SEED = 2026
+
+
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.argument("parts", nargs=-1, metavar="[PART]...")
+@click.option("--draws", default=100, show_default=True, help="Random starts, as in the paper.")
+@click.option(
+    "--results", type=click.Path(path_type=Path), help="For tables and figures. [results/]"
+)
+def main(parts: tuple[str, ...], draws: int, results: Path | None) -> None:
+    """Which solution four algorithms find, as in the paper of 2026.
+
+    PART is the name of a table or figure in `paper.json`; all of them by default.  Numbers of
+    other parts stay as they are stored.
+    """
+    for part in parts:
+        if part not in PARTS:
+            raise click.UsageError(f"PART: {part!r} is none of {', '.join(PARTS)}")
+    out = results or HERE / "results"
+    out.mkdir(parents=True, exist_ok=True)
+    try:
+        for part in parts or PARTS:
+            click.echo(f"{part} …")
+            store(out, part, work(part, draws, out))
+    except AmontonsError as reason:
+        raise click.ClickException(str(reason)) from reason
+    with replacing(out / "results.md") as path:
+        path.write_text(page(load(out)))
+
+
+def work(part: str, draws: int, out: Path) -> list | dict:
+    """The numbers of a part."""
+    table = PAPER[part]
+    module = ALGORITHMS[table["algorithm"]]
+    if "cells" in table:
+        return [[asdict(cell) for cell in row] for row in module.cells(table)]
+    return {"draws": draws, "counts": module.counts(table, draws, SEED)}
+
+
+def store(out: Path, part: str, found: list | dict) -> None:
+    """Put the numbers of a part beside those of the others."""
+    record = load(out)
+    record["machine"] = describe()
+    record[part] = found
+    with replacing(out / "results.json") as path:
+        path.write_text(json.dumps(record) + "\n")
+
+
+def load(out: Path) -> dict:
+    """What is stored."""
+    target = out / "results.json"
+    return json.loads(target.read_text()) if target.exists() else {}
+
+
+def page(record: dict) -> str:
+    """All tables of what is stored."""
+    lines = ["# rey2026: results", "", "Regenerate: `python -m reproduce.rey2026`.", ""]
+    lines += ["; ".join(f"{k} {v}" for k, v in record["machine"].items()) + ".", ""]
+    lines += report.summary(record, PAPER)
+    for name, table in PAPER.items():
+        if name in record and "algorithm" in table:
+            make = report.map_table if "cells" in table else report.count_table
+            lines += make(name, record[name], table)
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    main()
