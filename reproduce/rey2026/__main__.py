@@ -21,7 +21,7 @@ from . import alart_curnier, report
 
 HERE = Path(__file__).parent
 PAPER: dict[str, dict] = json.loads((HERE / "paper.json").read_text())
-# Each module has cells(table): a row of Cell per entry of table["values"], in it one per entry of
+# Each has cells(table): a row of Cell per entry of table["values"], in it one per entry of
 # table["columns"]; and counts(table, draws, seed): {kind: [a number per entry of "values"]}.
 ALGORITHMS: dict[str, ModuleType] = {"alart_curnier": alart_curnier}
 TABLES = [name for name, table in PAPER.items() if table.get("algorithm") in ALGORITHMS]

@@ -21,7 +21,7 @@ TOLERANCE = 1e-10  # of the judge; rounding leaves 1e-11 at eta = 1e-7
 
 
 def cells(table: Mapping) -> list[list[Cell]]:
-    """A table over eta and lambda^0; its last two columns are the exact stick and slip state."""
+    """A table over eta and lambda^0; the last two columns are the exact stick and slip."""
     triangle = Triangle(table["n_c"], table["mu"])
     starts = [np.array([column[::-1]]) for column in table["columns"]]  # printed (T, N)
     starts[-2:] = [exact(triangle, "stick"), exact(triangle, "slip")]
