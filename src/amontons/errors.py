@@ -21,6 +21,10 @@ class SingularOperator(AmontonsError, ArithmeticError):
     """The stiffness can not be inverted: the message says which body or block is not held."""
 
 
+class InvertedCells(AmontonsError, ArithmeticError):
+    """A deformation turns cells inside out: no stress is defined; take smaller steps."""
+
+
 class FileFormatError(AmontonsError, ValueError):
     """A file does not hold what its format asks for: names file, place and expectation."""
 

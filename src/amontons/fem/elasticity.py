@@ -75,7 +75,7 @@ def materials_by_region(
     mesh: Mesh, material: LinearElastic | Materials
 ) -> dict[str, LinearElastic]:
     """One material per region of the mesh; InvalidInput for missing or unknown ones."""
-    if isinstance(material, LinearElastic):
+    if not isinstance(material, Mapping):
         return dict.fromkeys(mesh.regions, material)
     for region in material:
         if region not in mesh.regions:
