@@ -1,0 +1,178 @@
+"""The critical friction of a 2D problem: below it every load has one solution, above not.
+
+Where no pattern of statuses has a singular linear piece, all pieces have the orientation that
+they have without friction, and the solution is unique for every load.  Just above the smallest
+friction with a singular piece some pieces have the other orientation, and there are loads with
+three solutions.  That smallest friction is bounded here from both sides; friction is t times
+the shape of the coefficients given, whose largest entry is one, and all bounds are values of t.
+
+Two older criteria are there for comparison: the P-matrix property asks the same of patterns in
+which only the tangent of a contact is closed, which no state of contact is (a safe bound, but
+it may be smaller); full contact ([Andersson], [Rey]) leaves out all patterns with free
+contacts, and its threshold is above the critical friction: it is not safe.
+
+[Andersson] L.-E. Andersson, A. Rietz, A. Klarbring, "On the uniqueness of solutions of quasi-
+static and discrete friction problems", in [Rey] section 5.
+[Rey] V. Rey et al., on several solutions of static friction problems (2026), section 5.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InvalidInput
+from ..problem import FrictionProblem
+from .determinant_search import NEGATIVE, STICK
+from .energy_bound import energy_bound
+from .exact_threshold import Threshold, exact_threshold, search_windows
+from .status_pieces import Pieces
+
+Array = NDArray[np.float64]
+ENUMERATED = 13  # contacts up to which all 4^n patterns are examined: 5 s
+COMPARED = 10  # contacts up to which the P-matrix threshold is computed: 5^n patterns
+FULL_CONTACT = 12  # contacts up to which the full contact threshold is: 3^n patterns
+
+
+@dataclass(frozen=True, eq=False)
+class Witness:
+    """A linear piece that is singular: with it friction `friction` is not safe for every load.
+
+    pattern: f free, s stick, slip + or -, of every contact.  coefficients (nc,): m in
+    r_T = m r_N of slipping contacts, |m| = friction * shape.  null_vector (nc, 2): r != 0 with
+    r = 0 at free and r_T = m r_N at slipping contacts, for which W r vanishes along u_N of
+    all closed and u_T of sticking contacts, up to `residual`, relative to |W_ij| |r_j|.
+    """
+
+    friction: float
+    pattern: str
+    coefficients: Array
+    null_vector: Array
+    residual: float
+
+    def __str__(self) -> str:
+        return f"the pattern {self.pattern} is singular at friction {self.friction:.6g}"
+
+
+@dataclass(frozen=True, eq=False)
+class CriticalFriction:
+    """Bounds on the critical friction, lower <= mu_* <= upper, in terms of t (largest mu).
+
+    criterion: what proves lower: "determinants" (all patterns), "multipliers", "energy", or
+    "frictionless" where no proof is left.  upper is inf where no singular piece was found up
+    to LARGEST.  witness: the piece behind upper.  p_matrix, full_contact: the two older
+    thresholds, None where they would take too long.  examined: pivots and linear matrix
+    inequalities.  reason: why the bounds are not closer.
+    """
+
+    lower: float
+    upper: float
+    criterion: str
+    witness: Witness | None
+    p_matrix: float | None
+    full_contact: float | None
+    examined: int
+    seconds: float
+    reason: str = ""
+
+    def __str__(self) -> str:
+        upper = "no upper bound found" if np.isinf(self.upper) else f"{self.upper:.5g}"
+        return f"critical friction between {self.lower:.5g} ({self.criterion}) and {upper}"
+
+
+def critical_friction(
+    problem: FrictionProblem, *, gap: float = 1e-3, time_limit: float = 60.0
+) -> CriticalFriction:
+    """Bounds on the friction below which every load has exactly one solution.
+
+    gap: relative distance of the bounds that is good enough.  time_limit: seconds.  Raises
+    UnsupportedForm in 3D and under Tresca's law.
+    """
+    if not time_limit > 0:
+        raise InvalidInput(f"time_limit: expected seconds > 0, got {time_limit!r}")
+    if not 0 < gap < 1:
+        raise InvalidInput(f"gap: expected a number between 0 and 1, got {gap!r}")
+    began = time.perf_counter()
+    pieces = Pieces.of(problem)
+    if not pieces.contacts or not pieces.couples:
+        why = "no tangential force moves a contact along its normal"
+        return CriticalFriction(np.inf, np.inf, "determinants", None, None, None, 0,
+                                time.perf_counter() - began, why)  # fmt: skip
+    found = Threshold()
+    search_windows(pieces, found, began + 0.3 * time_limit)
+    criterion, reason = _lower(pieces, found, began + time_limit)
+    witness = None
+    if found.states is not None:
+        witness = make_witness(pieces, found)
+    comparison = _comparison(pieces, found, began + time_limit)
+    return CriticalFriction(found.lower, found.upper, criterion, witness, *comparison,
+                            found.seen, time.perf_counter() - began, reason)  # fmt: skip
+
+
+def _lower(pieces: Pieces, found: Threshold, deadline: float) -> tuple[str, str]:
+    """Prove a lower bound; (criterion, reason)."""
+    if pieces.contacts <= ENUMERATED:
+        exact_threshold(pieces, found, deadline)
+        if found.proved:
+            return "determinants", ""
+    found.lower = min(energy_bound(pieces.W, pieces.shape)[0], found.upper)
+    if found.lower > 0:
+        return "energy", "more contacts than patterns can be enumerated for"
+    return "frictionless", "W is singular: reactions are not unique without friction either"
+
+
+def make_witness(pieces: Pieces, found: Threshold) -> Witness:
+    """The witness of an upper bound, in the units of the problem.
+
+    Moves upper up to where the determinant is provably negative, if rounding allows it within
+    1e-6 of itself.
+    """
+    states, r, t = found.states, found.null, found.upper
+    assert states is not None and r is not None
+    for room in (1e-12, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6):
+        if pieces.sign(states, t * (1 + room)) == NEGATIVE:
+            found.upper = t * (1 + room)
+            break
+    slip, m = pieces.slipping(states)
+    coefficients = np.zeros(pieces.total)
+    coefficients[pieces.places[slip]] = t * m
+    rows = pieces.rows(states)
+    size = np.abs(pieces.W[rows]) @ np.abs(r)
+    residual = np.abs(pieces.W[rows] @ r) / np.where(size > 0, size, 1.0)
+    return Witness(t, pieces.word(states), coefficients, pieces.reaction(r),
+                   float(residual.max(initial=0.0)))  # fmt: skip
+
+
+# ----------------------------------------------------------- the older criteria
+def _comparison(
+    pieces: Pieces, found: Threshold, deadline: float
+) -> tuple[float | None, float | None]:
+    """(P-matrix threshold, full contact threshold), None where they would take too long."""
+    p_matrix = None
+    if pieces.contacts <= COMPARED:
+        threshold = Threshold(found.upper, found.states, found.null)
+        exact_threshold(pieces, threshold, deadline, pieces.allowed(tangent=True))
+        p_matrix = threshold.upper if threshold.proved else None
+    full = full_contact_threshold(pieces, deadline)
+    return p_matrix, full
+
+
+def full_contact_threshold(pieces: Pieces, deadline: float = np.inf) -> float | None:
+    """Smallest t at which a pattern without free contacts is singular; not a safe friction.
+
+    In terms of u = 0 off the slipping tangents, such a piece reads (K u)_T = m (K u)_N with
+    K = W^-1: the patterns of K' with T and N exchanged and stick in the place of free.
+    """
+    if pieces.contacts > FULL_CONTACT or np.linalg.cond(pieces.W) > 1e12:
+        return None
+    swap = np.arange(2 * pieces.contacts).reshape(-1, 2)[:, ::-1].ravel()
+    K = np.linalg.inv(pieces.W).T[np.ix_(swap, swap)]
+    dual = Pieces(K, pieces.shape, pieces.scale, pieces.places, pieces.total)
+    allowed = dual.allowed()
+    allowed[:, STICK] = False
+    threshold = Threshold()
+    exact_threshold(dual, threshold, deadline, allowed=allowed)
+    return threshold.upper if threshold.proved else None

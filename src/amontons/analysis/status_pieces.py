@@ -1,0 +1,170 @@
+"""The linear pieces of a 2D Coulomb problem, and the friction at which one becomes singular.
+
+A pattern of statuses makes the law linear, whatever the load:
+
+    free   r = 0                     stick  u = 0
+    slip   u_N = 0, r_T = m r_N with m = +mu or -mu
+
+so that r = R x, E (W R x + q) = 0 with E the rows u_N of closed and u_T of sticking contacts.
+With mu_p = t shape_p the matrix of a pattern is E W R = A + t C, and its determinant is
+multi-affine in the m_p: what holds for m_p = +-mu_p holds for all |m_p| <= mu_p.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InvalidInput, UnsupportedForm
+from ..problem import FrictionProblem
+from .determinant_search import FREE, SLIP_MINUS, SLIP_PLUS, STICK, TANGENT
+from .rounding import EPSILON, determinant_sign
+
+Array = NDArray[np.float64]
+States = NDArray[np.int64]
+LETTERS = np.array(["f", "+", "-", "s", "t"])
+REAL = 1e-7  # imaginary part of an eigenvalue that counts as real, relative
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """W (2 k, 2 k) and the shape (k,) of friction of the contacts that react.
+
+    scale (2 k,): powers of two, reactions are r scale and velocities u / scale here, so that
+    the diagonal blocks have size one and W is still exact.  places (k,): the contacts in the
+    problem, which has `total`.
+    """
+
+    W: Array
+    shape: Array
+    scale: Array
+    places: NDArray[np.int64]
+    total: int
+
+    @classmethod
+    def of(cls, problem: FrictionProblem) -> Pieces:
+        """The pieces of a 2D Coulomb problem; raises UnsupportedForm for any other."""
+        if problem.dimension != 2:
+            raise UnsupportedForm("critical friction: expected a 2D problem, this one is 3D")
+        mu = problem.mu
+        local = problem.condensed()
+        nc = local.contacts
+        W = local.W if isinstance(local.W, np.ndarray) else local.W.toarray()
+        own = np.arange(nc)
+        size = np.linalg.norm(W.reshape(nc, 2, nc, 2)[own, :, own], 2, axis=(1, 2))
+        places = np.flatnonzero(size > 0)
+        root = np.exp2(np.round(np.log2(size[places]) / 2)).repeat(2)
+        rows = (2 * places[:, None] + [0, 1]).ravel()
+        return cls(W[np.ix_(rows, rows)] / root / root[:, None], friction_shape(mu)[places],
+                   root, places, nc)  # fmt: skip
+
+    @cached_property
+    def contacts(self) -> int:
+        """Number of contacts that react."""
+        return len(self.shape)
+
+    @cached_property
+    def coupling(self) -> Array:
+        """Size of the blocks of W between contacts, (k, k)."""
+        k = self.contacts
+        blocks = self.W.reshape(k, 2, k, 2)
+        return np.sqrt((blocks**2).sum(axis=(1, 3)))
+
+    @cached_property
+    def couples(self) -> bool:
+        """False where no tangential force moves a contact along its normal: any mu is safe."""
+        return bool((self.W[0::2, 1::2] != 0).any())
+
+    def allowed(self, *, tangent: bool = False) -> NDArray[np.bool_]:
+        """States that a contact may have, (k, 5); without friction it can not stick."""
+        states = np.zeros((self.contacts, 5), dtype=bool)
+        states[:, [SLIP_PLUS, SLIP_MINUS, STICK]] = True
+        states[:, FREE], states[:, TANGENT] = True, tangent
+        states[self.shape == 0] = [True, True, False, False, tangent]
+        return states
+
+    # ---------------------------------------------------------------- one pattern
+    def rows(self, states: States) -> NDArray[np.int64]:
+        """Closed directions of a pattern: the rows of E W."""
+        closed = np.zeros((self.contacts, 2), dtype=bool)
+        closed[:, 0] = (states != FREE) & (states != TANGENT)
+        closed[:, 1] = (states == STICK) | (states == TANGENT)
+        return np.flatnonzero(closed.ravel())
+
+    def slipping(self, states: States) -> tuple[NDArray[np.int64], Array]:
+        """Slipping contacts, and their m for t = 1."""
+        slip = np.flatnonzero((states == SLIP_PLUS) | (states == SLIP_MINUS))
+        return slip, np.where(states[slip] == SLIP_PLUS, 1.0, -1.0) * self.shape[slip]
+
+    def matrix(self, states: States, t: float) -> Array:
+        """E W R of a pattern at friction t shape."""
+        rows = self.rows(states)
+        slip, m = self.slipping(states)
+        E = self.W[np.ix_(rows, rows)]
+        E[:, np.searchsorted(rows, 2 * slip)] += self.W[np.ix_(rows, 2 * slip + 1)] * (t * m)
+        return E
+
+    def sign(self, states: States, t: float) -> int:
+        """Sign of the determinant of a pattern, 0 where rounding could change it."""
+        rows = self.rows(states)
+        slip, m = self.slipping(states)
+        rounding = np.zeros((len(rows), len(rows)))
+        rounding[:, np.searchsorted(rows, 2 * slip)] = (
+            4
+            * EPSILON
+            * (
+                np.abs(self.W[np.ix_(rows, 2 * slip)])
+                + np.abs(self.W[np.ix_(rows, 2 * slip + 1)] * (t * m))
+            )
+        )
+        return determinant_sign(self.matrix(states, t), rounding)
+
+    def threshold(self, states: States) -> tuple[float, Array] | None:
+        """(smallest t > 0 at which a pattern is singular, its null vector r), or None.
+
+        det (A + t C) = 0 reads -A^-1 C x = x / t on the slipping contacts.
+        """
+        rows = self.rows(states)
+        slip, m = self.slipping(states)
+        if not len(slip):
+            return None
+        columns = np.linalg.solve(
+            self.W[np.ix_(rows, rows)], -self.W[np.ix_(rows, 2 * slip + 1)] * m
+        )
+        where = np.searchsorted(rows, 2 * slip)
+        values, vectors = np.linalg.eig(columns[where])
+        real = np.abs(values.imag) <= REAL * np.abs(values)
+        real &= values.real > 0
+        if not real.any():
+            return None
+        best = np.flatnonzero(real)[np.argmax(values.real[real])]
+        t = 1 / float(values[best].real)
+        x = t * columns @ vectors[:, best].real
+        r = np.zeros(2 * self.contacts)
+        r[rows] = x
+        r[2 * slip + 1] = t * m * x[where]
+        return t, r / np.abs(r).max()
+
+    # ---------------------------------------------------------------- in words
+    def word(self, states: States) -> str:
+        """The pattern of all contacts of the problem; those that can not react are free."""
+        letters = np.full(self.total, "f")
+        letters[self.places] = LETTERS[states]
+        return "".join(letters)
+
+    def reaction(self, r: Array) -> Array:
+        """r (nc, 2) in the units of the problem, the largest entry being 1."""
+        whole = np.zeros((self.total, 2))
+        whole[self.places] = (r / self.scale).reshape(-1, 2)
+        return whole / max(np.abs(whole).max(initial=0.0), np.finfo(float).tiny)
+
+
+def friction_shape(mu: Array) -> Array:
+    """mu divided by its largest entry, (nc,); one everywhere where there is no friction."""
+    if not np.isfinite(mu).all():
+        raise InvalidInput(f"mu: expected finite numbers, got {mu}")
+    largest = mu.max(initial=0.0)
+    return mu / largest if largest > 0 else np.ones_like(mu)
