@@ -34,7 +34,7 @@ _HOME = {
     "checkpoint": ("export_fclib", "load_state", "save_state"),
     "case": ("read_case",),
     "results": ("ModelSolution",),
-    "api": ("all_solutions", "solve"),
+    "api": ("all_solutions", "multistart", "solve"),
     "analysis": ("PieceSolution", "Solutions", "performance_profile"),
     "fem": ("Mesh", "box", "mesh_shape", "read_cad", "read_mesh", "refined"),
     "contact": ("LevelSet", "Plane", "Sphere"),

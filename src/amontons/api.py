@@ -65,14 +65,39 @@ def all_solutions(
     time_limit: seconds, after which the list may lack some.  keep_proof: keep the multipliers
     that exclude all other patterns, in `Solutions.proof`.  The search takes milliseconds for
     ten contacts and grows exponentially: some ten contacts with much friction, some fifty with
-    little.  Raises UnsupportedForm in 3D and under Tresca's law.
+    little; more than 200 are left to `multistart`, which proves nothing.  Raises
+    UnsupportedForm in 3D and under Tresca's law.
     """
+    discrete = _discrete(problem)
+    from .analysis import enumerate as exact
+
+    if discrete.dimension == 2 and discrete.contacts > exact.CONTACTS:
+        found = multistart(discrete, time_limit=time_limit)
+        reason = f"more than {exact.CONTACTS} contacts: {found.reason}"
+        return replace(found, reason=reason)
+    return exact.enumerate_solutions(discrete, time_limit=time_limit, keep_proof=keep_proof)
+
+
+def multistart(
+    problem: FrictionProblem | Model, *, starts: int = 1000, seed: int = 0,
+    time_limit: float | None = None,
+) -> Solutions:  # fmt: skip
+    """Solutions of a Coulomb problem, 2D or 3D, by Newton's method from many starts; no proof.
+
+    starts: their number; seed: of their random choice; time_limit: seconds.  Finds in seconds
+    what there is up to some hundred contacts, as far as it can be checked.  Raises
+    UnsupportedForm under Tresca's law.
+    """
+    from .analysis.multistart import multistart as search
+
+    return search(_discrete(problem), starts=starts, seed=seed, time_limit=time_limit)
+
+
+def _discrete(problem: FrictionProblem | Model) -> FrictionProblem:
+    """The problem, or that of a model."""
     if not (isinstance(problem, FrictionProblem) or hasattr(problem, "assemble")):
         raise InvalidInput(f"problem: expected a Model or a FrictionProblem, got {problem!r}")
-    discrete = problem if isinstance(problem, FrictionProblem) else problem.assemble()
-    from .analysis.enumerate import enumerate_solutions
-
-    return enumerate_solutions(discrete, time_limit=time_limit, keep_proof=keep_proof)
+    return problem if isinstance(problem, FrictionProblem) else problem.assemble()
 
 
 def solve_any_form(
@@ -92,7 +117,7 @@ def _solve(
     if problem is None or not (model is None or hasattr(model, "assemble")):
         raise InvalidInput(f"problem: expected a Model or a FrictionProblem, got {problem!r}")
     began = time.perf_counter()
-    discrete = problem if model is None else model.assemble()
+    discrete = problem if model is None else model.discrete_problem()
     assembled = time.perf_counter() - began
     if isinstance(options.get("start"), ModelSolution):
         options["start"] = options["start"].solution

@@ -215,7 +215,7 @@ def test_bad_input_is_refused():
         am.all_solutions(random_delassus(0, 2, 3))
     many = am.FrictionProblem.from_delassus(np.eye(402), np.ones((201, 2)), np.ones(201))
     with pytest.raises(am.InvalidInput, match="at most 200, got 201"):
-        am.all_solutions(many)
+        enumerate_solutions(many)
     with pytest.raises(am.UnsupportedForm, match="Tresca"):
         am.all_solutions(
             am.FrictionProblem.from_delassus(np.eye(2), [[-1.0, 0]], am.Tresca([1.0]))

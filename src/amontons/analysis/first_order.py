@@ -1,0 +1,316 @@
+"""The first-order system: all one-sided tangents of the solution curves through a point.
+
+At a point where several pieces meet, H'((y, p); (y', p')) = 0 is itself piecewise linear: every
+piece has its own kernel, and a direction of that kernel counts if it leads into the piece
+([LR] eq. (P'), for contact (P'1)-(P'4') with the index sets (25); Theorem 3: if it leads there
+strictly, exactly one solution curve leaves along it).
+
+Orientation: along a curve without branch points sign(p') sign(det J_y) does not change.
+
+[LR] T. Ligurský, Y. Renard, CMAME 280 (2014), sections 2.1 and 3.1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg, sparse
+
+from .friction_path import FrictionPath
+from .path import PathProblem, name_of, weight_of
+
+Array = NDArray[np.float64]
+SINGULAR = 1e-10  # singular value, relative to the largest, that counts as zero
+INWARD = 1e-9  # rate, of a direction of length 1, below which a condition does not change
+SAME = 1e-7  # distance of two directions of length 1 that count as one
+COMBINATIONS = 20_000  # pieces at a point up to which all are looked at
+
+
+@dataclass(frozen=True, eq=False)
+class Tangent:
+    """A one-sided direction (y', p') of weighted length 1 and the piece into which it leads.
+
+    strict: it leads into the inside of the piece; else touching names the others.
+    """
+
+    direction: Array
+    rate: float
+    piece: Hashable
+    strict: bool = True
+    touching: tuple[Hashable, ...] = ()
+
+    def __neg__(self) -> Tangent:
+        return Tangent(-self.direction, -self.rate, self.piece, self.strict, self.touching)
+
+
+@dataclass(frozen=True, eq=False)
+class FirstOrder:
+    """All one-sided tangents at a point; complete: no piece was left out and none has a set.
+
+    sets: pieces with more than one tangent line: there solutions are not isolated.
+    """
+
+    tangents: tuple[Tangent, ...]
+    sets: tuple[Hashable, ...] = ()
+    complete: bool = True
+    reason: str = ""
+
+    def others(self, direction: Array, rate: float, weight: float) -> list[Tangent]:
+        """The tangents but the one along a direction, by which the point was reached."""
+        return [
+            t for t in self.tangents if _product(t.direction, t.rate, direction, rate, weight)
+            < 1 - SAME
+        ]  # fmt: skip
+
+
+def first_order(
+    problem: PathProblem, y: Array, p: float, *, tolerance: float = 1e-9,
+    pieces: Sequence[Hashable] | None = None,
+) -> FirstOrder:  # fmt: skip
+    """All one-sided tangents at a solution (y, p).
+
+    tolerance: distance to a border of a piece that counts as none.  pieces: those that meet
+    there, for problems that do not tell; every problem needs `jacobian_of` and `margins`.
+    """
+    if isinstance(problem, FrictionPath) and pieces is None:
+        return _friction(problem, y, p, tolerance)
+    if pieces is None:
+        pieces = problem.pieces(y, p, tolerance)  # type: ignore[attr-defined]
+    weight = weight_of(problem, len(y))
+    found: list[Tangent] = []
+    sets: list[Hashable] = []
+    for piece in pieces:
+        lines = kernel(*problem.jacobian_of(piece, y, p), weight)  # type: ignore[attr-defined]
+        if lines.shape[1] != 1:
+            sets.append(name_of(piece))
+            continue
+        for sign in (1.0, -1.0):
+            direction, rate = sign * lines[:-1, 0], sign * float(lines[-1, 0])
+            inward = _inward(problem, piece, y, p, direction, rate, tolerance)
+            if inward is not None:
+                found.append(Tangent(direction, rate, name_of(piece), inward))
+    return FirstOrder(_merged(found, weight), tuple(sets), not sets)
+
+
+def orientation(problem: PathProblem, y: Array, p: float, rate: float) -> int:
+    """sign(p') sign(det J_y): the same all along a curve; 0 where it is not defined."""
+    J, _ = problem.jacobian(y, p)
+    if isinstance(J, np.ndarray):
+        return int(np.sign(rate) * np.linalg.slogdet(J)[0])
+    factor = sparse.linalg.splu(sparse.csc_array(J))
+    signs = (
+        np.sign(factor.U.diagonal()).prod() * _parity(factor.perm_r) * _parity(factor.perm_c)
+    )
+    return int(np.sign(rate) * signs)
+
+
+def kernel(J: Any, Jp: Array, weight: float) -> Array:
+    """Orthonormal columns (n + 1, k), in the weighted norm, with J y' + Jp p' = 0."""
+    root = np.sqrt(weight)
+    J = J if isinstance(J, np.ndarray) else J.toarray()
+    full = np.column_stack([J / root, Jp])
+    size = np.linalg.norm(full, axis=1)
+    full = full / np.where(size > 0, size, 1.0)[:, None]
+    lines = linalg.null_space(full, rcond=SINGULAR)
+    lines[:-1] /= root
+    return lines
+
+
+def _inward(
+    problem: Any, piece: Hashable, y: Array, p: float, direction: Array, rate: float,
+    tolerance: float,
+) -> bool | None:  # fmt: skip
+    """Whether a direction leads strictly into a piece; None where it leads out of it."""
+    step = 1e-6 * max(1.0, float(np.abs(y).max(initial=0)))
+    here = problem.margins(piece, y, p)
+    there = problem.margins(piece, y + step * direction, p + step * rate)
+    near = np.abs(here) <= tolerance
+    if (here[~near] < 0).any():
+        return None
+    rates = (there[near] - here[near]) / step
+    size = max(1.0, float(np.abs(direction).max(initial=0)))
+    limit = max(INWARD * size, 1e-4 * step)  # curvature of smooth margins
+    if (rates < -limit).any():
+        return None
+    return bool((rates > limit).all())
+
+
+def _product(a: Array, ap: float, b: Array, bp: float, weight: float) -> float:
+    return float(weight * (a @ b) + ap * bp)
+
+
+def _merged(found: list[Tangent], weight: float) -> tuple[Tangent, ...]:
+    """One tangent per direction; pieces that share it are `touching`."""
+    kept: list[Tangent] = []
+    for one in sorted(found, key=lambda t: not t.strict):
+        for k, other in enumerate(kept):
+            near = _product(one.direction, one.rate, other.direction, other.rate, weight)
+            if near > 1 - SAME:
+                touching = (*other.touching, one.piece)
+                kept[k] = Tangent(
+                    other.direction, other.rate, other.piece, other.strict, touching
+                )
+                break
+        else:
+            kept.append(one)
+    return tuple(kept)
+
+
+def _parity(permutation: NDArray[np.int64]) -> int:
+    """1 for an even permutation, -1 for an odd one."""
+    seen = np.zeros(len(permutation), dtype=bool)
+    sign = 1
+    for start in range(len(permutation)):
+        length, k = 0, start
+        while not seen[k]:
+            seen[k], k, length = True, permutation[k], length + 1
+        if length and length % 2 == 0:
+            sign = -sign
+    return sign
+
+
+# ------------------------------------------------------------------ friction in 2D, reduced
+def _friction(path: FrictionPath, y: Array, p: float, tolerance: float) -> FirstOrder:
+    """Enumerates the statuses of the contacts at a border only, the others eliminated once."""
+    choices = path.choices(y, p, tolerance)
+    count = float(np.prod([float(len(c)) for c in choices]))
+    if count > COMBINATIONS:
+        reason = f"{count:.3g} pieces meet at this point, too many to look at all"
+        return FirstOrder((), (), False, reason)
+    if path.start.dimension == 3 or path.tresca:
+        return first_order(path, y, p, tolerance=tolerance, pieces=path.pieces(y, p, tolerance))
+    at_border = [i for i, c in enumerate(choices) if len(c) > 1]
+    basis = _others_eliminated(path, y, p, choices, at_border)
+    local = _LocalPieces(path, y, p, basis, at_border, [choices[i] for i in at_border])
+    found, sets = local.search()
+    letters = [c[0] for c in choices]
+
+    def name(word: Sequence[str]) -> str:
+        for i, letter in zip(at_border, word, strict=True):
+            letters[i] = letter
+        return "".join(letters)
+
+    weight = weight_of(path, len(y))
+    tangents = []
+    for word, c, strict in found:
+        whole = basis @ c
+        whole /= np.sqrt(weight * whole[:-1] @ whole[:-1] + whole[-1] ** 2)
+        tangents.append(Tangent(whole[:-1], float(whole[-1]), name(word), strict))
+    return FirstOrder(_merged(tangents, weight), tuple(name(w) for w in sets), not sets)
+
+
+def _others_eliminated(
+    path: FrictionPath, y: Array, p: float, choices: list[str], at_border: list[int]
+) -> Array:
+    """Columns: all (y', p') that obey the conditions of contacts inside of their piece."""
+    first = "".join(c[0] for c in choices)
+    J, Jp = path.jacobian_of(first, y, p)
+    m = len(y)
+    mine = np.zeros(m, dtype=bool)
+    for i in at_border:
+        mine[2 * i : 2 * i + 2] = True
+    rows, rest = np.flatnonzero(~mine), np.flatnonzero(mine)
+    basis = np.zeros((m + 1, len(rest) + 1))
+    basis[rest, np.arange(len(rest))] = 1
+    basis[m, -1] = 1
+    if not len(rows):
+        return basis
+    right = np.column_stack([J[np.ix_(rows, rest)], Jp[rows]])
+    try:
+        basis[rows] = -np.linalg.solve(J[np.ix_(rows, rows)], right)
+        if np.isfinite(basis).all() and np.abs(basis).max() < 1 / SINGULAR**0.8:
+            return basis
+    except np.linalg.LinAlgError:
+        pass
+    return linalg.null_space(np.column_stack([J, Jp])[rows], rcond=SINGULAR)
+
+
+class _LocalPieces:
+    """The pieces at a point, in coordinates c of what the other contacts allow."""
+
+    def __init__(
+        self, path: FrictionPath, y: Array, p: float, basis: Array, contacts: list[int],
+        choices: list[str],
+    ) -> None:  # fmt: skip
+        self.choices = choices
+        self.count = basis.shape[1]
+        W, mu = path.W, path.coefficient(p)
+        self.equations: list[dict[str, Array]] = []
+        self.conditions: list[dict[str, Array]] = []
+        for i, letters in zip(contacts, choices, strict=True):
+            N, T = 2 * i, 2 * i + 1
+            u_N = W[N] @ basis[:-1] + path.q1[N] * basis[-1]
+            u_T = W[T] @ basis[:-1] + path.q1[T] * basis[-1]
+            r_N, r_T = basis[N], basis[T]
+            bound = mu[i] * r_N + path.c1[i] * y[N] * basis[-1]
+            sign = 1.0 if "+" in letters else -1.0
+            both = "+" in letters and "-" in letters
+            grazing = "f" in letters
+            stick = [bound - sign * r_T] + ([bound + sign * r_T] if both else [])
+            equations = {"f": [r_N, r_T], "s": [u_N, u_T]}
+            conditions: dict[str, list[Array]] = {"f": [u_N], "s": stick}
+            for letter, s in (("+", 1.0), ("-", -1.0)):
+                equations[letter] = [u_N, r_T - s * bound]
+                moving = "s" in letters and mu[i] > 0
+                conditions[letter] = [-s * u_T] * moving + [r_N] * grazing
+            self.equations.append({k: _scaled(v) for k, v in equations.items()})
+            self.conditions.append({k: _scaled(v) for k, v in conditions.items() if v})
+
+    def search(self) -> tuple[list[tuple[tuple[str, ...], Array, bool]], list[tuple[str, ...]]]:
+        """(pattern, coordinates, strictly inside?) of all tangents; patterns with a set."""
+        words = list(product(*self.choices))
+        if not self.choices:
+            found = [((), s * np.ones(1), True) for s in (1.0, -1.0)]
+            return (found, []) if self.count == 1 else ([], [()])
+        stacks = np.array([
+            np.vstack([rows[letter] for rows, letter in zip(self.equations, word, strict=True)])
+            for word in words
+        ])  # fmt: skip
+        _, values, right = np.linalg.svd(stacks)
+        rank = (values > SINGULAR * np.maximum(values[:, :1], 1e-300)).sum(axis=1)
+        found, sets = [], []
+        for k, word in enumerate(words):
+            inside = [
+                rows[letter]
+                for rows, letter in zip(self.conditions, word, strict=True)
+                if letter in rows
+            ]
+            conditions = np.vstack(inside) if inside else np.zeros((0, self.count))
+            if rank[k] < self.count - 1:
+                if _holds_more_than_a_line(conditions, right[k, rank[k] :].T):
+                    sets.append(word)
+                continue
+            c = right[k, -1]
+            rates = conditions @ c
+            for s in (1.0, -1.0):
+                if (s * rates >= -INWARD).all():
+                    found.append((word, s * c, bool((s * rates > INWARD).all())))
+        return found, sets
+
+
+def _holds_more_than_a_line(conditions: Array, lines: Array) -> bool:
+    """True where some combination of several kernel vectors obeys all conditions."""
+    from scipy.optimize import linprog
+
+    G = conditions @ lines
+    k = lines.shape[1]
+    for axis in range(k):
+        for sign in (1.0, -1.0):
+            cost = np.zeros(k)
+            cost[axis] = -sign
+            answer = linprog(cost, -G, np.full(len(G), INWARD), bounds=[(-1, 1)] * k)
+            if answer.success and -answer.fun > 1e-6:
+                return True
+    return False
+
+
+def _scaled(rows: list[Array]) -> Array:
+    """Rows of length 1, where they are not zero."""
+    stack = np.array(rows)
+    size = np.linalg.norm(stack, axis=1)
+    return stack / np.where(size > 1e-12, size, 1.0)[:, None]

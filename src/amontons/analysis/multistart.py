@@ -1,0 +1,255 @@
+"""Many solutions of a Coulomb problem by Newton's method from many starts, 2D and 3D.
+
+A finder, not a proof: what it lists are solutions, and there may be others.  Starts: status
+patterns with random shares of free, sticking and slipping contacts in random directions;
+random reactions in the cone; known solutions with some contacts in another status; points
+between and beyond two known solutions; and the same starts again with the known solutions
+deflated (`newton_batch`).  Isolated solutions with regular Jacobians have orientations that add
+up to 1 where W is positive definite (degree theory): while they do not, one is missing, and
+the search goes on for up to EXTRA times the starts.
+"""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InvalidInput
+from ..problem import FrictionProblem
+from .enumerate import PieceSolution, Solutions
+from .newton_batch import FREE, SLIP, STICK, Stack
+
+Array = NDArray[np.float64]
+ROUND = 100  # starts between two looks at the clock and at the solutions known so far
+EXTRA = 3  # times the starts while a solution is known to be missing
+SAME = 1e-7  # scaled distance of two solutions that count as one
+BORDER = 1e-8  # scaled distance from a border of the law at which a solution has both patterns
+SINGULAR = 1e-10  # smallest singular value of a regular Jacobian, relative to the largest
+WORDS = 64  # touching patterns that are listed
+
+
+def multistart(
+    problem: FrictionProblem, *, starts: int = 1000, seed: int = 0,
+    time_limit: float | None = None, tolerance: float = 1e-8,
+) -> Solutions:  # fmt: skip
+    """Solutions of a 2D or 3D Coulomb problem found from many starts; never complete.
+
+    starts: Newton iterations that are begun.  seed: of their choice.  time_limit: seconds.
+    tolerance: error by the judge that a solution may have.  The global form is condensed.
+    Raises UnsupportedForm under Tresca's law.
+    """
+    if not starts >= 1:
+        raise InvalidInput(f"starts: expected at least 1, got {starts!r}")
+    if time_limit is not None and not time_limit > 0:
+        raise InvalidInput(f"time_limit: expected seconds > 0, got {time_limit!r}")
+    _ = problem.mu
+    began = time.perf_counter()
+    local = problem.condensed()
+    if local.q_norm == 0:
+        r = np.zeros((local.contacts, local.dimension))
+        rest = PieceSolution("f" * local.contacts, (), r, r.copy(), 0.0, 1, 0.0)
+        reason = "q is zero: only r = 0 can be judged, others were not looked for"
+        return Solutions((rest,), local.contacts == 0, reason, 0, 0.0)
+    finder = Finder(Stack.of(local), np.random.default_rng(seed), tolerance)
+    used = 0
+    while used < starts or (finder.lacks_one and used < EXTRA * starts):
+        if time_limit is not None and time.perf_counter() - began > time_limit:
+            break
+        used += finder.search(min(ROUND, EXTRA * starts - used))
+    seconds = time.perf_counter() - began
+    return Solutions(tuple(finder.solutions()), False, finder.reason(used), used, seconds)
+
+
+class Finder:
+    """The solutions found so far, and where to look next."""
+
+    def __init__(self, stack: Stack, random: np.random.Generator, tolerance: float) -> None:
+        self.stack, self.random, self.tolerance = stack, random, tolerance
+        self.found: list[Array] = []  # scaled reactions
+        self.sign: list[int] = []  # orientations
+
+    def search(self, count: int) -> int:
+        """Newton from `count` starts; returns count."""
+        plain = self._starts(count)
+        for r in self.stack.newton(plain, self.random):
+            self.add(r)
+        if self.found:
+            some = plain[: max(1, count // 4)]
+            for r in self.stack.newton(some, self.random, np.array(self.found)):
+                self.add(r)
+        return count
+
+    def add(self, r: Array) -> bool:
+        """Keep scaled reactions that the judge accepts and that are new."""
+        size = 1 + np.abs(r).max(initial=0.0)
+        if any(np.abs(r - other).max() <= SAME * size for other in self.found):
+            return False
+        if self.stack.problem.error(r * self.stack.to_r) > self.tolerance:
+            return False
+        for k, other in enumerate(self.found):
+            if self._connected(r, other):  # keep a point inside, its Jacobian is that of the set
+                self.found[k], self.sign[k] = (r + other) / 2, 0
+                return False
+        self.found.append(r)
+        self.sign.append(orientation(self.stack, r)[0])
+        return True
+
+    def _connected(self, r: Array, other: Array) -> bool:
+        """True where the segment between two solutions consists of solutions."""
+        points = np.array([(1 - t) * r + t * other for t in (0.25, 0.5, 0.75)])
+        F = self.stack.linearise(points, np.ones(points.shape[:2]))[0]
+        return bool(np.abs(F).max() <= BORDER * (1 + np.abs(r).max()))
+
+    @property
+    def lacks_one(self) -> bool:
+        """True when regular solutions were found whose orientations do not add up to 1."""
+        return 0 not in self.sign and sum(self.sign) != 1
+
+    def reason(self, used: int) -> str:
+        """What the list rests on."""
+        text = f"Newton's method from {used} starts, no proof"
+        if 0 in self.sign:
+            return f"{text}; a connected set or a singular Jacobian was found"
+        if self.lacks_one:
+            return f"{text}; orientations add up to {sum(self.sign)}, not 1: one is missing"
+        return f"{text}; orientations add up to 1"
+
+    # ---------------------------------------------------------------- starts
+    def _starts(self, count: int) -> Array:
+        """Reactions to start from, (count, nc, d)."""
+        kinds = [self._patterns, self._in_the_cone]
+        if self.found:
+            kinds += [self._patterns, self._neighbours]
+        if len(self.found) > 1:
+            kinds.append(self._between)
+        parts = np.array_split(np.arange(count), len(kinds))
+        return np.concatenate(
+            [kind(len(part)) for kind, part in zip(kinds, parts, strict=True)]
+        )
+
+    def _directions(self, count: int) -> Array:
+        """Unit tangents, (count, nc, d - 1): in half of the starts about one for all."""
+        nc, d = self.stack.shape
+        each = self.random.standard_normal((count, nc, d - 1))
+        common = self.random.standard_normal((count, 1, d - 1))
+        each += common * self.random.choice([0.0, 5.0], (count, 1, 1))
+        return each / np.maximum(np.linalg.norm(each, axis=2, keepdims=True), 1e-300)
+
+    def _solved(self, states: NDArray[np.int64], direction: Array) -> Array:
+        width = self.stack.width
+        return np.concatenate([
+            self.stack.on_piece(states[k : k + width], direction[k : k + width])
+            for k in range(0, max(len(states), 1), width)
+        ])  # fmt: skip
+
+    def _patterns(self, count: int) -> Array:
+        """Points of random patterns, each with its own shares of the statuses."""
+        shares = self.random.dirichlet([0.5, 0.5, 0.5], count)
+        chance = self.random.random((count, self.stack.shape[0]))
+        states = (chance[:, :, None] > shares.cumsum(axis=1)[:, None, :2]).sum(axis=2)
+        return self._solved(states, self._directions(count))
+
+    def _in_the_cone(self, count: int) -> Array:
+        nc, d = self.stack.shape
+        size = 10.0 ** self.random.uniform(-1.5, 1.5, (count, 1))
+        normal = size * self.random.exponential(1.0, (count, nc))
+        normal *= self.random.random((count, nc)) < self.random.random((count, 1))
+        share = self.random.random((count, nc, 1)) ** 0.5
+        tangent = (self.stack.mu * normal)[:, :, None] * share * self._directions(count)
+        return np.concatenate([normal[:, :, None], tangent], axis=2)
+
+    def _neighbours(self, count: int) -> Array:
+        """Points of patterns that differ in some contacts from that of a known solution."""
+        nc = self.stack.shape[0]
+        which = self.random.integers(len(self.found), size=count)
+        known = [statuses(self.stack, r) for r in self.found]
+        states = np.array([known[k][0] for k in which]).reshape(count, nc)
+        direction = np.array([known[k][1] for k in which]).reshape(count, nc, -1)
+        changed = self.random.integers(1, min(4, nc) + 1, (count, 1)) / nc
+        changed = self.random.random((count, nc)) < changed
+        states = np.where(changed, self.random.integers(3, size=(count, nc)), states)
+        other = self._directions(count)
+        return self._solved(states, np.where(changed[:, :, None], other, direction))
+
+    def _between(self, count: int) -> Array:
+        """Points on the line through two known solutions, each contact for itself or all."""
+        nc, _ = self.stack.shape
+        pick = self.random.integers(len(self.found), size=(2, count))
+        known = np.array(self.found)
+        t = self.random.uniform(-0.3, 1.3, (count, 1, 1))
+        own = self.random.random((count, nc, 1)) < 0.5
+        t = np.where(self.random.random((count, 1, 1)) < 0.5, t, own)
+        return (1 - t) * known[pick[0]] + t * known[pick[1]]
+
+    # ---------------------------------------------------------------- results
+    def solutions(self) -> Iterator[PieceSolution]:
+        """One entry per solution, most sticking contacts first."""
+        entries = [described(self.stack, r) for r in self.found]
+        yield from sorted(entries, key=lambda s: (-s.pattern.count("s"), s.pattern))
+
+
+# ------------------------------------------------------------- what a solution is
+def statuses(stack: Stack, r: Array) -> tuple[NDArray[np.int64], Array]:
+    """(status, (nc,), direction of slip, (nc, d - 1)) of one scaled solution."""
+    u = stack.velocity(r[None])[0]
+    bound = stack.mu * np.maximum(r[:, 0], 0)
+    reach = np.linalg.norm(r[:, 1:] - u[:, 1:], axis=1)
+    closed = (r[:, 0] > u[:, 0]) & stack.able
+    slip = closed & ((reach > bound) | (stack.mu == 0))
+    states = np.where(slip, SLIP, np.where(closed, STICK, FREE))
+    length = np.linalg.norm(u[:, 1:], axis=1, keepdims=True)
+    direction = np.where(length > 0, u[:, 1:] / np.where(length > 0, length, 1), 0.0)
+    return states, direction
+
+
+def orientation(stack: Stack, r: Array) -> tuple[int, int]:
+    """(sign of the determinant of the generalised Jacobian or 0, dimension of its kernel).
+
+    +1 without friction: there A + B W belongs to a symmetric positive definite problem.
+    """
+    matrix = stack.jacobian(r)
+    values = np.linalg.svd(matrix, compute_uv=False)
+    freedom = int((values <= SINGULAR * values.max(initial=0.0)).sum())
+    return (0 if freedom else int(np.linalg.slogdet(matrix)[0])), freedom
+
+
+def described(stack: Stack, r: Array) -> PieceSolution:
+    """A scaled solution as an entry of a list, in the units of the problem."""
+    u = stack.velocity(r[None])[0]
+    letters = [_letters(*contact) for contact in zip(r, u, stack.mu, stack.able, strict=True)]
+    words = ["".join(word) for word in itertools.islice(itertools.product(*letters), WORDS)]
+    sign, freedom = orientation(stack, r)
+    reaction = r * stack.to_r
+    velocity = np.array(stack.problem.velocity(reaction)[0])
+    energy = float((reaction * (u - stack.c) * stack.to_u).sum() / 2)
+    error = stack.problem.error(reaction)
+    return PieceSolution(words[0], tuple(words[1:]), reaction, velocity, error, sign, energy,
+                         freedom)  # fmt: skip
+
+
+def _letters(r: Array, u: Array, mu: float, able: bool) -> list[str]:
+    """Statuses that one contact has, at a border more than one: the most sticking first."""
+    near = BORDER * (1 + np.abs(r).max())
+    out = []
+    if able and abs(u[0]) <= near:
+        if np.abs(u[1:]).max() <= near and mu > 0:
+            out.append("s")
+        if np.linalg.norm(r[1:]) >= mu * r[0] - near:
+            out += _slip_letters(r, u, mu, near)
+    if np.abs(r).max() <= near:
+        out.append("f")
+    return out or ["f"]
+
+
+def _slip_letters(r: Array, u: Array, mu: float, near: float) -> list[str]:
+    if len(r) == 3:
+        return ["l"]
+    if mu == 0:
+        return ["+"]  # as `all_solutions` calls a contact without friction
+    plus = bool(abs(r[1] - mu * r[0]) <= near and u[1] <= near)
+    minus = bool(abs(r[1] + mu * r[0]) <= near and u[1] >= -near)
+    return ["+"] * plus + ["-"] * minus
