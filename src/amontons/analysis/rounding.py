@@ -34,6 +34,32 @@ def is_positive_definite(matrix: Array, rounding: Array | float = 0.0) -> bool:
     return True
 
 
+def gamma(operations: int) -> float:
+    """Relative rounding error of so many operations on one number, itself rounded up."""
+    half = EPSILON / 2
+    return 1.01 * operations * half / (1 - operations * half)
+
+
+def unit_scale(matrix: Array) -> Array:
+    """Powers of two s with which s_i s_j A_ij has a diagonal near 1: exact, and unit-free.
+
+    Ones where the diagonal is not positive.
+    """
+    diagonal = np.diag(matrix)
+    able = np.isfinite(diagonal) & (diagonal > 0)
+    return np.exp2(-np.round(np.log2(np.where(able, diagonal, 1.0)) / 2))
+
+
+def congruence(G: Array, W: Array) -> tuple[Array, Array]:
+    """(G^T W G, bound of the error of its entries) for stacks G (..., k, s), W (..., k, k).
+
+    G may itself be off by three roundings per entry, as after a normalisation.
+    """
+    turned = np.swapaxes(G, -1, -2)
+    size = np.abs(turned) @ np.abs(W) @ np.abs(G)
+    return turned @ W @ G, gamma(2 * W.shape[-1] + 10) * size
+
+
 def determinant_sign(matrix: Array, rounding: Array | float = 0.0) -> int:
     """Sign of det (A + d) for every |d| <= rounding, proved; 0 where it is not.
 
