@@ -135,6 +135,35 @@ def test_cycles_do_not_depend_on_friction(mu):
     assert solution.convergence.iterations <= 20
 
 
+@pytest.mark.parametrize("mu", [0.3, 1.0])
+def test_a_tall_body_does_not_swing(mu):
+    """Full steps of the tangent carry its foot past the solution, to and fro."""
+    model = am.Model(
+        [am.Body(am.box((1, 1, 2), cells=(6, 6, 12)), am.LinearElastic(200, 0.3))],
+        supports=[am.Fix("top", (0, 0.04, -0.04))],
+        contacts=[am.Contact("bottom", am.Plane((0, 0, 1)), mu=mu)],
+    )
+    problem = model.assemble()
+    found = drive(problem, ContactMultigrid(), tolerance=1e-9)
+    exact = drive(problem.condensed(), SemismoothNewton(), tolerance=1e-11)
+    assert found.converged
+    assert found.convergence.iterations <= 16
+    assert np.abs(found.r - exact.r).max() <= 1e-6 * np.abs(exact.r).max()
+    assert found.counts["stick"] > 0.4 * problem.contacts
+
+
+@pytest.mark.parametrize("size", [(4, 1, 1), (1, 1, 4), (8, 8, 1), (10, 3, 1)])
+def test_stretched_cells_take_no_more_cycles(size):
+    model = am.Model(
+        [am.Body(am.box(size, cells=8), am.LinearElastic(200, 0.3))],
+        supports=[am.Fix("top", (0, 0.02 * size[2], -0.02 * size[2]))],
+        contacts=[am.Contact("bottom", am.Plane((0, 0, 1)), mu=0.3)],
+    )
+    found = drive(model.assemble(), ContactMultigrid(), tolerance=1e-8)
+    assert found.converged
+    assert found.convergence.iterations <= 14
+
+
 @pytest.mark.parametrize("gap", [0.0, 0.05, 2.0])
 def test_a_body_held_by_contact_alone(gap):
     problem = loose(gap).assemble()
@@ -148,7 +177,7 @@ def test_a_body_held_by_contact_alone(gap):
 def test_coarse_levels_of_two_bodies_have_contacts_of_their_own(method):
     problem = two_bodies(method).assemble()
     levels = ContactLevels.of(problem)
-    assert [len(contacts.node) for _, contacts in levels.coarse] == [9]
+    assert [len(contacts.node) for _, contacts in levels.coarse] == [9, 4]
     # the coarse space is that of the meshes: v is interpolated from its values at coarse nodes
     finest, P = levels.hierarchy.levels[0], problem.levels[0]
     coarse = np.random.default_rng(1).standard_normal((finest.P.coarse, 3))

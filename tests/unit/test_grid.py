@@ -15,7 +15,8 @@ SHAPES = [(4, 4, 4), (6, 4, 2), (2, 4, 1)]
 
 
 def model(cells=(4, 4, 4), symmetric=False):
-    """A pressed and dragged box of unequal sides, in quarter symmetry if wanted."""
+    """A pressed and dragged box of cells of unequal sides, in quarter symmetry if wanted."""
+    size = np.array([1, 1.2, 0.9]) * cells / 4
     supports = [am.Fix("top", (0.01, 0.02, -0.03))]
     if symmetric:
         supports = [
@@ -24,7 +25,7 @@ def model(cells=(4, 4, 4), symmetric=False):
             am.Fix("top", (None, None, -0.03)),
         ]
     return am.Model(
-        [am.Body(am.box((1, 1.2, 0.9), cells=cells), am.LinearElastic(50, 0.3))],
+        [am.Body(am.box(size, cells=cells), am.LinearElastic(50, 0.3))],
         supports=supports,
         contacts=[am.Contact("bottom", am.Plane(normal=(0, 0, 1)), mu=0.4)],
     )
@@ -56,8 +57,15 @@ def test_products_and_parts(cells, symmetric, monkeypatch):
 
 
 def test_a_grid_of_one_cell_across(unstored):
-    problem = model((2, 4, 1)).assemble()  # odd: there is no coarser box
+    problem = model((2, 4, 1)).assemble()  # odd: no box is coarser in all directions
     assert sparse.issparse(problem.M)
+
+
+def test_a_grid_of_stretched_cells(unstored):
+    body = am.Body(am.box((4, 4, 1), cells=4), am.LinearElastic(50, 0.3))
+    contact = am.Contact("bottom", am.Plane((0, 0, 1)), mu=0.4)
+    problem = am.Model([body], [am.Fix("top", (0, 0, 0))], [contact]).assemble()
+    assert sparse.issparse(problem.M)  # its next level is not halved in all directions
 
 
 @pytest.mark.parametrize("symmetric", [False, True], ids=["clamped", "symmetric"])

@@ -70,10 +70,21 @@ def test_refined_box_is_the_finer_box(kind):
 @pytest.mark.parametrize("make", ["box", "refined"])
 def test_galerkin_equals_the_stiffness_of_the_coarse_mesh(kind, make):
     dim = CELLS[kind].dim
-    size = (1.0, 2.0, 0.7)[:dim]
+    size = (1.0, 1.3, 0.7)[:dim]
     coarse = am.box(size, 2, kind)
     fine = am.box(size, 4, kind) if make == "box" else am.refined(coarse)
     P = sparse.kron(fine.levels[0], np.eye(dim))
+    galerkin = (P.T @ stiffness(fine, LAW) @ P).toarray()
+    np.testing.assert_allclose(galerkin, stiffness(coarse, LAW).toarray(), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("kind", "size", "coarser"),
+    [("quad", (4, 1), (4, 2)), ("hex", (1, 1, 3), (2, 2, 4)), ("hex", (8, 8, 1), (4, 4, 2))],
+)
+def test_stretched_cells_are_halved_along_their_short_sides(kind, size, coarser):
+    fine, coarse = am.box(size, 4, kind), am.box(size, coarser, kind)
+    P = sparse.kron(fine.levels[0], np.eye(len(size)))
     galerkin = (P.T @ stiffness(fine, LAW) @ P).toarray()
     np.testing.assert_allclose(galerkin, stiffness(coarse, LAW).toarray(), atol=1e-9)
 

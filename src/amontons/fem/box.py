@@ -18,6 +18,7 @@ from .mesh import Mesh
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 KINDS = {2: ("quad", "tri"), 3: ("hex", "tet")}
+STRETCHED = 2.0  # from this ratio to the shortest one, a side of a cell is not doubled
 SIDES = {2: (("left", "right"), ("bottom", "top")),
          3: (("left", "right"), ("front", "back"), ("bottom", "top"))}  # fmt: skip
 
@@ -33,8 +34,9 @@ def box(
 
     cells: number per direction, one for all or one each.  kind: "hex" or "tet", in 2D "quad" or
     "tri" (the first is the default).  Surfaces left/right (x), front/back (y), bottom/top (z);
-    in 2D left/right (x), bottom/top (y).  Region "default".  While all numbers of cells are
-    even, the box of half as many is a coarser level, see `Mesh`.
+    in 2D left/right (x), bottom/top (y).  Region "default".  While numbers of cells are even,
+    the box of half as many is a coarser level, see `Mesh`: in all directions for cells of equal
+    sides, in those of the shorter sides alone where cells are stretched.
 
     >>> box((1, 1, 1), cells=2).points.shape
     (27, 3)
@@ -51,7 +53,7 @@ def box(
     nodes = cube if kind in ("hex", "quad") else _simplices(cube, dim)
     block = Cells(kind, nodes)
     surfaces = _sides(unit, block, dim)
-    levels = _levels(counts, kind)
+    levels = _levels(counts, lengths, kind)
     return Mesh(start + unit * lengths, (block,), surfaces, grid=counts, levels=levels)
 
 
@@ -95,27 +97,35 @@ def _simplices(cube: Index, dim: int) -> Index:
     return np.stack(pieces, axis=1).reshape(-1, dim + 1)
 
 
-def _levels(counts: tuple[int, ...], kind: str) -> tuple[sparse.csr_array, ...]:
-    """Prolongations between the boxes of half, a quarter, … as many cells, finest first."""
+def _levels(counts: tuple[int, ...], lengths: Array, kind: str) -> tuple[sparse.csr_array, ...]:
+    """Prolongations between boxes of ever fewer cells, finest first."""
     out = []
-    while all(n % 2 == 0 for n in counts):
+    while (halved := _halved(counts, lengths)).any():
         low, high = (
-            [_neighbour(n, step) for n in reversed(counts)] for step in (0, 1)
+            [_neighbour(n, step, half) for n, half in zip(counts, halved, strict=True)][::-1]
+            for step in (0, 1)
         )  # x runs fastest: its factor is the last
         if kind in ("hex", "quad"):
             level = _product([0.5 * (a + b) for a, b in zip(low, high, strict=True)])
         else:  # new nodes halve edges, which all run from low to high corners
             level = 0.5 * (_product(low) + _product(high))
         out.append(sparse.csr_array(level))
-        counts = tuple(n // 2 for n in counts)
+        counts = tuple(n // 2 if half else n for n, half in zip(counts, halved, strict=True))
     return tuple(out)
 
 
-def _neighbour(cells: int, step: int) -> sparse.csr_array:
+def _halved(counts: tuple[int, ...], lengths: Array) -> NDArray[np.bool_]:
+    """Directions to coarsen: point smoothers leave rough what long sides couple weakly."""
+    sides = lengths / counts
+    return (np.array(counts) % 2 == 0) & (sides < STRETCHED * sides.min())
+
+
+def _neighbour(cells: int, step: int, halved: bool) -> sparse.csr_array:
     """On a line: the coarse node below (step 0) or above (1) every fine node."""
     fine = np.arange(cells + 1)
-    entries = (np.ones(cells + 1), (fine, (fine + step) // 2))
-    return sparse.coo_array(entries, shape=(cells + 1, cells // 2 + 1)).tocsr()
+    coarse = (fine + step) // 2 if halved else fine
+    entries = (np.ones(cells + 1), (fine, coarse))
+    return sparse.coo_array(entries, shape=(cells + 1, coarse[-1] + 1)).tocsr()
 
 
 def _product(factors: list[sparse.csr_array]) -> sparse.csr_array:

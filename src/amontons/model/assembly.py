@@ -30,7 +30,7 @@ from .values import vector_at
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-GRID_FROM = 500_000  # dofs of a box of equal cells from which its stiffness is not stored
+GRID_FROM = 50_000  # dofs of a box of equal cells from which its stiffness is not stored
 SAME = 1e-12  # prescribed values that differ by less, relative to the largest, agree
 
 
@@ -165,6 +165,8 @@ def _grid(bodies: tuple[Body, ...]) -> GridMatrix | None:
         return None
     if mesh.points.size < GRID_FROM or not mesh.levels:
         return None
+    if mesh.levels[0].shape[1] != np.prod([n // 2 + 1 for n in mesh.grid]):
+        return None  # stretched cells, coarsened in some directions only
     low, high = mesh.bounding_box()
     cell = box((high - low) / mesh.grid, cells=1)
     dofs = (cell.cells[0].nodes[0][:, None] * 3 + np.arange(3)).ravel()

@@ -10,12 +10,19 @@ One cycle, from v on the finest level:
 3. smooth in reverse order.
 4. Anderson acceleration over a few cycles; forgotten when many states change.
 
+While many states change and the error hardly falls, step 2 is that of the convex problem with
+the present bounds of friction: nodes that it lets penetrate are lifted to the surface, and the
+step is taken as far as the energy of that problem falls.  This costs one more product.
+
 On geometric levels the start is nested: each level is solved to `coarse_tolerance` first, from
 the solution of the next coarser one.  No parameter depends on the units or on the law.
 
 The truncated coarse spaces go back to R. Kornhuber's monotone multigrid for obstacle problems;
-the tangent for Coulomb's law is that of the full Newton method in [HSW] section 7.
+the tangent for Coulomb's law is that of the full Newton method in [HSW] section 7; the limited
+step follows [GK].
 
+[GK] C. Gräser, R. Kornhuber, "Multigrid methods for obstacle problems", J. Comput. Math. 27
+(2009).
 [HSW] S. Hüeber, G. Stadler, B. Wohlmuth, "A primal-dual active set algorithm for
 three-dimensional contact problems with Coulomb friction", SIAM J. Sci. Comput. 30 (2008).
 """
@@ -41,6 +48,7 @@ Array = NDArray[np.float64]
 MANY = 0.01  # share of contacts that change their state above which Anderson forgets
 GROWTH = 1e3  # of the error over the best one that counts as divergence
 GRID_DEPTH = 3  # past cycles to mix at most where M is not stored
+SLOW = 0.5  # fall of the error in a cycle above which, while states change, steps are limited
 CLOSE = 0.9  # share of the tolerance at which an iterate is handed to the judge
 
 
@@ -57,7 +65,7 @@ class ContactMultigrid:
     matrix_free: ClassVar[bool] = True  # M may be an operator
     depth: int = 8
     nested: bool = True
-    coarse_tolerance: float = 1e-3
+    coarse_tolerance: float = 1e-2
     update_ratio: float = 0.03
     contact_sweeps: int = 1  # over the contact nodes after each sweep in the bulk
     patience: int = 30  # cycles without halving the error before it gives up
@@ -138,6 +146,7 @@ class _Run:
         self.held[self.contacts.node] = True
         self.change: Array | None = None
         self.states = np.full_like(self.contacts.state, -2)  # of the tangent
+        self.frozen = False  # are the bounds of friction, in the tangent?
         self.updates = 0
         self.r = np.empty_like(self.f)
 
@@ -148,7 +157,7 @@ class _Run:
             depth = min(depth, GRID_DEPTH)
         mixing = Anderson(x.size, depth)
         before = np.empty_like(x)
-        best = at_update = np.inf
+        best = at_update = last = np.inf
         patience = Patience(self.options.patience)
         self.levels.take(self)
         while True:
@@ -164,13 +173,17 @@ class _Run:
             best = min(best, error)
             if patience.over(error):
                 raise Breakdown("contact multigrid: the cycles have stalled")
-            if changed or error < self.options.update_ratio * at_update:
-                self.renew()
+            unsettled = changed > MANY * len(self.contacts.node)
+            careful = unsettled and error > SLOW * last
+            last = error
+            fallen = error < self.options.update_ratio * at_update
+            if changed or careful or self.frozen or fallen:
+                self.renew(careful)
                 at_update = error
-            self.correct(x)
+            (self.correct_carefully if careful else self.correct)(x)
             self.contacts.sweep(self.f, x, backward=True)
             self.smooth(x, backward=True)
-            if changed > MANY * len(self.contacts.node):
+            if unsettled:
                 mixing.forget()
             mixing.mix(before.reshape(-1), x.reshape(-1))
 
@@ -188,22 +201,23 @@ class _Run:
         self.r[self.contacts.node] = kept
         return max(balance / self.load, law / self.length)
 
-    def renew(self) -> None:
-        """The tangent at the present states, on all coarser levels."""
-        self.change = self.levels.truncation.change(
-            self.k, self.contacts, *self.contacts.tangent()
-        )
+    def renew(self, frozen: bool) -> None:
+        """The tangent at the present states on all coarser levels, for frozen bounds or not."""
+        self.frozen = frozen
+        contacts = self.contacts.frozen() if frozen else self.contacts
+        self.change = self.levels.truncation.change(self.k, contacts, *contacts.tangent())
         self.levels.truncation.install(self.k, self.change)
         self.states = self.contacts.state.copy()
         self.updates += 1
 
-    def correct(self, x: Array) -> None:
+    def correct(self, x: Array, contacts: ContactNodes | None = None) -> None:
         """x += V P (one V-cycle) on the rows of the tangent; exactly on the coarsest level."""
         self.levels.take(self)
-        V, W, _ = self.contacts.tangent()  # the slip of now, or the solution would not rest
-        self.contacts.combine(W, self.r)
+        contacts = contacts or self.contacts
+        V, W, _ = contacts.tangent()  # the slip of now, or the solution would not rest
+        contacts.combine(W, self.r)
         P = self.level.P
-        before = x[self.contacts.node]
+        before = x[contacts.node]
         if P is None:
             x += self.levels.truncation.solve(self.k, self.change, self.r)
         else:
@@ -211,4 +225,18 @@ class _Run:
             P.restrict(self.r, coarse.b)
             self.hierarchy.cycle(self.k + 1, coarse.b, coarse.x)
             P.add(coarse.x, x)
-        self.contacts.limit(V, before, x)
+        contacts.limit(V, before, x)
+
+    def correct_carefully(self, x: Array) -> None:
+        """The same for fixed bounds of friction, as far as the energy falls."""
+        contacts = self.contacts.frozen()
+        before, force = x.copy(), self.r.copy()
+        self.correct(x, contacts)
+        contacts.lift(x)
+        step = x - before
+        product = self.r
+        self.level.A.times(step, product)
+        length = contacts.step_length(
+            step, float(np.vdot(force, step)), float(np.vdot(step, product))
+        )
+        x[:] = before + length * step

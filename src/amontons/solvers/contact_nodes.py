@@ -40,6 +40,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 FREE, SLIDING, STUCK = 0, 1, 2  # of the tangential motion
 CLOSED = 3  # is added to it: a state is one number from 0 to 5
+HALVINGS = 10  # of the interval of a step length
 STIFF = 1e3  # L stays below this multiple of the node's own stiffness
 
 
@@ -135,6 +136,43 @@ class ContactNodes:
         """Keep of the motion since `before`, (nc, 3), what the trial space V allows."""
         moved = x[self.node] - before
         x[self.node] = before + np.einsum("kab,kb->ka", V, moved)
+
+    def frozen(self) -> ContactNodes:
+        """The same states under Tresca's law with the present bounds of Coulomb's."""
+        if self.tresca:
+            return self
+        out = replace(
+            self, coefficient=self.coefficient * np.maximum(self.r[:, 0], 0.0), tresca=True
+        )
+        out.r, out.u, out.state = self.r, self.u, self.state
+        return out
+
+    def lift(self, x: Array) -> None:
+        """Move nodes that penetrate to the surface, along the normal."""
+        n = self.H[:, :, 0]
+        gap = self.w[:, 0] + np.einsum("ca,ca->c", n, x[self.node])
+        x[self.node] -= (np.minimum(gap, 0.0) / np.einsum("ca,ca->c", n, n))[:, None] * n
+
+    def step_length(self, step: Array, force: float, stiffness: float) -> float:
+        """Length, up to 1, at which the energy along a step (nodes, 3) is least.
+
+        E'(a) = a stiffness - force + sum of bound |u_T + a d_T|'; under Tresca's law.
+        """
+        d = np.einsum("cai,ca->ci", self.H[:, :, 1:], step[self.node])
+
+        def slope(a: float) -> float:
+            u = self.u[:, 1:] + a * d
+            size = np.linalg.norm(u, axis=1)
+            work = np.einsum("ci,ci->c", u, d) / np.where(size > 0, size, 1.0)
+            return a * stiffness - force + float(self.coefficient @ work)
+
+        if slope(1.0) <= 0:
+            return 1.0
+        low, high = 0.0, 1.0
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if slope(middle) > 0 else (middle, high)
+        return low
 
     def combine(self, W: Array, residual: Array) -> None:
         """The rows of contacts become W^T of (law's force - force), in place."""
