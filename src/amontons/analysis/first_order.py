@@ -256,7 +256,7 @@ class _LocalPieces:
             conditions: dict[str, list[Array]] = {"f": [u_N], "s": stick}
             for letter, s in (("+", 1.0), ("-", -1.0)):
                 equations[letter] = [u_N, r_T - s * bound]
-                moving = "s" in letters and mu[i] > 0
+                moving = "s" in letters and bool(mu[i] > 0)
                 conditions[letter] = [-s * u_T] * moving + [r_N] * grazing
             self.equations.append({k: _scaled(v) for k, v in equations.items()})
             self.conditions.append({k: _scaled(v) for k, v in conditions.items() if v})

@@ -1,0 +1,160 @@
+"""Bifurcation diagrams: all branches found from all solutions, closed ones included."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .event_tracking import leaving
+from .first_order import Tangent
+from .following import Limits, Method, follow_path, track_both
+from .friction_path import FrictionPath
+from .path import Branch, EventKind, same
+
+Array = NDArray[np.float64]
+NEAR = 1e-7  # scaled distance of a solution to a branch that goes through it
+
+
+@dataclass(frozen=True, eq=False)
+class Diagram:
+    """Branches of one problem, each line of the diagram in one of them only.
+
+    complete: all solutions at every value in `at` were found, with proof, and lie on a branch;
+    branches that pass none of these values are not seen.  lost: solutions, as (parameter,
+    state), through which no branch could be followed; sets: points of connected sets of
+    solutions at one parameter, which are no curves over it.
+    """
+
+    branches: tuple[Branch, ...]
+    at: tuple[float, ...]
+    complete: bool
+    reason: str
+    lost: tuple[tuple[float, Array], ...] = ()
+    sets: tuple[tuple[float, Array], ...] = ()
+    seconds: float = 0.0
+
+    def __len__(self) -> int:
+        return len(self.branches)
+
+    def __iter__(self) -> Iterator[Branch]:
+        return iter(self.branches)
+
+    def solutions(self, parameter: float) -> list[Array]:
+        """The states of all branches at a value of the parameter."""
+        found: list[Array] = []
+        for branch in self.branches:
+            for y in branch.at(parameter):
+                if not any(same(y, other, NEAR) for other in found):
+                    found.append(y)
+        return found
+
+    @property
+    def folds(self) -> tuple[float, ...]:
+        """Values of the parameter at all folds, ascending."""
+        return tuple(sorted(e.parameter for b in self.branches for e in b.folds))
+
+    @property
+    def critical(self) -> float | None:
+        """The smallest value at which a fold makes solutions appear or vanish.
+
+        With friction as the parameter: the critical friction of that load, as far as the
+        branches tell.
+        """
+        return min(self.folds, default=None)
+
+    def record(self) -> dict[str, Any]:
+        """What the JSON file holds."""
+        return {
+            "branches": [branch.record() for branch in self.branches],
+            "at": list(self.at),
+            "complete": self.complete,
+            "reason": self.reason,
+            "critical": self.critical,
+        }
+
+    def __str__(self) -> str:
+        lines = [str(branch) for branch in self.branches]
+        count = f"{len(self)} branch" + ("es" if len(self) != 1 else "")
+        return "\n".join([f"{count}; {self.reason}", *lines])
+
+
+def bifurcation_diagram(
+    path: FrictionPath, limits: Limits, at: Sequence[float], *,
+    method: Method | None = None, time_limit: float | None = None,
+) -> Diagram:  # fmt: skip
+    """The branches through all solutions at the values `at`, and those that leave them.
+
+    Solutions come from `enumerate_solutions`.  time_limit: seconds for each search.
+    """
+    from .enumerate import enumerate_solutions
+
+    began = time.perf_counter()
+    branches: list[Branch] = []
+    lost: list[tuple[float, Array]] = []
+    sets: list[tuple[float, Array]] = []
+    doubts: list[str] = []
+    for p in at:
+        found = enumerate_solutions(path.at(p).condensed(), time_limit=time_limit)
+        if not found.complete:
+            doubts.append(f"at {p:g}: {found.reason}")
+        for solution in found.solutions:
+            y = path.state(solution.r)
+            if solution.freedom:
+                sets.append((p, y))
+            elif not _on_branches(branches, y, p):
+                _add(branches, path, y, p, limits, method)
+                if not _on_branches(branches, y, p):
+                    lost.append((p, y))
+    if lost:
+        doubts.append(f"{len(lost)} solutions lie on no branch")
+    if sets:
+        doubts.append(f"{len(sets)} sets of solutions are no curves")
+    values = ", ".join(f"{p:g}" for p in at)
+    reason = "; ".join(doubts) or f"all solutions at {values} are on these branches"
+    return Diagram(tuple(branches), tuple(at), not doubts, reason, tuple(lost), tuple(sets),
+                   time.perf_counter() - began)  # fmt: skip
+
+
+def _on_branches(branches: list[Branch], y: Array, p: float) -> bool:
+    return any(
+        same(y, other, NEAR)
+        for branch in branches
+        for other in (*branch.at(p), *_ends(branch, p))
+    )
+
+
+def _ends(branch: Branch, p: float) -> list[Array]:
+    return [x.state for x in branch.points if abs(x.parameter - p) <= 1e-12 * max(1.0, abs(p))]
+
+
+def _add(
+    branches: list[Branch], path: FrictionPath, y: Array, p: float, limits: Limits,
+    method: Method | None,
+) -> None:  # fmt: skip
+    """The branch through a solution, and those that leave its branch points."""
+    new = follow_path(path, y, p, limits, method=method, known=_patterns(branches))
+    branches.append(new)
+    if method is Method.GENERAL or not path.straight:
+        return
+    at_branch_points = [e for e in new.events if e.kind is EventKind.BRANCH]
+    for event in at_branch_points:
+        for tangent in leaving(path, event.state, event.parameter).tangents:
+            if not _followed(branches, tangent):
+                side = track_both(path, event.state, event.parameter, limits,
+                                  known=_patterns(branches), tangent=tangent)  # fmt: skip
+                branches.append(replace(side, seconds=side.seconds))
+                at_branch_points += [e for e in side.events if e.kind is EventKind.BRANCH]
+
+
+def _patterns(branches: list[Branch]) -> set[str]:
+    """Patterns of all lines that have been covered."""
+    return {str(point.piece) for branch in branches for point in branch.points}
+
+
+def _followed(branches: list[Branch], tangent: Tangent) -> bool:
+    return not {str(tangent.piece), *map(str, tangent.touching)}.isdisjoint(_patterns(branches))

@@ -1,0 +1,232 @@
+"""Following a solution curve both ways: by event tracking where it is straight."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InvalidInput, SingularOperator
+from ..problem import FrictionProblem
+from .event_tracking import check_straight, leaving, track
+from .first_order import Tangent
+from .friction_path import FrictionPath
+from .path import Branch, Event, EventKind, PathProblem, Point, Stop, joined, weight_of
+
+Array = NDArray[np.float64]
+Steps = Iterator[tuple[Point, Event | None]]
+Callback = Callable[[Point, Event | None], bool | None]
+SOLVED = 1e-9  # scaled residual of a state that counts as a solution
+
+
+class Method(Enum):
+    """How a curve is followed."""
+
+    EVENTS = "events"
+    GENERAL = "general"
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Where to end: the interval of the parameter, points per direction, seconds, a callback.
+
+    callback(point, event) is called at every point; True stops.
+    """
+
+    interval: tuple[float, float]
+    max_points: int = 100_000
+    time_limit: float | None = None
+    callback: Callback | None = None
+
+    def __post_init__(self) -> None:
+        low, high = self.interval
+        if not (np.isfinite([low, high]).all() and low < high):
+            raise InvalidInput(f"interval: expected two numbers a < b, got {self.interval}")
+        if self.max_points < 2:
+            raise InvalidInput(f"max_points: expected at least 2, got {self.max_points}")
+        if self.time_limit is not None and not self.time_limit > 0:
+            raise InvalidInput(f"time_limit: expected seconds > 0, got {self.time_limit!r}")
+
+
+@dataclass(frozen=True, eq=False)
+class Half:
+    """One direction of a branch."""
+
+    points: list[Point]
+    events: list[Event]
+    stop: Stop
+
+
+def track_both(
+    path: FrictionPath, y: Array, p: float, limits: Limits, *,
+    known: Collection[str] = (), tangent: Tangent | None = None,
+) -> Branch:  # fmt: skip
+    """The exact branch through a solution, both ways; only along `tangent` where it is given.
+
+    known: patterns of lines that other branches have covered: the branch ends where it meets
+    one (every line is part of one branch only).
+    """
+    began = time.perf_counter()
+    check_straight(path)
+    system = leaving(path, y, p)
+    if tangent is None:
+        forth, back, extra = _both_ways(system.tangents, weight_of(path, len(y)))
+    else:
+        forth, back, extra = tangent, None, ()
+    if forth is None and back is None:
+        raise SingularOperator(
+            "start: no solution curve leaves it; the solutions are not isolated there, "
+            f"or do not depend on the parameter ({system.reason or 'first-order system'})"
+        )
+    halves, seen = [], set(known)
+    for one in (forth, back):
+        if one is None:
+            halves.append(Half([], [], Stop.NOT_STARTED if tangent else Stop.DEAD_END))
+            continue
+        if halves and halves[0].stop is Stop.CLOSED:
+            halves.append(Half([], [], Stop.CLOSED))
+            continue
+        half = _collected(track(path, y, p, one, limits.interval), limits, seen, str(one.piece))
+        halves.append(half)
+        seen |= {str(point.piece) for point in half.points}
+    branch = _branch(path, halves[0], halves[1], began)
+    if len(extra):
+        rows = np.array([np.append(t.direction, t.rate) for t in system.tangents])
+        event = Event(EventKind.BRANCH, p, y, directions=rows)
+        events = sorted([*branch.events, event], key=lambda e: e.arclength)
+        branch = replace(branch, events=tuple(events))
+    return branch
+
+
+def _both_ways(
+    tangents: tuple[Tangent, ...], weight: float
+) -> tuple[Tangent | None, Tangent | None, tuple[Tangent, ...]]:
+    """(forth, back, others): forth is where the parameter grows fastest, back most opposite."""
+    if not tangents:
+        return None, None, ()
+    forth = max(tangents, key=lambda t: t.rate)
+
+    def along(t: Tangent) -> float:
+        return weight * float(t.direction @ forth.direction) + t.rate * forth.rate
+
+    rest = sorted((t for t in tangents if t is not forth), key=along)
+    return forth, (rest[0] if rest else None), tuple(rest[1:])
+
+
+def _collected(steps: Steps, limits: Limits, seen: set[str], first: str) -> Half:
+    """The points of one direction until it ends, meets what is known, or a limit stops it."""
+    began = time.perf_counter()
+    points: list[Point] = []
+    events: list[Event] = []
+    own = {first}
+    for point, event in steps:
+        points.append(point)
+        if event is not None:
+            events.append(event)
+            if event.stop is not None:
+                if len(points) > 1 and point.arclength == points[-2].arclength:
+                    points.pop()  # it began at the end
+                return Half(points, events, event.stop)
+            piece = str(point.piece)
+            if piece in own or piece in seen:
+                stop = Stop.CLOSED if piece in own else Stop.JOINED
+                return Half(points, [*events, _ended(point, stop)], stop)
+            own.add(piece)
+        stop = _limited(point, event, limits, len(points), began)
+        if stop is not None:
+            return Half(points, [*events, _ended(point, stop)], stop)
+    raise AssertionError("a walk ends with an event")  # track and Continuation promise it
+
+
+def _limited(
+    point: Point, event: Event | None, limits: Limits, count: int, began: float
+) -> Stop | None:
+    """The limit that is reached, if any."""
+    if limits.callback is not None and limits.callback(point, event):
+        return Stop.STOPPED
+    if count >= limits.max_points:
+        return Stop.MAX_POINTS
+    if limits.time_limit is not None and time.perf_counter() - began > limits.time_limit:
+        return Stop.TIME_LIMIT
+    return None
+
+
+def _ended(point: Point, stop: Stop) -> Event:
+    return Event(EventKind.END, point.parameter, point.state, point.arclength,
+                 before=point.piece, stop=stop)  # fmt: skip
+
+
+def _branch(problem: PathProblem, forth: Half, back: Half, began: float) -> Branch:
+    """Both halves as one branch; a fold at the very start belongs to neither and is added."""
+    if not forth.points:
+        forth, back = back, forth
+    events = list(forth.events)
+    if back.points and forth.points and forth.points[0].rate * back.points[0].rate > 0:
+        start = forth.points[0]
+        events.insert(0, Event(EventKind.FOLD, start.parameter, start.state,
+                               before=back.points[0].piece, after=start.piece))  # fmt: skip
+    return joined(
+        problem, (back.points, back.events, back.stop), (forth.points, events, forth.stop),
+        linear=isinstance(problem, FrictionPath) and problem.straight,
+        seconds=time.perf_counter() - began, closed=forth.stop is Stop.CLOSED,
+        name=getattr(problem, "name", "parameter"),
+    )  # fmt: skip
+
+
+# ---------------------------------------------------------------------- where to begin
+def exact_state(path: FrictionPath, p: float) -> Array:
+    """One exact solution at a parameter, by event tracking from a state without contact.
+
+    All contacts are lifted off and let down again.  Raises SingularOperator where that path
+    ends before it comes down (W is not positive definite).
+    """
+    problem = path.at(p).condensed()
+    q = np.asarray(problem.q)
+    size = float(np.abs(path.free(p)).max(initial=0)) or 1.0
+    lift = np.zeros_like(q)
+    lift[:, 0] = (2 * size * path.to_u.reshape(q.shape))[:, 0]
+    lifted = FrictionProblem.from_delassus(problem.W, q + lift, problem.mu)
+    down = FrictionPath(lifted, FrictionProblem.from_delassus(problem.W, q, problem.mu))
+    tangent = next(t for t in leaving(down, np.zeros(q.size), 0.0).tangents if t.rate > 0)
+    *_, (point, event) = track(down, np.zeros(q.size), 0.0, tangent, (-1.0, 1.0))
+    assert event is not None
+    if event.stop is not Stop.INTERVAL or point.parameter < 1:
+        raise SingularOperator(
+            f"start: no solution was found at {p:g}: {event.stop.advice if event.stop else ''}"
+        )
+    return path.state((point.state * down.to_r).reshape(q.shape))
+
+
+def polished(path: FrictionPath, y: Array, p: float) -> Array:
+    """The exact solution on the piece of an approximate one.
+
+    Raises InvalidInput where the state is no solution to within some per mille.
+    """
+    from .path import corrected
+
+    found = corrected(path, y, p)
+    if found is None or np.abs(found - y).max(initial=0) > 1e-3 * max(1.0, np.abs(y).max()):
+        rest = float(np.abs(path.residual(y, p)).max(initial=0))
+        raise InvalidInput(
+            f"start: expected a solution at {p:g}, got a state with residual {rest:.1e}"
+        )
+    return found
+
+
+def follow_path(
+    problem: PathProblem, y: Array, p: float, limits: Limits, *,
+    method: Method | None = None, known: Collection[str] = (),
+) -> Branch:  # fmt: skip
+    """The branch through a solution, by event tracking where it is straight."""
+    exact = isinstance(problem, FrictionPath) and problem.straight and not problem.tresca
+    if method is None:
+        method = Method.EVENTS if exact else Method.GENERAL
+    if method is Method.EVENTS:
+        if not isinstance(problem, FrictionPath):
+            raise InvalidInput("method: event tracking follows friction problems only")
+        return track_both(problem, polished(problem, y, p), p, limits, known=known)
+    raise InvalidInput("method: expected EVENTS")
