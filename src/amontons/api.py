@@ -125,7 +125,17 @@ def _solve(
         found = run(discrete, solver, callback=seen, **options)
     if model is None:
         return found
+    if found.convergence.outcome not in (Outcome.CONVERGED, Outcome.STOPPED):
+        found = _with_reason(found, model.imbalance())
     return ModelSolution(model, found, model.recover(found), assembled)
+
+
+def _with_reason(found: FrictionSolution, reason: str) -> FrictionSolution:
+    """The same record, whose detail says why there may be no solution."""
+    if not reason:
+        return found
+    detail = "; ".join(text for text in (found.convergence.detail, reason) if text)
+    return replace(found, convergence=replace(found.convergence, detail=detail))
 
 
 def drive_any_form(

@@ -319,7 +319,7 @@ def test_an_overlap_deeper_than_a_facet_is_found():
     np.testing.assert_allclose(rows.gap, -0.3)
     solid, over = am.box((1, 1, 1), 4), am.box((1, 1, 1), 3, origin=(0, 0, 0.4))
     np.testing.assert_allclose(mortar_contact(over, "bottom", solid, "top")[0].gap, -0.6)
-    with pytest.raises(am.InvalidInput, match="no slave facet has a master facet"):
+    with pytest.raises(am.InvalidInput, match="no part of the slave has a master"):
         mortar_contact(low, "bottom", low, "top")
 
 
@@ -333,10 +333,10 @@ def test_bad_surfaces_are_named():
     low, high = blocks_apart(3, (0, 0))
     with pytest.raises(am.InvalidInput, match="a surface can not be its own master"):
         mortar_contact(low, "top", low, "top")
-    with pytest.raises(am.InvalidInput, match="no slave facet has a master facet in front"):
+    with pytest.raises(am.InvalidInput, match="no part of the slave has a master"):
         mortar_contact(high, "top", low, "top")
     away = am.Mesh(high.points + [3, 0, 0], high.cells, high.surfaces)
-    with pytest.raises(am.InvalidInput, match="no slave facet has a master facet in front"):
+    with pytest.raises(am.InvalidInput, match="no part of the slave has a master"):
         mortar_contact(away, "bottom", low, "top")
     second = am.Body(high, SOFT, order=2).mesh
     with pytest.raises(am.InvalidInput, match="facets of first order"):

@@ -145,11 +145,11 @@ def test_frames_gap_and_left_out_nodes():
     assert on_master.shape == (lower.points.size, 6)
     near = pair_contact(upper, "bottom", lower, "top", search=0.3)[2]
     assert near.tolist() == found.tolist()
-    with pytest.raises(am.InvalidInput, match="no slave node has a master facet"):
+    with pytest.raises(am.InvalidInput, match="no part of the slave has a master"):
         pair_contact(upper, "bottom", lower, "top", search=0.2)
-    with pytest.raises(am.InvalidInput, match="no slave node"):
+    with pytest.raises(am.InvalidInput, match="no part of the slave"):
         pair_contact(upper, "top", lower, "top")  # they do not face each other
-    with pytest.raises(am.InvalidInput, match="no slave node"):
+    with pytest.raises(am.InvalidInput, match="no part of the slave"):
         pair_contact(lower, "bottom", lower, "top")  # through the body
 
 

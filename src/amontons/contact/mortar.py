@@ -39,7 +39,7 @@ from .curvature import heights
 from .dual import dual_functions, nodes_with_multiplier
 from .geometry import Obstacle, frames
 from .nodal import ContactRows, check_exterior, contact_nodes
-from .overlap import winding_number
+from .overlap import check_different, inside, not_facing
 from .pairs import KINDS, MAX_NODES
 from .segments import Segments, Surface, is_deep, nearest, segments
 
@@ -97,15 +97,12 @@ def mortar_contact(
     """
     check_exterior(slave, surface)
     check_exterior(master, master_surface)
-    _check_different(slave, surface, master, master_surface)
+    check_different(slave, surface, master, master_surface)
     over = Surface.of(slave.points, slave.surface(surface), surface)
     under = Surface.of(master.points, master.surface(master_surface), master_surface)
     parts = _in_front(over, under, master, joined=slave is master)
     if not len(parts.slave):
-        raise InvalidInput(
-            f"contact of {surface!r} with {master_surface!r}: no slave facet has a master "
-            "facet in front of it"
-        )
+        raise InvalidInput(not_facing(slave, surface, master, master_surface))
     normals = -nodal_normals(slave.points, over.blocks)
     facets, of = np.unique(parts.slave, return_inverse=True)
     mass = np.zeros((len(facets), MAX_NODES, MAX_NODES))
@@ -119,6 +116,8 @@ def mortar_contact(
     apart = average.onto_slave @ slave.points - across @ master.points
     apart += average.of_moments(of, parts.bulge)
     gap = np.einsum("pc,pc->p", axes[:, 0], apart)
+    size = max(np.abs(mesh.points).max(initial=0.0) for mesh in (slave, master))
+    gap[np.abs(gap) < ROUNDING * size] = 0.0
     rows = average.rows(axes, gap, fixed)
     found = np.isin(contact_nodes(slave, surface)[0], average.nodes)
     return rows, -coupled_columns(across, axes, fixed), found
@@ -198,29 +197,13 @@ def coupled_columns(weights: sparse.csr_array, axes: Array, fixed: Mask) -> spar
 
 
 # -------------------------------------------------------------------- the two sides
-def _check_different(slave: Mesh, surface: str, master: Mesh, master_surface: str) -> None:
-    if slave is not master:
-        return
-    seen = {tuple(sorted(f)) for b in slave.surface(surface) for f in b.nodes.tolist()}
-    other = {tuple(sorted(f)) for b in slave.surface(master_surface) for f in b.nodes.tolist()}
-    if both := len(seen & other):
-        raise InvalidInput(
-            f"contact of {surface!r} with {master_surface!r}: {both} facets are on both sides, "
-            "a surface can not be its own master; name the two sides as separate surfaces"
-        )
-
-
 def _in_front(over: Surface, under: Surface, master: Mesh, *, joined: bool) -> Segments:
     """Segments that count: the nearest, and deep ones only where the bodies really overlap."""
     every = segments(over, under, joined=joined)
     deep = is_deep(over, under, every)
     facets = np.unique(every.slave[deep])
     beside = over.centre[facets] + BESIDE * over.radius[facets, None] * over.normal[facets]
-    low, high = master.bounding_box()
-    inside = ((beside > low) & (beside < high)).all(axis=1)
-    for k in np.flatnonzero(inside):
-        inside[k] = winding_number(master, beside[k]) > 0.5
-    counts = ~deep | np.isin(every.slave, facets[inside])
+    counts = ~deep | np.isin(every.slave, facets[inside(master, beside)])
     return nearest(over, every.at(counts))
 
 

@@ -1,4 +1,6 @@
-"""Points inside a mesh: the winding number of its boundary around them.
+"""How two surfaces lie: points inside a mesh, shared facets, surfaces that do not meet.
+
+Inside is where the winding number of the boundary is not zero.
 
 The solid angle of a triangle is that of [OS]; in 2D the angle of an edge.
 
@@ -11,9 +13,52 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import InvalidInput
 from ..fem.mesh import Mesh
 
 Array = NDArray[np.float64]
+
+
+def inside(mesh: Mesh, points: Array) -> NDArray[np.bool_]:
+    """Which points (k, dim) lie inside a mesh of first order, (k,); k times its facets."""
+    low, high = mesh.bounding_box()
+    out = ((points > low) & (points < high)).all(axis=1)
+    for k in np.flatnonzero(out):
+        out[k] = winding_number(mesh, points[k]) > 0.5
+    return out
+
+
+def check_different(slave: Mesh, surface: str, master: Mesh, master_surface: str) -> None:
+    """Raise InvalidInput when two surfaces share facets."""
+    if slave is not master:
+        return
+    one, other = (
+        {tuple(sorted(f)) for block in slave.surface(name) for f in block.nodes.tolist()}
+        for name in (surface, master_surface)
+    )
+    if both := len(one & other):
+        raise InvalidInput(
+            f"contact of {surface!r} with {master_surface!r}: {both} facets are on both sides, "
+            "a surface can not be its own master; name the two sides as separate surfaces"
+        )
+
+
+def not_facing(slave: Mesh, surface: str, master: Mesh, master_surface: str) -> str:
+    """What to tell the user when nothing of one surface lies in front of the other."""
+    where = [
+        f"{name!r} reaches from {_shown(x.min(axis=0))} to {_shown(x.max(axis=0))}"
+        for mesh, name in ((slave, surface), (master, master_surface))
+        for x in (mesh.points[mesh.surface_nodes(name)],)
+    ]
+    return (
+        f"contact of {surface!r} with {master_surface!r}: no part of the slave has a master "
+        f"facet in front of it, along its outward normal; {', '.join(where)}: check the "
+        "positions, the units and which sides are named, or leave this contact out"
+    )
+
+
+def _shown(point: Array) -> str:
+    return "(" + ", ".join(f"{c:.4g}" for c in point) + ")"
 
 
 def winding_number(mesh: Mesh, point: Array) -> float:

@@ -27,6 +27,7 @@ from ..fem.mesh import Mesh
 from ..fem.surfaces import nodal_normals
 from .geometry import frames
 from .nodal import ContactRows, check_exterior, contact_columns, contact_nodes
+from .overlap import check_different, inside, not_facing
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -45,7 +46,8 @@ class Projection:
     """Closest facet of every point: found (k,); the rest (k, …) holds where found.
 
     nodes (k, 4) and shape (k, 4): nodes of the facet and their shape functions, padded with
-    weight zero; closest (k, dim); normal (k, dim), unit, outwards; size (k,) of the facet.
+    weight zero; closest (k, dim); normal (k, dim), unit, outwards; size (k,) of the facet;
+    deep (k,): some facet lies too far in front of the point, see `project`.
     """
 
     found: Mask
@@ -54,6 +56,7 @@ class Projection:
     closest: Array
     normal: Array
     size: Array
+    deep: Mask
 
 
 def pair_contact(
@@ -68,10 +71,13 @@ def pair_contact(
 
     rows.H is in the dofs of the slave mesh, the second matrix (n_master, nc d) in those of the
     master; H is their sum on the whole.  found, (slave nodes,): nodes with a facet in front of
-    them, not farther away than `search`; only these have rows.  Cost linear in the nodes.
+    them, not farther away than `search`; only these have rows.  Nodes inside the master body
+    have one however deep they are.  Raises InvalidInput when the surfaces do not face each
+    other, and when they share facets.  Cost linear in the nodes.
     """
     check_exterior(slave, surface)
     check_exterior(master, master_surface)
+    check_different(slave, surface, master, master_surface)
     nodes, weights = contact_nodes(slave, surface)
     facets = master.surface(master_surface)
     if other := {block.kind for block in facets} - set(KINDS):
@@ -82,12 +88,15 @@ def pair_contact(
     normals = nodal_normals(slave.points, slave.surface(surface))[nodes]
     own = nodes if slave is master else None
     hit = project(points, master.points, facets, facing=normals, search=search, own=own)
+    if hit.deep.any():
+        overlap = np.zeros(len(nodes), dtype=bool)
+        overlap[hit.deep] = inside(master, _ahead(slave, surface, normals, nodes)[hit.deep])
+        hit = project(
+            points, master.points, facets, facing=normals, search=search, own=own, free=overlap
+        )
     found = hit.found
     if not found.any():
-        raise InvalidInput(
-            f"contact of {surface!r} with {master_surface!r}: no slave node has a master "
-            "facet in front of it"
-        )
+        raise InvalidInput(not_facing(slave, surface, master, master_surface))
     points, normal = points[found], hit.normal[found]
     gap = np.einsum("ic,ic->i", points - hit.closest[found], normal)
     axes = frames(normal)
@@ -96,6 +105,19 @@ def pair_contact(
         contact_columns(nodes[found], axes, slave.points.size),
     )  # fmt: skip
     return rows, _master_columns(hit, axes, master.points.size), found
+
+
+def _ahead(mesh: Mesh, surface: str, normals: Array, nodes: Index) -> Array:
+    """Points a little in front of nodes, and off the rim: neither in the slave nor on sides."""
+    towards, size, count = np.zeros(mesh.points.shape), *np.zeros((2, len(mesh.points)))
+    for block in mesh.surface(surface):
+        x = mesh.points[block.nodes]
+        inwards = x.mean(axis=1, keepdims=True) - x
+        np.add.at(towards, block.nodes, inwards)
+        np.add.at(size, block.nodes, np.linalg.norm(inwards, axis=2))
+        np.add.at(count, block.nodes, 1.0)
+    move = towards[nodes] + size[nodes, None] * normals
+    return mesh.points[nodes] + BESIDE * move / count[nodes, None]
 
 
 def _master_columns(hit: Projection, axes: Array, size: int) -> sparse.csc_array:
@@ -117,12 +139,14 @@ def project(
     facing: Array | None = None,
     search: float = np.inf,
     own: Index | None = None,
+    free: Mask | None = None,
 ) -> Projection:
     """Closest points of a surface whose nodes have the given coordinates, (n, dim).
 
     facing, (k, dim): outward normals at the points; only facets that look at them count, and
     points behind a facet by more than its size see none.
     own, (k,): nodes that are the points themselves; their facets do not count.
+    free, (k,): points that may be behind facets by any distance.
     """
     k, dim = points.shape
     best = np.full(k, np.inf)
@@ -130,6 +154,7 @@ def project(
     shape = np.zeros((k, MAX_NODES))
     closest, normal = np.zeros((k, dim)), np.zeros((k, dim))
     length, beside = np.ones(k), np.full(k, np.inf)
+    deep, free = np.zeros(k, dtype=bool), np.zeros(k, dtype=bool) if free is None else free
     reach = _reach(points, coordinates, surface, facing, own)
     for facets, size in _by_size(coordinates, surface):
         point, facet = _candidates(points, coordinates, facets, reach + size)
@@ -144,9 +169,11 @@ def project(
         foot = np.einsum("ka,kac->kc", value, x)
         across = points[point] - foot
         distance = np.linalg.norm(across, axis=1)
-        distance[np.einsum("kc,kc->k", across, n) < -DEEP * size] = np.inf
         if facing is not None:
             distance[np.einsum("kc,kc->k", n, facing[point]) >= 0] = np.inf
+        behind = np.einsum("kc,kc->k", across, n) < -DEEP * size
+        deep[point[behind & np.isfinite(distance)]] = True
+        distance[behind & ~free[point]] = np.inf
         chosen = _first_of_smallest(point, distance)
         chosen = chosen[distance[chosen] < best[point[chosen]]]
         to, count = point[chosen], value.shape[1]
@@ -161,7 +188,7 @@ def project(
         & (best <= search)
         & ~((beside > BESIDE * length) & _on_rim(surface, nodes, shape))
     )
-    return Projection(found, nodes, shape, closest, normal, length)
+    return Projection(found, nodes, shape, closest, normal, length, deep)
 
 
 def _on_rim(surface: tuple[Facets, ...], nodes: Index, shape: Array) -> Mask:

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InvalidInput
 from .cells import CELLS, FIRST, ReferenceCell
+
+if TYPE_CHECKING:
+    from .facets import Cells
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -56,6 +62,28 @@ def checked_cells(points: Array, kind: str, nodes: ArrayLike, region: str) -> In
         )
     table.flags.writeable = False
     return table
+
+
+def check_repeated(points: Array, blocks: Sequence[Cells]) -> None:
+    """Raise InvalidInput when cells have the same nodes: their stiffness would count twice."""
+    marks = np.random.default_rng(0).integers(2**63, size=len(points), dtype=np.uint64)
+    label = np.concatenate([marks[b.nodes].sum(axis=1) for b in blocks])  # modulo 2^64
+    order = np.argsort(label, kind="stable")
+    same = np.flatnonzero(np.diff(label[order]) == 0)
+    starts = np.cumsum([0, *(len(b.nodes) for b in blocks)])
+
+    def nodes_of(cell: int) -> Index:
+        k = int(np.searchsorted(starts, cell, side="right")) - 1
+        return np.sort(blocks[k].nodes[cell - starts[k]])
+
+    same = [k for k in same if np.array_equal(nodes_of(order[k]), nodes_of(order[k + 1]))]
+    if same:
+        nodes = nodes_of(order[same[0]])
+        centre = ", ".join(f"{c:.4g}" for c in points[nodes].mean(axis=0))
+        raise InvalidInput(
+            f"mesh: two cells near ({centre}) have the same nodes {nodes.tolist()}; "
+            f"{len(same)} such pairs, expected every cell once"
+        )
 
 
 def _check_straight(cell: ReferenceCell, coordinates: Array, region: str) -> None:

@@ -13,7 +13,7 @@ from scipy import sparse
 from ..errors import InvalidInput
 from ..linear.levels import checked_levels
 from .cells import CELLS
-from .check import checked_cells
+from .check import check_repeated, checked_cells
 from .facets import Cells, Facets, boundary, oriented
 
 Array = NDArray[np.float64]
@@ -25,7 +25,8 @@ class Mesh:
     """A mesh in 2D or 3D, of first order or, see `second_order`, of second order.
 
     points (n, dim), unit of length; cells: blocks by kind and region; surfaces: name -> facets.
-    Every point belongs to a cell; inverted cells are turned, degenerate ones rejected.
+    Every point belongs to a cell; inverted cells are turned, degenerate and repeated ones
+    rejected.
     grid: cells per direction if the mesh is a structured box (multigrid makes use of it).
     levels: prolongations of nodal values, finest first: levels[0] has shape (n, nodes of the
     next coarser mesh), levels[1] leads from the one after that to it, and so on; every coarse
@@ -55,6 +56,7 @@ class Mesh:
         )
         object.__setattr__(self, "cells", blocks)
         self._check_use()
+        check_repeated(points, blocks)
         surfaces = {k: oriented(blocks, v, k, points) for k, v in self.surfaces.items()}
         object.__setattr__(self, "surfaces", surfaces)
         object.__setattr__(self, "levels", checked_levels(self.levels, len(points)))

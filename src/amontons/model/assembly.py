@@ -118,6 +118,7 @@ def discretise(
         K = _stiffness(bodies)
     prescribed = np.where(is_fixed, values, 0.0)
     placed = tuple(_place(bodies, contact, values, offsets) for contact in contacts)
+    _check_once(bodies, contacts, placed)
     whole_H = sparse.hstack([p.H for p in placed], format="csc")
     if not whole_H.shape[1]:
         raise InvalidInput(
@@ -326,6 +327,37 @@ def _check_held(mesh: Mesh, contact: Contact, rows: ContactRows, given: Array) -
     held = np.linalg.norm(normal * np.isnan(given), axis=1) < 1e-9
     moved = np.einsum("pc,pc->p", normal, np.nan_to_num(given))
     _check_supported(mesh, contact, rows.at(held), moved[held])
+
+
+def _check_once(
+    bodies: tuple[Body, ...], contacts: tuple[Contact, ...], placed: tuple[Placed, ...]
+) -> None:
+    """A pair given twice, also with exchanged sides, would share its load at random."""
+    seen: dict[tuple, list[Placed]] = {}
+    for contact, place in zip(contacts, placed, strict=True):
+        slave = locate(bodies, contact.slave)
+        if contact.master is None:
+            pair, again = (slave, repr(contact.obstacle)), "with the same obstacle"
+        else:
+            master = locate(bodies, contact.master)
+            pair, again = (slave, master), f"with {contact.master!r}"
+            if (master, slave) in seen and contact.where is None:
+                raise InvalidInput(
+                    f"contact on {contact.slave!r}: the contact {again} is there already, with "
+                    "slave and master exchanged; expected every pair once"
+                )
+        for other in seen.setdefault(pair, []):
+            if both := len(_rows_of(other.rows.points) & _rows_of(place.rows.points)):
+                raise InvalidInput(
+                    f"contact on {contact.slave!r}: {both} of its points have a contact "
+                    f"{again} already; expected every pair once"
+                )
+        seen[pair].append(place)
+
+
+def _rows_of(points: Array) -> set[tuple[float, ...]]:
+    """Points as a set."""
+    return set(map(tuple, points.tolist()))
 
 
 def _wanted(contact: Contact, points: Array) -> NDArray[np.bool_]:

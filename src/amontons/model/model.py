@@ -18,9 +18,10 @@ from ..linear.grid_matrix import GridMatrix
 from ..problem import FrictionProblem
 from ..solution import FrictionSolution
 from .assembly import Discretisation, discretise, locate
+from .balance import imbalance
 from .fields import ContactFields, recover_fields
 from .parts import Body, BodyForce, Contact, Fix, Traction
-from .rigid import check_held, loose_modes
+from .rigid import Piece, check_held, loose_modes
 from .values import ScalarValue, scalar_at
 
 Array = NDArray[np.float64]
@@ -142,13 +143,22 @@ class Model:
             both * np.concatenate([p.rows.weights for p in self.discretisation.placed])
         )
 
-    def _loose_but_held(self, parts: Discretisation, law: Law) -> bool:
-        """True when contact alone holds a body; raises SingularOperator when nothing does."""
+    def imbalance(self) -> str:
+        """Which bodies contact alone holds, and whether it can, in words; "" if supports do."""
+        parts = self.discretisation
+        return imbalance(parts, self._loose(parts), self.law, self.load_factor * parts.load)
+
+    def _loose(self, parts: Discretisation) -> list[tuple[Piece, Array]]:
+        """Pieces with the rigid modes that supports leave free."""
         fixed = np.zeros(parts.dofs, dtype=bool)
         fixed[parts.fixed] = True
+        return loose_modes(parts.parts, fixed)
+
+    def _loose_but_held(self, parts: Discretisation, law: Law) -> bool:
+        """True when contact alone holds a body; raises SingularOperator when nothing does."""
         acting = np.ones(parts.carried.shape, dtype=bool)
         acting[:, 1:] = (law.coefficient > 0)[:, None]
-        loose = loose_modes(parts.parts, fixed)
+        loose = self._loose(parts)
         check_held(loose, parts.whole_H, parts.dofs, acting.ravel())
         return bool(loose)
 

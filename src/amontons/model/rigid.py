@@ -89,10 +89,7 @@ def check_held(
     """
     if not loose:
         return
-    spread = np.concatenate([np.full(basis.shape[1], k) for k, (_, basis) in enumerate(loose)])
-    motion = np.zeros((dofs, len(spread)))
-    for k, (piece, basis) in enumerate(loose):
-        motion[np.ix_(piece.dofs, spread == k)] = piece.modes @ basis
+    motion, spread = rigid_motions(loose, dofs)
     left = _null_space((H.T @ motion)[acting])
     if not left.shape[1]:
         return
@@ -104,6 +101,15 @@ def check_held(
     raise SingularOperator(
         "; ".join(texts) + "; hold it with a support (Fix), friction or another contact"
     )
+
+
+def rigid_motions(loose: list[tuple[Piece, Array]], dofs: int) -> tuple[Array, Index]:
+    """Loose modes of all pieces as columns (dofs, k), and the piece of each, (k,)."""
+    of = np.concatenate([np.full(basis.shape[1], k) for k, (_, basis) in enumerate(loose)])
+    motion = np.zeros((dofs, len(of)))
+    for k, (piece, basis) in enumerate(loose):
+        motion[np.ix_(piece.dofs, of == k)] = piece.modes @ basis
+    return motion, of
 
 
 def describe(modes: Array) -> str:
