@@ -78,6 +78,13 @@ def test_linear_solves(symmetric, unstored):
     assert factor.iterations <= 30
 
 
+@pytest.mark.parametrize("solver", [am.Direct(), am.ConjugateGradient()])
+def test_other_linear_solvers_store_it(solver, unstored):
+    problem = model((4, 4, 4)).assemble()
+    x = solver.factor(problem.M, problem.near_nullspace).solve(problem.f)
+    assert np.linalg.norm(problem.M @ x - problem.f) <= 1e-8 * np.linalg.norm(problem.f)
+
+
 @pytest.mark.parametrize("symmetric", [False, True], ids=["clamped", "symmetric"])
 def test_the_same_contact_solution(symmetric, monkeypatch):
     expected = drive(model((8, 8, 4), symmetric).assemble(), tolerance=1e-10)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,13 @@ def by_columns(solve: Callable[[Array], Array], b: Array) -> Array:
     for k in range(columns.shape[1]):
         out[:, k] = solve(columns[:, k])
     return out.reshape(b.shape)
+
+
+def stored(matrix: Any) -> sparse.csc_array:
+    """A matrix by columns; an operator such as `GridMatrix` is assembled."""
+    if not sparse.issparse(matrix) and hasattr(matrix, "tocsc"):
+        matrix = matrix.tocsc()
+    return sparse.csc_array(matrix)
 
 
 class Factor(Protocol):

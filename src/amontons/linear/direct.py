@@ -22,6 +22,7 @@ from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
 from ..errors import InvalidInput, MissingDependency, SingularOperator
+from .base import stored
 
 Array = NDArray[np.float64]
 Solve = Callable[[Array], Array]
@@ -63,7 +64,7 @@ class Direct:
         self, matrix: sparse.csc_array, near_nullspace: Array | None = None
     ) -> DirectFactor:
         """A trusted factor of `matrix`, (n, n); raises SingularOperator when there is none."""
-        matrix = sparse.csc_array(matrix)
+        matrix = stored(matrix)
         if matrix.shape[0] != matrix.shape[1]:
             raise InvalidInput(f"matrix: expected a square one, got shape {matrix.shape}")
         if not matrix.has_sorted_indices:

@@ -10,7 +10,7 @@ from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
 from ..errors import SingularOperator
-from .base import Factor, LinearSolver, by_columns, check_stopping
+from .base import Factor, LinearSolver, by_columns, check_stopping, stored
 from .multigrid import AlgebraicMultigrid
 
 Array = NDArray[np.float64]
@@ -31,6 +31,7 @@ class ConjugateGradient:
         self, matrix: sparse.csc_array, near_nullspace: Array | None = None
     ) -> KrylovFactor:
         """Set up the preconditioner of `matrix`, (n, n)."""
+        matrix = stored(matrix)
         inner = self.preconditioner.factor(matrix, near_nullspace)
         return KrylovFactor(sparse.csr_array(matrix), inner, self)
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..errors import InvalidInput
+from .base import stored
 
 Array = NDArray[np.float64]
 
@@ -30,7 +31,7 @@ class AlgebraicMultigrid:
         """Hierarchy of a symmetric positive definite matrix, (n, n)."""
         import pyamg
 
-        rows = sparse.csr_matrix(matrix)
+        rows = sparse.csr_matrix(stored(matrix))
         blocks = rows
         if near_nullspace is not None and rows.shape[0] % self.block_size == 0:
             blocks = rows.tobsr((self.block_size, self.block_size))
