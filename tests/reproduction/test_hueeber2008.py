@@ -58,6 +58,13 @@ def test_table_51_from_zero(record):
         np.testing.assert_allclose(ours, known[f"level{level}"]["resultant"], rtol=1e-6)
 
 
+def test_table_51_nested(record):
+    for level, run in record["table5.1"]["nested"].items():
+        K, steps = REFERENCE["table5.1"]["nested"][level]
+        assert abs(run["K"] - K) <= 1
+        assert abs(run["steps"] - steps) <= 1
+
+
 def test_full_newton_is_superlinear_and_needs_a_third_of_the_steps(record):
     for level, run in record["newton"].items():
         last = np.array(run["changes"][-3:])

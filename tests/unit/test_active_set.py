@@ -15,6 +15,7 @@ from amontons.solvers.active_conditions import (
     newton_conditions,
     robin,
 )
+from amontons.solvers.active_nested import coarser
 from amontons.solvers.active_set import Cycles, Saddle
 
 LAW = am.LinearElastic(200, 0.3)
@@ -224,6 +225,20 @@ def test_a_nested_start_finds_the_sets_earlier():
         drive(problem, solver, tolerance=1e-10, callback=note, max_iterations=100)
         counts.append(sum(p != patterns[-1] for p in patterns))
     assert counts[0] < counts[1]
+
+
+def test_the_coarse_problem_is_that_of_the_coarser_mesh():
+    """Also its load, although the fine one holds prescribed values lifted into fine cells."""
+    below, found = cube(2).assemble(), coarser(cube(4).assemble())
+    assert found is not None
+    size = abs(below.f).max()
+    np.testing.assert_allclose(found.problem.f, below.f, atol=1e-12 * size)
+    np.testing.assert_allclose(found.problem.M.toarray(), below.M.toarray(), atol=1e-10 * size)
+    np.testing.assert_array_equal(found.problem.H.toarray(), below.H.toarray())
+    np.testing.assert_array_equal(found.problem.w, below.w)
+    again = coarser(found.problem)
+    assert again is not None
+    np.testing.assert_allclose(again.problem.f, cube(1).assemble().f, atol=1e-12 * size)
 
 
 def test_a_body_that_only_contact_holds():

@@ -52,8 +52,10 @@ class Coarser:
 def coarser(fine: FrictionProblem) -> Coarser | None:
     """The problem that a coarser mesh would give; None without one, or between two bodies.
 
-    Stiffness and load are Galerkin products, contacts those fine ones at coarse nodes with
-    their gaps and frames; Tresca's bounds are summed with the weights of interpolation.
+    Stiffness and load are Galerkin products for v = P v_coarse + e, contacts those fine ones at
+    coarse nodes with their gaps and frames; Tresca's bounds are summed with the weights of
+    interpolation.  e, zero at coarse nodes, is what the guess has beside its interpolation:
+    prescribed values belong to v - e on coarse cells, not to the fine ones next to the support.
     """
     basis = one_sided(fine)
     if basis is None or basis.coupling is not None or not fine.levels:
@@ -77,16 +79,18 @@ def coarser(fine: FrictionProblem) -> Coarser | None:
     values = basis.frames[contacts][contact, :, slot].ravel()
     shape = (P.shape[1], nc * d)
     modes = fine.near_nullspace
-    assert fine.w is not None
+    assert fine.w is not None and fine.M is not None and fine.f is not None
+    rest = fine.f
+    if fine.guess is not None:
+        rest = fine.f - fine.M @ (fine.guess - P @ fine.guess[own])
     problem = replace(
         FrictionProblem.from_global(
             P.T @ fine.M @ P, sparse.coo_array((values, (rows, columns)), shape=shape),
-            P.T @ fine.f, fine.w[contacts], _law(fine.law, contacts, weights),
+            P.T @ rest, fine.w[contacts], _law(fine.law, contacts, weights),
             near_nullspace=None if modes is None else modes[own], levels=fine.levels[1:],
         ),
         guess=None if fine.guess is None else fine.guess[own],
     )  # fmt: skip
-    assert fine.M is not None
     used = basis.dofs != HELD
     area = np.where(used, fine.M.diagonal()[basis.dofs], 0.0).sum(axis=1)
     return Coarser(problem, fine, P, weights, basis.frames, contacts, area)
