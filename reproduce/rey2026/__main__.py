@@ -17,13 +17,16 @@ from amontons.errors import AmontonsError
 from amontons.files import replacing
 from benchmarks.machine import describe
 
-from . import alart_curnier, report
+from . import alart_curnier, primal_dual, report
 
 HERE = Path(__file__).parent
 PAPER: dict[str, dict] = json.loads((HERE / "paper.json").read_text())
 # Each has cells(table): a row of Cell per entry of table["values"], in it one per entry of
 # table["columns"]; and counts(table, draws, seed): {kind: [a number per entry of "values"]}.
-ALGORITHMS: dict[str, ModuleType] = {"alart_curnier": alart_curnier}
+ALGORITHMS: dict[str, ModuleType] = {
+    "alart_curnier": alart_curnier,
+    "primal_dual": primal_dual,
+}
 TABLES = [name for name, table in PAPER.items() if table.get("algorithm") in ALGORITHMS]
 PARTS = tuple(TABLES)
 SEED = 2026

@@ -9,6 +9,7 @@ from .compressed import CompressedDelassus
 from .contact_multigrid import ContactMultigrid
 from .functions import AlartCurnier, ComplementarityFunction, JeanMoreau, NaturalMap
 from .gauss_seidel import Batch, GaussSeidel
+from .gradient import AcceleratedGradient, GradientIterate, Metric, Restart
 from .hybrid import Auto, Hybrid
 from .inexact import InexactNewton
 from .interior_point import InteriorPoint
@@ -19,6 +20,7 @@ from .smoothing import ProximalPoint, SmoothingNewton
 from .sweeps import SweepOrder
 
 METHODS: dict[str, type] = {
+    "accelerated-gradient": AcceleratedGradient,
     "active-set": ActiveSet,
     "auto": Auto,
     "compressed-delassus": CompressedDelassus,
@@ -34,6 +36,7 @@ METHODS: dict[str, type] = {
 
 __all__ = [
     "METHODS",
+    "AcceleratedGradient",
     "ActiveSet",
     "ActiveSetIterate",
     "AlartCurnier",
@@ -49,6 +52,7 @@ __all__ = [
     "FullStep",
     "GaussSeidel",
     "GoldsteinPrice",
+    "GradientIterate",
     "Hybrid",
     "InteriorPoint",
     "InexactNewton",
@@ -56,11 +60,13 @@ __all__ = [
     "JeanMoreau",
     "LineSearch",
     "LocalSolver",
+    "Metric",
     "Modification",
     "MultigridCycle",
     "NaturalMap",
     "NonMonotone",
     "ProximalPoint",
+    "Restart",
     "RhoStrategy",
     "SemismoothNewton",
     "SmoothingNewton",
