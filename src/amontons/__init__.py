@@ -37,7 +37,7 @@ _HOME = {
     "api": ("all_solutions", "multistart", "solve"),
     "analysis": ("PieceSolution", "Solutions", "performance_profile"),
     "fem": ("Mesh", "box", "mesh_shape", "read_cad", "read_mesh", "refined"),
-    "contact": ("LevelSet", "Plane", "Sphere"),
+    "contact": ("LevelSet", "Nitsche", "Plane", "Sphere"),
     "model": ("Body", "BodyForce", "Contact", "ContactFields", "Fix", "LinearElastic", "Model",
               "Traction", "distributed"),
 }  # fmt: skip

@@ -117,7 +117,7 @@ def _solve(
     if problem is None or not (model is None or hasattr(model, "assemble")):
         raise InvalidInput(f"problem: expected a Model or a FrictionProblem, got {problem!r}")
     began = time.perf_counter()
-    discrete = problem if model is None else model.assemble()
+    discrete = problem if model is None else model.discrete_problem()
     assembled = time.perf_counter() - began
     if isinstance(options.get("start"), ModelSolution):
         options["start"] = options["start"].solution

@@ -182,3 +182,30 @@ class Tresca:
 
 
 Law = Coulomb | Tresca
+
+
+def augmented_reaction(x: Array, law: Law) -> Array:
+    """(x_N^+, projection of x_T onto the disk that the law allows at x_N^+), (nc, d).
+
+    Alart and Curnier's form of both laws: r obeys them with u where r = this of x = r - rho u,
+    whatever rho > 0.
+    """
+    normal = np.maximum(x[:, 0], 0.0)
+    return np.column_stack([normal, project_disk(x[:, 1:], law.bound(x))])
+
+
+def augmented_reaction_jacobian(x: Array, law: Law) -> Array:
+    """One element of the generalised Jacobian of `augmented_reaction`, (nc, d, d).
+
+    On kinks: zero at x_N = 0, identity in x_T on the rim of the disk.
+    """
+    radius = law.bound(x)
+    in_t, in_radius = project_disk_jacobian(x[:, 1:], radius)
+    in_t[radius == 0] = 0.0
+    closed = x[:, 0] > 0
+    out = np.zeros((*x.shape, x.shape[1]))
+    out[:, 0, 0] = closed
+    out[:, 1:, 1:] = in_t
+    if isinstance(law, Coulomb):
+        out[:, 1:, 0] = in_radius * (law.mu * closed)[:, None]
+    return out

@@ -8,6 +8,7 @@ and does not change with units.  With û = u + mu |u_T| n (Coulomb) or u (Tresca
 *residual*:  rho_i = 1 / |H_i^T D^-1 H_i|_2 with D the block diagonal of M, u = H^T v + w,
              error = max(|M v - H r - f| / |load|,
                          |(r_i - P(r_i - rho_i û_i)) / rho_i| / |u_ref|).
+*nitsche*:   where v alone is unknown, see `nitsche_problem`.
 
 At r = 0 the map of a penetrating contact is |u_N| / sqrt(1 + mu^2) only, and would vanish for
 "glued" contacts with a huge mu; each contact counts at least half its penetration, which
@@ -38,6 +39,7 @@ class Measure(Enum):
 
     EXACT = "exact"
     RESIDUAL = "residual"
+    NITSCHE = "nitsche"
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -163,7 +165,12 @@ def published_natural_error(r: Array, u: Array, q: Array, law: Law) -> float:
     """
     residual = float(np.linalg.norm(law.natural_map(r, u, np.ones(len(r)))))
     scale = float(np.linalg.norm(q))
-    return residual / scale if scale > 0 else (0.0 if residual == 0 else math.inf)
+    return ratio(residual, scale)
+
+
+def ratio(size: float, scale: float) -> float:
+    """size / scale, with 0 / 0 = 0."""
+    return size / scale if scale > 0 else (0.0 if size == 0 else math.inf)
 
 
 def max_penetration(u: Array) -> float:
@@ -185,6 +192,7 @@ __all__ = [
     "natural_error",
     "published_fclib_error",
     "published_natural_error",
+    "ratio",
     "rounding_error",
     "scaled_residual",
 ]

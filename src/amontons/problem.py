@@ -51,7 +51,8 @@ class Form(Enum):
 
     GLOBAL = "global"
     DELASSUS = "local"
-    ANY = "any"
+    ANY = "any"  # of these two
+    NITSCHE = "nitsche"  # a NitscheProblem: displacements only
 
 
 @dataclass(frozen=True, eq=False)
@@ -455,8 +456,8 @@ class FrictionProblem:
         """What rounding alone may hide in `error`, unit-free: no smaller error can be known."""
         if self.measure is Measure.EXACT:
             p = self.condensed()
-            return _ratio(judge.rounding_error(p.rho, r), p.q_norm)
-        return _ratio(judge.rounding_error(self.rho, r), self.scales[1])
+            return judge.ratio(judge.rounding_error(p.rho, r), p.q_norm)
+        return judge.ratio(judge.rounding_error(self.rho, r), self.scales[1])
 
     def exact_error(self, r: Array) -> float:
         """The exact measure of the Delassus form."""
@@ -472,7 +473,7 @@ class FrictionProblem:
         balance = np.linalg.norm(self.M @ v - self.H @ r.ravel() - self.f)
         law = judge.scaled_residual(r, u, self.law, self.rho)
         load, reference = self.scales
-        error = max(_ratio(balance, load), _ratio(law, reference))
+        error = max(judge.ratio(balance, load), judge.ratio(law, reference))
         return float(error) if np.isfinite(error) else np.inf
 
     @property
@@ -541,11 +542,6 @@ class FrictionProblem:
         M, levels, modes = self.M, self.levels, self.near_nullspace
         assert M is not None
         return self._kept("hierarchy", (M,), lambda: prepared(M, levels, modes, self.dimension))
-
-
-def _ratio(size: float, scale: float) -> float:
-    """size / scale, with 0 / 0 = 0."""
-    return size / scale if scale > 0 else (0.0 if size == 0 else np.inf)
 
 
 def _node_blocks_inverse(M: sparse.csc_array, d: int) -> sparse.bsr_array:

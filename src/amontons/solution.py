@@ -14,6 +14,7 @@ from . import judge
 from .cones import Law
 from .errors import SingularOperator
 from .judge import Measure
+from .nitsche_problem import NitscheProblem
 from .problem import FrictionProblem
 from .status import ContactStatus, classify
 
@@ -86,7 +87,7 @@ class FrictionSolution:
     r, u: (nc, d) in the local frames; v: (n,) or None in the Delassus form.
     """
 
-    problem: FrictionProblem
+    problem: FrictionProblem | NitscheProblem
     r: Array
     u: Array
     v: Array | None
@@ -94,7 +95,10 @@ class FrictionSolution:
 
     @cached_property
     def _classified(self) -> tuple[NDArray[np.int8], NDArray[np.bool_], Array]:
-        return classify(self.problem, self.r, self.u)
+        problem = self.problem
+        if isinstance(problem, NitscheProblem):  # its r obeys the law with this displacement
+            return classify(problem, self.r, problem.lawful(self.v))
+        return classify(problem, self.r, self.u)
 
     @property
     def status(self) -> NDArray[np.int8]:
@@ -139,8 +143,8 @@ class FrictionSolution:
     def fclib_error(self) -> float | None:
         """The published FCLib error, for comparison only: it depends on the units.
 
-        None where it is not defined: M is singular and there is no q, or the solve was stopped
-        before M was factorised.
+        None where it is not defined: M is singular and there is no q, the solve was stopped
+        before M was factorised, or Nitsche's method has no q at all.
         """
         return self._published(judge.published_fclib_error)
 
@@ -154,7 +158,7 @@ class FrictionSolution:
 
     def _published(self, measure: Callable[[Array, Array, Array, Law], float]) -> float | None:
         p = self.problem
-        if not self.convergence.history:
+        if isinstance(p, NitscheProblem) or not self.convergence.history:
             return None
         try:
             q = p.free_velocity

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .errors import InvalidInput, SingularOperator, UnsupportedForm
 from .judge import Measure
+from .nitsche_problem import NO_MULTIPLIERS, NitscheProblem
 from .problem import Form, FrictionProblem
 from .solution import Convergence, FrictionSolution, Outcome, Step
 from .solvers import Auto
@@ -27,7 +28,7 @@ PROGRESS = 0.99  # the best error must fall at least by this factor within PATIE
 class _Watch:
     """The driver's memory of one solve."""
 
-    problem: FrictionProblem
+    problem: FrictionProblem | NitscheProblem
     tolerance: float
     started: float = field(default_factory=time.perf_counter)
     best: Iterate | None = None
@@ -76,7 +77,7 @@ class _Watch:
 
 
 def drive(
-    problem: FrictionProblem,
+    problem: FrictionProblem | NitscheProblem,
     solver: Solver | None = None,
     *,
     tolerance: float = 1e-8,
@@ -100,7 +101,10 @@ def drive(
     if callback is not None and not callable(callback):
         raise InvalidInput(f"callback: expected a function, got {callback!r}")
     _check_options(tolerance, max_iterations, time_limit)
-    if solver.form is not Form.ANY and solver.form is not problem.form:
+    if problem.form is Form.NITSCHE:
+        if not getattr(solver, "nitsche", False):
+            raise UnsupportedForm(f"{type(solver).__name__}: {NO_MULTIPLIERS}")
+    elif solver.form is not Form.ANY and solver.form is not problem.form:
         problem_form = problem.form.value
         condense = solver.form is Form.DELASSUS
         hint = "problem.condensed()" if condense else "Auto or a solver of the local form"
@@ -168,7 +172,7 @@ def _finish(watch: _Watch, outcome: Outcome, detail: str, solver: Solver) -> Fri
     problem = watch.problem
     best = watch.best if watch.best is not None else Iterate(_zero(problem))
     measure = problem.measure if watch.best is not None else Measure.EXACT
-    if measure is Measure.RESIDUAL and best.v is not None:  # the judge has read this v
+    if measure is not Measure.EXACT and best.v is not None:  # the judge has read this v
         u, v = problem.local_velocity(best.v), best.v
     elif watch.best is None and problem.form is Form.GLOBAL:
         u, v = _at_rest(problem)  # stopped in the first factorisation: do not start it again
@@ -208,14 +212,20 @@ def _zero(problem: FrictionProblem) -> Array:
     return np.zeros((problem.contacts, problem.dimension))
 
 
-def _start(problem: FrictionProblem, start: Iterate | FrictionSolution | None) -> Iterate:
+def _start(
+    problem: FrictionProblem | NitscheProblem, start: Iterate | FrictionSolution | None
+) -> Iterate:
     """The first iterate: zero reactions, or a copy of what the user gives."""
     if start is None:
+        if isinstance(problem, NitscheProblem):
+            return _start_of_nitsche(problem, None)
         return Iterate(_zero(problem), None, 0)
     if not hasattr(start, "r") or not hasattr(start, "v"):
         raise InvalidInput(
             f"start: expected a solution or an Iterate, got {type(start).__name__}"
         )
+    if isinstance(problem, NitscheProblem):
+        return _start_of_nitsche(problem, start.v)
     r = np.array(start.r, dtype=float)
     if r.shape != (problem.contacts, problem.dimension):
         raise InvalidInput(
@@ -229,9 +239,19 @@ def _start(problem: FrictionProblem, start: Iterate | FrictionSolution | None) -
     return Iterate(r, start.v, 0)
 
 
+def _start_of_nitsche(problem: NitscheProblem, v: Array | None) -> Iterate:
+    """The displacements v (n,) of a start; its reactions may be those of another method."""
+    v = problem.guess if v is None else np.array(v, dtype=float)
+    if v.shape != (problem.unknowns,):
+        raise InvalidInput(f"start: expected v of {problem.unknowns} entries, got {v.shape}")
+    if not np.isfinite(v).all():
+        raise InvalidInput("start: v holds a number that is not finite")
+    return Iterate(problem.reaction(v), v, 0)
+
+
 def _with_motion(problem: FrictionProblem, start: Iterate) -> Iterate:
     """The start with some v where finding that of its r would cost a linear solve."""
-    if start.v is not None or problem.measure is not Measure.RESIDUAL:
+    if start.v is not None or problem.measure is Measure.EXACT:
         return start
     guess = problem.guess
     return replace(start, v=guess if guess is not None else np.zeros(problem.unknowns))

@@ -7,6 +7,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from .nitsche_problem import NitscheProblem
 from .problem import FrictionProblem
 
 Array = NDArray[np.float64]
@@ -21,7 +22,7 @@ class ContactStatus(IntEnum):
 
 
 def classify(
-    problem: FrictionProblem, r: Array, u: Array
+    problem: FrictionProblem | NitscheProblem, r: Array, u: Array
 ) -> tuple[NDArray[np.int8], NDArray[np.bool_], Array]:
     """(status, sliding, margin), each (nc,), of reactions r and velocities u, (nc, d).
 
@@ -42,7 +43,9 @@ def classify(
     return status, sliding, _margin(problem, r, u, status)
 
 
-def _margin(problem: FrictionProblem, r: Array, u: Array, status: NDArray[np.int8]) -> Array:
+def _margin(
+    problem: FrictionProblem | NitscheProblem, r: Array, u: Array, status: NDArray[np.int8]
+) -> Array:
     slack = problem.law.bound(r) - np.linalg.norm(r[:, 1:], axis=1)
     slide = problem.rho * np.linalg.norm(u[:, 1:], axis=1)
     stick = status == ContactStatus.STICK

@@ -11,10 +11,11 @@ import amontons
 
 PACKAGE = Path(amontons.__file__).parent
 ORDER = (
-    "errors < files < cones < linear < blocks < condensation < judge < problem < nitsche_problem < one_sided "
-    "< one_contact < status < solution < solvers < solve < fem < contact < model < masonry "
-    "< granular < hild < vee < evolution < analysis < gallery < fclib < checkpoint < expressions "
-    "< case < vtk < plots < output < results < report < api < cli"
+    "errors < files < cones < linear < blocks < condensation < judge < problem < "
+    "nitsche_problem < one_sided < one_contact < status < solution < solvers < solve < fem < "
+    "contact < model < masonry < granular < hild < vee < evolution < analysis < gallery < "
+    "fclib < checkpoint < expressions < case < vtk < plots < output < results < report < api "
+    "< cli"
 ).split(" < ")
 ALONE = {  # package: the file or folder that imports it, one for each kind of file
     "ngsolve": "fem", "netgen": "fem", "pyamg": "linear", "matplotlib": "plots", "click": "cli",

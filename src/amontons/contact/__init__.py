@@ -2,9 +2,10 @@
 
 from .geometry import LevelSet, Obstacle, Plane, Sphere, frames
 from .mortar import mortar_contact, mortar_obstacle
+from .nitsche import Nitsche, NitscheTerms, nitsche_obstacle, nitsche_pair
 from .nodal import ContactRows, contact_nodes, forces, nodal_contact
 from .pairs import pair_contact
 
-__all__ = ["ContactRows", "LevelSet", "Obstacle", "Plane", "Sphere", "contact_nodes", "forces",
-           "frames", "mortar_contact", "mortar_obstacle", "nodal_contact",
-           "pair_contact"]  # fmt: skip
+__all__ = ["ContactRows", "LevelSet", "Nitsche", "NitscheTerms", "Obstacle", "Plane", "Sphere",
+           "contact_nodes", "forces", "frames", "mortar_contact", "mortar_obstacle",
+           "nitsche_obstacle", "nitsche_pair", "nodal_contact", "pair_contact"]  # fmt: skip

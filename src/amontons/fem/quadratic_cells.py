@@ -53,11 +53,14 @@ def _lagrange(nodes: Array, simplex: bool) -> tuple[Callable, Callable]:
     return lambda x: weights @ monomials(x), lambda x: weights @ slopes(x)
 
 
-def _gauss(dim: int, simplex: bool) -> tuple[Array, Array]:
-    """Three points per direction, exact to degree 5; on simplices by collapsing the cube."""
+def gauss(dim: int, simplex: bool, count: int = 3) -> tuple[Array, Array]:
+    """`count` points per direction, exact to degree 2 count - 1; simplices: a collapsed cube.
+
+    Points (count^dim, dim) and weights of the unit cube or simplex.
+    """
     points, weights = [], []
-    rules = [roots_jacobi(3, dim - 1 - k if simplex else 0, 0) for k in range(dim)]
-    for nodes in product(range(3), repeat=dim):
+    rules = [roots_jacobi(count, dim - 1 - k if simplex else 0, 0) for k in range(dim)]
+    for nodes in product(range(count), repeat=dim):
         at = np.array([(1 + rules[k][0][j]) / 2 for k, j in enumerate(nodes)])
         scale = [2.0 ** -(dim - k if simplex else 1) for k in range(dim)]
         weights.append(np.prod([rules[k][1][j] * scale[k] for k, j in enumerate(nodes)]))
@@ -75,7 +78,7 @@ def _cell(kind: str) -> ReferenceCell:
     shape, gradient = _lagrange(nodes, simplex)
     facets = tuple(_facet(facet, parents, len(first.corners)) for facet in first.facets)
     return ReferenceCell(kind, first.dim, nodes, facets, shape, gradient,
-                         _gauss(first.dim, simplex), parents)  # fmt: skip
+                         gauss(first.dim, simplex), parents)  # fmt: skip
 
 
 def _facet(corners: tuple[int, ...], parents: Parents, first: int) -> tuple[int, ...]:

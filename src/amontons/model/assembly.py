@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +10,13 @@ from scipy import sparse
 
 from ..contact import (
     ContactRows,
+    Nitsche,
+    NitscheTerms,
     contact_nodes,
     mortar_contact,
     mortar_obstacle,
+    nitsche_obstacle,
+    nitsche_pair,
     nodal_contact,
     pair_contact,
 )
@@ -39,6 +43,8 @@ class Placed:
     """Contacts of one pair: body of the slave, kept (slave nodes,), rows of the kept ones.
 
     H (dofs, nc d): the rows in the dofs of the whole model, with those of a master body.
+    By Nitsche's method Gauss points of the slave take the place of its nodes, and `nitsche`
+    holds their tractions, also in the dofs of the whole model.
     """
 
     body: int
@@ -46,6 +52,7 @@ class Placed:
     all_points: Array
     rows: ContactRows
     H: sparse.csc_array
+    nitsche: NitscheTerms | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,27 +272,30 @@ def _place(bodies: tuple[Body, ...], contact: Contact, values: Array, offsets: I
     values (dofs,): prescribed displacements, NaN where free.
     """
     is_fixed = ~np.isnan(values)
-    k, surface = locate(bodies, contact.slave)
+    k = locate(bodies, contact.slave)[0]
     mesh = bodies[k].mesh
-    rows, H, met = _met(bodies, contact, values, offsets)
+    rows, H, met, points, terms = _met(bodies, contact, values, offsets)
     d = mesh.dim
     normal = sparse.csc_array(H[:, ::d]).multiply(~is_fixed[:, None])
     kept = np.sqrt(np.asarray(normal.power(2).sum(axis=0)).ravel()) > 1e-9
     prescribed = np.where(is_fixed, values, 0.0)
     _check_supported(mesh, contact, rows.at(~kept), (H[:, ::d].T @ prescribed)[~kept])
-    points = mesh.points[contact_nodes(mesh, surface)[0]]
     kept &= _wanted(contact, points)[met]
     all_kept = met.copy()
     all_kept[met] = kept
-    return Placed(k, all_kept, points, rows.at(kept), H[:, np.repeat(kept, d)])
+    terms = None if terms is None else terms.at(kept)
+    return Placed(k, all_kept, points, rows.at(kept), H[:, np.repeat(kept, d)], terms)
 
 
 def _met(
     bodies: tuple[Body, ...], contact: Contact, values: Array, offsets: Index
-) -> tuple[ContactRows, sparse.csc_array, NDArray[np.bool_]]:
-    """Contacts of one pair, their H in the dofs of the model, and which slave nodes meet."""
+) -> tuple[ContactRows, sparse.csc_array, NDArray[np.bool_], Array, NitscheTerms | None]:
+    """Contacts of one pair, H in the dofs of the model, which of all points meet, and terms."""
+    if contact.nitsche is not None:
+        return _met_by_nitsche(bodies, contact, contact.nitsche, offsets)
     k, surface = locate(bodies, contact.slave)
     slave, size = bodies[k].mesh, int(offsets[-1])
+    points = slave.points[contact_nodes(slave, surface)[0]]
     mortar = contact.method == "mortar"
     given = [v.reshape(-1, slave.dim) for v in np.split(values, offsets[1:-1])]
     if contact.obstacle is not None:
@@ -294,7 +304,7 @@ def _met(
         if mortar:
             _check_held(slave, contact, rows, given[k][rows.nodes])
             rows, met = mortar_obstacle(slave, surface, contact.obstacle, prescribed=given[k])
-        return rows, _shifted(rows.H, int(offsets[k]), size), met
+        return rows, _shifted(rows.H, int(offsets[k]), size), met, points, None
     assert contact.master is not None
     j, other = locate(bodies, contact.master)
     master = bodies[j].mesh
@@ -305,7 +315,30 @@ def _met(
     else:
         rows, on_master, met = pair_contact(slave, surface, master, other)
     H = _shifted(rows.H, int(offsets[k]), size) + _shifted(on_master, int(offsets[j]), size)
-    return rows, sparse.csc_array(H), met
+    return rows, sparse.csc_array(H), met, points, None
+
+
+def _met_by_nitsche(
+    bodies: tuple[Body, ...], contact: Contact, options: Nitsche, offsets: Index
+) -> tuple[ContactRows, sparse.csc_array, NDArray[np.bool_], Array, NitscheTerms | None]:
+    """The same for the Gauss points of Nitsche's method."""
+    k, surface = locate(bodies, contact.slave)
+    body, first, size = bodies[k], int(offsets[k]), int(offsets[-1])
+    if contact.obstacle is not None:
+        rows, terms = nitsche_obstacle(
+            body.mesh, surface, contact.obstacle, body.material, options
+        )
+        met, points = np.ones(len(rows.points), dtype=bool), rows.points
+        H = _shifted(rows.H, first, size)
+    else:
+        assert contact.master is not None
+        j, other = locate(bodies, contact.master)
+        rows, terms, on_master, met, points = nitsche_pair(
+            body.mesh, surface, bodies[j].mesh, other, body.material, options
+        )
+        H = _shifted(rows.H, first, size) + _shifted(on_master, int(offsets[j]), size)
+    terms = replace(terms, traction=_shifted(terms.traction, first, size))
+    return rows, sparse.csc_array(H), met, points, terms
 
 
 def _check_supported(mesh: Mesh, contact: Contact, rows: ContactRows, moved: Array) -> None:

@@ -12,14 +12,16 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..cones import Coulomb, Law, Tresca
-from ..errors import InvalidInput
+from ..errors import InvalidInput, UnsupportedForm
 from ..linear import Direct
 from ..linear.grid_matrix import GridMatrix
+from ..nitsche_problem import NO_MULTIPLIERS, NitscheProblem
 from ..problem import FrictionProblem
 from ..solution import FrictionSolution
 from .assembly import Discretisation, discretise, locate
 from .balance import imbalance
 from .fields import ContactFields, recover_fields
+from .nitsche import nitsche_matrices, nitsche_problem
 from .parts import Body, BodyForce, Contact, Fix, Traction
 from .rigid import Piece, check_held, loose_modes
 from .values import ScalarValue, scalar_at
@@ -57,6 +59,10 @@ class Model:
         laws = {contact.friction for contact in self.contacts}
         if len(laws) > 1:
             raise InvalidInput("contacts: expected one friction law, got both mu and tresca")
+        if len({contact.nitsche is None for contact in self.contacts}) > 1:
+            raise InvalidInput(
+                "contacts: expected Nitsche's method in all of them or in none, got both"
+            )
         if not np.isfinite(self.load_factor):
             raise InvalidInput(f"load_factor: expected a finite number, got {self.load_factor}")
         object.__setattr__(self, "bodies", _named(self.bodies))
@@ -83,12 +89,20 @@ class Model:
 
         Its unknowns are the displacements of the free dofs; prescribed ones are lifted into f
         and w.  Nodes whose normal direction is prescribed by supports are no contacts.  Raises
-        SingularOperator naming the body and the rigid modes that nothing can hold.
+        SingularOperator naming the body and the rigid modes that nothing can hold, and
+        UnsupportedForm with Nitsche's method, which has no reactions for unknowns.
         """
+        problem = self._problem
+        if isinstance(problem, NitscheProblem):
+            raise UnsupportedForm(NO_MULTIPLIERS)
+        return problem
+
+    def discrete_problem(self) -> FrictionProblem | NitscheProblem:
+        """What `solve` solves: as `assemble`, with Nitsche's method a NitscheProblem."""
         return self._problem
 
     @cached_property
-    def _problem(self) -> FrictionProblem:
+    def _problem(self) -> FrictionProblem | NitscheProblem:
         parts = self.discretisation
         w = self.load_factor * parts.carried
         w[:, 0] += parts.gap
@@ -96,7 +110,9 @@ class Model:
             self.load_factor * parts.load, w, self.load_factor * parts.prescribed
         )
 
-    def increment(self, load: Array, prescribed: Array, before: Array) -> FrictionProblem:
+    def increment(
+        self, load: Array, prescribed: Array, before: Array
+    ) -> FrictionProblem | NitscheProblem:
         """The discrete problem of a quasi-static step, with friction on the new slip only.
 
         load (dofs,): nodal forces; prescribed (dofs,): values on the fixed dofs, else zero;
@@ -108,13 +124,20 @@ class Model:
         w[:, 1:] -= before
         return self._discrete((load - parts.K @ prescribed)[parts.free], w, prescribed)
 
-    def _discrete(self, f: Array, w: Array, prescribed: Array) -> FrictionProblem:
+    def _discrete(
+        self, f: Array, w: Array, prescribed: Array
+    ) -> FrictionProblem | NitscheProblem:
         """The problem with a load f and local values w; shares its matrices with others.
 
         prescribed (dofs,): the values on the fixed dofs that f and w contain already.
         """
         parts, law = self.discretisation, self.law
         loose = self._loose_but_held(parts, law)
+        if self.contacts[0].nitsche is not None:
+            if "nitsche" not in self._shared:
+                self._shared["nitsche"] = nitsche_matrices(parts, not loose)
+            matrices = self._shared["nitsche"]
+            return nitsche_problem(parts, matrices, f, w, prescribed, law, self.name)
         guess, size = parts.continued(prescribed), None
         if loose:
             guess, size = _bonded(parts, f, w)
@@ -133,8 +156,9 @@ class Model:
         for contact, placed in zip(self.contacts, self.discretisation.placed, strict=True):
             name = contact.friction
             given = scalar_at(
-                getattr(contact, name), placed.all_points, f"{name} on {contact.slave!r}"
-            )
+                getattr(contact, name), placed.all_points, f"{name} on {contact.slave!r}",
+                each="slave node" if contact.nitsche is None else "Gauss point",
+            )  # fmt: skip
             values.append(given[placed.kept])
         both = np.concatenate(values)
         if self.contacts[0].friction == "mu":

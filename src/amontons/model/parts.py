@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contact import Obstacle
+from ..contact import Nitsche, Obstacle
 from ..errors import InvalidInput
 from ..fem.elasticity import LinearElastic, materials_by_region
 from ..fem.mesh import Mesh
@@ -19,7 +19,7 @@ from ..fem.order import second_order
 from .values import ScalarValue, VectorValue
 
 Array = NDArray[np.float64]
-METHODS = ("nodal", "mortar")  # "dual-mortar" is another name of the latter
+METHODS = ("nodal", "mortar", "nitsche")  # "dual-mortar" is another name of the second
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +87,8 @@ class Contact:
     left out.
     method: "nodal", every slave node against the closest point of the other side, or "mortar",
     averages with dual basis functions, exact also for a uniform pressure between meshes that do
-    not match.
+    not match, or "nitsche", the law at Gauss points with stresses in the place of reactions;
+    `Nitsche(...)` sets its options.
 
     Either mu, the coefficient of Coulomb friction, or tresca, the largest shear traction (a
     stress): a number, one number per slave node, or a function of points (n, dim) -> (n,).
@@ -99,7 +100,7 @@ class Contact:
     mu: ScalarValue | None = None
     tresca: ScalarValue | None = None
     master: str | None = None
-    method: str = "nodal"
+    method: str | Nitsche = "nodal"
     where: Callable[[Array], NDArray[np.bool_]] | None = None
 
     def __post_init__(self) -> None:
@@ -113,7 +114,9 @@ class Contact:
             )
         if self.method == "dual-mortar":
             object.__setattr__(self, "method", "mortar")
-        if self.method not in METHODS:
+        if self.method == "nitsche":
+            object.__setattr__(self, "method", Nitsche())
+        if not isinstance(self.method, Nitsche) and self.method not in METHODS:
             raise InvalidInput(
                 f"method: expected one of {', '.join(METHODS)}, got {self.method!r}"
             )
@@ -123,6 +126,11 @@ class Contact:
             raise InvalidInput(
                 f"obstacle: expected a Plane, Sphere or LevelSet, got {self.obstacle!r}"
             )
+
+    @property
+    def nitsche(self) -> Nitsche | None:
+        """Options of Nitsche's method, None for the others."""
+        return self.method if isinstance(self.method, Nitsche) else None
 
     @property
     def friction(self) -> str:

@@ -34,7 +34,9 @@ def vector_at(value: VectorValue, points: Array, what: str, *, free: bool = Fals
     return np.array(columns, dtype=float).T.reshape(len(points), dim)
 
 
-def scalar_at(value: ScalarValue, points: Array, what: str) -> Array:
+def scalar_at(
+    value: ScalarValue, points: Array, what: str, *, each: str = "slave node"
+) -> Array:
     """A scalar value at points (n, dim): (n,), finite and >= 0.
 
     Callables take all points at once, (n, dim), and return (n,) or a number.
@@ -59,7 +61,7 @@ def scalar_at(value: ScalarValue, points: Array, what: str) -> Array:
             raise InvalidInput(f"{what}: expected numbers, got {value!r}") from error
     if found.shape not in ((), (n,)):
         raise InvalidInput(
-            f"{what}: expected a number or one per slave node, ({n},), got {found.shape}"
+            f"{what}: expected a number or one per {each}, ({n},), got {found.shape}"
         )
     out = np.array(np.broadcast_to(found, (n,)))
     bad = np.flatnonzero(~np.isfinite(out) | (out < 0))

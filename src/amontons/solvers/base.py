@@ -73,7 +73,8 @@ class Solver(Protocol):
     """Options as fields; `iterates` yields until the driver stops asking.
 
     A solver with a class variable matrix_free = True also takes problems whose M is an operator
-    (`GridMatrix`); for others the driver assembles it.
+    (`GridMatrix`); for others the driver assembles it.  One with nitsche = True also takes a
+    `NitscheProblem`, where v alone is unknown and r follows from it.
     """
 
     form: ClassVar[Form]

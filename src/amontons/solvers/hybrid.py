@@ -11,6 +11,8 @@
     global form, W dear             `CompressedDelassus`, then semismooth Newton without W, then
                                     the Delassus form after all if W fits into memory
     global form, M singular         semismooth Newton with a factor of the whole system
+    Nitsche's method                Newton, then with the friction bound settled apart
+                                    (`nitsche_newton`)
 
 A mesh is what has levels or rigid modes (`FrictionProblem.levels`, `near_nullspace`).
 
@@ -44,6 +46,7 @@ from ..errors import InvalidInput, SingularOperator
 from ..judge import Measure
 from ..linear import Direct
 from ..linear.distributed import DistributedMatrix
+from ..nitsche_problem import NitscheProblem
 from ..problem import Form, FrictionProblem
 from .base import Breakdown, Iterate, Patience, Solver, Target, check_at_least
 from .compressed import CompressedDelassus
@@ -51,6 +54,7 @@ from .contact_multigrid import ContactMultigrid
 from .gauss_seidel import GaussSeidel
 from .inexact import DeformablePortfolio
 from .newton import SemismoothNewton
+from .nitsche_newton import robust_iterates
 
 MESH = 3_000  # unknowns of a mesh from which multigrid beats a factorisation
 STALLED = 20  # iterates without halving the error after which Auto changes the method
@@ -95,11 +99,15 @@ class Auto:
 
     form: ClassVar[Form] = Form.ANY
     matrix_free: ClassVar[bool] = True
+    nitsche: ClassVar[bool] = True
 
     def iterates(
         self, problem: FrictionProblem, start: Iterate, target: Target
     ) -> Iterator[Iterate]:
         """Iterates of one method after another, until nothing is left to try."""
+        if isinstance(problem, NitscheProblem):
+            yield from robust_iterates(problem, start, target)
+            return
         if problem.contacts == 0:
             return
         best = [start]

@@ -35,12 +35,14 @@ from scipy.sparse import linalg as sparse_linalg
 
 from ..errors import InvalidInput, SingularOperator
 from ..linear import Direct, LinearSolver
+from ..nitsche_problem import NitscheProblem
 from ..problem import Form, FrictionProblem
 from .augmentation import RhoStrategy, augmentation, own_blocks
 from .base import Breakdown, Iterate, Target, check_positive
 from .block_lu import Symbolic, newton_step_inplace
 from .functions import AlartCurnier, ComplementarityFunction, Linearised, NaturalMap, columns
 from .line_search import LineSearch, NonMonotone
+from .nitsche_newton import newton_iterates
 
 Array = NDArray[np.float64]
 DENSE_UNKNOWNS = (
@@ -87,6 +89,8 @@ class SemismoothNewton:
     the Schur complement with one factor of M in the global form.  A LinearSolver given here
     factorises the whole system of the global form in each step.
 
+    With Nitsche's method only linear and line_search count: function and rho are its own.
+
     The natural map needs one rho per contact, because the projection onto Coulomb's cone is
     that of one norm; Alart-Curnier and Jean-Moreau take rho_N and rho_T apart.
     """
@@ -97,6 +101,8 @@ class SemismoothNewton:
     line_search: LineSearch = field(default_factory=NonMonotone)
     rho: float = 1.0  # augmentation parameter relative to what the strategy gives
     rho_strategy: RhoStrategy = RhoStrategy.PER_CONTACT
+
+    nitsche: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         check_positive(rho=self.rho)
@@ -111,6 +117,9 @@ class SemismoothNewton:
         self, problem: FrictionProblem, start: Iterate, target: Target
     ) -> Iterator[Iterate]:
         """Newton steps from `start`; raises Breakdown when a step can not be computed."""
+        if isinstance(problem, NitscheProblem):
+            yield from newton_iterates(problem, start, self.line_search, self.linear)
+            return
         system = self._linearise(problem)
         rho = augmentation(problem, self.rho_strategy, self.rho)
         law = _Residual(self.function, problem, rho)
