@@ -14,7 +14,8 @@ __version__ = "0.1.0"
 
 _HOME = {
     "errors": ("AmontonsError", "FileFormatError", "Interrupted", "InvalidInput",
-               "MissingDependency", "NotConverged", "SingularOperator", "UnsupportedForm"),
+               "InvertedCells", "MissingDependency", "NotConverged", "SingularOperator",
+               "UnsupportedForm"),
     "cones": ("Coulomb", "Tresca"),
     "linear": ("AlgebraicMultigrid", "ConjugateGradient", "Direct", "GeometricMultigrid",
                "Petsc"),
@@ -26,6 +27,7 @@ _HOME = {
                 "InexactNewton", "InteriorPoint", "JeanMoreau", "LocalSolver", "Metric",
                 "Modification", "MultigridCycle", "NaturalMap", "NonMonotone", "ProximalPoint",
                 "Restart", "RhoStrategy", "SemismoothNewton", "SmoothingNewton", "SweepOrder"),
+    "solvers.nonlinear_newton": ("NonlinearNewton",),
     "solve": ("drive",),
     "fclib": ("read_fclib", "write_fclib"),
     "masonry": ("Bond", "Wall"),
@@ -38,8 +40,8 @@ _HOME = {
     "analysis": ("PieceSolution", "Solutions", "performance_profile"),
     "fem": ("Mesh", "box", "mesh_shape", "read_cad", "read_mesh", "refined"),
     "contact": ("LevelSet", "Nitsche", "Plane", "Sphere"),
-    "model": ("Body", "BodyForce", "Contact", "ContactFields", "Fix", "LinearElastic", "Model",
-              "Traction", "distributed"),
+    "model": ("Body", "BodyForce", "CiarletGeymonat", "Contact", "ContactFields", "Fix",
+              "LinearElastic", "Model", "NeoHookean", "Traction", "distributed"),
 }  # fmt: skip
 _MODULE = {name: module for module, names in _HOME.items() for name in names}
 

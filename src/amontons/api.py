@@ -45,7 +45,9 @@ def solve(problem, solver=None, *, tolerance=1e-8, max_iterations=None, time_lim
     after Ctrl-C), which carries the best solution, instead of returning it.
 
     A model is condensed for solvers that need the Delassus form; a FrictionProblem has the form
-    its owner chose, and the wrong one raises UnsupportedForm.
+    its owner chose, and the wrong one raises UnsupportedForm.  A model with hyperelastic laws
+    is solved at finite strains by `NonlinearNewton`; the problem of its solution is the
+    tangent one of the deformed state.
     """
     run = drive if isinstance(problem, FrictionProblem) else drive_any_form
     options = {"tolerance": tolerance, "max_iterations": max_iterations,
@@ -116,6 +118,8 @@ def _solve(
     model = None if isinstance(problem, FrictionProblem) else problem
     if problem is None or not (model is None or hasattr(model, "assemble")):
         raise InvalidInput(f"problem: expected a Model or a FrictionProblem, got {problem!r}")
+    if model is not None and getattr(model, "is_large", False):
+        return _solve_large(model, solver, callback, options)
     began = time.perf_counter()
     discrete = problem if model is None else model.discrete_problem()
     assembled = time.perf_counter() - began
@@ -136,6 +140,24 @@ def _with_reason(found: FrictionSolution, reason: str) -> FrictionSolution:
         return found
     detail = "; ".join(text for text in (found.convergence.detail, reason) if text)
     return replace(found, convergence=replace(found.convergence, detail=detail))
+
+
+def _solve_large(
+    model: Model, solver: Solver | None, callback: Callback | None, options: dict[str, Any]
+) -> ModelSolution:
+    """The same of a model with hyperelastic laws: one nonlinear problem."""
+    from .model.large_deformation import large_deformation
+    from .solvers.nonlinear_newton import nonlinear_solver
+
+    method = nonlinear_solver(solver)
+    began = time.perf_counter()
+    problem = large_deformation(model)
+    assembled = time.perf_counter() - began
+    if isinstance(options.get("start"), ModelSolution):
+        options["start"] = options["start"].solution
+    with _progress(callback, options["tolerance"]) as seen:
+        found = problem.solved(drive(problem, method, callback=seen, **options))  # type: ignore[arg-type]
+    return ModelSolution(model, found, model.recover(found), assembled)
 
 
 def drive_any_form(

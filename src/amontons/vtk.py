@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .fem import cell_stress, von_mises
+from .fem.hyperelasticity import cauchy_stress, is_hyperelastic
 from .fem.write import write_meshes
 from .solution import FrictionSolution
 
@@ -34,7 +35,12 @@ def write_model(
     """
     pairs = list(zip(model.bodies, fields.displacement, strict=True))
     starts = np.cumsum([0, *(len(body.mesh.points) for body, _ in pairs)])
-    stress = [cell_stress(body.mesh, body.material, moved) for body, moved in pairs]
+    stress = [
+        (cauchy_stress if is_hyperelastic(body.material) else cell_stress)(
+            body.mesh, body.material, moved
+        )
+        for body, moved in pairs
+    ]
     owner = [np.full(body.mesh.cell_count, k) for k, (body, _) in enumerate(pairs)]
     displacement = _spatial(np.concatenate(fields.displacement))
     write_meshes(

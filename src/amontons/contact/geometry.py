@@ -2,7 +2,8 @@
 
 gap >= 0 outside the obstacle; normals point from the obstacle into the body.  Small-strain
 theory: both are taken once, in the reference configuration, and a node then moves along the
-tangent plane of its obstacle.
+tangent plane of its obstacle.  Large deformations take both where the node is, and need the
+slopes of both: `gap_slopes`, `normal_slopes`.
 """
 
 from __future__ import annotations
@@ -63,6 +64,14 @@ class Plane:
         _same_dimension("plane", len(self.normal), points)
         return np.tile(np.asarray(self.normal), (len(points), 1))
 
+    def gap_slopes(self, points: Array) -> Array:
+        """Gradient of the gap, (n, dim): the normal."""
+        return self.normals(points)
+
+    def normal_slopes(self, points: Array) -> Array:
+        """Derivative of the normal by position, (n, dim, dim): zero."""
+        return np.zeros((*points.shape, points.shape[1]))
+
 
 @dataclass(frozen=True)
 class Sphere:
@@ -86,28 +95,35 @@ class Sphere:
         _same_dimension("sphere", len(self.center), points)
         return _unit("sphere", points - np.asarray(self.center), points)
 
+    def gap_slopes(self, points: Array) -> Array:
+        """Gradient of the gap, (n, dim): the normal."""
+        return self.normals(points)
+
+    def normal_slopes(self, points: Array) -> Array:
+        """Derivative of the normal by position, (n, dim, dim): (I - n n^T) / distance."""
+        n = self.normals(points)
+        distance = self.gap(points) + self.radius
+        return _tangential(n) / distance[:, None, None]
+
 
 @dataclass(frozen=True)
 class LevelSet:
     """The obstacle where `function` < 0; function and gradient take points (n, dim).
 
     function returns (n,), unit of length or any smooth multiple of it: the gap is
-    function / |gradient|, exact to first order near the surface.  gradient returns (n, dim);
-    central differences by default.
+    function / |gradient|, exact to first order near the surface.  gradient returns (n, dim),
+    hessian (n, dim, dim), which large deformations need; central differences by default.
     """
 
     function: Callable[[Array], Array]
     gradient: Callable[[Array], Array] | None = None
+    hessian: Callable[[Array], Array] | None = None
 
     def __post_init__(self) -> None:
-        if not callable(self.function):
-            raise InvalidInput(
-                f"function: expected a callable of points, got {self.function!r}"
-            )
-        if self.gradient is not None and not callable(self.gradient):
-            raise InvalidInput(
-                f"gradient: expected a callable of points, got {self.gradient!r}"
-            )
+        for name in ("function", "gradient", "hessian"):
+            given = getattr(self, name)
+            if not (callable(given) or (given is None and name != "function")):
+                raise InvalidInput(f"{name}: expected a callable of points, got {given!r}")
 
     def gap(self, points: Array) -> Array:
         """Value over slope, (n,): the distance to first order."""
@@ -117,6 +133,37 @@ class LevelSet:
     def normals(self, points: Array) -> Array:
         """Unit vectors uphill, (n, dim)."""
         return _unit("level set", self._slopes(points), points)
+
+    def gap_slopes(self, points: Array) -> Array:
+        """Gradient of the gap, (n, dim): n - (value / slope^2) second n."""
+        slopes, second = self._slopes(points), self._second(points)
+        length = np.linalg.norm(slopes, axis=1)
+        n = slopes / length[:, None]
+        bent = np.einsum("pij,pj->pi", second, n)
+        return n - (self._values(points) / length**2)[:, None] * bent
+
+    def normal_slopes(self, points: Array) -> Array:
+        """Derivative of the normal by position, (n, dim, dim): (I - n n^T) second / slope."""
+        slopes = self._slopes(points)
+        length = np.linalg.norm(slopes, axis=1)
+        n = slopes / length[:, None]
+        return _tangential(n) @ self._second(points) / length[:, None, None]
+
+    def _second(self, points: Array) -> Array:
+        """Second derivatives, (n, dim, dim), symmetric."""
+        if self.hessian is not None:
+            second = np.asarray(self.hessian(points), dtype=float)
+            wanted = (*points.shape, points.shape[1])
+            if second.shape != wanted:
+                raise InvalidInput(f"hessian: expected shape {wanted}, got {second.shape}")
+        elif self.gradient is not None:
+            second = self._central(self._slopes, points, 1 / 3)
+        else:  # differences of differences: a longer step keeps half of the digits
+            second = self._central(
+                lambda x: self._central(self._values, x, 1 / 4), points, 1 / 4
+            )
+        _finite("hessian of the level set", second, points)
+        return (second + second.swapaxes(1, 2)) / 2
 
     def _values(self, points: Array) -> Array:
         values = np.asarray(self.function(points), dtype=float)
@@ -135,7 +182,7 @@ class LevelSet:
                     f"gradient: expected shape {points.shape}, got {slopes.shape}"
                 )
         else:
-            slopes = self._differences(points)
+            slopes = self._central(self._values, points, 1 / 3)
         _finite("gradient of the level set", slopes, points)
         flat = np.flatnonzero(np.linalg.norm(slopes, axis=1) == 0)
         if flat.size:
@@ -144,18 +191,20 @@ class LevelSet:
             )
         return slopes
 
-    def _differences(self, points: Array) -> Array:
-        """Central differences; the step balances truncation and rounding, h^3 ~ eps."""
+    @staticmethod
+    def _central(what: Callable[[Array], Array], points: Array, power: float) -> Array:
+        """Central differences in a new last axis; step eps^power of the size of the points.
+
+        Power 1/3 balances truncation and rounding of values, 1/4 of first differences.
+        """
         size = max(float(np.abs(points).max(initial=0.0)), float(np.ptp(points, axis=0).max()))
-        step = np.finfo(float).eps ** (1 / 3) * (size if size > 0 else 1.0)
+        step = np.finfo(float).eps ** power * (size if size > 0 else 1.0)
         columns = []
         for axis in range(points.shape[1]):
             shift = np.zeros(points.shape[1])
             shift[axis] = step
-            columns.append(
-                (self._values(points + shift) - self._values(points - shift)) / (2 * step)
-            )
-        return np.stack(columns, axis=1)
+            columns.append((what(points + shift) - what(points - shift)) / (2 * step))
+        return np.stack(columns, axis=-1)
 
 
 def frames(normals: Array) -> Array:
@@ -194,6 +243,11 @@ def _finite(what: str, values: Array, points: Array) -> Array:
             f"at {points[bad[0][0]]}"
         )
     return values
+
+
+def _tangential(n: Array) -> Array:
+    """I - n n^T per unit normal, (n, dim, dim)."""
+    return np.eye(n.shape[1]) - n[:, :, None] * n[:, None, :]
 
 
 def _unit(what: str, vectors: Array, points: Array) -> Array:

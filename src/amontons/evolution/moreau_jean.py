@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..cones import Coulomb, Law, Tresca
-from ..errors import InvalidInput
+from ..errors import InvalidInput, UnsupportedForm
 from ..model import Model
 from ..problem import FrictionProblem
 from ..solution import FrictionSolution
@@ -77,6 +77,10 @@ class MoreauJean:
 
     def prepare(self, model: Model, tolerance: float) -> MovingModel:
         """The matrices of all steps; tolerance of their solves."""
+        if model.is_large:
+            raise UnsupportedForm(
+                "model: dynamics are those of small strains; use QuasiStatic or LinearElastic"
+            )
         return MovingModel(self, model, tolerance)
 
 

@@ -15,6 +15,7 @@ from ..errors import InvalidInput
 from ..model import Model
 from ..solvers.base import Iterate
 from .energy import Energies
+from .large_steps import LargeSlowModel
 from .moreau_jean import Solve
 from .state import State, TimeStep
 from .system import Motion
@@ -32,9 +33,9 @@ class QuasiStatic:
         if not (np.isfinite(self.step) and self.step > 0):
             raise InvalidInput(f"step: expected a number > 0, got {self.step!r}")
 
-    def prepare(self, model: Model, tolerance: float) -> SlowModel:
+    def prepare(self, model: Model, tolerance: float) -> SlowModel | LargeSlowModel:
         """The matrices of all steps; equilibrium at the end never creates energy."""
-        return SlowModel(model)
+        return LargeSlowModel(model) if model.is_large else SlowModel(model)
 
 
 class SlowModel:

@@ -53,7 +53,8 @@ class TimeStep:
     """One step: the state after it, its discrete problem's solution, its energies.
 
     active (k,): the contacts that are in the problem, in order; the rest is open.  gap (nc,)
-    after the step, unit of length.
+    after the step, unit of length.  frames (nc, d, d): those of the deformed state where it is
+    large, else those of the model hold.
     """
 
     model: Model
@@ -62,6 +63,7 @@ class TimeStep:
     active: Index
     energies: Energies
     gap: Array
+    frames: Array | None = None
 
     @property
     def time(self) -> float:
@@ -111,9 +113,11 @@ class TimeStep:
         placed = self.model.discretisation.placed
         surfaces = [locate(self.model.bodies, c.slave) for c in self.model.contacts]
         rows = [p.rows for p in placed]
-        frames = np.concatenate([r.frames for r in rows])
+        frames = self.frames
+        if frames is None:
+            frames = np.concatenate([r.frames for r in rows])
         weights = np.concatenate([r.weights for r in rows])
-        force = forces(rows, self.state.force)
+        force = self._force
         traction = self.state.force / weights[:, None]
         return ContactFields(
             displacement=self.displacement, points=np.concatenate([r.points for r in rows]),
@@ -125,14 +129,21 @@ class TimeStep:
             facets=tuple((k, self.model.bodies[k].mesh.surface(name)) for k, name in surfaces),
         )  # fmt: skip
 
+    @property
+    def _force(self) -> Array:
+        """Contact forces on the slaves, (nc, d), global axes."""
+        if self.frames is not None:
+            return np.einsum("pkc,pk->pc", self.frames, self.state.force)
+        placed = self.model.discretisation.placed
+        return forces([p.rows for p in placed], self.state.force)
+
     def resultant(self, pairs: Sequence[int] | None = None) -> Array:
         """Sum of the contact forces on the slaves of some (all) contact pairs, global axes."""
         placed = self.model.discretisation.placed
         ends = np.cumsum([0, *(len(p.rows.nodes) for p in placed)])
         total = np.zeros(self.model.dimension)
         for k in range(len(placed)) if pairs is None else pairs:
-            force = self.state.force[ends[k] : ends[k + 1]]
-            total += placed[k].rows.force(force).sum(axis=0)
+            total += self._force[ends[k] : ends[k + 1]].sum(axis=0)
         return total
 
     def __str__(self) -> str:

@@ -13,6 +13,8 @@ from ..problem import Form, FrictionProblem
 from ..solution import FrictionSolution
 from ..solve import drive
 from ..solvers.base import Iterate, Solver
+from ..solvers.nonlinear_newton import nonlinear_solver
+from .large_steps import LargeSlowModel
 from .moreau_jean import Local, MoreauJean
 from .quasi_static import QuasiStatic
 from .state import State, TimeStep, at_rest
@@ -41,6 +43,8 @@ def evolve(
     The problem of a step is `step.problem`.
     """
     prepared = method.prepare(model, tolerance)
+    if isinstance(prepared, LargeSlowModel):
+        solver = nonlinear_solver(solver)  # type: ignore[assignment]
     state = start if start is not None else at_rest(model)
     _check(state, prepared.motion, method.step, until)
 

@@ -1,10 +1,11 @@
 """Models: bodies, supports, loads, contacts; assembled to a discrete problem and recovered."""
 
 from ..fem.elasticity import LinearElastic
+from ..fem.hyperelasticity import CiarletGeymonat, NeoHookean
 from .fields import ContactFields
 from .model import Model
 from .parts import Body, BodyForce, Contact, Fix, Traction
 from .processes import distributed
 
-__all__ = ["Body", "BodyForce", "Contact", "ContactFields", "Fix", "LinearElastic", "Model",
-           "Traction", "distributed"]  # fmt: skip
+__all__ = ["Body", "BodyForce", "CiarletGeymonat", "Contact", "ContactFields", "Fix",
+           "LinearElastic", "Model", "NeoHookean", "Traction", "distributed"]  # fmt: skip

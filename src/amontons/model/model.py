@@ -13,6 +13,7 @@ from scipy import sparse
 
 from ..cones import Coulomb, Law, Tresca
 from ..errors import InvalidInput, UnsupportedForm
+from ..fem.hyperelasticity import is_hyperelastic
 from ..linear import Direct
 from ..linear.grid_matrix import GridMatrix
 from ..nitsche_problem import NO_MULTIPLIERS, NitscheProblem
@@ -21,6 +22,7 @@ from ..solution import FrictionSolution
 from .assembly import Discretisation, discretise, locate
 from .balance import imbalance
 from .fields import ContactFields, recover_fields
+from .large_fields import recover_large
 from .nitsche import nitsche_matrices, nitsche_problem
 from .parts import Body, BodyForce, Contact, Fix, Traction
 from .rigid import Piece, check_held, loose_modes
@@ -76,6 +78,11 @@ class Model:
         return self.bodies[0].mesh.dim
 
     @property
+    def is_large(self) -> bool:
+        """True with hyperelastic laws: finite strains, contact in the current configuration."""
+        return any(is_hyperelastic(body.material) for body in self.bodies)
+
+    @property
     def discretisation(self) -> Discretisation:
         """Matrices at load factor 1, assembled once and shared by variants of this model."""
         if "all" not in self._shared:
@@ -103,6 +110,11 @@ class Model:
 
     @cached_property
     def _problem(self) -> FrictionProblem | NitscheProblem:
+        if self.is_large:
+            raise UnsupportedForm(
+                "model: hyperelastic laws have no one linear problem; use solve(model), whose "
+                "solution.problem is the tangent one, or LinearElastic"
+            )
         parts = self.discretisation
         w = self.load_factor * parts.carried
         w[:, 0] += parts.gap
@@ -203,8 +215,13 @@ class Model:
         return other
 
     def recover(self, solution: FrictionSolution) -> ContactFields:
-        """Displacements, tractions and resultant of a solution of `assemble()`."""
+        """Displacements, tractions and resultant of a solution of `assemble()`.
+
+        With large deformations of its `large_deformation`, and frames of the deformed state.
+        """
         surfaces = tuple(locate(self.bodies, c.slave) for c in self.contacts)
+        if self.is_large:
+            return recover_large(self, surfaces, solution)
         return recover_fields(
             self.bodies, surfaces, self.discretisation, solution, self.load_factor
         )

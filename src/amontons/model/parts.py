@@ -14,34 +14,38 @@ from numpy.typing import NDArray
 from ..contact import Nitsche, Obstacle
 from ..errors import InvalidInput
 from ..fem.elasticity import LinearElastic, materials_by_region
+from ..fem.hyperelasticity import CiarletGeymonat, NeoHookean
 from ..fem.mesh import Mesh
 from ..fem.order import second_order
 from .values import ScalarValue, VectorValue
 
 Array = NDArray[np.float64]
+Material = LinearElastic | NeoHookean | CiarletGeymonat
 METHODS = ("nodal", "mortar", "nitsche")  # "dual-mortar" is another name of the second
 
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A mesh and its material: one LinearElastic, or one per region name.
+    """A mesh and its material: LinearElastic, NeoHookean or CiarletGeymonat, or one per region.
+
+    The last two mean large deformations, of the whole model.
 
     order: 1 or 2, degree of the displacement.  With 2 the mesh becomes one of second order, see
     `second_order`: its points are then all nodes.
     """
 
     mesh: Mesh
-    material: LinearElastic | Mapping[str, LinearElastic]
+    material: Material | Mapping[str, Material]
     name: str = ""
     order: int = 1
 
     def __post_init__(self) -> None:
         if not isinstance(self.mesh, Mesh):
             raise InvalidInput(f"mesh: expected a Mesh (see box, read_mesh), got {self.mesh!r}")
-        if not isinstance(self.material, LinearElastic | Mapping):
+        if not isinstance(self.material, Material | Mapping):
             raise InvalidInput(
-                "material: expected LinearElastic or a dict region -> LinearElastic, "
-                f"got {self.material!r}"
+                "material: expected LinearElastic, NeoHookean or CiarletGeymonat, or a dict "
+                f"region -> one of them, got {self.material!r}"
             )
         if self.order not in (1, 2):
             raise InvalidInput(f"order: expected 1 or 2, got {self.order!r}")
