@@ -35,10 +35,12 @@ def meshes():
 
 
 def deformed(mesh, seed):
-    """Positions after a random large but admissible deformation."""
+    """Displacements of a random large but admissible deformation."""
     rng = np.random.default_rng(seed)
     slope = np.eye(mesh.dim) + 0.25 * rng.uniform(-1, 1, (mesh.dim, mesh.dim))
-    return mesh.points @ slope.T + 0.01 * rng.uniform(-1, 1, mesh.points.shape)
+    return mesh.points @ (slope - np.eye(mesh.dim)).T + 0.01 * rng.uniform(
+        -1, 1, mesh.points.shape
+    )
 
 
 def energy_density(law, F):
@@ -46,10 +48,10 @@ def energy_density(law, F):
     C, J = F.T @ F, np.linalg.det(F)
     if isinstance(law, NeoHookean):
         return (law.shear / 2 * (np.trace(C) - 3) - law.shear * np.log(J)
-                + law.lame_lambda / 2 * np.log(J) ** 2)  # fmt: skip
+                + law.lame_lambda() / 2 * np.log(J) ** 2)  # fmt: skip
     cofactor = np.linalg.det(C) * np.linalg.inv(C).T
     a, b = law.a, law.shear / 2 - law.a
-    c, d = law.lame_lambda / 4 - law.shear / 2 + law.a, law.lame_lambda / 2 + law.shear
+    c, d = law.lame_lambda() / 4 - law.shear / 2 + law.a, law.lame_lambda() / 2 + law.shear
     return (a * (np.trace(C) - 3) + b * (np.trace(cofactor) - 3)
             + c * (np.linalg.det(C) - 1) - d * np.log(J))  # fmt: skip
 
@@ -58,17 +60,17 @@ def energy_density(law, F):
 @pytest.mark.parametrize("kind", meshes())
 def test_tangent_forces_and_energy_belong_together(kind, law):
     mesh = meshes()[kind]
-    body, x = HyperelasticBody(mesh, law), deformed(mesh, 3)
-    forces, blocks = body.tangent(x)
-    direction = np.random.default_rng(5).standard_normal(x.shape)
+    body, u = HyperelasticBody(mesh, law), deformed(mesh, 3)
+    forces, blocks = body.tangent(u)
+    direction = np.random.default_rng(5).standard_normal(u.shape)
     step = 1e-5
-    ahead, behind = body.forces(x + step * direction), body.forces(x - step * direction)
-    predicted = (body.matrix(blocks) @ direction.ravel()).reshape(x.shape)
+    ahead, behind = body.forces(u + step * direction), body.forces(u - step * direction)
+    predicted = (body.matrix(blocks) @ direction.ravel()).reshape(u.shape)
     error = np.abs((ahead - behind) / (2 * step) - predicted).max()
     assert error < 1e-6 * np.abs(predicted).max()
-    work = (body.energy(x + step * direction) - body.energy(x - step * direction)) / (2 * step)
+    work = (body.energy(u + step * direction) - body.energy(u - step * direction)) / (2 * step)
     assert work == pytest.approx((forces * direction).sum(), rel=1e-6)
-    assert np.array_equal(forces, body.forces(x))
+    assert np.array_equal(forces, body.forces(u))
 
 
 @pytest.mark.parametrize("law", LAWS, ids=repr)
@@ -79,20 +81,20 @@ def test_patch(kind, law):
     F = np.eye(3)
     rng = np.random.default_rng(1)
     F[: mesh.dim, : mesh.dim] += 0.3 * rng.uniform(-1, 1, (mesh.dim, mesh.dim))
-    x = mesh.points @ F[: mesh.dim, : mesh.dim].T
+    u = mesh.points @ (F - np.eye(3))[: mesh.dim, : mesh.dim].T
     body = HyperelasticBody(mesh, law)
     volume = 1.0 if kind == "pyramid" else 2.0
     if kind != "pyramid":
-        assert body.energy(x) == pytest.approx(volume * energy_density(law, F), rel=1e-12)
+        assert body.energy(u) == pytest.approx(volume * energy_density(law, F), rel=1e-12)
     P = np.zeros((3, 3))
     for i, k in np.ndindex(3, 3):
         shift = np.zeros((3, 3))
         shift[i, k] = 1e-6
         P[i, k] = (energy_density(law, F + shift) - energy_density(law, F - shift)) / 2e-6
     wanted = P @ F.T / np.linalg.det(F)
-    found = cauchy_stress(mesh, law, x - mesh.points)
+    found = cauchy_stress(mesh, law, u)
     assert np.abs(found - wanted).max() < 1e-8 * np.abs(wanted).max()
-    forces = body.forces(x)
+    forces = body.forces(u)
     outer = np.unique(np.concatenate([f.nodes.ravel() for f in mesh.boundary]))
     inner = np.setdiff1d(np.arange(len(mesh.points)), outer)
     assert np.abs(forces[inner]).max(initial=0) < 1e-13 * np.abs(P).max()
@@ -109,10 +111,14 @@ def test_rigid_motions_and_rotations(kind, law):
     mesh = meshes()[kind]
     Q = np.linalg.qr(np.random.default_rng(2).standard_normal((mesh.dim, mesh.dim)))[0]
     Q[0] *= np.linalg.det(Q)
-    body, x = HyperelasticBody(mesh, law), deformed(mesh, 7)
-    assert np.abs(body.forces(mesh.points @ Q.T + 1)).max() < 1e-13 * law.young
-    turned = body.forces(x @ Q.T - 3)
-    assert np.abs(turned - body.forces(x) @ Q.T).max() < 1e-12 * np.abs(turned).max()
+    body, u = HyperelasticBody(mesh, law), deformed(mesh, 7)
+    assert (
+        np.abs(body.forces(mesh.points @ (Q.T - np.eye(mesh.dim)) + 1)).max()
+        < 1e-13 * law.young
+    )
+    x = mesh.points + u
+    turned = body.forces(x @ Q.T - 3 - mesh.points)
+    assert np.abs(turned - body.forces(u) @ Q.T).max() < 1e-12 * np.abs(turned).max()
 
 
 @pytest.mark.parametrize("law", LAWS, ids=repr)
@@ -121,7 +127,7 @@ def test_the_tangent_at_rest_is_linear_elasticity(kind, law):
     mesh = meshes()[kind]
     linear = stiffness(mesh, am.LinearElastic(law.young, law.poisson)).tocsr()
     body = HyperelasticBody(mesh, law)
-    tangent = body.matrix(body.tangent(np.array(mesh.points))[1]).tocsr()
+    tangent = body.matrix(body.tangent(np.zeros_like(mesh.points))[1]).tocsr()
     assert abs(tangent - linear).max() < 1e-12 * abs(linear).max()
 
 
@@ -129,21 +135,21 @@ def test_the_tangent_at_rest_is_linear_elasticity(kind, law):
 def test_inverted_cells_are_reported_and_never_a_number(law):
     mesh = am.box((1, 1), cells=2)
     body = HyperelasticBody(mesh, law)
-    x = mesh.points * [1.0, -1.0]
+    u = mesh.points * [0.0, -2.0]
     for ask in (body.forces, body.tangent, body.energy):
         with pytest.raises(InvertedCells, match="det F is -1"):
-            ask(x)
+            ask(u)
         with pytest.raises(InvertedCells):
-            ask(np.full_like(x, np.nan))
+            ask(np.full_like(u, np.nan))
 
 
 def test_several_regions():
     points = [[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1]]
     left, right = np.array([[0, 1, 4, 3]]), np.array([[1, 2, 5, 4]])
     mesh = Mesh(points, (Cells("quad", left, "left"), Cells("quad", right, "right")))
-    x = deformed(mesh, 4)
-    both = HyperelasticBody(mesh, {"left": LAWS[0], "right": LAWS[1]}).forces(x)
-    only = [HyperelasticBody(mesh, law).forces(x) for law in LAWS[:2]]
+    u = deformed(mesh, 4)
+    both = HyperelasticBody(mesh, {"left": LAWS[0], "right": LAWS[1]}).forces(u)
+    only = [HyperelasticBody(mesh, law).forces(u) for law in LAWS[:2]]
     assert np.allclose(both[[0, 3]], only[0][[0, 3]], atol=1e-14)
     assert np.allclose(both[[2, 5]], only[1][[2, 5]], atol=1e-14)
     with pytest.raises(InvalidInput, match="region 'right'"):

@@ -19,7 +19,7 @@ import numpy as np
 from numba import njit
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy")
 def _inverse_transposed(F, H, dim):
     """F^-T into H (both 3x3, the leading dim x dim part) and det F."""
     if dim == 2:
@@ -39,20 +39,20 @@ def _inverse_transposed(F, H, dim):
     return J
 
 
-@njit(cache=True, error_model="numpy", inline="always")
-def _deformation(x, nodes, G, F, dim):
-    """F = sum_a x_a G_a^T at one point of integration."""
+@njit(cache=True, error_model="numpy")
+def _deformation(u, nodes, G, F, dim):
+    """F = I + sum_a u_a G_a^T at one point of integration: u has more digits than X + u."""
     for i in range(dim):
         for k in range(dim):
-            F[i, k] = 0.0
+            F[i, k] = 1.0 if i == k else 0.0
     for a in range(len(nodes)):
         for i in range(dim):
-            value = x[nodes[a], i]
+            value = u[nodes[a], i]
             for k in range(dim):
                 F[i, k] += value * G[a, k]
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy")
 def _products(F, C, B, dim):
     """C = F^T F and B = F F^T; returns tr C, with F_33 = 1 in 2D."""
     trace = 1.0 if dim == 2 else 0.0
@@ -67,7 +67,7 @@ def _products(F, C, B, dim):
     return trace
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy")
 def _stress(F, C, H, trace, J, law, P, dim):
     """(2) into P."""
     a, b = 2.0 * law[0], 2.0 * law[1]
@@ -84,20 +84,20 @@ def _stress(F, C, H, trace, J, law, P, dim):
 
 
 @njit(cache=True, error_model="numpy")
-def forces_inplace(x, nodes, gradients, volumes, laws, out):
-    """Add nodal forces (n, dim) of positions x (n, dim) to out; returns the least J.
+def forces_inplace(u, nodes, gradients, volumes, laws, out):
+    """Add nodal forces (n, dim) of displacements u (n, dim) to out; returns the least J.
 
     nodes (k, a); gradients (k, q, a, dim) in the reference configuration; volumes (k, q);
     laws (k, 5): a, b, c, d, e of (1).
     """
-    dim = x.shape[1]
+    dim = u.shape[1]
     F, C, B, H, P = np.zeros((5, 3, 3))
     least = np.inf
     for k in range(len(nodes)):
         law = laws[k]
         for q in range(volumes.shape[1]):
             G = gradients[k, q]
-            _deformation(x, nodes[k], G, F, dim)
+            _deformation(u, nodes[k], G, F, dim)
             trace = _products(F, C, B, dim)
             J = _inverse_transposed(F, H, dim)
             least = min(least, J)
@@ -114,15 +114,15 @@ def forces_inplace(x, nodes, gradients, volumes, laws, out):
 
 
 @njit(cache=True, error_model="numpy")
-def energy_of(x, nodes, gradients, volumes, laws):
-    """(energy, least J) of positions x: the integral of (1)."""
-    dim = x.shape[1]
+def energy_of(u, nodes, gradients, volumes, laws):
+    """(energy, least J) of displacements u: the integral of (1)."""
+    dim = u.shape[1]
     F, C, B, H = np.zeros((4, 3, 3))
     total, least = 0.0, np.inf
     for k in range(len(nodes)):
         law = laws[k]
         for q in range(volumes.shape[1]):
-            _deformation(x, nodes[k], gradients[k, q], F, dim)
+            _deformation(u, nodes[k], gradients[k, q], F, dim)
             trace = _products(F, C, B, dim)
             J = _inverse_transposed(F, H, dim)
             least = min(least, J)
@@ -140,13 +140,13 @@ def energy_of(x, nodes, gradients, volumes, laws):
 
 
 @njit(cache=True, error_model="numpy")
-def tangent_inplace(x, nodes, gradients, volumes, laws, places, out, blocks):
+def tangent_inplace(u, nodes, gradients, volumes, laws, places, out, blocks):
     """Add forces to out (n, dim) and the tangent to blocks (m, dim, dim); returns the least J.
 
     places (k, a, a): the block of every pair of nodes of a cell.  (3) is symmetric: only pairs
     b >= a are summed up, in a local matrix, and mirrored.
     """
-    dim, count = x.shape[1], nodes.shape[1]
+    dim, count = u.shape[1], nodes.shape[1]
     F, C, B, H, P = np.zeros((5, 3, 3))
     A = np.zeros((dim, dim, dim, dim))
     half = np.zeros((dim, dim, dim))
@@ -157,7 +157,7 @@ def tangent_inplace(x, nodes, gradients, volumes, laws, places, out, blocks):
         local[:] = 0.0
         for q in range(volumes.shape[1]):
             G, volume = gradients[k, q], volumes[k, q]
-            _deformation(x, nodes[k], G, F, dim)
+            _deformation(u, nodes[k], G, F, dim)
             trace = _products(F, C, B, dim)
             J = _inverse_transposed(F, H, dim)
             least = min(least, J)
@@ -195,7 +195,7 @@ def tangent_inplace(x, nodes, gradients, volumes, laws, places, out, blocks):
     return least
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy")
 def _moduli(F, C, B, H, trace, g, J, law, volume, A, dim):
     """A[i, I, k, K] = dP_iI / dF_kK of (3), times the volume."""
     a, b = 2.0 * law[0] * volume, 2.0 * law[1] * volume

@@ -51,15 +51,14 @@ class NeoHookean:
         """Shear modulus at F = I, unit of stress."""
         return LinearElastic(self.young, self.poisson).shear
 
-    @property
-    def lame_lambda(self) -> float:
-        """First Lamé constant at F = I, unit of stress."""
-        return LinearElastic(self.young, self.poisson).lame_lambda(3)
+    def lame_lambda(self, dim: int = 3) -> float:
+        """First Lamé constant at F = I, also of plane strain; unit of stress."""
+        return LinearElastic(self.young, self.poisson).lame_lambda(dim)
 
     @property
     def coefficients(self) -> tuple[float, float, float, float, float]:
         """a, b, c, d, e of the family, unit of stress."""
-        return self.shear / 2, 0.0, 0.0, self.shear, self.lame_lambda
+        return self.shear / 2, 0.0, 0.0, self.shear, self.lame_lambda()
 
 
 @dataclass(frozen=True)
@@ -106,23 +105,22 @@ class CiarletGeymonat:
 
     @property
     def _allowed(self) -> tuple[float, float]:
-        return max(0.0, self.shear / 2 - self.lame_lambda / 4), self.shear / 2
+        return max(0.0, self.shear / 2 - self.lame_lambda() / 4), self.shear / 2
 
     @property
     def shear(self) -> float:
         """Shear modulus at F = I, unit of stress."""
         return LinearElastic(self.young, self.poisson).shear
 
-    @property
-    def lame_lambda(self) -> float:
-        """First Lamé constant at F = I, unit of stress."""
-        return LinearElastic(self.young, self.poisson).lame_lambda(3)
+    def lame_lambda(self, dim: int = 3) -> float:
+        """First Lamé constant at F = I, also of plane strain; unit of stress."""
+        return LinearElastic(self.young, self.poisson).lame_lambda(dim)
 
     @property
     def coefficients(self) -> tuple[float, float, float, float, float]:
         """a, b, c, d, e of the family, unit of stress."""
         a, half = float(self.a), self.shear / 2  # type: ignore[arg-type]
-        quarter = self.lame_lambda / 4
+        quarter = self.lame_lambda() / 4
         return a, half - a, quarter - half + a, 2 * quarter + 2 * half, 0.0
 
 
@@ -148,7 +146,7 @@ class _Block:
 
 
 class HyperelasticBody:
-    """Nodal forces and tangent of a mesh with hyperelastic laws, as functions of positions.
+    """Nodal forces and tangent of a mesh with hyperelastic laws, as functions of displacements.
 
     The pattern of the tangent never changes: blocks of dim x dim in rows `pointers` and columns
     `columns` of nodes, sorted.  All functions raise InvertedCells where J <= 0 at a point of
@@ -170,22 +168,24 @@ class HyperelasticBody:
             for cells, place in zip(mesh.cells, places, strict=True)
         ]
 
-    def forces(self, x: Array) -> Array:
-        """Nodal forces (n, dim) that hold the positions x (n, dim): dE/dx."""
-        out = np.zeros_like(x)
+    def forces(self, u: Array) -> Array:
+        """Nodal forces (n, dim) that hold the displacements u (n, dim): dE/du."""
+        u = np.ascontiguousarray(u, dtype=float)
+        out = np.zeros_like(u)
         for block in self.blocks:
             least = forces_inplace(
-                x, block.nodes, block.gradients, block.volumes, block.laws, out
+                u, block.nodes, block.gradients, block.volumes, block.laws, out
             )
             _check(least)
         return out
 
-    def tangent(self, x: Array) -> tuple[Array, Array]:
-        """(forces (n, dim), blocks (m, dim, dim) of the derivative by x)."""
-        dim = x.shape[1]
-        out, blocks = np.zeros_like(x), np.zeros((len(self.columns), dim, dim))
+    def tangent(self, u: Array) -> tuple[Array, Array]:
+        """(forces (n, dim), blocks (m, dim, dim) of the derivative by u)."""
+        u = np.ascontiguousarray(u, dtype=float)
+        dim = u.shape[1]
+        out, blocks = np.zeros_like(u), np.zeros((len(self.columns), dim, dim))
         for block in self.blocks:
-            least = tangent_inplace(x, block.nodes, block.gradients, block.volumes, block.laws,
+            least = tangent_inplace(u, block.nodes, block.gradients, block.volumes, block.laws,
                                     block.places, out, blocks)  # fmt: skip
             _check(least)
         return out, blocks
@@ -195,11 +195,12 @@ class HyperelasticBody:
         size = self.mesh.points.size
         return sparse.bsr_array((blocks, self.columns, self.pointers), shape=(size, size))
 
-    def energy(self, x: Array) -> float:
-        """Stored energy at positions x (n, dim), unit of work; zero at rest."""
+    def energy(self, u: Array) -> float:
+        """Stored energy at displacements u (n, dim), unit of work; zero at rest."""
+        u = np.ascontiguousarray(u, dtype=float)
         total = 0.0
         for block in self.blocks:
-            part, least = energy_of(x, block.nodes, block.gradients, block.volumes, block.laws)
+            part, least = energy_of(u, block.nodes, block.gradients, block.volumes, block.laws)
             _check(least)
             total += part
         return total
@@ -232,8 +233,8 @@ def _block(mesh: Mesh, cells: Cells, law: tuple[float, ...], places: Index) -> _
         volumes.append(weight * determinant(jac))
         gradients.append(cell.gradient(at) @ np.linalg.inv(jac))
     laws = np.tile(np.asarray(law), (len(cells.nodes), 1))
-    return _Block(cells.nodes, np.ascontiguousarray(np.stack(gradients, axis=1)),
-                  np.stack(volumes, axis=1), laws, places)  # fmt: skip
+    arrays = (cells.nodes, np.stack(gradients, axis=1), np.stack(volumes, axis=1), laws, places)
+    return _Block(*(np.array(a, order="C") for a in arrays))  # one type for compiled loops
 
 
 def _rule(cell: ReferenceCell) -> tuple[Array, Array]:

@@ -1,0 +1,344 @@
+"""Bodies at finite strains against obstacles: the discrete nonlinear problem.
+
+With f_int the nodal forces of the hyperelastic bodies at displacements v, and f the loads, the
+force that a contact has to supply is lambda = f_int - f at its node.  The displacements v of
+the free dofs are all the unknowns of
+
+    F(v) = f_int(v) - f           on free dofs that are no contact,                         (1)
+         = law(lambda(v), X + v)  at contacts, (2) of `contact.current`,
+
+which is continuous and piecewise smooth; all its entries are forces.  Friction speaks of the
+motion since `before`, the displacements at the end of the last step: [LR] section 3.
+`linearised` is the tangent problem at a state, as a `FrictionProblem`: it has the same
+reactions, gaps and slips there, so that statuses, files and pictures need nothing else.
+
+Left out: master surfaces, loads that follow the body, friction on components of a contact's
+motion that supports hold.
+
+[LR] T. Ligurský, Y. Renard, "A continuation problem for computing solutions of discretised
+evolution problems with application to plane quasi-static contact problems with friction",
+Comput. Methods Appl. Mech. Engrg. 280 (2014).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from .. import judge
+from ..cones import Law
+from ..contact.current import STICK, ContactPoint, Pieces
+from ..contact.nodal import contact_columns
+from ..errors import InvertedCells
+from ..judge import Measure
+from ..problem import Form, FrictionProblem
+from ..solution import FrictionSolution
+from .assembly import external_load
+from .nonlinear_parts import NonlinearParts, nonlinear_parts
+
+if TYPE_CHECKING:
+    from .model import Model
+
+Array = NDArray[np.float64]
+TOUCHING = 1e-9  # gaps up to this part of the size count as closed where nothing holds a body
+RESOLVED = 1e-7  # load, relative to stiffness times size, of which rounding leaves enough
+
+
+@dataclass(frozen=True, eq=False)
+class LargeDeformation:
+    """One static problem, or one step, at finite strains.
+
+    load, prescribed (dofs,): nodal forces, and values on the fixed dofs, zero on the free ones;
+    before (nc, d): displacements of the contacts since which friction counts; drift (nc, d):
+    motion added to that since then; scales: sizes of the load and of u for `error`; known:
+    load, prescribed values (dofs,) and state v (n,) from which load steps may begin, by default
+    the undeformed state.
+    """
+
+    parts: NonlinearParts
+    load: Array
+    prescribed: Array
+    before: Array
+    drift: Array
+    scales: tuple[float, float]
+    known: tuple[Array, Array, Array] | None = None
+    name: str = ""
+
+    # ---------------------------------------------------------------- sizes
+    form = Form.GLOBAL
+    measure = Measure.RESIDUAL
+
+    @property
+    def law(self) -> Law:
+        """Friction law of all contacts."""
+        return self.parts.contact.law
+
+    @property
+    def rho(self) -> Array:
+        """Augmentation parameter, (nc,), force per length."""
+        return self.parts.contact.rho
+
+    @property
+    def unknowns(self) -> int:
+        """Free dofs n."""
+        return len(self.parts.free)
+
+    @property
+    def contacts(self) -> int:
+        """Number of contacts nc."""
+        return len(self.parts.at)
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        return self.parts.dimension
+
+    # ---------------------------------------------------------------- states
+    def displacement(self, v: Array) -> Array:
+        """Displacements of all nodes, (nodes, d), of those of the free dofs v (n,)."""
+        out = self.prescribed.copy()
+        out[self.parts.free] = v
+        return out.reshape(self.parts.X.shape)
+
+    def _moved(self, u: Array) -> tuple[Array, Array]:
+        """Positions of the contacts and their motion since the last step, (nc, d)."""
+        at = u.ravel()[self.parts.at]
+        return self.parts.points + at, at - self.before + self.drift
+
+    def _point(self, u: Array, rest: Array) -> ContactPoint:
+        """The law at displacements u (nodes, d), where the bodies need `rest` (dofs,)."""
+        x, motion = self._moved(u)
+        return self.parts.contact.at(rest[self.parts.at], motion, x)
+
+    def contact_point(self, v: Array) -> ContactPoint:
+        """The contact law at a state."""
+        u = self.displacement(v)
+        return self._point(u, self.parts.forces(u) - self.load)
+
+    def residual(self, v: Array) -> Array:
+        """F(v), (n,), unit of force; raises InvertedCells where it is not defined."""
+        u = self.displacement(v)
+        rest = self.parts.forces(u) - self.load
+        rest[self.parts.at] = self._point(u, rest).residual()
+        return rest[self.parts.free]
+
+    def tangent(self, v: Array, pieces: Pieces | None = None) -> sparse.csc_array:
+        """dF/dv, (n, n), of the active piece of the law or of the given one, (nc,)."""
+        return self.linearisation(v, pieces).matrix
+
+    def linearisation(self, v: Array, pieces: Pieces | None = None) -> Linearisation:
+        """F and its derivatives at a state."""
+        u = self.displacement(v)
+        forces, blocks = self.parts.tangent(u)
+        point = self._point(u, forces - self.load)
+        return Linearisation(
+            self, forces - self.load, blocks, point, *point.derivatives(pieces)
+        )
+
+    def pieces(self, v: Array) -> Pieces:
+        """The active piece of the law at every contact, see `ContactPoint.pieces`."""
+        return self.contact_point(v).pieces
+
+    # ---------------------------------------------------------------- what the driver asks
+    @property
+    def guess(self) -> None:
+        """No better first state is known than `known_state`."""
+
+    def assembled(self) -> LargeDeformation:
+        """Itself."""
+        return self
+
+    def reactions(self, v: Array) -> Array:
+        """Contact forces r (nc, d) in the frames at the state v."""
+        return self._local(v)[0]
+
+    def _local(self, v: Array) -> tuple[Array, Array, Array, Array]:
+        """r, u, frames of `CurrentContact.local`, and f_int - f (dofs,)."""
+        u = self.displacement(v)
+        rest = self.parts.forces(u) - self.load
+        x, motion = self._moved(u)
+        return *self.parts.contact.local(rest[self.parts.at], motion, x), rest
+
+    def local_velocity(self, v: Array) -> Array:
+        """u = [gap, slip since the last step], (nc, d), in the frames at the state v."""
+        x, motion = self._moved(self.displacement(v))
+        return self.parts.contact.local(np.zeros_like(x), motion, x)[1]
+
+    def error(self, r: Array, v: Array | None = None) -> float:
+        """The residual measure of `judge` at reactions r and state v; infinite if inverted."""
+        if v is None or not (np.isfinite(v).all() and np.isfinite(r).all()):
+            return np.inf
+        try:
+            _, u, axes, rest = self._local(v)
+        except InvertedCells:
+            return np.inf
+        rest[self.parts.at] -= np.einsum("pkc,pk->pc", axes, r)
+        balance = float(np.linalg.norm(rest[self.parts.free]))
+        law = judge.scaled_residual(r, u, self.law, self.rho)
+        return max(_ratio(balance, self.scales[0]), _ratio(law, self.scales[1]))
+
+    def rounding(self, r: Array) -> float:
+        """What rounding alone may hide in `error`, unit-free."""
+        return _ratio(judge.rounding_error(self.rho, r), self.scales[1])
+
+    # ---------------------------------------------------------------- load steps
+    @property
+    def known_state(self) -> Array:
+        """The state v (n,) at share 0 of the load."""
+        return np.zeros(self.unknowns) if self.known is None else self.known[2]
+
+    def at_share(self, share: float) -> LargeDeformation:
+        """The problem at a share of the way from the known load to this one."""
+        load, prescribed = (0.0, 0.0) if self.known is None else self.known[:2]
+        return replace(
+            self,
+            load=load + share * (self.load - load),
+            prescribed=prescribed + share * (self.prescribed - prescribed),
+        )
+
+    def predicted(self, share: float, goal: float, v: Array) -> tuple[Linearisation, Array]:
+        """The linearisation at a share, and the first-order change of F, (n,), to another."""
+        now, then = self.at_share(share), self.at_share(goal)
+        here = now.linearisation(v)
+        return here, here.shifted(then.load - now.load, then.prescribed - now.prescribed)
+
+    def closed_pieces(self, v: Array) -> list[Pieces]:
+        """The active pieces with touching contacts stuck, then with all of them stuck."""
+        point = self.contact_point(v)
+        gap = self.parts.contact.gap(point.x)
+        size = np.ptp(self.parts.X, axis=0).max()
+        return [
+            np.where((point.pieces % 4 == 0) & (gap <= limit), STICK, point.pieces)
+            for limit in (TOUCHING * size, np.inf)
+        ]
+
+    # ---------------------------------------------------------------- results
+    def solved(self, found: FrictionSolution) -> FrictionSolution:
+        """The same solution, of the tangent problem at its state unless cells are inverted."""
+        assert found.v is not None
+        try:
+            return replace(found, problem=self.linearised(found.v))
+        except InvertedCells:
+            return found
+
+    def linearised(self, v: Array) -> FrictionProblem:
+        """The tangent problem at v: same reactions, gaps and slips there, frames of there."""
+        parts = self.parts
+        moved = self.displacement(v)
+        _, blocks = parts.tangent(moved)
+        r, u, axes, rest = self._local(v)
+        bend = parts.contact.normal_slopes(self._moved(moved)[0])
+        blocks[parts.diagonal] -= _turned(axes, r, bend)
+        nodes = parts.at[:, 0] // self.dimension
+        H = sparse.csc_array(contact_columns(nodes, axes, parts.X.size).tocsr()[parts.free])
+        M = parts.on_free(blocks)
+        w = u - (H.T @ v).reshape(u.shape)
+        return FrictionProblem.from_global(
+            M, H, M @ v - rest[parts.free], w, self.law, load_scale=self.scales[0],
+            u_scale=self.scales[1], name=self.name,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Linearisation:
+    """F and its derivatives at one state.
+
+    rest (dofs,): f_int - f; blocks: its derivative; by_force, by_x, by_motion (nc, d, d): those
+    of the contact law.
+    """
+
+    problem: LargeDeformation
+    rest: Array
+    blocks: Array
+    point: ContactPoint
+    by_force: Array
+    by_x: Array
+    by_motion: Array
+
+    @property
+    def residual(self) -> Array:
+        """F, (n,)."""
+        parts = self.problem.parts
+        out = self.rest.copy()
+        out[parts.at] = self.point.residual()
+        return out[parts.free]
+
+    @cached_property
+    def matrix(self) -> sparse.csc_array:
+        """dF/dv, (n, n)."""
+        parts = self.problem.parts
+        blocks = self.blocks.copy()
+        rows = np.flatnonzero(parts.row_contact >= 0)
+        blocks[rows] = self.by_force[parts.row_contact[rows]] @ blocks[rows]
+        blocks[parts.diagonal] += self.by_x + self.by_motion
+        return parts.on_free(blocks)
+
+    def shifted(self, load: Array, prescribed: Array, drift: Array | None = None) -> Array:
+        """First-order change of F, (n,), with changes of load, prescribed (dofs,) and drift."""
+        parts = self.problem.parts
+        change = parts.matrix(self.blocks) @ prescribed - load
+        at = np.einsum("pij,pj->pi", self.by_force, change[parts.at])
+        if drift is not None:
+            at += np.einsum("pij,pj->pi", self.by_motion, drift)
+        change[parts.at] = at
+        return change[parts.free]
+
+
+def _turned(axes: Array, r: Array, bend: Array) -> Array:
+    """Derivative of the forces sum_k r_k axis_k by the position, (nc, d, d).
+
+    dn = bend dx, and tangents are carried along: dt = -n (t . dn).
+    """
+    n, t = axes[:, 0], axes[:, 1:]
+    along = np.einsum("pk,pkc,pcj->pj", r[:, 1:], t, bend)
+    return r[:, 0, None, None] * bend - n[:, :, None] * along[:, None, :]
+
+
+def _ratio(size: float, scale: float) -> float:
+    """size / scale, with 0 / 0 = 0."""
+    return size / scale if scale > 0 else (0.0 if size == 0 else np.inf)
+
+
+def large_deformation(model: Model) -> LargeDeformation:
+    """The static problem of a model with hyperelastic laws, at its load factor.
+
+    Friction speaks of the motion from the undeformed state.
+    """
+    nonlinear_parts(model)  # says what is not supported
+    linear = model.discretisation
+    load = external_load(model.bodies, model.loads, linear.offsets)
+    factor = model.load_factor
+    return large_step(model, factor * load, factor * linear.prescribed)
+
+
+def large_step(
+    model: Model, load: Array, prescribed: Array, before: Array | None = None,
+    known: tuple[Array, Array, Array] | None = None,
+) -> LargeDeformation:  # fmt: skip
+    """One step under nodal forces and prescribed values (dofs,), since displacements `before`.
+
+    before (nc, d): of the contacts, zero by default; known: see `LargeDeformation`.
+    """
+    parts = nonlinear_parts(model)
+    before = np.zeros(parts.at.shape) if before is None else before
+    scales = _scales(model, parts, load, prescribed)
+    return LargeDeformation(parts, load, prescribed, before, np.zeros_like(before), scales,
+                            known, model.name)  # fmt: skip
+
+
+def _scales(
+    model: Model, parts: NonlinearParts, load: Array, prescribed: Array
+) -> tuple[float, float]:
+    """Sizes of the load and of u: those of linear elasticity, and what rounding can resolve."""
+    linear = model.discretisation
+    around = np.abs(parts.X - parts.X.mean(axis=0)).ravel()
+    force = abs(linear.stored_stiffness) @ around
+    still = np.zeros((len(parts.at), parts.dimension - 1))
+    found = model.increment(load, prescribed, still).scales
+    least = (np.linalg.norm(force), np.linalg.norm(around[parts.at]))
+    return max(found[0], RESOLVED * float(least[0])), max(found[1], RESOLVED * float(least[1]))
