@@ -10,6 +10,7 @@ from click.testing import CliRunner
 
 import amontons as am
 from amontons.cli import main
+from amontons.cli.sources import open_source
 from amontons.fclib import read_fclib, write_fclib
 from amontons.gallery import box_tower, random_delassus
 
@@ -201,6 +202,24 @@ def test_enumerate_lists_all_solutions():
     table = run("enumerate", "example:hild", "--mu", "2", "--set", "mesh.refine=1").stdout
     assert "ff " in table
     assert "1 solution; there is no other" in table
+
+
+@pytest.mark.parametrize("name", ["brake", "one-contact"])
+def test_enumerate_draws_solutions_side_by_side(name, tmp_path):
+    picture = tmp_path / "solutions.png"
+    assert run("enumerate", f"example:{name}", "--picture", str(picture)).exit_code == 0
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    refused = run("enumerate", f"example:{name}", "--picture", str(tmp_path / "a.doc"))
+    assert refused.exit_code == 2
+    assert ".doc" in refused.stderr
+
+
+def test_a_brake_arm_jams_only_with_much_friction():
+    counts = [
+        len(am.all_solutions(open_source("example:brake").model.with_mu(mu)).solutions)
+        for mu in (0.3, 0.42, 0.5, 0.8)
+    ]
+    assert counts == [1, 1, 3, 3]  # a rigid arm jams from 0.364 on
 
 
 def test_enumerate_says_what_it_can_not_do():

@@ -137,6 +137,7 @@ def bench(**options: object) -> None:
     epilog="""\b
 Examples:
   amontons enumerate example:hild             three solutions, and proof that there is no other
+  amontons enumerate example:brake --picture brake.png
   amontons enumerate example:hild --mu 2 --set mesh.refine=4
   amontons enumerate problem.hdf5 --json - | jq .complete
 
@@ -151,6 +152,8 @@ Exit codes: 0 the list is complete, 1 there may be others, 2 bad input.
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
               help="Replace a value of the case.")  # fmt: skip
 @click.option("--json", "json_copy", metavar="FILE", help="The same as JSON; - prints it.")
+@click.option("--picture", metavar="FILE",
+              help="Draw the solutions side by side: .png, .svg or .pdf.")  # fmt: skip
 def enumerate_solutions(**options: object) -> int:
     """Find all solutions of a 2D problem with Coulomb friction, and prove that these are all.
 

@@ -7,14 +7,20 @@ from typing import Any
 
 import click
 import numpy as np
+from numpy.typing import NDArray
 
 from ..analysis.enumerate import Solutions
 from ..api import all_solutions
 from ..errors import InvalidInput
-from ..output import to_json, versions
-from .sources import open_source
+from ..files import replacing
+from ..output import FIGURES, to_json, versions
+from ..problem import FrictionProblem
+from ..solve import drive
+from ..solvers import Iterate
+from .sources import Source, open_source
 from .terminal import check_writable, deliver_json, show_table
 
+Array = NDArray[np.float64]
 SCHEMA = "amontons/enumerate/1"
 INCOMPLETE = 1  # exit code
 SHOWN = 60  # contacts of a pattern that a table shows
@@ -22,10 +28,11 @@ SHOWN = 60  # contacts of a pattern that a table shows
 
 def run(
     source: str, overrides: Sequence[str], mu: float | None, time_limit: float | None,
-    json_copy: str | None,
+    json_copy: str | None, picture: str | None,
 ) -> int:  # fmt: skip
     """Search, show; the exit code."""
     check_writable(json_copy, "--json")
+    check_writable(picture, "--picture", FIGURES)
     opened = open_source(source, overrides)
     problem = opened.discrete()
     if mu is not None:
@@ -37,6 +44,11 @@ def run(
         _show(opened.title, found)
     if json_copy is not None:
         deliver_json(to_json(record(found)), json_copy)
+    if picture is not None:
+        named = [
+            f"{k}: orientation {s.orientation:+d}" for k, s in enumerate(found.solutions, 1)
+        ]
+        draw(opened, problem, [s.r for s in found.solutions], named, picture)
     return 0 if found.complete else INCOMPLETE
 
 
@@ -51,6 +63,19 @@ def record(found: Solutions) -> dict[str, Any]:
     return {"schema": SCHEMA, "complete": found.complete, "reason": found.reason,
             "examined": found.examined, "seconds": found.seconds, "solutions": solutions,
             "versions": versions()}  # fmt: skip
+
+
+def draw(
+    opened: Source, problem: FrictionProblem, reactions: Sequence[Array], names: Sequence[str],
+    picture: str,
+) -> None:  # fmt: skip
+    """Solutions of a problem, given by their reactions, side by side."""
+    from ..plots import solutions_figure
+
+    solutions = [drive(problem, start=Iterate(np.array(r))) for r in reactions]
+    figure = solutions_figure(solutions, names, title=opened.title, model=opened.model)
+    with replacing(picture) as temporary:
+        figure.savefig(temporary)
 
 
 def _show(title: str, found: Solutions) -> None:

@@ -1,5 +1,6 @@
-"""Figures: of one solution, of a method's convergence, of steps in time, of many methods."""
+"""Figures: of one solution, of several, of convergence, of steps in time, of many methods."""
 
+from .several import solutions_figure
 from .solution import COLOURS, convergence_figure, profile_figure, status_figure
 from .steps import SI, Frame, Units, draw_film, energy_figure, series_figure, step_figure
 
@@ -13,6 +14,7 @@ __all__ = [
     "energy_figure",
     "profile_figure",
     "series_figure",
+    "solutions_figure",
     "status_figure",
     "step_figure",
 ]
