@@ -260,11 +260,15 @@ class FrictionProblem:
         return self._kept("factor", (M,), lambda: solver.factor(M, modes))
 
     def assembled(self) -> FrictionProblem:
-        """The same problem with M as a stored matrix, for solvers that need its entries."""
+        """The same problem with M as a stored matrix, for solvers that need its entries.
+
+        Its levels, which the operator has for itself, become those of the problem.
+        """
         if not isinstance(self.M, GridMatrix):
             return self
         M = self.M
-        return replace(self, M=self._kept("stored", (M,), M.tocsc))
+        levels = self.levels or self._kept("stored levels", (M,), M.free_levels)
+        return replace(self, M=self._kept("stored", (M,), M.tocsc), levels=levels)
 
     @cached_property
     def bodies(self) -> Bodies:

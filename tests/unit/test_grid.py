@@ -102,3 +102,12 @@ def test_other_solvers_get_the_stored_matrix(unstored):
     solution = drive(problem, SemismoothNewton(), tolerance=1e-8)
     assert solution.converged
     assert drive(problem).converged
+
+
+def test_the_stored_matrix_comes_with_the_levels(monkeypatch):
+    stored = model((8, 8, 4)).assemble()
+    monkeypatch.setattr(assembly, "GRID_FROM", 1)
+    problem = model((8, 8, 4)).assemble().assembled()
+    assert len(problem.levels) == len(stored.levels) > 0
+    for ours, theirs in zip(problem.levels, stored.levels, strict=True):
+        assert abs(ours - theirs).max() == 0

@@ -10,7 +10,7 @@ from scipy import sparse
 
 from .grid import GridBlocks
 from .hierarchy import Hierarchy, Nodes
-from .levels import Levels, fine_unknown
+from .levels import Levels, fine_unknown, free_levels
 from .transfer import Transfer
 
 Array = NDArray[np.float64]
@@ -75,6 +75,12 @@ class GridMatrix:
         out = sparse.csc_array(whole[self.nodes.place][:, self.nodes.place])
         out.sort_indices()
         return out
+
+    def free_levels(self) -> Levels:
+        """Prolongations of the free unknowns, finest first."""
+        fixed = np.ones(3 * self.nodes.count, dtype=bool)
+        fixed[self.nodes.place] = False
+        return free_levels([self.levels], [self.nodes.count], 3, fixed)
 
     @cached_property
     def hierarchy(self) -> Hierarchy:
