@@ -452,3 +452,69 @@ def test_forces_balance_the_load_of_a_body_held_by_contact_alone():
     assert len(model.discretisation.placed[0].rows.nodes) == 12
     solution = am.drive(model.assemble(), tolerance=1e-10)
     np.testing.assert_allclose(model.recover(solution).resultant, (-0.05, -0.02, 1), atol=1e-8)
+
+
+def dual_moments(n):
+    """Integrals of t (1 - t) psi_i over [0, 1] with n elements, psi dual to hat functions."""
+    at, weights = np.polynomial.legendre.leggauss(3)
+    s, weights = (at + 1) / 2, weights / (2 * n)
+    out = np.zeros(n + 1)
+    for e in range(n):
+        t = (e + s) / n
+        out[e] += (t * (1 - t) * weights) @ (2 - 3 * s)
+        out[e + 1] += (t * (1 - t) * weights) @ (3 * s - 1)
+    return out
+
+
+def tresca_bounds(bound, method="mortar", high=None, low=None):
+    """Forces that bound friction, and the contacts, of a unit block on a plane or a block."""
+    bodies = [am.Body(high or am.box((1, 1, 1), (4, 4, 1)), SOFT, name="upper")]
+    partner = {"obstacle": am.Plane((0, 0, 1))}
+    if low is not None:
+        bodies.append(am.Body(low, SOFT, name="lower"))
+        partner = {"master": "lower.top"}
+    slave = "bottom" if low is None else "upper.bottom"
+    contact = am.Contact(slave, tresca=bound, method=method, **partner)
+    fixes = [am.Fix("top" if low is None else "upper.top", 0)]
+    fixes += [am.Fix("lower.bottom", 0)] if low is not None else []
+    model = am.Model(bodies, fixes, [contact])
+    return model.assemble().law.limit, model.discretisation.placed[0].rows
+
+
+def test_a_tresca_bound_is_integrated_with_the_dual_functions():
+    """As [HSW] Table 4.1 has it; nodal contact takes the value at the node times its area."""
+
+    def bound(x):
+        return 800 * x[:, 0] * x[:, 1] * (1 - x[:, 0]) * (1 - x[:, 1])
+
+    limit, rows = tresca_bounds(bound)
+    where = np.rint(4 * rows.points[:, :2]).astype(int)
+    np.testing.assert_allclose(limit, 800 * dual_moments(4)[where].prod(axis=1), rtol=1e-12)
+    nodal, rows = tresca_bounds(bound, "nodal")
+    np.testing.assert_allclose(nodal, bound(rows.points) * rows.weights)
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.3])
+def test_tresca_bounds_between_meshes_that_do_not_match(shift):
+    """A traction on the bound has its integral; numbers and nodal values count by the weight."""
+    low, high = blocks_apart(3, (shift, 0), 4, 3)
+    area = (1 - shift) * (1 + shift) / 2  # of x over [shift, 1]
+    limit, rows = tresca_bounds(lambda x: x[:, 0], high=high, low=low)
+    force = rows.H[:, ::3] @ -limit  # on the whole surface, also on nodes without multiplier
+    np.testing.assert_allclose(np.abs(force).sum(), area, rtol=1e-12)
+    limit, rows = tresca_bounds(7.0, high=high, low=low)
+    np.testing.assert_allclose(limit, 7 * rows.weights)
+    same, _ = tresca_bounds(lambda x: np.full(len(x), 7.0), high=high, low=low)
+    np.testing.assert_allclose(same, limit)
+    values = np.arange(16.0)
+    limit, rows = tresca_bounds(values, high=high, low=low)
+    slave = high.surface_nodes("bottom")
+    given = values[np.searchsorted(slave, rows.nodes)]
+    np.testing.assert_allclose(limit, given * rows.weights)
+
+
+def test_tresca_bounds_are_not_negative():
+    """Dual functions are, so that a bound next to zeros may have a negative integral."""
+    limit, _ = tresca_bounds(lambda x: np.where(x[:, 0] < 0.25, 1.0, 0.0))
+    assert (limit >= 0).all()
+    assert limit.max() > 0

@@ -24,6 +24,7 @@ three-dimensional contact problems with Coulomb friction", SIAM J. Sci. Comput. 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,7 +39,7 @@ from .clipping import line_rule, square_rule, triangle_rule
 from .curvature import heights
 from .dual import dual_functions, nodes_with_multiplier
 from .geometry import Obstacle, frames
-from .nodal import ContactRows, check_exterior, contact_nodes
+from .nodal import ContactRows, Field, check_exterior, contact_nodes
 from .overlap import check_different, inside, not_facing
 from .pairs import KINDS, MAX_NODES
 from .segments import Segments, Surface, is_deep, nearest, segments
@@ -52,6 +53,7 @@ HARDLY = 0.1  # covered part of a node's weight below which it gets no multiplie
 ROUNDING = 1e-14  # averages below this are zeros with rounding errors
 SAME = 1e-12  # prescribed values that differ by less, relative to the largest, agree
 BESIDE = 1e-3  # of a facet: how far outside of it a point is asked for
+COVERED = 1e-6  # part of a facet that may be missing where it faces the other side as a whole
 RULES = {"line": line_rule(4), "tri": triangle_rule(4), "quad": square_rule(4)}
 
 
@@ -127,12 +129,14 @@ def mortar_contact(
 class _Average:
     """Averages of nodal values over the slave surface, one for each node with multiplier.
 
-    nodes (nc,); weights (nc,): D_p; psi (f, 4, 4): dual functions on the facets that take part;
-    onto_slave (nc, n): 1 at the node, its average of others without multiplier besides.
+    nodes (nc,); weights (nc,): D_p; facets (f,) that take part, mass (f, 4, 4): int phi phi on
+    what faces the other side, psi (f, 4, 4): dual functions; onto_slave (nc, n): 1 at the node,
+    its average of others without multiplier besides.
     """
 
-    points: Array
-    facet_nodes: Index
+    surface: Surface
+    facets: Index
+    mass: Array
     nodes: Index
     weights: Array
     psi: Array
@@ -154,8 +158,34 @@ class _Average:
         own = sparse.csr_array(
             (np.ones(len(chosen)), (np.arange(len(chosen)), chosen)), shape=(len(chosen), n)
         )
-        return cls(surface.points, nodes, chosen, weights, psi,
+        return cls(surface, facets, mass, chosen, weights, psi,
                    own + _cleaned(extra, weights))  # fmt: skip
+
+    @property
+    def points(self) -> Array:
+        """Points of the mesh, (n, dim)."""
+        return self.surface.points
+
+    @property
+    def facet_nodes(self) -> Index:
+        """Nodes of the facets that take part, (f, 4)."""
+        return self.surface.nodes[self.facets]
+
+    def of_function(self, field: Field) -> Array:
+        """int f psi_p / int psi_p, (nc,); f is interpolated on facets that face it in part."""
+        at_nodes = np.zeros(len(self.points))
+        used = np.unique(self.facet_nodes)
+        at_nodes[used] = field(self.points[used])
+        moments = np.einsum("fab,fb->fa", self.mass, at_nodes[self.facet_nodes])
+        exact = np.zeros((len(self.surface.nodes), MAX_NODES))
+        for of, phi, area, x in _gauss_points(self.surface):
+            exact[of, : len(phi)] += (area * field(phi @ x))[:, None] * phi
+        covered = self.mass.sum(axis=(1, 2))
+        whole = covered > (1 - COVERED) * self.surface.area[self.facets]
+        moments[whole] = exact[self.facets[whole]]
+        both = np.stack([moments, self.mass.sum(axis=2)], axis=2)
+        field_and_one = self.of_moments(np.arange(len(self.facets)), both)
+        return field_and_one[:, 0] / field_and_one[:, 1]
 
     def onto(self, parts: Segments, of: Index, master: Surface) -> sparse.csr_array:
         """Averages of the master's nodal values, (nc, n_master); of: facet of every segment."""
@@ -174,7 +204,9 @@ class _Average:
         """Contacts with given frames and gaps, in the dofs of the slave."""
         fixed = np.zeros(axes.shape[:2], dtype=bool) if fixed is None else fixed
         H = coupled_columns(self.onto_slave, axes, fixed)
-        return ContactRows(self.nodes, self.points[self.nodes], self.weights, gap, axes, H)
+        return ContactRows(
+            self.nodes, self.points[self.nodes], self.weights, gap, axes, H, self.of_function
+        )
 
 
 def coupled_columns(weights: sparse.csr_array, axes: Array, fixed: Mask) -> sparse.csc_array:
@@ -211,17 +243,24 @@ def _against(slave: Surface, obstacle: Obstacle) -> tuple[Array, Array]:
     """int phi phi (f, 4, 4) and int g phi (f, 4) of whole facets, g the obstacle's gap."""
     mass = np.zeros((len(slave.nodes), MAX_NODES, MAX_NODES))
     moment = np.zeros((len(slave.nodes), MAX_NODES))
-    for n in np.unique(slave.corners):
-        cell, of = CELLS[KINDS[n - 2]], np.flatnonzero(slave.corners == n)
-        x = slave.points[slave.nodes[of, :n]]
-        for at, weight in zip(*RULES[cell.kind], strict=True):
-            jac, phi = cell.jacobians(x, at), cell.shape(at)
-            area = weight * np.sqrt(np.linalg.det(np.swapaxes(jac, 1, 2) @ jac))
-            mass[of, :n, :n] += area[:, None, None] * np.outer(phi, phi)
-            height = heights(np.broadcast_to(phi, (len(of), 1, n)), slave.slopes[of, :n], x)
-            gap = obstacle.gap(phi @ x + height * slave.normal[of])
-            moment[of, :n] += (area * gap)[:, None] * phi
+    for of, phi, area, x in _gauss_points(slave):
+        n = len(phi)
+        mass[of, :n, :n] += area[:, None, None] * np.outer(phi, phi)
+        height = heights(np.broadcast_to(phi, (len(of), 1, n)), slave.slopes[of, :n], x)
+        gap = obstacle.gap(phi @ x + height * slave.normal[of])
+        moment[of, :n] += (area * gap)[:, None] * phi
     return mass, moment
+
+
+def _gauss_points(side: Surface) -> Iterator[tuple[Index, Array, Array, Array]]:
+    """Point after point: facets (k,), shape functions (a,), weights (k,), corners (k, a, d)."""
+    for n in np.unique(side.corners):
+        cell, of = CELLS[KINDS[n - 2]], np.flatnonzero(side.corners == n)
+        x = side.points[side.nodes[of, :n]]
+        for at, weight in zip(*RULES[cell.kind], strict=True):
+            jac = cell.jacobians(x, at)
+            area = weight * np.sqrt(np.linalg.det(np.swapaxes(jac, 1, 2) @ jac))
+            yield of, cell.shape(at), area, x
 
 
 # -------------------------------------------------------------------- supports

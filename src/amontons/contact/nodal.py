@@ -6,7 +6,7 @@ shape function over the surface, it is a traction.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +21,7 @@ from .geometry import Obstacle, frames
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+Field = Callable[[Array], Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +30,8 @@ class ContactRows:
 
     nodes (nc,); points (nc, d); weights (nc,), area; gap (nc,), length; frames (nc, d, d), rows
     n, t1(, t2); H (n_dofs, nc d): local displacements are H^T v + [gap, 0, 0].
+    average: the mean of a function of points (k, d) at every contact, (nc,), with the weights
+    that gaps and displacements have there; None where these are values at the points.
     """
 
     nodes: Index
@@ -37,6 +40,11 @@ class ContactRows:
     gap: Array
     frames: Array
     H: sparse.csc_array
+    average: Callable[[Field], Array] | None = None
+
+    def mean(self, field: Field) -> Array:
+        """A function of points (k, d), seen by the contacts, (nc,)."""
+        return field(self.points) if self.average is None else self.average(field)
 
     def force(self, r: Array) -> Array:
         """Forces on the slave in global axes, (nc, d), of reactions r (nc, d) in the frames.
@@ -50,10 +58,11 @@ class ContactRows:
 
     def at(self, kept: NDArray[np.bool_]) -> ContactRows:
         """A selection of these contacts."""
-        columns = np.repeat(kept, self.points.shape[1])
+        columns, average = np.repeat(kept, self.points.shape[1]), self.average
         return ContactRows(self.nodes[kept], self.points[kept], self.weights[kept],
                            self.gap[kept], self.frames[kept],
-                           sparse.csc_array(self.H[:, columns]))  # fmt: skip
+                           sparse.csc_array(self.H[:, columns]),
+                           None if average is None else lambda f: average(f)[kept])  # fmt: skip
 
 
 def forces(pairs: Sequence[ContactRows], r: Array) -> Array:

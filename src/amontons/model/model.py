@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..cones import Coulomb, Law, Tresca
+from ..contact import ContactRows
 from ..errors import InvalidInput, UnsupportedForm
 from ..fem.hyperelasticity import is_hyperelastic
 from ..linear import Direct
@@ -172,6 +173,8 @@ class Model:
                 each="slave node" if contact.nitsche is None else "Gauss point",
             )  # fmt: skip
             values.append(given[placed.kept])
+            if name == "tresca" and callable(contact.tresca):
+                values[-1] = _mean_bound(contact, placed.rows)
         both = np.concatenate(values)
         if self.contacts[0].friction == "mu":
             return Coulomb(both)
@@ -225,6 +228,13 @@ class Model:
         return recover_fields(
             self.bodies, surfaces, self.discretisation, solution, self.load_factor
         )
+
+
+def _mean_bound(contact: Contact, rows: ContactRows) -> Array:
+    """A bound given as a function, averaged as the gap is; dual functions may be negative."""
+    given, what = contact.tresca, f"tresca on {contact.slave!r}"
+    assert given is not None
+    return np.maximum(rows.mean(lambda x: scalar_at(given, x, what)), 0.0)
 
 
 def _surfaces(*parts: Fix | Traction | BodyForce | Contact) -> list[str]:

@@ -96,6 +96,8 @@ class Contact:
 
     Either mu, the coefficient of Coulomb friction, or tresca, the largest shear traction (a
     stress): a number, one number per slave node, or a function of points (n, dim) -> (n,).
+    The bound of a contact is a force, the area of the node times the value at the node; with
+    mortar times the mean of the function with the dual function of the node, if that is > 0.
     where: a function of points (n, dim) -> (n,) bool that tells which slave nodes take part.
     """
 
