@@ -137,7 +137,7 @@ def _add(
     method: Method | None,
 ) -> None:  # fmt: skip
     """The branch through a solution, and those that leave its branch points."""
-    new = follow_path(path, y, p, limits, method=method, known=_patterns(branches))
+    new = follow_path(path, y, p, limits, method=method, known=branches)
     branches.append(new)
     if method is Method.GENERAL or not path.straight:
         return
@@ -146,7 +146,7 @@ def _add(
         for tangent in leaving(path, event.state, event.parameter).tangents:
             if not _followed(branches, tangent):
                 side = track_both(path, event.state, event.parameter, limits,
-                                  known=_patterns(branches), tangent=tangent)  # fmt: skip
+                                  known=branches, tangent=tangent)  # fmt: skip
                 branches.append(replace(side, seconds=side.seconds))
                 at_branch_points += [e for e in side.events if e.kind is EventKind.BRANCH]
 

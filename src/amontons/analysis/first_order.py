@@ -19,8 +19,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, sparse
+from scipy import linalg
 
+from .corrector import determinant_sign
 from .friction_path import FrictionPath
 from .path import PathProblem, name_of, weight_of
 
@@ -100,23 +101,18 @@ def first_order(
 def orientation(problem: PathProblem, y: Array, p: float, rate: float) -> int:
     """sign(p') sign(det J_y): the same all along a curve; 0 where it is not defined."""
     J, _ = problem.jacobian(y, p)
-    if isinstance(J, np.ndarray):
-        return int(np.sign(rate) * np.linalg.slogdet(J)[0])
-    factor = sparse.linalg.splu(sparse.csc_array(J))
-    signs = (
-        np.sign(factor.U.diagonal()).prod() * _parity(factor.perm_r) * _parity(factor.perm_c)
-    )
-    return int(np.sign(rate) * signs)
+    return int(np.sign(rate)) * determinant_sign(J)
 
 
-def kernel(J: Any, Jp: Array, weight: float) -> Array:
+def kernel(J: Any, Jp: Array, weight: float, singular: float = SINGULAR) -> Array:
     """Orthonormal columns (n + 1, k), in the weighted norm, with J y' + Jp p' = 0."""
     root = np.sqrt(weight)
     J = J if isinstance(J, np.ndarray) else J.toarray()
     full = np.column_stack([J / root, Jp])
     size = np.linalg.norm(full, axis=1)
-    full = full / np.where(size > 0, size, 1.0)[:, None]
-    lines = linalg.null_space(full, rcond=SINGULAR)
+    floor = 1e-8 * max(1.0, float(size.max(initial=0.0)))  # a row of rounding stays small
+    _, values, right = linalg.svd(full / np.maximum(size, floor)[:, None])
+    lines = right[int((values > singular * max(1.0, float(values[0]))).sum()) :].T.copy()
     lines[:-1] /= root
     return lines
 
@@ -159,19 +155,6 @@ def _merged(found: list[Tangent], weight: float) -> tuple[Tangent, ...]:
         else:
             kept.append(one)
     return tuple(kept)
-
-
-def _parity(permutation: NDArray[np.int64]) -> int:
-    """1 for an even permutation, -1 for an odd one."""
-    seen = np.zeros(len(permutation), dtype=bool)
-    sign = 1
-    for start in range(len(permutation)):
-        length, k = 0, start
-        while not seen[k]:
-            seen[k], k, length = True, permutation[k], length + 1
-        if length and length % 2 == 0:
-            sign = -sign
-    return sign
 
 
 # ------------------------------------------------------------------ friction in 2D, reduced

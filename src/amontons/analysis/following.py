@@ -1,9 +1,9 @@
-"""Following a solution curve both ways: by event tracking where it is straight."""
+"""Following a solution curve both ways, to its ends or until it meets itself or another."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -12,15 +12,31 @@ from numpy.typing import NDArray
 
 from ..errors import InvalidInput, SingularOperator
 from ..problem import FrictionProblem
+from .continuation import Continuation
 from .event_tracking import check_straight, leaving, track
 from .first_order import Tangent
 from .friction_path import FrictionPath
-from .path import Branch, Event, EventKind, PathProblem, Point, Stop, joined, weight_of
+from .path import (
+    Branch,
+    Event,
+    EventKind,
+    PathProblem,
+    Point,
+    Stop,
+    corrected,
+    joined,
+    same,
+    weight_of,
+)
 
 Array = NDArray[np.float64]
 Steps = Iterator[tuple[Point, Event | None]]
+Passed = Callable[[Point, Event | None], Stop | None]
 Callback = Callable[[Point, Event | None], bool | None]
 SOLVED = 1e-9  # scaled residual of a state that counts as a solution
+PLACE = 1e-7  # relative distance of two located events that count as one
+NOTHING = 1e-12  # weighted length that counts as none
+CHORD = 0.1  # distance of a chord to the start, in its length, at which it passes through
 
 
 class Method(Enum):
@@ -63,12 +79,12 @@ class Half:
 
 def track_both(
     path: FrictionPath, y: Array, p: float, limits: Limits, *,
-    known: Collection[str] = (), tangent: Tangent | None = None,
+    known: Sequence[Branch] = (), tangent: Tangent | None = None,
 ) -> Branch:  # fmt: skip
     """The exact branch through a solution, both ways; only along `tangent` where it is given.
 
-    known: patterns of lines that other branches have covered: the branch ends where it meets
-    one (every line is part of one branch only).
+    known: other branches; this one ends where it meets a line of theirs, every line being part
+    of one branch only.
     """
     began = time.perf_counter()
     check_straight(path)
@@ -82,7 +98,8 @@ def track_both(
             "start: no solution curve leaves it; the solutions are not isolated there, "
             f"or do not depend on the parameter ({system.reason or 'first-order system'})"
         )
-    halves, seen = [], set(known)
+    halves: list[Half] = []
+    seen = {str(point.piece) for branch in known for point in branch.points}
     for one in (forth, back):
         if one is None:
             halves.append(Half([], [], Stop.NOT_STARTED if tangent else Stop.DEAD_END))
@@ -90,16 +107,12 @@ def track_both(
         if halves and halves[0].stop is Stop.CLOSED:
             halves.append(Half([], [], Stop.CLOSED))
             continue
-        half = _collected(track(path, y, p, one, limits.interval), limits, seen, str(one.piece))
+        walk = track(path, y, p, one, limits.interval)
+        half = _collected(walk, limits, PassedLines(str(one.piece), seen))
         halves.append(half)
         seen |= {str(point.piece) for point in half.points}
     branch = _branch(path, halves[0], halves[1], began)
-    if len(extra):
-        rows = np.array([np.append(t.direction, t.rate) for t in system.tangents])
-        event = Event(EventKind.BRANCH, p, y, directions=rows)
-        events = sorted([*branch.events, event], key=lambda e: e.arclength)
-        branch = replace(branch, events=tuple(events))
-    return branch
+    return _with_branch_point(branch, y, p, system.tangents if extra else ())
 
 
 def _both_ways(
@@ -117,29 +130,86 @@ def _both_ways(
     return forth, (rest[0] if rest else None), tuple(rest[1:])
 
 
-def _collected(steps: Steps, limits: Limits, seen: set[str], first: str) -> Half:
+def _collected(steps: Steps, limits: Limits, passed: Passed) -> Half:
     """The points of one direction until it ends, meets what is known, or a limit stops it."""
     began = time.perf_counter()
     points: list[Point] = []
     events: list[Event] = []
-    own = {first}
     for point, event in steps:
         points.append(point)
         if event is not None:
             events.append(event)
-            if event.stop is not None:
-                if len(points) > 1 and point.arclength == points[-2].arclength:
-                    points.pop()  # it began at the end
-                return Half(points, events, event.stop)
-            piece = str(point.piece)
-            if piece in own or piece in seen:
-                stop = Stop.CLOSED if piece in own else Stop.JOINED
-                return Half(points, [*events, _ended(point, stop)], stop)
-            own.add(piece)
-        stop = _limited(point, event, limits, len(points), began)
+        if event is not None and event.stop is not None:
+            if len(points) > 1 and point.arclength - points[-2].arclength <= NOTHING:
+                points.pop()  # it began at the end
+            return Half(points, events, event.stop)
+        stop = passed(point, event)
+        if stop is None:
+            stop = _limited(point, event, limits, len(points), began)
         if stop is not None:
             return Half(points, [*events, _ended(point, stop)], stop)
     raise AssertionError("a walk ends with an event")  # track and Continuation promise it
+
+
+class PassedLines:
+    """Tells when a line is entered for the second time: a pattern has one line only."""
+
+    def __init__(self, first: str, known: set[str]) -> None:
+        self.own, self.known = {first}, known
+
+    def __call__(self, point: Point, event: Event | None) -> Stop | None:
+        """CLOSED, JOINED, or None where the line is new."""
+        if event is None:
+            return None
+        piece = str(point.piece)
+        if piece in self.own or piece in self.known:
+            return Stop.CLOSED if piece in self.own else Stop.JOINED
+        self.own.add(piece)
+        return None
+
+
+class PassedEvents:
+    """Tells when an event is met for the second time, or the start; events lie precisely."""
+
+    def __init__(self, start: Point, known: Sequence[Event], weight: float) -> None:
+        self.start, self.weight = start, weight
+        self.known = [e for e in known if e.kind in (EventKind.FOLD, EventKind.STATUS)]
+        self.own: list[Event] = []
+        self.before = start
+
+    def __call__(self, point: Point, event: Event | None) -> Stop | None:
+        """CLOSED, JOINED, or None where all is new."""
+        before, self.before = self.before, point
+        if event is not None and event.kind in (EventKind.FOLD, EventKind.STATUS):
+            if any(_same_place(event, other) for other in self.own):
+                return Stop.CLOSED
+            if any(_same_place(event, other) for other in self.known):
+                return Stop.JOINED
+            self.own.append(event)
+        return Stop.CLOSED if self._through_start(before, point) else None
+
+    def _through_start(self, a: Point, b: Point) -> bool:
+        """True where the chord from a to b passes the start in the sense in which it began."""
+        s = self.start
+        if a is s or b.arclength == 0:
+            return False
+        along = [
+            self.weight * float((x.state - s.state) @ s.direction)
+            + (x.parameter - s.parameter) * s.rate
+            for x in (a, b)
+        ]
+        if not along[0] < 0 <= along[1]:
+            return False
+        t = along[0] / (along[0] - along[1])
+        off = a.state + t * (b.state - a.state) - s.state
+        off_p = a.parameter + t * (b.parameter - a.parameter) - s.parameter
+        length = np.sqrt(self.weight * off @ off + off_p**2)
+        return bool(length <= CHORD * (b.arclength - a.arclength))
+
+
+def _same_place(a: Event, b: Event) -> bool:
+    near = abs(a.parameter - b.parameter) <= PLACE * max(1.0, abs(b.parameter))
+    return near and same(a.state, b.state, PLACE)
 
 
 def _limited(
@@ -201,14 +271,15 @@ def exact_state(path: FrictionPath, p: float) -> Array:
     return path.state((point.state * down.to_r).reshape(q.shape))
 
 
-def polished(path: FrictionPath, y: Array, p: float) -> Array:
-    """The exact solution on the piece of an approximate one.
+def polished(path: PathProblem, y: Array, p: float) -> Array:
+    """The exact solution next to an approximate one, by Newton steps at fixed parameter.
 
+    At a fold these do not converge: there a state is taken as it is if its residual is small.
     Raises InvalidInput where the state is no solution to within some per mille.
     """
-    from .path import corrected
-
     found = corrected(path, y, p)
+    if found is None and np.abs(path.residual(y, p)).max(initial=0) <= SOLVED:
+        return y
     if found is None or np.abs(found - y).max(initial=0) > 1e-3 * max(1.0, np.abs(y).max()):
         rest = float(np.abs(path.residual(y, p)).max(initial=0))
         raise InvalidInput(
@@ -217,16 +288,67 @@ def polished(path: FrictionPath, y: Array, p: float) -> Array:
     return found
 
 
+def continue_both(
+    problem: PathProblem, y: Array, p: float, limits: Limits,
+    options: Continuation | None = None, *,
+    known: Sequence[Branch] = (), tangent: Tangent | None = None,
+) -> Branch:  # fmt: skip
+    """The branch through a solution of any path problem by continuation, both ways.
+
+    Only along `tangent` where it is given.  known: other branches; this one ends at the first
+    event of theirs that it meets.
+    """
+    began = time.perf_counter()
+    options = options or Continuation()
+    weight = weight_of(problem, len(y))
+    if tangent is None:
+        tangents = options.start(problem, y, p)
+        forth, back, extra = _both_ways(tangents, weight)
+    else:
+        tangents, forth, back, extra = (tangent,), tangent, None, ()
+    met = [event for branch in known for event in branch.events]
+    halves: list[Half] = []
+    for one in (forth, back):
+        if one is None or (halves and halves[0].stop is Stop.CLOSED):
+            closed = bool(halves) and halves[0].stop is Stop.CLOSED
+            halves.append(Half([], [], Stop.CLOSED if closed else Stop.NOT_STARTED))
+            continue
+        walk = options.walk(problem, y, p, one, limits.interval)
+        start = Point(p, y, one.direction, one.rate, one.piece)
+        half = _collected(walk, limits, PassedEvents(start, met, weight))
+        halves.append(half)
+        met += half.events
+    branch = _branch(problem, halves[0], halves[1], began)
+    return _with_branch_point(branch, y, p, tangents if extra else ())
+
+
+def _with_branch_point(
+    branch: Branch, y: Array, p: float, tangents: Sequence[Tangent]
+) -> Branch:
+    """The branch with an event at its start, from which other branches leave too."""
+    if not tangents:
+        return branch
+    rows = np.array([np.append(t.direction, t.rate) for t in tangents])
+    event = Event(EventKind.BRANCH, p, y, directions=rows)
+    events = sorted([*branch.events, event], key=lambda e: e.arclength)
+    return replace(branch, events=tuple(events))
+
+
 def follow_path(
     problem: PathProblem, y: Array, p: float, limits: Limits, *,
-    method: Method | None = None, known: Collection[str] = (),
+    method: Method | None = None, options: Continuation | None = None,
+    known: Sequence[Branch] = (),
 ) -> Branch:  # fmt: skip
-    """The branch through a solution, by event tracking where it is straight."""
+    """The branch through a solution: by event tracking where it is straight, else generally.
+
+    The state is corrected first; raises InvalidInput where it is far from a solution.
+    """
     exact = isinstance(problem, FrictionPath) and problem.straight and not problem.tresca
     if method is None:
-        method = Method.EVENTS if exact else Method.GENERAL
-    if method is Method.EVENTS:
-        if not isinstance(problem, FrictionPath):
-            raise InvalidInput("method: event tracking follows friction problems only")
-        return track_both(problem, polished(problem, y, p), p, limits, known=known)
-    raise InvalidInput("method: expected EVENTS")
+        method = Method.EVENTS if exact and options is None else Method.GENERAL
+    y = polished(problem, np.asarray(y, dtype=float), p)
+    if method is Method.GENERAL:
+        return continue_both(problem, y, p, limits, options, known=known)
+    if not isinstance(problem, FrictionPath):
+        raise InvalidInput("method: event tracking follows friction problems only")
+    return track_both(problem, y, p, limits, known=known)

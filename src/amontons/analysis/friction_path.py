@@ -173,11 +173,8 @@ class FrictionPath:
         return np.array(problem.law.coefficient / scale)
 
     def coefficient(self, p: float) -> Array:
-        """mu, or the scaled bound, at p, (nc,); raises InvalidInput where it is negative."""
-        value = self.c0 + p * self.c1
-        if (value < 0).any():
-            raise InvalidInput(f"parameter: the friction is negative at {p:g}; stay above")
-        return value
+        """mu, or the scaled bound, at p, (nc,); predictions may look beyond zero."""
+        return self.c0 + p * self.c1
 
     def free(self, p: float) -> Array:
         """Scaled q at p, (m,)."""
@@ -194,7 +191,7 @@ class FrictionPath:
 
     def _radius(self, z_N: Array, p: float) -> Array:
         """Bound of |y_T| as the active piece has it."""
-        bound = self.coefficient(p)
+        bound = np.maximum(self.coefficient(p), 0.0)
         return bound if self.tresca else bound * np.maximum(z_N, 0)
 
     # ---------------------------------------------------------------- path problem
