@@ -30,7 +30,7 @@ How it is solved.  max t with M - t I >= 0, all S_j >= 0 and the sum of all thei
 values bound t from above.  It ends as soon as M is positive definite, and when the bound is
 negative or too small for any proof.  All of it is floating point: the caller's `accept`
 has to prove what it needs from the multipliers as they are, rounding included
-(`rounding.is_positive_definite`).
+(`slacks_are_positive`, `rounding.is_positive_definite`).
 
 S. Boyd, L. Vandenberghe, "Convex Optimization" (2004), sections 4.6.2 and 11.8.
 """
@@ -47,6 +47,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from .multiplier_steps import Family, Point, Program, Slacks, advance
+from .rounding import are_positive_definite, gamma
 
 Array = NDArray[np.float64]
 SHORTEST = 1e-6  # step length below which rounding stands in the way
@@ -70,7 +71,8 @@ class Multipliers:
 
     W, extras: of every family (sets, k, k) and (sets, extras).  t: smallest eigenvalue of M.
     bound: none of the same trace has a larger one.  lowest (N,): where y M y / |y|^2 is
-    smallest, for branching.
+    smallest, for branching.  moments: the dual matrices X of M and of all slacks in order,
+    (1, N, N) and (J, s, s); those of slacks weigh the states of a set against each other.
     """
 
     outcome: LmiOutcome
@@ -80,6 +82,7 @@ class Multipliers:
     bound: float
     lowest: Array
     steps: int
+    moments: tuple[Array, ...] = ()
 
 
 Parts = tuple[Array, ...]  # one array per family
@@ -121,15 +124,33 @@ def energy_rows(W: Array) -> Array:
     return Z.reshape(-1, len(W))
 
 
+def slacks_are_positive(families: Sequence[Family], W: Parts, extras: Parts) -> bool:
+    """True only when all slacks are positive definite, rounding included.
+
+    Tensors may be off by a dozen roundings, as those of `restricted` with normalised G.
+    """
+    for family, own, more in zip(families, W, extras, strict=True):
+        low, high = np.triu_indices(family.size)
+        x = np.hstack([own[:, low, high], more])
+        for slacks in family.slacks:
+            y = x[slacks.owner]
+            S = np.einsum("ji,jiab->jab", y, slacks.tensor)
+            size = np.einsum("ji,jiab->jab", np.abs(y), np.abs(slacks.tensor))
+            if not are_positive_definite(S, gamma(x.shape[1] + 14) * size):
+                return False
+    return True
+
+
 # ------------------------------------------------------------------- solving it
 def find_multipliers(
     Z: Array, families: Sequence[Family], *, accept: Accept | None = None,
-    time_limit: float | None = None,
+    time_limit: float | None = None, smallest: float = SMALLEST,
 ) -> Multipliers:  # fmt: skip
     """Multipliers with M and all slacks positive definite, or why there are none.
 
     accept(W, extras): the last word on multipliers with M > 0, each from a later step than the
-    one before; without it they are taken as they are.
+    one before; without it they are taken as they are.  smallest: give up as soon as no
+    eigenvalue of M above this is possible, the mean of all being 1.
     """
     deadline = np.inf if time_limit is None else time.perf_counter() + time_limit
     program = Program(Z, tuple(families))
@@ -141,7 +162,7 @@ def find_multipliers(
                 outcome = LmiOutcome.FOUND
                 break
             refused += 1
-        if program.theta * point.lam < SMALLEST:
+        if program.theta * point.lam < smallest:
             outcome = LmiOutcome.NONE
             break
         if time.perf_counter() > deadline:
@@ -154,7 +175,9 @@ def find_multipliers(
     W, extras = multipliers_at(program, point)
     values, vectors = linalg.eigh(point.S[0][0], subset_by_index=[0, 0])
     least, bound = float(values[0]) + point.t, program.theta * point.lam
-    return Multipliers(outcome, W, extras, least, bound, vectors[:, 0], steps)
+    return Multipliers(
+        outcome, W, extras, least, bound, vectors[:, 0], steps, tuple(point.X)
+    )
 
 
 def multipliers_at(
@@ -185,6 +208,7 @@ __all__ = [
     "energy_rows",
     "find_multipliers",
     "restricted",
+    "slacks_are_positive",
     "symmetric",
     "symmetric_basis",
 ]

@@ -263,7 +263,10 @@ class Normal:
 def advance(program: Program, point: Point) -> tuple[Point, float] | None:
     """(next point, shorter one of its two step lengths), None where rounding forbids."""
     inverse = [_inverse(B) for B in point.S]
-    normal = Normal(program, point.X, inverse)
+    try:
+        normal = Normal(program, point.X, inverse)
+    except np.linalg.LinAlgError:
+        return None
     objective = np.zeros(program.unknowns)
     objective[-1] = 1.0
     gradient = program.adjoint(inverse)

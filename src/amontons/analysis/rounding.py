@@ -60,6 +60,24 @@ def congruence(G: Array, W: Array) -> tuple[Array, Array]:
     return turned @ W @ G, gamma(2 * W.shape[-1] + 10) * size
 
 
+def are_positive_definite(stack: Array, error: Array) -> bool:
+    """`is_positive_definite` of every matrix of a stack (J, s, s), error of the same shape."""
+    size = stack.shape[1]
+    diagonal = np.diagonal(stack, axis1=1, axis2=2)
+    if not (np.isfinite(stack).all() and np.isfinite(error).all() and (diagonal > 0).all()):
+        return False
+    scale = np.exp2(-np.round(np.log2(diagonal) / 2))
+    scale = scale[:, :, None] * scale[:, None, :]
+    spread = (error * scale).sum(axis=2).max(axis=1, initial=0.0)
+    trace = (diagonal * np.diagonal(scale, axis1=1, axis2=2)).sum(axis=1)
+    shift = (spread + 2 * (size + 3) * EPSILON * trace) * (1 + 1e-9)
+    try:
+        np.linalg.cholesky(stack * scale - shift[:, None, None] * np.eye(size))
+    except LinAlgError:
+        return False
+    return True
+
+
 def determinant_sign(matrix: Array, rounding: Array | float = 0.0) -> int:
     """Sign of det (A + d) for every |d| <= rounding, proved; 0 where it is not.
 

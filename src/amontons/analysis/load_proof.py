@@ -1,0 +1,127 @@
+"""What multipliers prove about one load, rounding included.
+
+About a known solution z0, with d = z - z0 for another solution z of a branch, d_u = W d_r:
+
+    d_p^T W_p d_p <= 0 in cone(C_s - z0_p) for all contacts p and statuses s,
+    M = sum_p Z_p^T W_p Z_p >= tau I   on all d_r                    =>  d = 0.
+
+z0 obeys balance only up to `Known.off`: d + e lies in the cones with |e_u| <= off, so
+
+    tau |d|^2 <= sum_p (2 |d_p^T W_p e_p| + |e_p^T W_p e_p|) <= 2 beta |d| + alpha,
+
+and every solution of the branch is within rho = (beta + sqrt(beta^2 + tau alpha)) / tau of z0.
+Without a known solution the same with (z, 1), which leaves no solution at all.
+
+Velocities that vanish in a branch, u_k = 0, add rho_k u_k^2 to W_p: nothing on the cones, but
+M need not be positive beside them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from .load_pieces import Known, LoadProblem, States
+from .rounding import gamma, is_positive_definite, unit_scale
+
+Array = NDArray[np.float64]
+PENALTIES = 10.0 ** np.arange(0, 9, 2)  # of velocities that vanish, times |W_p|
+SHARE = 0.5  # of the smallest eigenvalue of M that is proved
+
+
+@dataclass(frozen=True, eq=False)
+class BranchProof:
+    """Scaled multipliers (nc, k, k) of a branch; k = 5 where no solution is left.
+
+    distance: bound of |r - r0| in scaled reactions, for every solution of the branch.
+    """
+
+    branch: States
+    multipliers: Array
+    distance: float
+
+
+def prove(
+    local: LoadProblem, branch: States, multipliers: Array, known: Known | None
+) -> BranchProof | None:
+    """The proof, None where rounding could spoil it; slacks are not looked at."""
+    rows = local.zero_velocities(branch)
+    Z, size = _rows(local, branch, apex=known is None)
+    for penalty in PENALTIES if len(rows) else (0.0,):
+        W = _penalised(multipliers, rows, penalty)
+        M, error = _sum(W, Z, size)
+        scale = unit_scale(M)
+        M, error = (A * scale[:, None] * scale for A in (M, error))
+        exact = known is None or not known.off.any()
+        tau = 0.0 if exact else SHARE * _smallest_eigenvalue(M)
+        if not is_positive_definite(M - tau * np.eye(len(M)), error):
+            continue
+        if exact:
+            return BranchProof(branch, W, 0.0)
+        assert known is not None
+        return BranchProof(branch, W, _distance(W, size, scale, tau, known.off))
+    return None
+
+
+def _rows(local: LoadProblem, branch: States, *, apex: bool) -> tuple[Array, Array]:
+    """z of all contacts (nc, k, N) in coordinates (y, tau), r = R y, and bounds of its size."""
+    R = local.reactions(branch).toarray()
+    nc, N = local.contacts, R.shape[1]
+    parts = []
+    for r, W, q in ((R, local.W, local.q), (abs(R), abs(local.W), abs(local.q))):
+        out = np.zeros((nc, 5, N + 1))
+        out[:, :2, :N] = r.reshape(nc, 2, N)
+        out[:, 2:4, :N] = (W @ r).reshape(nc, 2, N)
+        out[:, 2:4, N] = q.reshape(nc, 2)
+        out[:, 4, N] = 1.0
+        parts.append(out if apex else out[:, :4, :N])
+    return parts[0], parts[1]
+
+
+def _penalised(multipliers: Array, rows: NDArray[np.int64], penalty: float) -> Array:
+    """Multipliers with the squares of vanishing velocities added."""
+    W = multipliers.copy()
+    contact, component = rows // 2, rows % 2
+    size = np.abs(W).max(axis=(1, 2), initial=0.0)[contact]
+    size = np.maximum(size, 1e-3 * size.max(initial=1.0))
+    W[contact, 2 + component, 2 + component] += penalty * size
+    return W
+
+
+def _sum(W: Array, Z: Array, size: Array) -> tuple[Array, Array]:
+    """(sum_p Z_p^T W_p Z_p, bound of the error of its entries)."""
+    N = Z.shape[2]
+    M = Z.reshape(-1, N).T @ (W @ Z).reshape(-1, N)
+    whole = size.reshape(-1, N).T @ (np.abs(W) @ size).reshape(-1, N)
+    return (M + M.T) / 2, gamma(len(W) * W.shape[1] + 16) * whole
+
+
+def _smallest_eigenvalue(M: Array) -> float:
+    """An estimate, by inverse iteration; 0 where M is not positive definite."""
+    try:
+        factor = linalg.cho_factor(M, check_finite=False)
+    except linalg.LinAlgError:
+        return 0.0
+    x = np.cos(np.arange(len(M)) + 0.5)  # any vector that is not special
+    length = 1.0
+    for _ in range(20):
+        x = linalg.cho_solve(factor, x / np.linalg.norm(x), check_finite=False)
+        length = float(np.linalg.norm(x))
+    return 1 / length
+
+
+def _distance(W: Array, size: Array, scale: Array, tau: float, off: Array) -> float:
+    """Bound of the largest scaled reaction by which another solution can differ."""
+    if tau <= 0:
+        return np.inf
+    e = np.zeros((len(W), 4))
+    e[:, 2:] = off.reshape(-1, 2)
+    push = np.einsum("pab,pb->pa", np.abs(W), e)
+    alpha = float(np.einsum("pa,pa->", push, e)) * (1 + 1e-9)
+    beta = float(np.linalg.norm(scale * np.einsum("pan,pa->n", size, push))) * (1 + 1e-9)
+    reach = (beta + np.sqrt(beta**2 + tau * alpha)) / tau * (1 + 1e-9)
+    # reactions of slipping contacts are mu times a coordinate at most
+    return float(reach * np.max(np.abs(size[:, :2]) @ scale, initial=0.0))
