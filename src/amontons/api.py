@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, overload
@@ -17,7 +17,10 @@ from .solve import Callback, drive
 from .solvers.base import Iterate, Solver
 
 if TYPE_CHECKING:
+    from .analysis.continuation import Continuation
+    from .analysis.diagram import Diagram
     from .analysis.enumerate import Solutions
+    from .analysis.path import Branch, PathProblem
     from .model import Model
 
 Start = Iterate | FrictionSolution | ModelSolution | None
@@ -62,17 +65,22 @@ def all_solutions(
     problem: FrictionProblem | Model, *, time_limit: float | None = None,
     keep_proof: bool = False,
 ) -> Solutions:  # fmt: skip
-    """All solutions of a 2D Coulomb problem, and whether there can be no other.
+    """All solutions of a Coulomb problem, and whether there can be no other.
 
-    time_limit: seconds, after which the list may lack some.  keep_proof: keep the multipliers
-    that exclude all other patterns, in `Solutions.proof`.  The search takes milliseconds for
-    ten contacts and grows exponentially: some ten contacts with much friction, some fifty with
-    little; more than 200 are left to `multistart`, which proves nothing.  Raises
-    UnsupportedForm in 3D and under Tresca's law.
+    time_limit: seconds, after which the list may lack some; in 3D 60 by default.  keep_proof:
+    keep what excludes all others, in `Solutions.proof`.  In 2D the search takes milliseconds
+    for ten contacts and grows exponentially: some ten contacts with much friction, some fifty
+    with little; more than 200 are left to `multistart`, which proves nothing.  In 3D some
+    contacts with much friction, some tens with little.  Raises UnsupportedForm under Tresca's
+    law.
     """
     discrete = _discrete(problem)
     from .analysis import enumerate as exact
 
+    if discrete.dimension == 3:
+        from .analysis.disc_search import enumerate_discs
+
+        return enumerate_discs(discrete, time_limit=time_limit, keep_proof=keep_proof)
     if discrete.dimension == 2 and discrete.contacts > exact.CONTACTS:
         found = multistart(discrete, time_limit=time_limit)
         reason = f"more than {exact.CONTACTS} contacts: {found.reason}"
@@ -100,6 +108,67 @@ def _discrete(problem: FrictionProblem | Model) -> FrictionProblem:
     if not (isinstance(problem, FrictionProblem) or hasattr(problem, "assemble")):
         raise InvalidInput(f"problem: expected a Model or a FrictionProblem, got {problem!r}")
     return problem if isinstance(problem, FrictionProblem) else problem.assemble()
+
+
+def follow(
+    problem: FrictionProblem | Model | PathProblem, parameter: str = "load",
+    interval: tuple[float, float] = (0.0, 1.0), *, base: FrictionProblem | Model | None = None,
+    start: object = None, at: float | None = None, options: Continuation | None = None,
+    **limits: Any,
+) -> Branch:  # fmt: skip
+    """The solution curve over a parameter, both ways from a start, with its folds and events.
+
+    parameter: "load" or "friction", see `path_of`; a PathProblem has its own.  base, for
+    "load": the problem at 0, `problem` being that at 1.  start: a solution at the parameter
+    `at`, by default the lower end of the interval; without one the curve begins at a solution
+    found there.  2D problems with Coulomb friction under a load are tracked exactly, from event
+    to event; others are continued step by step, with `options`, which also asks for that.
+    limits: max_points (per direction), time_limit (seconds), callback(point, event), which
+    stops by returning True.
+    Each end of the branch has a named reason.
+    """
+    from .analysis.following import Limits, follow_path
+    from .analysis.parametrised import first_state, path_of, state_of
+    from .analysis.path import PathProblem
+
+    bounds = Limits(tuple(interval), **limits)
+    at = bounds.interval[0] if at is None else float(at)
+    if isinstance(problem, PathProblem):
+        if start is None:
+            raise InvalidInput("start: a PathProblem needs the unknowns of a solution at `at`")
+        return follow_path(problem, state_of(problem, start), at, bounds, options=options)
+    path = path_of(_checked(problem), parameter, bounds.interval, base)
+    y = first_state(path, at) if start is None else state_of(path, start)
+    return follow_path(path, y, at, bounds, options=options)
+
+
+def diagram(
+    problem: FrictionProblem | Model, parameter: str = "load",
+    interval: tuple[float, float] = (0.0, 1.0), *, base: FrictionProblem | Model | None = None,
+    at: Sequence[float] | None = None, options: Continuation | None = None, **limits: Any,
+) -> Diagram:  # fmt: skip
+    """All branches through all solutions at the values `at` of a parameter, in 2D.
+
+    at: by default both ends and the middle of the interval; all solutions there are searched
+    for as in `all_solutions`, with time_limit seconds for each search.  Others as in `follow`.
+    """
+    from .analysis.diagram import bifurcation_diagram
+    from .analysis.following import Limits
+    from .analysis.parametrised import path_of
+
+    bounds = Limits(tuple(interval), **limits)
+    a, b = bounds.interval
+    path = path_of(_checked(problem), parameter, bounds.interval, base)
+    values = (a, (a + b) / 2, b) if at is None else tuple(float(p) for p in at)
+    return bifurcation_diagram(
+        path, bounds, values, options=options, time_limit=bounds.time_limit
+    )
+
+
+def _checked(problem: Any) -> FrictionProblem | Model:
+    if isinstance(problem, FrictionProblem) or hasattr(problem, "assemble"):
+        return problem
+    raise InvalidInput(f"problem: expected a Model or a FrictionProblem, got {problem!r}")
 
 
 def solve_any_form(

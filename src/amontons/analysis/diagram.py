@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .continuation import Continuation
 from .event_tracking import leaving
 from .first_order import Tangent
-from .following import Limits, Method, follow_path, track_both
+from .following import Limits, follow_path, track_both
 from .friction_path import FrictionPath
 from .path import Branch, EventKind, same
 
@@ -85,11 +86,12 @@ class Diagram:
 
 def bifurcation_diagram(
     path: FrictionPath, limits: Limits, at: Sequence[float], *,
-    method: Method | None = None, time_limit: float | None = None,
+    options: Continuation | None = None, time_limit: float | None = None,
 ) -> Diagram:  # fmt: skip
     """The branches through all solutions at the values `at`, and those that leave them.
 
-    Solutions come from `enumerate_solutions`.  time_limit: seconds for each search.
+    Solutions come from `enumerate_solutions`.  time_limit: seconds for each search.  options:
+    those of step-by-step continuation, also where the curves are straight.
     """
     from .enumerate import enumerate_solutions
 
@@ -107,7 +109,7 @@ def bifurcation_diagram(
             if solution.freedom:
                 sets.append((p, y))
             elif not _on_branches(branches, y, p):
-                _add(branches, path, y, p, limits, method)
+                _add(branches, path, y, p, limits, options)
                 if not _on_branches(branches, y, p):
                     lost.append((p, y))
     if lost:
@@ -134,12 +136,12 @@ def _ends(branch: Branch, p: float) -> list[Array]:
 
 def _add(
     branches: list[Branch], path: FrictionPath, y: Array, p: float, limits: Limits,
-    method: Method | None,
+    options: Continuation | None,
 ) -> None:  # fmt: skip
     """The branch through a solution, and those that leave its branch points."""
-    new = follow_path(path, y, p, limits, method=method, known=branches)
+    new = follow_path(path, y, p, limits, options=options, known=branches)
     branches.append(new)
-    if method is Method.GENERAL or not path.straight:
+    if options is not None or not path.straight or path.tresca:
         return
     at_branch_points = [e for e in new.events if e.kind is EventKind.BRANCH]
     for event in at_branch_points:

@@ -24,6 +24,7 @@ from scipy import linalg
 from .corrector import determinant_sign
 from .friction_path import FrictionPath
 from .path import PathProblem, name_of, weight_of
+from .sparse_kernel import sparse_kernel
 
 Array = NDArray[np.float64]
 SINGULAR = 1e-10  # singular value, relative to the largest, that counts as zero
@@ -106,8 +107,9 @@ def orientation(problem: PathProblem, y: Array, p: float, rate: float) -> int:
 
 def kernel(J: Any, Jp: Array, weight: float, singular: float = SINGULAR) -> Array:
     """Orthonormal columns (n + 1, k), in the weighted norm, with J y' + Jp p' = 0."""
+    if not isinstance(J, np.ndarray):
+        return sparse_kernel(J, Jp, weight, singular)
     root = np.sqrt(weight)
-    J = J if isinstance(J, np.ndarray) else J.toarray()
     full = np.column_stack([J / root, Jp])
     size = np.linalg.norm(full, axis=1)
     floor = 1e-8 * max(1.0, float(size.max(initial=0.0)))  # a row of rounding stays small
@@ -239,7 +241,7 @@ class _LocalPieces:
             conditions: dict[str, list[Array]] = {"f": [u_N], "s": stick}
             for letter, s in (("+", 1.0), ("-", -1.0)):
                 equations[letter] = [u_N, r_T - s * bound]
-                moving = "s" in letters and bool(mu[i] > 0)
+                moving = "s" in letters
                 conditions[letter] = [-s * u_T] * moving + [r_N] * grazing
             self.equations.append({k: _scaled(v) for k, v in equations.items()})
             self.conditions.append({k: _scaled(v) for k, v in conditions.items() if v})

@@ -172,6 +172,11 @@ class FrictionPath:
         scale = self.to_r[::d] if self.tresca else 1.0
         return np.array(problem.law.coefficient / scale)
 
+    @cached_property
+    def frictionless(self) -> Mask:
+        """Contacts without friction at any p, (nc,): closed ones slip, by name to "+"."""
+        return (self.c0 == 0) & (self.c1 == 0)
+
     def coefficient(self, p: float) -> Array:
         """mu, or the scaled bound, at p, (nc,); predictions may look beyond zero."""
         return self.c0 + p * self.c1
@@ -213,14 +218,14 @@ class FrictionPath:
         if self.start.dimension == 2:
             up = z_T[:, 0] >= 0
             letters = np.where(closed & sliding, np.where(up, "+", "-"), letters)
-            letters = np.where(closed & (radius == 0), "+", letters)
+            letters = np.where(closed & self.frictionless, "+", letters)
             if self.tresca:
                 letters = np.where(~closed & sliding, np.where(up, "p", "m"), letters)
-                letters = np.where(~closed & (radius == 0), "p", letters)
+                letters = np.where(~closed & self.frictionless, "p", letters)
         else:
-            letters = np.where(closed & (sliding | (radius == 0)), "l", letters)
+            letters = np.where(closed & (sliding | self.frictionless), "l", letters)
             if self.tresca:
-                letters = np.where(~closed & (sliding | (radius == 0)), "q", letters)
+                letters = np.where(~closed & (sliding | self.frictionless), "q", letters)
         return "".join(letters)
 
     def residual_of(self, piece: str, y: Array, p: float) -> Array:
@@ -271,7 +276,7 @@ class FrictionPath:
         size = np.linalg.norm(z_T, axis=1)
         out = np.full((len(mu), 3), np.inf)
         out[:, 0] = np.where(word.closed, z_N, -z_N)
-        lawful = (mu > 0) & (word.closed | self.tresca)
+        lawful = ~self.frictionless & (word.closed | self.tresca)
         out[:, 1] = np.where(lawful & word.sliding, size - radius, out[:, 1])
         stick = lawful & word.sticking
         if self.start.dimension == 2:
@@ -293,7 +298,7 @@ class FrictionPath:
         mu = self.coefficient(p)
         flat = self.start.dimension == 2
         out = []
-        for n, t, c in zip(z_N.tolist(), z_T, mu.tolist(), strict=True):
+        for k, (n, t, c) in enumerate(zip(z_N.tolist(), z_T, mu.tolist(), strict=True)):
             size = float(np.linalg.norm(t))
             slip = ("+" if t[0] >= 0 else "-") if flat else "l"
             radius = c if self.tresca else c * max(n, 0.0)
@@ -301,7 +306,7 @@ class FrictionPath:
             both = "s" * (size <= radius + tolerance) + slip * (size >= radius - tolerance)
             if flat and "s" in both and 2 * radius <= tolerance + tolerance * c:
                 both = "s+-"  # the bounds on both sides are near
-            if c == 0:
+            if self.frictionless[k]:
                 both = "+" if flat else "l"
             closed = both if "c" in normal else ""
             if not self.tresca:

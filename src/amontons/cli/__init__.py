@@ -168,6 +168,49 @@ def enumerate_solutions(**options: object) -> int:
 @main.command(
     epilog="""\b
 Examples:
+  amontons follow example:vee                     two folds, three solutions between them
+  amontons follow example:vee --all --mu 2
+  amontons follow example:hild --parameter friction --from 0.1 --to 5 --all
+
+\b
+Exit codes: 0 every branch has come to its end, 1 one was given up, 2 bad input.
+"""
+)
+@click.argument("source")
+@click.option("--parameter", type=click.Choice(["load", "friction", "t"]), default="load",
+              show_default=True,
+              help="What changes; t is the time of loads that depend on it.")  # fmt: skip
+@click.option("--from", "low", type=float, default=0.0, show_default=True, metavar="A",
+              help="Where the interval begins; the curve starts here.")  # fmt: skip
+@click.option("--to", "high", type=float, default=1.0, show_default=True, metavar="B",
+              help="Where it ends.")  # fmt: skip
+@click.option("--mu", type=float, metavar="X", help="Friction coefficient of all contacts.")
+@click.option("--all", "every", is_flag=True,
+              help="Branches through all solutions at both ends and the middle.")  # fmt: skip
+@click.option("--max-points", type=click.IntRange(min=2), default=100_000, show_default=True,
+              metavar="N", help="Points of a branch in each direction.")  # fmt: skip
+@click.option("--time-limit", type=float, metavar="SECONDS", help="For each direction.")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
+              help="Replace a value of the case.")  # fmt: skip
+@click.option("-o", "--output", "folder", metavar="DIR",
+              help="Folder for the results. [name of the source with -results]")  # fmt: skip
+@click.option("--json", "json_copy", metavar="FILE",
+              help="A copy of follow.json; - prints it and nothing else.")  # fmt: skip
+@click.option("--quiet", is_flag=True, help="No summary.")
+def follow(**options: object) -> int:
+    """Follow the solutions while the load or the friction changes: folds, events, branches.
+
+    SOURCE is a TOML case file, an FCLib HDF5 file, or example:NAME.  Writes follow.json (points
+    and events) and follow.png into DIR.
+    """
+    from .follow import run as run_follow
+
+    return run_follow(**options)  # type: ignore[arg-type]
+
+
+@main.command(
+    epilog="""\b
+Examples:
   amontons run example:wall --set wall.cells=[4,2,2] --pictures
   amontons run wall.toml -o out
   amontons run wall.toml -o out --restart --set evolution.until=2

@@ -1,0 +1,120 @@
+"""From a model or a problem and the name of a parameter to a path and a first point."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InvalidInput, NotConverged, SingularOperator
+from ..evolution.system import Motion
+from ..problem import Form, FrictionProblem
+from ..solution import Outcome
+from ..solve import drive
+from .following import exact_state
+from .friction_path import FrictionPath
+from .path import PathProblem
+
+if TYPE_CHECKING:
+    from ..model import Model
+
+Array = NDArray[np.float64]
+PARAMETERS = ("load", "friction")
+BENT = 1e-9  # departure from a straight line in time, relative, that a load may have
+START = 1e-10  # error of the solution from which continuation starts
+
+
+def path_of(
+    problem: Model | FrictionProblem, parameter: str, interval: tuple[float, float],
+    base: Model | FrictionProblem | None = None,
+) -> FrictionPath:  # fmt: skip
+    """The problems that a parameter runs through.
+
+    "load": loads and supports that depend on time t are taken at t; where none does, all of
+    them grow with the parameter as load factor, f of a problem in global form, q in Delassus
+    form.  base, for "load": the problem at 0, `problem` being that at 1.  "friction": the
+    coefficients keep their ratios, the parameter is the largest.
+    """
+    if parameter not in PARAMETERS:
+        raise InvalidInput(
+            f"parameter: expected one of {', '.join(PARAMETERS)}, got {parameter!r}"
+        )
+    if parameter == "friction":
+        if base is not None:
+            raise InvalidInput("base: expected none where friction is the parameter")
+        if interval[0] < 0:
+            raise InvalidInput(f"interval: expected friction >= 0, got {interval[0]:g}")
+        return FrictionPath.friction(_discrete(problem))
+    if base is not None:
+        return _between(_discrete(base), _discrete(problem))
+    if isinstance(problem, FrictionProblem):
+        nothing = problem.f if problem.form is Form.GLOBAL else problem.q
+        assert nothing is not None
+        return _between(problem.with_load(np.zeros_like(nothing)), problem)
+    motion = Motion(problem)
+    if not motion.is_timed:
+        return _between(problem.with_load(0.0).assemble(), problem.with_load(1.0).assemble())
+    return _in_time(motion, interval)
+
+
+def _in_time(motion: Motion, interval: tuple[float, float]) -> FrictionPath:
+    """Loads and supports at the time t, straight lines between the ends of the interval."""
+    a, b = interval
+    ends = [(motion.load(t), motion.prescribed(t)) for t in (a, b, (a + b) / 2)]
+    for first, last, middle in zip(*ends, strict=True):
+        size = max(float(np.abs(first).max(initial=0)), float(np.abs(last).max(initial=0)))
+        if np.abs((first + last) / 2 - middle).max(initial=0) > BENT * size:
+            raise InvalidInput(
+                f"interval: the loads are no straight line in time between {a:g} and {b:g}; "
+                "follow it in parts, or with base=, from one load to another"
+            )
+    whole = motion.parts
+    before = np.zeros((len(whole.gap), whole.carried.shape[1] - 1))
+    first, last = (motion.body.increment(*end, before) for end in ends[:2])
+    path = _between(first, last)
+    return _between(path.at(-a / (b - a)), path.at((1 - a) / (b - a)))
+
+
+def _between(start: FrictionProblem, end: FrictionProblem) -> FrictionPath:
+    """A path whose ends share the factor of M, or W."""
+    path = FrictionPath(start, end)
+    same: dict[str, Any] = {"_shared": start._shared}
+    same |= {"M": start.M, "H": start.H} if start.form is Form.GLOBAL else {"W": start.W}
+    return FrictionPath(start, replace(end, **same), path.name)
+
+
+def _discrete(problem: Model | FrictionProblem) -> FrictionProblem:
+    return problem if isinstance(problem, FrictionProblem) else problem.assemble()
+
+
+def state_of(path: PathProblem, start: object) -> Array:
+    """The unknowns of a start: a solution, reactions (nc, d), or the unknowns themselves."""
+    r = getattr(start, "r", start)
+    try:
+        values = np.asarray(r, dtype=float)
+    except (TypeError, ValueError) as reason:
+        raise InvalidInput(f"start: expected a solution or an array, got {start!r}") from reason
+    if not isinstance(path, FrictionPath):
+        return values.ravel()
+    wanted = (path.start.contacts, path.start.dimension)
+    if values.shape != wanted:
+        raise InvalidInput(f"start: expected reactions of shape {wanted}, got {values.shape}")
+    return path.state(values)
+
+
+def first_state(path: FrictionPath, p: float) -> Array:
+    """A solution to begin with: exact in 2D under Coulomb's law, else from a solver.
+
+    Raises NotConverged where the solver finds none.
+    """
+    if path.start.dimension == 2 and not path.tresca:
+        try:
+            return exact_state(path, p)
+        except SingularOperator:
+            pass  # W is not positive definite: a solver may still find a solution
+    found = drive(path.at(p), tolerance=START)
+    if found.convergence.outcome is not Outcome.CONVERGED:
+        raise NotConverged(f"start: no solution at {p:g}: {found.convergence}", found)
+    return path.state(found.r)

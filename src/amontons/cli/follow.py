@@ -1,0 +1,107 @@
+"""`amontons follow`: solution curves over the load or the friction, with folds and events."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .. import api
+from ..analysis.path import Branch, Event, EventKind, Stop
+from ..errors import InvalidInput
+from ..files import replacing
+from ..output import to_json, versions
+from .sources import open_source
+from .terminal import check_folder, check_writable, deliver_json, show_table
+
+SCHEMA = "amontons/follow/1"
+UNFINISHED = 1  # exit code
+FINISHED = (Stop.INTERVAL, Stop.CLOSED, Stop.JOINED, Stop.NOT_STARTED)
+ALIASES = {"t": "load"}  # the time of loads that depend on it
+ROWS = 30  # events that the table shows
+SHOWN = 40  # letters of a pattern
+
+
+def run(
+    source: str, overrides: Sequence[str], parameter: str, low: float, high: float,
+    mu: float | None, every: bool, max_points: int, time_limit: float | None,
+    folder: str | None, json_copy: str | None, quiet: bool,
+) -> int:  # fmt: skip
+    """Follow, write, show; the exit code."""
+    check_writable(json_copy, "--json")
+    opened = open_source(source, overrides)
+    if not low < high:
+        raise InvalidInput(f"--from, --to: expected a smaller and a larger number, got {low:g} "
+                           f"and {high:g}")  # fmt: skip
+    place = check_folder(f"{opened.name}-results" if folder is None else folder)
+    target = opened.target if mu is None else opened.target.with_mu(mu)
+    name = ALIASES.get(parameter, parameter)
+    limits: dict[str, Any] = {"max_points": max_points, "time_limit": time_limit}
+    if every:
+        found = api.diagram(target, name, (low, high), **limits)
+        branches, complete, reason = list(found), found.complete, found.reason
+    else:
+        branches, complete, reason = [api.follow(target, name, (low, high), **limits)], None, ""
+    text = to_json(record(branches, parameter, (low, high), complete, reason))
+    _write(place, text, branches, opened.title)
+    if json_copy is not None:
+        deliver_json(text, json_copy)
+    if json_copy != "-" and not quiet:
+        _show(opened.title, parameter, branches, reason, place)
+    ended = all(stop in FINISHED for branch in branches for stop in branch.stops)
+    return 0 if ended and complete is not False else UNFINISHED
+
+
+def record(
+    branches: Sequence[Branch], parameter: str, interval: tuple[float, float],
+    complete: bool | None, reason: str,
+) -> dict[str, Any]:  # fmt: skip
+    """What follow.json holds; points and events name their branch."""
+    parts = [branch.record() for branch in branches]
+
+    def rows(key: str) -> list[dict[str, Any]]:
+        return [{"branch": k, **row} for k, part in enumerate(parts) for row in part[key]]
+
+    return {
+        "schema": SCHEMA, "parameter": parameter, "interval": list(interval),
+        "points": rows("points"), "events": rows("events"),
+        "branches": [{"stops": part["stops"], "closed": part["closed"]} for part in parts],
+        "complete": complete, "reason": reason, "versions": versions(),
+    }  # fmt: skip
+
+
+def _write(place: Path, text: str, branches: list[Branch], title: str) -> None:
+    from ..plots import branch_figure
+
+    place.mkdir(parents=True, exist_ok=True)
+    with replacing(place / "follow.json") as path:
+        path.write_text(text, encoding="utf-8")
+    if branches:
+        with replacing(place / "follow.png") as path:
+            branch_figure(branches, title=title).savefig(path)
+
+
+def _show(title: str, parameter: str, branches: list[Branch], reason: str, place: Path) -> None:
+    events = [(k, e) for k, branch in enumerate(branches) for e in branch.events]
+    shown = [item for item in events if item[1].kind is not EventKind.STATUS]
+    rest = ROWS - len(shown)
+    if len(events) - len(shown) <= rest:
+        shown = events
+    rows = [[str(k), e.kind.name.lower(), f"{e.parameter:.10g}", _way(e)] for k, e in shown]
+    show_table(title, ["branch", "event", parameter, ""], rows, numbers="left")
+    if len(shown) < len(events):
+        click.echo(f"{len(events) - len(shown)} changes of status are in follow.json")
+    for branch in branches:
+        click.echo(str(branch))
+    if reason:
+        click.echo(reason)
+    click.echo(f"results in {place}/")
+
+
+def _way(event: Event) -> str:
+    if event.stop is not None:
+        return event.stop.advice
+    words = [str(word) for word in (event.before, event.after) if word is not None]
+    return " -> ".join(w if len(w) <= SHOWN else f"{w[: SHOWN - 1]}…" for w in words)

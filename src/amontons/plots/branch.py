@@ -1,0 +1,66 @@
+"""Bifurcation diagrams: one quantity of the solutions over the parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from .solution import INK
+
+if TYPE_CHECKING:
+    from ..analysis.path import Branch
+
+LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+Quantity = Callable[[Any], float]  # of one solution
+
+
+def branch_figure(
+    branches: Branch | Iterable[Branch], *, quantity: Quantity | None = None,
+    label: str = "", title: str = "",
+) -> Figure:  # fmt: skip
+    """A quantity of the solutions over the parameter, folds and branch points marked.
+
+    quantity: a function of one solution (one entry of `Branch.solutions`), by default the size
+    of the reactions, or of the unknowns.  label: its name and unit.
+    """
+    several = [branches] if hasattr(branches, "points") else list(branches)
+    figure = Figure(figsize=(6.4, 4.4), dpi=150, layout="constrained")
+    axes = figure.subplots()
+    for k, branch in enumerate(several):
+        draw_branch(axes, branch, quantity, LINES[k % len(LINES)])
+    axes.set_xlabel(several[0].name if several else "parameter")
+    axes.set_ylabel(label or ("size of the reactions" if quantity is None else "quantity"))
+    if title:
+        axes.set_title(title, loc="left", fontsize="medium")
+    if axes.get_legend_handles_labels()[1]:
+        axes.legend(frameon=False)
+    return figure
+
+
+def draw_branch(
+    axes: Axes, branch: Branch, quantity: Quantity | None = None, colour: str = LINES[0],
+    label: str | None = None,
+) -> None:  # fmt: skip
+    """One branch on given axes: a line, its folds as dots, branch points as diamonds."""
+    values = _values(branch, quantity)
+    axes.plot(branch.parameter, values, color=colour, linewidth=1.4, label=label)
+    length = branch.arclength
+    for kind, marker in (("FOLD", "o"), ("BRANCH", "D")):
+        at = [event for event in branch.events if event.kind.name == kind]
+        if at:
+            height = np.interp([event.arclength for event in at], length, values)
+            axes.plot([e.parameter for e in at], height, marker, color=colour, markersize=5,
+                      markeredgecolor=INK, markeredgewidth=0.6)  # fmt: skip
+
+
+def _values(branch: Branch, quantity: Quantity | None) -> list[float]:
+    if quantity is not None:
+        return [float(quantity(solution)) for solution in branch.solutions]
+    rows = branch.table()
+    if rows and "norm" in rows[0]:
+        return [row["norm"] for row in rows]
+    return [float(np.linalg.norm(point.state)) for point in branch.points]
