@@ -212,7 +212,7 @@ def test_proofs_hold_up_when_checked_from_the_problem():
 
 def test_bad_input_is_refused():
     with pytest.raises(am.UnsupportedForm, match="2D"):
-        am.all_solutions(random_delassus(0, 2, 3))
+        enumerate_solutions(random_delassus(0, 2, 3))
     many = am.FrictionProblem.from_delassus(np.eye(402), np.ones((201, 2)), np.ones(201))
     with pytest.raises(am.InvalidInput, match="at most 200, got 201"):
         enumerate_solutions(many)

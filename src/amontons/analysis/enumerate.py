@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,9 @@ from ..errors import InvalidInput, UnsupportedForm
 from ..problem import FrictionProblem
 from . import pattern_search as search
 from .scaled_problem import REACH, SAME, ScaledProblem, States
+
+if TYPE_CHECKING:
+    from .disc_search import DiscProof
 
 Array = NDArray[np.float64]
 LETTERS = {search.OPEN_OR_CLOSED: ".", search.CLOSED: "c", search.OPEN: "f",
@@ -31,8 +35,8 @@ CONTACTS = 200  # up to which the dictionaries of all levels need less than 0.6 
 class PieceSolution:
     """A solution, or a connected set of them on one linear piece of the law.
 
-    pattern: status of every contact, f free, s stick, slip + (r_T = mu r_N) or -.  touching:
-    further patterns that the same solution has, being on their border.  r, u (nc, 2).
+    pattern: status of every contact, f free, s stick, slip + (r_T = mu r_N) or -, in 3D l.
+    touching: further patterns that the same solution has, being on their border.  r, u (nc, d).
     error: by the judge.  orientation: sign of the determinant of the piece, 1 as without
     friction, 0 where it is singular.  energy: r W r / 2, the potential energy above that of
     the state without contact.  freedom: dimension of the set of solutions on this piece, 0 for
@@ -75,7 +79,7 @@ class Solutions:
     reason: str
     examined: int
     seconds: float
-    proof: Proof | None = None
+    proof: Proof | DiscProof | None = None
 
     def __len__(self) -> int:
         return len(self.solutions)

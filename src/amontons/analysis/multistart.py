@@ -50,10 +50,7 @@ def multistart(
     began = time.perf_counter()
     local = problem.condensed()
     if local.q_norm == 0:
-        r = np.zeros((local.contacts, local.dimension))
-        rest = PieceSolution("f" * local.contacts, (), r, r.copy(), 0.0, 1, 0.0)
-        reason = "q is zero: only r = 0 can be judged, others were not looked for"
-        return Solutions((rest,), local.contacts == 0, reason, 0, 0.0)
+        return without_load(local)
     finder = Finder(Stack.of(local), np.random.default_rng(seed), tolerance)
     used = 0
     while used < starts or (finder.lacks_one and used < EXTRA * starts):
@@ -62,6 +59,14 @@ def multistart(
         used += finder.search(min(ROUND, EXTRA * starts - used))
     seconds = time.perf_counter() - began
     return Solutions(tuple(finder.solutions()), False, finder.reason(used), used, seconds)
+
+
+def without_load(problem: FrictionProblem) -> Solutions:
+    """What can be said where q is zero, or without contacts."""
+    r = np.zeros((problem.contacts, problem.dimension))
+    rest = PieceSolution("f" * problem.contacts, (), r, r.copy(), 0.0, 1, 0.0)
+    reason = "q is zero: only r = 0 can be judged, others were not looked for"
+    return Solutions((rest,), problem.contacts == 0, reason, 0, 0.0)
 
 
 class Finder:
@@ -91,7 +96,9 @@ class Finder:
         if self.stack.problem.error(r * self.stack.to_r) > self.tolerance:
             return False
         for k, other in enumerate(self.found):
-            if self._connected(r, other):  # keep a point inside, its Jacobian is that of the set
+            if self._connected(
+                r, other
+            ):  # keep a point inside, its Jacobian is that of the set
                 self.found[k], self.sign[k] = (r + other) / 2, 0
                 return False
         self.found.append(r)

@@ -1,7 +1,7 @@
 """Semismooth Newton from many starts at once, by stacked dense systems.
 
 The Alart-Curnier function of `solvers.functions` on a problem in scaled variables,
-u = W r + c with |W_ii| = 1 and |c| = 1: (A + B W) dr = -F for a whole stack of reactions, one
+u = W r + c with |W_ii| and |c| near 1: (A + B W) dr = -F for a whole stack of reactions, one
 call of LAPACK for all.  There is no line search: steps are full, or shortened at random once
 they did not converge at once, which leaves cycles.  A step near a known solution can be
 deflated, [FBF] eq. (2.11): with m the product of 1 + 1 / |r - r_k|^2 over the known ones, the
@@ -34,7 +34,8 @@ WIDE = 4e6  # entries of a stack of matrices
 class Stack:
     """A problem in scaled variables, r * to_r being reactions in their unit.
 
-    W (nc d, nc d), c (nc, d), mu (nc,), able (nc,): contacts that can react.
+    W (nc d, nc d), c (nc, d), mu (nc,), able (nc,): contacts that can react.  The scales are
+    powers of two, so that nothing is rounded: |W_ii| and |c| are 1 within factors of 2.
     """
 
     problem: FrictionProblem
@@ -53,8 +54,8 @@ class Stack:
         nc, d = problem.q.shape
         own = np.arange(nc)
         size = np.linalg.norm(W.reshape(nc, d, nc, d)[own, :, own], 2, axis=(1, 2))
-        root = np.sqrt(np.where(size > 0, size, 1.0))[:, None]
-        unit = float(np.linalg.norm(problem.q / root))
+        root = _power_of_two(np.sqrt(np.where(size > 0, size, 1.0)))[:, None]
+        unit = float(_power_of_two(np.linalg.norm(problem.q / root)))
         each = np.repeat(root[:, 0], d)
         return cls(problem, W / each / each[:, None], problem.q / (unit * root), problem.mu,
                    size > 0, unit / root, unit * root)  # fmt: skip
@@ -116,6 +117,18 @@ class Stack:
         F[:, ~self.able], A[:, ~self.able], B[:, ~self.able] = r[:, ~self.able], np.eye(d), 0
         return F, A, B
 
+    def polished(self, r: Array) -> tuple[Array, float]:
+        """Reactions (nc, d) near a solution after two more steps, and the size of the last."""
+        size, rho = np.inf, np.ones((1, self.shape[0]))
+        for _ in range(3):
+            F, A, B = self.linearise(r[None], rho)
+            dr = self._solve(A, B, -F)[0]
+            last, size = size, float(np.abs(dr).max(initial=0.0))
+            if size > last:
+                return r, last
+            r = r + dr
+        return r, size
+
     def jacobian(self, r: Array) -> Array:
         """A + B W, (nc d, nc d), at one (nc, d) of reactions."""
         nc, d = self.shape
@@ -157,6 +170,11 @@ class Stack:
                 dr = dr * deflation(r, dr, known)[:, None, None]
             r = r + dr * _lengths(random, step, len(r))[:, None, None]
         return np.concatenate(reached)
+
+
+def _power_of_two(x: Array | float) -> Array:
+    """The nearest one, to multiply by without rounding."""
+    return np.exp2(np.round(np.log2(x)))
 
 
 def _lengths(random: np.random.Generator, step: int, count: int) -> Array:
