@@ -1,0 +1,319 @@
+"""All solutions of a 3D Coulomb problem, with proof: branch and bound over statuses and arcs.
+
+A region gives every contact the statuses it may have and an arc for its direction of slip.
+With at most one known solution in it, multipliers close it (`disc_multipliers`): about that
+solution there is no other, or there is none at all.  Else, and where two known solutions are in
+it, a contact is decided: free or closed, stick or slip, then halves of the arc.  Regions in
+which every contact is free or sticks are a linear system.  Solutions to begin with come from
+`multistart`, further ones from Newton's method where no region is left to divide.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InvalidInput
+from ..problem import FrictionProblem
+from .disc_multipliers import UNCERTAINTY, BoxProblem, BoxProof, contains
+from .disc_sets import ON, Law, Region
+from .enumerate import Solutions
+from .multistart import EXTRA, ROUND, Finder, without_load
+from .newton_batch import FREE, SLIP, STICK, Stack
+
+Array = NDArray[np.float64]
+Regions = tuple[Region, ...]
+FINEST = 0.002  # rad: half of the smallest arc
+SURE = 1e-7  # scaled violation of the law that excludes the solution of a linear system
+SECONDS = 60.0  # of a search without a limit of its own: it may grow without end
+STARTS = 300  # of Newton's method before the search
+
+
+@dataclass(frozen=True, eq=False)
+class DiscBox:
+    """A region in which there is no solution but r, (nc, 3), or none at all where r is None.
+
+    letters: what every contact may do, . anything, c closed, f free, s stick, l slip with
+    u_T / |u_T| at an angle within arcs[:, 1] of arcs[:, 0], rad.  V (nc, 6, 6), in the units of
+    the problem: with d = (r', u') - (r, u) of any solution r' in the region d V d <= 0 for
+    every contact, and the sum is positive for all d_u = W d_r; without r it is (nc, 7, 7), and
+    d = (r', u', 1).
+    """
+
+    letters: str
+    arcs: Array
+    r: Array | None
+    V: Array
+
+
+@dataclass(frozen=True, eq=False)
+class DiscProof:
+    """Regions that together are everything; anyone can check it with W, q and mu.
+
+    linear: patterns of free and sticking contacts, each a linear system of its own.
+    """
+
+    boxes: tuple[DiscBox, ...]
+    linear: tuple[str, ...]
+
+
+def enumerate_discs(
+    problem: FrictionProblem, *, time_limit: float | None = None, tolerance: float = 1e-8,
+    keep_proof: bool = False,
+) -> Solutions:  # fmt: skip
+    """All solutions of a 3D Coulomb problem; the global form is condensed.
+
+    time_limit: seconds, 60 where there is none, after which the list is not complete.
+    tolerance: error by the judge that a solution may have.  keep_proof: fill `Solutions.proof`
+    with a DiscProof.  Raises UnsupportedForm under Tresca's law.
+    """
+    if time_limit is not None and not time_limit > 0:
+        raise InvalidInput(f"time_limit: expected seconds > 0, got {time_limit!r}")
+    _ = problem.mu
+    began = time.perf_counter()
+    local = problem.condensed()
+    if local.q_norm == 0:
+        return without_load(local)
+    limit = SECONDS if time_limit is None else time_limit
+    stack = Stack.of(local)
+    finder = Finder(stack, np.random.default_rng(0), tolerance)
+    search = DiscSearch(stack, finder, began + limit)
+    search.begin()
+    search.run()
+    return Solutions(
+        tuple(finder.solutions()), search.complete, search.reason(limit), search.examined,
+        time.perf_counter() - began, search.proof() if keep_proof else None,
+    )  # fmt: skip
+
+
+@dataclass(eq=False)
+class DiscSearch:
+    """The state of one search; `run` does it."""
+
+    stack: Stack
+    finder: Finder
+    deadline: float = np.inf
+    examined: int = 0
+    undecided: int = 0
+    stopped: bool = False
+
+    def __post_init__(self) -> None:
+        self.proofs: list[BoxProof] = []
+        self.linear: list[Regions] = []
+
+    def begin(self) -> None:
+        """Solutions from many starts, more where one is known to be missing."""
+        used = 0
+        while used < STARTS or (self.finder.lacks_one and used < EXTRA * STARTS):
+            if used and time.perf_counter() > self.deadline:
+                return
+            used += self.finder.search(ROUND)
+
+    @property
+    def complete(self) -> bool:
+        """True when every region was closed."""
+        return not self.stopped and not self.undecided
+
+    @property
+    def _penetrates(self) -> bool:
+        """True when a contact that can not react has u_N < 0: no solution."""
+        return bool((self.stack.c[~self.stack.able, 0] < 0).any())
+
+    def reason(self, limit: float) -> str:
+        """Why the list is complete, or why not."""
+        if self.stopped:
+            return f"stopped after {limit:g} s"
+        if self.undecided:
+            return f"{self.undecided} regions could be neither divided nor excluded"
+        return "every region was searched and all others are excluded"
+
+    def proof(self) -> DiscProof:
+        """What closed the regions, in the units of the problem."""
+        return DiscProof(
+            tuple(self._box(proof) for proof in self.proofs),
+            tuple("".join(region.letter for region in regions) for regions in self.linear),
+        )
+
+    def _box(self, proof: BoxProof) -> DiscBox:
+        stack, nc = self.stack, len(proof.regions)
+        unit = np.repeat(np.hstack([stack.to_r, stack.to_u]), 3, axis=1)
+        if proof.r is None:
+            unit = np.hstack([unit, np.ones((nc, 1))])
+        V = proof.V / unit[:, :, None] / unit[:, None, :]
+        arcs = np.array([(region.middle, region.half) for region in proof.regions])
+        letters = "".join(region.letter for region in proof.regions)
+        return DiscBox(letters, arcs, None if proof.r is None else proof.r * stack.to_r, V)
+
+    def run(self, most_solutions: int | None = None) -> None:
+        """Divide until all regions are closed, the clock runs out, or enough are found."""
+        if self._penetrates:
+            return
+        self._polish()
+        queue: list[Regions] = [self._root()]
+        while queue:
+            if time.perf_counter() > self.deadline:
+                self.stopped = True
+                return
+            if most_solutions is not None and len(self.finder.found) >= most_solutions:
+                return
+            queue += reversed(self._look_at(queue.pop()))
+
+    def _polish(self) -> None:
+        """Known solutions to the last digits; those that can not be are no references."""
+        self.vague = []
+        for k, r in enumerate(self.finder.found):
+            better, step = self.stack.polished(r)
+            if np.abs(better - r).max(initial=0.0) <= ON * (1 + np.abs(r).max(initial=0.0)):
+                self.finder.found[k] = better
+            self.vague.append(step > UNCERTAINTY * (1 + np.abs(r).max(initial=0.0)))
+
+    def _root(self) -> Regions:
+        """Every contact undecided; those that can not react are free."""
+        return tuple(Region() if able else Region("f") for able in self.stack.able)
+
+    def _look_at(self, regions: Regions) -> list[Regions]:
+        """Regions that remain of one; none where it is closed or has to be given up."""
+        self.examined += 1
+        if len(self.vague) < len(self.finder.found):
+            self._polish()
+        inside = [r for r in self.finder.found if self._holds(regions, r)]
+        if len(inside) > 1:
+            p = self._difference(regions, inside)
+            parts = [] if p is None else self._divided(regions, p, inside)
+            self.undecided += not parts
+            return parts
+        if all(region.letter in "fs" for region in regions):
+            self._settle(regions, bool(inside))
+            return []
+        if inside and self._is_vague(inside[0]):
+            self.undecided += 1
+            return []
+        answer = BoxProblem(self.stack, regions, inside[0] if inside else None).solve(
+            max(self.deadline - time.perf_counter(), 0.01)
+        )
+        if answer.proof is not None:
+            self.proofs.append(answer.proof)
+            return []
+        for p in self._order(regions, answer.scores):
+            parts = self._divided(regions, p, inside)
+            if parts:
+                if not inside and all(region.letter not in ".c" for region in regions):
+                    self._newton(regions)
+                return parts
+        if not inside and self._newton(regions):
+            return [regions]
+        self.undecided += 1
+        return []
+
+    def _is_vague(self, r: Array) -> bool:
+        pairs = zip(self.vague, self.finder.found, strict=True)
+        return any(vague and other is r for vague, other in pairs)
+
+    # ---------------------------------------------------------------- regions
+    def _laws(self, r: Array) -> list[Law]:
+        z = np.hstack([r, self.stack.velocity(r[None])[0]])
+        return [Law(float(mu), own) for mu, own in zip(self.stack.mu, z, strict=True)]
+
+    def _holds(self, regions: Regions, r: Array) -> bool:
+        laws = self._laws(r)
+        return all(contains(law, region) for law, region in zip(laws, regions, strict=True))
+
+    def _order(self, regions: Regions, scores: Array) -> Iterator[int]:
+        """Contacts to divide, the most promising first."""
+        width = np.array([{".": 2 * np.pi, "c": 2 * np.pi}.get(g.letter, g.half * (
+            g.letter == "l")) for g in regions])  # fmt: skip
+        key = np.where(scores > 0, scores, 0.0)
+        yield from sorted(range(len(regions)), key=lambda p: (-key[p], -width[p]))
+
+    def _divided(self, regions: Regions, p: int, inside: list[Array]) -> list[Regions]:
+        """The parts of regions by contact p, [] where it is decided to the last."""
+        own = regions[p]
+        if own.letter in "fs":
+            return []
+        if own.letter == ".":
+            parts = [Region("f"), Region("c")]
+        elif own.letter == "c":
+            if self.stack.mu[p] == 0:
+                return []
+            parts = [Region("s"), replace(own, letter="l")]
+        else:
+            parts = self._arcs(own, p, inside)
+        return [(*regions[:p], part, *regions[p + 1 :]) for part in parts]
+
+    def _arcs(self, own: Region, p: int, inside: list[Array]) -> list[Region]:
+        """Halves of an arc; a circle is cut across the direction of a known solution.
+
+        The arc of two known solutions is cut between them.
+        """
+        if own.half <= FINEST or self.stack.mu[p] == 0:
+            return []
+        angles = [law.direction for law in (self._laws(r)[p] for r in inside)]
+        known = [angle for angle in angles if angle is not None]
+        if own.half >= np.pi:
+            middle = known[0] if known else own.middle
+            return [Region("l", middle, np.pi / 2), Region("l", middle + np.pi, np.pi / 2)]
+        return [Region("l", own.middle - own.half / 2, own.half / 2),
+                Region("l", own.middle + own.half / 2, own.half / 2)]  # fmt: skip
+
+    def _difference(self, regions: Regions, inside: list[Array]) -> int | None:
+        """A contact whose division tells known solutions apart."""
+        rank: list[tuple[int, int, int]] = []
+        for p in range(len(regions)):
+            parts = self._divided(regions, p, inside)
+            counts = [sum(self._holds(part, r) for r in inside) for part in parts]
+            if parts and max(counts) < len(inside):
+                rank.append((max(counts), sum(counts), p))
+        if rank:
+            return min(rank)[2]
+        return next((p for p in self._order(regions, np.zeros(len(regions)))
+                     if self._divided(regions, p, inside)), None)  # fmt: skip
+
+    # ---------------------------------------------------------------- leaves
+    def _start(self, regions: Regions) -> Array:
+        """Scaled r on a pattern, slip in the middle of its arcs, signs disregarded."""
+        code = {"f": FREE, "s": STICK, "l": SLIP, ".": FREE, "c": STICK}
+        states = np.array([[code[region.letter] for region in regions]])
+        angle = np.array([region.middle for region in regions])
+        direction = np.column_stack([np.cos(angle), np.sin(angle)])
+        return self.stack.on_piece(states, direction[None])
+
+    def _newton(self, regions: Regions) -> bool:
+        """True when Newton's method from a region finds a solution that was not known."""
+        reached = self.stack.newton(self._start(regions), np.random.default_rng(0))
+        return any([self.finder.add(r) for r in reached])
+
+    def _settle(self, regions: Regions, known: bool) -> None:
+        """A region without slip: its linear system has a solution of the law or not."""
+        self.linear.append(regions)
+        r = self._start(regions)[0]
+        u = self.stack.velocity(r[None])[0]
+        free = np.array([region.letter == "f" for region in regions])
+        closed = ~free
+        equations = max(np.abs(r[free]).max(initial=0.0), np.abs(u[closed]).max(initial=0.0))
+        matrix = self.stack.W[np.ix_(np.repeat(closed, 3), np.repeat(closed, 3))]
+        if equations > 1e-9 * (1 + np.abs(r).max()) or _ill_conditioned(matrix):
+            self.undecided += 1
+            return
+        if known:
+            return
+        tangent = np.linalg.norm(r[:, 1:], axis=1) - self.stack.mu * r[:, 0]
+        worst = max(np.max(-u[free, 0], initial=-np.inf),
+                    np.max(tangent[closed], initial=-np.inf),
+                    np.max(-r[closed, 0], initial=-np.inf))  # fmt: skip
+        if worst <= SURE * (1 + np.abs(r).max()) and not self.finder.add(r):
+            self.undecided += not self._known(r)
+
+    def _known(self, r: Array) -> bool:
+        size = 1 + np.abs(r).max()
+        return any(np.abs(r - other).max() <= 10 * ON * size for other in self.finder.found)
+
+
+def _ill_conditioned(matrix: Array) -> bool:
+    if not len(matrix):
+        return False
+    values = np.linalg.svd(matrix, compute_uv=False)
+    return bool(values[-1] <= 1e-8 * values[0])
