@@ -19,21 +19,23 @@ static and discrete friction problems", in [Rey] section 5.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InvalidInput
 from ..problem import FrictionProblem
-from .determinant_search import NEGATIVE, STICK
+from .determinant_search import NEGATIVE, POSITIVE, STICK, STOPPED
 from .energy_bound import energy_bound
-from .exact_threshold import Threshold, exact_threshold, search_windows
+from .exact_threshold import LARGEST, Threshold, exact_threshold, search_windows
+from .friction_branching import Branching, Leaf
 from .status_pieces import Pieces
 
 Array = NDArray[np.float64]
 ENUMERATED = 13  # contacts up to which all 4^n patterns are examined: 5 s
 COMPARED = 10  # contacts up to which the P-matrix threshold is computed: 5^n patterns
+EASY = 20.0  # contacts times the part of the upper bound that takes one matrix inequality
 FULL_CONTACT = 12  # contacts up to which the full contact threshold is: 3^n patterns
 
 
@@ -61,11 +63,12 @@ class Witness:
 class CriticalFriction:
     """Bounds on the critical friction, lower <= mu_* <= upper, in terms of t (largest mu).
 
-    criterion: what proves lower: "determinants" (all patterns), "multipliers", "energy", or
-    "frictionless" where no proof is left.  upper is inf where no singular piece was found up
-    to LARGEST.  witness: the piece behind upper.  p_matrix, full_contact: the two older
-    thresholds, None where they would take too long.  examined: pivots and linear matrix
-    inequalities.  reason: why the bounds are not closer.
+    criterion: what proves lower: "determinants" (all patterns), "multipliers" (`proof`),
+    "energy", or "none" where there is no proof.  upper is inf where no singular piece was found
+    up to LARGEST.  witness: the piece behind upper.  p_matrix, full_contact: the two older
+    thresholds, None where they would take too long.  proof: groups of patterns that together
+    are all of them.  examined: determinants and linear matrix inequalities.  reason: why the
+    bounds are not closer.
     """
 
     lower: float
@@ -77,6 +80,7 @@ class CriticalFriction:
     examined: int
     seconds: float
     reason: str = ""
+    proof: tuple[Leaf, ...] = ()
 
     def __str__(self) -> str:
         upper = "no upper bound found" if np.isinf(self.upper) else f"{self.upper:.5g}"
@@ -101,27 +105,78 @@ def critical_friction(
         why = "no tangential force moves a contact along its normal"
         return CriticalFriction(np.inf, np.inf, "determinants", None, None, None, 0,
                                 time.perf_counter() - began, why)  # fmt: skip
-    found = Threshold()
-    search_windows(pieces, found, began + 0.3 * time_limit)
-    criterion, reason = _lower(pieces, found, began + time_limit)
-    witness = None
-    if found.states is not None:
-        witness = make_witness(pieces, found)
+    search = _Search(pieces, began + time_limit, gap)
+    search.run(began + 0.2 * time_limit)
+    found = search.found
+    witness = None if found.states is None else make_witness(pieces, found)
     comparison = _comparison(pieces, found, began + time_limit)
-    return CriticalFriction(found.lower, found.upper, criterion, witness, *comparison,
-                            found.seen, time.perf_counter() - began, reason)  # fmt: skip
+    return CriticalFriction(found.lower, found.upper, search.criterion, witness, *comparison,
+                            found.seen, time.perf_counter() - began, search.reason,
+                            search.proof)  # fmt: skip
 
 
-def _lower(pieces: Pieces, found: Threshold, deadline: float) -> tuple[str, str]:
-    """Prove a lower bound; (criterion, reason)."""
-    if pieces.contacts <= ENUMERATED:
-        exact_threshold(pieces, found, deadline)
-        if found.proved:
-            return "determinants", ""
-    found.lower = min(energy_bound(pieces.W, pieces.shape)[0], found.upper)
-    if found.lower > 0:
-        return "energy", "more contacts than patterns can be enumerated for"
-    return "frictionless", "W is singular: reactions are not unique without friction either"
+@dataclass(eq=False)
+class _Search:
+    """Upper bounds by windows, then a lower one by the strongest method that fits."""
+
+    pieces: Pieces
+    deadline: float
+    gap: float
+    found: Threshold = field(default_factory=Threshold)
+    criterion: str = "none"
+    reason: str = ""
+    proof: tuple[Leaf, ...] = ()
+
+    def run(self, windows_until: float) -> None:
+        """Close the bounds as far as time allows."""
+        pieces, found = self.pieces, self.found
+        search_windows(pieces, found, windows_until)
+        if pieces.contacts <= ENUMERATED:
+            exact_threshold(pieces, found, self.deadline)
+            if found.proved:
+                self.criterion = "determinants"
+                return
+        found.lower = min(energy_bound(pieces.W, pieces.shape)[0], found.upper)
+        if found.lower == 0:
+            self.reason = "W is singular: reactions are not unique without friction either"
+            return
+        self.criterion = "energy"
+        self._branch()
+
+    def _branch(self) -> None:
+        """Raise the lower bound by branch and bound, in steps that cost more and more."""
+        n, found = self.pieces.contacts, self.found
+        part = min(EASY / n, 0.9)
+        while found.lower < found.upper * (1 - self.gap):
+            t = min(found.upper * part, LARGEST)
+            began = time.perf_counter()
+            branching = Branching(self.pieces, t, self.deadline)
+            sign = branching.run()
+            spent = time.perf_counter() - began
+            found.seen += branching.patterns + branching.inequalities
+            if sign == POSITIVE:
+                found.lower, self.criterion = max(t, found.lower), "multipliers"
+                self.proof = tuple(leaf.of_problem(self.pieces) for leaf in branching.leaves)
+                if t == LARGEST:
+                    return
+                part = self._next(part, spent)
+            elif sign == STOPPED or not self._take(branching):
+                self.reason = (
+                    "time is up" if sign == STOPPED else "a determinant is too near to zero"
+                )
+                return
+
+    def _next(self, part: float, spent: float) -> float:
+        """The next part of the upper bound to prove: further on where the last one was easy."""
+        left = self.deadline - time.perf_counter()
+        step = 0.8 if spent < 0.02 * left else 0.4 if spent < 0.1 * left else 0.2
+        further = part + step * (1 - part)
+        return 1 - self.gap if further > 1 - 3 * self.gap else further
+
+    def _take(self, branching: Branching) -> bool:
+        """Take the pattern that failed as an upper bound; False where it is none."""
+        states = branching.failed
+        return states is not None and self.found.take(self.pieces, states)
 
 
 def make_witness(pieces: Pieces, found: Threshold) -> Witness:

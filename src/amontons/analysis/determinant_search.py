@@ -159,3 +159,14 @@ def search_inplace(m, allowed, S, B, work, turn, states, level, budget):
             level += 1
             turn[level] = 0
     return POSITIVE, level, seen
+
+
+@njit(cache=True)
+def eliminate(S, B, state, m):
+    """(sign of the pivot, Schur complement, error bound) with the first contact in a state."""
+    size = len(S)
+    T, C, X, Y = np.empty((4, size, size))
+    sign = _state_sign(S, B, state, m)
+    if sign == POSITIVE:
+        _enter_inplace(S, B, size, state, m, T, C, X, Y)
+    return sign, T[: size - 2, : size - 2].copy(), C[: size - 2, : size - 2].copy()

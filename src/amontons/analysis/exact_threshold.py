@@ -88,18 +88,19 @@ def _below(
 
 
 def first_failure(
-    W: Array, m: Array, allowed: NDArray[np.bool_], deadline: float = np.inf
-) -> tuple[int, States, int]:
+    W: Array, m: Array, allowed: NDArray[np.bool_], deadline: float = np.inf,
+    rounding: Array | float = 0.0,
+) -> tuple[int, States, int]:  # fmt: skip
     """(sign, pattern of the first contacts, pivots seen) of the first pivot that is not > 0.
 
     The sign is NEGATIVE or UNKNOWN (within rounding of zero); POSITIVE where all patterns pass,
-    STOPPED at the deadline (time.perf_counter).
+    STOPPED at the deadline (time.perf_counter).  rounding: of the entries of W.
     """
     n = len(m)
     if n == 0:
         return POSITIVE, np.zeros(0, dtype=np.int64), 0
     S, B = np.zeros((2, n, 2 * n, 2 * n))
-    S[0] = W
+    S[0], B[0] = W, rounding
     work = np.empty((2, 2 * n, 2 * n))
     turn, states = np.zeros((2, n), dtype=np.int64)
     level = total = 0

@@ -175,9 +175,7 @@ def find_multipliers(
     W, extras = multipliers_at(program, point)
     values, vectors = linalg.eigh(point.S[0][0], subset_by_index=[0, 0])
     least, bound = float(values[0]) + point.t, program.theta * point.lam
-    return Multipliers(
-        outcome, W, extras, least, bound, vectors[:, 0], steps, tuple(point.X)
-    )
+    return Multipliers(outcome, W, extras, least, bound, vectors[:, 0], steps, tuple(point.X))
 
 
 def multipliers_at(
