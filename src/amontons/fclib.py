@@ -27,8 +27,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from .errors import FileFormatError, InvalidInput
+from .errors import FileFormatError, InvalidInput, UnsupportedForm
 from .files import replacing
+from .nitsche_problem import NO_MULTIPLIERS, NitscheProblem
 from .problem import Form, FrictionProblem
 from .solution import FrictionSolution
 
@@ -393,9 +394,11 @@ def write_fclib(
     """Write a problem, in the form it has, and optionally its solution; nothing on failure.
 
     A problem from `read_fclib` keeps storage and texts of its file; an empty title or
-    description means the old text.  Raises UnsupportedForm for Tresca friction, which FCLib
-    does not know.
+    description means the old text.  Raises UnsupportedForm for Tresca friction and for
+    Nitsche's method, which FCLib does not know.
     """
+    if isinstance(problem, NitscheProblem):
+        raise UnsupportedForm(f"fclib: {NO_MULTIPLIERS}")
     mu, problem = problem.mu, problem.assembled()
     if solution is not None and solution.r.shape != (problem.contacts, problem.dimension):
         raise InvalidInput(

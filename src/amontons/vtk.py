@@ -28,7 +28,8 @@ def write_model(
     COPEN gap, CPRESS pressure (positive in compression), CSHEAR and CSLIP lengths of the shear
     traction and of the slip, CSTATUS 0 open, 1 slip, 2 stick and -1 off the contact surface,
     CSLIDING 0 or 1, CFORCE force on the slave in global axes.  Corners of triangles of second
-    order are no contacts: the first four get the mean of the contacts around.
+    order are no contacts: the first four get the mean of the contacts around.  By Nitsche's
+    method a node takes the Gauss points next to it: means of CPRESS and CSHEAR by area.
 
     Where several pairs meet at a node, CFORCE, CPRESS and CSHEAR are those of the sum of their
     forces, pressures and shear vectors; COPEN is the least, CSLIP, CSTATUS, CSLIDING the most.
@@ -46,23 +47,24 @@ def write_model(
     write_meshes(
         path,
         [body.mesh for body, _ in pairs],
-        {"displacement": displacement, **_contact_fields(fields, solution, starts)},
+        {"displacement": displacement, **_contact_fields(model, fields, solution, starts)},
         {"von_mises": von_mises(np.concatenate(stress)), "body": np.concatenate(owner)},
     )
 
 
 def _contact_fields(
-    fields: ContactFields, solution: FrictionSolution, starts: NDArray[np.int64]
+    model: Model, fields: ContactFields, solution: FrictionSolution, starts: NDArray[np.int64]
 ) -> dict[str, NDArray]:
     """Values per node of all bodies."""
     at = starts[fields.body] + fields.node
     nodes, index = np.unique(at, return_inverse=True)
+    share = _shares(model, fields, at)
     shear = np.einsum("ik,ikc->ic", fields.shear, fields.frames[:, 1:])  # global axes: they add
     slip = np.linalg.norm(fields.slip, axis=1)
     found = {
         "COPEN": _gathered(np.minimum, fields.gap, index),
-        "CPRESS": _gathered(np.add, fields.pressure, index),
-        "CSHEAR": np.linalg.norm(_gathered(np.add, shear, index), axis=1),
+        "CPRESS": _gathered(np.add, share * fields.pressure, index),
+        "CSHEAR": np.linalg.norm(_gathered(np.add, share[:, None] * shear, index), axis=1),
         "CSLIP": _gathered(np.maximum, slip, index),
         "CSTATUS": _gathered(np.maximum, solution.status.astype(np.int32), index),
         "CSLIDING": _gathered(np.maximum, solution.sliding.astype(np.int32), index),
@@ -78,6 +80,17 @@ def _contact_fields(
     for name in ("COPEN", "CPRESS", "CSHEAR", "CSLIP"):
         out[name] = _with_corners(out[name], fields, starts)
     return out
+
+
+def _shares(model: Model, fields: ContactFields, at: NDArray[np.int64]) -> Array:
+    """Part of each contact in its pair's area at the node, (nc,): 1 but for Gauss points."""
+    if model.contacts[0].nitsche is None:
+        return np.ones(len(at))
+    sizes = [len(placed.rows.nodes) for placed in model.discretisation.placed]
+    pair = np.repeat(np.arange(len(sizes)), sizes)
+    _, label = np.unique(np.stack([pair, at]), axis=1, return_inverse=True)
+    total = np.bincount(label.ravel(), fields.weights)
+    return fields.weights / total[label.ravel()]
 
 
 def _gathered(combine: np.ufunc, values: NDArray, index: NDArray[np.int64]) -> NDArray:

@@ -1,11 +1,16 @@
 """Nitsche's contact: exact solutions whatever kappa, tangents, invariance, honest refusals."""
 
+import json
 from dataclasses import replace
 
+import meshio
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import amontons as am
+from amontons.case import read_case
+from amontons.cli import main
 from amontons.errors import InvalidInput, UnsupportedForm
 from amontons.fem.traces import surface_points
 from amontons.hild import free_displacement, hild_triangle, stick_displacement
@@ -296,3 +301,99 @@ def test_start_takes_displacements_of_another_method():
     assert solution.displacement[0] == pytest.approx(am.solve(model).displacement[0], abs=1e-9)
     with pytest.raises(InvalidInput, match="start"):
         am.solve(model, start=Iterate(np.zeros((1, 2)), np.zeros(3)))
+
+
+# ------------------------------------------------------------------------ files and commands
+CASE = """
+title = "dragged"
+[mesh]
+box = [1, 1, 1]
+cells = 2
+[material.default]
+young = 200.0
+poisson = 0.3
+[[fix]]
+on = "top"
+value = [0.0, 0.02, "-0.01 - 0.01*x"]
+[[contact]]
+slave = "bottom"
+obstacle = { plane = { normal = [0, 0, 1] } }
+friction = { coulomb = 0.4 }
+method = METHOD
+"""
+
+
+@pytest.mark.parametrize(
+    "method", ['"nitsche"', '{ kind = "nitsche", kappa = 900, theta = -1 }']
+)
+def test_case_file_to_results(method, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "case.toml").write_text(CASE.replace("METHOD", method))
+    done = CliRunner().invoke(main, ["solve", "case.toml"])
+    assert done.exit_code == 0, done.output
+    record = json.loads((tmp_path / "case-results" / "solution.json").read_text())
+    assert record["measure"] == "nitsche"
+    assert record["fclib_error"] is None
+    assert record["contacts"]["total"] == 4 * 16
+    model = read_case("case.toml").model
+    solution = am.solve(model)
+    assert record["resultant"] == pytest.approx(solution.resultant)
+    assert {p.name for p in (tmp_path / "case-results").iterdir()} == {
+        "solution.json", "solution.h5", "solution.vtu", "status.png", "convergence.png"
+    }  # fmt: skip
+    options = model.contacts[0].nitsche
+    assert (options.kappa, options.theta) == (
+        (None, 0.0) if "k" not in method[:3] else (900, -1)
+    )
+    facts = CliRunner().invoke(main, ["info", "case.toml", "--json", "-"])
+    assert json.loads(facts.output)["form"] == "nitsche"
+    for command in (["enumerate", "case.toml"], ["convert", "case.toml", "case.hdf5"]):
+        refused = CliRunner().invoke(main, command)
+        assert refused.exit_code == 2
+        assert "nodal" in refused.stderr
+
+
+def test_nodes_of_the_picture_take_means_of_their_points(tmp_path):
+    across = -0.3 / 0.7
+    model = block(
+        (3, 2), supports=[],
+        loads=[am.Traction("top", (0, -1.0)), am.Traction("left", (-across, 0)),
+               am.Traction("right", (across, 0))],
+    )  # fmt: skip
+    solution = am.solve(model, tolerance=1e-11)
+    solution.write(tmp_path / "a.vtu")
+    solution.plot(tmp_path / "a.png")
+    data = meshio.read(tmp_path / "a.vtu").point_data
+    bottom = model.bodies[0].mesh.surface_nodes("bottom")
+    assert data["CPRESS"][bottom] == pytest.approx(np.ones(4))
+    assert data["CSTATUS"][bottom] == pytest.approx(2 * np.ones(4))
+    assert data["CFORCE"][bottom].sum(axis=0) == pytest.approx([0, 2, 0], abs=1e-9)
+
+
+def test_quasi_static_steps_remember_the_slip():
+    """Dragged forth and back: the shear comes back with the other sign."""
+    model = block((6, 3), mu=0.3, supports=[
+        am.Fix("top", lambda x, t: (0.03 * np.sin(np.pi * t), -0.01))
+    ])  # fmt: skip
+    shears = [
+        step.solution.r[:, 1].sum()
+        for step in am.evolve(model, am.QuasiStatic(0.25), until=1.0)
+    ]
+    assert shears[0] < 0 < shears[-1]
+    nodal = replace(model, contacts=[am.Contact("bottom", am.Plane((0, 1)), mu=0.3)])
+    other = [
+        step.solution.r[:, 1].sum()
+        for step in am.evolve(nodal, am.QuasiStatic(0.25), until=1.0)
+    ]
+    assert shears == pytest.approx(other, rel=0.05)
+
+
+def test_dynamics_and_exchange_files_refuse(tmp_path):
+    moving = block(
+        bodies=[am.Body(am.box((2, 1), (4, 2)), am.LinearElastic(200, 0.3, density=1))]
+    )
+    with pytest.raises(UnsupportedForm, match="nodal"):
+        next(am.evolve(moving, am.MoreauJean(0.1), until=0.2))
+    with pytest.raises(UnsupportedForm, match="nodal"):
+        am.write_fclib(block().discrete_problem(), tmp_path / "a.hdf5")
+    assert not list(tmp_path.iterdir())

@@ -20,7 +20,7 @@ from .settings import LIMITS, Settings, make_solver, method_class
 from .tables import LARGEST, Table
 
 if TYPE_CHECKING:
-    from ..contact import Obstacle
+    from ..contact import Nitsche, Obstacle
     from ..fem import LinearElastic, Mesh
     from ..model import Contact, Model
 
@@ -30,7 +30,6 @@ MAX_NODES = 5_000_000  # of a box: a typing error must not fill the memory
 LATER = {  # words of the format that this version can not serve
     "neo-hookean": "large deformations are not available yet, use 'linear-elastic'",
     "ciarlet-geymonat": "large deformations are not available yet, use 'linear-elastic'",
-    "nitsche": "Nitsche's method is not available yet, use 'nodal' or 'mortar'",
 }
 
 
@@ -241,7 +240,7 @@ def _contact(table: Table, mesh: Mesh) -> Contact:
     from ..model import Contact
 
     table.only("slave", "obstacle", "master", "friction", "method")
-    method = _available(table, "method", ("nodal", "mortar", "dual-mortar"), ("nitsche",))
+    method = _contact_method(table)
     slave = table.text("slave")
     for key in ("slave", "master"):
         if key in table.data:
@@ -264,6 +263,25 @@ def _contact(table: Table, mesh: Mesh) -> Contact:
             return Contact(slave, master=master, mu=mu, tresca=tresca, method=method)
         obstacle = _obstacle(table.table("obstacle"), mesh.dim)
         return Contact(slave, obstacle, mu=mu, tresca=tresca, method=method)
+
+
+def _contact_method(table: Table) -> str | Nitsche:
+    """A word, or a table { kind = "nitsche", kappa = …, theta = … } of options."""
+    from ..contact import Nitsche
+
+    if not isinstance(table.data.get("method"), dict):
+        return table.choice("method", ("nodal", "mortar", "dual-mortar", "nitsche"), "nodal")
+    options = table.table("method")
+    options.only("kind", "kappa", "scale", "theta", "points")
+    options.need("kind", "'nitsche', the method that has options")
+    options.choice("kind", ("nitsche",))
+    values: dict[str, Any] = {
+        key: options.number(key) for key in ("kappa", "scale", "theta") if key in options.data
+    }
+    if "points" in options.data:
+        values["points"] = options.whole("points")
+    with _Blame(options, ""):
+        return Nitsche(**values)
 
 
 def _refuse_repeated(top: Table) -> None:

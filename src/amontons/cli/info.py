@@ -10,6 +10,7 @@ import numpy as np
 
 from ..cones import Tresca
 from ..errors import InvalidInput, SingularOperator
+from ..nitsche_problem import NitscheProblem
 from ..output import to_json
 from ..problem import Form, FrictionProblem
 from ..solvers import METHODS
@@ -23,7 +24,7 @@ def run(source: str, overrides: Sequence[str], json_copy: str | None) -> None:
     """Print the table, or the JSON."""
     check_writable(json_copy, "--json")
     opened = open_source(source, overrides)
-    facts = describe(opened.discrete())
+    facts = describe(opened.solvable())
     facts = {"name": opened.name, **facts}
     if json_copy != "-":
         show_table(opened.title, ["", ""], [[k, _text(v)] for k, v in facts.items()], "left")
@@ -31,8 +32,10 @@ def run(source: str, overrides: Sequence[str], json_copy: str | None) -> None:
         deliver_json(to_json(facts), json_copy)
 
 
-def describe(problem: FrictionProblem) -> dict[str, Any]:
+def describe(problem: FrictionProblem | NitscheProblem) -> dict[str, Any]:
     """Facts about a problem by name; W is looked at only where it is cheap to form."""
+    if isinstance(problem, NitscheProblem):
+        return _describe_nitsche(problem)
     problem = problem.assembled()
     facts: dict[str, Any] = {
         "form": problem.form.value, "dimension": problem.dimension,
@@ -49,6 +52,22 @@ def describe(problem: FrictionProblem) -> dict[str, Any]:
     facts["scales (a guess)"] = _scales(problem)
     facts["methods that fit"] = fitting_methods(problem)
     return facts
+
+
+def _describe_nitsche(problem: NitscheProblem) -> dict[str, Any]:
+    """The facts that a problem without reactions has."""
+    m = problem.matrices
+    name = "friction bound" if isinstance(problem.law, Tresca) else "friction coefficient"
+    ends = (problem.law.coefficient, m.kappa, m.kappa / m.stiffness)
+    friction, kappa, safety = ([float(x.min()), float(x.max())] for x in ends)
+    return {
+        "form": problem.form.value, "dimension": problem.dimension,
+        "contacts": problem.contacts, "unknowns": problem.unknowns, "entries of M": m.M.nnz,
+        name: friction, "kappa": kappa, "kappa / stiffness of the cells": safety,
+        "methods that fit": [
+            name for name, kind in METHODS.items() if getattr(kind, "nitsche", False)
+        ],
+    }  # fmt: skip
 
 
 def _delassus_facts(problem: FrictionProblem) -> dict[str, Any]:

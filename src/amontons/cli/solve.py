@@ -34,7 +34,7 @@ def run(
     place = check_folder(f"{opened.name}-results" if folder is None else folder)
     check_writable(json_copy, "--json")
     began = time.perf_counter()
-    opened.discrete()
+    opened.solvable()
     assembled = time.perf_counter() - began if opened.model is not None else 0.0
     silent = quiet or json_copy == "-"
     try:

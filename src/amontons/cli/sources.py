@@ -18,6 +18,7 @@ from ..case.overrides import set_value, split_override
 from ..case.settings import LIMITS
 from ..errors import FileFormatError, InvalidInput, SingularOperator
 from ..expressions import nearest
+from ..nitsche_problem import NitscheProblem
 from ..problem import FrictionProblem
 
 if TYPE_CHECKING:
@@ -47,12 +48,17 @@ class Source:
         return self.model if self.model is not None else self.discrete()
 
     def discrete(self) -> FrictionProblem:
-        """The discrete problem; assembles a model."""
+        """The discrete problem; assembles a model.  UnsupportedForm with Nitsche's method."""
+        problem = self.solvable()
+        return self.model.assemble() if isinstance(problem, NitscheProblem) else problem  # type: ignore[union-attr]
+
+    def solvable(self) -> FrictionProblem | NitscheProblem:
+        """What `solve` solves; assembles a model."""
         if self.problem is not None:
             return self.problem
         assert self.model is not None
         with naming_keys(self.model, self.file):
-            return self.model.assemble()
+            return self.model.discrete_problem()
 
 
 @contextmanager

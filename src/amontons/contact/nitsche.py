@@ -3,7 +3,7 @@
 No multipliers: with the traction t = sigma nu of the slave's own displacement and the local
 displacement u (gap included), both in the local frame, the traction that acts at a point is
 
-    p = P(t - kappa u),  p_N = (t_N - kappa u_N)^+,  p_T on the disk of radius mu p_N (or bound).
+    p = P(t - kappa u):  p_N = (t_N - kappa u_N)^+, p_T in the disk of radius mu p_N or bound.
 
 The discrete problem reads, for all test displacements z with local parts u(z) and t(z),
 

@@ -37,6 +37,7 @@ from scipy import sparse
 from ..cones import Coulomb, Law, Tresca
 from ..errors import InvalidInput, UnsupportedForm
 from ..model import Model
+from ..nitsche_problem import NO_MULTIPLIERS
 from ..problem import FrictionProblem
 from ..solution import FrictionSolution
 from ..solvers.base import Iterate
@@ -81,6 +82,8 @@ class MoreauJean:
             raise UnsupportedForm(
                 "model: dynamics are those of small strains; use QuasiStatic or LinearElastic"
             )
+        if model.contacts[0].nitsche is not None:
+            raise UnsupportedForm(f"model: {NO_MULTIPLIERS}")
         return MovingModel(self, model, tolerance)
 
 

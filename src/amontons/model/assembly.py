@@ -20,7 +20,7 @@ from ..contact import (
     nodal_contact,
     pair_contact,
 )
-from ..errors import InvalidInput
+from ..errors import InvalidInput, UnsupportedForm
 from ..fem.box import box
 from ..fem.elasticity import LinearElastic, body_load, stiffness
 from ..fem.mesh import Mesh, unknown
@@ -324,6 +324,13 @@ def _met_by_nitsche(
     """The same for the Gauss points of Nitsche's method."""
     k, surface = locate(bodies, contact.slave)
     body, first, size = bodies[k], int(offsets[k]), int(offsets[-1])
+    if not isinstance(body.material, LinearElastic) and not all(
+        isinstance(law, LinearElastic) for law in dict(body.material).values()
+    ):
+        raise UnsupportedForm(
+            f"contact on {contact.slave!r}: Nitsche's method takes the stress from "
+            'LinearElastic; use method="nodal"'
+        )
     if contact.obstacle is not None:
         rows, terms = nitsche_obstacle(
             body.mesh, surface, contact.obstacle, body.material, options

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -96,7 +96,7 @@ def _pairs(solution: FrictionSolution, fields: ContactFields, model: Model) -> l
         model.contacts, fields.facets, np.split(np.arange(len(bound)), ends[:-1]), strict=True
     ):
         if len(rows):
-            found.append(
+            pair = (
                 _Pair(
                     contact.slave,
                     body,
@@ -112,7 +112,28 @@ def _pairs(solution: FrictionSolution, fields: ContactFields, model: Model) -> l
                     fields.node[rows],
                 )  # fmt: skip
             )
+            by_node = contact.nitsche is not None and model.dimension == 3
+            found.append(_at_nodes(pair, fields.weights[rows]) if by_node else pair)
     return found
+
+
+def _at_nodes(pair: _Pair, weights: Array) -> _Pair:
+    """Gauss points gathered at their nodes: means by area, and the highest status."""
+    node, label = np.unique(pair.node, return_inverse=True)
+    label = label.ravel()
+    total = np.bincount(label, weights)
+
+    def mean(values: Array) -> Array:
+        out = np.zeros((len(node), *values.shape[1:]))
+        np.add.at(out, label, (values.T * (weights / total[label])).T)
+        return out
+
+    status = np.zeros(len(node), dtype=pair.status.dtype)
+    np.maximum.at(status, label, pair.status)
+    names = ("bound", "points", "gap", "slip", "pressure", "shear")
+    means = {name: mean(getattr(pair, name)) for name in names}
+    first = np.unique(label, return_index=True)[1]
+    return replace(pair, status=status, node=node, frames=pair.frames[first], **means)
 
 
 def _legend(figure: Figure, solution: FrictionSolution, markers: bool) -> None:
