@@ -7,7 +7,7 @@ p = 1, and the motion that friction speaks of loses its drift,
 
 the continuation problem of [LR] section 3: at p = 0 a solution of the last step solves it, with
 V the motion of that step where the steps are equally long, and at p = 1 it is the next step.
-V = 0 gives the static problem under a growing load.
+V = 0 gives the static problem under a growing load.  2D, as slip has two senses there.
 
 [LR] T. Ligurský, Y. Renard, CMAME 280 (2014).
 """
@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..cones import Coulomb
-from ..contact.current import BACK, OPEN, SLIP, STICK
-from ..errors import UnsupportedForm
-from ..model.large_deformation import LargeDeformation, Linearisation
+from ..contact.current import BACK, OPEN, SLIP, STICK, Pieces
+from ..errors import InvertedCells, UnsupportedForm
+from ..model.large_deformation import LargeDeformation
 from ..solution import ContactStatus
 
 Array = NDArray[np.float64]
@@ -38,7 +38,6 @@ class LoadPath:
     """A PathProblem in the displacements y (n,) of the free dofs and the share p of the load.
 
     step: the problem at p = 1; load, prescribed (dofs,): those at p = 0; drift (nc, d): V.
-    Raises InvertedCells where cells are inside out.
     """
 
     step: LargeDeformation
@@ -49,6 +48,8 @@ class LoadPath:
     def __post_init__(self) -> None:
         if not isinstance(self.step.law, Coulomb):
             raise UnsupportedForm("path: expected Coulomb friction, this model has Tresca's")
+        if self.step.dimension != 2:
+            raise UnsupportedForm("path: expected a model in 2D, this one is in 3D")
         if self.drift is None:
             object.__setattr__(self, "drift", np.zeros_like(self.step.before))
 
@@ -64,21 +65,40 @@ class LoadPath:
 
     # ---------------------------------------------------------------- PathProblem
     def residual(self, y: Array, p: float) -> Array:
-        """F, (n,), unit of force."""
-        return self.at(p).residual(y)
+        """F, (n,), unit of force; infinite where cells are inverted."""
+        return self._residual(y, p, None)
+
+    def residual_of(self, piece: Hashable, y: Array, p: float) -> Array:
+        """The selection function of a piece, (n,)."""
+        return self._residual(y, p, self._states(piece))
+
+    def _residual(self, y: Array, p: float, states: Pieces | None) -> Array:
+        try:
+            return self.at(p).residual(y, states)
+        except InvertedCells:
+            return np.full(y.shape, np.inf)
 
     def jacobian(self, y: Array, p: float) -> tuple[sparse.csc_array, Array]:
-        """dF/dy, (n, n), and dF/dp, (n,), of the active piece."""
-        return self._slopes(self.at(p).linearisation(y))
+        """dF/dy, (n, n), and dF/dp, (n,), of the active piece.
+
+        Raises LinAlgError where cells are inverted.
+        """
+        return self._slopes(y, p, None)
 
     def jacobian_of(
         self, piece: Hashable, y: Array, p: float
     ) -> tuple[sparse.csc_array, Array]:
         """The same of a given piece."""
-        return self._slopes(self.at(p).linearisation(y, self._states(piece)))
+        return self._slopes(y, p, self._states(piece))
 
-    def _slopes(self, here: Linearisation) -> tuple[sparse.csc_array, Array]:
+    def _slopes(
+        self, y: Array, p: float, states: Pieces | None
+    ) -> tuple[sparse.csc_array, Array]:
         step = self.step
+        try:
+            here = self.at(p).linearisation(y, states)
+        except InvertedCells as reason:
+            raise np.linalg.LinAlgError(str(reason)) from reason
         return here.matrix, here.shifted(
             step.load - self.load,
             step.prescribed - self.prescribed,

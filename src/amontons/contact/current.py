@@ -152,12 +152,27 @@ class ContactPoint:
             out[~closed] += 4
         return out.astype(np.int8)
 
-    def residual(self) -> Array:
-        """(2), (nc, d), unit of force."""
+    def residual(self, pieces: Pieces | None = None) -> Array:
+        """(2), (nc, d), unit of force; or the selection functions of given pieces."""
+        if pieces is not None:
+            return self._selected(pieces)
         normal = np.maximum(self.z_normal, 0.0)[:, None] * self.n
         length = np.linalg.norm(self.z_tangent, axis=1)
         scale = np.where(length > self.bound, self.bound / np.where(length > 0, length, 1), 1.0)
         return self.force - normal - scale[:, None] * self.z_tangent
+
+    def _selected(self, pieces: Pieces) -> Array:
+        """(2) as if the given pieces were active."""
+        closed, kind = (pieces > 0) & (pieces < 4), pieces % 4
+        normal = np.where(closed, self.z_normal, 0.0)[:, None] * self.n
+        bound = self._bound(closed)
+        if self.n.shape[1] == 2:
+            sign = np.select([kind == SLIP, kind == BACK], [1.0, -1.0], 0.0)
+            slip = (sign * bound)[:, None] * _tangents(self.n)
+        else:
+            length = np.where(self.along > 0, self.along, 1.0)
+            slip = (np.where(kind >= SLIP, bound, 0.0) / length)[:, None] * self.z_tangent
+        return self.force - normal - slip - (kind == STICK)[:, None] * self.z_tangent
 
     def margins(self, pieces: Pieces) -> Array:
         """Distances to the borders of given pieces, (nc, 3): all positive inside of them."""

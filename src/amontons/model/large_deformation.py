@@ -120,11 +120,14 @@ class LargeDeformation:
         u = self.displacement(v)
         return self._point(u, self.parts.forces(u) - self.load)
 
-    def residual(self, v: Array) -> Array:
-        """F(v), (n,), unit of force; raises InvertedCells where it is not defined."""
+    def residual(self, v: Array, pieces: Pieces | None = None) -> Array:
+        """F(v), (n,), unit of force, or the selection function of given pieces.
+
+        Raises InvertedCells where it is not defined.
+        """
         u = self.displacement(v)
         rest = self.parts.forces(u) - self.load
-        rest[self.parts.at] = self._point(u, rest).residual()
+        rest[self.parts.at] = self._point(u, rest).residual(pieces)
         return rest[self.parts.free]
 
     def tangent(self, v: Array, pieces: Pieces | None = None) -> sparse.csc_array:

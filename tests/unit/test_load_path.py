@@ -1,0 +1,127 @@
+"""Large deformations as path problems: pieces, derivatives, kernels, the folds of a block."""
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+import amontons as am
+from amontons.analysis.continuation import Continuation
+from amontons.analysis.following import Limits, continue_both
+from amontons.analysis.load_path import LoadPath
+from amontons.analysis.sparse_kernel import sparse_kernel
+from amontons.model.large_deformation import large_deformation
+
+TURN = 0.023
+
+
+def block(cells):
+    """The rectangular block of ligursky2014 on a coarse mesh, and its rigidly turned state."""
+    mesh = am.box((40, 80), cells=(cells, 2 * cells))
+    law = am.CiarletGeymonat.from_lame(4000.0, 120.0, 30.0)
+    c, s = -2 * np.sin(TURN / 2) ** 2, np.sin(TURN)
+
+    def model(down):
+        top = am.Fix("top", lambda x: (x[0] * c, x[0] * s - down))
+        contact = am.Contact("bottom", am.Plane((0, 1)), mu=1.8)
+        return am.Model([am.Body(mesh, law)], [top], [contact])
+
+    first, last = (large_deformation(model(down)) for down in (0.0, 1.0))
+    path = LoadPath(last, first.load, first.prescribed)
+    turned = (mesh.points - [0, 80]) @ np.array([[c, s], [-s, c]])
+    return path, turned.ravel()[last.parts.free]
+
+
+def sphere_path():
+    """A small block pressed on a ball, with a drift."""
+    mesh = am.box((1, 1), cells=3)
+    model = am.Model([am.Body(mesh, am.NeoHookean(1.0, 0.3))], [am.Fix("top", (0.2, -0.2))],
+                     [am.Contact("bottom", am.Sphere((0.4, -1), 1.0), mu=0.5)],
+                     [am.Traction("left", (0.02, 0))])  # fmt: skip
+    step = large_deformation(model)
+    drift = 0.01 * np.random.default_rng(0).standard_normal(step.before.shape)
+    return LoadPath(step, 0.3 * step.load, 0.2 * step.prescribed, drift)
+
+
+def test_selection_functions_and_their_derivatives():
+    path = sphere_path()
+    rng = np.random.default_rng(1)
+    for _ in range(5):
+        y, p = 0.03 * rng.standard_normal(path.step.unknowns), rng.uniform()
+        active = path.piece(y, p)
+        assert np.array_equal(path.residual_of(active, y, p), path.residual(y, p))
+        assert (path.margins(active, y, p) >= 0).all()
+        for piece in (active, "fs+-", "+-sf", "ssss"):
+            if piece != active:
+                assert (path.margins(piece, y, p) < 0).any()
+            dy, dp = rng.standard_normal(y.shape), rng.standard_normal()
+            J, Jp = path.jacobian_of(piece, y, p)
+            h = 1e-6
+            ahead = path.residual_of(piece, y + h * dy, p + h * dp)
+            behind = path.residual_of(piece, y - h * dy, p - h * dp)
+            change = (ahead - behind) / (2 * h)
+            assert np.abs(J @ dy + Jp * dp - change).max() < 1e-6 * np.abs(change).max()
+        J, Jp = path.jacobian(y, p)
+        same = path.jacobian_of(active, y, p)
+        assert abs(J - same[0]).max() == 0
+        assert np.array_equal(Jp, same[1])
+
+
+def test_pieces_that_meet_are_all_named():
+    """A corner touches without force, after it has moved to the right: free or slip back."""
+    path, y = block(2)
+    assert path.pieces(y, 0.0, 1e-9) == ["fff"]
+    lowest = path.at(0.0).local_velocity(y)[0, 0]
+    down = np.zeros(path.step.parts.X.shape)
+    down[:, 1] = -lowest  # with the top
+    found = path.pieces(y + down.ravel()[path.step.parts.free], lowest, 1e-7)
+    assert set(found) == {"fff", "-ff"}
+
+
+def test_inverted_cells_have_an_infinite_residual_and_no_tangent():
+    path, y = block(2)
+    assert np.isinf(path.residual(y * 100, 0.0)).all()
+    with pytest.raises(np.linalg.LinAlgError):
+        path.jacobian(y * 100, 0.0)
+
+
+def test_the_block_starts_at_rest_and_has_two_folds():
+    path, y = block(4)
+    assert np.abs(path.residual(y, 0.0)).max() < 1e-11
+    folds = []
+    for longest in (0.5, 0.1):
+        options = Continuation(max_step=longest, residual=5e-10, change=5e-10)
+        branch = continue_both(path, y, 0.0, Limits((0.0, 1.0)), options)
+        assert branch.parameter[-1] == 1.0
+        folds.append([event.parameter for event in branch.folds])
+        assert branch.folds[0].before[-2:] == "ff"
+    high, low = folds[0]
+    assert 0.49 < low < high < 0.55
+    assert np.abs(np.subtract(*folds)).max() < 1e-9
+    middle = (low + high) / 2
+    states = branch.at(middle)
+    assert len(states) == 3
+    for state in states:
+        problem = path.at(middle)
+        assert np.abs(problem.residual(state)).max() < 1e-9
+        r, u = problem.reactions(state), problem.local_velocity(state)
+        assert u[:, 0].min() > -1e-12
+        assert r[:, 0].min() > -1e-9
+        assert np.abs(r[:, 0] * u[:, 0]).max() < 1e-9
+        assert (np.abs(r[:, 1]) <= 1.8 * r[:, 0] + 1e-8).all()
+        assert (r[:, 1] * u[:, 1]).max() < 1e-9
+    assert {problem.pieces(state)[-1] for state in states} >= {0, 1}
+
+
+@pytest.mark.parametrize("lines", [1, 2])
+def test_kernels_of_sparse_matrices(lines):
+    rng = np.random.default_rng(lines)
+    for n in (7, 40):
+        J, Jp = rng.standard_normal((n, n)), rng.standard_normal(n)
+        J[:, 0] = J[:, 1]  # J alone is singular: the line may be without p
+        if lines == 2:
+            J[2], Jp[2] = J[3], Jp[3]
+        found = sparse_kernel(sparse.csc_array(J), Jp, 1 / n, 1e-10)
+        assert found.shape == (n + 1, lines)
+        assert np.abs(J @ found[:-1] + np.outer(Jp, found[-1])).max() < 1e-12
+        weight = np.r_[np.full(n, 1 / n), 1.0]
+        assert np.allclose((found.T * weight) @ found, np.eye(lines), atol=1e-10)
