@@ -27,7 +27,7 @@ from .newton_batch import Stack
 from .rounding import gamma, is_positive_definite
 
 Array = NDArray[np.float64]
-UNCERTAINTY = 1e-11  # of a reference relative to its size, scaled
+EXACT = 1e-13  # error of a reference relative to its size, scaled, as Newton's method ends
 ROUNDING = 1e-13  # of a slack relative to its terms
 ROUNDS = 4  # of further directions of slip
 TRIES = 3  # multipliers of one search that are looked at
@@ -58,8 +58,12 @@ class BoxAnswer:
 class BoxProblem:
     """The matrix inequality of one region."""
 
-    def __init__(self, stack: Stack, regions: Sequence[Region], r: Array | None) -> None:
+    def __init__(
+        self, stack: Stack, regions: Sequence[Region], r: Array | None, *, error: float = EXACT
+    ) -> None:
+        """error: bound of that of r, relative to 1 + the largest |r|."""
         self.stack, self.regions, self.r = stack, tuple(regions), r
+        self.error = 0.0 if r is None else error * (1 + float(np.abs(r).max(initial=0.0)))
         nc = len(self.regions)
         z0: list[Array | None] = [None] * nc
         if r is not None:
@@ -209,21 +213,19 @@ class BoxProblem:
         W: Sequence[Array], extras: Sequence[Array],
     ) -> bool:  # fmt: skip
         """True when all slacks are positive by more than rounding and the error of z0."""
-        error = ROUNDING + (0.0 if self.r is None else UNCERTAINTY)
         for f, index, own, more in zip(families, owners, W, extras, strict=True):
             low, high = np.triu_indices(f.size)
             x = np.hstack([own[:, low, high], more])
-            reach = [1.0 if law.z0 is None else 1 + float(np.linalg.norm(law.z0)) for law in
-                     (self.laws[p] for p in index)]  # fmt: skip
-            columns = np.sqrt(3 + 2 * self.stack.mu[index] ** 2) + reach  # norm of generators
-            margin = 4 * np.linalg.norm(own, axis=(1, 2)) * columns * np.array(reach)
+            error = np.array([self.laws[p].relative(self.error) for p in index])
+            square = 5 + 2 * self.stack.mu[index] ** 2  # of the norm of generators, at least
+            margin = np.linalg.norm(own, axis=(1, 2)) * square * (ROUNDING + 2 * error)
             for slacks in f.slacks:
                 if slacks.tensor.shape[2] == 1:
                     if (slacks.at(x) <= 0).any():
                         return False
                     continue
                 values = np.linalg.eigvalsh(slacks.at(x))[:, 0]
-                if (values <= error * margin[slacks.owner]).any():
+                if (values <= margin[slacks.owner]).any():
                     return False
         return True
 
@@ -232,8 +234,7 @@ class BoxProblem:
         bad = []
         for p, (law, region) in enumerate(zip(self.laws, self.regions, strict=True)):
             if "l" in region.statuses and law.mu > 0 and self.rows[p]:
-                reach = 1.0 if law.z0 is None else 1 + float(np.linalg.norm(law.z0))
-                angle = negative_on_arc(law, region, V[p], UNCERTAINTY * reach)
+                angle = negative_on_arc(law, region, V[p], law.relative(self.error))
                 if angle is not None:
                     bad.append((p, angle))
         return bad

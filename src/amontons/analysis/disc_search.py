@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..errors import InvalidInput
 from ..problem import FrictionProblem
-from .disc_multipliers import UNCERTAINTY, BoxProblem, BoxProof, contains
+from .disc_multipliers import EXACT, BoxProblem, BoxProof, contains
 from .disc_sets import ON, Law, Region
 from .enumerate import Solutions
 from .multistart import EXTRA, ROUND, Finder, without_load
@@ -30,6 +30,7 @@ Regions = tuple[Region, ...]
 FINEST = 0.002  # rad: half of the smallest arc
 SURE = 1e-7  # scaled violation of the law that excludes the solution of a linear system
 SECONDS = 60.0  # of a search without a limit of its own: it may grow without end
+VAGUE = 1e-9  # relative error of a solution that can not be a reference
 STARTS = 300  # of Newton's method before the search
 
 
@@ -104,19 +105,22 @@ class DiscSearch:
     def __post_init__(self) -> None:
         self.proofs: list[BoxProof] = []
         self.linear: list[Regions] = []
+        self.errors: list[float] = []
+        self.queue: list[Regions] = [] if self._penetrates else [self._root()]
 
-    def begin(self) -> None:
+    def begin(self, deadline: float | None = None) -> None:
         """Solutions from many starts, more where one is known to be missing."""
         used = 0
+        deadline = self.deadline if deadline is None else deadline
         while used < STARTS or (self.finder.lacks_one and used < EXTRA * STARTS):
-            if used and time.perf_counter() > self.deadline:
+            if time.perf_counter() > deadline:
                 return
-            used += self.finder.search(ROUND)
+            used += self.finder.search(ROUND if self.stack.width > ROUND else 10)
 
     @property
     def complete(self) -> bool:
         """True when every region was closed."""
-        return not self.stopped and not self.undecided
+        return not self.queue and not self.undecided
 
     @property
     def _penetrates(self) -> bool:
@@ -150,26 +154,26 @@ class DiscSearch:
 
     def run(self, most_solutions: int | None = None) -> None:
         """Divide until all regions are closed, the clock runs out, or enough are found."""
-        if self._penetrates:
-            return
-        self._polish()
-        queue: list[Regions] = [self._root()]
-        while queue:
+        while self.queue:
             if time.perf_counter() > self.deadline:
                 self.stopped = True
                 return
             if most_solutions is not None and len(self.finder.found) >= most_solutions:
                 return
-            queue += reversed(self._look_at(queue.pop()))
+            self.step()
+
+    def step(self) -> None:
+        """Close or divide the region that is next."""
+        self.queue += reversed(self._look_at(self.queue.pop()))
 
     def _polish(self) -> None:
         """Known solutions to the last digits; those that can not be are no references."""
-        self.vague = []
+        self.errors = []
         for k, r in enumerate(self.finder.found):
             better, step = self.stack.polished(r)
             if np.abs(better - r).max(initial=0.0) <= ON * (1 + np.abs(r).max(initial=0.0)):
                 self.finder.found[k] = better
-            self.vague.append(step > UNCERTAINTY * (1 + np.abs(r).max(initial=0.0)))
+            self.errors.append(EXACT + 10 * step / (1 + float(np.abs(r).max(initial=0.0))))
 
     def _root(self) -> Regions:
         """Every contact undecided; those that can not react are free."""
@@ -178,7 +182,7 @@ class DiscSearch:
     def _look_at(self, regions: Regions) -> list[Regions]:
         """Regions that remain of one; none where it is closed or has to be given up."""
         self.examined += 1
-        if len(self.vague) < len(self.finder.found):
+        if len(self.errors) < len(self.finder.found):
             self._polish()
         inside = [r for r in self.finder.found if self._holds(regions, r)]
         if len(inside) > 1:
@@ -189,12 +193,12 @@ class DiscSearch:
         if all(region.letter in "fs" for region in regions):
             self._settle(regions, bool(inside))
             return []
-        if inside and self._is_vague(inside[0]):
+        error = self._error(inside[0]) if inside else EXACT
+        if error > VAGUE:
             self.undecided += 1
             return []
-        answer = BoxProblem(self.stack, regions, inside[0] if inside else None).solve(
-            max(self.deadline - time.perf_counter(), 0.01)
-        )
+        box = BoxProblem(self.stack, regions, inside[0] if inside else None, error=error)
+        answer = box.solve(max(self.deadline - time.perf_counter(), 0.01))
         if answer.proof is not None:
             self.proofs.append(answer.proof)
             return []
@@ -209,9 +213,9 @@ class DiscSearch:
         self.undecided += 1
         return []
 
-    def _is_vague(self, r: Array) -> bool:
-        pairs = zip(self.vague, self.finder.found, strict=True)
-        return any(vague and other is r for vague, other in pairs)
+    def _error(self, r: Array) -> float:
+        """Bound of the relative error of one of the solutions found."""
+        return next(e for e, r0 in zip(self.errors, self.finder.found, strict=True) if r0 is r)
 
     # ---------------------------------------------------------------- regions
     def _laws(self, r: Array) -> list[Law]:

@@ -79,10 +79,14 @@ class Law:
 
     @property
     def apex(self) -> Array | None:
-        """g, None where z0 is zero."""
+        """g at length 1, None where z0 is zero."""
         if self.z0 is None:
             return np.eye(7)[6]
-        return None if np.abs(self.z0).max() <= ON else -self.z0
+        return None if np.abs(self.z0).max() <= ON else -self.z0 / np.linalg.norm(self.z0)
+
+    def relative(self, error: float) -> float:
+        """Error of g where that of z0 is `error`."""
+        return 0.0 if self.z0 is None else 2 * error / max(float(np.linalg.norm(self.z0)), ON)
 
     @property
     def direction(self) -> float | None:
@@ -128,10 +132,10 @@ class Law:
         if self.direction is not None and self.z0 is not None:
             psi = (angle - self.direction) / 2 + order * np.pi / 2
             t = np.array([-np.sin(self.direction + psi), np.cos(self.direction + psi)]).T
-            t = 0.5**order * t
+            across = np.array([-self.mu * self.z0[0], np.hypot(*self.z0[4:])])
+            t = 0.5**order / np.linalg.norm(across) * t
             span[:, :, 2] = 0
-            span[:, 1:3, 2] = -2 * self.mu * self.z0[0] * t
-            span[:, 4:6, 2] = 2 * np.hypot(*self.z0[4:]) * t
+            span[:, 1:3, 2], span[:, 4:6, 2] = across[0] * t, across[1] * t
         return G, span
 
 

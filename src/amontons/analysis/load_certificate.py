@@ -28,7 +28,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InvalidInput, UnsupportedForm
+from ..errors import InvalidInput
 from ..problem import FrictionProblem
 from ..solution import FrictionSolution
 from . import load_pieces as pieces
@@ -96,14 +96,16 @@ def certify_load(
     problem: FrictionProblem, solution: FrictionSolution | PieceSolution, *,
     time_limit: float = 60.0,
 ) -> LoadCertificate:  # fmt: skip
-    """Certificate that a 2D Coulomb problem has no solution but the given one, or another one.
+    """Certificate that a Coulomb problem has no solution but the given one, or another one.
 
     time_limit: seconds, after which the answer is undecided.  The global form is condensed.
-    Raises UnsupportedForm in 3D and under Tresca's law, InvalidInput where `solution` does not
-    solve the problem.
+    In 3D see `load_certificate_discs`.  Raises UnsupportedForm under Tresca's law, InvalidInput
+    where `solution` does not solve the problem.
     """
-    if problem.dimension != 2:
-        raise UnsupportedForm("certify_load: expected a 2D problem, this one is in 3D")
+    if problem.dimension == 3:
+        from .load_certificate_discs import certify_load_discs
+
+        return certify_load_discs(problem, solution, time_limit=time_limit)
     if not time_limit > 0:
         raise InvalidInput(f"time_limit: expected seconds > 0, got {time_limit!r}")
     _ = problem.mu

@@ -1,0 +1,104 @@
+"""Is a solution of a 3D Coulomb problem the only one for its load?  A certificate, or another.
+
+The whole problem is one region about the given solution first: multipliers on friction discs
+(`disc_multipliers`) that leave no other.  Where there are none, Newton's method looks for
+another solution from many starts, and then the regions are divided (`disc_search`) until one is
+found or all are closed.  Solutions within 1e-7 (scaled) of each other count as one.
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InvalidInput
+from ..problem import FrictionProblem
+from ..solution import FrictionSolution
+from .disc_search import DiscSearch
+from .disc_sets import ON
+from .enumerate import PieceSolution
+from .load_certificate import LoadCertificate, LoadOutcome
+from .multistart import Finder, described
+from .newton_batch import Stack
+
+Array = NDArray[np.float64]
+TOLERANCE = 1e-8  # error by the judge of a solution
+FINDING = 0.2  # share of the time that may go into looking for another solution
+
+
+def certify_load_discs(
+    problem: FrictionProblem, solution: FrictionSolution | PieceSolution, *,
+    time_limit: float = 60.0,
+) -> LoadCertificate:  # fmt: skip
+    """Certificate that a 3D Coulomb problem has no solution but the given one, or another one.
+
+    time_limit: seconds, after which the answer is undecided.  The branches of the certificate
+    are of the type `DiscBox`.  The global form is condensed.  Raises UnsupportedForm under
+    Tresca's law, InvalidInput where `solution` does not solve the problem.
+    """
+    if not time_limit > 0:
+        raise InvalidInput(f"time_limit: expected seconds > 0, got {time_limit!r}")
+    _ = problem.mu
+    r = np.asarray(solution.r)
+    if r.shape != (problem.contacts, 3):
+        raise InvalidInput(
+            f"solution: expected reactions ({problem.contacts}, 3), got {r.shape}"
+        )
+    return _Certification(problem.condensed(), r, time_limit).run()
+
+
+class _Certification:
+    """The search of one certificate."""
+
+    def __init__(self, local: FrictionProblem, r: Array, time_limit: float) -> None:
+        self.began, self.limit, self.local, self.r = time.perf_counter(), time_limit, local, r
+        self.examined = 0
+        self.search: DiscSearch | None = None
+
+    def run(self) -> LoadCertificate:
+        """Root, other solutions, regions."""
+        if not self.local.contacts:
+            return self._answer(LoadOutcome.CERTIFIED, "there is no contact")
+        if self.local.q_norm == 0:
+            return self._answer(LoadOutcome.UNDECIDED, "q is zero: nothing sets a scale")
+        stack = Stack.of(self.local)
+        r, _ = stack.polished(self.r / stack.to_r)
+        finder = Finder(stack, np.random.default_rng(0), TOLERANCE)
+        near = np.abs(r - self.r / stack.to_r).max() <= 1e-4 * (1 + np.abs(r).max())
+        if not near or not finder.add(r):
+            error = self.local.error(self.r)
+            raise InvalidInput(
+                f"solution: expected a solution of the problem, got one with error {error:.1e};"
+                " solve again with a smaller tolerance"
+            )
+        search = self.search = DiscSearch(stack, finder, self.began + self.limit)
+        self.r = r * stack.to_r
+        if not search.queue:
+            raise InvalidInput("solution: a contact that can not react penetrates")
+        search.step()
+        if not search.complete:
+            search.begin(self.began + FINDING * self.limit)
+            search.run(most_solutions=2)
+        others = [other for other in finder.found if np.abs(other - finder.found[0]).max() > ON]
+        if others:
+            other = described(stack, others[0])
+            reason = f"{other.pattern} is another solution"
+            return self._answer(LoadOutcome.REFUTED, reason, other)
+        if search.complete:
+            count = len(search.proofs) + len(search.linear)
+            parts = f" on {count} parts" if count > 1 else ""
+            return self._answer(LoadOutcome.CERTIFIED, f"multipliers exclude all others{parts}")
+        return self._answer(LoadOutcome.UNDECIDED, search.reason(self.limit))
+
+    def _answer(
+        self, outcome: LoadOutcome, reason: str, other: PieceSolution | None = None
+    ) -> LoadCertificate:
+        certified = outcome is LoadOutcome.CERTIFIED
+        proof = self.search.proof() if self.search is not None and certified else None
+        examined = 0 if self.search is None else self.search.examined
+        return LoadCertificate(
+            outcome, other, () if proof is None else proof.boxes, self.r,
+            ON if certified else np.inf, examined, reason, time.perf_counter() - self.began,
+        )  # fmt: skip
