@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 EXACT = 1e-13  # error of a reference relative to its size, scaled, as Newton's method ends
 ROUNDING = 1e-13  # of a slack relative to its terms
 ROUNDS = 4  # of further directions of slip
+SHIFTS = (1e-3, 3e-3, 1e-2)  # of forms that are positive between samples, relative
 TRIES = 3  # multipliers of one search that are looked at
 
 
@@ -134,8 +135,7 @@ class BoxProblem:
         refused: list[list[tuple[int, float]]], W: Sequence[Array], extras: Sequence[Array],
     ) -> bool:  # fmt: skip
         """Prove what was found; True also when it was refused often enough."""
-        V = self._whole(W, owners)
-        failures = self._failures(V)
+        V, failures = self._shifted(self._whole(W, owners))
         if not failures and self._slacks_hold(families, owners, W, extras):
             proof = self._proved(V)
             if proof is not None:
@@ -228,6 +228,18 @@ class BoxProblem:
                 if (values <= margin[slacks.owner]).any():
                     return False
         return True
+
+    def _shifted(self, V: Array) -> tuple[Array, list[tuple[int, float]]]:
+        """V made more negative where an arc needs it, and the arcs where that was not enough."""
+        for share in SHIFTS:
+            failures = self._failures(V)
+            if not failures:
+                return V, []
+            V = V.copy()
+            for p, _ in failures:
+                own = np.ix_([p], self.rows[p], self.rows[p])
+                V[own] -= share * np.linalg.norm(V[p], 2) * np.eye(len(self.rows[p]))
+        return V, self._failures(V)
 
     def _failures(self, V: Array) -> list[tuple[int, float]]:
         """Contacts with a direction of slip at which the form of V is not proved negative."""

@@ -155,10 +155,10 @@ Exit codes: 0 the list is complete, 1 there may be others, 2 bad input.
 @click.option("--picture", metavar="FILE",
               help="Draw the solutions side by side: .png, .svg or .pdf.")  # fmt: skip
 def enumerate_solutions(**options: object) -> int:
-    """Find all solutions of a 2D problem with Coulomb friction, and prove that these are all.
+    """Find all solutions of a problem with Coulomb friction, and prove that these are all.
 
     SOURCE is a TOML case file, an FCLib HDF5 file, or example:NAME.  Patterns list the contacts
-    in order: f free, s stick, + or - slip.
+    in order: f free, s stick, + or - slip, in 3D l slip.
     """
     from .enumerate import run as run_enumerate
 

@@ -83,7 +83,7 @@ def _show(title: str, found: Solutions) -> None:
     for s in found.solutions:
         word = s.pattern if len(s.pattern) <= SHOWN else f"{s.pattern[: SHOWN - 1]}…"
         counts = [
-            str(sum(s.pattern.count(letter) for letter in part)) for part in ("f", "s", "+-")
+            str(sum(s.pattern.count(letter) for letter in part)) for part in ("f", "s", "+-l")
         ]
         kind = "isolated" if s.freedom == 0 else f"a set of dimension {s.freedom}"
         rows.append(
