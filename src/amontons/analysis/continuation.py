@@ -33,6 +33,7 @@ from .tangent_switch import switched_tangent
 
 Array = NDArray[np.float64]
 WITHIN, ACROSS = 0.999, 0.99999  # cosines inside of a piece, and where kinks may come
+LOCATED = 1e-3  # margin of a located border, relative to the one that counts as zero
 MOST_KINKS = 20  # passed at one point before the walk ends
 PIECES = ("residual_of", "jacobian_of", "margins", "pieces")
 
@@ -327,45 +328,57 @@ class _Walk:
         return [*out, *self._first_order()]
 
     def _to_border(self, step: float) -> Spot | None:
-        """The point of this piece's curve where the first margin vanishes, by regula falsi."""
+        """The point of this piece's curve where the first margin vanishes, by regula falsi.
+
+        Cubics through the points already there predict the next: one correction will do.
+        """
         o, s, problem = self.options, self.spot, self.problem
-
-        def at(h: float) -> tuple[Spot, float] | None:
-            found = self.curve.correct(*s.ahead(h), s.ty, s.tp, o.tolerances)
-            if found is None:
-                return None
-            margins = problem.margins(self.piece, found[0].y, found[0].p)  # type: ignore[attr-defined]
-            falling = margins[watched] if watched is not None else margins
-            return found[0], float(falling.min(initial=np.inf))
-
-        here = problem.margins(self.piece, s.y, s.p)  # type: ignore[attr-defined]
-        watched = None
-        end = at(step)
+        end = self.curve.correct(*s.ahead(step), s.ty, s.tp, o.tolerances)
         if end is None:
             return None
+        here = problem.margins(self.piece, s.y, s.p)  # type: ignore[attr-defined]
         there = problem.margins(self.piece, end[0].y, end[0].p)  # type: ignore[attr-defined]
         watched = np.flatnonzero(there < 0)
-        low, high = 0.0, step
+        low, high = (0.0, s), (step, end[0])
         f_low = float(np.maximum(here[watched], 0).min(initial=np.inf))
         f_high, best = float(there[watched].min()), end[0]
         if f_low <= 0:
             return s
         side = 0  # which end moved last
         for _ in range(60):
-            h = low + (high - low) * f_low / (f_low - f_high)
-            found = at(h)
+            h = low[0] + (high[0] - low[0]) * f_low / (f_low - f_high)
+            found = self.curve.correct(*self._cubic(low, high, h), s.ty, s.tp, o.tolerances)
             if found is None:
                 return None
-            best, value = found
-            if abs(value) <= 1e-14 or high - low <= 1e-15:
+            best = found[0]
+            margins = problem.margins(self.piece, best.y, best.p)  # type: ignore[attr-defined]
+            value = float(margins[watched].min())
+            if abs(value) <= LOCATED * o.border or high[0] - low[0] <= 1e-15:
                 return best
             if value > 0:
-                low, f_low, f_high = h, value, f_high * (0.5 if side > 0 else 1.0)
+                low, f_low, f_high = (h, best), value, f_high * (0.5 if side > 0 else 1.0)
                 side = 1
             else:
-                high, f_high, f_low = h, value, f_low * (0.5 if side < 0 else 1.0)
+                high, f_high, f_low = (h, best), value, f_low * (0.5 if side < 0 else 1.0)
                 side = -1
         return best
+
+    def _cubic(
+        self, low: tuple[float, Spot], high: tuple[float, Spot], h: float
+    ) -> tuple[Array, float]:
+        """The point at h on the cubic through two spots along their tangents.
+
+        h is the distance from the present point along its tangent, as in `_zero`.
+        """
+        (a, one), (b, two) = low, high
+        t, length = (h - a) / (b - a), b - a
+        here = self.spot
+        rates = [length / self.curve.product(x.ty, x.tp, here.ty, here.tp) for x in (one, two)]
+        weights = (1 - t) ** 2 * (1 + 2 * t), t**2 * (3 - 2 * t)
+        slopes = (1 - t) ** 2 * t * rates[0], -(t**2) * (1 - t) * rates[1]
+        y = weights[0] * one.y + weights[1] * two.y + slopes[0] * one.ty + slopes[1] * two.ty
+        p = weights[0] * one.p + weights[1] * two.p + slopes[0] * one.tp + slopes[1] * two.tp
+        return y, p
 
     def _first_order(self) -> Found:
         """At a kink that was located: all ways on, and the one that is taken."""
