@@ -17,7 +17,7 @@ from amontons.errors import AmontonsError
 from amontons.files import replacing
 from benchmarks.machine import describe
 
-from . import alart_curnier, primal_dual, report
+from . import alart_curnier, nitsche, primal_dual, report
 
 HERE = Path(__file__).parent
 PAPER: dict[str, dict] = json.loads((HERE / "paper.json").read_text())
@@ -25,6 +25,7 @@ PAPER: dict[str, dict] = json.loads((HERE / "paper.json").read_text())
 # table["columns"]; and counts(table, draws, seed): {kind: [a number per entry of "values"]}.
 ALGORITHMS: dict[str, ModuleType] = {
     "alart_curnier": alart_curnier,
+    "nitsche": nitsche,
     "primal_dual": primal_dual,
 }
 TABLES = [name for name, table in PAPER.items() if table.get("algorithm") in ALGORITHMS]
