@@ -17,7 +17,7 @@ from amontons.errors import AmontonsError
 from amontons.files import replacing
 from benchmarks.machine import describe
 
-from . import alart_curnier, nitsche, primal_dual, report
+from . import alart_curnier, nitsche, primal_dual, report, uzawa
 
 HERE = Path(__file__).parent
 PAPER: dict[str, dict] = json.loads((HERE / "paper.json").read_text())
@@ -27,6 +27,7 @@ ALGORITHMS: dict[str, ModuleType] = {
     "alart_curnier": alart_curnier,
     "nitsche": nitsche,
     "primal_dual": primal_dual,
+    "uzawa": uzawa,
 }
 TABLES = [name for name, table in PAPER.items() if table.get("algorithm") in ALGORITHMS]
 PARTS = tuple(TABLES)

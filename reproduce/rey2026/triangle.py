@@ -122,6 +122,11 @@ class Triangle:
         return G
 
     @cached_property
+    def lengths(self) -> Array:
+        """Integral over AB of the shape function of each contact, (n_c,)."""
+        return self.model.discretisation.placed[0].rows.weights
+
+    @cached_property
     def places(self) -> Array:
         """x of the contacts, (n_c,)."""
         return self.model.discretisation.placed[0].rows.points[:, 0]

@@ -18,6 +18,7 @@ from .local_contact import LocalSolver
 from .newton import SemismoothNewton
 from .smoothing import ProximalPoint, SmoothingNewton
 from .sweeps import SweepOrder
+from .uzawa import InnerStart, Uzawa
 
 METHODS: dict[str, type] = {
     "accelerated-gradient": AcceleratedGradient,
@@ -32,6 +33,7 @@ METHODS: dict[str, type] = {
     "proximal-point": ProximalPoint,
     "semismooth-newton": SemismoothNewton,
     "smoothing-newton": SmoothingNewton,
+    "uzawa": Uzawa,
 }
 
 __all__ = [
@@ -56,6 +58,7 @@ __all__ = [
     "Hybrid",
     "InteriorPoint",
     "InexactNewton",
+    "InnerStart",
     "Iterate",
     "JeanMoreau",
     "LineSearch",
@@ -73,4 +76,5 @@ __all__ = [
     "Solver",
     "SweepOrder",
     "Target",
+    "Uzawa",
 ]
