@@ -18,9 +18,11 @@ from .solvers.base import Iterate, Solver
 
 if TYPE_CHECKING:
     from .analysis.continuation import Continuation
+    from .analysis.critical_friction import CriticalFriction
     from .analysis.diagram import Diagram
     from .analysis.enumerate import Solutions
     from .analysis.path import Branch, PathProblem
+    from .analysis.uniqueness import Uniqueness
     from .model import Model
 
 Start = Iterate | FrictionSolution | ModelSolution | None
@@ -169,6 +171,41 @@ def _checked(problem: Any) -> FrictionProblem | Model:
     if isinstance(problem, FrictionProblem) or hasattr(problem, "assemble"):
         return problem
     raise InvalidInput(f"problem: expected a Model or a FrictionProblem, got {problem!r}")
+
+
+def uniqueness(
+    problem: FrictionProblem | Model, solution: FrictionSolution | ModelSolution | None = None,
+    *, time_limit: float = 60.0,
+) -> Uniqueness:  # fmt: skip
+    """Whether a problem has one solution: for every load, for this load, or more than one.
+
+    solution: one that was found; by default the problem is solved.  time_limit: seconds, half
+    of them at most for the bounds on the critical friction.  The verdict is undecided, with the
+    reason, where there is neither a proof nor a second solution.
+    """
+    if not (isinstance(problem, FrictionProblem) or hasattr(problem, "assemble")):
+        raise InvalidInput(f"problem: expected a Model or a FrictionProblem, got {problem!r}")
+    discrete = problem if isinstance(problem, FrictionProblem) else problem.assemble()
+    found = solution.solution if isinstance(solution, ModelSolution) else solution
+    from .analysis.uniqueness import assess
+
+    return assess(discrete, found, time_limit=time_limit)
+
+
+def critical_friction(
+    problem: FrictionProblem | Model, *, gap: float = 1e-2, time_limit: float = 60.0
+) -> CriticalFriction:
+    """Bounds on the friction below which every load of a 2D problem has exactly one solution.
+
+    gap: relative distance of the bounds that is good enough.  time_limit: seconds.  Exact up to
+    some 13 contacts.  Raises UnsupportedForm in 3D and under Tresca's law.
+    """
+    if not (isinstance(problem, FrictionProblem) or hasattr(problem, "assemble")):
+        raise InvalidInput(f"problem: expected a Model or a FrictionProblem, got {problem!r}")
+    discrete = problem if isinstance(problem, FrictionProblem) else problem.assemble()
+    from .analysis.critical_friction import critical_friction as bounds
+
+    return bounds(discrete, gap=gap, time_limit=time_limit)
 
 
 def solve_any_form(

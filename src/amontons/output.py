@@ -44,6 +44,7 @@ class Output:
     method: str = ""  # as on the command line; empty: the name of the solver's class
     assemble_seconds: float = 0.0
     from_fclib: bool = False
+    uniqueness: dict[str, Any] | None = None  # what is known about other solutions
 
 
 # ------------------------------------------------------------------------------- choosing
@@ -169,6 +170,7 @@ def summary(output: Output) -> dict[str, Any]:
         "resultant": resultant,
         "max_penetration": found.max_penetration,
         "max_cone_violation": found.max_cone_violation,
+        "uniqueness": output.uniqueness,
         "versions": versions(),
     }
     return finite(data)

@@ -7,7 +7,6 @@ import pytest
 from uniqueness_checker import check_proof, smallest_determinant
 
 import amontons as am
-from amontons.analysis import critical_friction as module
 from amontons.analysis import friction_branching
 from amontons.analysis.critical_friction import critical_friction
 from amontons.analysis.determinant_search import NEGATIVE, POSITIVE, STOPPED
@@ -103,7 +102,7 @@ def test_time_is_respected():
 
 
 def test_critical_friction_uses_multipliers_where_there_are_too_many_patterns(monkeypatch):
-    monkeypatch.setattr(module, "ENUMERATED", 3)
+    monkeypatch.setattr("amontons.analysis.critical_friction.ENUMERATED", 3)
     found = critical_friction(hild_triangle(6).assemble(), gap=0.02)
     assert found.criterion == "multipliers"
     assert 0.97 * 1.72866 < found.lower < 1.72866 < found.upper < 1.72867

@@ -88,11 +88,13 @@ class CriticalFriction:
 
 
 def critical_friction(
-    problem: FrictionProblem, *, gap: float = 1e-3, time_limit: float = 60.0
-) -> CriticalFriction:
+    problem: FrictionProblem, *, gap: float = 1e-2, time_limit: float = 60.0,
+    first: float | None = None,
+) -> CriticalFriction:  # fmt: skip
     """Bounds on the friction below which every load has exactly one solution.
 
-    gap: relative distance of the bounds that is good enough.  time_limit: seconds.  Raises
+    gap: relative distance of the bounds that is good enough.  time_limit: seconds.  first: a
+    friction of interest, which is proved to be safe before others if it can be.  Raises
     UnsupportedForm in 3D and under Tresca's law.
     """
     if not time_limit > 0:
@@ -105,7 +107,7 @@ def critical_friction(
         why = "no tangential force moves a contact along its normal"
         return CriticalFriction(np.inf, np.inf, "determinants", None, None, None, 0,
                                 time.perf_counter() - began, why)  # fmt: skip
-    search = _Search(pieces, began + time_limit, gap)
+    search = _Search(pieces, began + time_limit, gap, first)
     search.run(began + 0.2 * time_limit)
     found = search.found
     witness = None if found.states is None else make_witness(pieces, found)
@@ -122,6 +124,7 @@ class _Search:
     pieces: Pieces
     deadline: float
     gap: float
+    first: float | None = None
     found: Threshold = field(default_factory=Threshold)
     criterion: str = "none"
     reason: str = ""
@@ -145,38 +148,48 @@ class _Search:
 
     def _branch(self) -> None:
         """Raise the lower bound by branch and bound, in steps that cost more and more."""
-        n, found = self.pieces.contacts, self.found
-        part = min(EASY / n, 0.9)
-        while found.lower < found.upper * (1 - self.gap):
-            t = min(found.upper * part, LARGEST)
-            began = time.perf_counter()
-            branching = Branching(self.pieces, t, self.deadline)
-            sign = branching.run()
-            spent = time.perf_counter() - began
-            found.seen += branching.patterns + branching.inequalities
-            if sign == POSITIVE:
-                found.lower, self.criterion = max(t, found.lower), "multipliers"
-                self.proof = tuple(leaf.of_problem(self.pieces) for leaf in branching.leaves)
-                if t == LARGEST:
-                    return
-                part = self._next(part, spent)
-            elif sign == STOPPED or not self._take(branching):
-                self.reason = (
-                    "time is up" if sign == STOPPED else "a determinant is too near to zero"
-                )
+        found, first = self.found, self.first
+        if first is not None and found.lower < first < min(found.upper, LARGEST):
+            left = self.deadline - time.perf_counter()
+            self._prove(first, self.deadline - left / 2)
+        part = min(EASY / self.pieces.contacts, 0.9)
+        while True:
+            cap = min(found.upper, LARGEST)
+            if found.lower >= cap * (1 - self.gap):
                 return
+            part = max(part, min(self._further(found.lower / cap, 0.1), 1 - self.gap / 2))
+            began = time.perf_counter()
+            if not self._prove(cap * part, self.deadline):
+                return
+            part = self._next(found.lower / min(found.upper, LARGEST), began)
 
-    def _next(self, part: float, spent: float) -> float:
-        """The next part of the upper bound to prove: further on where the last one was easy."""
-        left = self.deadline - time.perf_counter()
-        step = 0.8 if spent < 0.02 * left else 0.4 if spent < 0.1 * left else 0.2
-        further = part + step * (1 - part)
-        return 1 - self.gap if further > 1 - 3 * self.gap else further
-
-    def _take(self, branching: Branching) -> bool:
-        """Take the pattern that failed as an upper bound; False where it is none."""
+    def _prove(self, t: float, deadline: float) -> bool:
+        """Prove that t is safe, or find a smaller upper bound; False where neither is done."""
+        found = self.found
+        branching = Branching(self.pieces, t, deadline)
+        sign = branching.run()
+        found.seen += branching.patterns + branching.inequalities
+        if sign == POSITIVE:
+            found.lower, self.criterion = t, "multipliers"
+            self.proof = tuple(leaf.of_problem(self.pieces) for leaf in branching.leaves)
+            return True
         states = branching.failed
-        return states is not None and self.found.take(self.pieces, states)
+        if states is not None and found.take(self.pieces, states):
+            return True
+        self.reason = "time is up" if sign == STOPPED else "a determinant is too near to zero"
+        return False
+
+    @staticmethod
+    def _further(part: float, step: float) -> float:
+        return part + step * (1 - part)
+
+    def _next(self, part: float, began: float) -> float:
+        """The next part of the upper bound to prove: further on where the last one was easy."""
+        now = time.perf_counter()
+        spent, left = now - began, self.deadline - now
+        step = 0.8 if spent < 0.02 * left else 0.4 if spent < 0.1 * left else 0.2
+        further = self._further(part, step)
+        return 1 - self.gap / 2 if further > 1 - 3 * self.gap else further
 
 
 def make_witness(pieces: Pieces, found: Threshold) -> Witness:

@@ -56,6 +56,9 @@ Examples:
               help="Folder for the results. [name of the source with -results]")  # fmt: skip
 @click.option("--json", "json_copy", metavar="FILE",
               help="A copy of solution.json; - prints it and nothing else.")  # fmt: skip
+@click.option("--uniqueness", "full_verdict", is_flag=True,
+              help="Find out whether there are other solutions, for up to a minute; the cheap "
+              "part of it is always done.")  # fmt: skip
 @click.option("--quiet", is_flag=True, help="No progress, no summary.")
 def solve(**options: object) -> int:
     """Solve a problem and write the results.
@@ -163,6 +166,35 @@ def enumerate_solutions(**options: object) -> int:
     from .enumerate import run as run_enumerate
 
     return run_enumerate(**options)  # type: ignore[arg-type]
+
+
+@main.command(
+    epilog="""\b
+Examples:
+  amontons uniqueness example:hild            another solution, and the critical friction
+  amontons uniqueness example:hild --mu 1     one solution, whatever the load
+  amontons uniqueness problem.hdf5 --json - | jq .verdict
+
+\b
+Exit codes: 0 settled, either way, 1 undecided, 2 bad input.
+""",
+)
+@click.argument("source")
+@click.option("--mu", type=float, metavar="X", help="Friction coefficient of all contacts.")
+@click.option("--time-limit", type=float, default=60.0, show_default=True, metavar="SECONDS",
+              help="Stop after about that time, with the bounds reached by then.")  # fmt: skip
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
+              help="Replace a value of the case.")  # fmt: skip
+@click.option("--json", "json_copy", metavar="FILE", help="The same as JSON; - prints it.")
+def uniqueness(**options: object) -> int:
+    """Say whether a problem has one solution: for every load, for this load, or several.
+
+    SOURCE is a TOML case file, an FCLib HDF5 file, or example:NAME.  In 2D also bounds on the
+    critical friction, below which every load has exactly one solution.
+    """
+    from .uniqueness import run
+
+    return run(**options)  # type: ignore[arg-type]
 
 
 @main.command(

@@ -5,11 +5,13 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import click
 
 from .. import api, output
+from ..analysis.uniqueness import Uniqueness, assess, quick_verdict
 from ..case import in_words
 from ..errors import FileFormatError, InvalidInput, SingularOperator, UnsupportedForm
 from ..results import ModelSolution
@@ -17,12 +19,13 @@ from ..solution import FrictionSolution, Outcome
 from .group import INTERRUPTED
 from .sources import Source, open_source, with_flags
 from .terminal import check_folder, check_writable
+from .uniqueness import brief, describe, record
 
 
 def run(
     source: str, method: str | None, tolerance: float | None, overrides: Sequence[str],
     max_iterations: int | None, time_limit: float | None, folder: str | None,
-    json_copy: str | None, quiet: bool,
+    json_copy: str | None, quiet: bool, full_verdict: bool,
 ) -> int:  # fmt: skip
     """Solve and write; returns the exit code."""
     opened = open_source(source, overrides)
@@ -47,12 +50,15 @@ def run(
         text = f"{source}: --method {settings.method}: {in_words(str(reason))}"
         raise type(reason)(text) from reason
     result = _output(opened, found, settings.method, assembled)
+    verdict = _verdict(found, full_verdict)
+    if verdict is not None:
+        result = replace(result, uniqueness=record(verdict))
     copy = None if json_copy in (None, "-") else Path(str(json_copy))
     output.save(result, place, copy)
     if json_copy == "-":
         click.echo(output.to_json(output.summary(result)), nl=False)
     elif not quiet:
-        _report(result, place)
+        _report(result, verdict, full_verdict, place)
     return _finish(found)
 
 
@@ -66,8 +72,19 @@ def _output(
                          from_fclib=source.from_fclib)  # fmt: skip
 
 
-def _report(result: output.Output, folder: Path) -> None:
+def _verdict(found: FrictionSolution | ModelSolution, full: bool) -> Uniqueness | None:
+    """The verdict, or its cheap part; None where the problem is too large for that."""
+    solution = found.solution if isinstance(found, ModelSolution) else found
+    if full:
+        return assess(solution.problem, solution if solution.converged else None)
+    return quick_verdict(solution.problem)
+
+
+def _report(
+    result: output.Output, verdict: Uniqueness | None, full: bool, folder: Path
+) -> None:
     click.echo(in_words(output.describe(result)))
+    click.echo(describe(verdict) if full and verdict is not None else brief(verdict))
     click.echo(f"results in {folder}/")
 
 

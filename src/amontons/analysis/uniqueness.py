@@ -1,0 +1,279 @@
+"""Is the solution of a contact problem the only one?  A verdict in four grades.
+
+Cheap answers come first: a friction that is safe for every load (`energy_bound`, then
+`critical_friction`), then this load (all patterns, or the certificate about the solution that
+was found), then a second solution.  What none of them settles is undecided, with the reason.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..cones import Tresca
+from ..errors import InvalidInput, UnsupportedForm
+from ..problem import FrictionProblem
+from ..solution import FrictionSolution
+from ..solve import drive
+from .critical_friction import CriticalFriction, Witness, critical_friction
+from .energy_bound import energy_bound
+from .enumerate import PieceSolution, enumerate_solutions
+from .load_certificate import LoadCertificate, LoadOutcome, certify_load
+from .multistart import multistart
+from .status_pieces import friction_shape
+
+Array = NDArray[np.float64]
+ENUMERATED = 25  # contacts up to which all solutions are looked for before a certificate
+INSTANT = 8  # contacts up to which the quick verdict examines all patterns: milliseconds
+QUICK = 400  # rows of W up to which the quick verdict is given: some ten milliseconds
+BOUNDS = 0.5  # part of the time for the bounds on the critical friction
+STARTS = 200  # of Newton's method in 3D
+SAME = 1e-6  # distance of two solutions that count as one, relative to their size
+
+
+class Verdict(Enum):
+    """What is known; the value is the name in JSON files."""
+
+    UNIQUE_EVERY_LOAD = "unique_every_load"
+    UNIQUE_THIS_LOAD = "unique_this_load"
+    NOT_UNIQUE = "not_unique"
+    UNDECIDED = "undecided"
+
+    @property
+    def meaning(self) -> str:
+        """One sentence for the user."""
+        return _MEANING[self]
+
+
+_MEANING = {
+    Verdict.UNIQUE_EVERY_LOAD: "There is exactly one solution, whatever the load.",
+    Verdict.UNIQUE_THIS_LOAD: "For this load there is exactly one solution.",
+    Verdict.NOT_UNIQUE: "There is another solution for the same load.",
+    Verdict.UNDECIDED: "No other solution was found, and no proof that there is none.",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Uniqueness:
+    """The verdict, and all that supports it.
+
+    friction: largest coefficient of the problem, of which lower and upper are bounds: below
+    lower every load has one solution (criterion: what proves it), from upper on some load has
+    several (witness).  solution, other: the one found, and a second one or None.  certificate:
+    of UNIQUE_THIS_LOAD at larger sizes.  critical: the bounds with all details.
+    """
+
+    verdict: Verdict
+    friction: float
+    lower: float
+    upper: float
+    criterion: str
+    reason: str
+    witness: Witness | None = None
+    solution: FrictionSolution | None = None
+    other: PieceSolution | None = None
+    certificate: LoadCertificate | None = None
+    critical: CriticalFriction | None = None
+    seconds: float = 0.0
+
+    def __str__(self) -> str:
+        upper = "unknown" if np.isinf(self.upper) else f"{self.upper:.4g}"
+        return (
+            f"{self.verdict.value.replace('_', ' ')}: {self.verdict.meaning} {self.reason} "
+            f"(friction {self.friction:g}; critical friction between {self.lower:.4g} and "
+            f"{upper})"
+        )
+
+
+def assess(
+    problem: FrictionProblem, solution: FrictionSolution | None = None, *,
+    time_limit: float = 60.0,
+) -> Uniqueness:  # fmt: skip
+    """The verdict on a problem; the global form is condensed.
+
+    solution: one that was found; by default the problem is solved.  time_limit: seconds.
+    """
+    if not time_limit > 0:
+        raise InvalidInput(f"time_limit: expected seconds > 0, got {time_limit!r}")
+    began = time.perf_counter()
+    if isinstance(problem.law, Tresca):
+        return _given_friction(problem, began)
+    local = problem.condensed()
+    verdict = _every_load(local, began + BOUNDS * time_limit)
+    if verdict.verdict is Verdict.UNDECIDED:
+        verdict = _this_load(local, solution, verdict, began + time_limit)
+    return replace(verdict, seconds=time.perf_counter() - began)
+
+
+def quick_verdict(problem: FrictionProblem) -> Uniqueness | None:
+    """The part of the verdict that costs next to nothing; None for problems too large for it.
+
+    Never condenses a problem that is not condensed for other reasons.
+    """
+    if problem.contacts * problem.dimension > QUICK or not problem.condensing_is_cheap:
+        return None
+    began = time.perf_counter()
+    if isinstance(problem.law, Tresca):
+        return _given_friction(problem, began)
+    local = problem.condensed()
+    verdict = _by_energy(local)
+    if verdict.verdict is Verdict.UNDECIDED and _is_small(local):
+        verdict = _by_bounds(verdict, critical_friction(local, time_limit=1.0))
+    return replace(verdict, seconds=time.perf_counter() - began)
+
+
+def _is_small(local: FrictionProblem) -> bool:
+    return local.dimension == 2 and 0 < local.contacts <= INSTANT
+
+
+# ------------------------------------------------------------------- every load
+def _given_friction(problem: FrictionProblem, began: float) -> Uniqueness:
+    """Tresca's law: the solution minimises a convex energy, strictly where W is definite."""
+    local = problem.condensed()
+    shape = np.ones(local.contacts)
+    definite = local.contacts == 0 or energy_bound(_dense(local), shape)[0] > 0
+    verdict = Verdict.UNIQUE_EVERY_LOAD if definite else Verdict.UNDECIDED
+    reason = (
+        "With given friction bounds it minimises a strictly convex energy."
+        if definite
+        else "W is singular: reactions may not be unique."
+    )
+    return Uniqueness(verdict, 0.0, 0.0, np.inf, "given friction", reason,
+                      seconds=time.perf_counter() - began)  # fmt: skip
+
+
+def _by_energy(local: FrictionProblem) -> Uniqueness:
+    """The verdict of the cheapest bound."""
+    friction = float(local.mu.max(initial=0.0))
+    lower = energy_bound(_dense(local), friction_shape(local.mu))[0]
+    if friction < lower or local.contacts == 0:
+        reason = f"Friction {friction:g} is below a safe bound of {lower:.3g}."
+        return Uniqueness(Verdict.UNIQUE_EVERY_LOAD, friction, lower, np.inf, "energy", reason)
+    reason = (
+        f"The cheapest safe bound is {lower:.3g}."
+        if lower > 0
+        else "W is singular: reactions may not be unique even without friction."
+    )
+    return Uniqueness(Verdict.UNDECIDED, friction, lower, np.inf, "energy", reason)
+
+
+def _every_load(local: FrictionProblem, deadline: float) -> Uniqueness:
+    """The verdict of the bounds on the critical friction."""
+    cheap = _by_energy(local)
+    if local.dimension != 2 or not local.contacts:
+        return cheap
+    left = max(deadline - time.perf_counter(), 0.1)
+    bounds = critical_friction(local, time_limit=left, first=cheap.friction)
+    return _by_bounds(cheap, bounds)
+
+
+def _by_bounds(cheap: Uniqueness, bounds: CriticalFriction) -> Uniqueness:
+    """The verdict with the bounds on the critical friction."""
+    lower, criterion = bounds.lower, bounds.criterion
+    if cheap.lower > lower:
+        lower, criterion = cheap.lower, cheap.criterion
+    friction = cheap.friction
+    if friction < lower:
+        verdict = Verdict.UNIQUE_EVERY_LOAD
+        reason = f"Friction {friction:g} is below a safe bound of {lower:.4g}."
+    elif friction >= bounds.upper:
+        verdict = Verdict.UNDECIDED
+        reason = "Friction is above the critical one: some loads have several solutions."
+    else:
+        verdict, reason = Verdict.UNDECIDED, "Friction is not proved to be safe for every load."
+    return replace(cheap, verdict=verdict, lower=lower, upper=bounds.upper, reason=reason,
+                   criterion=criterion, witness=bounds.witness, critical=bounds)  # fmt: skip
+
+
+# --------------------------------------------------------------------- this load
+def _this_load(
+    local: FrictionProblem, solution: FrictionSolution | None, verdict: Uniqueness,
+    deadline: float,
+) -> Uniqueness:  # fmt: skip
+    """All solutions where they can be enumerated, else the certificate about one."""
+    if local.dimension == 2 and local.contacts <= ENUMERATED and local.q_norm > 0:
+        answer = _by_enumeration(local, verdict, _left(deadline) / 2)
+        if answer is not None:
+            return answer
+    if solution is None:
+        solution = drive(local, time_limit=_left(deadline))
+    if not solution.converged:
+        reason = f"No solution was found: {solution.convergence}."
+        return replace(verdict, reason=reason)
+    verdict = replace(verdict, solution=solution)
+    if local.q_norm == 0:
+        reason = "Without load r = 0 is a solution; others were not looked for."
+        return replace(verdict, reason=f"{verdict.reason} {reason}")
+    try:
+        found = certify_load(local, solution, time_limit=_left(deadline))
+    except UnsupportedForm:
+        return _by_starts(local, solution, verdict, deadline)
+    except InvalidInput as reason:  # a solution that is not accurate enough
+        return replace(verdict, reason=f"{verdict.reason} {reason}.")
+    if found.outcome is LoadOutcome.CERTIFIED:
+        return replace(verdict, verdict=Verdict.UNIQUE_THIS_LOAD, certificate=found,
+                       reason=_sentence(found.reason))  # fmt: skip
+    if found.outcome is LoadOutcome.REFUTED:
+        return _refuted(verdict, found.other, solution.u, _sentence(found.reason))
+    return replace(verdict, reason=f"{verdict.reason} {_sentence(found.reason)}")
+
+
+def _by_enumeration(
+    local: FrictionProblem, verdict: Uniqueness, time_limit: float
+) -> Uniqueness | None:
+    """The verdict of the list of all solutions, None where it settles nothing."""
+    found = enumerate_solutions(local, time_limit=time_limit)
+    isolated = all(s.freedom == 0 for s in found.solutions)
+    if found.complete and len(found) == 1 and isolated:
+        reason = "All other patterns of statuses are excluded."
+        return replace(verdict, verdict=Verdict.UNIQUE_THIS_LOAD, reason=reason)
+    if len(found) > 1 or not isolated:
+        s = found.solutions
+        other = s[1] if len(s) > 1 else s[0]
+        count = f"{len(s)} solutions were found" if isolated else "a set of solutions was found"
+        reason = f"{count[0].upper()}{count[1:]}: {', '.join(x.pattern for x in s[:5])}."
+        return _refuted(verdict, other, s[0].u, reason)
+    return None
+
+
+def _by_starts(
+    local: FrictionProblem, solution: FrictionSolution, verdict: Uniqueness, deadline: float
+) -> Uniqueness:
+    """A second solution from many starts, or none."""
+    found = multistart(local, starts=STARTS, time_limit=_left(deadline))
+    size = SAME * max(float(np.abs(solution.r).max(initial=0.0)), np.finfo(float).tiny)
+    others = [s for s in found.solutions if np.abs(s.r - solution.r).max() > size]
+    if others:
+        reason = "It was found from another start."
+        return _refuted(verdict, others[0], solution.u, reason)
+    reason = f"{verdict.reason} Newton's method from {STARTS} starts found no other."
+    return replace(verdict, reason=reason)
+
+
+def _refuted(
+    verdict: Uniqueness, other: PieceSolution | None, u: Array, reason: str
+) -> Uniqueness:
+    """NOT_UNIQUE, saying so where only reactions differ."""
+    if other is not None and other.freedom == 0:
+        size = max(float(np.abs(u).max(initial=0.0)), np.finfo(float).tiny)
+        if np.abs(other.u - u).max() <= SAME * size:
+            reason += " Reactions differ, the motion is the same."
+    return replace(verdict, verdict=Verdict.NOT_UNIQUE, other=other, reason=reason)
+
+
+# ----------------------------------------------------------------------- helpers
+def _dense(local: FrictionProblem) -> Array:
+    W = local.W
+    return W if isinstance(W, np.ndarray) else W.toarray()  # type: ignore[union-attr]
+
+
+def _left(deadline: float) -> float:
+    return max(deadline - time.perf_counter(), 0.1)
+
+
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}" + ("" if text.endswith(".") else ".")
