@@ -17,7 +17,8 @@ from pathlib import Path
 
 import numpy as np
 from machine import describe
-from mortar_models import BallOnBlock, Rings, measured, stacked
+from mortar_models import BallOnBlock, Rings, dragged, measured, stacked
+from scipy.spatial.transform import Rotation
 
 import amontons as am
 from amontons.contact import mortar_contact
@@ -63,6 +64,25 @@ def balances():
         force = max(abs(H.T @ np.tile(axis, len(points))).max() for axis in np.eye(3))
         turn = max(abs(H.T @ np.cross(axis, points).ravel()).max() for axis in np.eye(3))
         yield name, f"{force:.0e}", f"{turn:.0e}" if not wave else f"{turn:.0e} (gap x force)"
+
+
+def invariance(solve):
+    """Rows: what changes, largest difference of pressures and of forces, relative."""
+    plain = solve(dragged())
+    turn = Rotation.from_rotvec([0.3, -1.1, 0.7]).as_matrix()
+    for what, axes, length, force in (
+        ("turned about (0.3, -1.1, 0.7)", turn, 1.0, 1.0),
+        ("lengths in 1e-3, forces in 1e4", np.eye(3), 1e3, 1e-4),
+        ("both", turn, 1e3, 1e-4),
+    ):
+        other = solve(dragged(axes, length, force))
+        pressure = other.pressure * length**2 / force - plain.pressure
+        forces = other.force / force - plain.force @ axes.T
+        yield (
+            what, f"{np.abs(pressure).max() / plain.pressure.max():.0e}",
+            f"{np.abs(forces).max() / np.abs(plain.force).max():.0e}",
+            " ".join(f"{name} {count}" for name, count in other.counts.items()),
+        )  # fmt: skip
 
 
 def hertz(solve, cells):
@@ -156,6 +176,8 @@ def main():
         f"{machine}. Errors in per cent where nothing else is said; meshes never match.\n",
         table("Patch test", ("mesh", "largest error, relative"), patch_tests(exact)),
         table("Balance", ("surfaces", "force", "moment"), balances()),
+        table("Invariance: a round foot pressed and dragged on a block",
+              ("change", "pressure", "force", "contacts"), invariance(exact)),
         table("Hertz: a quarter of a ball (R = 1, a = 0.057) on a block",
               ("slave", "cells in the radius", "unknowns", "in contact", "peak pressure",
                "radius", "CPU s"), hertz(solve, cells)),

@@ -62,6 +62,29 @@ def _distorted(mesh: am.Mesh, amount: float) -> am.Mesh:
     return am.Mesh(mesh.points + shift, mesh.cells, mesh.surfaces)
 
 
+def dragged(turn: Array | None = None, length: float = 1.0, force: float = 1.0) -> am.Model:
+    """A block with a round foot pressed and dragged on another; it sticks, slides and lifts.
+
+    turn (3, 3): of both bodies and all that acts; length, force: the units.
+    """
+    axes = np.eye(3) if turn is None else turn
+    low, high = (
+        am.box((1, 1, 1), (4, 4, 1)),
+        am.box((1, 1, 1), (3, 3, 1), origin=(0.1, 0.15, 1)),
+    )
+    foot = (high.points[:, 2] == 1) * 0.05 * ((high.points[:, :2] - 0.6) ** 2).sum(axis=1)
+    raised = mapped(high, lambda x: x + np.outer(foot, [0, 0, 1]))
+    material = am.LinearElastic(young=100 * force / length**2, poisson=0.3)
+    bodies = [
+        am.Body(mapped(mesh, lambda x: length * x @ axes.T), material, name=name)
+        for mesh, name in ((low, "lower"), (raised, "upper"))
+    ]
+    move = tuple(length * axes @ [0.01, 0.002, -0.05])
+    contact = am.Contact("upper.bottom", master="lower.top", mu=0.3, method="mortar")
+    supports = [am.Fix("lower.bottom", 0), am.Fix("upper.top", move)]
+    return am.Model(bodies, supports, [contact])
+
+
 # -------------------------------------------------------------------- ball on block
 @dataclass(frozen=True)
 class BallOnBlock:
