@@ -140,6 +140,13 @@ def linear_solution(W, q, mu, pattern):
     return r
 
 
+def breaks_the_law(W, q, mu, r):
+    """True for reactions outside of the cone or with penetration, clearly."""
+    u = (W @ r.ravel()).reshape(r.shape) + q
+    excess = np.hypot(r[:, 1], r[:, 2]) - mu * r[:, 0]
+    return bool((excess > 1e-8).any() or (u[:, 0] < -1e-8).any())
+
+
 def accepted(W, q, mu, proof, solutions):
     """True when the proof leaves no other solutions, (nc, 3) each, than those given."""
 
@@ -153,7 +160,7 @@ def accepted(W, q, mu, proof, solutions):
         if r is not None and not listed(r):
             return False
     return all(
-        (box.r is None or listed(box.r))
+        (box.r is None or listed(box.r) or breaks_the_law(W, q, mu, box.r))
         and balance_is_positive(W, q, box)
         and law_is_negative(W, q, mu, box)
         for box in proof.boxes

@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 EXACT = 1e-13  # error of a reference relative to its size, scaled, as Newton's method ends
 ROUNDING = 1e-13  # of a slack relative to its terms
 ROUNDS = 4  # of further directions of slip
-SHIFTS = (1e-3, 3e-3, 1e-2)  # of forms that are positive between samples, relative
+SHIFTS = (0.0, 1e-3, 3e-3, 1e-2)  # of forms that are positive between samples, relative
 TRIES = 3  # multipliers of one search that are looked at
 
 
@@ -230,26 +230,21 @@ class BoxProblem:
         return True
 
     def _shifted(self, V: Array) -> tuple[Array, list[tuple[int, float]]]:
-        """V made more negative where an arc needs it, and the arcs where that was not enough."""
-        for share in SHIFTS:
-            failures = self._failures(V)
-            if not failures:
-                return V, []
-            V = V.copy()
-            for p, _ in failures:
-                own = np.ix_([p], self.rows[p], self.rows[p])
-                V[own] -= share * np.linalg.norm(V[p], 2) * np.eye(len(self.rows[p]))
-        return V, self._failures(V)
-
-    def _failures(self, V: Array) -> list[tuple[int, float]]:
-        """Contacts with a direction of slip at which the form of V is not proved negative."""
-        bad = []
+        """V more negative where an arc needs it, and the arcs where that was not enough."""
+        V, failures = V.copy(), []
         for p, (law, region) in enumerate(zip(self.laws, self.regions, strict=True)):
-            if "l" in region.statuses and law.mu > 0 and self.rows[p]:
-                angle = negative_on_arc(law, region, V[p], law.relative(self.error))
-                if angle is not None:
-                    bad.append((p, angle))
-        return bad
+            if "l" not in region.statuses or law.mu == 0 or not self.rows[p]:
+                continue
+            error = law.relative(self.error)
+            own, one = np.ix_([p], self.rows[p], self.rows[p]), np.eye(len(self.rows[p]))
+            for share in SHIFTS:
+                V[own] -= share * np.linalg.norm(V[p], 2) * one
+                angle = negative_on_arc(law, region, V[p], error)
+                if angle is None:
+                    break
+            if angle is not None:
+                failures.append((p, angle))
+        return V, failures
 
     def _proved(self, V: Array) -> BoxProof | None:
         """The proof with weights on what is fixed, None when M is not surely definite.

@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 Regions = tuple[Region, ...]
 FINEST = 0.002  # rad: half of the smallest arc
 SURE = 1e-7  # scaled violation of the law that excludes the solution of a linear system
+CODE = {"f": FREE, "s": STICK, "l": SLIP, ".": FREE, "c": STICK}
+GHOST_STEPS, TURN = 12, 1e-6  # Newton steps for directions, rad of their differences
 SECONDS = 60.0  # of a search without a limit of its own: it may grow without end
 VAGUE = 1e-9  # relative error of a solution that can not be a reference
 STARTS = 300  # of Newton's method before the search
@@ -37,6 +39,8 @@ STARTS = 300  # of Newton's method before the search
 @dataclass(frozen=True, eq=False)
 class DiscBox:
     """A region in which there is no solution but r, (nc, 3), or none at all where r is None.
+
+    r may also be a point where the equations of a pattern hold but a sign of the law does not.
 
     letters: what every contact may do, . anything, c closed, f free, s stick, l slip with
     u_T / |u_T| at an angle within arcs[:, 1] of arcs[:, 0], rad.  V (nc, 6, 6), in the units of
@@ -202,16 +206,63 @@ class DiscSearch:
         if answer.proof is not None:
             self.proofs.append(answer.proof)
             return []
+        if not inside and all(region.letter in "fsl" for region in regions):
+            if self._newton(regions):
+                return [regions]
+            if self._closed_about_a_ghost(regions):
+                return []
         for p in self._order(regions, answer.scores):
             parts = self._divided(regions, p, inside)
             if parts:
-                if not inside and all(region.letter not in ".c" for region in regions):
-                    self._newton(regions)
                 return parts
-        if not inside and self._newton(regions):
-            return [regions]
         self.undecided += 1
         return []
+
+    def _closed_about_a_ghost(self, regions: Regions) -> bool:
+        """Close a pattern about the one point where its equations hold but a sign does not."""
+        r, error = self._ghost(regions)
+        if r is None or not self._holds(regions, r) or error > VAGUE:
+            return False
+        u = self.stack.velocity(r[None])[0]
+        slip = np.array([region.letter == "l" for region in regions])
+        stick = np.array([region.letter == "s" for region in regions])
+        size = 1 + np.abs(r).max()
+        excess = np.linalg.norm(r[:, 1:], axis=1) - self.stack.mu * r[:, 0]
+        worst = max(np.max(excess[stick], initial=-np.inf),
+                    np.max(-u[~slip & ~stick, 0], initial=-np.inf))  # fmt: skip
+        if worst <= SURE * size or not (r[slip, 0] > SURE * size).all():
+            return False
+        left = max(self.deadline - time.perf_counter(), 0.01)
+        answer = BoxProblem(self.stack, regions, r, error=error).solve(left)
+        if answer.proof is not None:
+            self.proofs.append(answer.proof)
+        return answer.proof is not None
+
+    def _ghost(self, regions: Regions) -> tuple[Array | None, float]:
+        """(r with the equations of a pattern and u_T along r_T, relative error of it)."""
+        slip = np.flatnonzero([region.letter == "l" for region in regions])
+        states = np.array([CODE[region.letter] for region in regions])
+        angle = np.array([region.middle for region in regions])
+        step = np.inf
+        for _ in range(GHOST_STEPS):
+            trial = np.vstack([angle, angle + TURN * np.eye(len(angle))[slip]])
+            direction = np.stack([np.cos(trial), np.sin(trial)], axis=2)
+            r = self.stack.on_piece(np.tile(states, (len(trial), 1)), direction)
+            u = self.stack.velocity(r)
+            across = direction[..., 0] * u[..., 2] - direction[..., 1] * u[..., 1]
+            value = across[0, slip]
+            J = (across[1:, slip] - value).T / TURN
+            try:
+                turn = np.linalg.solve(J, value)
+            except np.linalg.LinAlgError:
+                return None, np.inf
+            step = float(np.abs(turn).max(initial=0.0))
+            if not step < 1.0:
+                return None, np.inf
+            angle[slip] -= turn
+        along = np.einsum("pi,pi->p", direction[0], u[0, :, 1:])
+        proper = step < VAGUE and (along[slip] > SURE).all()
+        return (r[0], EXACT + 100 * step) if proper else (None, np.inf)
 
     def _error(self, r: Array) -> float:
         """Bound of the relative error of one of the solutions found."""
@@ -279,8 +330,7 @@ class DiscSearch:
     # ---------------------------------------------------------------- leaves
     def _start(self, regions: Regions) -> Array:
         """Scaled r on a pattern, slip in the middle of its arcs, signs disregarded."""
-        code = {"f": FREE, "s": STICK, "l": SLIP, ".": FREE, "c": STICK}
-        states = np.array([[code[region.letter] for region in regions]])
+        states = np.array([[CODE[region.letter] for region in regions]])
         angle = np.array([region.middle for region in regions])
         direction = np.column_stack([np.cos(angle), np.sin(angle)])
         return self.stack.on_piece(states, direction[None])

@@ -35,7 +35,8 @@ Array = NDArray[np.float64]
 SAMPLES = 16  # directions of a full circle
 FEWEST = 6  # of an arc: a form of e has five coefficients
 ON = 1e-7  # scaled distance at which a reference counts as on a border of the law
-DIVISIONS = 4  # of intervals of directions, each into 16 parts
+INTERVALS, PARTS, DIVISIONS = 96, 12, 5  # of directions: at first, of one, how often divided
+MOST = 20_000  # intervals at a time
 NEAR = 0.3  # rad from e0 within which the span replaces the cone
 
 
@@ -274,42 +275,47 @@ def negative_on_arc(law: Law, region: Region, V: Array, uncertainty: float) -> f
     derivative bends it; means of copositive matrices are copositive.  uncertainty: of z0.
     """
     first, last = region.middle - region.half, region.middle + region.half
-    ends = np.linspace(first, last, max(2, int(np.ceil(region.half / np.pi * 256)) + 1))
+    count = max(2, int(np.ceil(region.half / np.pi * INTERVALS)) + 1)
+    ends = np.linspace(first, last, count)
     intervals = np.column_stack([ends[:-1], ends[1:]])
     for _ in range(DIVISIONS):
-        bad = ~_negative_between(law, intervals, V, uncertainty)
-        if not bad.any():
-            return None
-        low, high = intervals[bad].T
-        share = np.linspace(0, 1, 17)
+        good, wrong = _negative_between(law, intervals, V, uncertainty)
+        if wrong is not None or good.all():
+            return wrong
+        low, high = intervals[~good].T
+        share = np.linspace(0, 1, PARTS + 1)
         ends = low[:, None] + (high - low)[:, None] * share
         intervals = np.column_stack([ends[:, :-1].ravel(), ends[:, 1:].ravel()])
-        if len(intervals) > 20000:
+        if len(intervals) > MOST:
             break
     return float(intervals[0, 0])
 
 
 def _negative_between(
     law: Law, intervals: Array, V: Array, uncertainty: float
-) -> NDArray[np.bool_]:
-    """Which intervals of directions, (j, 2), are proved."""
+) -> tuple[NDArray[np.bool_], float | None]:
+    """(which intervals of directions, (j, 2), are proved; a direction at which V fails)."""
     size = float(np.linalg.norm(V))
     uncertainty = 0.0 if law.z0 is None else uncertainty
     width = float(np.diff(intervals, axis=1).max())
     good = np.zeros(len(intervals), dtype=bool)
-    ends = law.slip(intervals.ravel())
-    middle = [law.slip(intervals.mean(axis=1), order) for order in range(4)]
-    for kind in (0, 1):
-        G = ends[kind]
-        derivatives = [part[kind] for part in middle]
-        bend = _most_bent(V, derivatives, width, size)
+    hopeful = np.zeros(2 * len(intervals), dtype=bool)
+    for kind, test in enumerate((copositive, definite)):
+        left = intervals[~good]
+        G = law.slip(left.ravel())[kind]
+        middle = [law.slip(left.mean(axis=1), order)[kind] for order in range(4)]
+        bend = _most_bent(V, middle, width, size)
         norm = float(np.linalg.norm(G, axis=(1, 2)).max())
         margin = np.repeat(bend * width**2 / 8, 2)
         margin += size * (2 * norm * uncertainty + 1e-13 * norm**2)
-        Q = -np.swapaxes(G, 1, 2) @ V @ G - margin[:, None, None] * np.eye(G.shape[2])
-        holds = np.linalg.eigvalsh(Q)[:, 0] > 0 if kind else copositive(Q)
-        good |= holds.reshape(-1, 2).all(axis=1)
-    return good
+        Q = -np.swapaxes(G, 1, 2) @ V @ G
+        hopeful[np.repeat(~good, 2)] |= test(Q)
+        holds = test(Q - margin[:, None, None] * np.eye(G.shape[2]))
+        good[~good] = holds.reshape(-1, 2).all(axis=1)
+        if good.all():
+            return good, None
+    bad = np.repeat(~good, 2) & ~hopeful
+    return good, float(intervals.ravel()[np.argmax(bad)]) if bad.any() else None
 
 
 def _most_bent(V: Array, G: list[Array], width: float, size: float) -> Array:
@@ -322,6 +328,12 @@ def _most_bent(V: Array, G: list[Array], width: float, size: float) -> Array:
     n = [float(np.linalg.norm(part, axis=(1, 2)).max()) for part in G]
     third = 2 * size * (n[0] * n[3] + 3 * n[1] * n[2])
     return np.maximum(np.linalg.eigvalsh(second)[:, -1], 0) + third * width / 2
+
+
+def definite(Q: Array) -> NDArray[np.bool_]:
+    """Which symmetric Q (j, s, s) are positive definite."""
+    minors = [np.linalg.det(Q[:, :k, :k]) for k in range(1, Q.shape[1] + 1)]
+    return (np.array(minors) > 0).all(axis=0)
 
 
 def copositive(Q: Array) -> NDArray[np.bool_]:
