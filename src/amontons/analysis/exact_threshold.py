@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 LARGEST = 1e4  # friction up to which a threshold is looked for
 CLOSE = 1e-6  # distance of lower and upper bound, relative
 WINDOW = 7  # contacts of a window: 4^7 patterns take about a millisecond
+STRIDES = (1, 2, 3, 4, 6)  # of the contacts of a window, by how strongly they are coupled
 PATTERNS = 2_000_000  # between two looks at the clock
 
 
@@ -115,22 +116,27 @@ def first_failure(
 
 # ------------------------------------------------------------- upper bounds from windows
 def search_windows(pieces: Pieces, threshold: Threshold, deadline: float) -> None:
-    """Lower the upper bound by all patterns of windows of contacts, until none helps."""
+    """Lower the upper bound by all patterns of windows of contacts, until none helps.
+
+    A window is a contact with its nearest others, or every second one of them and so on: some
+    patterns only move as a whole.
+    """
     n = pieces.contacts
     order = np.argsort(-pieces.coupling, axis=1, kind="stable")
-    base = np.full(n, FREE)
-    while True:
-        before = threshold.upper
-        for centre in range(n):
-            window = np.sort(order[centre, :WINDOW])
-            while time.perf_counter() <= deadline:
-                if not _improve(pieces, threshold, base, window):
-                    break
-                base = threshold.states
-            if time.perf_counter() > deadline:
+    reach = [s for s in STRIDES if s == 1 or s * (WINDOW - 1) < n]
+    windows = [np.sort(order[c, : s * WINDOW : s][:WINDOW]) for s in reach for c in range(n)]
+    base = np.full(n, FREE) if threshold.states is None else threshold.states
+    idle = 0  # windows since the last success
+    while idle < len(windows):
+        for window in windows:
+            idle += 1
+            while _improve(pieces, threshold, base, window):
+                assert threshold.states is not None
+                base, idle = threshold.states, 0
+                if time.perf_counter() > deadline:
+                    return
+            if idle >= len(windows) or time.perf_counter() > deadline:
                 return
-        if not threshold.upper < before * (1 - CLOSE):
-            return
 
 
 def _improve(
