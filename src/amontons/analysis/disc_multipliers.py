@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 EXACT = 1e-13  # error of a reference relative to its size, scaled, as Newton's method ends
 ROUNDING = 1e-13  # of a slack relative to its terms
 ROUNDS = 4  # of further directions of slip
-SHIFTS = (0.0, 1e-3, 3e-3, 1e-2)  # of forms that are positive between samples, relative
+SHIFTS = (0.0, 0.01, 0.09, 0.4)  # of forms that are positive between samples, part of the room
 TRIES = 3  # multipliers of one search that are looked at
 
 
@@ -104,7 +104,7 @@ class BoxProblem:
     def solve(self, time_limit: float | None = None) -> BoxAnswer:
         """Look for multipliers; more directions of slip where a proof fails between two."""
         extra: list[tuple[float, ...]] = [()] * len(self.regions)
-        basis = self._basis()
+        basis = self.basis
         scores = np.zeros(len(self.regions))
         if basis.shape[1] == 0:
             return self._without_freedom()
@@ -158,7 +158,8 @@ class BoxProblem:
         rows = [self.Z[p, i] for p, fixed in enumerate(self.fixed) for i in fixed]
         return np.array(rows).reshape(len(rows), self.Z.shape[2])
 
-    def _basis(self) -> Array:
+    @cached_property
+    def basis(self) -> Array:
         """Columns span what the region leaves, orthonormal in the energy."""
         n = self.stack.W.shape[0]
         fixed = self._fixed_rows()
@@ -231,14 +232,14 @@ class BoxProblem:
 
     def _shifted(self, V: Array) -> tuple[Array, list[tuple[int, float]]]:
         """V more negative where an arc needs it, and the arcs where that was not enough."""
-        V, failures = V.copy(), []
+        V, failures, room = V.copy(), [], self._room(V)
         for p, (law, region) in enumerate(zip(self.laws, self.regions, strict=True)):
             if "l" not in region.statuses or law.mu == 0 or not self.rows[p]:
                 continue
             error = law.relative(self.error)
             own, one = np.ix_([p], self.rows[p], self.rows[p]), np.eye(len(self.rows[p]))
             for share in SHIFTS:
-                V[own] -= share * np.linalg.norm(V[p], 2) * one
+                V[own] -= share * room * one
                 angle = negative_on_arc(law, region, V[p], error)
                 if angle is None:
                     break
@@ -246,13 +247,23 @@ class BoxProblem:
                 failures.append((p, angle))
         return V, failures
 
+    def _room(self, V: Array) -> float:
+        """How much can be taken from the diagonal of all V before M is singular."""
+        Z = (self.Z @ self.basis).reshape(-1, self.basis.shape[1])
+        M = Z.T @ (V @ Z.reshape(len(V), self.size, -1)).reshape(Z.shape)
+        try:
+            least = linalg.eigh(M, Z.T @ Z, eigvals_only=True, subset_by_index=[0, 0])[0]
+        except np.linalg.LinAlgError:
+            return 0.0
+        return max(0.0, float(least))
+
     def _proved(self, V: Array) -> BoxProof | None:
         """The proof with weights on what is fixed, None when M is not surely definite.
 
         M is looked at in coordinates T in which it is nearly diagonal: any T will do, since
         T^T M T > 0 makes M > 0 on its range, and T is square.
         """
-        basis, fixed = self._basis(), self._fixed_rows()
+        basis, fixed = self.basis, self._fixed_rows()
         N = self.Z.shape[2]
         Z = self.Z.reshape(-1, N)
         whole, T = V, basis
