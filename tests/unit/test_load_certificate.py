@@ -215,3 +215,61 @@ def test_the_clock():
     assert answer.outcome is LoadOutcome.UNDECIDED
     assert "stopped" in answer.reason
     assert not answer.branches
+
+
+def test_shared_multipliers_are_complete_certificates(monkeypatch):
+    # few multipliers on a subspace first, as for many contacts
+    monkeypatch.setattr("amontons.analysis.load_certificate.LARGE", 1)
+    monkeypatch.setattr("amontons.analysis.load_reduction.SETS", 4)
+    called = []
+
+    def never(*arguments, **options):
+        called.append(arguments)
+
+    problem = hild_triangle(40, mu=0.5).assemble().condensed()
+    q = np.column_stack(
+        [np.cos(np.linspace(0, 5, 40)) - 0.2, np.sin(np.linspace(0, 9, 40)) / 2]
+    )
+    for other in (problem, am.FrictionProblem.from_delassus(problem.W, q, problem.mu)):
+        with monkeypatch.context() as patch:
+            patch.setattr("amontons.analysis.load_certificate.find_multipliers", never)
+            answer = certify_load(other, am.solve(other))
+        assert not called
+        assert answer.outcome is LoadOutcome.CERTIFIED
+        checked(other, answer)
+    three = hild_triangle(10, mu=3.5).assemble().condensed()
+    assert certify_load(three, am.solve(three)).outcome is LoadOutcome.REFUTED
+
+
+def test_few_unknowns_and_many_give_the_same_matrix(monkeypatch):
+    from amontons.analysis import multiplier_steps as steps
+    from amontons.analysis.multiplier_lmi import Family, Slacks, restricted
+
+    random = np.random.default_rng(0)
+    Z = random.standard_normal((4 * 30, 5))
+    rows, each = np.arange(120).reshape(30, 4), np.arange(30)
+    share = sparse.csr_array((np.ones(30), (each, each % 2)), shape=(30, 2))
+    slacks = (Slacks(each, restricted(np.tile(np.eye(4), (30, 1, 1)))),)
+    family = Family(rows, slacks, np.ones(0), share)
+    few = steps.Program(Z, (family,))
+    assert few.few is not None
+    monkeypatch.setattr(steps, "FEW", 0)
+    many = steps.Program(Z, (family,))
+    assert many.few is None
+    point = few.start()
+    inverse = [np.linalg.inv(B) for B in point.S]
+    right = random.standard_normal((few.unknowns, 2))
+    answers = [steps.Normal(p, point.X, inverse)(right) for p in (few, many)]
+    assert answers[0] == pytest.approx(answers[1], rel=1e-8)
+
+
+def test_a_rough_solution_is_good_enough():
+    problem = hild_triangle(12, mu=0.7).assemble().condensed()
+    x = np.linspace(0, 1, 12)
+    q = np.column_stack([np.cos(5 * x) - 0.2, np.sin(7 * x) / 2])
+    problem = am.FrictionProblem.from_delassus(problem.W, q, problem.mu)
+    for tolerance in (1e-6, 1e-10):
+        answer = certify_load(problem, am.solve(problem, am.GaussSeidel(), tolerance=tolerance))
+        assert answer.outcome is LoadOutcome.CERTIFIED
+        assert answer.distance < 1e-8
+        assert problem.error(answer.r0) < 1e-12

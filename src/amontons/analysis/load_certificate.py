@@ -35,16 +35,20 @@ from . import load_pieces as pieces
 from .enumerate import PieceSolution
 from .load_pieces import Known, LoadProblem, States
 from .load_proof import BranchProof, prove
+from .load_reduction import shared_multipliers
 from .multiplier_lmi import LmiOutcome, find_multipliers, slacks_are_positive
 from .multistart import Finder, described
 from .newton_batch import Stack
 
 Array = NDArray[np.float64]
 NEAR = 1e-6  # of the size of reactions: a larger `distance` proves nothing of use
+LARGE = 150  # contacts from which few different multipliers are tried first
 STARTS = 60  # of Newton's method once the first inequality has no multipliers
 STEP_WORK, ROUND_WORK = 30.0, 2e9  # operations of a start per (2 nc)^3, of a round of starts
 TOLERANCE = 1e-8  # error by the judge of another solution
 EXACT = 1e-12  # error of solutions that fill a segment
+GOOD = 1e-12  # by which a solution in scaled variables may miss the law
+SAME_SOLUTION = 1e-4  # scaled distance that refining a solution may move it
 DISTINCT = 1e-6  # scaled distance of two solutions that count as different
 
 
@@ -243,6 +247,15 @@ class Inequality:
         self.groups = pieces.groups(self.cones, local.coordinates(branch))
         self.Z, _ = pieces.energy_basis(local, branch, apex)
 
+    @property
+    def large(self) -> bool:
+        """Where few different multipliers are worth a try first."""
+        return (
+            self.local.contacts >= LARGE
+            and self.known is not None
+            and bool((self.branch == pieces.UNDECIDED).all())
+        )
+
     def solve(self, near: float, time_limit: float) -> BranchProof | Failure:
         """Its proof with a distance <= near, or where it fails."""
         if not self.Z.shape[1]:  # nothing moves: any multipliers will do
@@ -262,6 +275,10 @@ class Inequality:
             proofs.append(proof)
             return True
 
+        if self.large and shared_multipliers(
+            self.local, self.branch, self.groups, accept, time_limit=time_limit / 2
+        ):
+            return proofs[-1]
         answer = find_multipliers(
             self.Z, [g.turned for g in self.groups], accept=accept, time_limit=time_limit
         )
@@ -270,12 +287,7 @@ class Inequality:
         return self._failure(answer.lowest, self._whole(answer.W))
 
     def _whole(self, parts: tuple[Array, ...]) -> Array:
-        """Multipliers (nc, k, k) with zeros for the variables that vanish."""
-        k = self.cones.G.shape[2]
-        out = np.zeros((self.local.contacts, k, k))
-        for group, W in zip(self.groups, parts, strict=True):
-            out[np.ix_(group.contacts, group.coordinates, group.coordinates)] = W
-        return out
+        return pieces.whole(self.groups, parts, self.local.contacts, self.cones.G.shape[2])
 
     def _failure(self, lowest: Array, W: Array) -> Failure:
         nc = self.local.contacts
@@ -287,30 +299,48 @@ class Inequality:
 
 # ------------------------------------------------------------------ solutions
 def refined(local: LoadProblem, r: Array) -> Known:
-    """Scaled reactions (2 nc,) on the law, solved again on their linear piece.
+    """The solution next to scaled reactions (2 nc,), on its piece or by Newton's method.
 
-    Raises InvalidInput where r is no solution.
+    Raises InvalidInput where there is none.
     """
-    known = pieces.known_solution(local, r)
-    if not known.touches.any(axis=1).all() or known.off.max(initial=0.0) > NEAR:
+    best = pieces.known_solution(local, r)
+    for improve in (_on_piece, _by_newton):
+        if best.valid and best.off.max(initial=0.0) <= GOOD:
+            return best
+        for other in improve(local, best.r if best.valid else r):
+            known = pieces.known_solution(local, other)
+            near = np.abs(known.r - r).max() <= SAME_SOLUTION * (1 + np.abs(r).max())
+            better = not best.valid or known.off.max() < best.off.max()
+            if near and known.valid and better:
+                best = known
+    if not best.valid or best.off.max(initial=0.0) > NEAR:
         error = local.problem.error((r * local.to_r).reshape(-1, 2))
         raise InvalidInput(
             f"solution: expected a solution of the problem, got one with error {error:.1e}; "
             "solve again with a smaller tolerance"
         )
+    return best
+
+
+def _on_piece(local: LoadProblem, r: Array) -> list[Array]:
+    """The reactions that the statuses of a solution determine."""
+    known = pieces.known_solution(local, r)
     branch = np.argmax(known.touches, axis=1).astype(np.int8)
-    R = local.reactions(branch)
-    rows = local.zero_velocities(branch)
-    if not len(rows):
-        return known
+    R, rows = local.reactions(branch), local.zero_velocities(branch)
+    if not known.valid or not len(rows):
+        return []
     try:
         y = np.linalg.solve((R.T @ local.W[rows].T).T, -local.q[rows])
     except np.linalg.LinAlgError:
-        return known
-    other = pieces.known_solution(local, np.asarray(R @ y))
-    near = np.abs(other.r - known.r).max() <= NEAR * (1 + np.abs(known.r).max())
-    better = other.off.max() < known.off.max() and other.touches.any(axis=1).all()
-    return other if near and better else known
+        return []
+    return [np.asarray(R @ y)]
+
+
+def _by_newton(local: LoadProblem, r: Array) -> list[Array]:
+    """Where semismooth Newton steps lead."""
+    stack = Stack.of(local.problem)
+    reached = stack.newton(r.reshape(1, -1, 2), np.random.default_rng(0))
+    return [found.ravel() for found in reached]
 
 
 class OtherSolutions:

@@ -157,6 +157,11 @@ class Known:
     off: Array
     touches: NDArray[np.bool_]
 
+    @property
+    def valid(self) -> bool:
+        """True where every contact has a status."""
+        return bool(self.touches.any(axis=1).all())
+
 
 def known_solution(local: LoadProblem, r: Array) -> Known:
     """Scaled reactions (2 nc,) put on the law: what misses a border by SNAP lies on it."""
@@ -331,6 +336,14 @@ def groups(cones: Cones, coordinates: list[tuple[int, ...]]) -> list[Group]:
             own = (*own, 4)
         G = cones.G[:, index][:, :, list(own)]
         out.append(_group(index, own, rows, cones.kind[index[0]], G))
+    return out
+
+
+def whole(parts: list[Group], W: tuple[Array, ...], contacts: int, k: int = 4) -> Array:
+    """Multipliers (nc, k, k) with zeros for the variables that vanish."""
+    out = np.zeros((contacts, k, k))
+    for group, own in zip(parts, W, strict=True):
+        out[np.ix_(group.contacts, group.coordinates, group.coordinates)] = own
     return out
 
 

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
+from scipy import linalg, sparse
 
 from .load_pieces import Known, LoadProblem, States
 from .rounding import gamma, is_positive_definite, unit_scale
@@ -49,15 +49,17 @@ def prove(
 ) -> BranchProof | None:
     """The proof, None where rounding could spoil it; slacks are not looked at."""
     rows = local.zero_velocities(branch)
-    Z, size = _rows(local, branch, apex=known is None)
+    motion, size = _motions(local, branch, apex=known is None)
     for penalty in PENALTIES if len(rows) else (0.0,):
         W = _penalised(multipliers, rows, penalty)
-        M, error = _sum(W, Z, size)
+        M = motion.sum(W)
+        error = gamma(4 * len(W) + 24) * size.sum(np.abs(W))
         scale = unit_scale(M)
         M, error = (A * scale[:, None] * scale for A in (M, error))
         exact = known is None or not known.off.any()
         tau = 0.0 if exact else SHARE * _smallest_eigenvalue(M)
-        if not is_positive_definite(M - tau * np.eye(len(M)), error):
+        M[np.diag_indices(len(M))] -= tau
+        if not is_positive_definite(M, error):
             continue
         if exact:
             return BranchProof(branch, W, 0.0)
@@ -66,19 +68,48 @@ def prove(
     return None
 
 
-def _rows(local: LoadProblem, branch: States, *, apex: bool) -> tuple[Array, Array]:
-    """z of all contacts (nc, k, N) in coordinates (y, tau), r = R y, and bounds of its size."""
-    R = local.reactions(branch).toarray()
-    nc, N = local.contacts, R.shape[1]
-    parts = []
-    for r, W, q in ((R, local.W, local.q), (abs(R), abs(local.W), abs(local.q))):
-        out = np.zeros((nc, 5, N + 1))
-        out[:, :2, :N] = r.reshape(nc, 2, N)
-        out[:, 2:4, :N] = (W @ r).reshape(nc, 2, N)
-        out[:, 2:4, N] = q.reshape(nc, 2)
-        out[:, 4, N] = 1.0
-        parts.append(out if apex else out[:, :4, :N])
-    return parts[0], parts[1]
+@dataclass(frozen=True, eq=False)
+class _Motion:
+    """r = R y and u = U y for coordinates y, the last one 1 where there is an apex."""
+
+    R: sparse.csr_array
+    U: Array
+
+    def sum(self, W: Array) -> Array:
+        """sum_p Z_p^T W_p Z_p, z_p = Z_p y; only one product takes time."""
+        rr, ru, uu = diagonal_parts(W)
+        mixed = self.R.T @ (ru @ self.U)
+        M = self.U.T @ (uu @ self.U) + mixed + mixed.T + (self.R.T @ rr @ self.R).toarray()
+        if W.shape[1] == 5:
+            last = self.R.T @ W[:, :2, 4].ravel() + self.U.T @ W[:, 2:4, 4].ravel()
+            M[:, -1] += last
+            M[-1] += last
+            M[-1, -1] += W[:, 4, 4].sum()
+        return (M + M.T) / 2
+
+
+def diagonal_parts(W: Array) -> tuple[sparse.csr_array, ...]:
+    """The parts r r, r u and u u of multipliers (nc, k, k), as (2 nc, 2 nc) each."""
+    nc = len(W)
+    each, pointer = np.arange(nc), np.arange(nc + 1)
+    return tuple(
+        sparse.csr_array(sparse.bsr_array((np.ascontiguousarray(part), each, pointer),
+                                          shape=(2 * nc, 2 * nc)))
+        for part in (W[:, :2, :2], W[:, :2, 2:4], W[:, 2:4, 2:4])
+    )  # fmt: skip
+
+
+def _motions(local: LoadProblem, branch: States, *, apex: bool) -> tuple[_Motion, _Motion]:
+    """Of the variables, and of the sizes of the terms that they are sums of."""
+    R = local.reactions(branch)
+    out = []
+    for r, W, q in ((R, local.W, local.q), (abs(R), np.abs(local.W), np.abs(local.q))):
+        U = np.asarray((r.T @ W.T).T)
+        if apex:
+            U = np.column_stack([U, q])
+            r = sparse.hstack([r, sparse.csr_array((r.shape[0], 1))], format="csr")
+        out.append(_Motion(r, U))
+    return out[0], out[1]
 
 
 def _penalised(multipliers: Array, rows: NDArray[np.int64], penalty: float) -> Array:
@@ -89,14 +120,6 @@ def _penalised(multipliers: Array, rows: NDArray[np.int64], penalty: float) -> A
     size = np.maximum(size, 1e-3 * size.max(initial=1.0))
     W[contact, 2 + component, 2 + component] += penalty * size
     return W
-
-
-def _sum(W: Array, Z: Array, size: Array) -> tuple[Array, Array]:
-    """(sum_p Z_p^T W_p Z_p, bound of the error of its entries)."""
-    N = Z.shape[2]
-    M = Z.reshape(-1, N).T @ (W @ Z).reshape(-1, N)
-    whole = size.reshape(-1, N).T @ (np.abs(W) @ size).reshape(-1, N)
-    return (M + M.T) / 2, gamma(len(W) * W.shape[1] + 16) * whole
 
 
 def _smallest_eigenvalue(M: Array) -> float:
@@ -113,7 +136,7 @@ def _smallest_eigenvalue(M: Array) -> float:
     return 1 / length
 
 
-def _distance(W: Array, size: Array, scale: Array, tau: float, off: Array) -> float:
+def _distance(W: Array, size: _Motion, scale: Array, tau: float, off: Array) -> float:
     """Bound of the largest scaled reaction by which another solution can differ."""
     if tau <= 0:
         return np.inf
@@ -121,7 +144,7 @@ def _distance(W: Array, size: Array, scale: Array, tau: float, off: Array) -> fl
     e[:, 2:] = off.reshape(-1, 2)
     push = np.einsum("pab,pb->pa", np.abs(W), e)
     alpha = float(np.einsum("pa,pa->", push, e)) * (1 + 1e-9)
-    beta = float(np.linalg.norm(scale * np.einsum("pan,pa->n", size, push))) * (1 + 1e-9)
+    along = size.R.T @ push[:, :2].ravel() + size.U.T @ push[:, 2:].ravel()
+    beta = float(np.linalg.norm(scale * along)) * (1 + 1e-9)
     reach = (beta + np.sqrt(beta**2 + tau * alpha)) / tau * (1 + 1e-9)
-    # reactions of slipping contacts are mu times a coordinate at most
-    return float(reach * np.max(np.abs(size[:, :2]) @ scale, initial=0.0))
+    return float(reach * np.max(size.R @ scale, initial=0.0))

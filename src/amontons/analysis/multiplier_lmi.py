@@ -145,19 +145,21 @@ def slacks_are_positive(families: Sequence[Family], W: Parts, extras: Parts) -> 
 def find_multipliers(
     Z: Array, families: Sequence[Family], *, accept: Accept | None = None,
     time_limit: float | None = None, smallest: float = SMALLEST,
+    margin: float = 0.0,
 ) -> Multipliers:  # fmt: skip
     """Multipliers with M and all slacks positive definite, or why there are none.
 
     accept(W, extras): the last word on multipliers with M > 0, each from a later step than the
     one before; without it they are taken as they are.  smallest: give up as soon as no
-    eigenvalue of M above this is possible, the mean of all being 1.
+    eigenvalue of M above this is possible, the mean of all being 1.  margin: ask only when
+    this part of the largest possible eigenvalue is reached.
     """
     deadline = np.inf if time_limit is None else time.perf_counter() + time_limit
     program = Program(Z, tuple(families))
     point = program.start()
     refused, steps, outcome = 0, 0, LmiOutcome.STALLED
     while steps < STEPS and refused < REFUSALS:
-        if _positive(point):
+        if _positive(point) and (not margin or point.t > margin * program.theta * point.lam):
             if accept is None or accept(*multipliers_at(program, point)):
                 outcome = LmiOutcome.FOUND
                 break

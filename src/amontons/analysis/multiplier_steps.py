@@ -8,8 +8,9 @@ n_i = trace A_i it is the pair of semidefinite programs
 
 theta the number of rows of S; lam theta - t = tr X S >= 0, so lam theta bounds t from above.
 The direction is that of [HRVW] and [KSH], with Mehrotra's corrector; its matrix tr A_i X A_j
-S^-1 has an entry for two entries of W from Z X Z^T and Z S^-1 Z^T at O(1).  Extras of a set
-enter only the slacks of that set and are eliminated there.
+S^-1 has an entry for two entries of W from Z X Z^T and Z S^-1 Z^T at O(1), or comes from all
+A_i where sets share few unknowns.  Extras of a set enter only the slacks of that set and are
+eliminated there.
 
 [HRVW] C. Helmberg, F. Rendl, R. Vanderbei, H. Wolkowicz, SIAM J. Optim. 6 (1996).
 [KSH] M. Kojima, S. Shindoh, S. Hara, SIAM J. Optim. 7 (1997).
@@ -28,6 +29,7 @@ from scipy import linalg, sparse
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Blocks = list[Array]  # first the (1, N, N) of M, then the (J, s, s) of all slacks in order
+FEW = 2e7  # entries of all derivatives of M that are kept where unknowns are few
 ROOM = 0.95  # part of the way to the boundary that a step takes at most
 
 
@@ -110,6 +112,23 @@ class Program:
         ]
         self.theta = float(sum(len(B) * B.shape[1] for B in self.identity))
         self.traces = self.adjoint(self.identity)
+        self.few = self._few()
+
+    def _few(self) -> Array | None:
+        """dM / dx of every unknown of W, where that is less work than all entries of all W."""
+        N, k = self.N, self.entries
+        pairs = 4.0 * len(self.Z) ** 2 * N + 15.0 * len(self.a) ** 2
+        if 4.0 * k * N**3 + 2.0 * (k * N) ** 2 > pairs or k * N**2 > FEW:
+            return None
+        columns = sparse.csc_array(self.spread)
+        out = np.empty((k, N, N))
+        for j in range(k):
+            part = slice(columns.indptr[j], columns.indptr[j + 1])
+            i = columns.indices[part]
+            weights = columns.data[part] * self.factor[i]
+            half = (self.Z[self.a[i]].T * weights) @ self.Z[self.b[i]]
+            out[j] = half + half.T
+        return out
 
     def _slacks(self) -> Iterator[tuple[int, Slacks]]:
         """(number of the family, slacks) in the order of blocks."""
@@ -186,11 +205,17 @@ class Normal:
 
     def __init__(self, program: Program, X: Blocks, inverse: Blocks) -> None:
         p = self.program = program
-        P, Q = (p.Z @ B[0][0] @ p.Z.T for B in (X, inverse))
-        product = p.Z @ (X[0][0] @ inverse[0][0])
         H = np.zeros((p.entries + 1, p.entries + 1))
         spread = p.spread
-        _normal_inplace(H, P, Q, p.a, p.b, p.factor, spread.indptr, spread.indices, spread.data)
+        if p.few is not None:
+            flat = p.few.reshape(p.entries, -1)
+            H[:-1, :-1] = (X[0][0] @ p.few @ inverse[0][0]).reshape(p.entries, -1) @ flat.T
+        else:
+            P, Q = (p.Z @ B[0][0] @ p.Z.T for B in (X, inverse))
+            _normal_inplace(
+                H, P, Q, p.a, p.b, p.factor, spread.indptr, spread.indices, spread.data
+            )
+        product = p.Z @ (X[0][0] @ inverse[0][0])
         cross = np.empty(len(p.a))
         for i in range(0, len(p.a), 1024):
             a, b = p.a[i : i + 1024], p.b[i : i + 1024]

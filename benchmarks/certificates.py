@@ -1,0 +1,222 @@
+"""Certificates of uniqueness: how far they reach, what they cost, and whether they are right.
+
+    python benchmarks/certificates.py [small] [hild] [mixed] [large] [--problems 500]
+
+Each name is one table (all of them without a name); results/certificates.json keeps the rows,
+so that tables can be made one at a time; results/certificates.md is written from all of them.
+A table is a function that returns rows, with its heading in TABLES: add others there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from machine import describe
+
+import amontons as am
+from amontons.analysis.load_certificate import LoadOutcome, certify_load
+from amontons.hild import hild_triangle
+from amontons.problem import FrictionProblem
+
+RESULTS = Path(__file__).parent / "results"
+sys.path.append(str(Path(__file__).parents[1] / "tests" / "unit"))
+Row = dict[str, object]
+
+
+# ------------------------------------------------------------------ small problems
+def small_problem(seed: int) -> FrictionProblem:
+    """One to seven contacts, mu from 0.5 to 4, four kinds of W and of loads in turn."""
+    random = np.random.default_rng(seed)
+    nc = int(random.integers(1, 8))
+    A = random.standard_normal((2 * nc, 2 * nc))
+    W = A @ A.T / (2 * nc) + 0.05 * np.eye(2 * nc)
+    mu = np.full(nc, random.uniform(0.5, 4.0))
+    q = random.standard_normal((nc, 2)) * [1, 2]
+    if seed % 4 == 1:  # contacts with three solutions each, weakly coupled
+        W = np.kron(np.eye(nc), [[1.0, 0.8], [0.8, 1.0]]) + 0.1 * A @ A.T / (2 * nc)
+        q = np.abs(q)
+    elif seed % 4 == 2:
+        mu = random.uniform(0.5, 4.0, nc)
+    elif seed % 4 == 3:
+        W = dense(hild_triangle(nc).assemble().condensed())
+        q = q * np.sqrt(W[0, 0])
+    return FrictionProblem.from_delassus(W, q, mu)
+
+
+def dense(problem: FrictionProblem) -> np.ndarray:
+    """W as an array."""
+    return problem.W if isinstance(problem.W, np.ndarray) else problem.W.toarray()
+
+
+def small(arguments: argparse.Namespace) -> list[Row]:
+    """Every problem from one of its enumerated solutions; certificates are checked again."""
+    from load_certificate_checker import check_load
+
+    count, seconds, wrong = Counter(), [], []
+    for seed in range(arguments.problems):
+        problem = small_problem(seed)
+        truth = am.all_solutions(problem)
+        if not truth.complete or not len(truth):
+            count["not enumerated"] += 1
+            continue
+        alone = len(truth) == 1 and not truth.solutions[0].freedom
+        began = time.process_time()
+        answer = certify_load(problem, truth.solutions[seed % len(truth)], time_limit=300)
+        seconds.append(time.process_time() - began)
+        count["one" if alone else "several", answer.outcome] += 1
+        ok = answer.outcome is (LoadOutcome.CERTIFIED if alone else LoadOutcome.REFUTED)
+        if answer.outcome is LoadOutcome.CERTIFIED:
+            branches = [(b.pattern, b.multipliers) for b in answer.branches]
+            check_load(problem.W, problem.q, problem.mu, answer.r0, branches)
+        if answer.outcome is LoadOutcome.REFUTED:
+            pattern = answer.other.pattern
+            ok &= any(pattern in (s.pattern, *s.touching) for s in truth.solutions)
+        if not ok:
+            wrong.append(seed)
+            print("seed", seed, answer, "of", [s.pattern for s in truth.solutions])
+    rows = []
+    for kind in ("one", "several"):
+        row: Row = {"solutions": kind}
+        row |= {outcome.value: count[kind, outcome] for outcome in LoadOutcome}
+        rows.append(row)
+    rows[0]["CPU s, median"] = f"{np.median(seconds):.3f}"
+    rows[0]["longest"] = f"{max(seconds):.1f}"
+    rows[0]["not as enumerated"] = str(wrong or "none")
+    rows[0]["not enumerated"] = count["not enumerated"]
+    return rows
+
+
+# ------------------------------------------------------------------ the triangle
+def certified(problem: FrictionProblem, solution: object, limit: float) -> Row:
+    """Outcome, inequalities, CPU seconds."""
+    began = time.process_time()
+    answer = certify_load(problem, solution, time_limit=limit)
+    seconds = time.process_time() - began
+    return {
+        "outcome": answer.outcome.value, "inequalities": answer.examined,
+        "distance": f"{answer.distance:.1e}", "CPU s": f"{seconds:.2f}",
+    }  # fmt: skip
+
+
+class Rest:
+    """r = 0, which solves Hild's problem for every mu."""
+
+    def __init__(self, contacts: int) -> None:
+        self.r = np.zeros((contacts, 2))
+
+
+def triangle(sizes: dict[int, tuple[float, ...]], limit: float) -> list[Row]:
+    """The solution without contact, on structured meshes."""
+    rows = []
+    for n, values in sizes.items():
+        problem = hild_triangle(n).assemble().condensed()
+        for mu in values:
+            row = certified(problem.with_mu(mu), Rest(n), limit)
+            rows.append({"contacts": n, "mu": mu, **row})
+            print(rows[-1], flush=True)
+    return rows
+
+
+def hild(arguments: argparse.Namespace) -> list[Row]:
+    """Where one inequality is enough, where branches are needed, where others exist."""
+    values = (0.3, 0.6, 1.0, 2.0, 2.5, 2.9, 3.5)
+    sizes = {10: values, 25: values, 50: (*values[:5], 3.5), 100: (*values[:4], 3.5)}
+    return triangle(sizes, arguments.limit)
+
+
+def large(arguments: argparse.Namespace) -> list[Row]:
+    """Many contacts."""
+    return triangle({200: (0.3, 0.6), 400: (0.3, 0.6), 1000: (0.3, 0.6)}, arguments.limit)
+
+
+def mixed_load(W: np.ndarray, seed: int) -> np.ndarray:
+    """q (nc, 2): random waves along the contact, the short ones smaller."""
+    random = np.random.default_rng(seed)
+    x = np.linspace(0, 1, len(W) // 2, endpoint=False)
+    q = np.zeros((len(x), 2))
+    for j in range(1, 9):
+        phase = random.uniform(0, 2 * np.pi)
+        q += random.standard_normal(2) / j * np.cos(np.pi * j * x + phase)[:, None]
+    return q
+
+
+def mixed(arguments: argparse.Namespace) -> list[Row]:
+    """Loads whose solutions have open, sticking and slipping contacts, n = 100."""
+    W = dense(hild_triangle(100).assemble().condensed())
+    rows = []
+    for mu in (0.3, 0.6, 1.0):
+        count, seconds, inequalities, seed = Counter(), [], [], 0
+        while sum(count.values()) < arguments.loads:
+            q, seed = mixed_load(W, seed), seed + 1
+            problem = FrictionProblem.from_delassus(W, q, np.full(100, mu))
+            solution = am.solve(problem, tolerance=1e-10, check=False)
+            if not solution.converged or not min(solution.counts.values()):
+                continue
+            row = certified(problem, solution, arguments.limit)
+            print(mu, seed - 1, solution.counts, row, flush=True)
+            count[row["outcome"]] += 1
+            seconds.append(float(str(row["CPU s"])))
+            inequalities.append(row["inequalities"])
+        rows.append({
+            "mu": mu, **{o.value: count[o.value] for o in LoadOutcome},
+            "inequalities, most": max(inequalities), 
+            "CPU s, median": f"{np.median(seconds):.2f}", "longest": f"{max(seconds):.2f}",
+        })  # fmt: skip
+    return rows
+
+
+# ------------------------------------------------------------------ the page
+Table = Callable[[argparse.Namespace], list[Row]]
+TABLES: dict[str, tuple[Table, str]] = {
+    "small": (small, "This load: random problems of up to seven contacts, mu 0.5 to 4. All "
+              "solutions are known from enumeration; each certificate is checked again in the "
+              "rational numbers (above four contacts partly in floating point)"),
+    "hild": (hild, "This load: Hild's triangle, n contacts, the solution without contact"),
+    "mixed": (mixed, "This load: 100 contacts of the triangle, random loads whose solutions "
+              "have open, sticking and slipping contacts"),
+    "large": (large, "This load: many contacts"),
+}  # fmt: skip
+
+
+def table(rows: list[Row]) -> str:
+    """Rows as markdown."""
+    heads = list(dict.fromkeys(key for row in rows for key in row))
+    lines = [heads, ["---"] * len(heads)]
+    lines += [[str(row.get(head, "")) for head in heads] for row in rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def main() -> None:
+    """Make the tables asked for, and the page of all."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("tables", nargs="*", choices=[[], *TABLES], default=[])
+    parser.add_argument("--problems", type=int, default=500)
+    parser.add_argument("--loads", type=int, default=20, help="mixed loads per friction")
+    parser.add_argument("--limit", type=float, default=300.0, help="seconds per certificate")
+    arguments = parser.parse_args()
+    kept = RESULTS / "certificates.json"
+    results = json.loads(kept.read_text()) if kept.exists() else {}
+    for name in arguments.tables or TABLES:
+        results[name] = TABLES[name][0](arguments)
+        kept.write_text(json.dumps(results, indent=1, default=str) + "\n")
+    where = describe()
+    parts = ["# Certificates of uniqueness", "",
+             f"`python benchmarks/certificates.py`, {where['cpu']}, Python {where['python']}, "
+             f"numpy {where['numpy']}; CPU seconds on one thread.", "",
+             "Inequalities: linear matrix inequalities that were solved. Distance: bound of what "
+             "another solution can differ, relative to the largest reaction.", ""]  # fmt: skip
+    for name, (_, title) in TABLES.items():
+        if name in results:
+            parts += [f"## {title}", "", table(results[name]), ""]
+    (RESULTS / "certificates.md").write_text("\n".join(parts))
+
+
+if __name__ == "__main__":
+    main()
