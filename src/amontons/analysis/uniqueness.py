@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cones import Tresca
-from ..errors import InvalidInput, UnsupportedForm
+from ..errors import InvalidInput, SingularOperator, UnsupportedForm
 from ..problem import FrictionProblem
 from ..solution import FrictionSolution
 from ..solve import drive
@@ -110,8 +110,9 @@ def assess(
 
 
 def quick_verdict(problem: FrictionProblem) -> Uniqueness | None:
-    """The part of the verdict that costs next to nothing; None for problems too large for it.
+    """The part of the verdict that costs next to nothing.
 
+    None for problems too large for it, and where contact alone holds a body.
     Never condenses a problem that is not condensed for other reasons.
     """
     if problem.contacts * problem.dimension > QUICK or not problem.condensing_is_cheap:
@@ -119,7 +120,10 @@ def quick_verdict(problem: FrictionProblem) -> Uniqueness | None:
     began = time.perf_counter()
     if isinstance(problem.law, Tresca):
         return _given_friction(problem, began)
-    local = problem.condensed()
+    try:
+        local = problem.condensed()
+    except SingularOperator:  # contact alone holds a body
+        return None
     verdict = _by_energy(local)
     if verdict.verdict is Verdict.UNDECIDED and _is_small(local):
         verdict = _by_bounds(verdict, critical_friction(local, time_limit=1.0))

@@ -76,7 +76,10 @@ def describe(found: Uniqueness) -> str:
 def brief(found: Uniqueness | None) -> str:
     """One line with the cheap part of the verdict."""
     if found is None:
-        return "uniqueness: not examined, the problem is large; ask with --uniqueness"
+        return (
+            "uniqueness: not examined, the problem is large or contact alone holds a body; "
+            "ask with --uniqueness"
+        )
     if found.verdict is Verdict.UNIQUE_EVERY_LOAD:
         return f"uniqueness: one solution for every load. {found.reason}"
     return f"uniqueness: not settled. {found.reason} Ask with --uniqueness"
