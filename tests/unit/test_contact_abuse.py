@@ -112,6 +112,20 @@ def test_no_node_is_lost_in_a_deep_round_overlap(d, depth):
     np.testing.assert_allclose(am.solve(one).force, nodal.force, atol=1e-6)
 
 
+@BOTH
+@DIMS
+def test_the_whole_boundary_of_a_body_may_be_the_master(d, method):
+    """Its sides, flush with those of the slave, do not face it, whatever rounding says."""
+    low = block(d, 3)
+    low = am.Mesh(low.points, low.cells, low.surfaces | {"skin": low.boundary})
+    for overlap in (0.1, 0.5):
+        high = block(d, 4, 1 - overlap)
+        contact = am.Contact("upper.bottom", master="skin", mu=0.3, method=method)
+        found = am.solve(two(d, method, high, low, contacts=[contact]))
+        assert len(found.r) == 5 ** (d - 1)
+        assert found.force[:, -1].sum() == pytest.approx(50 * overlap, rel=2e-3)
+
+
 # ------------------------------------------------------------------- self-contact
 @BOTH
 @DIMS

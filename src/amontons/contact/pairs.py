@@ -24,7 +24,7 @@ from scipy.spatial import cKDTree
 from ..errors import InvalidInput
 from ..fem.facets import Facets
 from ..fem.mesh import Mesh
-from ..fem.surfaces import nodal_normals
+from ..fem.surfaces import facet_normals, nodal_normals
 from .geometry import frames
 from .nodal import ContactRows, check_exterior, contact_columns, contact_nodes
 from .overlap import check_different, inside, not_facing
@@ -33,6 +33,9 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 BESIDE = 1e-3  # a projection may lie this far beside its facet, relative to the facet's size
+EDGEWISE = (
+    0.1  # cosine of the angle between normals below which surfaces do not face each other
+)
 DEEP = 1.0  # an overlap deeper than this part of the facet is the far side of a body
 NEWTON = 20  # steps to the closest point of a warped quadrilateral; a flat one takes few
 ON_EDGE = 1e-9  # shape functions below this vanish: the closest point lies on an edge
@@ -89,11 +92,11 @@ def pair_contact(
     own = nodes if slave is master else None
     hit = project(points, master.points, facets, facing=normals, search=search, own=own)
     if hit.deep.any():
-        overlap = np.zeros(len(nodes), dtype=bool)
-        overlap[hit.deep] = inside(master, _ahead(slave, surface, normals, nodes)[hit.deep])
-        hit = project(
-            points, master.points, facets, facing=normals, search=search, own=own, free=overlap
-        )
+        overlap = np.zeros(len(slave.points), dtype=bool)
+        for node, ahead in _ahead(slave, surface, nodes[hit.deep]):
+            overlap[node] |= inside(master, ahead)
+        hit = project(points, master.points, facets, facing=normals, search=search, own=own,
+                      free=overlap[nodes])  # fmt: skip
     found = hit.found
     if not found.any():
         raise InvalidInput(not_facing(slave, surface, master, master_surface))
@@ -107,17 +110,17 @@ def pair_contact(
     return rows, _master_columns(hit, axes, master.points.size), found
 
 
-def _ahead(mesh: Mesh, surface: str, normals: Array, nodes: Index) -> Array:
-    """Points a little in front of nodes, and off the rim: neither in the slave nor on sides."""
-    towards, size, count = np.zeros(mesh.points.shape), *np.zeros((2, len(mesh.points)))
+def _ahead(mesh: Mesh, surface: str, nodes: Index) -> Iterator[tuple[Index, Array]]:
+    """Some of these nodes, and points a little in front of a facet of each, off its sides."""
+    wanted = np.zeros(len(mesh.points), dtype=bool)
+    wanted[nodes] = True
     for block in mesh.surface(surface):
         x = mesh.points[block.nodes]
         inwards = x.mean(axis=1, keepdims=True) - x
-        np.add.at(towards, block.nodes, inwards)
-        np.add.at(size, block.nodes, np.linalg.norm(inwards, axis=2))
-        np.add.at(count, block.nodes, 1.0)
-    move = towards[nodes] + size[nodes, None] * normals
-    return mesh.points[nodes] + BESIDE * move / count[nodes, None]
+        ahead = _unit(facet_normals(mesh.points, block))[:, None]
+        ahead = x + BESIDE * (inwards + np.linalg.norm(inwards, axis=2)[:, :, None] * ahead)
+        for slot, node in enumerate(block.nodes.T):
+            yield node[wanted[node]], ahead[wanted[node], slot]
 
 
 def _master_columns(hit: Projection, axes: Array, size: int) -> sparse.csc_array:
@@ -170,7 +173,7 @@ def project(
         across = points[point] - foot
         distance = np.linalg.norm(across, axis=1)
         if facing is not None:
-            distance[np.einsum("kc,kc->k", n, facing[point]) >= 0] = np.inf
+            distance[np.einsum("kc,kc->k", n, facing[point]) > -EDGEWISE] = np.inf
         behind = np.einsum("kc,kc->k", across, n) < -DEEP * size
         deep[point[behind & np.isfinite(distance)]] = True
         distance[behind & ~free[point]] = np.inf
@@ -232,7 +235,7 @@ def _reach(
     counts = np.ones(near.shape, dtype=bool)
     if facing is not None:
         normals = nodal_normals(coordinates, surface)
-        counts &= np.einsum("kjc,kc->kj", normals[near], facing) < 0
+        counts &= np.einsum("kjc,kc->kj", normals[near], facing) < -EDGEWISE
     if own is not None:
         counts &= near != own[:, None]
     least = np.where(counts, distance, np.inf).min(axis=1)

@@ -23,12 +23,11 @@ from ..fem.surfaces import facet_areas, facet_normals, nodal_normals
 from .clipping import clip, line_rule, quadrature
 from .curvature import heights, slopes
 from .geometry import frames
-from .pairs import AROUND, DEEP, KINDS, MAX_NODES, shapes
+from .pairs import AROUND, DEEP, EDGEWISE, KINDS, MAX_NODES, shapes
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
-EDGEWISE = 0.1  # cosine of the angle between facets below which they do not face each other
 FLAT_FACET = 1e-12  # area, relative to the square of the longest side, of a degenerate facet
 SLIVER = 1e-8  # part of a facet; biorthogonal functions on less are lost in rounding
 TWICE = 1e-6  # coverage above 1 by less is rounding
