@@ -15,6 +15,7 @@ from ..solution import Outcome
 from ..solve import drive
 from .following import exact_state
 from .friction_path import FrictionPath
+from .load_path import LoadPath, load_path
 from .path import PathProblem
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ START = 1e-10  # error of the solution from which continuation starts
 def path_of(
     problem: Model | FrictionProblem, parameter: str, interval: tuple[float, float],
     base: Model | FrictionProblem | None = None,
-) -> FrictionPath:  # fmt: skip
+) -> FrictionPath | LoadPath:  # fmt: skip
     """The problems that a parameter runs through.
 
     "load": loads and supports that depend on time t are taken at t; where none does, all of
@@ -47,6 +48,10 @@ def path_of(
         if interval[0] < 0:
             raise InvalidInput(f"interval: expected friction >= 0, got {interval[0]:g}")
         return FrictionPath.friction(_discrete(problem))
+    if getattr(problem, "is_large", False):
+        if base is not None:
+            raise InvalidInput("base: expected none for a model with hyperelastic laws")
+        return load_path(problem, interval)  # type: ignore[arg-type]
     if base is not None:
         return _between(_discrete(base), _discrete(problem))
     if isinstance(problem, FrictionProblem):
@@ -91,6 +96,8 @@ def _discrete(problem: Model | FrictionProblem) -> FrictionProblem:
 
 def state_of(path: PathProblem, start: object) -> Array:
     """The unknowns of a start: a solution, reactions (nc, d), or the unknowns themselves."""
+    if isinstance(path, LoadPath):
+        start = getattr(start, "v", start)
     r = getattr(start, "r", start)
     try:
         values = np.asarray(r, dtype=float)
@@ -104,11 +111,13 @@ def state_of(path: PathProblem, start: object) -> Array:
     return path.state(values)
 
 
-def first_state(path: FrictionPath, p: float) -> Array:
+def first_state(path: FrictionPath | LoadPath, p: float) -> Array:
     """A solution to begin with: exact in 2D under Coulomb's law, else from a solver.
 
     Raises NotConverged where the solver finds none.
     """
+    if isinstance(path, LoadPath):
+        return path.found_at(p)
     if path.start.dimension == 2 and not path.tresca:
         try:
             return exact_state(path, p)

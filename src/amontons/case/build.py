@@ -21,15 +21,17 @@ from .tables import LARGEST, Table
 
 if TYPE_CHECKING:
     from ..contact import Nitsche, Obstacle
-    from ..fem import LinearElastic, Mesh
+    from ..fem import Mesh
     from ..model import Contact, Model
+    from ..model.parts import Material
 
 TOP = ("title", "mesh", "wall", "material", "fix", "traction", "body_force", "contact",
        "solver", "evolution")  # fmt: skip
+LAWS = {  # of materials, with their own keys
+    "linear-elastic": ("plane", "density"), "neo-hookean": (), "ciarlet-geymonat": ("a",),
+}  # fmt: skip
 MAX_NODES = 5_000_000  # of a box: a typing error must not fill the memory
 LATER = {  # words of the format that this version can not serve
-    "neo-hookean": "large deformations are not available yet, use 'linear-elastic'",
-    "ciarlet-geymonat": "large deformations are not available yet, use 'linear-elastic'",
 }
 
 
@@ -201,7 +203,7 @@ def _read_file(table: Table, path: Path) -> Mesh:
         return read_cad(name, size)
 
 
-def _materials(table: Table, mesh: Mesh) -> LinearElastic | dict[str, LinearElastic]:
+def _materials(table: Table, mesh: Mesh) -> Material | dict[str, Material]:
     """One material for all, [material.default], and one per region named otherwise."""
     found = {region: _material(table.table(region)) for region in table.data}
     if not found:
@@ -215,14 +217,20 @@ def _materials(table: Table, mesh: Mesh) -> LinearElastic | dict[str, LinearElas
     return found
 
 
-def _material(table: Table) -> LinearElastic:
-    from ..model import LinearElastic
+def _material(table: Table) -> Material:
+    from ..model import CiarletGeymonat, LinearElastic, NeoHookean
 
-    table.only("law", "young", "poisson", "plane", "density")
-    _available(table, "law", ("linear-elastic",), ("neo-hookean", "ciarlet-geymonat"))
+    law = table.choice("law", tuple(LAWS), "linear-elastic")
+    table.only("law", "young", "poisson", *LAWS[law])
     density = table.number("density") if "density" in table.data else None
     young, poisson = table.number("young"), table.number("poisson")
     with _Blame(table, ""):
+        if law == "neo-hookean":
+            return NeoHookean(young, poisson)
+        if law == "ciarlet-geymonat":
+            return CiarletGeymonat(
+                young, poisson, table.number("a") if "a" in table.data else None
+            )
         return LinearElastic(
             young, poisson, table.choice("plane", ("strain", "stress"), "strain"), density
         )

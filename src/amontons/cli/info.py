@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from ..problem import Form, FrictionProblem
 from ..solvers import METHODS
 from .sources import open_source
 from .terminal import check_writable, deliver_json, show_table
+
+if TYPE_CHECKING:
+    from ..model.large_deformation import LargeDeformation
 
 RANK_LIMIT = 2000  # rows of W up to which its singular values are computed
 
@@ -32,10 +35,12 @@ def run(source: str, overrides: Sequence[str], json_copy: str | None) -> None:
         deliver_json(to_json(facts), json_copy)
 
 
-def describe(problem: FrictionProblem | NitscheProblem) -> dict[str, Any]:
+def describe(problem: FrictionProblem | NitscheProblem | LargeDeformation) -> dict[str, Any]:
     """Facts about a problem by name; W is looked at only where it is cheap to form."""
     if isinstance(problem, NitscheProblem):
         return _describe_nitsche(problem)
+    if not isinstance(problem, FrictionProblem):
+        return _describe_large(problem)
     problem = problem.assembled()
     facts: dict[str, Any] = {
         "form": problem.form.value, "dimension": problem.dimension,
@@ -67,6 +72,19 @@ def _describe_nitsche(problem: NitscheProblem) -> dict[str, Any]:
         "methods that fit": [
             name for name, kind in METHODS.items() if getattr(kind, "nitsche", False)
         ],
+    }  # fmt: skip
+
+
+def _describe_large(problem: LargeDeformation) -> dict[str, Any]:
+    """The facts that a nonlinear problem has."""
+    name = "friction bound" if isinstance(problem.law, Tresca) else "friction coefficient"
+    ends = (problem.law.coefficient, problem.rho)
+    friction, stiffness = ([float(x.min()), float(x.max())] for x in ends)
+    return {
+        "form": "large deformation", "dimension": problem.dimension,
+        "contacts": problem.contacts, "unknowns": problem.unknowns,
+        "entries of the tangent": problem.parts.taken.nnz, name: friction,
+        "stiffness at contacts": stiffness, "methods that fit": ["auto"],
     }  # fmt: skip
 
 

@@ -73,7 +73,14 @@ def _output(
 
 
 def _verdict(found: FrictionSolution | ModelSolution, full: bool) -> Uniqueness | None:
-    """The verdict, or its cheap part; None where the problem is too large for that."""
+    """The verdict, or its cheap part; None where the problem is too large for that.
+
+    None also for large deformations: that of the tangent problem would say little.
+    """
+    if isinstance(found, ModelSolution) and found.model.is_large:
+        if full:
+            raise UnsupportedForm("--uniqueness: there is no verdict on large deformations")
+        return None
     solution = found.solution if isinstance(found, ModelSolution) else found
     if full:
         return assess(solution.problem, solution if solution.converged else None)
@@ -84,7 +91,8 @@ def _report(
     result: output.Output, verdict: Uniqueness | None, full: bool, folder: Path
 ) -> None:
     click.echo(in_words(output.describe(result)))
-    click.echo(describe(verdict) if full and verdict is not None else brief(verdict))
+    if not (result.model is not None and result.model.is_large):
+        click.echo(describe(verdict) if full and verdict is not None else brief(verdict))
     click.echo(f"results in {folder}/")
 
 

@@ -23,6 +23,7 @@ from ..problem import FrictionProblem
 
 if TYPE_CHECKING:
     from ..model import Model
+    from ..model.large_deformation import LargeDeformation
 
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 DATA = files("amontons") / "examples_data"
@@ -48,11 +49,14 @@ class Source:
         return self.model if self.model is not None else self.discrete()
 
     def discrete(self) -> FrictionProblem:
-        """The discrete problem; assembles a model.  UnsupportedForm with Nitsche's method."""
-        problem = self.solvable()
-        return self.model.assemble() if isinstance(problem, NitscheProblem) else problem  # type: ignore[union-attr]
+        """The discrete problem; assembles a model.
 
-    def solvable(self) -> FrictionProblem | NitscheProblem:
+        UnsupportedForm with Nitsche's method and with large deformations.
+        """
+        problem = self.solvable()
+        return problem if isinstance(problem, FrictionProblem) else self.model.assemble()  # type: ignore[union-attr]
+
+    def solvable(self) -> FrictionProblem | NitscheProblem | LargeDeformation:
         """What `solve` solves; assembles a model."""
         if self.problem is not None:
             return self.problem

@@ -23,6 +23,7 @@ from ..solution import FrictionSolution
 from .assembly import Discretisation, discretise, locate
 from .balance import imbalance
 from .fields import ContactFields, recover_fields
+from .large_deformation import LargeDeformation, large_deformation
 from .large_fields import recover_large
 from .nitsche import nitsche_matrices, nitsche_problem
 from .parts import Body, BodyForce, Contact, Fix, Traction
@@ -105,9 +106,12 @@ class Model:
             raise UnsupportedForm(NO_MULTIPLIERS)
         return problem
 
-    def discrete_problem(self) -> FrictionProblem | NitscheProblem:
-        """What `solve` solves: as `assemble`, with Nitsche's method a NitscheProblem."""
-        return self._problem
+    def discrete_problem(self) -> FrictionProblem | NitscheProblem | LargeDeformation:
+        """What `solve` solves: as `assemble`, with Nitsche's method a NitscheProblem.
+
+        With hyperelastic laws a LargeDeformation.
+        """
+        return large_deformation(self) if self.is_large else self._problem
 
     @cached_property
     def _problem(self) -> FrictionProblem | NitscheProblem:
@@ -200,6 +204,10 @@ class Model:
         loose = self._loose(parts)
         check_held(loose, parts.whole_H, parts.dofs, acting.ravel())
         return bool(loose)
+
+    def check_held(self) -> None:
+        """Raise SingularOperator for a body that neither supports nor contacts can hold."""
+        self._loose_but_held(self.discretisation, self.law)
 
     def with_mu(self, mu: ScalarValue) -> Model:
         """The same model with Coulomb friction mu in all its contacts."""
