@@ -13,7 +13,14 @@ from amontons.cli import main
 from amontons.cli.sources import DATA, examples
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
-SMALLER = {"cube": 4, "tresca": 4, "slab": "[12,6]", "hertz": "[32,16]", "dome": "[6,6,3]"}
+SMALLER = {
+    "block": "[4,8]",
+    "cube": 4,
+    "tresca": 4,
+    "slab": "[12,6]",
+    "hertz": "[32,16]",
+    "dome": "[6,6,3]",
+}
 
 
 def load(path):

@@ -86,10 +86,10 @@ def test_inverted_cells_have_an_infinite_residual_and_no_tangent():
 
 def test_the_block_starts_at_rest_and_has_two_folds():
     path, y = block(4)
-    assert np.abs(path.residual(y, 0.0)).max() < 1e-11
+    assert np.abs(path.residual(y, 0.0)).max() < 1e-14
     folds = []
     for longest in (0.5, 0.1):
-        options = Continuation(max_step=longest, residual=5e-10, change=5e-10)
+        options = Continuation(max_step=longest)
         branch = continue_both(path, y, 0.0, Limits((0.0, 1.0)), options)
         assert branch.parameter[-1] == 1.0
         folds.append([event.parameter for event in branch.folds])

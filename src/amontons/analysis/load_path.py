@@ -14,8 +14,10 @@ V = 0 gives the static problem under a growing load.  2D, as slip has two senses
 
 from __future__ import annotations
 
+import time
 from collections.abc import Hashable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 from typing import Any
 
@@ -25,11 +27,17 @@ from scipy import sparse
 
 from ..cones import Coulomb
 from ..contact.current import BACK, OPEN, SLIP, STICK, Pieces
-from ..errors import InvertedCells, UnsupportedForm
-from ..model.large_deformation import LargeDeformation
-from ..solution import ContactStatus
+from ..errors import InvalidInput, InvertedCells, NotConverged, UnsupportedForm
+from ..evolution.system import Motion
+from ..model import Model
+from ..model.large_deformation import LargeDeformation, large_step
+from ..solution import ContactStatus, Convergence, FrictionSolution, Outcome, Step
+from ..solve import drive
+from ..solvers.nonlinear_newton import NonlinearNewton
 
 Array = NDArray[np.float64]
+TOLERANCE = 1e-8  # of solutions by the judge
+STRAIGHT = 1e-9  # departure from a straight line in time, relative, that a load may have
 LETTERS = np.array(["f", "s", "+", "-"])  # of OPEN, STICK, SLIP, BACK as in `pattern`
 
 
@@ -38,6 +46,7 @@ class LoadPath:
     """A PathProblem in the displacements y (n,) of the free dofs and the share p of the load.
 
     step: the problem at p = 1; load, prescribed (dofs,): those at p = 0; drift (nc, d): V.
+    Residuals and margins are forces divided by `unit`, so that rounding is far below one.
     """
 
     step: LargeDeformation
@@ -64,8 +73,24 @@ class LoadPath:
         )
 
     # ---------------------------------------------------------------- PathProblem
+    @cached_property
+    def unit(self) -> float:
+        """Force on a node where stresses are as large as moduli."""
+        forces = np.concatenate([body.unit_forces() for body in self.step.parts.bodies])
+        return float(np.sqrt((forces**2).mean()))
+
+    @cached_property
+    def weight(self) -> float:
+        """kappa of the weighted norm: 1 / n in the unit of the prescribed displacement.
+
+        Where none is prescribed a hundredth of the size of the bodies takes its place.
+        """
+        moved = float(np.abs(self.step.prescribed - self.prescribed).max(initial=0.0))
+        size = moved if moved > 0 else 0.01 * float(np.ptp(self.step.parts.X, axis=0).max())
+        return 1.0 / (self.step.unknowns * size**2)
+
     def residual(self, y: Array, p: float) -> Array:
-        """F, (n,), unit of force; infinite where cells are inverted."""
+        """F, (n,), in units of force; infinite where cells are inverted."""
         return self._residual(y, p, None)
 
     def residual_of(self, piece: Hashable, y: Array, p: float) -> Array:
@@ -74,7 +99,7 @@ class LoadPath:
 
     def _residual(self, y: Array, p: float, states: Pieces | None) -> Array:
         try:
-            return self.at(p).residual(y, states)
+            return self.at(p).residual(y, states) / self.unit
         except InvertedCells:
             return np.full(y.shape, np.inf)
 
@@ -99,11 +124,12 @@ class LoadPath:
             here = self.at(p).linearisation(y, states)
         except InvertedCells as reason:
             raise np.linalg.LinAlgError(str(reason)) from reason
-        return here.matrix, here.shifted(
+        change = here.shifted(
             step.load - self.load,
             step.prescribed - self.prescribed,
             -self.drift,  # type: ignore[operator]
         )
+        return here.matrix / self.unit, change / self.unit
 
     def piece(self, y: Array, p: float) -> str:
         """The pattern of statuses: f free, s stick, slip + or -, from the sign of the force."""
@@ -112,23 +138,21 @@ class LoadPath:
     def pieces(self, y: Array, p: float, tolerance: float) -> list[str]:
         """All patterns that meet at a point: contacts near a border take both sides of it.
 
-        tolerance: distance to a border, unit of force, that counts as none.
+        tolerance: distance to a border that counts as none.
         """
         point = self.at(p).contact_point(y)
-        choices = []
-        for k, own in enumerate(point.pieces):
-            near = [own]
-            for other in (OPEN, STICK, SLIP, BACK):
-                states = point.pieces.copy()
-                states[k] = other
-                if other != own and point.margins(states)[k].min() >= -tolerance:
-                    near.append(other)
-            choices.append(near)
-        return [self._name(np.array(states)) for states in product(*choices)]
+        kinds = np.array([OPEN, STICK, SLIP, BACK], dtype=np.int8)
+        margins = [
+            point.margins(np.full(self.step.contacts, kind)) / self.unit for kind in kinds
+        ]
+        fits = np.stack([margin.min(axis=1) >= -tolerance for margin in margins])
+        fits[point.pieces, np.arange(fits.shape[1])] = True
+        return [self._name(np.array(s)) for s in product(*(kinds[own] for own in fits.T))]
 
     def margins(self, piece: Hashable, y: Array, p: float) -> Array:
-        """Distances to the borders of a piece, unit of force: all positive inside of it."""
-        return self.at(p).contact_point(y).margins(self._states(piece)).ravel()
+        """Distances to the borders of a piece: all positive inside of it."""
+        point = self.at(p).contact_point(y)
+        return point.margins(self._states(piece)).ravel() / self.unit
 
     @staticmethod
     def _name(states: NDArray) -> str:
@@ -137,6 +161,31 @@ class LoadPath:
     @staticmethod
     def _states(piece: Any) -> NDArray[np.int8]:
         return np.array(["fs+-".index(letter) for letter in piece], dtype=np.int8)
+
+    # ---------------------------------------------------------------- solutions
+    def solution(self, y: Array, p: float) -> FrictionSolution:
+        """The point as a solution of its tangent problem, with the judge's error."""
+        problem, began = self.at(p), time.perf_counter()
+        r, u = problem.reactions(y), problem.local_velocity(y)
+        error = problem.error(r, y)
+        seconds = time.perf_counter() - began
+        outcome = Outcome.CONVERGED if error <= TOLERANCE else Outcome.STAGNATED
+        record = Convergence(
+            outcome, 1, error, TOLERANCE, (Step(1, error, 0, seconds),), 0, seconds,
+            "continuation", problem.measure,
+        )  # fmt: skip
+        return problem.solved(FrictionSolution(problem, r, u, np.array(y), record))  # type: ignore[arg-type]
+
+    def found_at(self, p: float) -> Array:
+        """A solution (n,) at a share of the load, by Newton's method with load steps.
+
+        Raises NotConverged where it finds none.
+        """
+        found = drive(self.at(p), NonlinearNewton(), tolerance=TOLERANCE)  # type: ignore[arg-type]
+        if found.convergence.outcome is not Outcome.CONVERGED:
+            raise NotConverged(f"start: no solution at {p:g}: {found.convergence}", found)
+        assert found.v is not None
+        return found.v
 
     # ---------------------------------------------------------------- tables
     def describe(self, y: Array, p: float) -> dict[str, Any]:
@@ -154,3 +203,33 @@ class LoadPath:
             **{status.name.lower(): int(mask.sum()) for status, mask in counts.items()},
             **{f"resultant_{axis}": float(f) for axis, f in zip("xyz", total, strict=False)},
         }
+
+
+def load_path(model: Model, interval: tuple[float, float]) -> LoadPath:
+    """A model with hyperelastic laws over its load.
+
+    Loads and supports that depend on the time t are taken at t, and have to be straight lines
+    in it; where none does, all of them grow with the parameter as load factor.  Friction speaks
+    of the motion from the undeformed state.
+    """
+    motion = Motion(model)
+    if not motion.is_timed:
+        interval = (0.0, 1.0)
+    a, b = interval
+    shares = (0.0, 1.0, 0.5) if not motion.is_timed else (1.0, 1.0, 1.0)
+    ends = [
+        (share * motion.load(t), share * motion.prescribed(t))
+        for share, t in zip(shares, (a, b, (a + b) / 2), strict=True)
+    ]
+    lines = []
+    for first, last, middle in zip(*ends, strict=True):
+        size = max(float(np.abs(first).max(initial=0)), float(np.abs(last).max(initial=0)))
+        if np.abs((first + last) / 2 - middle).max(initial=0) > STRAIGHT * size:
+            raise InvalidInput(
+                f"interval: the loads are no straight line in time between {a:g} and {b:g}; "
+                "follow it in parts"
+            )
+        slope = (last - first) / (b - a)
+        lines.append((first - a * slope, first + (1 - a) * slope))
+    (load_0, load_1), (prescribed_0, prescribed_1) = lines
+    return LoadPath(large_step(motion.body, load_1, prescribed_1), load_0, prescribed_0)

@@ -46,7 +46,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 TOUCHING = 1e-9  # gaps up to this part of the size count as closed where nothing holds a body
-RESOLVED = 1e-7  # load, relative to stiffness times size, of which rounding leaves enough
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,9 +54,8 @@ class LargeDeformation:
 
     load, prescribed (dofs,): nodal forces, and values on the fixed dofs, zero on the free ones;
     before (nc, d): displacements of the contacts since which friction counts; drift (nc, d):
-    motion added to that since then; scales: sizes of the load and of u for `error`; known:
-    load, prescribed values (dofs,) and state v (n,) from which load steps may begin, by default
-    the undeformed state.
+    motion added to that since then; known: load, prescribed values (dofs,) and state v (n,)
+    from which load steps may begin, by default the undeformed state.
     """
 
     parts: NonlinearParts
@@ -65,7 +63,6 @@ class LargeDeformation:
     prescribed: Array
     before: Array
     drift: Array
-    scales: tuple[float, float]
     known: tuple[Array, Array, Array] | None = None
     name: str = ""
 
@@ -173,21 +170,35 @@ class LargeDeformation:
         return self.parts.contact.local(np.zeros_like(x), motion, x)[1]
 
     def error(self, r: Array, v: Array | None = None) -> float:
-        """The residual measure of `judge` at reactions r and state v; infinite if inverted."""
+        """The residual measure of `judge` at reactions r and state v; infinite if inverted.
+
+        Forces are compared with those at supports, loads and contacts, the law at contacts with
+        their gaps, slips and r / rho: sizes of linear elasticity would be those of rotations.
+        """
         if v is None or not (np.isfinite(v).all() and np.isfinite(r).all()):
             return np.inf
         try:
             _, u, axes, rest = self._local(v)
         except InvertedCells:
             return np.inf
+        load, length = self._sizes(r, u, rest)
         rest[self.parts.at] -= np.einsum("pkc,pk->pc", axes, r)
         balance = float(np.linalg.norm(rest[self.parts.free]))
         law = judge.scaled_residual(r, u, self.law, self.rho)
-        return max(_ratio(balance, self.scales[0]), _ratio(law, self.scales[1]))
+        return max(balance / load, law / length)
+
+    def _sizes(self, r: Array, u: Array, rest: Array) -> tuple[float, float]:
+        """Sizes of the forces and of u, at least what rounding can resolve."""
+        held = rest.copy()
+        held[self.parts.free] = self.load[self.parts.free]
+        load = np.hypot(np.linalg.norm(held), np.linalg.norm(rest[self.parts.at]))
+        length = np.hypot(np.linalg.norm(u), np.linalg.norm(r / self.rho[:, None]))
+        least = self.parts.resolved
+        return max(float(load), least[0]), max(float(length), least[1])
 
     def rounding(self, r: Array) -> float:
-        """What rounding alone may hide in `error`, unit-free."""
-        return _ratio(judge.rounding_error(self.rho, r), self.scales[1])
+        """What rounding alone may hide in `error`: its scales take care of that."""
+        return 0.0
 
     # ---------------------------------------------------------------- load steps
     @property
@@ -240,10 +251,11 @@ class LargeDeformation:
         nodes = parts.at[:, 0] // self.dimension
         H = sparse.csc_array(contact_columns(nodes, axes, parts.X.size).tocsr()[parts.free])
         M = parts.on_free(blocks)
+        load, length = self._sizes(r, u, rest)
         w = u - (H.T @ v).reshape(u.shape)
         return FrictionProblem.from_global(
-            M, H, M @ v - rest[parts.free], w, self.law, load_scale=self.scales[0],
-            u_scale=self.scales[1], name=self.name,
+            M, H, M @ v - rest[parts.free], w, self.law, load_scale=load, u_scale=length,
+            name=self.name,
         )  # fmt: skip
 
 
@@ -302,11 +314,6 @@ def _turned(axes: Array, r: Array, bend: Array) -> Array:
     return r[:, 0, None, None] * bend - n[:, :, None] * along[:, None, :]
 
 
-def _ratio(size: float, scale: float) -> float:
-    """size / scale, with 0 / 0 = 0."""
-    return size / scale if scale > 0 else (0.0 if size == 0 else np.inf)
-
-
 def large_deformation(model: Model) -> LargeDeformation:
     """The static problem of a model with hyperelastic laws, at its load factor.
 
@@ -328,20 +335,7 @@ def large_step(
     before (nc, d): of the contacts, zero by default; known: see `LargeDeformation`.
     """
     parts = nonlinear_parts(model)
+    model.check_held()
     before = np.zeros(parts.at.shape) if before is None else before
-    scales = _scales(model, parts, load, prescribed)
-    return LargeDeformation(parts, load, prescribed, before, np.zeros_like(before), scales,
-                            known, model.name)  # fmt: skip
-
-
-def _scales(
-    model: Model, parts: NonlinearParts, load: Array, prescribed: Array
-) -> tuple[float, float]:
-    """Sizes of the load and of u: those of linear elasticity, and what rounding can resolve."""
-    linear = model.discretisation
-    around = np.abs(parts.X - parts.X.mean(axis=0)).ravel()
-    force = abs(linear.stored_stiffness) @ around
-    still = np.zeros((len(parts.at), parts.dimension - 1))
-    found = model.increment(load, prescribed, still).scales
-    least = (np.linalg.norm(force), np.linalg.norm(around[parts.at]))
-    return max(found[0], RESOLVED * float(least[0])), max(found[1], RESOLVED * float(least[1]))
+    return LargeDeformation(parts, load, prescribed, before, np.zeros_like(before), known,
+                            model.name)  # fmt: skip

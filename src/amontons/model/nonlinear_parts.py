@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+RESOLVED = 1e-7  # of stresses like moduli, and of displacements like the size
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +54,14 @@ class NonlinearParts:
     def points(self) -> Array:
         """Reference positions of the contacts, (nc, d)."""
         return self.X.ravel()[self.at]
+
+    @cached_property
+    def resolved(self) -> tuple[float, float]:
+        """Sizes of forces and of u that rounding leaves with some eight digits."""
+        forces = np.concatenate([body.unit_forces() for body in self.bodies])
+        around = self.points - self.X.mean(axis=0)
+        return (RESOLVED * float(np.linalg.norm(forces)),
+                RESOLVED * float(np.linalg.norm(around)))  # fmt: skip
 
     @property
     def dimension(self) -> int:
