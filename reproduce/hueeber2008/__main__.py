@@ -97,16 +97,26 @@ def page(record: dict) -> str:
         if part in record:
             lines += make(record[part], REFERENCE[part])
     if "table5.1" in record:
+        lines += note("table5.1")
         known = json.loads(RESULTANTS.read_text()) if RESULTANTS.exists() else {}
         lines += tables.resultants(record["table5.1"]["zero"], known)
     if {"newton", "table5.1"} <= record.keys():
         lines += tables.newton(record["newton"], record["table5.1"]["zero"])
     if "table6.1" in record:
-        lines += tables.table61(record["table6.1"], REFERENCE["table6.1"])
+        lines += [*tables.table61(record["table6.1"], REFERENCE["table6.1"]), *note("table6.1")]
     if "section7" in record:
-        lines += tables.section7(record["section7"])
+        lines += [*tables.section7(record["section7"]), *note("section7")]
     lines += [f"![Figure {name}](figure{name}.png)\n" for name in FIGURES]
     return "\n".join(lines)
+
+
+def note(part: str) -> list[str]:
+    """What `notes.md` says about the differences of a part."""
+    for section in (HERE / "notes.md").read_text().split("\n# ")[1:]:
+        title, text = section.split("\n", 1)
+        if title == part:
+            return [text.strip(), ""]
+    return []
 
 
 def _records(runs: dict[str, Run]) -> dict:

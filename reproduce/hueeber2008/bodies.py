@@ -48,13 +48,13 @@ def section6(levels: list[int], out: Path) -> dict:
         for k in chosen
     }  # fmt: skip
     solution = pressed[str(last)].solution
-    figures.sets(pressed, out / "figure6.5.png")
-    figures.deformed(shell.model(last, 0.5), solution, out / "figure6.1.png", keep=_half)
+    figures.sets({k: pressed[k] for k in pressed if k != "0"} or pressed, out / "figure6.5.png")
+    figures.deformed(shell.model(last, 0.5), solution, out / "figure6.1.png", cut=True)
     _contacts(last, 0.5, solution, out / "figure6.2.png")
     pulled_model = shell.model(last, 0.7, traction=True)
     pulled = run(pulled_model.assemble(), fixed_point(**INEXACT), 1e-9,
                  start=shell.first_guess(pulled_model))  # fmt: skip
-    figures.deformed(pulled_model, pulled.solution, out / "figure6.6a.png", keep=_half)
+    figures.deformed(pulled_model, pulled.solution, out / "figure6.6a.png", cut=True)
     _contacts(last, 0.7, pulled.solution, out / "figure6.6b.png", traction=True)
     return {"pressed": records(pressed), "pulled": records({str(last): pulled})}
 
@@ -65,17 +65,12 @@ def section7(levels: list[int], out: Path) -> dict:
     found = ring.newton(fine)
     model, solution = ring.model(fine), found["newton"].solution
     figures.newton({"ring and tool, F = 0.7": found}, out / "figure7.2b.png")
-    figures.deformed(model, solution, out / "figure7.1.png", view=(18, -70), keep=_half)
+    figures.deformed(model, solution, out / "figure7.1.png", view=(18, -70), cut=True)
     _unrolled(model, solution, out / "figure7.2a.png")
     level = min(max(levels), 2)
     compared = {f"shell, F = {mu}": shell.newton(level, mu) for mu in (0.2, 0.4, 0.6)}
     figures.newton(compared, out / "figure7.3.png")
     return {"ring": records(found)} | {name: records(runs) for name, runs in compared.items()}
-
-
-def _half(points: np.ndarray) -> np.ndarray:
-    """Cells behind the plane y = 0."""
-    return points[:, 1] > 0
 
 
 def _contacts(
@@ -86,7 +81,7 @@ def _contacts(
     (placed,) = model.discretisation.placed
     figures.status(
         model, solution, placed.rows.points[:, :2], np.eye(3)[:2], 0.5 * 2.0**-level, path,
-        ((0, 0.3), (0, 0.3)),
+        ((0.12, 0.54), (0, 0.42)),
     )  # fmt: skip
 
 
@@ -99,5 +94,5 @@ def _unrolled(model: am.Model, solution: am.FrictionSolution, path: Path) -> Non
     axes = np.stack([around, np.broadcast_to([0.0, 0.0, 1.0], around.shape)], axis=1)
     figures.status(
         model, solution, np.column_stack([angle, points[:, 2]]), axes, 0.05, path,
-        ((-0.3, 0.3), (0.0, 0.5)), ("angle", "z"),
+        ((-0.3, 0.3), (-0.06, 0.52)), ("angle", "z"),
     )  # fmt: skip

@@ -39,7 +39,8 @@ def status(
     """Nodes by status, slip as lines, traction as arrows: figures 4.2, 5.2, 6.2, 6.3, 7.2.
 
     points (nc, 2) and axes (nc, 2, 3) or (2, 3): where nodes are drawn and along what; scale:
-    length of the longest line, and of the longest arrow.
+    length of the longest line, and of the longest arrow.  A long belt of nodes gets lines and
+    arrows in the cut-out only.
     """
     slip, pull = in_plane(model, solution.u, axes), -in_plane(model, solution.r, axes)
     pressure = np.maximum(solution.r[:, 0], 0)
@@ -48,25 +49,34 @@ def status(
     moved = solution.sliding & (closed | isinstance(solution.problem.law, am.Tresca))
     pulled = np.linalg.norm(pull, axis=1) > 1e-9 * max(np.abs(pull).max(), 1e-300)
     figure, both = plt.subplots(1, 2, figsize=(13, 6.4), width_ratios=(1.15, 1))
+    wide, high = np.ptp(points, axis=0)
+    belt = wide >= 3 * high
     for frame, shown in zip(both, (None, cut), strict=True):
+        dot = size * (3 if shown else 0.4 if belt else 0.8)
         for name, mask, colour in _kinds(solution, closed):
             if mask.any():
-                frame.scatter(*points[mask].T, s=(4 if shown else 1) * size[mask], color=colour,
-                              label=f"{name} ({mask.sum()})", zorder=2)  # fmt: skip
+                frame.scatter(*points[mask].T, s=dot[mask], color=colour, zorder=2,
+                              label=f"{name} ({mask.sum()})")  # fmt: skip
         line = slip * scale / max(np.linalg.norm(slip[moved], axis=1).max(initial=0), 1e-300)
         ends = np.stack([points[moved], points[moved] + line[moved]], axis=1)
-        frame.add_collection(matplotlib.collections.LineCollection(ends, colors="0.15", lw=0.9))
+        # at sliding nodes both have one direction: a broad line under a thin arrow
+        lines = matplotlib.collections.LineCollection(
+            ends, colors="0.25", lw=2.6 if shown else 1.1, zorder=2.5, alpha=0.6
+        )
         unit = pull * scale / max(np.linalg.norm(pull, axis=1).max(), 1e-300)
-        frame.quiver(*points[pulled].T, *unit[pulled].T, angles="xy", scale_units="xy",
-                     scale=1, width=0.0022, color="#2b8a3e", zorder=3)  # fmt: skip
-        wide, high = np.ptp(points, axis=0)
-        shape = "equal" if shown or wide < 3 * high else "auto"  # a belt would be a line
+        if shown or not belt:
+            frame.add_collection(lines)
+            frame.quiver(*points[pulled].T, *unit[pulled].T, angles="xy", scale_units="xy",
+                         scale=1, width=0.0026, color="#1b5e20", zorder=3)  # fmt: skip
+        shape = "auto" if belt and not shown else "equal"
         frame.set(xlabel=words[0], aspect=shape, title="cut-out" if shown else "")
         if shown:
             frame.set(xlim=shown[0], ylim=shown[1])
     both[0].set_ylabel(words[1])
     both[0].legend(loc="upper center", bbox_to_anchor=(0.5, -0.08), ncol=4, frameon=False)
-    both[0].set_title("size: normal force; line: slip; arrow: traction on the other side")
+    both[0].set_title(
+        "size: normal force; grey line: slip; arrow: shear force on the other side"
+    )
     figure.savefig(path, dpi=DPI, bbox_inches="tight")
     plt.close(figure)
 
@@ -85,47 +95,85 @@ def _kinds(solution: am.FrictionSolution, closed: np.ndarray) -> list:
 
 def deformed(
     model: am.Model, solution: am.FrictionSolution, path: Path,
-    view: tuple[float, float] = (22, -60), keep=None,
+    view: tuple[float, float] = (22, -60), *, cut: bool = False,
 ) -> None:  # fmt: skip
     """Surfaces of the deformed bodies coloured by von Mises stress: figures 4.1, 5.1, 6.1, 7.1.
 
-    keep(points) -> mask of cells by their centres: a cut through the bodies.
+    cut: only what lies behind the plane y = 0, and the section in that plane beside it.
     """
     fields = model.recover(solution)
-    figure = plt.figure(figsize=(7, 5.4))
-    axes = figure.add_subplot(projection="3d")
-    patches, values = [], []
+    faces, values, sections = [], [], []
     for body, moved in zip(model.bodies, fields.displacement, strict=True):
-        mesh = body.mesh
-        stress = von_mises(cell_stress(mesh, body.material, moved))
+        mesh, stress = body.mesh, _nodal_stress(body, moved)
         (block,) = mesh.cells
-        kept = np.ones(len(block.nodes), dtype=bool)
-        if keep is not None:
-            kept = keep(mesh.points[block.nodes].mean(axis=1))
-        nodal = np.zeros(len(mesh.points))
-        np.add.at(nodal, block.nodes, stress[:, None])
-        nodal /= np.bincount(block.nodes.ravel(), minlength=len(nodal))
+        centre = mesh.points[block.nodes].mean(axis=1)
+        kept = centre[:, 1] > 0 if cut else np.ones(len(centre), dtype=bool)
         used, local = np.unique(block.nodes[kept], return_inverse=True)
         part = am.Mesh(mesh.points[used], (Cells("hex", local.reshape(-1, 8)),))
-        for facets in part.boundary:
-            nodes = used[facets.nodes]
-            patches.append((mesh.points + moved)[nodes])
-            values.append(nodal[nodes].mean(axis=1))
-    values = np.concatenate(values)
-    colours = plt.Normalize(0, np.quantile(values, 0.995))
-    faces = np.concatenate(patches)
-    axes.add_collection3d(
-        Poly3DCollection(faces, facecolors=plt.cm.viridis(colours(values)), edgecolors="0.3",
-                         linewidths=0.1)
-    )  # fmt: skip
-    low, high = faces.min(axis=(0, 1)), faces.max(axis=(0, 1))
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect(high - low)
-    axes.view_init(*view)
-    figure.colorbar(plt.cm.ScalarMappable(colours, "viridis"), ax=axes, shrink=0.7, pad=0.12,
-                    label="von Mises stress")  # fmt: skip
+        (facets,) = part.boundary
+        nodes = used[facets.nodes]
+        faces.append((mesh.points + moved)[nodes])
+        values.append(stress[nodes].mean(axis=1))
+        flat = (np.abs(mesh.points[nodes][:, :, 1]) < 1e-9).all(axis=1)
+        sections.append(((mesh.points + moved)[:, [0, 2]], nodes[flat], values[-1][flat]))
+    every = np.concatenate(values)
+    colours = plt.Normalize(0, np.quantile(every, 0.98))  # corners would take all colours
+    figure = plt.figure(figsize=(13.5, 4.8) if cut else (7, 5.4))
+    axes = figure.add_subplot(1, 2 if cut else 1, 1, projection="3d")
+    _surfaces(axes, np.concatenate(faces), colours(every), view)
+    frames = [axes]
+    if cut:
+        axes.set_zlabel("")  # where that of the section is
+        figure.subplots_adjust(wspace=0.3)
+        frames.append(figure.add_subplot(1, 2, 2))
+        for section in sections:
+            _section(frames[1], *section, colours)
+    figure.colorbar(plt.cm.ScalarMappable(colours, "viridis"), ax=frames, shrink=0.7, pad=0.06,
+                    extend="max", label="von Mises stress")  # fmt: skip
     figure.savefig(path, dpi=DPI, bbox_inches="tight")
     plt.close(figure)
+
+
+def _nodal_stress(body: am.Body, moved: np.ndarray) -> np.ndarray:
+    """Von Mises stress at the nodes, (n,): means of the cells around."""
+    (block,) = body.mesh.cells
+    stress = von_mises(cell_stress(body.mesh, body.material, moved))
+    total = np.zeros(len(body.mesh.points))
+    np.add.at(total, block.nodes, stress[:, None])
+    return total / np.bincount(block.nodes.ravel(), minlength=len(total))
+
+
+def _surfaces(axes, faces: np.ndarray, share: np.ndarray, view: tuple[float, float]) -> None:
+    """Faces (k, 4, 3) in space."""
+    axes.add_collection3d(
+        Poly3DCollection(faces, facecolors=plt.cm.viridis(share), edgecolors="0.75",
+                         linewidths=0.15)
+    )  # fmt: skip
+    low, high = faces.min(axis=(0, 1)), faces.max(axis=(0, 1))
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]),
+             xlabel="x", ylabel="y", zlabel="z")  # fmt: skip
+    axes.set_box_aspect(high - low)
+    for axis, span in zip((axes.xaxis, axes.yaxis, axes.zaxis), high - low, strict=True):
+        axis.set_major_locator(plt.MaxNLocator(max(2, int(5 * span / (high - low).max()))))
+    axes.view_init(*view)
+
+
+def _section(axes, points: np.ndarray, nodes: np.ndarray, values: np.ndarray, colours) -> None:
+    """Facets nodes (k, 4) of a body in the plane y = 0 with its outline; of tubes one side."""
+    x = points[nodes][:, :, 0]
+    if np.abs(x).min() > 0.1 * np.abs(x).max():
+        right = x.mean(axis=1) > 0
+        nodes, values = nodes[right], values[right]
+    shown = {"facecolors": plt.cm.viridis(colours(values)), "edgecolors": "0.75"}
+    axes.add_collection(
+        matplotlib.collections.PolyCollection(points[nodes], linewidths=0.3, **shown)
+    )
+    sides = np.stack([nodes, np.roll(nodes, -1, axis=1)], axis=2).reshape(-1, 2)
+    sides, times = np.unique(np.sort(sides, axis=1), axis=0, return_counts=True)
+    outline = points[sides[times == 1]]
+    axes.add_collection(matplotlib.collections.LineCollection(outline, colors="k", lw=1.2))
+    axes.autoscale()
+    axes.set(aspect="equal", xlabel="x", ylabel="z", title="section y = 0")
 
 
 def radial(solutions: dict, radius: np.ndarray, path: Path) -> None:
@@ -144,6 +192,7 @@ def radial(solutions: dict, radius: np.ndarray, path: Path) -> None:
         frame.plot(radius, float(mu) * normal, ".", ms=2, color="0.6", label="$F \\lambda_n$")
         frame.set(xlabel="distance from the middle", title=f"F = {mu}")
         frame.legend(frameon=False)
+    np.atleast_1d(axes)[0].set_ylabel("traction")
     figure.tight_layout()
     figure.savefig(path, dpi=DPI)
     plt.close(figure)
@@ -154,14 +203,17 @@ def newton(runs: dict[str, dict[str, Run]], path: Path) -> None:
 
     runs: {title: {method: run}}.
     """
-    figure, axes = plt.subplots(1, len(runs), figsize=(4.4 * len(runs), 3.8), squeeze=False)
+    figure, axes = plt.subplots(
+        1, len(runs), figsize=(4.4 * len(runs), 3.8), squeeze=False, sharey=True
+    )
     for frame, (title, methods) in zip(axes[0], runs.items(), strict=True):
         best = methods["newton"].iterates[-1].r
         for (name, run), style in zip(methods.items(), ("-o", "--s"), strict=True):
             error = np.array([np.linalg.norm(it.r - best) for it in run.iterates])
             error /= np.linalg.norm(best)
             shown = error > 0
-            frame.semilogy(np.flatnonzero(shown) + 1, error[shown], style, ms=3, label=name)
+            label = {"newton": "full Newton", "fixed-point": "fixed point"}[name]
+            frame.semilogy(np.flatnonzero(shown) + 1, error[shown], style, ms=3, label=label)
         frame.set(xlabel="step k", title=title)
         frame.legend(frameon=False)
     axes[0, 0].set_ylabel("$|\\lambda^k - \\lambda^*| / |\\lambda^*|$")
@@ -171,17 +223,20 @@ def newton(runs: dict[str, dict[str, Run]], path: Path) -> None:
 
 
 def sets(runs: dict[str, Run], path: Path) -> None:
-    """Numbers of active nodes over the steps, K_l dashed: figure 5.3."""
-    figure, grid = plt.subplots(2, 3, figsize=(12, 6), sharex=True)
+    """Numbers of active nodes over the steps, K_l dashed: figures 5.3 and 6.5."""
+    columns = 2 if len(runs) == 4 else min(len(runs), 3)
+    rows = -(-len(runs) // columns)
+    figure, grid = plt.subplots(
+        rows, columns, figsize=(4.2 * columns, 3.2 * rows), squeeze=False
+    )
+    last = max(run.steps for run in runs.values())
     for axes, (level, run) in zip(grid.flat, runs.items(), strict=False):
         k = np.arange(1, run.steps + 1)
         axes.plot(k, run.normal, "-o", ms=3, color=SLIP, label="$|A_n|$")
         axes.plot(k, run.tangential, "-s", ms=3, color=STICK, label="$|A_\\tau|$")
         axes.axvline(run.settled, ls="--", color="0.4", label=f"$K_l$ = {run.settled}")
-        axes.set_title(f"level {level}")
+        axes.set(title=f"level {level}", xlabel="step k", xlim=(0, last + 1))
         axes.legend(frameon=False)
-    for axes in grid[-1]:
-        axes.set_xlabel("step k")
     for axes in grid.flat[len(runs) :]:
         axes.set_visible(False)
     figure.tight_layout()

@@ -16,6 +16,9 @@ NEVER = 1e-300  # tolerance of the driver: the paper stops by the change of u in
 class Run:
     """The steps k = 1, 2, … of a run that ended when the change of u fell below a tolerance.
 
+    The paper does not name the norm; ours is the Euclidean one over the contact nodes (between
+    two bodies: of relative displacements, the unknowns of the paper's basis).
+
     normal, tangential: numbers of active nodes |A_n|, |A_tau|; settled: K_l, the first step
     with the final sets, which are then kept; cycles: multigrid steps; finished: the change got
     there.
@@ -52,11 +55,19 @@ def run(
     """Steps until |u^k - u^k-1| / |u^k| is below `change`, at most `limit`."""
     seen: list = []
     errors: list[float] = []
+    changes: list[float] = []
+    v = None if start is None else start.v
+    last = problem.H.T @ (np.zeros(problem.unknowns) if v is None else v)
 
     def note(step, iterate) -> bool:
+        nonlocal last
+        now = problem.H.T @ iterate.v
+        size = max(float(np.linalg.norm(now)), np.finfo(float).tiny)
+        changes.append(float(np.linalg.norm(now - last)) / size)
+        last = now
         seen.append(iterate)
         errors.append(step.error)
-        return iterate.change < change
+        return len(seen) > 1 and changes[-1] < change  # k > k_f: not in the first step
 
     solution = am.drive(
         problem, solver, tolerance=NEVER, max_iterations=limit, start=start, callback=note
@@ -68,8 +79,8 @@ def run(
     return Run(
         solution, [int(it.normal.sum()) for it in seen],
         [int(it.tangential.sum()) for it in seen], settled,
-        sum(it.linear_iterations for it in seen), [it.change for it in seen], errors,
-        bool(seen) and seen[-1].change < change, seen,
+        sum(it.linear_iterations for it in seen), changes, errors,
+        bool(seen) and changes[-1] < change, seen,
     )  # fmt: skip
 
 

@@ -109,7 +109,11 @@ def first_guess(model: am.Model) -> object:
 
 
 def prolonged(coarse: am.Model, found: object, fine: am.Model) -> object:
-    """The iterate on the next finer level: displacements and tractions interpolated."""
+    """The iterate on the next finer level: displacements and tractions interpolated.
+
+    On the contact zone the local displacements are, gaps included: what is closed stays closed
+    although finer facets have other gaps.
+    """
     problem = fine.assemble()
     P = problem.levels[0]
     given = coarse.discretisation
@@ -119,10 +123,19 @@ def prolonged(coarse: am.Model, found: object, fine: am.Model) -> object:
     v = (nodal @ values.reshape(-1, 3)).ravel()[fine.discretisation.free]
     assert len(v) == P.shape[0]
     (below,), (above,) = given.placed, fine.discretisation.placed
-    surface = np.zeros((len(coarse.bodies[0].mesh.points), 3))
+
+    def interpolated(rows: np.ndarray) -> np.ndarray:
+        surface = np.zeros((len(coarse.bodies[0].mesh.points), 3))
+        surface[below.rows.nodes] = rows
+        return (fine.bodies[0].mesh.levels[0] @ surface)[above.rows.nodes]
+
+    u = interpolated(coarse.assemble().local_velocity(found.v)) - problem.local_velocity(v)
+    place = np.full(fine.discretisation.dofs, -1)
+    place[fine.discretisation.free] = np.arange(len(v))
+    slave = place[3 * above.rows.nodes[:, None] + np.arange(3)]  # the block comes first
+    v[slave] += np.einsum("kij,ki->kj", above.rows.frames, u)
     traction = np.einsum("kij,ki->kj", below.rows.frames, found.r)
-    surface[below.rows.nodes] = traction / below.rows.weights[:, None]
-    spread = (fine.bodies[0].mesh.levels[0] @ surface)[above.rows.nodes]
+    spread = interpolated(traction / below.rows.weights[:, None])
     r = np.einsum("kij,kj->ki", above.rows.frames, spread * above.rows.weights[:, None])
     return Iterate(r, v)
 
