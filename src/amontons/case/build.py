@@ -31,8 +31,6 @@ LAWS = {  # of materials, with their own keys
     "linear-elastic": ("plane", "density"), "neo-hookean": (), "ciarlet-geymonat": ("a",),
 }  # fmt: skip
 MAX_NODES = 5_000_000  # of a box: a typing error must not fill the memory
-LATER = {  # words of the format that this version can not serve
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,14 +232,6 @@ def _material(table: Table) -> Material:
         return LinearElastic(
             young, poisson, table.choice("plane", ("strain", "stress"), "strain"), density
         )
-
-
-def _available(table: Table, key: str, now: Sequence[str], later: Sequence[str]) -> str:
-    """A word that may belong to what is planned but not there."""
-    word = table.choice(key, (*now, *later), now[0])
-    if word in later:
-        raise table.error(key, f"'{word}': {LATER[word]}")
-    return word
 
 
 def _contact(table: Table, mesh: Mesh) -> Contact:
