@@ -120,10 +120,12 @@ def test_the_whole_boundary_of_a_body_may_be_the_master(d, method):
     low = am.Mesh(low.points, low.cells, low.surfaces | {"skin": low.boundary})
     for overlap in (0.1, 0.5):
         high = block(d, 4, 1 - overlap)
-        contact = am.Contact("upper.bottom", master="skin", mu=0.3, method=method)
-        found = am.solve(two(d, method, high, low, contacts=[contact]))
-        assert len(found.r) == 5 ** (d - 1)
-        assert found.force[:, -1].sum() == pytest.approx(50 * overlap, rel=2e-3)
+        high = am.Mesh(high.points, high.cells, high.surfaces | {"all": high.boundary})
+        for slave in ("upper.bottom", "all") if method == "nodal" else ("upper.bottom",):
+            contact = am.Contact(slave, master="skin", mu=0.3, method=method)
+            found = am.solve(two(d, method, high, low, contacts=[contact]))
+            assert len(found.r) == 5 ** (d - 1)
+            assert found.force[:, -1].sum() == pytest.approx(50 * overlap, rel=2e-3)
 
 
 # ------------------------------------------------------------------- self-contact

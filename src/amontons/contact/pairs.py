@@ -94,7 +94,7 @@ def pair_contact(
     if hit.deep.any():
         overlap = np.zeros(len(slave.points), dtype=bool)
         for node, ahead in _ahead(slave, surface, nodes[hit.deep]):
-            overlap[node] |= inside(master, ahead)
+            np.logical_or.at(overlap, node, inside(master, ahead))
         hit = project(points, master.points, facets, facing=normals, search=search, own=own,
                       free=overlap[nodes])  # fmt: skip
     found = hit.found
