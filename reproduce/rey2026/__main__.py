@@ -17,7 +17,7 @@ from amontons.errors import AmontonsError
 from amontons.files import replacing
 from benchmarks.machine import describe
 
-from . import alart_curnier, nitsche, primal_dual, report, uzawa
+from . import alart_curnier, nitsche, primal_dual, report, solutions, uzawa
 
 HERE = Path(__file__).parent
 PAPER: dict[str, dict] = json.loads((HERE / "paper.json").read_text())
@@ -30,7 +30,7 @@ ALGORITHMS: dict[str, ModuleType] = {
     "uzawa": uzawa,
 }
 TABLES = [name for name, table in PAPER.items() if table.get("algorithm") in ALGORITHMS]
-PARTS = tuple(TABLES)
+PARTS = (*TABLES, "enumeration", "figure1", "refinement", "mu_crit")
 SEED = 2026
 
 
@@ -63,6 +63,14 @@ def main(parts: tuple[str, ...], draws: int, results: Path | None) -> None:
 
 def work(part: str, draws: int, out: Path) -> list | dict:
     """The numbers of a part."""
+    if part == "enumeration":
+        return solutions.enumeration()
+    if part == "figure1":
+        return solutions.slip_figure(out / "figure1.png")
+    if part == "refinement":
+        return solutions.refinement()
+    if part == "mu_crit":
+        return solutions.critical()
     table = PAPER[part]
     module = ALGORITHMS[table["algorithm"]]
     if "cells" in table:
@@ -94,6 +102,14 @@ def page(record: dict) -> str:
         if name in record and "algorithm" in table:
             make = report.map_table if "cells" in table else report.count_table
             lines += make(name, record[name], table)
+    if "nitsche_35" in record:
+        lines += report.rate(record["nitsche_35"], PAPER["nitsche_35"])
+    for part, make in (("enumeration", report.enumeration), ("figure1", report.figure),
+                       ("refinement", report.refinement)):  # fmt: skip
+        if part in record:
+            lines += make(record[part])
+    if "mu_crit" in record:
+        lines += report.critical(record["mu_crit"], PAPER["mu_crit"])
     return "\n".join(lines)
 
 

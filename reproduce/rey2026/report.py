@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 TITLES = {"uzawa": "Uzawa", "nitsche": "Nitsche", "alart_curnier": "Alart-Curnier",
           "primal_dual": "primal-dual"}  # fmt: skip
+LEAST = 1e-6  # error below which rounding decides a rate
 WITHIN = 0.1  # relative difference up to which a printed error counts as ours
 
 
@@ -73,3 +75,79 @@ def summary(record: Mapping, paper: Mapping) -> list[str]:
         total = [total[0] + same, total[1] + every]
         lines.append(f"| {name} | {every} | {same} |")
     return [*lines, f"| all | {total[1]} | {total[0]} |", ""]
+
+
+def enumeration(record: Mapping) -> list[str]:
+    """Number of solutions over mu, section 5.1."""
+    lines = ["## Number of solutions over μ = 0, 0.1, … 5 (section 5.1)", "",
+             "Paper: 1 below μ = 3, 2 at 3, 3 above.", "",
+             "| n_c | number of solutions | proved | slip solution at 3.5 |",
+             "|---|---|---|---|"]  # fmt: skip
+    for n_c, one in record.items():
+        runs = [
+            f"{count:g} at {first:g}" + (f" to {last:g}" if last > first else "")
+            for first, last, count in one["runs"]
+        ]
+        proved = "all" if one["complete"] else "not all"
+        words = " ".join(f"`{pattern}`" for pattern in one["slip at 3.5"])
+        lines.append(f"| {n_c} | {', '.join(runs)} | {proved} | {words} |")
+    return [*lines, ""]
+
+
+def critical(record: Mapping, paper: Mapping) -> list[str]:
+    """Critical coefficients, section 5.2."""
+    lines = [
+        "## mu_crit: critical coefficients, ours (paper)",
+        "",
+        "mu_P is printed there as the first failing multiple of 0.01.",
+        "",
+        "| n_c | mu_P | mu_c, full contact | proved for every load |",
+        "|---|---|---|---|",
+    ]
+    for k, n_c in enumerate(paper["n_c"]):
+        if str(n_c) in record:
+            one = record[str(n_c)]
+            lines.append(
+                f"| {n_c} | {one['mu_P']:.4f} ({paper['mu_P'][k]:.2f}) | {one['mu_c']:.4f} "
+                f"({paper['mu_c'][k]:.2f}) | {one['lower']:.4f} to {one['upper']:.4f} |"
+            )
+    return [*lines, ""]
+
+
+def figure(record: Mapping) -> list[str]:
+    """Figure 1 and the solutions that it shows."""
+    lines = ["## Figure 1: n_c = 25, μ = 3.5", ""]
+    for one in record["solutions"]:
+        counts = ", ".join(f"{n} {word}" for word, n in one["counts"].items() if n)
+        lines.append(f"- {counts}: energy {one['energy']:.4f}, error {one['error']:.0e}")
+    proved = (
+        "There is no other, with proof." if record["complete"] else "The list may lack some."
+    )
+    return [*lines, "", proved, "", "![Figure 1](figure1.png)", ""]
+
+
+def refinement(record: Mapping) -> list[str]:
+    """The slip solution over the mesh."""
+    lines = ["## The slip solution over the mesh (structured, μ = 3.5)", "",
+             "Energies; free has 0 and stick 4.1667 on every mesh.", "",
+             "| n_c | pattern | energy |", "|---|---|---|"]  # fmt: skip
+    for n_c, one in record.items():
+        for pattern, energy in one["slip"]:
+            lines.append(f"| {n_c} | `{pattern}` | {energy:.4f} |")
+    return [*lines, ""]
+
+
+def rate(record: Mapping, paper: Mapping) -> list[str]:
+    """How Nitsche's slip solution tends to that of the nodal contact as kappa grows."""
+    known = [(value, row[-1]["error"]) for value, row in
+             zip(paper["values"], record, strict=True)
+             if row[-1]["kind"] == "slip" and row[-1]["error"] > LEAST]  # fmt: skip
+    lines = ["## Nitsche's energetic error over κ (last column of nitsche_35)", "",
+             "| κ | squared energy norm | rate in κ |", "|---|---|---|"]  # fmt: skip
+    for k, (kappa, error) in enumerate(known):
+        slope = ""
+        if k:
+            before, worse = known[k - 1]
+            slope = f"{2 * math.log(error / worse) / math.log(kappa / before):.2f}"
+        lines.append(f"| {kappa:g} | {error**2:.1e} | {slope} |")
+    return [*lines, ""]

@@ -1,7 +1,7 @@
 """Hild's triangle on the meshes used here, and what kind of solution a displacement is.
 
-`meshes.json` holds nodes and triangles.  n_c = 1, 3, 4, 5 have the critical coefficients that
-the paper prints, n_c = 2 is the one with four similar triangles; the others are as gmsh makes
+`meshes.json` holds nodes and triangles.  n_c = 1, 3, 4, 5 have both critical coefficients that
+the paper prints, n_c = 2 has two triangles and the printed mu_c; the others are as gmsh makes
 them with elements of size 1 / n_c and n_c equal edges on AB.
 """
 
