@@ -61,6 +61,22 @@ def test_the_triangle_is_proved_and_checked():
     assert pieces.word(unsafe.failed) == "fff+-+"
 
 
+def test_many_contacts_have_pairs_only_where_it_matters(monkeypatch):
+    monkeypatch.setattr("amontons.analysis.pair_multipliers.FEW", 3)
+    monkeypatch.setattr("amontons.analysis.friction_branching.FEW", 3)
+    monkeypatch.setattr("amontons.analysis.pair_multipliers.ACTIVE", 0.95)
+    pieces = Pieces.of(hild_triangle(7).assemble())
+    alone = Branching(pieces, 1.4, np.inf)  # multipliers of single contacts reach 1.48
+    assert alone.run() == POSITIVE
+    assert [len(leaf.multipliers.pairs) for leaf in alone.leaves] == [0]
+    assert check_proof(pieces.W, np.full(7, 1.4), alone.leaves)
+    mixed = Branching(pieces, 1.53, np.inf)
+    assert mixed.run() == POSITIVE
+    found = [leaf.multipliers for leaf in mixed.leaves if leaf.multipliers is not None]
+    assert any(len(x.pairs) and len(x.singles) for x in found)
+    assert check_proof(pieces.W, np.full(7, 1.53), mixed.leaves)
+
+
 def test_the_checker_refuses_what_is_wrong():
     pieces = Pieces.of(hild_triangle(5).assemble())
     safe = Branching(pieces, 1.7, np.inf)

@@ -101,10 +101,18 @@ def left_over(W, contacts, letters, mu):
     return np.linalg.det(E), S
 
 
-def multipliers_hold(S, mu, pairs, W):
+def multipliers_hold(S, mu, found):
     """True when the multipliers exclude every pattern of contacts with u = S r."""
     k = len(mu)
     Q = np.zeros((4 * k, 4 * k))
+    pairs, W = found.pairs, found.W
+    if set(np.r_[pairs.ravel(), found.singles]) != set(range(k)):
+        return False
+    for p, block in zip(found.singles, found.V, strict=True):
+        for G in planes(mu[p]).values():
+            if np.linalg.eigvalsh(G.T @ block @ G)[-1] >= 0:
+                return False
+        Q[4 * p : 4 * p + 4, 4 * p : 4 * p + 4] += block
     for (p, q), block in zip(pairs, W, strict=True):
         for a in planes(mu[p]).values():
             for b in planes(mu[q]).values():
@@ -153,6 +161,6 @@ def check_proof(W, mu, leaves):
             return False
         if leaf.multipliers is None:
             return smallest_determinant(S, rest) > 0
-        return multipliers_hold(S, rest, leaf.multipliers.pairs, leaf.multipliers.W)
+        return multipliers_hold(S, rest, leaf.multipliers)
 
     return covered(())

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from .determinant_search import FREE, POSITIVE, SLIP_MINUS, SLIP_PLUS, STICK, STOPPED, eliminate
 from .exact_threshold import first_failure
-from .pair_multipliers import PairMultipliers, find_pair_multipliers, proves
+from .pair_multipliers import FEW, PairMultipliers, find_pair_multipliers, proves
 from .status_pieces import Pieces, States
 
 Array = NDArray[np.float64]
@@ -44,8 +44,13 @@ class Leaf:
         places, multipliers = pieces.places, self.multipliers
         if multipliers is not None:
             to_r = pieces.scale.reshape(-1, 2)[list(self.left)]
-            z = np.hstack([to_r, 1 / to_r])[multipliers.pairs].reshape(-1, 8)
-            multipliers = replace(multipliers, W=multipliers.W * z[:, :, None] * z[:, None, :])
+            z = np.hstack([to_r, 1 / to_r])
+            pair, single = z[multipliers.pairs].reshape(-1, 8), z[multipliers.singles]
+            multipliers = replace(
+                multipliers,
+                W=multipliers.W * pair[:, :, None] * pair[:, None, :],
+                V=multipliers.V * single[:, :, None] * single[:, None, :],
+            )
         named = (
             tuple(int(i) for i in places[list(part)]) for part in (self.contacts, self.left)
         )
@@ -62,6 +67,7 @@ class Rest:
     rounding: Array
     decided: tuple[int, ...] = ()
     states: tuple[int, ...] = ()
+    undecided: Array | None = None  # weight of every contact, from the parent
 
 
 @dataclass(eq=False)
@@ -96,15 +102,19 @@ class Branching:
         for multipliers in self.known.get(tuple(rest.contacts), []):
             if proves(multipliers, rest.S, rest.rounding):
                 return self._leave(rest, multipliers)
-        left = max(self.deadline - time.perf_counter(), 1e-3)
-        self.inequalities += 1
-        found, weights = find_pair_multipliers(
-            rest.S, rest.rounding, self.m[rest.contacts], time_limit=left
-        )
+        found, weights = self._multipliers(rest)
+        if found is None and rest.undecided is None and len(rest.contacts) > FEW:
+            found, weights = self._multipliers(replace(rest, undecided=_undecided(weights)))
         if found is not None:
             self.known.setdefault(tuple(rest.contacts), []).append(found)
             return self._leave(rest, found)
         return self._branch(rest, weights)
+
+    def _multipliers(self, rest: Rest) -> tuple[PairMultipliers | None, Array]:
+        left = max(self.deadline - time.perf_counter(), 1e-3)
+        self.inequalities += 1
+        return find_pair_multipliers(rest.S, rest.rounding, self.m[rest.contacts],
+                                     time_limit=left, undecided=rest.undecided)  # fmt: skip
 
     def _leave(self, rest: Rest, multipliers: PairMultipliers | None) -> int:
         left = tuple(int(i) for i in rest.contacts)
@@ -128,8 +138,9 @@ class Branching:
         return sign
 
     def _branch(self, rest: Rest, weights: Array) -> int:
-        undecided = weights.sum(axis=1) - weights.max(axis=1)
+        undecided = _undecided(weights)
         p = int(np.argmax(undecided))
+        rest = replace(rest, undecided=undecided)
         for state, sign, child in self._children(rest, p, np.argsort(-weights[p])):
             if sign != POSITIVE:
                 return self._fail(sign, Rest(rest.contacts[p : p + 1], rest.S, rest.rounding,
@@ -153,5 +164,12 @@ class Branching:
         for state in np.array([FREE, SLIP_PLUS, SLIP_MINUS, STICK])[order]:
             if self.allowed[contact, state]:
                 sign, T, C = eliminate(S, rounding, state, self.m[contact])
-                yield int(state), sign, Rest(others, T, C, (*rest.decided, contact),
-                                             (*rest.states, int(state)))  # fmt: skip
+                yield int(state), sign, Rest(
+                    others, T, C, (*rest.decided, contact), (*rest.states, int(state)),
+                    np.delete(rest.undecided, p),
+                )  # fmt: skip
+
+
+def _undecided(weights: Array) -> Array:
+    """Weight (k,) of all states of a contact but its strongest one."""
+    return weights.sum(axis=1) - weights.max(axis=1)

@@ -1,8 +1,9 @@
 """Proofs by quadratic multipliers that no pattern of some contacts has a singular piece.
 
-With z_p = (r_N, r_T, u_N, u_T) of a contact and symmetric W_c for pairs c of contacts, let
+With z_p = (r_N, r_T, u_N, u_T) of a contact and symmetric W_c for pairs c of contacts, and for
+single ones where that is enough, let
 
-    z_c W_c z_c < 0  for both contacts in any of the states free, stick, slip+, slip-,
+    z_c W_c z_c < 0  for all contacts of c in any of the states free, stick, slip+, slip-,
     M(S) = sum_c z_c W_c z_c > 0  for u = S r, r != 0.
 
 Then no combination of states is singular.  All of them also have one orientation: let Q be the
@@ -42,27 +43,32 @@ Pairs = NDArray[np.int64]
 STATES = 4  # free, slip+, slip-, stick, as in determinant_search
 HOPELESS = 3e-3  # eigenvalue of M below which the search ends, the mean of all being 1
 ORIENTED = (1, -1, -1)  # sign of det(-stick Q b) for b = free, slip+, slip- in `state_planes`
+FEW = 16  # contacts that are all paired
+ACTIVE = 0.1  # undecided weight of contacts that are paired, of the largest one
 MARGIN = 1e-9  # of signs of four-by-four matrices, relative: far above rounding
 
 
 @dataclass(frozen=True, eq=False)
 class PairMultipliers:
-    """pairs (J, 2): places of contacts; W (J, 8, 8): of (z_p, z_q) of every pair."""
+    """pairs (J, 2): places of contacts; W (J, 8, 8): of (z_p, z_q) of every pair.
+
+    singles (K,), V (K, 4, 4): contacts with multipliers of their own.
+    """
 
     pairs: Pairs
     W: Array
+    singles: NDArray[np.int64]
+    V: Array
 
     def form(self, contacts: int) -> tuple[Array, Array]:
         """(Q, bound of its rounding), (4 k, 4 k) each."""
         Q, size = np.zeros((2, 4 * contacts, 4 * contacts))
-        for rows, W in zip(pair_rows(self.pairs), self.W, strict=True):
-            Q[np.ix_(rows, rows)] += W
-            size[np.ix_(rows, rows)] += np.abs(W)
-        return Q, 2 * EPSILON * (2 + self.degree(contacts)) * size
-
-    def degree(self, contacts: int) -> int:
-        """Largest number of pairs that a contact is in."""
-        return int(np.bincount(self.pairs.ravel(), minlength=contacts).max(initial=0))
+        for rows, own in ((pair_rows(self.pairs), self.W), (single_rows(self.singles), self.V)):
+            for where, block in zip(rows, own, strict=True):
+                Q[np.ix_(where, where)] += block
+                size[np.ix_(where, where)] += np.abs(block)
+        terms = np.bincount(self.pairs.ravel(), minlength=contacts).max(initial=0)
+        return Q, 2 * EPSILON * (3 + int(terms)) * size
 
 
 def state_planes(m: Array) -> Array:
@@ -78,6 +84,11 @@ def state_planes(m: Array) -> Array:
 def pair_rows(pairs: Pairs) -> NDArray[np.int64]:
     """Rows (J, 8) of z of both contacts of a pair among those of all contacts."""
     return (4 * pairs[:, :, None] + np.arange(4)).reshape(-1, 8)
+
+
+def single_rows(singles: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Rows (K, 4) of z of single contacts."""
+    return 4 * singles[:, None] + np.arange(4)
 
 
 def strongest_pairs(S: Array) -> Pairs:
@@ -104,34 +115,57 @@ def pair_family(pairs: Pairs, m: Array) -> Family:
     return Family(pair_rows(pairs), tuple(slacks), np.zeros(0))
 
 
+def single_family(singles: NDArray[np.int64], m: Array) -> Family:
+    """The matrix inequalities -W_p > 0 on all states of single contacts."""
+    planes = state_planes(m)
+    owner = np.arange(len(singles))
+    slacks = tuple(Slacks(owner, restricted(planes[singles, a])) for a in range(STATES))
+    return Family(single_rows(singles), slacks, np.zeros(0))
+
+
 def find_pair_multipliers(
-    S: Array, rounding: Array, m: Array, *, time_limit: float
+    S: Array, rounding: Array, m: Array, *, time_limit: float, undecided: Array | None = None
 ) -> tuple[PairMultipliers | None, Array]:
     """(proved multipliers or None, weight (k, 4) of every state where there are none).
 
     S, rounding (2 k, 2 k): u = (S + d) r with any |d| <= rounding.  The weights belong to the
     dual moments: how much of every state a contact would need for a singular piece.
+    undecided (k,): what of them is known; many contacts are paired only where it is large.
     """
     k = len(m)
-    pairs = strongest_pairs(S)
-    family = pair_family(pairs, m)
+    pairs = _chosen_pairs(S, undecided)
+    singles = np.setdiff1d(np.arange(k), pairs)
+    families = [pair_family(pairs, m)] if len(pairs) else []
+    families += [single_family(singles, m)] if len(singles) else []
     T = _coordinates(S)
-    Z = np.empty((k, 4, 2 * k))
-    Z[:, :2], Z[:, 2:] = T.reshape(k, 2, 2 * k), (S @ T).reshape(k, 2, 2 * k)
+
+    def multipliers(W: tuple[Array, ...]) -> PairMultipliers:
+        V = W[-1] if len(singles) else np.zeros((0, 4, 4))
+        return PairMultipliers(pairs, W[0] if len(pairs) else np.zeros((0, 8, 8)), singles, V)
 
     def accept(W: tuple[Array, ...], extras: tuple[Array, ...]) -> bool:
-        found = PairMultipliers(pairs, W[0])
+        found = multipliers(W)
         return (
             proves(found, S, rounding, T)
             and is_oriented(found, m)
-            and slacks_are_positive([family], W, extras)
+            and slacks_are_positive(families, W, extras)
         )
 
-    answer = find_multipliers(Z.reshape(4 * k, 2 * k), [family], accept=accept,
+    answer = find_multipliers(_stacked(T, S @ T), families, accept=accept,
                               time_limit=time_limit, smallest=HOPELESS)  # fmt: skip
     if answer.outcome is LmiOutcome.FOUND:
-        return PairMultipliers(pairs, answer.W[0]), np.zeros((k, STATES))
-    return None, _weights(answer, pairs, k)
+        return multipliers(answer.W), np.zeros((k, STATES))
+    return None, _weights(answer, pairs, singles, k)
+
+
+def _chosen_pairs(S: Array, undecided: Array | None) -> Pairs:
+    """All strongest pairs of few contacts, of many those with an undecided contact."""
+    pairs = strongest_pairs(S)
+    if len(S) // 2 <= FEW:
+        return pairs
+    if undecided is None:
+        return pairs[:0]
+    return pairs[undecided[pairs].max(axis=1) > ACTIVE * undecided.max()]
 
 
 def proves(
@@ -187,13 +221,19 @@ def _stacked(r: Array, u: Array) -> Array:
     return z.reshape(4 * k, -1)
 
 
-def _weights(answer: Multipliers, pairs: Pairs, contacts: int) -> Array:
+def _weights(
+    answer: Multipliers, pairs: Pairs, singles: NDArray[np.int64], contacts: int
+) -> Array:
     """Traces of the dual moments by contact and state, (k, 4)."""
     weights = np.zeros((contacts, STATES))
-    for index, X in enumerate(answer.moments[1:]):
-        a, b = divmod(index, STATES)
-        diagonal = np.diagonal(X, axis1=1, axis2=2)
-        np.add.at(weights[:, a], pairs[:, 0], diagonal[:, :2].sum(axis=1))
-        np.add.at(weights[:, b], pairs[:, 1], diagonal[:, 2:].sum(axis=1))
-    count = np.bincount(pairs.ravel(), minlength=contacts)
-    return weights / np.maximum(count, 1)[:, None]
+    moments = list(answer.moments[1:])
+    if len(pairs):
+        for a in range(STATES):
+            for b in range(STATES):
+                diagonal = np.diagonal(moments.pop(0), axis1=1, axis2=2)
+                np.add.at(weights[:, a], pairs[:, 0], diagonal[:, :2].sum(axis=1))
+                np.add.at(weights[:, b], pairs[:, 1], diagonal[:, 2:].sum(axis=1))
+        weights /= np.maximum(np.bincount(pairs.ravel(), minlength=contacts), 1)[:, None]
+    for a, X in enumerate(moments):
+        weights[singles, a] = np.trace(X, axis1=1, axis2=2)
+    return weights
