@@ -36,12 +36,13 @@ from .enumerate import PieceSolution
 from .load_pieces import Known, LoadProblem, States
 from .load_proof import BranchProof, prove
 from .load_reduction import shared_multipliers
-from .multiplier_lmi import LmiOutcome, find_multipliers, slacks_are_positive
+from .multiplier_lmi import SMALLEST, LmiOutcome, find_multipliers, slacks_are_positive
 from .multistart import Finder, described
 from .newton_batch import Stack
 
 Array = NDArray[np.float64]
 NEAR = 1e-6  # of the size of reactions: a larger `distance` proves nothing of use
+HOPELESS = 1e-6  # eigenvalue of M, of mean 1, below which a branch is divided instead
 LARGE = 150  # contacts from which few different multipliers are tried first
 STARTS = 60  # of Newton's method once the first inequality has no multipliers
 STEP_WORK, ROUND_WORK = 30.0, 2e9  # operations of a start per (2 nc)^3, of a round of starts
@@ -248,6 +249,11 @@ class Inequality:
         self.Z, _ = pieces.energy_basis(local, branch, apex)
 
     @property
+    def divisible(self) -> bool:
+        """True where some contact is not decided yet."""
+        return bool((self.branch >= pieces.UNDECIDED).any())
+
+    @property
     def large(self) -> bool:
         """Where few different multipliers are worth a try first."""
         return (
@@ -280,8 +286,9 @@ class Inequality:
         ):
             return proofs[-1]
         answer = find_multipliers(
-            self.Z, [g.turned for g in self.groups], accept=accept, time_limit=time_limit
-        )
+            self.Z, [g.turned for g in self.groups], accept=accept, time_limit=time_limit,
+            smallest=HOPELESS if self.divisible else SMALLEST,
+        )  # fmt: skip
         if answer.outcome is LmiOutcome.FOUND:
             return proofs[-1]
         return self._failure(answer.lowest, self._whole(answer.W))
