@@ -12,7 +12,7 @@ from click.testing import CliRunner
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))  # the reproductions are not installed
 
-from reproduce.rey2026 import primal_dual, report, solutions, uzawa  # noqa: E402
+from reproduce.rey2026 import alart_curnier, primal_dual, report, solutions, uzawa  # noqa: E402
 from reproduce.rey2026.__main__ import ALGORITHMS, PAPER, PARTS, main  # noqa: E402
 from reproduce.rey2026.triangle import Triangle  # noqa: E402
 
@@ -48,6 +48,16 @@ def test_the_command_prints_all_cells_of_alart_curnier(tmp_path):
     assert "**slip** (free)" in "\n".join(
         report.map_table("alart", record["alart"], PAPER["alart"])
     )
+
+
+@pytest.mark.parametrize("eta", [1e-3, 1.0, 1e3])
+def test_on_one_element_the_law_at_points_is_that_of_the_node(eta):
+    triangle = Triangle(1, 3.5)
+    for start in PAPER["alart_35"]["columns"][:6]:
+        row = np.array([start[::-1]])
+        one = alart_curnier.run(triangle, eta, row)
+        two = alart_curnier.run_at_points(triangle, eta, row)
+        assert one.kind == two.kind
 
 
 def test_bad_parts_are_refused(tmp_path):
