@@ -273,3 +273,15 @@ def test_a_rough_solution_is_good_enough():
         assert answer.outcome is LoadOutcome.CERTIFIED
         assert answer.distance < 1e-8
         assert problem.error(answer.r0) < 1e-12
+
+
+def test_too_many_contacts_are_undecided_where_sharing_fails(monkeypatch):
+    monkeypatch.setattr("amontons.analysis.load_certificate.LARGE", 1)
+    monkeypatch.setattr("amontons.analysis.load_certificate.LARGEST", 5)
+    monkeypatch.setattr("amontons.analysis.load_reduction.SETS", 2)
+    problem = hild_triangle(15, mu=2.9).assemble().condensed()
+    answer = certify_load(problem, am.solve(problem))
+    assert answer.outcome is LoadOutcome.UNDECIDED
+    assert "contacts" in answer.reason
+    three = hild_triangle(15, mu=3.5).assemble().condensed()
+    assert certify_load(three, am.solve(three)).outcome is LoadOutcome.REFUTED

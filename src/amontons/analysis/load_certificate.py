@@ -43,9 +43,10 @@ from .newton_batch import Stack
 Array = NDArray[np.float64]
 NEAR = 1e-6  # of the size of reactions: a larger `distance` proves nothing of use
 HOPELESS = 1e-6  # eigenvalue of M, of mean 1, below which a branch is divided instead
+LARGEST = 600  # contacts up to which each can have a multiplier of its own: memory
 LARGE = 150  # contacts from which few different multipliers are tried first
 STARTS = 60  # of Newton's method once the first inequality has no multipliers
-STEP_WORK, ROUND_WORK = 30.0, 2e9  # operations of a start per (2 nc)^3, of a round of starts
+STEP_WORK, RATE = 30.0, 1e10  # operations of a start per (2 nc)^3, and per second
 TOLERANCE = 1e-8  # error by the judge of another solution
 EXACT = 1e-12  # error of solutions that fill a segment
 GOOD = 1e-12  # by which a solution in scaled variables may miss the law
@@ -148,8 +149,13 @@ class _Search:
         if failure is None:
             return self._certified()
         self.other = OtherSolutions(self.local, self.known)
-        found = self.other.near(failure) or self.other.far(0.2 * self.left)
-        return self._refuted(found) if found else self._divide(failure)
+        found = self.other.near(failure, self.left) or self.other.far(0.2 * self.left)
+        if found:
+            return self._refuted(found)
+        if self.local.contacts > LARGEST:
+            reason = f"no shared multipliers, and more than {LARGEST} contacts for own ones"
+            return self._answer(LoadOutcome.UNDECIDED, reason)
+        return self._divide(failure)
 
     def _divide(self, failure: Failure) -> LoadCertificate:
         """Branch until all is proved, another solution is found, or the time is over."""
@@ -169,7 +175,7 @@ class _Search:
                 following = self._prove(child)
                 if following is None:
                     continue
-                found = self.other.near(following)
+                found = self.other.near(following, self.left)
                 if found:
                     return self._refuted(found)
                 stack.append(following)
@@ -265,7 +271,7 @@ class Inequality:
     def solve(self, near: float, time_limit: float) -> BranchProof | Failure:
         """Its proof with a distance <= near, or where it fails."""
         if not self.Z.shape[1]:  # nothing moves: any multipliers will do
-            W = -np.tile(np.eye(self.cones.G.shape[2]), (self.local.contacts, 1, 1))
+            W = self._whole_identity()
             proof = prove(self.local, self.branch, W, self.known)
             able = proof is not None and proof.distance <= near
             return proof if able and proof else self._failure(np.zeros(0), W)
@@ -285,6 +291,8 @@ class Inequality:
             self.local, self.branch, self.groups, accept, time_limit=time_limit / 2
         ):
             return proofs[-1]
+        if self.local.contacts > LARGEST:
+            return self._failure(np.zeros(self.Z.shape[1]), self._whole_identity())
         answer = find_multipliers(
             self.Z, [g.turned for g in self.groups], accept=accept, time_limit=time_limit,
             smallest=HOPELESS if self.divisible else SMALLEST,
@@ -295,6 +303,10 @@ class Inequality:
 
     def _whole(self, parts: tuple[Array, ...]) -> Array:
         return pieces.whole(self.groups, parts, self.local.contacts, self.cones.G.shape[2])
+
+    def _whole_identity(self) -> Array:
+        """W = -I, which is never positive on the cones."""
+        return -np.tile(np.eye(self.cones.G.shape[2]), (self.local.contacts, 1, 1))
 
     def _failure(self, lowest: Array, W: Array) -> Failure:
         nc = self.local.contacts
@@ -359,9 +371,16 @@ class OtherSolutions:
         self.random = np.random.default_rng(0)
         self.size = DISTINCT * (1 + np.abs(self.known).max(initial=0.0))
 
-    def near(self, failure: Failure) -> PieceSolution | None:
+    @property
+    def seconds(self) -> float:
+        """Of Newton's method from one start, at most and roughly."""
+        return STEP_WORK * self.stack.W.shape[0] ** 3 / RATE
+
+    def near(self, failure: Failure, seconds: float) -> PieceSolution | None:
         """From where an inequality fails: along d, or at z / tau."""
         z = failure.direction
+        if 4 * self.seconds > seconds or not z.any():
+            return None
         if z.shape[1] == 5:
             tau = z[0, 4]
             starts = z[None, :, :2] / (tau if tau else 1.0)
@@ -375,8 +394,9 @@ class OtherSolutions:
         """From many starts."""
         began, finder = time.perf_counter(), Finder(self.stack, self.random, TOLERANCE)
         finder.add(self.known)
-        work = STEP_WORK * max(self.stack.W.shape[0], 1) ** 3
-        each = int(np.clip(ROUND_WORK / work, 2, STARTS))
+        if 2 * self.seconds > seconds:
+            return None
+        each = int(np.clip(0.2 / self.seconds, 2, STARTS))
         for _ in range(0, STARTS, each):
             finder.search(each)
             found = self._first(np.array(finder.found).reshape(-1, *self.known.shape))
