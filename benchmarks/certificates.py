@@ -210,8 +210,8 @@ def main() -> None:
     parts = ["# Certificates of uniqueness", "",
              f"`python benchmarks/certificates.py`, {where['cpu']}, Python {where['python']}, "
              f"numpy {where['numpy']}; CPU seconds on one thread.", "",
-             "Inequalities: linear matrix inequalities that were solved. Distance: bound of what "
-             "another solution can differ, relative to the largest reaction.", ""]  # fmt: skip
+             "Inequalities: linear matrix inequalities that were solved. Distance: bound of "
+             "what another solution can differ, relative to the largest reaction.", ""]  # fmt: skip
     for name, (_, title) in TABLES.items():
         if name in results:
             parts += [f"## {title}", "", table(results[name]), ""]
