@@ -125,3 +125,33 @@ def test_kernels_of_sparse_matrices(lines):
         assert np.abs(J @ found[:-1] + np.outer(Jp, found[-1])).max() < 1e-12
         weight = np.r_[np.full(n, 1 / n), 1.0]
         assert np.allclose((found.T * weight) @ found, np.eye(lines), atol=1e-10)
+
+
+def test_an_evolution_crosses_a_jump():
+    """A block that slides lets go of its ground in a jump: load steps alone end at the fold."""
+
+    def top(x, t):
+        return 0.5 * max(0.0, t - 1), -0.2 * min(t, 1.0)
+
+    mesh = am.box((1, 1), cells=6)
+    model = am.Model([am.Body(mesh, am.NeoHookean(1.0, 0.3))], [am.Fix("top", top)],
+                     [am.Contact("bottom", am.Plane((0, 1)), mu=0.3)])  # fmt: skip
+    *_, before = am.evolve(model, am.QuasiStatic(0.25), until=1.75)
+    with pytest.raises(am.NotConverged, match="no equilibrium found beyond 0.8"):
+        list(am.evolve(model, am.QuasiStatic(0.25), until=2.0, start=before.state))
+    solver = am.NonlinearNewton(crossing=am.PathCrossing())
+    (after,) = am.evolve(
+        model, am.QuasiStatic(0.25), until=2.0, start=before.state, solver=solver
+    )
+    assert "over folds at 0.879" in after.solution.convergence.detail
+    assert after.solution.converged
+    r, gap = after.state.force, after.gap
+    assert gap.min() > -1e-10
+    assert r[:, 0].min() > -1e-8
+    assert np.abs(r[:, 0] * gap).max() < 1e-9
+    assert (np.abs(r[:, 1]) <= 0.3 * r[:, 0] + 1e-8).all()
+    with pytest.raises(am.NotConverged, match="followed to"):
+        list(am.evolve(
+            model, am.QuasiStatic(0.25), until=2.0, start=before.state,
+            solver=am.NonlinearNewton(crossing=am.PathCrossing(max_points=2)),
+        ))  # fmt: skip

@@ -15,6 +15,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 Array = NDArray[np.float64]
+ALONG = 0.1  # cosine between b and the line from which b serves as it is
 ROUNDS = 4  # of inverse iteration
 
 
@@ -60,7 +61,10 @@ def _line(A: sparse.csr_array, random: np.random.Generator) -> tuple[Array, Any]
                 t = factor.solve(last)
                 if not np.isfinite(t).all():
                     raise RuntimeError
+                cosine = 1 / (np.linalg.norm(t) * np.linalg.norm(border))
                 border = t / np.linalg.norm(t)
+                if cosine > ALONG:
+                    break
             return border, factor
         except RuntimeError:  # "Factor is exactly singular"
             continue

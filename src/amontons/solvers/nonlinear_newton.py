@@ -80,6 +80,14 @@ class NonlinearProblem(Protocol):
         ...
 
 
+class Crossing(Protocol):
+    """Leads on from where load steps end."""
+
+    def across(self, problem: Any, share: float, v: Array, target: Target) -> tuple[Array, str]:
+        """(state at the whole load, what happened on the way); Breakdown where it can not."""
+        ...
+
+
 @dataclass(frozen=True)
 class NonlinearNewton:
     """The method for large deformations."""
@@ -88,6 +96,7 @@ class NonlinearNewton:
     patience: int = 12  # Newton steps without halving the residual before the load step is cut
     smallest_share: float = 1e-4  # of the load in one load step
     linear: LinearSolver = Direct()
+    crossing: Crossing | None = None  # what leads on where load steps end, see `PathCrossing`
 
     form: ClassVar[Form] = Form.GLOBAL
 
@@ -113,6 +122,9 @@ class NonlinearNewton:
         v = problem.known_state
         while True:
             if step < self.smallest_share:
+                if self.crossing is not None:
+                    v, told = self.crossing.across(problem, share, v, target)
+                    yield from shown.best(self._newton(problem, v, target), told)
                 raise Breakdown(
                     f"no equilibrium found beyond {share:.4g} of the load: {reason}"
                 )
@@ -225,12 +237,14 @@ class _Shown:
     size: float = np.inf
     waiting: int = 0
 
-    def best(self, steps: Iterator[tuple[Array, Array, float]]) -> Iterator[Iterate]:
+    def best(
+        self, steps: Iterator[tuple[Array, Array, float]], told: str = ""
+    ) -> Iterator[Iterate]:
         """The iterates whose |F| is the least so far."""
         for v, r, size in steps:
             self.waiting += 1
             if size < self.size:
-                yield Iterate(r, v, self.waiting, self.waiting)
+                yield Iterate(r, v, self.waiting, self.waiting, told)
                 self.size, self.waiting = size, 0
 
 
