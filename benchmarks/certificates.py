@@ -207,15 +207,17 @@ def main() -> None:
         results[name] = TABLES[name][0](arguments)
         kept.write_text(json.dumps(results, indent=1, default=str) + "\n")
     where = describe()
-    parts = ["# Certificates of uniqueness", "",
-             f"`python benchmarks/certificates.py`, {where['cpu']}, Python {where['python']}, "
-             f"numpy {where['numpy']}; CPU seconds on one thread.", "",
-             "Inequalities: linear matrix inequalities that were solved. Distance: bound of "
-             "what another solution can differ, relative to the largest reaction.", ""]  # fmt: skip
+    parts = [
+        "# Certificates of uniqueness",
+        f"`python benchmarks/certificates.py`, {where['cpu']}, Python {where['python']}, "
+        f"numpy {where['numpy']}; CPU seconds on one thread.",
+        "Inequalities: linear matrix inequalities that were solved. Distance: bound of what "
+        "another solution can differ, relative to the largest reaction.",
+    ]
     for name, (_, title) in TABLES.items():
         if name in results:
-            parts += [f"## {title}", "", table(results[name]), ""]
-    (RESULTS / "certificates.md").write_text("\n".join(parts))
+            parts += [f"## {title}", table(results[name])]
+    (RESULTS / "certificates.md").write_text("\n\n".join(parts) + "\n")
 
 
 if __name__ == "__main__":
