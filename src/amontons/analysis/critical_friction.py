@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from ..errors import InvalidInput
 from ..problem import FrictionProblem
-from .determinant_search import NEGATIVE, POSITIVE, STICK, STOPPED
+from .determinant_search import NEGATIVE, POSITIVE, STICK, STOPPED, UNKNOWN
 from .energy_bound import energy_bound
 from .exact_threshold import LARGEST, Threshold, exact_threshold, search_windows
 from .friction_branching import Branching, Leaf
@@ -35,6 +35,8 @@ from .status_pieces import Pieces
 Array = NDArray[np.float64]
 ENUMERATED = 13  # contacts up to which all 4^n patterns are examined: 5 s
 COMPARED = 10  # contacts up to which the P-matrix threshold is computed: 5^n patterns
+DIRECT = 18  # contacts up to which the whole gap is tried at once
+PATIENCE = 0.75  # part of the time left for one attempt
 EASY = 20.0  # contacts times the part of the upper bound that takes one matrix inequality
 FULL_CONTACT = 12  # contacts up to which the full contact threshold is: 3^n patterns
 
@@ -147,48 +149,58 @@ class _Search:
         self._branch()
 
     def _branch(self) -> None:
-        """Raise the lower bound by branch and bound, in steps that cost more and more."""
-        found, first = self.found, self.first
-        if first is not None and found.lower < first < min(found.upper, LARGEST):
-            left = self.deadline - time.perf_counter()
-            self._prove(first, self.deadline - left / 2)
-        part = min(EASY / self.pieces.contacts, 0.9)
-        while True:
-            cap = min(found.upper, LARGEST)
-            if found.lower >= cap * (1 - self.gap):
-                return
-            part = max(part, min(self._further(found.lower / cap, 0.1), 1 - self.gap / 2))
-            began = time.perf_counter()
-            if not self._prove(cap * part, self.deadline):
-                return
-            part = self._next(found.lower / min(found.upper, LARGEST), began)
+        """Raise the lower bound by branch and bound, in steps that cost more and more.
 
-    def _prove(self, t: float, deadline: float) -> bool:
-        """Prove that t is safe, or find a smaller upper bound; False where neither is done."""
-        found = self.found
-        branching = Branching(self.pieces, t, deadline)
+        An attempt gets PATIENCE of the time that is left; where it is stopped, a smaller one
+        follows.
+        """
+        found, first, n = self.found, self.first, self.pieces.contacts
+        if first is not None and found.lower < first < min(found.upper, LARGEST):
+            self._prove(first, 0.5)
+        if n <= DIRECT:
+            self._prove(min(found.upper, LARGEST) * (1 - self.gap / 2), 0.5)
+        failed, part = 1.0, min(EASY / n, 0.9)
+        while time.perf_counter() < self.deadline:
+            cap = min(found.upper, LARGEST)
+            lower = found.lower / cap
+            if lower >= 1 - self.gap or failed - lower < self.gap:
+                return
+            part = lower + 0.5 * (failed - lower) if part <= lower else part
+            began = time.perf_counter()
+            sign = self._prove(cap * part, PATIENCE)
+            if sign == UNKNOWN:
+                return
+            if sign == STOPPED:
+                failed, part = part, 0.5 * (lower + part)
+            else:
+                part = self._next(found.lower / min(found.upper, LARGEST), failed, began)
+
+    def _prove(self, t: float, share: float) -> int:
+        """Prove that t is safe in a share of the time that is left, or find a witness.
+
+        POSITIVE, NEGATIVE with a smaller upper bound, STOPPED, or UNKNOWN within rounding.
+        """
+        found, now = self.found, time.perf_counter()
+        branching = Branching(self.pieces, t, now + share * (self.deadline - now))
         sign = branching.run()
         found.seen += branching.patterns + branching.inequalities
         if sign == POSITIVE:
-            found.lower, self.criterion = t, "multipliers"
+            found.lower, self.criterion, self.reason = t, "multipliers", ""
             self.proof = tuple(leaf.of_problem(self.pieces) for leaf in branching.leaves)
-            return True
+            return POSITIVE
         states = branching.failed
         if states is not None and found.take(self.pieces, states):
-            return True
+            return NEGATIVE
         self.reason = "time is up" if sign == STOPPED else "a determinant is too near to zero"
-        return False
+        return STOPPED if sign == STOPPED else UNKNOWN
 
-    @staticmethod
-    def _further(part: float, step: float) -> float:
-        return part + step * (1 - part)
-
-    def _next(self, part: float, began: float) -> float:
+    def _next(self, part: float, failed: float, began: float) -> float:
         """The next part of the upper bound to prove: further on where the last one was easy."""
         now = time.perf_counter()
         spent, left = now - began, self.deadline - now
-        step = 0.8 if spent < 0.02 * left else 0.4 if spent < 0.1 * left else 0.2
-        further = self._further(part, step)
+        further = part + (0.35 if spent < 0.03 * left else 0.2) * (1 - part)
+        if failed < 1:
+            further = min(further, 0.5 * (part + failed))
         return 1 - self.gap / 2 if further > 1 - 3 * self.gap else further
 
 

@@ -1,0 +1,132 @@
+"""The critical friction: listed values, bounds on finer triangles, and 500 random problems.
+
+    python benchmarks/critical_friction.py [--limit 60] [--contacts 15,25,50] [--random 500]
+
+Seconds are those of the processor.  Random problems have up to four contacts, any definite W
+and any shape of friction; the truth is every determinant by numpy, and every proof and witness
+goes through the checker of the tests, which shares no code with the package.  Proofs by
+multipliers are asked for 2 % below the critical friction without enumerating more than one
+contact, and must be refused 2 % above it.
+
+Writes results/critical_friction.md beside this file.
+"""
+
+import os
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+from machine import describe
+
+import amontons as am
+from amontons.analysis import friction_branching
+from amontons.analysis.determinant_search import POSITIVE
+from amontons.analysis.friction_branching import Branching
+from amontons.analysis.status_pieces import Pieces
+from amontons.hild import hild_triangle
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE.parent / "tests" / "unit"))
+from uniqueness_checker import check_proof, check_witness, smallest_determinant  # noqa: E402
+
+LISTED = [2.2, 1.9324, 1.8517, 2.0263, 1.7949, 1.7287, 1.5792, 1.5488, 1.4672, 1.4403, 1.3766]
+
+
+def listed():
+    """Rows of the triangles with listed thresholds."""
+    am.critical_friction(hild_triangle(2))  # compiles
+    for n, value in enumerate(LISTED, 1):
+        problem = hild_triangle(n).assemble().condensed()
+        began = time.process_time()
+        found = am.critical_friction(problem)
+        spent = time.process_time() - began
+        p_matrix = "" if found.p_matrix is None else f"{found.p_matrix:.4f}"
+        full = f"{found.full_contact:.4f}"
+        bounds = f"{found.lower:.6f} | {found.upper:.6f} | {p_matrix} | {full}"
+        yield f"| {n} | {value} | {bounds} | {found.witness.pattern} | {spent:.2f} |"
+
+
+def finer(sizes, limit):
+    """Rows of larger triangles."""
+    for n in sizes:
+        problem = hild_triangle(n).assemble().condensed()
+        began = time.process_time()
+        found = am.critical_friction(problem, time_limit=limit)
+        spent = time.process_time() - began
+        bounds = f"{found.lower:.4f} | {found.upper:.4f} | {found.lower / found.upper:.3f}"
+        yield f"| {n} | {bounds} | {len(found.proof)} | {spent:.1f} |"
+
+
+def random_problem(seed):
+    """Any definite W, strongly or weakly coupled, in any unit."""
+    random = np.random.default_rng(seed)
+    nc = int(random.integers(1, 5))
+    A = random.standard_normal((2 * nc, 2 * nc))
+    W = A @ A.T / nc + np.diag(random.uniform(0.01, 3, 2 * nc)) * 10 ** random.uniform(-2, 0.5)
+    mu = random.uniform(0.1, 2.0, nc)
+    mu[random.random(nc) < 0.15] = 0.0
+    W *= 10 ** random.uniform(-4, 4)
+    return am.FrictionProblem.from_delassus(W, random.standard_normal((nc, 2)), mu)
+
+
+def wrong(problem):
+    """What is wrong with the answers on a small problem: an empty list."""
+    faults = []
+    W, mu = problem.W, problem.mu
+    shape = mu / mu.max() if mu.max() > 0 else np.ones_like(mu)
+    found = am.critical_friction(problem)
+    if smallest_determinant(W, found.lower * shape) <= 0:
+        faults.append("lower bound is not safe")
+    if np.isinf(found.upper):
+        if smallest_determinant(W, 0.99e4 * shape) <= 0:
+            faults.append("a singular piece was missed")
+        return faults
+    if smallest_determinant(W, found.upper * (1 + 1e-5) * shape) >= 0:
+        faults.append("upper bound is not singular")
+    if not check_witness(W, shape, found.witness, found.upper):
+        faults.append("witness refused")
+    if found.lower < found.upper * (1 - 1e-3):
+        faults.append("bounds are apart")
+    pieces = Pieces.of(problem)
+    safe, unsafe = (Branching(pieces, part * found.upper, np.inf) for part in (0.98, 1.02))
+    scaled = pieces.W, pieces.shape
+    if safe.run() != POSITIVE or not check_proof(scaled[0], safe.t * scaled[1], safe.leaves):
+        faults.append("no proof below")
+    if unsafe.run() == POSITIVE:
+        faults.append("proof above")
+    return faults
+
+
+def main():
+    """All tables."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--limit", type=float, default=60.0)
+    parser.add_argument("--contacts", default="15,25,50")
+    parser.add_argument("--random", type=int, default=500)
+    options = parser.parse_args()
+    sizes = [int(n) for n in options.contacts.split(",") if n]
+    command = f"`python benchmarks/critical_friction.py`, {describe()}"
+    lines = ["# Critical friction", "", command, "",
+             "Structured triangles of `example:hild`, against the listed values.", "",
+             "| contacts | listed | lower | upper | P-matrix | full contact | witness | s |",
+             "|---|---|---|---|---|---|---|---|", *listed(), ""]  # fmt: skip
+    lines += [f"Finer ones, at most {options.limit:g} s each (wall time).", "",
+              "| contacts | lower | upper | ratio | groups of patterns | s |",
+              "|---|---|---|---|---|---|", *finer(sizes, options.limit), ""]  # fmt: skip
+    friction_branching.ENUMERATED = 1
+    faults = [(seed, wrong(random_problem(seed))) for seed in range(options.random)]
+    bad = [f"{seed}: {', '.join(what)}" for seed, what in faults if what]
+    lines.append(f"{options.random} random problems, {len(bad)} with a fault.")
+    lines += [f"- {line}" for line in bad]
+    text = "\n".join(lines) + "\n"
+    print(text)
+    (HERE / "results" / "critical_friction.md").write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
