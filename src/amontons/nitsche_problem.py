@@ -94,17 +94,18 @@ class NitscheMatrices:
         """Factor of the matrix of the energy norm."""
         if self.held:
             return Direct().factor(self.M)
-        return self._with_springs(self.weights * self.stiffness)
+        return Direct().factor(sparse.csc_array(self.M + self.springs))
 
     @cached_property
     def bonded(self) -> Factor:
         """Factor of M + H rho H^T: all points bonded to the other side."""
-        return self._with_springs(self.rho)
+        stiff = self.H @ self._each(self.rho) @ self.H.T
+        return Direct().factor(sparse.csc_array(self.M + stiff))
 
-    def _with_springs(self, springs: Array) -> Factor:
-        return Direct().factor(
-            sparse.csc_array(self.M + self.H @ self._each(springs) @ self.H.T)
-        )
+    @cached_property
+    def springs(self) -> sparse.csc_array:
+        """H (omega c) H^T, (n, n): springs at all points, as stiff as the cells behind them."""
+        return sparse.csc_array(self.H @ self._each(self.weights * self.stiffness) @ self.H.T)
 
 
 @dataclass(frozen=True, eq=False)

@@ -347,7 +347,9 @@ def test_case_file_to_results(method, tmp_path, monkeypatch):
     )
     facts = CliRunner().invoke(main, ["info", "case.toml", "--json", "-"])
     assert json.loads(facts.output)["form"] == "nitsche"
-    for command in (["enumerate", "case.toml"], ["convert", "case.toml", "case.hdf5"]):
+    for command in (["enumerate", "case.toml"], ["convert", "case.toml", "case.hdf5"],
+                    ["solve", "case.toml", "--uniqueness"], ["uniqueness", "case.toml"],
+                    ["follow", "case.toml"]):  # fmt: skip
         refused = CliRunner().invoke(main, command)
         assert refused.exit_code == 2
         assert "nodal" in refused.stderr
@@ -397,3 +399,25 @@ def test_dynamics_and_exchange_files_refuse(tmp_path):
     with pytest.raises(UnsupportedForm, match="nodal"):
         am.write_fclib(block().discrete_problem(), tmp_path / "a.hdf5")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("poisson", [0.45, 0.48, 0.49])
+@pytest.mark.parametrize("options", VARIANTS)
+def test_friction_alone_holds_a_block_that_wants_to_spread(poisson, options):
+    """Points slip to both sides of one that sticks: Newton's tangents are nearly singular."""
+    model = am.Model(
+        [am.Body(am.box((1.3, 0.9), (5, 7), "tri"), am.LinearElastic(200, poisson))],
+        loads=[am.Traction("top", (0.18, -2.0))],
+        contacts=[am.Contact("bottom", am.Plane((0, 1)), mu=0.2, method="nitsche")],
+    )
+    solution = am.solve(by_nitsche(model, **options))
+    assert solution.resultant == pytest.approx([-0.18 * 1.3, 2.0 * 1.3])
+    assert {"+", "-"} <= set(solution.pattern)
+
+
+def test_overload_is_not_called_converged():
+    """More shear than friction can carry: no solution, and the reason is named."""
+    model = block(mu=0.2, supports=[], loads=[am.Traction("top", (0.3, -1.0))])
+    solution = am.solve(model, check=False, max_iterations=100)
+    assert not solution.converged
+    assert "no solution" in solution.convergence.detail

@@ -14,6 +14,7 @@ from .. import api, output
 from ..analysis.uniqueness import Uniqueness, assess, quick_verdict
 from ..case import in_words
 from ..errors import FileFormatError, InvalidInput, SingularOperator, UnsupportedForm
+from ..nitsche_problem import NO_MULTIPLIERS
 from ..results import ModelSolution
 from ..solution import FrictionSolution, Outcome
 from .group import INTERRUPTED
@@ -75,8 +76,13 @@ def _output(
 def _verdict(found: FrictionSolution | ModelSolution, full: bool) -> Uniqueness | None:
     """The verdict, or its cheap part; None where the problem is too large for that.
 
-    None also for large deformations: that of the tangent problem would say little.
+    None also for large deformations: that of the tangent problem would say little; and for
+    Nitsche's method, which has no reactions to speak of.
     """
+    if isinstance(found, ModelSolution) and found.model.contacts[0].nitsche is not None:
+        if full:
+            raise UnsupportedForm(f"--uniqueness: {NO_MULTIPLIERS}")
+        return None
     if isinstance(found, ModelSolution) and found.model.is_large:
         if full:
             raise UnsupportedForm("--uniqueness: there is no verdict on large deformations")
@@ -91,7 +97,8 @@ def _report(
     result: output.Output, verdict: Uniqueness | None, full: bool, folder: Path
 ) -> None:
     click.echo(in_words(output.describe(result)))
-    if not (result.model is not None and result.model.is_large):
+    model = result.model
+    if model is None or not (model.is_large or model.contacts[0].nitsche is not None):
         click.echo(describe(verdict) if full and verdict is not None else brief(verdict))
     click.echo(f"results in {folder}/")
 

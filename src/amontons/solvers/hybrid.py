@@ -11,8 +11,7 @@
     global form, W dear             `CompressedDelassus`, then semismooth Newton without W, then
                                     the Delassus form after all if W fits into memory
     global form, M singular         semismooth Newton with a factor of the whole system
-    Nitsche's method                Newton, then with the friction bound settled apart
-                                    (`nitsche_newton`)
+    Nitsche's method                Newton, then proximal points (`nitsche_newton`)
 
 A mesh is what has levels or rigid modes (`FrictionProblem.levels`, `near_nullspace`).
 

@@ -3,9 +3,14 @@
     dF/dv dv = -F(v),   v <- v + t dv,   t by a line search on |F|_*, the norm of the judge.
 
 F is piecewise smooth (without friction, or in 2D, piecewise linear), [R]; full steps end after
-a few pieces or cycle.  Where friction makes them cycle or climb, `settled` takes its bound from
-the last solution instead (Tresca's law): the law is then a projection onto fixed disks, a
-monotone map, and Newton's method with a line search goes down to its solution.
+a few pieces or cycle.  Where they make no way, as for bodies that friction alone holds, whose
+tangents are nearly singular, `proximal` adds springs at all contact points that are relaxed at
+the last solution v_k (the proximal point method),
+
+    F(v) + firmness springs (v - v_k) = 0,
+
+solves this by Newton's method with a line search, and goes on from there with softer springs,
+or stiffer ones where that failed.
 
 [R] Y. Renard, "Generalized Newton's methods for the approximation and resolution of frictional
 contact problems in elasticity", Comput. Methods Appl. Mech. Eng. 256 (2013).
@@ -14,22 +19,23 @@ contact problems in elasticity", Comput. Methods Appl. Mech. Eng. 256 (2013).
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
-from ..cones import Coulomb, Tresca
+from ..errors import SingularOperator
 from ..linear import Direct, LinearSolver
 from ..nitsche_problem import NitscheProblem
 from .base import Breakdown, Iterate, Patience, Target
 from .line_search import Armijo, LineSearch
 
 Array = NDArray[np.float64]
-STALLED = 12  # Newton steps without halving the residual after which friction is settled apart
-WITHIN = 0.1  # residual of a problem with given friction, relative to that of its start
-GIVEN_STEPS = 30  # Newton steps of such a problem
-ROUNDS = (0, 2, 5, 10, 20, 50, 100)  # such problems before each try of Newton's method
+STALLED = 12  # Newton steps without halving the residual after which springs are added
+FIRMNESS = 0.1  # of the first springs, relative to the cells behind the surface
+CHANGE, STIFFEST = 5.0, 1e6  # factor between two of them; the largest one
+INNER = 0.1  # residual of a problem with springs, relative to that of its start
+QUICK, INNER_STEPS = 4, 15  # Newton steps after which springs get softer, or stiffer
 REPEATED = 1e-12  # relative difference of residuals below which steps go round in circles
 
 
@@ -66,21 +72,20 @@ def _next(
 def robust_iterates(
     problem: NitscheProblem, start: Iterate, target: Target
 ) -> Iterator[Iterate]:
-    """What Auto does: Newton, with settled friction before the next try when that stalls."""
+    """What Auto does: Newton with a line search, and proximal points where that stalls."""
     best = [start]
-    for rounds in ROUNDS:
-        for iterate in islice(settled(problem, best[0], target), rounds):
-            best[0] = iterate
-            yield iterate
-        yield from _while_falling(problem, best)
+    yield from _while_falling(problem, newton_iterates(problem, start, Armijo(), None), best)
+    yield from proximal_iterates(problem, best[0])
 
 
-def _while_falling(problem: NitscheProblem, best: list[Iterate]) -> Iterator[Iterate]:
-    """Newton steps from best[0] as long as the residual falls; best[0] becomes the best."""
+def _while_falling(
+    problem: NitscheProblem, iterates: Iterator[Iterate], best: list[Iterate]
+) -> Iterator[Iterate]:
+    """Iterates from best[0] as long as the residual falls; best[0] becomes the best."""
     error = problem.error(best[0].r, best[0].v)
     patience, seen = Patience(STALLED, mark=error), [error]
     try:
-        for iterate in newton_iterates(problem, best[0], Armijo(), None):
+        for iterate in iterates:
             new = problem.error(iterate.r, iterate.v)
             if new < error:
                 error, best[0] = new, iterate
@@ -92,19 +97,40 @@ def _while_falling(problem: NitscheProblem, best: list[Iterate]) -> Iterator[Ite
         return
 
 
-def settled(problem: NitscheProblem, start: Iterate, target: Target) -> Iterator[Iterate]:
-    """Newton for the friction bound of the last solution, the bound renewed each time."""
-    law = problem.law
-    v = problem.guess if start.v is None else start.v
-    if not isinstance(law, Coulomb):
-        return
-    while True:
-        bound = law.bound(problem.reaction(v))
-        given = problem.with_law(Tresca(bound))
-        goal = WITHIN * given.size(given.residual(v))
-        values: list[float] = []
-        for _ in range(GIVEN_STEPS):
-            v = _next(given, v, Armijo(), Direct(), values)
-            if given.size(given.residual(v)) <= goal or target.seconds_left <= 0:
-                break
-        yield Iterate(problem.reaction(v), v, len(values), stage="settled friction")
+def proximal_iterates(problem: NitscheProblem, start: Iterate) -> Iterator[Iterate]:
+    """Solutions with springs relaxed at the one before; Breakdown where none is found."""
+    v, firmness = problem.guess if start.v is None else start.v, FIRMNESS
+    size = problem.size(problem.residual(v))
+    while firmness <= STIFFEST:
+        found, steps = _with_springs(problem, v, firmness, INNER * size)
+        if found is None:
+            firmness *= CHANGE
+            continue
+        v, size = found, problem.size(problem.residual(found))
+        if steps <= QUICK:
+            firmness /= CHANGE
+        yield Iterate(problem.reaction(v), v, steps, stage="proximal point")
+    raise Breakdown("no springs at the contact make a problem that Newton's method solves")
+
+
+def _with_springs(
+    problem: NitscheProblem, v0: Array, firmness: float, goal: float
+) -> tuple[Array | None, int]:
+    """v with |F(v) + firmness springs (v - v0)|_* <= goal, or None; number of Newton steps."""
+    springs = firmness * problem.matrices.springs
+
+    def size(v: Array) -> float:
+        return problem.size(problem.residual(v) + springs @ (v - v0))
+
+    v, values = v0, [size(v0)]
+    for count in range(1, INNER_STEPS + 1):
+        right = problem.residual(v) + springs @ (v - v0)
+        try:
+            step = Direct().factor(sparse.csc_array(problem.tangent(v) + springs)).solve(-right)
+        except SingularOperator:
+            return None, count
+        v = v + Armijo().length(lambda t, v=v, step=step: size(v + t * step), values) * step
+        values.append(size(v))
+        if values[-1] <= goal:
+            return v, count
+    return None, INNER_STEPS
