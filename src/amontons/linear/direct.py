@@ -8,6 +8,7 @@ tried on a known right-hand side before it is trusted.
 from __future__ import annotations
 
 import importlib.util
+import os
 import warnings
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, wait
@@ -176,6 +177,8 @@ def _pardiso(matrix: sparse.csc_array, threads: int) -> Solve:
     import pypardiso
 
     solver = pypardiso.PyPardisoSolver()
+    # without this every further solver searches the disk for the library, a tenth of a second
+    os.environ.setdefault("PYPARDISO_MKL_RT", solver.libmkl._name)
     rows = sparse.csr_matrix(matrix)
     solver.factorize(rows)
     return lambda b: solver.solve(rows, np.asfortranarray(b, dtype=float))
