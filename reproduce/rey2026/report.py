@@ -85,7 +85,7 @@ def enumeration(record: Mapping) -> list[str]:
              "|---|---|---|---|"]  # fmt: skip
     for n_c, one in record.items():
         runs = [
-            f"{count:g} at {first:g}" + (f" to {last:g}" if last > first else "")
+            f"{count:g} for {first:g}" + (f" to {last:g}" if last > first else "")
             for first, last, count in one["runs"]
         ]
         proved = "all" if one["complete"] else "not all"
