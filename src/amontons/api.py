@@ -183,9 +183,7 @@ def uniqueness(
     of them at most for the bounds on the critical friction.  The verdict is undecided, with the
     reason, where there is neither a proof nor a second solution.
     """
-    if not (isinstance(problem, FrictionProblem) or hasattr(problem, "assemble")):
-        raise InvalidInput(f"problem: expected a Model or a FrictionProblem, got {problem!r}")
-    discrete = problem if isinstance(problem, FrictionProblem) else problem.assemble()
+    discrete = _discrete(problem)
     found = solution.solution if isinstance(solution, ModelSolution) else solution
     from .analysis.uniqueness import assess
 
@@ -198,14 +196,11 @@ def critical_friction(
     """Bounds on the friction below which every load of a 2D problem has exactly one solution.
 
     gap: relative distance of the bounds that is good enough.  time_limit: seconds.  Exact up to
-    some 13 contacts.  Raises UnsupportedForm in 3D and under Tresca's law.
+    13 contacts.  Raises UnsupportedForm in 3D and under Tresca's law.
     """
-    if not (isinstance(problem, FrictionProblem) or hasattr(problem, "assemble")):
-        raise InvalidInput(f"problem: expected a Model or a FrictionProblem, got {problem!r}")
-    discrete = problem if isinstance(problem, FrictionProblem) else problem.assemble()
     from .analysis.critical_friction import critical_friction as bounds
 
-    return bounds(discrete, gap=gap, time_limit=time_limit)
+    return bounds(_discrete(problem), gap=gap, time_limit=time_limit)
 
 
 def solve_any_form(

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cones import Tresca
-from ..errors import InvalidInput, SingularOperator, UnsupportedForm
+from ..errors import InvalidInput, SingularOperator
 from ..problem import FrictionProblem
 from ..solution import FrictionSolution
 from ..solve import drive
@@ -23,7 +23,6 @@ from .critical_friction import CriticalFriction, Witness, critical_friction
 from .energy_bound import energy_bound
 from .enumerate import PieceSolution, enumerate_solutions
 from .load_certificate import LoadCertificate, LoadOutcome, certify_load
-from .multistart import multistart
 from .status_pieces import friction_shape
 
 Array = NDArray[np.float64]
@@ -31,7 +30,6 @@ ENUMERATED = 25  # contacts up to which all solutions are looked for before a ce
 INSTANT = 8  # contacts up to which the quick verdict examines all patterns: milliseconds
 QUICK = 400  # rows of W up to which the quick verdict is given: some ten milliseconds
 BOUNDS = 0.5  # part of the time for the bounds on the critical friction
-STARTS = 200  # of Newton's method in 3D
 SAME = 1e-6  # distance of two solutions that count as one, relative to their size
 
 
@@ -100,9 +98,15 @@ def assess(
     if not time_limit > 0:
         raise InvalidInput(f"time_limit: expected seconds > 0, got {time_limit!r}")
     began = time.perf_counter()
+    try:
+        local = problem.condensed()
+    except (SingularOperator, InvalidInput) as reason:  # no W, or too large for the memory
+        friction = 0.0 if isinstance(problem.law, Tresca) else problem.mu.max(initial=0.0)
+        spent = time.perf_counter() - began
+        return Uniqueness(Verdict.UNDECIDED, float(friction), 0.0, np.inf, "none",
+                          _sentence(str(reason)), seconds=spent)  # fmt: skip
     if isinstance(problem.law, Tresca):
-        return _given_friction(problem, began)
-    local = problem.condensed()
+        return _given_friction(local, began)
     verdict = _every_load(local, began + BOUNDS * time_limit)
     if verdict.verdict is Verdict.UNDECIDED:
         verdict = _this_load(local, solution, verdict, began + time_limit)
@@ -118,12 +122,12 @@ def quick_verdict(problem: FrictionProblem) -> Uniqueness | None:
     if problem.contacts * problem.dimension > QUICK or not problem.condensing_is_cheap:
         return None
     began = time.perf_counter()
-    if isinstance(problem.law, Tresca):
-        return _given_friction(problem, began)
     try:
         local = problem.condensed()
     except SingularOperator:  # contact alone holds a body
         return None
+    if isinstance(problem.law, Tresca):
+        return _given_friction(local, began)
     verdict = _by_energy(local)
     if verdict.verdict is Verdict.UNDECIDED and _is_small(local):
         verdict = _by_bounds(verdict, critical_friction(local, time_limit=1.0))
@@ -135,14 +139,13 @@ def _is_small(local: FrictionProblem) -> bool:
 
 
 # ------------------------------------------------------------------- every load
-def _given_friction(problem: FrictionProblem, began: float) -> Uniqueness:
-    """Tresca's law: the solution minimises a convex energy, strictly where W is definite."""
-    local = problem.condensed()
+def _given_friction(local: FrictionProblem, began: float) -> Uniqueness:
+    """Tresca's law is monotone: one solution where W is definite."""
     shape = np.ones(local.contacts)
     definite = local.contacts == 0 or energy_bound(_dense(local), shape)[0] > 0
     verdict = Verdict.UNIQUE_EVERY_LOAD if definite else Verdict.UNDECIDED
     reason = (
-        "With given friction bounds it minimises a strictly convex energy."
+        "With given friction bounds the law is monotone, and W is definite."
         if definite
         else "W is singular: reactions may not be unique."
     )
@@ -214,8 +217,6 @@ def _this_load(
         return replace(verdict, reason=f"{verdict.reason} {reason}")
     try:
         found = certify_load(local, solution, time_limit=_left(deadline))
-    except UnsupportedForm:
-        return _by_starts(local, solution, verdict, deadline)
     except InvalidInput as reason:  # a solution that is not accurate enough
         return replace(verdict, reason=f"{verdict.reason} {reason}.")
     if found.outcome is LoadOutcome.CERTIFIED:
@@ -242,20 +243,6 @@ def _by_enumeration(
         reason = f"{count[0].upper()}{count[1:]}: {', '.join(x.pattern for x in s[:5])}."
         return _refuted(verdict, other, s[0].u, reason)
     return None
-
-
-def _by_starts(
-    local: FrictionProblem, solution: FrictionSolution, verdict: Uniqueness, deadline: float
-) -> Uniqueness:
-    """A second solution from many starts, or none."""
-    found = multistart(local, starts=STARTS, time_limit=_left(deadline))
-    size = SAME * max(float(np.abs(solution.r).max(initial=0.0)), np.finfo(float).tiny)
-    others = [s for s in found.solutions if np.abs(s.r - solution.r).max() > size]
-    if others:
-        reason = "It was found from another start."
-        return _refuted(verdict, others[0], solution.u, reason)
-    reason = f"{verdict.reason} Newton's method from {STARTS} starts found no other."
-    return replace(verdict, reason=reason)
 
 
 def _refuted(
