@@ -30,7 +30,8 @@ Array = NDArray[np.float64]
 EXACT = 1e-13  # error of a reference relative to its size, scaled, as Newton's method ends
 ROUNDING = 1e-13  # of a slack relative to its terms
 ROUNDS = 4  # of further directions of slip
-SHIFTS = (0.0, 0.01, 0.09, 0.4)  # of forms that are positive between samples, part of the room
+# how much a form that is positive between samples is lowered, in parts of what all V may be
+SHIFTS = (0.0, 0.01, 0.09, 0.4, 1.5, 6.0)
 TRIES = 3  # multipliers of one search that are looked at
 
 
