@@ -5,8 +5,8 @@ d_rN d_uN <= 0 and tangents d_rT d_uT <= mu |d_rN| |d_uT|, also with friction di
 
     d_r W d_r <= sum mu |d_rN| |d_uT| <= sum mu/2 (alpha d_rN^2 + d_uT^2 / alpha),
 
-and d = 0 where W - mu/2 (alpha N'N + (TW)'(TW) / alpha) is positive definite.  With
-lambda_A = |N W^-1 N'|, lambda_B = |T W T'| that is so below 1 / sqrt(lambda_A lambda_B).
+one alpha per contact, and d = 0 where W - mu/2 (N' alpha N + (TW)' (TW) / alpha) is positive
+definite.  Tried are alpha in proportion to powers of |W_ii|.
 """
 
 from __future__ import annotations
@@ -15,54 +15,80 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cholesky, solve_triangular
 
-from .rounding import EPSILON, is_positive_definite
+from .rounding import EPSILON, is_positive_definite, unit_scale
 
 Array = NDArray[np.float64]
+POWERS = (0.0, 0.5, 1.0)  # of |W_ii|, to which alpha is proportional
 
 
-def energy_bound(W: Array, shape: Array) -> tuple[float, float]:
-    """(t, alpha): at friction t shape every load has exactly one solution; t = 0 is no bound.
+def energy_bound(W: Array, shape: Array) -> tuple[float, Array]:
+    """(t, alpha (k,)): at friction t shape every load has one solution; t = 0 is no bound.
 
-    W (k d, k d), shape (k,).  Proved in spite of rounding, for W as given.
+    W (k d, k d), shape (k,).  Proved in spite of rounding, for W as given.  Contacts that can
+    not react, with W_ii = 0, are left out; their alpha is 1.
     """
     k = len(shape)
     d = len(W) // max(k, 1)
-    if not k:
-        return np.inf, 1.0
-    symmetric = (W + W.T) / 2
-    normal = np.arange(k) * d
-    tangent = np.setdiff1d(np.arange(k * d), normal)
-    weight = np.sqrt(shape)
+    own = np.arange(k)
+    size = np.linalg.norm(W.reshape(k, d, k, d)[own, :, own], axis=(1, 2))
+    able = size > 0
+    if not able.any():
+        return np.inf, np.ones(k)
+    rows = np.flatnonzero(np.repeat(able, d))
+    W, shape, size = W[np.ix_(rows, rows)], shape[able], size[able]
     try:
-        root = cholesky(symmetric, lower=True)
+        root = cholesky((W + W.T) / 2, lower=True)
     except LinAlgError:
-        return 0.0, 1.0
-    to_energy = solve_triangular(root, np.eye(k * d), lower=True)
-    A = to_energy[:, normal] * weight  # |A y|^2 = sum shape r_N^2, W = 1 in these coordinates
-    B = (W[tangent] @ to_energy.T) * np.repeat(weight, d - 1)[:, None]
+        return 0.0, np.ones(k)
+    to_energy = solve_triangular(root, np.eye(len(W)), lower=True)
+    best, chosen = 0.0, np.ones(len(size))
+    for power in POWERS:
+        t, alpha = _estimate(W, shape, to_energy, (size / size.max()) ** power)
+        if t > best:
+            best, chosen = t, alpha
+    whole = np.ones(k)
+    whole[able] = chosen
+    for room in (1e-9, 1e-6, 1e-3, 1e-1):
+        if best > 0 and _holds(W, shape, best * (1 - room), chosen):
+            return best * (1 - room), whole
+    return 0.0, whole
+
+
+def _estimate(W: Array, shape: Array, to_energy: Array, relative: Array) -> tuple[float, Array]:
+    """(t, alpha) with alpha in the given proportions, not proved.
+
+    W = 1 in the coordinates y = L^T r of its Cholesky factor L.
+    """
+    normal, tangent = _directions(W, shape)
+    weight = np.sqrt(shape * relative)
+    A = to_energy[:, normal] * weight
+    other = np.repeat(np.sqrt(shape / relative), len(tangent) // len(normal))
+    B = (W[tangent] @ to_energy.T) * other[:, None]
     size_a, size_b = np.linalg.norm(A, 2) ** 2, np.linalg.norm(B, 2) ** 2
     if not (size_a > 0 and size_b > 0):
-        return 0.0, 1.0
+        return 0.0, relative
     alpha = float(np.sqrt(size_b / size_a))
     largest = float(np.linalg.norm(np.vstack([A.T * np.sqrt(alpha), B / np.sqrt(alpha)]), 2))
-    for room in (1e-9, 1e-6, 1e-3, 1e-1):
-        t = 2 / largest**2 * (1 - room)
-        if _holds(W, shape, t, alpha):
-            return t, alpha
-    return 0.0, alpha
+    return 2 / largest**2, alpha * relative
 
 
-def _holds(W: Array, shape: Array, t: float, alpha: float) -> bool:
+def _directions(W: Array, shape: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Rows of normals and of tangents."""
+    d = len(W) // len(shape)
+    normal = np.arange(len(shape)) * d
+    return normal, np.setdiff1d(np.arange(len(W)), normal)
+
+
+def _holds(W: Array, shape: Array, t: float, alpha: Array) -> bool:
     """True when the matrix of the module docstring is positive definite, proved."""
-    k = len(shape)
-    d = len(W) // k
-    normal = np.arange(k) * d
-    tangent = np.setdiff1d(np.arange(k * d), normal)
+    normal, tangent = _directions(W, shape)
     half = 0.5 * t * shape
     rows = W[tangent]
-    weight = np.repeat(half, d - 1)[:, None] / alpha
+    weight = np.repeat(half / alpha, len(tangent) // len(normal))[:, None]
     M = (W + W.T) / 2 - rows.T @ (weight * rows)
     M[normal, normal] -= half * alpha
     size = np.abs(W + W.T) / 2 + np.abs(rows.T) @ (weight * np.abs(rows))
     size[normal, normal] += half * alpha
-    return is_positive_definite((M + M.T) / 2, (k * d + 8) * EPSILON * size)
+    scale = unit_scale(M)
+    M = (M + M.T) / 2 * scale[:, None] * scale
+    return is_positive_definite(M, (len(W) + 8) * EPSILON * size * scale[:, None] * scale)
