@@ -25,6 +25,7 @@ from scipy.sparse.linalg import splu
 from .path import Matrix, PathProblem, weight_of
 
 Array = NDArray[np.float64]
+ROUNDED = 1e-12  # residual of a trial solve, relative, of a factor that is good enough
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +159,12 @@ class Curve:
 
 
 class Factored:
-    """LU factors of a dense or sparse matrix; raises LinAlgError for a singular one."""
+    """LU factors of a dense or sparse matrix; raises LinAlgError for a singular one.
+
+    Of a sparse one the last row and column are kept apart, and the rest is factorised: in a
+    bordered matrix they are full and would fill the factors.  Where the rest is singular, as at
+    a smooth fold, the whole is factorised.
+    """
 
     def __init__(self, matrix: Matrix) -> None:
         self._dense = isinstance(matrix, np.ndarray)
@@ -169,17 +175,51 @@ class Factored:
             if info > 0:
                 raise np.linalg.LinAlgError("the matrix is singular")
         else:
-            try:
-                self._factor: Any = splu(sparse.csc_array(matrix))
-            except RuntimeError as reason:  # "Factor is exactly singular"
-                raise np.linalg.LinAlgError(str(reason)) from reason
+            self._matrix = sparse.csc_array(matrix)
+            self._split = len(self._matrix.indptr) > 2 and self._apart()
+            if not self._split:
+                self._factorise_whole()
+
+    def _apart(self) -> bool:
+        """Factorise all but the last row and column; False where that is singular."""
+        A = self._matrix
+        column, row = A[:-1, [-1]].toarray().ravel(), A[[-1], :-1].toarray().ravel()
+        try:
+            self._factor: Any = splu(sparse.csc_array(A[:-1, :-1]), permc_spec="MMD_AT_PLUS_A")
+        except RuntimeError:
+            return False
+        self._z, self._row = self._factor.solve(column), row
+        self._corner = float(A[-1, -1] - row @ self._z)
+        trial = np.cos(np.arange(len(A.indptr) - 1.0))
+        size = float((abs(A) @ np.abs(trial)).max())
+        answer = self._solve_split(A @ trial)
+        if not np.isfinite(answer).all():
+            return False
+        return float(np.abs(A @ (trial - answer)).max()) <= ROUNDED * size
+
+    def _factorise_whole(self) -> None:
+        try:
+            self._factor = splu(self._matrix)
+        except RuntimeError as reason:  # "Factor is exactly singular"
+            raise np.linalg.LinAlgError(str(reason)) from reason
+
+    @np.errstate(all="ignore")  # a singular rest shows in the trial solve
+    def _solve_split(self, right: Array) -> Array:
+        """By block elimination, refined once."""
+        answer = self._eliminated(right)
+        return answer + self._eliminated(right - self._matrix @ answer)
+
+    def _eliminated(self, right: Array) -> Array:
+        x = self._factor.solve(right[:-1])
+        last = (right[-1] - self._row @ x) / self._corner
+        return np.concatenate([x - np.multiply.outer(self._z, last), np.asarray(last)[None]])
 
     def solve(self, right: Array) -> Array:
         """The solution, finite."""
         if self._dense:
             answer = lapack.dgetrs(self._lu, self._pivots, right)[0]
         else:
-            answer = self._factor.solve(right)
+            answer = (self._solve_split if self._split else self._factor.solve)(right)
         if not np.isfinite(answer).all():
             raise np.linalg.LinAlgError("the matrix is singular")
         return answer
@@ -192,6 +232,7 @@ class Factored:
             return int(np.sign(np.diagonal(self._lu)).prod()) * (-1) ** moved
         factor = self._factor
         signs = np.sign(factor.U.diagonal()).prod()
+        signs *= np.sign(self._corner) if self._split else 1.0
         return int(signs * _parity(factor.perm_r) * _parity(factor.perm_c))
 
 
