@@ -287,8 +287,9 @@ class Inequality:
             proofs.append(proof)
             return True
 
+        share = 1.0 if self.local.contacts > LARGEST else 0.5
         if self.large and shared_multipliers(
-            self.local, self.branch, self.groups, accept, time_limit=time_limit / 2
+            self.local, self.branch, self.groups, accept, time_limit=share * time_limit
         ):
             return proofs[-1]
         if self.local.contacts > LARGEST:
