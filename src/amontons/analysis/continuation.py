@@ -29,11 +29,12 @@ from ..errors import InvalidInput
 from .corrector import Curve, Spot, Tolerances
 from .first_order import Tangent, first_order
 from .path import Event, EventKind, PathProblem, Point, Stop, name_of
-from .tangent_switch import switched_tangent
+from .tangent_switch import nearest_tangent, switched_tangent
 
 Array = NDArray[np.float64]
 WITHIN, ACROSS = 0.999, 0.99999  # cosines inside of a piece, and where kinks may come
 LOCATED = 1e-3  # margin of a located border, relative to the one that counts as zero
+BEHIND = 1e-9  # distance from a kink at which its next piece has begun
 MOST_KINKS = 20  # passed at one point before the walk ends
 PIECES = ("residual_of", "jacobian_of", "margins", "pieces")
 
@@ -413,7 +414,8 @@ class _Walk:
         if self.by_pieces:
             self.curve = Curve(self.problem, len(self.spot.y), self.piece)
         ty, tp = self.curve.unit(tangent.direction, tangent.rate)
-        self.spot, self.sign = Spot(self.spot.y, self.spot.p, ty, tp), 0
+        old = self.spot
+        self.spot, self.sign = Spot(old.y, old.p, ty, tp, old.sign), 0
 
     def _orientation(self, piece: Any, rate: float) -> int:
         from .corrector import determinant_sign
@@ -432,8 +434,9 @@ class _Walk:
         before, low, high = self.piece, 0.0, step
         last: Spot | None = None
         beyond: Spot | None = None
-        for _ in range(60):
-            h = (low + high) / 2
+        for k in range(60):
+            # first just behind the last kink, which lies there but for rounding
+            h = min(BEHIND, high / 2) if k == 0 else (low + high) / 2
             found = self._corrected(h)
             if found is not None and not self._leaves(found[0]):
                 low, last = h, found[0]
@@ -449,6 +452,9 @@ class _Walk:
             if self.stop is not None:
                 return out
             self._move(last)
+        self.kinks_here += 1
+        if self.kinks_here > MOST_KINKS:
+            return [*out, (self.here(), self._ended(Stop.SINGULAR, "kinks without end"))]
         if switch:
             tangent = switched_tangent(
                 self.curve, self.spot, self.options.min_step, self.cosine
@@ -458,10 +464,11 @@ class _Walk:
         elif beyond is None:
             return None
         else:
-            tangent = beyond.ty, beyond.tp
+            near = nearest_tangent(self.curve, self.spot, self.options.min_step)
+            tangent = (beyond.ty, beyond.tp) if near is None else near
         self.step = self.options.step if switch else self.step
-        ahead = (self.spot.y + self.options.min_step * tangent[0],
-                 self.spot.p + self.options.min_step * tangent[1])  # fmt: skip
+        ahead = (self.spot.y + BEHIND * tangent[0],
+                 self.spot.p + BEHIND * tangent[1])  # fmt: skip
         after = name_of(self.problem.piece(*ahead))
         self._enter(Tangent(tangent[0], tangent[1], after))
         kind = EventKind.FOLD if self._note_turn() else EventKind.STATUS

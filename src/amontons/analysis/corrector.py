@@ -136,6 +136,10 @@ class Curve:
                     return Spot(y, p, ty, tp, factor.sign), count
         return None
 
+    def orientation(self, y: Array, p: float, ty: Array, tp: float) -> int:
+        """Sign of the determinant of the matrix bordered by a direction, 0 if singular."""
+        return determinant_sign(self._bordered(*self.jacobian(y, p), ty, tp))
+
     def at_parameter(self, y: Array, p: float, tolerances: Tolerances) -> Array | None:
         """y after Newton steps at a fixed parameter, None without convergence."""
         for _ in range(2 * tolerances.corrections):

@@ -1,7 +1,9 @@
 """Algorithm 2 of [LR]: the tangent on the other side of a kink, for problems that do not tell.
 
-The tangent of the next piece is that of the selection function that is active a little ahead;
-its sense is the one in which that selection function stays active.
+The tangent of the next piece is that of the selection function that is active a little ahead.
+Its sense is the one that keeps the orientation, the sign of the bordered determinant: the test
+of [LR], on which side that selection function stays active, can mislead where several kinks
+follow closely or the tangents are nearly parallel; it decides where a determinant vanishes.
 
 [LR] T. Ligurský, Y. Renard, CMAME 280 (2014), section 2.2.
 """
@@ -14,7 +16,7 @@ from numpy.typing import NDArray
 from .corrector import Curve, Spot
 
 Array = NDArray[np.float64]
-AHEAD = 1.5  # h_1 / h_min
+AHEAD = (0.01, 0.1, 1.5, 15.0, 150.0)  # h_1 / h_min; [LR] has 1.5, but does not locate kinks
 REACH = 1e5  # largest h_2 / h_min that is tried
 
 
@@ -22,15 +24,32 @@ def switched_tangent(
     curve: Curve, spot: Spot, min_step: float, cosine: float
 ) -> tuple[Array, float] | None:
     """(y', p') of length 1 that leads away from a kink just ahead, None if none does."""
-    for factor in (1.0, 10.0, 100.0, 1000.0):  # how far ahead the next piece is looked for
-        ahead = AHEAD * min_step * factor
-        line = _line(curve, *spot.ahead(ahead))
+    for factor in AHEAD:
+        there = spot.ahead(min_step * factor)
+        line = _line(curve, *there)
         if line is None or _aligned(curve, line, (spot.ty, spot.tp)) >= cosine:
             continue  # still the piece from which the curve comes
+        sign = curve.orientation(*there, *line)
+        if sign and spot.sign:
+            r = sign * spot.sign
+            return r * line[0], r * line[1]
         found = _sense(curve, spot, line, min_step, cosine)
         if found is not None:
             return found
     return None
+
+
+def nearest_tangent(curve: Curve, spot: Spot, min_step: float) -> tuple[Array, float] | None:
+    """The tangent just beyond a kink that was passed, in the sense that keeps the orientation.
+
+    The piece that begins there may be shorter than the step that passed it.
+    """
+    there = spot.ahead(min_step * AHEAD[0])
+    line = _line(curve, *there)
+    if line is None:
+        return None
+    sign = curve.orientation(*there, *line) * spot.sign
+    return (sign * line[0], sign * line[1]) if sign else None
 
 
 def _sense(
