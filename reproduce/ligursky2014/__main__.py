@@ -1,0 +1,119 @@
+"""`python -m reproduce.ligursky2014`: the command line; see `README.md` for what it found."""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from amontons.errors import AmontonsError
+from amontons.files import replacing
+from benchmarks.machine import describe
+
+from . import block, examples, tables, vee
+
+HERE = Path(__file__).parent
+REFERENCE = json.loads((HERE / "reference.json").read_text())
+Work = Callable[[Sequence[int], Path], Any]
+
+
+def _example(name: str) -> Work:
+    return lambda levels, out: examples.EXAMPLES[name]()
+
+
+WORK: dict[str, Work] = {
+    **{name: _example(name) for name in examples.EXAMPLES},
+    "vee": vee.run,
+    "friction": vee.run_friction,
+    "block": block.run,
+    "block-friction": block.run_friction,
+}
+PAGES: dict[str, Callable[[Any], list[str]]] = {
+    **{
+        name: (lambda rows, name=name: tables.example(name, rows)) for name in examples.EXAMPLES
+    },
+    "vee": lambda found: tables.vee(found, REFERENCE["vee"]),
+    "friction": tables.friction,
+    "block": block.page,
+    "block-friction": block.page_friction,
+}
+FIGURES = {"vee": ("9", "10"), "friction": ("11",), "block": ("12", "13"),
+           "block-friction": ("14",)}  # fmt: skip
+
+
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.argument("parts", nargs=-1, metavar="[PART]...")
+@click.option("--levels", default="1,2,3", show_default=True,
+              help="Refinements of the meshes: 1, 2, 3 are those of the paper.")  # fmt: skip
+@click.option(
+    "--results", type=click.Path(path_type=Path), help="For tables and figures. [results/]"
+)
+def main(parts: tuple[str, ...], levels: str, results: Path | None) -> None:
+    """Continuation through folds, as in the paper of 2014.
+
+    PART is example1 … example5, vee, friction, block or block-friction; all of them by default.
+    Numbers of other parts stay as they are stored.
+    """
+    for part in parts:
+        if part not in WORK:
+            raise click.UsageError(f"PART: {part!r} is none of {', '.join(WORK)}")
+    try:
+        chosen = sorted({int(x) for x in levels.split(",")})
+    except ValueError as error:
+        raise click.UsageError(f"--levels: expected numbers, got {levels!r}") from error
+    if not set(chosen) <= set(vee.LEVELS):
+        raise click.UsageError(f"--levels: expected numbers from 1 to 3, got {levels!r}")
+    out = results or HERE / "results"
+    out.mkdir(parents=True, exist_ok=True)
+    try:
+        for part in parts or WORK:
+            click.echo(f"{part} …")
+            store(out, part, WORK[part](chosen, out))
+    except AmontonsError as reason:
+        raise click.ClickException(str(reason)) from reason
+    text = page(load(out))
+    with replacing(out / "results.md") as path:
+        path.write_text(text)
+    click.echo(text)
+
+
+def store(out: Path, part: str, found: Any) -> None:
+    """Put the numbers of a part beside those of the others."""
+    record = load(out)
+    record["machine"] = describe()
+    record[part] = found
+    with replacing(out / "results.json") as path:
+        path.write_text(json.dumps(record) + "\n")
+
+
+def load(out: Path) -> dict[str, Any]:
+    """What is stored."""
+    target = out / "results.json"
+    return json.loads(target.read_text()) if target.exists() else {}
+
+
+def page(record: dict[str, Any]) -> str:
+    """All tables of what is stored."""
+    lines = [
+        "# ligursky2014: results",
+        "",
+        "Regenerate: `python -m reproduce.ligursky2014`.",
+        "",
+    ]
+    lines += ["; ".join(f"{k} {v}" for k, v in record["machine"].items()) + ".", ""]
+    for part, make in PAGES.items():
+        if part in record:
+            lines += make(record[part])
+            lines += [f"![Figure {name}](figure{name}.png)\n" for name in FIGURES.get(part, ())]
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,162 @@
+"""Section 3.2.1: the V-shaped body on 2220, 8880 and 35520 triangles, figures 9 to 11."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+import amontons as am
+from amontons.analysis.continuation import Switch
+from amontons.evolution.timed import steady
+from amontons.fem.facets import Cells, Facets
+from amontons.files import replacing
+from amontons.plots import solutions_figure
+from amontons.vee import vee
+
+HERE = Path(__file__).parent
+LEVELS = {1: 2220, 2: 8880, 3: 35520}
+GAMMA = 0.38
+FRICTION = (0.6, 1.0, 1.4, 1.6, 1.8, 2.0)  # figure 11
+PAPER = {  # section 3.2.1
+    "step": 5e-4, "min_step": 5e-7, "max_step": 0.1, "grow": 1.3, "shrink": 0.5,
+    "residual": 5e-12, "change": 5e-12, "min_cosine": 0.99999, "corrections": 5, "quick": 4,
+}  # fmt: skip
+METHODS = {
+    "event tracking": None,
+    "algorithm 1, first-order system": am.Continuation(),
+    "algorithms 1 and 2, their settings": am.Continuation(**PAPER, switch=Switch.TANGENT),
+}
+DPI = 150
+
+
+@cache
+def mesh(level: int) -> am.Mesh:
+    """The paper's mesh: that of 555 triangles, refined."""
+    data = json.loads((HERE / "mesh.json").read_text())
+    surfaces = {
+        name: (Facets("line", np.array(data[name])),) for name in ("clamped", "contact")
+    }
+    cells = (Cells("tri", np.array(data["triangles"])),)
+    return am.refined(am.Mesh(np.array(data["points"]), cells, surfaces), level)
+
+
+def follow(level: int, options: am.Continuation | None, mu: float = 1.8) -> am.Branch:
+    """The whole curve, gamma from 0 to 1."""
+    return am.follow(vee(mesh(level), mu=mu), "load", (0.0, 1.0), options=options)
+
+
+def corner(branch: am.Branch) -> int:
+    """The contact at the most left node."""
+    body = steady(vee(branch_mesh(branch)))
+    return int(
+        np.argmin(body.recover(branch.problem.solution(branch[0].state, 0.0)).points[:, 0])
+    )
+
+
+def branch_mesh(branch: am.Branch) -> am.Mesh:
+    """The mesh on which a branch was computed, by the number of its contacts."""
+    contacts = branch.problem.start.contacts
+    return next(mesh(k) for k in range(6) if len(mesh(k).surface_nodes("contact")) == contacts)
+
+
+def record(branch: am.Branch, cpu: float) -> dict[str, Any]:
+    """Folds, the solutions at gamma = 0.38, and what it took."""
+    left, path = corner(branch), branch.problem
+    rows = []
+    for y in branch.at(GAMMA):
+        solution = path.solution(y, GAMMA)
+        rows.append({
+            "status": solution.pattern[left], "error": solution.convergence.error,
+            "u_n": -float(solution.u[left, 0]), "u_t": float(solution.u[left, 1]),
+            "lam_n": -float(solution.r[left, 0]), "lam_t": float(solution.r[left, 1]),
+        })  # fmt: skip
+    return {
+        "folds": [e.parameter for e in branch.folds], "points": len(branch),
+        "status changes": sum(e.kind is am.EventKind.STATUS for e in branch.events),
+        "stops": [s.name.lower() for s in branch.stops], "cpu": cpu, "corner at 0.38": rows,
+    }  # fmt: skip
+
+
+def run(levels: Sequence[int], out: Path) -> dict[str, Any]:
+    """All methods on the levels, and figures 9 and 10 (on the coarsest)."""
+    found: dict[str, Any] = {}
+    tracked = {}
+    for level in levels:
+        found[str(LEVELS[level])] = {}
+        for name, options in METHODS.items():
+            follow(level, options) if level == levels[0] else None  # compile before timing
+            began = time.process_time()
+            branch = follow(level, options)
+            cpu = time.process_time() - began
+            found[str(LEVELS[level])][name] = record(branch, cpu)
+            if options is None:
+                tracked[level] = branch
+    save(figure9(tracked), out / "figure9.png")
+    save(figure10(tracked[levels[0]]), out / "figure10.png")
+    return found
+
+
+def run_friction(levels: Sequence[int], out: Path) -> dict[str, Any]:
+    """Figure 11: the curve for several coefficients of friction, on the coarsest level."""
+    branches = {mu: follow(levels[0], None, mu) for mu in FRICTION}
+    save(figure11(branches), out / "figure11.png")
+    return {f"{mu:g}": [e.parameter for e in branch.folds] for mu, branch in branches.items()}
+
+
+# ------------------------------------------------------------------------------ figures
+def figure9(branches: dict[int, am.Branch]) -> Figure:
+    """Displacements and contact stresses of the most left node, one line per mesh."""
+    figure = Figure(figsize=(9.0, 6.4), dpi=DPI, layout="constrained")
+    panels = figure.subplots(2, 2).ravel()
+    for level, branch in branches.items():
+        left = corner(branch)
+        solutions = branch.solutions
+        weight = steady(vee(branch_mesh(branch))).recover(solutions[0]).weights[left]
+        u = np.array([s.u[left] for s in solutions])
+        r = np.array([s.r[left] for s in solutions]) / weight
+        label = f"{LEVELS.get(level, 555 * 4**level)} triangles"
+        for axes, values in zip(panels, (-u[:, 0], u[:, 1], -r[:, 0], r[:, 1]), strict=True):
+            axes.plot(branch.parameter, values, linewidth=1.2, label=label)
+    names = (r"$u_\nu$ (m)", r"$u_\tau$ (m)", r"$T_\nu$ (GN/m$^2$)", r"$T_\tau$ (GN/m$^2$)")
+    for axes, name in zip(panels, names, strict=True):
+        axes.set_xlabel(r"$\gamma$")
+        axes.set_ylabel(name)
+    panels[0].legend(frameon=False)
+    return figure
+
+
+def figure10(branch: am.Branch) -> Figure:
+    """The three deformed bodies at gamma = 0.38."""
+    solutions = [branch.problem.solution(y, GAMMA) for y in branch.at(GAMMA)]
+    names = ["separated", "corner slips left", "corner sticks"]
+    model = steady(vee(branch_mesh(branch)))
+    return solutions_figure(solutions, names, title="gamma = 0.38", model=model)
+
+
+def figure11(branches: dict[float, am.Branch]) -> Figure:
+    """Normal contact stress of the most left node over gamma, one line per friction."""
+    figure = Figure(figsize=(6.4, 4.4), dpi=DPI, layout="constrained")
+    axes = figure.subplots()
+    for mu, branch in branches.items():
+        left = corner(branch)
+        solutions = branch.solutions
+        weight = steady(vee(branch_mesh(branch))).recover(solutions[0]).weights[left]
+        stress = [-s.r[left, 0] / weight for s in solutions]
+        axes.plot(branch.parameter, stress, linewidth=1.2, label=f"F = {mu:g}")
+    axes.set_xlabel(r"$\gamma$")
+    axes.set_ylabel(r"$T_\nu$ (GN/m$^2$)")
+    axes.legend(frameon=False)
+    return figure
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure whole or not at all."""
+    with replacing(path) as temporary:
+        figure.savefig(temporary, dpi=DPI)
