@@ -110,7 +110,8 @@ def main():
     parser.add_argument("--random", type=int, default=500)
     options = parser.parse_args()
     sizes = [int(n) for n in options.contacts.split(",") if n]
-    command = f"`python benchmarks/critical_friction.py`, {describe()}"
+    flags = "".join(f" {flag}" for flag in sys.argv[1:])
+    command = f"`python benchmarks/critical_friction.py{flags}`, {describe()}"
     lines = ["# Critical friction", "", command, "",
              "Structured triangles of `example:hild`, against the listed values.", "",
              "| contacts | listed | lower | upper | P-matrix | full contact | witness | s |",
