@@ -173,6 +173,16 @@ def test_singular_w_has_no_safe_friction():
     assert "singular" in found.reason
 
 
+@pytest.mark.parametrize("mu", [[1.0, 1.0], [0.5, 0.0], [0.0, 2.0]])
+def test_a_contact_given_twice_has_no_safe_friction(mu):
+    block = np.array([[1.0, 0.5], [0.5, 2.0]])  # entries without rounding: exactly singular
+    problem = am.FrictionProblem.from_delassus(np.tile(block, (2, 2)), np.ones((2, 2)), mu)
+    found = critical_friction(problem)
+    assert found.lower == 0
+    assert "singular" in found.reason
+    assert found.upper > 0
+
+
 def test_bad_input_is_refused():
     with pytest.raises(UnsupportedForm, match="2D"):
         critical_friction(box_tower())

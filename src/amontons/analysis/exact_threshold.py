@@ -79,7 +79,7 @@ def _below(
 ) -> None:
     """A lower bound where rounding hides the signs just below the threshold."""
     for gap in (1e-5, 1e-4, 1e-3, 1e-2, 1e-1):
-        t = threshold.upper * (1 - gap)
+        t = min(threshold.upper, LARGEST) * (1 - gap)
         sign, _, seen = first_failure(pieces.W, t * pieces.shape, allowed, deadline)
         threshold.seen += seen
         if sign == POSITIVE:

@@ -125,15 +125,19 @@ class Pieces:
     def threshold(self, states: States) -> tuple[float, Array] | None:
         """(smallest t > 0 at which a pattern is singular, its null vector r), or None.
 
-        det (A + t C) = 0 reads -A^-1 C x = x / t on the slipping contacts.
+        det (A + t C) = 0 reads -A^-1 C x = x / t on the slipping contacts.  None too where A is
+        singular: then friction is not what makes the pattern so.
         """
         rows = self.rows(states)
         slip, m = self.slipping(states)
         if not len(slip):
             return None
-        columns = np.linalg.solve(
-            self.W[np.ix_(rows, rows)], -self.W[np.ix_(rows, 2 * slip + 1)] * m
-        )
+        try:
+            columns = np.linalg.solve(
+                self.W[np.ix_(rows, rows)], -self.W[np.ix_(rows, 2 * slip + 1)] * m
+            )
+        except np.linalg.LinAlgError:
+            return None
         where = np.searchsorted(rows, 2 * slip)
         values, vectors = np.linalg.eig(columns[where])
         real = np.abs(values.imag) <= REAL * np.abs(values)
