@@ -153,18 +153,15 @@ def half_plane(strips: int) -> np.ndarray:
 def large(arguments: argparse.Namespace) -> list[Row]:
     """Many contacts: the triangle, and mixed statuses on a half plane."""
     rows: list[Row] = [
-        {"problem": "triangle", **row}
-        for row in triangle({200: (0.3, 0.6), 400: (0.3, 0.6)}, arguments.limit)
+        {"problem": "triangle", **row} for row in triangle({400: (0.3, 0.6)}, arguments.limit)
     ]
-    for n in (400, 1000):
-        W = half_plane(n)
-        for mu in (0.3, 0.6):
-            problem = FrictionProblem.from_delassus(W, mixed_load(W, 0), np.full(n, mu))
-            solution = am.solve(problem, tolerance=1e-10)
-            row = certified(problem, solution, arguments.limit)
-            counts = "/".join(str(k) for k in solution.counts.values())
-            rows.append({"problem": f"half plane, {counts}", "contacts": n, "mu": mu, **row})
-            print(rows[-1], flush=True)
+    W = half_plane(1000)
+    problem = FrictionProblem.from_delassus(W, mixed_load(W, 0), np.full(1000, 0.3))
+    solution = am.solve(problem, tolerance=1e-10)
+    counts = "/".join(str(k) for k in solution.counts.values())
+    row = certified(problem, solution, arguments.limit)
+    rows.append({"problem": f"half plane, {counts}", "contacts": 1000, "mu": 0.3, **row})
+    print(rows[-1], flush=True)
     return rows
 
 
