@@ -1,6 +1,5 @@
 """Contact between bodies: projection against brute force, patch tests, left-out nodes."""
 
-
 import numpy as np
 import pytest
 

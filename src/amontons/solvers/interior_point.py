@@ -194,9 +194,7 @@ def relax_inplace(  # noqa: PLR0913
                     rhs[i, 0] *= mu[i]
                     rhs[i, 1] = fa[1] + keep * residual[i, 1]
                     rhs[i, 2] = fa[2] + keep * residual[i, 2]
-            solve_inplace(
-                order, upper_start, upper, lower_start, lower, U, L, inverse, rhs, dr
-            )
+            solve_inplace(order, upper_start, upper, lower_start, lower, U, L, inverse, rhs, dr)
             velocity_inplace(indptr, indices, data, zero, dr, du)
             for i in range(nc):
                 if rho[i] <= 0.0:
