@@ -24,10 +24,10 @@ import numpy as np
 from machine import describe
 
 import amontons as am
-from amontons.analysis import friction_branching
-from amontons.analysis.determinant_search import POSITIVE
-from amontons.analysis.friction_branching import Branching
-from amontons.analysis.status_pieces import Pieces
+from amontons.analysis.certificates import friction_branching
+from amontons.analysis.certificates.determinant_search import POSITIVE
+from amontons.analysis.certificates.friction_branching import Branching
+from amontons.analysis.certificates.status_pieces import Pieces
 from amontons.hild import hild_triangle
 
 HERE = Path(__file__).parent

@@ -28,8 +28,8 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from amontons.analysis.following import Limits, exact_state, track_both  # noqa: E402
-from amontons.analysis.parametrised import path_of  # noqa: E402
+from amontons.analysis.paths.following import Limits, exact_state, track_both  # noqa: E402
+from amontons.analysis.paths.parametrised import path_of  # noqa: E402
 from amontons.files import replacing  # noqa: E402
 from amontons.vee import vee  # noqa: E402
 from benchmarks.machine import describe  # noqa: E402

@@ -14,11 +14,11 @@ import numpy as np
 from scipy import sparse
 
 import amontons as am
-from amontons.analysis.continuation import Continuation
-from amontons.analysis.first_order import first_order
-from amontons.analysis.following import Limits, continue_both
-from amontons.analysis.friction_path import FrictionPath
-from amontons.analysis.path import EventKind
+from amontons.analysis.paths.continuation import Continuation
+from amontons.analysis.paths.first_order import first_order
+from amontons.analysis.paths.following import Limits, continue_both
+from amontons.analysis.paths.friction_path import FrictionPath
+from amontons.analysis.paths.path import EventKind
 
 A, B = (
     2.0,

@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import amontons as am
-from amontons.analysis.continuation import Switch
+from amontons.analysis.paths.continuation import Switch
 from amontons.evolution.timed import steady
 from amontons.fem.facets import Cells, Facets
 from amontons.files import replacing

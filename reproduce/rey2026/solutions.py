@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import amontons as am
-from amontons.analysis.critical_friction import critical_friction
+from amontons.analysis.certificates.critical_friction import critical_friction
 from amontons.hild import hild_triangle
 
 from .triangle import Triangle, mesh

@@ -29,7 +29,7 @@ _HOME = {
                 "ProximalPoint", "Restart", "RhoStrategy", "SemismoothNewton",
                 "SmoothingNewton", "SweepOrder", "Uzawa"),
     "solvers.nonlinear_newton": ("NonlinearNewton",),
-    "analysis.path_crossing": ("PathCrossing",),
+    "analysis.paths.path_crossing": ("PathCrossing",),
     "solve": ("drive",),
     "fclib": ("read_fclib", "write_fclib"),
     "masonry": ("Bond", "Wall"),

@@ -17,12 +17,12 @@ from .solve import Callback, drive
 from .solvers.base import Iterate, Solver
 
 if TYPE_CHECKING:
-    from .analysis.continuation import Continuation
-    from .analysis.critical_friction import CriticalFriction
-    from .analysis.diagram import Diagram
-    from .analysis.enumerate import Solutions
-    from .analysis.path import Branch, PathProblem
-    from .analysis.uniqueness import Uniqueness
+    from .analysis.certificates.critical_friction import CriticalFriction
+    from .analysis.certificates.uniqueness import Uniqueness
+    from .analysis.paths.continuation import Continuation
+    from .analysis.paths.diagram import Diagram
+    from .analysis.paths.path import Branch, PathProblem
+    from .analysis.solutions.enumerate import Solutions
     from .model import Model
 
 Start = Iterate | FrictionSolution | ModelSolution | None
@@ -77,10 +77,10 @@ def all_solutions(
     law.
     """
     discrete = _discrete(problem)
-    from .analysis import enumerate as exact
+    from .analysis.solutions import enumerate as exact
 
     if discrete.dimension == 3:
-        from .analysis.disc_search import enumerate_discs
+        from .analysis.solutions.disc_search import enumerate_discs
 
         return enumerate_discs(discrete, time_limit=time_limit, keep_proof=keep_proof)
     if discrete.dimension == 2 and discrete.contacts > exact.CONTACTS:
@@ -100,7 +100,7 @@ def multistart(
     what there is up to some hundred contacts, as far as it can be checked.  Raises
     UnsupportedForm under Tresca's law.
     """
-    from .analysis.multistart import multistart as search
+    from .analysis.solutions.multistart import multistart as search
 
     return search(_discrete(problem), starts=starts, seed=seed, time_limit=time_limit)
 
@@ -129,9 +129,9 @@ def follow(
     stops by returning True.
     Each end of the branch has a named reason.
     """
-    from .analysis.following import Limits, follow_path
-    from .analysis.parametrised import first_state, path_of, state_of
-    from .analysis.path import PathProblem
+    from .analysis.paths.following import Limits, follow_path
+    from .analysis.paths.parametrised import first_state, path_of, state_of
+    from .analysis.paths.path import PathProblem
 
     bounds = Limits(tuple(interval), **limits)
     at = bounds.interval[0] if at is None else float(at)
@@ -154,9 +154,9 @@ def diagram(
     at: by default both ends and the middle of the interval; all solutions there are searched
     for as in `all_solutions`, with time_limit seconds for each search.  Others as in `follow`.
     """
-    from .analysis.diagram import bifurcation_diagram
-    from .analysis.following import Limits
-    from .analysis.parametrised import path_of
+    from .analysis.paths.diagram import bifurcation_diagram
+    from .analysis.paths.following import Limits
+    from .analysis.paths.parametrised import path_of
 
     bounds = Limits(tuple(interval), **limits)
     a, b = bounds.interval
@@ -185,7 +185,7 @@ def uniqueness(
     """
     discrete = _discrete(problem)
     found = solution.solution if isinstance(solution, ModelSolution) else solution
-    from .analysis.uniqueness import assess
+    from .analysis.certificates.uniqueness import assess
 
     return assess(discrete, found, time_limit=time_limit)
 
@@ -198,7 +198,7 @@ def critical_friction(
     gap: relative distance of the bounds that is good enough.  time_limit: seconds.  Exact up to
     13 contacts.  Raises UnsupportedForm in 3D and under Tresca's law.
     """
-    from .analysis.critical_friction import critical_friction as bounds
+    from .analysis.certificates.critical_friction import critical_friction as bounds
 
     return bounds(_discrete(problem), gap=gap, time_limit=time_limit)
 

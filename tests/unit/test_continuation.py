@@ -7,11 +7,10 @@ from hypothesis import strategies as st
 from scipy import sparse
 
 import amontons as am
-from amontons.analysis.continuation import Continuation, Switch, resumed
-from amontons.analysis.diagram import bifurcation_diagram
-from amontons.analysis.enumerate import enumerate_solutions
-from amontons.analysis.first_order import first_order
-from amontons.analysis.following import (
+from amontons.analysis.paths.continuation import Continuation, Switch, resumed
+from amontons.analysis.paths.diagram import bifurcation_diagram
+from amontons.analysis.paths.first_order import first_order
+from amontons.analysis.paths.following import (
     Limits,
     Method,
     continue_both,
@@ -19,8 +18,9 @@ from amontons.analysis.following import (
     follow_path,
     track_both,
 )
-from amontons.analysis.friction_path import FrictionPath
-from amontons.analysis.path import EventKind, Stop
+from amontons.analysis.paths.friction_path import FrictionPath
+from amontons.analysis.paths.path import EventKind, Stop
+from amontons.analysis.solutions.enumerate import enumerate_solutions
 from amontons.errors import InvalidInput
 
 ONE = [[1.0, 0.8], [0.8, 1.0]]

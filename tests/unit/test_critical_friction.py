@@ -8,11 +8,11 @@ import pytest
 from uniqueness_checker import check_witness, piece_matrix, smallest_determinant
 
 import amontons as am
-from amontons.analysis.critical_friction import critical_friction
-from amontons.analysis.determinant_search import NEGATIVE, POSITIVE, UNKNOWN
-from amontons.analysis.energy_bound import energy_bound
-from amontons.analysis.exact_threshold import first_failure
-from amontons.analysis.rounding import determinant_sign, is_positive_definite
+from amontons.analysis.certificates.critical_friction import critical_friction
+from amontons.analysis.certificates.determinant_search import NEGATIVE, POSITIVE, UNKNOWN
+from amontons.analysis.certificates.energy_bound import energy_bound
+from amontons.analysis.certificates.exact_threshold import first_failure
+from amontons.analysis.multipliers.rounding import determinant_sign, is_positive_definite
 from amontons.errors import InvalidInput, UnsupportedForm
 from amontons.gallery import box_tower, one_contact_2d
 from amontons.hild import hild_triangle, mesh_of_triangle

@@ -8,8 +8,8 @@ from brute_force_3d import random_problem_3d, solutions_by_brute_force
 from disc_checker import accepted, balance_is_positive, law_is_negative
 
 import amontons as am
-from amontons.analysis.disc_search import enumerate_discs
-from amontons.analysis.disc_sets import Law, Region, copositive, negative_on_arc
+from amontons.analysis.solutions.disc_search import enumerate_discs
+from amontons.analysis.solutions.disc_sets import Law, Region, copositive, negative_on_arc
 from amontons.gallery import random_delassus
 
 
@@ -120,8 +120,8 @@ def test_the_checker_refuses_wrong_proofs():
 
 
 def test_no_proof_for_one_solution_of_several():
-    from amontons.analysis.disc_multipliers import BoxProblem
-    from amontons.analysis.newton_batch import Stack
+    from amontons.analysis.solutions.disc_multipliers import BoxProblem
+    from amontons.analysis.solutions.newton_batch import Stack
 
     W, q, mu = random_problem_3d(12)
     problem = am.FrictionProblem.from_delassus(W, q, mu)

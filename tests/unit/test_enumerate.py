@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import amontons as am
-from amontons.analysis import pattern_search
-from amontons.analysis.enumerate import enumerate_solutions
+from amontons.analysis.solutions import pattern_search
+from amontons.analysis.solutions.enumerate import enumerate_solutions
 from amontons.gallery import one_contact_2d, random_delassus
 from amontons.hild import hild_triangle
 
@@ -185,7 +185,7 @@ def test_no_load_and_no_contacts():
 
 
 def test_the_clock_stops_the_search(monkeypatch):
-    monkeypatch.setattr("amontons.analysis.enumerate.NODES", 5)
+    monkeypatch.setattr("amontons.analysis.solutions.enumerate.NODES", 5)
     found = am.all_solutions(hild_triangle(6, mu=3.5), time_limit=1e-9)
     assert not found.complete
     assert "stopped" in found.reason

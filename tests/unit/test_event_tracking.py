@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 import amontons as am
-from amontons.analysis.diagram import bifurcation_diagram
-from amontons.analysis.enumerate import enumerate_solutions
-from amontons.analysis.event_tracking import leaving, track
-from amontons.analysis.first_order import orientation
-from amontons.analysis.following import Limits, exact_state, polished, track_both
-from amontons.analysis.friction_path import FrictionPath
-from amontons.analysis.path import EventKind, Stop
+from amontons.analysis.paths.diagram import bifurcation_diagram
+from amontons.analysis.paths.event_tracking import leaving, track
+from amontons.analysis.paths.first_order import orientation
+from amontons.analysis.paths.following import Limits, exact_state, polished, track_both
+from amontons.analysis.paths.friction_path import FrictionPath
+from amontons.analysis.paths.path import EventKind, Stop
+from amontons.analysis.solutions.enumerate import enumerate_solutions
 from amontons.errors import InvalidInput, UnsupportedForm
 
 ONE = [[1.0, 0.8], [0.8, 1.0]]

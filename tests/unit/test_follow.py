@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 import amontons as am
-from amontons.analysis.enumerate import enumerate_solutions
+from amontons.analysis.solutions.enumerate import enumerate_solutions
 from amontons.cli import main
 from amontons.errors import InvalidInput
 from amontons.gallery import one_contact_2d

@@ -7,12 +7,16 @@ import pytest
 from uniqueness_checker import check_proof, smallest_determinant
 
 import amontons as am
-from amontons.analysis import friction_branching
-from amontons.analysis.critical_friction import critical_friction
-from amontons.analysis.determinant_search import NEGATIVE, POSITIVE, STOPPED
-from amontons.analysis.friction_branching import Branching
-from amontons.analysis.pair_multipliers import find_pair_multipliers, is_oriented, proves
-from amontons.analysis.status_pieces import Pieces
+from amontons.analysis.certificates import friction_branching
+from amontons.analysis.certificates.critical_friction import critical_friction
+from amontons.analysis.certificates.determinant_search import NEGATIVE, POSITIVE, STOPPED
+from amontons.analysis.certificates.friction_branching import Branching
+from amontons.analysis.certificates.pair_multipliers import (
+    find_pair_multipliers,
+    is_oriented,
+    proves,
+)
+from amontons.analysis.certificates.status_pieces import Pieces
 from amontons.hild import hild_triangle
 
 
@@ -62,9 +66,9 @@ def test_the_triangle_is_proved_and_checked():
 
 
 def test_many_contacts_have_pairs_only_where_it_matters(monkeypatch):
-    monkeypatch.setattr("amontons.analysis.pair_multipliers.FEW", 3)
-    monkeypatch.setattr("amontons.analysis.friction_branching.FEW", 3)
-    monkeypatch.setattr("amontons.analysis.pair_multipliers.ACTIVE", 0.95)
+    monkeypatch.setattr("amontons.analysis.certificates.pair_multipliers.FEW", 3)
+    monkeypatch.setattr("amontons.analysis.certificates.friction_branching.FEW", 3)
+    monkeypatch.setattr("amontons.analysis.certificates.pair_multipliers.ACTIVE", 0.95)
     pieces = Pieces.of(hild_triangle(7).assemble())
     alone = Branching(pieces, 1.4, np.inf)  # multipliers of single contacts reach 1.48
     assert alone.run() == POSITIVE
@@ -118,7 +122,7 @@ def test_time_is_respected():
 
 
 def test_critical_friction_uses_multipliers_where_there_are_too_many_patterns(monkeypatch):
-    monkeypatch.setattr("amontons.analysis.critical_friction.ENUMERATED", 3)
+    monkeypatch.setattr("amontons.analysis.certificates.critical_friction.ENUMERATED", 3)
     found = critical_friction(hild_triangle(6).assemble(), gap=0.02)
     assert found.criterion == "multipliers"
     assert 0.97 * 1.72866 < found.lower < 1.72866 < found.upper < 1.72867

@@ -24,6 +24,7 @@ ALONE = {  # package: the file or folder that imports it, one for each kind of f
     "meshio": "fem vtk",  # reads meshes, writes pictures
     "h5py": "fclib output checkpoint",  # the exchange format, our results, our states
 }  # fmt: skip
+INSIDE = {"analysis": ("multipliers", "solutions", "certificates", "paths")}  # the same, in it
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 
@@ -63,6 +64,17 @@ def test_imports_go_downwards(path):
         target = name.split(".")[1] if name.startswith("amontons.") else "__version__"
         if target not in ("__version__", home(path)):
             assert ORDER.index(target) < place, f"{home(path)} imports {target}"
+
+
+@pytest.mark.parametrize("folder", INSIDE)
+def test_imports_go_downwards_inside_a_folder(folder):
+    order = INSIDE[folder]
+    for path in (PACKAGE / folder).rglob("*/*.py"):
+        place = order.index(path.parent.name)
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and node.level == 2 and node.module:
+                target = node.module.split(".")[0]
+                assert target not in order or order.index(target) < place, f"{path}: {target}"
 
 
 @pytest.mark.parametrize("package", ALONE)

@@ -6,7 +6,7 @@ from load_certificate_checker import check_load
 from scipy import sparse
 
 import amontons as am
-from amontons.analysis.load_certificate import LoadOutcome, certify_load
+from amontons.analysis.certificates.load_certificate import LoadOutcome, certify_load
 from amontons.errors import InvalidInput, UnsupportedForm
 from amontons.gallery import one_contact_2d, random_delassus
 from amontons.hild import hild_triangle
@@ -219,8 +219,8 @@ def test_the_clock():
 
 def test_shared_multipliers_are_complete_certificates(monkeypatch):
     # few multipliers on a subspace first, as for many contacts
-    monkeypatch.setattr("amontons.analysis.load_certificate.LARGE", 1)
-    monkeypatch.setattr("amontons.analysis.load_reduction.SETS", 4)
+    monkeypatch.setattr("amontons.analysis.certificates.load_certificate.LARGE", 1)
+    monkeypatch.setattr("amontons.analysis.certificates.load_reduction.SETS", 4)
     called = []
 
     def never(*arguments, **options):
@@ -232,7 +232,9 @@ def test_shared_multipliers_are_complete_certificates(monkeypatch):
     )
     for other in (problem, am.FrictionProblem.from_delassus(problem.W, q, problem.mu)):
         with monkeypatch.context() as patch:
-            patch.setattr("amontons.analysis.load_certificate.find_multipliers", never)
+            patch.setattr(
+                "amontons.analysis.certificates.load_certificate.find_multipliers", never
+            )
             answer = certify_load(other, am.solve(other))
         assert not called
         assert answer.outcome is LoadOutcome.CERTIFIED
@@ -242,8 +244,8 @@ def test_shared_multipliers_are_complete_certificates(monkeypatch):
 
 
 def test_few_unknowns_and_many_give_the_same_matrix(monkeypatch):
-    from amontons.analysis import multiplier_steps as steps
-    from amontons.analysis.multiplier_lmi import Family, Slacks, restricted
+    from amontons.analysis.multipliers import multiplier_steps as steps
+    from amontons.analysis.multipliers.multiplier_lmi import Family, Slacks, restricted
 
     random = np.random.default_rng(0)
     Z = random.standard_normal((4 * 30, 5))
@@ -276,9 +278,9 @@ def test_a_rough_solution_is_good_enough():
 
 
 def test_too_many_contacts_are_undecided_where_sharing_fails(monkeypatch):
-    monkeypatch.setattr("amontons.analysis.load_certificate.LARGE", 1)
-    monkeypatch.setattr("amontons.analysis.load_certificate.LARGEST", 5)
-    monkeypatch.setattr("amontons.analysis.load_reduction.SETS", 2)
+    monkeypatch.setattr("amontons.analysis.certificates.load_certificate.LARGE", 1)
+    monkeypatch.setattr("amontons.analysis.certificates.load_certificate.LARGEST", 5)
+    monkeypatch.setattr("amontons.analysis.certificates.load_reduction.SETS", 2)
     problem = hild_triangle(15, mu=2.9).assemble().condensed()
     answer = certify_load(problem, am.solve(problem))
     assert answer.outcome is LoadOutcome.UNDECIDED

@@ -5,10 +5,10 @@ import pytest
 from scipy import sparse
 
 import amontons as am
-from amontons.analysis.continuation import Continuation
-from amontons.analysis.following import Limits, continue_both
-from amontons.analysis.load_path import LoadPath
-from amontons.analysis.sparse_kernel import sparse_kernel
+from amontons.analysis.paths.continuation import Continuation
+from amontons.analysis.paths.following import Limits, continue_both
+from amontons.analysis.paths.load_path import LoadPath
+from amontons.analysis.paths.sparse_kernel import sparse_kernel
 from amontons.model.large_deformation import large_deformation
 
 TURN = 0.023

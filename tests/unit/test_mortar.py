@@ -496,7 +496,7 @@ def test_a_tresca_bound_is_integrated_with_the_dual_functions():
 
 @pytest.mark.parametrize("shift", [0.0, 0.3])
 def test_tresca_bounds_between_meshes_that_do_not_match(shift):
-    """A traction on the bound has its integral; numbers and nodal values count by the weight."""
+    """A traction on the bound has its integral; other bounds count by the weight."""
     low, high = blocks_apart(3, (shift, 0), 4, 3)
     area = (1 - shift) * (1 + shift) / 2  # of x over [shift, 1]
     limit, rows = tresca_bounds(lambda x: x[:, 0], high=high, low=low)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from amontons.analysis.multiplier_lmi import (
+from amontons.analysis.multipliers.multiplier_lmi import (
     Family,
     LmiOutcome,
     Slacks,
@@ -12,7 +12,7 @@ from amontons.analysis.multiplier_lmi import (
     find_multipliers,
     restricted,
 )
-from amontons.analysis.rounding import congruence, is_positive_definite, unit_scale
+from amontons.analysis.multipliers.rounding import congruence, is_positive_definite, unit_scale
 from amontons.gallery import one_contact_2d
 from amontons.hild import hild_triangle
 

@@ -5,8 +5,8 @@ import pytest
 from brute_force_3d import random_problem_3d, solutions_by_brute_force
 
 import amontons as am
-from amontons.analysis.multistart import multistart
-from amontons.analysis.newton_batch import Stack, deflation
+from amontons.analysis.solutions.multistart import multistart
+from amontons.analysis.solutions.newton_batch import Stack, deflation
 from amontons.gallery import one_contact_2d, random_delassus
 from amontons.hild import hild_triangle
 

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from amontons.analysis.path import (
+from amontons.analysis.paths.path import (
     Branch,
     Event,
     EventKind,

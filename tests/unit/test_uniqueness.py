@@ -8,7 +8,7 @@ from click.testing import CliRunner
 from uniqueness_checker import check_witness
 
 import amontons as am
-from amontons.analysis.uniqueness import Verdict, quick_verdict
+from amontons.analysis.certificates.uniqueness import Verdict, quick_verdict
 from amontons.cli import main
 from amontons.errors import InvalidInput
 from amontons.gallery import box_tower, one_contact_2d

@@ -1,12 +1,12 @@
 """Questions about problems and solvers; sees discrete problems only."""
 
-from .continuation import Continuation
-from .critical_friction import CriticalFriction, Witness
-from .diagram import Diagram
-from .enumerate import PieceSolution, Solutions
-from .path import Branch, Event, EventKind, PathProblem, Stop
+from .certificates.critical_friction import CriticalFriction, Witness
+from .certificates.uniqueness import Uniqueness, Verdict
+from .paths.continuation import Continuation
+from .paths.diagram import Diagram
+from .paths.path import Branch, Event, EventKind, PathProblem, Stop
 from .profiles import performance_profile
-from .uniqueness import Uniqueness, Verdict
+from .solutions.enumerate import PieceSolution, Solutions
 
 __all__ = [
     "Branch",

@@ -9,7 +9,7 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.enumerate import Solutions
+from ..analysis.solutions.enumerate import Solutions
 from ..api import all_solutions
 from ..errors import InvalidInput
 from ..files import replacing

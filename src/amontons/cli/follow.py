@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from .. import api
-from ..analysis.path import Branch, Event, EventKind, Stop
+from ..analysis.paths.path import Branch, Event, EventKind, Stop
 from ..errors import InvalidInput
 from ..files import replacing
 from ..output import to_json, versions

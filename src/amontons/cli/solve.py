@@ -11,7 +11,7 @@ from pathlib import Path
 import click
 
 from .. import api, output
-from ..analysis.uniqueness import Uniqueness, assess, quick_verdict
+from ..analysis.certificates.uniqueness import Uniqueness, assess, quick_verdict
 from ..case import in_words
 from ..errors import FileFormatError, InvalidInput, SingularOperator, UnsupportedForm
 from ..nitsche_problem import NO_MULTIPLIERS

@@ -9,8 +9,8 @@ from typing import Any
 import click
 import numpy as np
 
-from ..analysis.critical_friction import CriticalFriction
-from ..analysis.uniqueness import Uniqueness, Verdict
+from ..analysis.certificates.critical_friction import CriticalFriction
+from ..analysis.certificates.uniqueness import Uniqueness, Verdict
 from ..api import uniqueness
 from ..errors import InvalidInput
 from ..output import to_json, versions

@@ -191,7 +191,7 @@ class HyperelasticBody:
         return out, blocks
 
     def unit_forces(self) -> Array:
-        """Sizes of nodal forces (n,) where stresses are as large as moduli: scale of rounding."""
+        """Sizes of nodal forces (n,) where stresses are as large as moduli, for rounding."""
         out = np.zeros(len(self.mesh.points))
         for block in self.blocks:
             a, b, c, d, e = block.laws[0]

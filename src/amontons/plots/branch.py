@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from .solution import INK
 
 if TYPE_CHECKING:
-    from ..analysis.path import Branch
+    from ..analysis.paths.path import Branch
 
 LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 Quantity = Callable[[Any], float]  # of one solution

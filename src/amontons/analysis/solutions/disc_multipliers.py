@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from ..multipliers.multiplier_lmi import Family, LmiOutcome, Slacks, find_multipliers
+from ..multipliers.rounding import gamma, is_positive_definite
 from .disc_sets import ON, Inequalities, Law, Region, inequalities, negative_on_arc
-from .multiplier_lmi import Family, LmiOutcome, Slacks, find_multipliers
 from .newton_batch import Stack
-from .rounding import gamma, is_positive_definite
 
 Array = NDArray[np.float64]
 EXACT = 1e-13  # error of a reference relative to its size, scaled, as Newton's method ends

@@ -18,8 +18,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InvalidInput
-from ..problem import FrictionProblem
+from ...errors import InvalidInput
+from ...problem import FrictionProblem
 from .enumerate import PieceSolution, Solutions
 from .newton_batch import FREE, SLIP, STICK, Stack
 

@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg, sparse
 
+from ..multipliers.rounding import gamma, is_positive_definite, unit_scale
 from .load_pieces import Known, LoadProblem, States
-from .rounding import gamma, is_positive_definite, unit_scale
 
 Array = NDArray[np.float64]
 PENALTIES = 10.0 ** np.arange(0, 9, 2)  # of velocities that vanish, times |W_p|

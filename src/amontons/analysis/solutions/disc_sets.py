@@ -29,7 +29,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .multiplier_lmi import restricted
+from ..multipliers.multiplier_lmi import restricted
 
 Array = NDArray[np.float64]
 SAMPLES = 16  # directions of a full circle

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from scipy import linalg, sparse
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
+from ..multipliers.multiplier_lmi import Accept, LmiOutcome, find_multipliers
+from ..multipliers.multiplier_steps import Family
 from .load_pieces import Group, LoadProblem, States, whole
 from .load_proof import diagonal_parts
-from .multiplier_lmi import Accept, LmiOutcome, find_multipliers
-from .multiplier_steps import Family
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from ..problem import FrictionProblem
+from ...problem import FrictionProblem
 from . import pattern_search as search
 
 Array = NDArray[np.float64]

@@ -25,15 +25,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..cones import Coulomb
-from ..contact.current import BACK, OPEN, SLIP, STICK, Pieces
-from ..errors import InvalidInput, InvertedCells, NotConverged, UnsupportedForm
-from ..evolution.system import Motion
-from ..model import Model
-from ..model.large_deformation import LargeDeformation, large_step
-from ..solution import ContactStatus, Convergence, FrictionSolution, Outcome, Step
-from ..solve import drive
-from ..solvers.nonlinear_newton import NonlinearNewton
+from ...cones import Coulomb
+from ...contact.current import BACK, OPEN, SLIP, STICK, Pieces
+from ...errors import InvalidInput, InvertedCells, NotConverged, UnsupportedForm
+from ...evolution.system import Motion
+from ...model import Model
+from ...model.large_deformation import LargeDeformation, large_step
+from ...solution import ContactStatus, Convergence, FrictionSolution, Outcome, Step
+from ...solve import drive
+from ...solvers.nonlinear_newton import NonlinearNewton
 
 Array = NDArray[np.float64]
 TOLERANCE = 1e-8  # of solutions by the judge

@@ -25,10 +25,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cones import Coulomb, Tresca
-from ..errors import InvalidInput, UnsupportedForm
-from ..problem import Form, FrictionProblem
-from ..solution import Convergence, FrictionSolution, Outcome, Step
+from ...cones import Coulomb, Tresca
+from ...errors import InvalidInput, UnsupportedForm
+from ...problem import Form, FrictionProblem
+from ...solution import Convergence, FrictionSolution, Outcome, Step
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 from scipy.sparse.csgraph import minimum_spanning_tree
 
-from .multiplier_lmi import (
+from ..multipliers.multiplier_lmi import (
     Family,
     LmiOutcome,
     Multipliers,
@@ -36,7 +36,7 @@ from .multiplier_lmi import (
     restricted,
     slacks_are_positive,
 )
-from .rounding import EPSILON, is_positive_definite
+from ..multipliers.rounding import EPSILON, is_positive_definite
 
 Array = NDArray[np.float64]
 Pairs = NDArray[np.int64]

@@ -17,8 +17,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InvalidInput
-from ..problem import FrictionProblem
+from ...errors import InvalidInput
+from ...problem import FrictionProblem
 from .disc_multipliers import EXACT, BoxProblem, BoxProof, contains
 from .disc_sets import ON, Law, Region
 from .enumerate import Solutions

@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InvalidInput, NotConverged, SingularOperator
-from ..evolution.system import Motion
-from ..problem import Form, FrictionProblem
-from ..solution import Outcome
-from ..solve import drive
+from ...errors import InvalidInput, NotConverged, SingularOperator
+from ...evolution.system import Motion
+from ...problem import Form, FrictionProblem
+from ...solution import Outcome
+from ...solve import drive
 from .following import exact_state
 from .friction_path import FrictionPath
 from .load_path import LoadPath, load_path
 from .path import PathProblem
 
 if TYPE_CHECKING:
-    from ..model import Model
+    from ...model import Model
 
 Array = NDArray[np.float64]
 PARAMETERS = ("load", "friction")

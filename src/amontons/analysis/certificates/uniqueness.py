@@ -14,14 +14,14 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cones import Tresca
-from ..errors import InvalidInput, SingularOperator
-from ..problem import FrictionProblem
-from ..solution import FrictionSolution
-from ..solve import drive
+from ...cones import Tresca
+from ...errors import InvalidInput, SingularOperator
+from ...problem import FrictionProblem
+from ...solution import FrictionSolution
+from ...solve import drive
+from ..solutions.enumerate import PieceSolution, enumerate_solutions
 from .critical_friction import CriticalFriction, Witness, critical_friction
 from .energy_bound import energy_bound
-from .enumerate import PieceSolution, enumerate_solutions
 from .load_certificate import LoadCertificate, LoadOutcome, certify_load
 from .status_pieces import friction_shape
 

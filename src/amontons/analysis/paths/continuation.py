@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InvalidInput
+from ...errors import InvalidInput
 from .corrector import Curve, Spot, Tolerances
 from .first_order import Tangent, first_order
 from .path import Event, EventKind, PathProblem, Point, Stop, name_of

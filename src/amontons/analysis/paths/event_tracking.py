@@ -22,7 +22,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InvalidInput, UnsupportedForm
+from ...errors import InvalidInput, UnsupportedForm
 from .first_order import FirstOrder, Tangent, first_order
 from .friction_path import FrictionPath
 from .path import Event, EventKind, Point, Stop, weight_of

@@ -28,17 +28,22 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InvalidInput
-from ..problem import FrictionProblem
-from ..solution import FrictionSolution
+from ...errors import InvalidInput
+from ...problem import FrictionProblem
+from ...solution import FrictionSolution
+from ..multipliers.multiplier_lmi import (
+    SMALLEST,
+    LmiOutcome,
+    find_multipliers,
+    slacks_are_positive,
+)
+from ..solutions.enumerate import PieceSolution
+from ..solutions.multistart import Finder, described
+from ..solutions.newton_batch import Stack
 from . import load_pieces as pieces
-from .enumerate import PieceSolution
 from .load_pieces import Known, LoadProblem, States
 from .load_proof import BranchProof, prove
 from .load_reduction import shared_multipliers
-from .multiplier_lmi import SMALLEST, LmiOutcome, find_multipliers, slacks_are_positive
-from .multistart import Finder, described
-from .newton_batch import Stack
 
 Array = NDArray[np.float64]
 NEAR = 1e-6  # of the size of reactions: a larger `distance` proves nothing of use

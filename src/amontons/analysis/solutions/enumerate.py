@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InvalidInput, UnsupportedForm
-from ..problem import FrictionProblem
+from ...errors import InvalidInput, UnsupportedForm
+from ...problem import FrictionProblem
 from . import pattern_search as search
 from .scaled_problem import REACH, SAME, ScaledProblem, States
 

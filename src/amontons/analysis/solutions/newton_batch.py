@@ -18,9 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cones import Coulomb
-from ..problem import FrictionProblem
-from ..solvers.functions import AlartCurnier
+from ...cones import Coulomb
+from ...problem import FrictionProblem
+from ...solvers.functions import AlartCurnier
 
 Array = NDArray[np.float64]
 FREE, STICK, SLIP = 0, 1, 2

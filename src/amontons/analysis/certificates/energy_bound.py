@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cholesky, solve_triangular
 
-from .rounding import EPSILON, is_positive_definite, unit_scale
+from ..multipliers.rounding import EPSILON, is_positive_definite, unit_scale
 
 Array = NDArray[np.float64]
 POWERS = (0.0, 0.5, 1.0)  # of |W_ii|, to which alpha is proportional

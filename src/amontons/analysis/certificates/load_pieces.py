@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg, sparse
 
-from ..problem import FrictionProblem
-from .multiplier_lmi import Family, Slacks, restricted
+from ...problem import FrictionProblem
+from ..multipliers.multiplier_lmi import Family, Slacks, restricted
 
 Array = NDArray[np.float64]
 States = NDArray[np.int8]

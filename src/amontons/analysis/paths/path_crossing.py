@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InvalidInput
-from ..model.large_deformation import LargeDeformation
-from ..solvers.base import Breakdown, Target
+from ...errors import InvalidInput
+from ...model.large_deformation import LargeDeformation
+from ...solvers.base import Breakdown, Target
 from .continuation import Continuation
 from .following import polished
 from .load_path import LoadPath

@@ -13,15 +13,15 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InvalidInput
-from ..problem import FrictionProblem
-from ..solution import FrictionSolution
-from .disc_search import DiscSearch
-from .disc_sets import ON
-from .enumerate import PieceSolution
+from ...errors import InvalidInput
+from ...problem import FrictionProblem
+from ...solution import FrictionSolution
+from ..solutions.disc_search import DiscSearch
+from ..solutions.disc_sets import ON
+from ..solutions.enumerate import PieceSolution
+from ..solutions.multistart import Finder, described
+from ..solutions.newton_batch import Stack
 from .load_certificate import LoadCertificate, LoadOutcome
-from .multistart import Finder, described
-from .newton_batch import Stack
 
 Array = NDArray[np.float64]
 TOLERANCE = 1e-8  # error by the judge of a solution

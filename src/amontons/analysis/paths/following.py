@@ -10,8 +10,8 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InvalidInput, SingularOperator
-from ..problem import FrictionProblem
+from ...errors import InvalidInput, SingularOperator
+from ...problem import FrictionProblem
 from .continuation import Continuation
 from .event_tracking import check_straight, leaving, track
 from .first_order import Tangent

@@ -24,8 +24,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InvalidInput
-from ..problem import FrictionProblem
+from ...errors import InvalidInput
+from ...problem import FrictionProblem
 from .determinant_search import NEGATIVE, POSITIVE, STICK, STOPPED, UNKNOWN
 from .energy_bound import energy_bound
 from .exact_threshold import LARGEST, Threshold, exact_threshold, search_windows

@@ -18,10 +18,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InvalidInput, UnsupportedForm
-from ..problem import FrictionProblem
+from ...errors import InvalidInput, UnsupportedForm
+from ...problem import FrictionProblem
+from ..multipliers.rounding import EPSILON, determinant_sign
 from .determinant_search import FREE, SLIP_MINUS, SLIP_PLUS, STICK, TANGENT
-from .rounding import EPSILON, determinant_sign
 
 Array = NDArray[np.float64]
 States = NDArray[np.int64]

@@ -93,7 +93,7 @@ def bifurcation_diagram(
     Solutions come from `enumerate_solutions`.  time_limit: seconds for each search.  options:
     those of step-by-step continuation, also where the curves are straight.
     """
-    from .enumerate import enumerate_solutions
+    from ..solutions.enumerate import enumerate_solutions
 
     began = time.perf_counter()
     branches: list[Branch] = []

@@ -1,0 +1,1 @@
+"""Quadratic multipliers: matrix inequalities solved, and proved with rounding counted."""

@@ -1,0 +1,1 @@
+"""Solution paths over load or friction: continuation and exact event tracking."""

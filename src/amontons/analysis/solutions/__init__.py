@@ -1,0 +1,1 @@
+"""All solutions of a problem: exact search in 2D and 3D, and many starts."""
