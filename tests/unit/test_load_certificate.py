@@ -1,5 +1,7 @@
 """One load: certificates checked again without the package, enumeration as the truth."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from load_certificate_checker import check_load
@@ -183,6 +185,31 @@ def test_unsymmetric_w():
     assert answer.outcome.name == ("CERTIFIED" if len(truth) == 1 else "REFUTED")
     if len(truth) == 1:
         checked(problem, answer)
+
+
+@pytest.mark.parametrize("q", [(0.2, 1.0), (0.2, 0.1)])
+def test_branches_in_which_nothing_can_move(q):
+    # open is the only solution, and the singular W leaves no room for a proof
+    problem = am.FrictionProblem.from_delassus(np.ones((2, 2)), [q], [1.0])
+    assert (
+        certify_load(problem, am.solve(problem), time_limit=5).outcome
+        is not LoadOutcome.REFUTED
+    )
+
+
+def test_a_regular_piece_has_one_solution():
+    # both contacts stick; other points of the same piece miss the law by less than rounding
+    W = np.array([
+        [1.16777347e-09, 7.62480327e-07, -1.36089254e-11, -1.24572511e-06],
+        [7.62480327e-07, 1.12364953e-03, -1.52152646e-08, -2.83672553e-03],
+        [-1.36089254e-11, -1.52152646e-08, 2.70556876e-13, 3.30182870e-08],
+        [-1.24572511e-06, -2.83672553e-03, 3.30182870e-08, 1.65361200e-02],
+    ])  # fmt: skip
+    q = np.array([[-6.29308773e-13, -1.29132462e-09], [-1.06269424e-14, -6.98781477e-11]])
+    problem = am.FrictionProblem.from_delassus(W, q, [2.0, 2.0])
+    solution = SimpleNamespace(r=np.linalg.solve(W, -q.ravel()).reshape(2, 2))
+    found = certify_load(problem, solution, time_limit=5)
+    assert found.outcome is not LoadOutcome.REFUTED
 
 
 def test_no_contact_and_contacts_that_can_not_react():

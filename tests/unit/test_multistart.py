@@ -112,6 +112,19 @@ def test_a_contact_that_can_not_react():
     assert [s.pattern for s in multistart(open_, starts=50).solutions] == ["sf"]
 
 
+@pytest.mark.parametrize(("q", "mu"), [([-1.0, 1.0], 1.0), ([-1.0, 0.5], 0.0)])
+def test_a_step_onto_a_known_solution_can_not_be_deflated(q, mu):
+    problem = am.FrictionProblem.from_delassus(np.eye(2), [q], [mu])
+    assert len(multistart(problem, starts=50)) == 1
+
+
+def test_huge_reactions_that_swallow_the_load_are_no_solutions():
+    # u_N = r_N + r_T + 0.2 >= 0.2 in the cone; r = 1e17 (1, -1) leaves q below rounding
+    problem = am.FrictionProblem.from_delassus(np.ones((2, 2)), [[0.2, 0.1]], [1.0])
+    found = multistart(problem, starts=200)
+    assert [s.pattern for s in found.solutions] == ["f"]
+
+
 def test_a_deflated_step_turns_away_from_a_known_solution():
     known, dr = np.zeros((1, 1, 2)), np.array([[[-1.0, 0.0]]])
     far, near = np.array([[[100.0, 0.0]]]), np.array([[[0.5, 0.0]]])

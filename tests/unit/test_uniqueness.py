@@ -128,6 +128,53 @@ def test_without_contacts_or_load():
     assert am.uniqueness(rest.with_mu(1.0)).verdict is EVERY
 
 
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize(
+    ("gap", "verdict"), [(-1e-3, UNDECIDED), (-1e-17, EVERY), (1.0, EVERY)]
+)
+def test_a_contact_that_can_not_react(dimension, gap, verdict):
+    W = np.diag([1.0] * dimension + [0.0] * dimension)
+    q = np.zeros((2, dimension))
+    q[0, 0], q[1, 0] = -1.0, gap
+    problem = am.FrictionProblem.from_delassus(W, q, [0.3, 0.3])
+    found = am.uniqueness(problem)
+    assert found.verdict is quick_verdict(problem).verdict is verdict
+    assert ("no solution" in found.reason) == (verdict is UNDECIDED)
+    every = am.all_solutions(problem)
+    assert every.complete
+    assert len(every) == (verdict is EVERY)
+
+
+@pytest.mark.parametrize("W", [np.diag([1.0, 0.0]), np.diag([0.0, 1.0]), np.diag([-1.0, 1.0])])
+def test_without_coupling_w_must_be_definite(W):
+    problem = am.FrictionProblem.from_delassus(W, [[-1.0, 0.0]], [0.5])
+    assert quick_verdict(problem).verdict is UNDECIDED
+    assert quick_verdict(problem).lower == 0
+
+
+def test_contacts_given_twice_share_their_reactions_in_many_ways():
+    W = np.tile(np.eye(2), (2, 2))
+    problem = am.FrictionProblem.from_delassus(W, [[-1.0, 0.1]] * 2, [0.5, 0.5])
+    assert am.uniqueness(problem).verdict is SEVERAL
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize(
+    ("unit", "far", "able"), [(1.0, 1e10, 1.0), (1e20, 0.5, 0.0), (1e-12, 1e7, 0.0)]
+)
+def test_a_second_contact_hides_no_solution_of_the_first(dimension, unit, far, able):
+    # W = [[1, .8], [.8, 1]] at mu = 2 has three solutions; the second contact stays open
+    W = np.eye(2 * dimension)
+    W[0, 1] = W[1, 0] = 0.8
+    W[dimension:] *= able
+    q = np.zeros((2, dimension))
+    q[0, :2], q[1, 0] = (0.2, 1.0), far
+    problem = am.FrictionProblem.from_delassus(unit * W, q, [2.0, 2.0])
+    assert am.uniqueness(problem, time_limit=20).verdict is SEVERAL
+    assert len(am.all_solutions(problem, time_limit=20)) == 3
+    assert len(am.multistart(problem, starts=100)) == 3
+
+
 def test_large_problems_are_not_examined_quickly():
     n = 201
     problem = am.FrictionProblem.from_delassus(np.eye(2 * n), np.ones((n, 2)), np.ones(n))

@@ -105,7 +105,8 @@ def critical_friction(
         raise InvalidInput(f"gap: expected a number between 0 and 1, got {gap!r}")
     began = time.perf_counter()
     pieces = Pieces.of(problem)
-    if not pieces.contacts or not pieces.couples:
+    definite = energy_bound(pieces.W, pieces.shape)[0] > 0  # also where no contact reacts
+    if definite and not pieces.couples:
         why = "no tangential force moves a contact along its normal"
         return CriticalFriction(np.inf, np.inf, "determinants", None, None, None, 0,
                                 time.perf_counter() - began, why)  # fmt: skip

@@ -38,7 +38,7 @@ from ..multipliers.multiplier_lmi import (
     slacks_are_positive,
 )
 from ..solutions.enumerate import PieceSolution
-from ..solutions.multistart import Finder, described
+from ..solutions.multistart import Finder, certain_error, described
 from ..solutions.newton_batch import Stack
 from . import load_pieces as pieces
 from .load_pieces import Known, LoadProblem, States
@@ -207,7 +207,7 @@ class _Search:
         return self._answer(LoadOutcome.CERTIFIED, f"multipliers exclude all others{parts}")
 
     def _refuted(self, other: PieceSolution) -> LoadCertificate:
-        return self._answer(LoadOutcome.REFUTED, f"{other.pattern} is another solution", other)
+        return self._answer(LoadOutcome.REFUTED, f"another solution is {other.pattern}", other)
 
     def _answer(
         self, outcome: LoadOutcome, reason: str, other: PieceSolution | None = None
@@ -423,4 +423,4 @@ class OtherSolutions:
         return error <= TOLERANCE and (between > 100 * error or between <= EXACT)
 
     def _error(self, r: Array) -> float:
-        return self.problem.error(r * self.stack.to_r)
+        return certain_error(self.problem, r * self.stack.to_r)

@@ -84,7 +84,7 @@ class _Certification:
         others = [other for other in finder.found if np.abs(other - finder.found[0]).max() > ON]
         if others:
             other = described(stack, others[0])
-            reason = f"{other.pattern} is another solution"
+            reason = f"another solution is {other.pattern}"
             return self._answer(LoadOutcome.REFUTED, reason, other)
         if search.complete:
             count = len(search.proofs) + len(search.linear)

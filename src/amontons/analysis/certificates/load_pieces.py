@@ -24,6 +24,7 @@ from scipy import linalg, sparse
 
 from ...problem import FrictionProblem
 from ..multipliers.multiplier_lmi import Family, Slacks, restricted
+from ..multipliers.scales import contact_sizes, load_size
 
 Array = NDArray[np.float64]
 States = NDArray[np.int8]
@@ -65,12 +66,10 @@ class LoadProblem:
         nc = local.contacts
         assert local.W is not None and local.q is not None
         W = local.W if isinstance(local.W, np.ndarray) else local.W.toarray()
-        own = np.arange(nc)
-        size = np.linalg.norm(W.reshape(nc, 2, nc, 2)[own, :, own], 2, axis=(1, 2))
-        reacts = size > 0
-        root = np.repeat(_power_of_two(np.sqrt(np.where(reacts, size, 1.0))), 2)
+        size, reacts = contact_sizes(W, nc)
+        root = np.repeat(_power_of_two(np.sqrt(size)), 2)
         q = local.q.ravel() / root
-        unit = _power_of_two(np.array(np.linalg.norm(q) or 1.0))
+        unit = _power_of_two(np.array(load_size(q.reshape(nc, 2), local.mu, reacts) or 1.0))
         W = W / root / root[:, None]
         return cls(local, W, q / unit, local.mu, unit / root, unit * root, reacts)
 
@@ -401,9 +400,10 @@ def energy_basis(local: LoadProblem, branch: States, apex: bool) -> tuple[Array,
         energy = linalg.block_diag(energy, 1.0)
     T = linalg.null_space(motion[rows]) if len(rows) else np.eye(motion.shape[1])
     T = T @ _inverse_root(T.T @ energy @ T)
-    r = np.asarray(R @ T[: R.shape[1]]).reshape(-1, 2, T.shape[1])
-    u = (motion @ T).reshape(-1, 2, T.shape[1])
-    Z = np.concatenate([r, u], axis=1).reshape(-1, T.shape[1])
+    shape = (local.contacts, 2, T.shape[1])  # no columns where nothing can move
+    r = np.asarray(R @ T[: R.shape[1]]).reshape(shape)
+    u = (motion @ T).reshape(shape)
+    Z = np.concatenate([r, u], axis=1).reshape(4 * local.contacts, T.shape[1])
     return (np.vstack([Z, T[-1:]]) if apex else Z), T
 
 

@@ -19,6 +19,7 @@ from ...errors import InvalidInput, SingularOperator
 from ...problem import FrictionProblem
 from ...solution import FrictionSolution
 from ...solve import drive
+from ..multipliers.scales import contact_sizes
 from ..solutions.enumerate import PieceSolution, enumerate_solutions
 from .critical_friction import CriticalFriction, Witness, critical_friction
 from .energy_bound import energy_bound
@@ -80,10 +81,12 @@ class Uniqueness:
 
     def __str__(self) -> str:
         upper = "unknown" if np.isinf(self.upper) else f"{self.upper:.4g}"
+        bounds = f"critical friction between {self.lower:.4g} and {upper}"
+        if np.isinf(self.lower):
+            bounds = "any friction is safe"
         return (
             f"{self.verdict.value.replace('_', ' ')}: {self.verdict.meaning} {self.reason} "
-            f"(friction {self.friction:g}; critical friction between {self.lower:.4g} and "
-            f"{upper})"
+            f"(friction {self.friction:g}; {bounds})"
         )
 
 
@@ -105,6 +108,8 @@ def assess(
         spent = time.perf_counter() - began
         return Uniqueness(Verdict.UNDECIDED, float(friction), 0.0, np.inf, "none",
                           _sentence(str(reason)), seconds=spent)  # fmt: skip
+    if _blocked(local):
+        return _without_solution(local, began)
     if isinstance(problem.law, Tresca):
         return _given_friction(local, began)
     verdict = _every_load(local, began + BOUNDS * time_limit)
@@ -126,6 +131,8 @@ def quick_verdict(problem: FrictionProblem) -> Uniqueness | None:
         local = problem.condensed()
     except SingularOperator:  # contact alone holds a body
         return None
+    if _blocked(local):
+        return _without_solution(local, began)
     if isinstance(problem.law, Tresca):
         return _given_friction(local, began)
     verdict = _by_energy(local)
@@ -136,6 +143,21 @@ def quick_verdict(problem: FrictionProblem) -> Uniqueness | None:
 
 def _is_small(local: FrictionProblem) -> bool:
     return local.dimension == 2 and 0 < local.contacts <= INSTANT
+
+
+# --------------------------------------------------------------------- no solution
+def _blocked(local: FrictionProblem) -> bool:
+    """True where a contact penetrates that can not react; rounding of a gap does not count."""
+    assert local.q is not None
+    reacts = contact_sizes(_dense(local), local.contacts)[1]
+    return bool((local.q[~reacts, 0] < -SAME * local.q_norm).any())
+
+
+def _without_solution(local: FrictionProblem, began: float) -> Uniqueness:
+    friction = 0.0 if isinstance(local.law, Tresca) else float(local.mu.max(initial=0.0))
+    reason = "There is no solution: a contact penetrates that can not react."
+    return Uniqueness(Verdict.UNDECIDED, friction, 0.0, np.inf, "none", reason,
+                      seconds=time.perf_counter() - began)  # fmt: skip
 
 
 # ------------------------------------------------------------------- every load
@@ -158,7 +180,7 @@ def _by_energy(local: FrictionProblem) -> Uniqueness:
     friction = float(local.mu.max(initial=0.0))
     lower = energy_bound(_dense(local), friction_shape(local.mu))[0]
     if friction < lower or local.contacts == 0:
-        reason = f"Friction {friction:g} is below a safe bound of {lower:.3g}."
+        reason = _is_below(friction, lower)
         return Uniqueness(Verdict.UNIQUE_EVERY_LOAD, friction, lower, np.inf, "energy", reason)
     reason = (
         f"The cheapest safe bound is {lower:.3g}."
@@ -186,7 +208,7 @@ def _by_bounds(cheap: Uniqueness, bounds: CriticalFriction) -> Uniqueness:
     friction = cheap.friction
     if friction < lower:
         verdict = Verdict.UNIQUE_EVERY_LOAD
-        reason = f"Friction {friction:g} is below a safe bound of {lower:.4g}."
+        reason = _is_below(friction, lower)
     elif friction >= bounds.upper:
         verdict = Verdict.UNDECIDED
         reason = "Friction is above the critical one: some loads have several solutions."
@@ -260,6 +282,12 @@ def _refuted(
 def _dense(local: FrictionProblem) -> Array:
     W = local.W
     return W if isinstance(W, np.ndarray) else W.toarray()  # type: ignore[union-attr]
+
+
+def _is_below(friction: float, lower: float) -> str:
+    if np.isinf(lower):
+        return "Every friction is safe."
+    return f"Friction {friction:g} is below a safe bound of {lower:.4g}."
 
 
 def _left(deadline: float) -> float:

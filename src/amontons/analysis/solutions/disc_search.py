@@ -128,8 +128,8 @@ class DiscSearch:
 
     @property
     def _penetrates(self) -> bool:
-        """True when a contact that can not react has u_N < 0: no solution."""
-        return bool((self.stack.c[~self.stack.able, 0] < 0).any())
+        """True when a contact that can not react has u_N < 0, beyond rounding: no solution."""
+        return bool((self.stack.c[~self.stack.able, 0] < -SURE).any())
 
     def reason(self, limit: float) -> str:
         """Why the list is complete, or why not."""

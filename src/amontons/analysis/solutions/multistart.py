@@ -93,7 +93,7 @@ class Finder:
         size = 1 + np.abs(r).max(initial=0.0)
         if any(np.abs(r - other).max() <= SAME * size for other in self.found):
             return False
-        if self.stack.problem.error(r * self.stack.to_r) > self.tolerance:
+        if certain_error(self.stack.problem, r * self.stack.to_r) > self.tolerance:
             return False
         for k, other in enumerate(self.found):
             if self._connected(
@@ -222,6 +222,11 @@ def orientation(stack: Stack, r: Array) -> tuple[int, int]:
     values = np.linalg.svd(matrix, compute_uv=False)
     freedom = int((values <= SINGULAR * values.max(initial=0.0)).sum())
     return (0 if freedom else int(np.linalg.slogdet(matrix)[0])), freedom
+
+
+def certain_error(problem: FrictionProblem, r: Array) -> float:
+    """Error by the judge, or what rounding of huge reactions may hide of it, if more."""
+    return max(problem.error(r), problem.rounding(r))
 
 
 def described(stack: Stack, r: Array) -> PieceSolution:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ...cones import Coulomb
 from ...problem import FrictionProblem
 from ...solvers.functions import AlartCurnier
+from ..multipliers.scales import contact_sizes, load_size
 
 Array = NDArray[np.float64]
 FREE, STICK, SLIP = 0, 1, 2
@@ -52,13 +53,12 @@ class Stack:
         assert problem.W is not None and problem.q is not None
         W = problem.W if isinstance(problem.W, np.ndarray) else problem.W.toarray()
         nc, d = problem.q.shape
-        own = np.arange(nc)
-        size = np.linalg.norm(W.reshape(nc, d, nc, d)[own, :, own], 2, axis=(1, 2))
-        root = _power_of_two(np.sqrt(np.where(size > 0, size, 1.0)))[:, None]
-        unit = float(_power_of_two(np.linalg.norm(problem.q / root)))
+        size, reacts = contact_sizes(W, nc)
+        root = _power_of_two(np.sqrt(size))[:, None]
+        unit = float(_power_of_two(load_size(problem.q / root, problem.mu, reacts)))
         each = np.repeat(root[:, 0], d)
         return cls(problem, W / each / each[:, None], problem.q / (unit * root), problem.mu,
-                   size > 0, unit / root, unit * root)  # fmt: skip
+                   reacts, unit / root, unit * root)  # fmt: skip
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -188,8 +188,9 @@ def deflation(r: Array, dr: Array, known: Array) -> Array:
     apart = r[:, None] - known
     square = np.maximum((apart**2).sum(axis=(2, 3)), 1e-30)
     along = -2 * np.einsum("ksij,kij->ks", apart, dr) / (square * (1 + square))
-    factor = 1 / (1 - along.sum(axis=1))
-    return np.clip(np.where(np.isfinite(factor), factor, 10.0), -10.0, 10.0)
+    rest = 1 - along.sum(axis=1)
+    rest = np.where(np.isfinite(rest), rest, 0.0)
+    return 1 / np.where(np.abs(rest) < 0.1, np.copysign(0.1, rest), rest)
 
 
 def _least_squares(matrix: Array, b: Array) -> Array:

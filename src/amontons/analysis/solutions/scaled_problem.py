@@ -1,9 +1,10 @@
 """A 2D Coulomb problem in scaled variables: the box of its solutions, and its linear pieces.
 
-Scaled variables: r sqrt|W_ii| and u / sqrt|W_ii|, divided by |q / sqrt|W_ii||.  Every solution
-dissipates, r u <= 0, so r W r + q r <= 0: where W is positive definite that ellipsoid bounds
-all reactions and velocities beforehand, and proofs hold without further assumption; so they do
-where W is singular but no reaction in the cone has W r = 0.
+Scaled variables: r sqrt|W_ii| and u / sqrt|W_ii|, divided by |q / sqrt|W_ii|| of the contacts
+that q can press (`load_size`).  Every solution dissipates, r u <= 0, so r W r + q r <= 0: where
+W is positive definite that ellipsoid bounds all reactions and velocities beforehand, and proofs
+hold without further assumption; so they do where W is singular but no reaction in the cone has
+W r = 0.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from ...problem import FrictionProblem
+from ..multipliers.scales import contact_sizes, load_size
 from . import pattern_search as search
 
 Array = NDArray[np.float64]
@@ -32,14 +34,14 @@ class ScaledProblem:
         self.problem, self.mu = problem, problem.mu
         nc = self.contacts = problem.contacts
         W = problem.W if isinstance(problem.W, np.ndarray) else problem.W.toarray()
-        own = np.arange(nc)
-        size = np.linalg.norm(W.reshape(nc, 2, nc, 2)[own, :, own], 2, axis=(1, 2))
-        self.reacts = size > 0
-        root = np.repeat(np.sqrt(np.where(self.reacts, size, 1.0)), 2)
-        self.unit = float(np.linalg.norm(problem.q.ravel() / root))
+        size, self.reacts = contact_sizes(W, nc)
+        root = np.repeat(np.sqrt(size), 2)
+        self.unit = load_size(problem.q / root.reshape(nc, 2), self.mu, self.reacts)
         self.to_r, self.to_u = self.unit / root, self.unit * root
         self.W = W / root / root[:, None]
         self.c = problem.q.ravel() / self.to_u
+        normal = self.c[0::2]  # a view: rounding of the gap of a contact that can not react
+        normal[~self.reacts & (np.abs(normal) <= SLACK)] = 0.0
         generators = np.zeros((2 * nc, 2 * nc))  # r = generators x
         shrink = 1 / np.maximum(self.mu, 1.0)
         for i in range(nc):
