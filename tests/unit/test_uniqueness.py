@@ -13,6 +13,7 @@ from amontons.cli import main
 from amontons.errors import InvalidInput
 from amontons.gallery import box_tower, one_contact_2d
 from amontons.hild import hild_triangle
+from amontons.solvers import Iterate
 
 EVERY, THIS = Verdict.UNIQUE_EVERY_LOAD, Verdict.UNIQUE_THIS_LOAD
 SEVERAL, UNDECIDED = Verdict.NOT_UNIQUE, Verdict.UNDECIDED
@@ -150,6 +151,15 @@ def test_without_coupling_w_must_be_definite(W):
     problem = am.FrictionProblem.from_delassus(W, [[-1.0, 0.0]], [0.5])
     assert quick_verdict(problem).verdict is UNDECIDED
     assert quick_verdict(problem).lower == 0
+
+
+def test_the_other_solution_is_not_the_given_one():
+    problem = one_contact_2d(2.0)
+    for known in am.all_solutions(problem).solutions:
+        solution = am.solve(problem, start=Iterate(np.array(known.r)))
+        found = am.uniqueness(problem, solution)
+        assert found.solution is solution
+        assert np.abs(found.other.r - solution.r).max() > 0.1
 
 
 def test_contacts_given_twice_share_their_reactions_in_many_ways():

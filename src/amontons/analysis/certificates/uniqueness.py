@@ -225,9 +225,10 @@ def _this_load(
 ) -> Uniqueness:  # fmt: skip
     """All solutions where they can be enumerated, else the certificate about one."""
     if local.dimension == 2 and local.contacts <= ENUMERATED and local.q_norm > 0:
-        answer = _by_enumeration(local, verdict, _left(deadline) / 2)
+        answer = _by_enumeration(local, solution, verdict, _left(deadline) / 2)
         if answer is not None:
             return answer
+    given = solution is not None
     if solution is None:
         solution = drive(local, time_limit=_left(deadline))
     if not solution.converged:
@@ -239,8 +240,9 @@ def _this_load(
         return replace(verdict, reason=f"{verdict.reason} {reason}")
     try:
         found = certify_load(local, solution, time_limit=_left(deadline))
-    except InvalidInput as reason:  # a solution that is not accurate enough
-        return replace(verdict, reason=f"{verdict.reason} {reason}.")
+    except InvalidInput as reason:
+        why = f"No certificate: {reason}." if given else "The solution is too rough to certify."
+        return replace(verdict, reason=f"{verdict.reason} {why}")
     if found.outcome is LoadOutcome.CERTIFIED:
         return replace(verdict, verdict=Verdict.UNIQUE_THIS_LOAD, certificate=found,
                        reason=_sentence(found.reason))  # fmt: skip
@@ -250,20 +252,27 @@ def _this_load(
 
 
 def _by_enumeration(
-    local: FrictionProblem, verdict: Uniqueness, time_limit: float
-) -> Uniqueness | None:
+    local: FrictionProblem, solution: FrictionSolution | None, verdict: Uniqueness,
+    time_limit: float,
+) -> Uniqueness | None:  # fmt: skip
     """The verdict of the list of all solutions, None where it settles nothing."""
+    verdict = replace(verdict, solution=solution)
     found = enumerate_solutions(local, time_limit=time_limit)
     isolated = all(s.freedom == 0 for s in found.solutions)
     if found.complete and len(found) == 1 and isolated:
         reason = "All other patterns of statuses are excluded."
         return replace(verdict, verdict=Verdict.UNIQUE_THIS_LOAD, reason=reason)
+    if found.complete and not found.solutions:
+        return replace(verdict, reason="There is no solution: all patterns are excluded.")
     if len(found) > 1 or not isolated:
         s = found.solutions
-        other = s[1] if len(s) > 1 else s[0]
+        first = s[0] if solution is None else solution
+        size = np.sqrt(contact_sizes(_dense(local), local.contacts)[0])[:, None]
+        other = max(s, key=lambda x: float(np.linalg.norm(size * (x.r - first.r))))
+        other = other if isolated else s[0]
         count = f"{len(s)} solutions were found" if isolated else "a set of solutions was found"
         reason = f"{count[0].upper()}{count[1:]}: {', '.join(x.pattern for x in s[:5])}."
-        return _refuted(verdict, other, s[0].u, reason)
+        return _refuted(verdict, other, first.u, reason)
     return None
 
 
