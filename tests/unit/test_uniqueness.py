@@ -185,6 +185,22 @@ def test_a_second_contact_hides_no_solution_of_the_first(dimension, unit, far, a
     assert len(am.multistart(problem, starts=100)) == 3
 
 
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("larger", [1e4, 1e10])
+@pytest.mark.parametrize("second", [(-1.0, 0.0), (0.2, 1.0)])
+def test_loads_of_different_size_are_resolved_or_nothing_is_claimed(dimension, larger, second):
+    # three solutions at the first contact; the second has one and is loaded much more
+    W = np.eye(2 * dimension)
+    W[0, 1] = W[1, 0] = 0.8
+    q = np.zeros((2, dimension))
+    q[0, :2], q[1, :2] = (0.2, 1.0), np.multiply(larger, second)
+    problem = am.FrictionProblem.from_delassus(W, q, [2.0, 0.5])
+    found = am.all_solutions(problem, time_limit=20)
+    assert found.complete == (larger < 1e6)
+    assert len(found) == 3 or not found.complete
+    assert am.uniqueness(problem, time_limit=20).verdict in (SEVERAL, UNDECIDED)
+
+
 def test_large_problems_are_not_examined_quickly():
     n = 201
     problem = am.FrictionProblem.from_delassus(np.eye(2 * n), np.ones((n, 2)), np.ones(n))

@@ -123,7 +123,7 @@ def _penalised(multipliers: Array, rows: NDArray[np.int64], penalty: float) -> A
 
 
 def _smallest_eigenvalue(M: Array) -> float:
-    """An estimate, by inverse iteration; 0 where M is not positive definite."""
+    """An estimate, by inverse iteration; 0 where M is not positive definite, or overflows."""
     try:
         factor = linalg.cho_factor(M, check_finite=False)
     except linalg.LinAlgError:
@@ -133,6 +133,8 @@ def _smallest_eigenvalue(M: Array) -> float:
     for _ in range(20):
         x = linalg.cho_solve(factor, x / np.linalg.norm(x), check_finite=False)
         length = float(np.linalg.norm(x))
+        if length == 0:
+            return 0.0
     return 1 / length
 
 

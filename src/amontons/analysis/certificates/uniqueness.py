@@ -19,7 +19,7 @@ from ...errors import InvalidInput, SingularOperator
 from ...problem import FrictionProblem
 from ...solution import FrictionSolution
 from ...solve import drive
-from ..multipliers.scales import contact_sizes
+from ..multipliers.scales import UNRESOLVED, contact_sizes, resolves
 from ..solutions.enumerate import PieceSolution, enumerate_solutions
 from .critical_friction import CriticalFriction, Witness, critical_friction
 from .energy_bound import energy_bound
@@ -103,11 +103,13 @@ def assess(
     began = time.perf_counter()
     try:
         local = problem.condensed()
-    except (SingularOperator, InvalidInput) as reason:  # no W, or too large for the memory
+    except (SingularOperator, InvalidInput) as error:  # no W, or too large for the memory
+        no_w = isinstance(error, SingularOperator)
+        reason = f"Contact alone holds a body, there is no W: {error}" if no_w else str(error)
         friction = 0.0 if isinstance(problem.law, Tresca) else problem.mu.max(initial=0.0)
         spent = time.perf_counter() - began
         return Uniqueness(Verdict.UNDECIDED, float(friction), 0.0, np.inf, "none",
-                          _sentence(str(reason)), seconds=spent)  # fmt: skip
+                          _sentence(reason), seconds=spent)  # fmt: skip
     if _blocked(local):
         return _without_solution(local, began)
     if isinstance(problem.law, Tresca):
@@ -243,6 +245,8 @@ def _this_load(
     except InvalidInput as reason:
         why = f"No certificate: {reason}." if given else "The solution is too rough to certify."
         return replace(verdict, reason=f"{verdict.reason} {why}")
+    if found.outcome is LoadOutcome.CERTIFIED and not resolves(local, solution.r):
+        return replace(verdict, reason=f"{verdict.reason} {_sentence(UNRESOLVED)}")
     if found.outcome is LoadOutcome.CERTIFIED:
         return replace(verdict, verdict=Verdict.UNIQUE_THIS_LOAD, certificate=found,
                        reason=_sentence(found.reason))  # fmt: skip

@@ -5,7 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ...problem import FrictionProblem
+
 Array = NDArray[np.float64]
+UNRESOLVED = "the loads of contacts differ too much to tell solutions at the least loaded apart"
+RESOLVED = 1e-6  # load of a contact relative to the largest load or reaction, scaled
 
 
 def contact_sizes(W: Array, contacts: int) -> tuple[Array, NDArray[np.bool_]]:
@@ -30,3 +34,19 @@ def load_size(q: Array, mu: Array, reacts: NDArray[np.bool_]) -> float:
     tangent = np.linalg.norm(q[:, 1:], axis=1)
     loaded = reacts & (q[:, 0] < mu * tangent)
     return float(np.linalg.norm(q[loaded]) or np.linalg.norm(q))
+
+
+def resolves(problem: FrictionProblem, r: Array) -> bool:
+    """False where a contact is loaded so much less than others that tolerances swallow it.
+
+    problem in Delassus form, r (nc, d).  The load of a contact is |q_i| + sum |W_ij| |r_j|.
+    """
+    assert problem.W is not None and problem.q is not None
+    W = problem.W if isinstance(problem.W, np.ndarray) else problem.W.toarray()
+    q, (nc, d) = problem.q, r.shape
+    size, reacts = contact_sizes(W, nc)
+    load = np.linalg.norm(np.abs(q) + (np.abs(W) @ np.abs(r).ravel()).reshape(nc, d), axis=1)
+    load /= np.sqrt(size)
+    largest = np.linalg.norm(np.sqrt(size)[:, None] * r, axis=1).max(initial=0.0)
+    largest = max(largest, load_size(q / np.sqrt(size)[:, None], problem.mu, reacts))
+    return not bool((reacts & (load > 0) & (load < RESOLVED * largest)).any())

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ...errors import InvalidInput
 from ...problem import FrictionProblem
+from ..multipliers.scales import UNRESOLVED, resolves
 from .disc_multipliers import EXACT, BoxProblem, BoxProof, contains
 from .disc_sets import ON, Law, Region
 from .enumerate import Solutions
@@ -123,8 +124,13 @@ class DiscSearch:
 
     @property
     def complete(self) -> bool:
-        """True when every region was closed."""
-        return not self.queue and not self.undecided
+        """True when every region was closed, and solutions can be told apart."""
+        return not self.queue and not self.undecided and self._resolved
+
+    @property
+    def _resolved(self) -> bool:
+        stack = self.stack
+        return all(resolves(stack.problem, r * stack.to_r) for r in self.finder.found)
 
     @property
     def _penetrates(self) -> bool:
@@ -137,6 +143,8 @@ class DiscSearch:
             return f"stopped after {limit:g} s"
         if self.undecided:
             return f"{self.undecided} regions could be neither divided nor excluded"
+        if not self._resolved:
+            return UNRESOLVED
         return "every region was searched and all others are excluded"
 
     def proof(self) -> DiscProof:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ...errors import InvalidInput, UnsupportedForm
 from ...problem import FrictionProblem
+from ..multipliers.scales import UNRESOLVED, resolves
 from . import pattern_search as search
 from .scaled_problem import REACH, SAME, ScaledProblem, States
 
@@ -132,8 +133,11 @@ def enumerate_solutions(
         reason = f"{undecided} patterns are too near to a solution to be excluded"
     elif not piece.bounded:
         reason = f"W is singular: reactions above {REACH:g} times the size of q / W may exist"
-    complete = not stopped and not undecided and piece.bounded
     solutions = tuple(_merged(piece, found))
+    resolved = all(resolves(local, s.r) for s in solutions)
+    if not resolved:
+        reason = UNRESOLVED
+    complete = not stopped and not undecided and piece.bounded and resolved
     return Solutions(
         solutions, complete, reason, examined, time.perf_counter() - began, _proof(piece, cuts)
     )
