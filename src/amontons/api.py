@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, overload
 
+from .cones import Coulomb
 from .errors import Interrupted, InvalidInput, NotConverged
 from .problem import Form, FrictionProblem
 from .results import ModelSolution
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from .analysis.solutions.enumerate import Solutions
     from .model import Model
 
+HUGE = 1e12  # friction above which rounding hides what the law says
 Start = Iterate | FrictionSolution | ModelSolution | None
 
 
@@ -106,10 +108,17 @@ def multistart(
 
 
 def _discrete(problem: FrictionProblem | Model) -> FrictionProblem:
-    """The problem, or that of a model."""
+    """The problem, or that of a model; raises InvalidInput for friction without limits."""
     if not (isinstance(problem, FrictionProblem) or hasattr(problem, "assemble")):
         raise InvalidInput(f"problem: expected a Model or a FrictionProblem, got {problem!r}")
-    return problem if isinstance(problem, FrictionProblem) else problem.assemble()
+    discrete = problem if isinstance(problem, FrictionProblem) else problem.assemble()
+    largest = float(discrete.law.coefficient.max(initial=0.0))
+    if isinstance(discrete.law, Coulomb) and largest > HUGE:
+        raise InvalidInput(
+            f"mu: expected friction of at most {HUGE:g} to ask for all solutions, got "
+            f"{largest:g}; contacts that can not slip are bonded, hold them by supports"
+        )
+    return discrete
 
 
 def follow(
