@@ -14,10 +14,8 @@ import click
 import numpy as np
 
 import amontons as am
-from amontons.errors import AmontonsError
-from amontons.files import replacing
-from benchmarks.machine import describe
 
+from ..record import check_parts, heading, levels_of, regenerate
 from . import bodies, cube, figures, tables
 from .runs import Run
 
@@ -47,48 +45,16 @@ def main(parts: tuple[str, ...], levels: str, results: Path | None) -> None:
     table6.1, section6 (the shell, up to level 3), section7 (ring and tool, coarse up to level
     2); all of them by default.  Numbers of other parts stay as they are stored.
     """
-    for part in parts:
-        if part not in PARTS:
-            raise click.UsageError(f"PART: {part!r} is none of {', '.join(PARTS)}")
-    try:
-        chosen = sorted({int(x) for x in levels.split(",")})
-    except ValueError as error:
-        raise click.UsageError(f"--levels: expected numbers, got {levels!r}") from error
-    if not chosen or chosen[0] < 0 or chosen[-1] > 5:
-        raise click.UsageError(f"--levels: expected numbers from 0 to 5, got {levels!r}")
+    check_parts(parts, PARTS)
+    chosen = levels_of(levels, 0, 5)
     out = results or HERE / "results"
-    out.mkdir(parents=True, exist_ok=True)
-    try:
-        for part in parts or PARTS:
-            click.echo(f"{part} …")
-            store(out, part, WORK[part](chosen, out))
-    except AmontonsError as reason:
-        raise click.ClickException(str(reason)) from reason
-    text = page(load(out))
-    with replacing(out / "results.md") as path:
-        path.write_text(text)
-    click.echo(text)
-
-
-def store(out: Path, part: str, runs: dict) -> None:
-    """Put the numbers of a part beside those of the others."""
-    record = load(out)
-    record["machine"] = describe()
-    record[part] = runs
-    with replacing(out / "results.json") as path:
-        path.write_text(json.dumps(record) + "\n")
-
-
-def load(out: Path) -> dict:
-    """What is stored."""
-    target = out / "results.json"
-    return json.loads(target.read_text()) if target.exists() else {}
+    chosen_parts = parts or PARTS
+    click.echo(regenerate(out, chosen_parts, lambda p: (p, WORK[p](chosen, out)), page))
 
 
 def page(record: dict) -> str:
     """All tables of what is stored."""
-    lines = ["# hueeber2008: results", "", "Regenerate: `python -m reproduce.hueeber2008`.", ""]
-    lines += ["; ".join(f"{k} {v}" for k, v in record["machine"].items()) + ".", ""]
+    lines = heading("hueeber2008", record)
     makers: dict[str, Callable] = {
         "table4.1": tables.table41, "table4.2": tables.table42, "table4.3": tables.table43,
         "table5.1": tables.table51,

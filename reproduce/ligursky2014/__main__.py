@@ -13,10 +13,7 @@ from typing import Any
 
 import click
 
-from amontons.errors import AmontonsError
-from amontons.files import replacing
-from benchmarks.machine import describe
-
+from ..record import check_parts, heading, levels_of, regenerate
 from . import block, examples, tables, vee
 
 HERE = Path(__file__).parent
@@ -61,53 +58,16 @@ def main(parts: tuple[str, ...], levels: str, results: Path | None) -> None:
     PART is example1 … example5, vee, friction, block or block-friction; all of them by default.
     Numbers of other parts stay as they are stored.
     """
-    for part in parts:
-        if part not in WORK:
-            raise click.UsageError(f"PART: {part!r} is none of {', '.join(WORK)}")
-    try:
-        chosen = sorted({int(x) for x in levels.split(",")})
-    except ValueError as error:
-        raise click.UsageError(f"--levels: expected numbers, got {levels!r}") from error
-    if not set(chosen) <= set(vee.LEVELS):
-        raise click.UsageError(f"--levels: expected numbers from 1 to 3, got {levels!r}")
+    check_parts(parts, tuple(WORK))
+    chosen = levels_of(levels, min(vee.LEVELS), max(vee.LEVELS))
     out = results or HERE / "results"
-    out.mkdir(parents=True, exist_ok=True)
-    try:
-        for part in parts or WORK:
-            click.echo(f"{part} …")
-            store(out, part, WORK[part](chosen, out))
-    except AmontonsError as reason:
-        raise click.ClickException(str(reason)) from reason
-    text = page(load(out))
-    with replacing(out / "results.md") as path:
-        path.write_text(text)
-    click.echo(text)
-
-
-def store(out: Path, part: str, found: Any) -> None:
-    """Put the numbers of a part beside those of the others."""
-    record = load(out)
-    record["machine"] = describe()
-    record[part] = found
-    with replacing(out / "results.json") as path:
-        path.write_text(json.dumps(record) + "\n")
-
-
-def load(out: Path) -> dict[str, Any]:
-    """What is stored."""
-    target = out / "results.json"
-    return json.loads(target.read_text()) if target.exists() else {}
+    chosen_parts = parts or tuple(WORK)
+    click.echo(regenerate(out, chosen_parts, lambda p: (p, WORK[p](chosen, out)), page))
 
 
 def page(record: dict[str, Any]) -> str:
     """All tables of what is stored."""
-    lines = [
-        "# ligursky2014: results",
-        "",
-        "Regenerate: `python -m reproduce.ligursky2014`.",
-        "",
-    ]
-    lines += ["; ".join(f"{k} {v}" for k, v in record["machine"].items()) + ".", ""]
+    lines = heading("ligursky2014", record)
     for part, make in PAGES.items():
         if part in record:
             lines += make(record[part])

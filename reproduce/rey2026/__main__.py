@@ -13,10 +13,7 @@ from types import ModuleType
 
 import click
 
-from amontons.errors import AmontonsError
-from amontons.files import replacing
-from benchmarks.machine import describe
-
+from ..record import check_parts, heading, regenerate
 from . import alart_curnier, nitsche, primal_dual, report, solutions, uzawa
 
 HERE = Path(__file__).parent
@@ -50,21 +47,14 @@ def main(
     PART is the name of a table or figure in `paper.json`; all of them by default.  Numbers of
     other parts stay as they are stored.
     """
-    for part in parts:
-        if part not in PARTS:
-            raise click.UsageError(f"PART: {part!r} is none of {', '.join(PARTS)}")
+    check_parts(parts, PARTS)
     out = results or HERE / "results"
-    out.mkdir(parents=True, exist_ok=True)
-    try:
-        for part in parts or PARTS:
-            click.echo(f"{part} …")
-            other = "counts" in PAPER.get(part, {}) and int(contacts) != PAPER[part]["n_c"]
-            store(out, f"{part}@{contacts}" if other else part,
-                  work(part, draws, int(contacts), out))  # fmt: skip
-    except AmontonsError as reason:
-        raise click.ClickException(str(reason)) from reason
-    with replacing(out / "results.md") as path:
-        path.write_text(page(load(out)))
+
+    def named(part: str) -> tuple[str, list | dict]:
+        other = "counts" in PAPER.get(part, {}) and int(contacts) != PAPER[part]["n_c"]
+        return f"{part}@{contacts}" if other else part, work(part, draws, int(contacts), out)
+
+    regenerate(out, parts or PARTS, named, page)
 
 
 def work(part: str, draws: int, contacts: int, out: Path) -> list | dict:
@@ -85,25 +75,9 @@ def work(part: str, draws: int, contacts: int, out: Path) -> list | dict:
     return {"draws": draws, "counts": module.counts(table, draws, SEED)}
 
 
-def store(out: Path, part: str, found: list | dict) -> None:
-    """Put the numbers of a part beside those of the others."""
-    record = load(out)
-    record["machine"] = describe()
-    record[part] = found
-    with replacing(out / "results.json") as path:
-        path.write_text(json.dumps(record) + "\n")
-
-
-def load(out: Path) -> dict:
-    """What is stored."""
-    target = out / "results.json"
-    return json.loads(target.read_text()) if target.exists() else {}
-
-
 def page(record: dict) -> str:
     """All tables of what is stored."""
-    lines = ["# rey2026: results", "", "Regenerate: `python -m reproduce.rey2026`.", ""]
-    lines += ["; ".join(f"{k} {v}" for k, v in record["machine"].items()) + ".", ""]
+    lines = heading("rey2026", record)
     lines += report.summary(record, PAPER)
     for name, table in PAPER.items():
         if name in record and "algorithm" in table:

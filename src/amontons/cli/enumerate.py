@@ -11,19 +11,17 @@ from numpy.typing import NDArray
 
 from ..analysis.solutions.enumerate import Solutions
 from ..api import all_solutions
-from ..errors import InvalidInput
 from ..files import replacing
 from ..output import FIGURES, to_json, versions
 from ..problem import FrictionProblem
 from ..solve import drive
 from ..solvers import Iterate
 from .sources import Source, open_source
-from .terminal import check_writable, deliver_json, show_table
+from .terminal import check_writable, deliver_json, shortened, show_table
 
 Array = NDArray[np.float64]
 SCHEMA = "amontons/enumerate/1"
 INCOMPLETE = 1  # exit code
-SHOWN = 60  # contacts of a pattern that a table shows
 
 
 def run(
@@ -34,11 +32,7 @@ def run(
     check_writable(json_copy, "--json")
     check_writable(picture, "--picture", FIGURES)
     opened = open_source(source, overrides)
-    problem = opened.discrete()
-    if mu is not None:
-        if not (np.isfinite(mu) and mu >= 0):
-            raise InvalidInput(f"--mu: expected a friction coefficient >= 0, got {mu}")
-        problem = problem.with_mu(mu)
+    problem = opened.discrete_with(mu)
     found = all_solutions(problem, time_limit=time_limit)
     if json_copy != "-":
         _show(opened.title, found)
@@ -81,13 +75,19 @@ def draw(
 def _show(title: str, found: Solutions) -> None:
     rows = []
     for s in found.solutions:
-        word = s.pattern if len(s.pattern) <= SHOWN else f"{s.pattern[: SHOWN - 1]}…"
         counts = [
             str(sum(s.pattern.count(letter) for letter in part)) for part in ("f", "s", "+-l")
         ]
         kind = "isolated" if s.freedom == 0 else f"a set of dimension {s.freedom}"
         rows.append(
-            [word, *counts, f"{s.orientation:+d}", f"{s.energy:.5g}", f"{s.error:.1e}", kind]
+            [
+                shortened(s.pattern),
+                *counts,
+                f"{s.orientation:+d}",
+                f"{s.energy:.5g}",
+                f"{s.error:.1e}",
+                kind,
+            ]
         )
     show_table(
         title,

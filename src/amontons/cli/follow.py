@@ -14,7 +14,7 @@ from ..errors import InvalidInput
 from ..files import replacing
 from ..output import to_json, versions
 from .sources import open_source
-from .terminal import check_folder, check_writable, deliver_json, show_table
+from .terminal import check_folder, check_writable, deliver_json, shortened, show_table
 
 SCHEMA = "amontons/follow/1"
 UNFINISHED = 1  # exit code
@@ -104,4 +104,4 @@ def _way(event: Event) -> str:
     if event.stop is not None:
         return event.stop.advice
     words = [str(word) for word in (event.before, event.after) if word is not None]
-    return " -> ".join(w if len(w) <= SHOWN else f"{w[: SHOWN - 1]}…" for w in words)
+    return " -> ".join(shortened(word, SHOWN) for word in words)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 import os
 import stat
 import tomllib
@@ -55,6 +56,15 @@ class Source:
         """
         problem = self.solvable()
         return problem if isinstance(problem, FrictionProblem) else self.model.assemble()  # type: ignore[union-attr]
+
+    def discrete_with(self, mu: float | None) -> FrictionProblem:
+        """The discrete problem with the coefficient of --mu on all contacts, if given."""
+        problem = self.discrete()
+        if mu is None:
+            return problem
+        if not (math.isfinite(mu) and mu >= 0):
+            raise InvalidInput(f"--mu: expected a friction coefficient >= 0, got {mu}")
+        return problem.with_mu(mu)
 
     def solvable(self) -> FrictionProblem | NitscheProblem | LargeDeformation:
         """What `solve` solves; assembles a model."""

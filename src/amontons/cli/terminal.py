@@ -34,6 +34,11 @@ def show_table(
     Console(width=wide, highlight=False).print(table)
 
 
+def shortened(pattern: str, letters: int = 60) -> str:
+    """A pattern of statuses, its end left out where it is long."""
+    return pattern if len(pattern) <= letters else f"{pattern[: letters - 1]}…"
+
+
 def deliver_json(text: str, target: str | None) -> None:
     """Print JSON for "-", write it for a file name, nothing for None."""
     if target == "-":

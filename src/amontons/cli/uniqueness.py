@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import click
-import numpy as np
 
 from ..analysis.certificates.critical_friction import CriticalFriction
 from ..analysis.certificates.uniqueness import Uniqueness, Verdict
@@ -15,11 +14,10 @@ from ..api import uniqueness
 from ..errors import InvalidInput
 from ..output import to_json, versions
 from .sources import open_source
-from .terminal import check_writable, deliver_json
+from .terminal import check_writable, deliver_json, shortened
 
 SCHEMA = "amontons/uniqueness/1"
 UNSETTLED = 1  # exit code
-SHOWN = 60  # contacts of a pattern that is shown
 
 
 def run(
@@ -31,11 +29,7 @@ def run(
     if not time_limit > 0:
         raise InvalidInput(f"--time-limit: expected seconds > 0, got {time_limit}")
     opened = open_source(source, overrides)
-    problem = opened.discrete()
-    if mu is not None:
-        if not (np.isfinite(mu) and mu >= 0):
-            raise InvalidInput(f"--mu: expected a friction coefficient >= 0, got {mu}")
-        problem = problem.with_mu(mu)
+    problem = opened.discrete_with(mu)
     found = uniqueness(problem, time_limit=time_limit)
     if json_copy != "-":
         click.echo(f"{opened.title}\n{describe(found)}")
@@ -64,11 +58,11 @@ def describe(found: Uniqueness) -> str:
     if found.witness is not None:
         lines.append(
             f"some loads have several from {found.upper:.5g} on: the linear piece of pattern "
-            f"{_short(found.witness.pattern)} is singular there"
+            f"{shortened(found.witness.pattern)} is singular there"
         )
     lines += _comparison(found.critical)
     if found.other is not None:
-        lines.append(f"another solution: {_short(found.other.pattern)}, error "
+        lines.append(f"another solution: {shortened(found.other.pattern)}, error "
                      f"{found.other.error:.1e}")  # fmt: skip
     return "\n".join(lines)
 
@@ -117,7 +111,3 @@ def record(found: Uniqueness) -> dict[str, Any]:
             "criterion": found.criterion, "witness": witness, "other": other,
             "comparison": comparison, "seconds": found.seconds,
             "versions": versions()}  # fmt: skip
-
-
-def _short(pattern: str) -> str:
-    return pattern if len(pattern) <= SHOWN else f"{pattern[: SHOWN - 1]}…"

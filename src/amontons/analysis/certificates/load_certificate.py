@@ -117,15 +117,21 @@ def certify_load(
         from .load_certificate_discs import certify_load_discs
 
         return certify_load_discs(problem, solution, time_limit=time_limit)
+    r = reactions_of(problem, solution, time_limit)
+    return _Search(LoadProblem.of(problem), r, time_limit).run()
+
+
+def reactions_of(
+    problem: FrictionProblem, solution: FrictionSolution | PieceSolution, time_limit: float
+) -> Array:
+    """Reactions (nc, d) of a solution under Coulomb's law; raises for what can not be meant."""
     if not time_limit > 0:
         raise InvalidInput(f"time_limit: expected seconds > 0, got {time_limit!r}")
     _ = problem.mu
-    r = np.asarray(solution.r)
-    if r.shape != (problem.contacts, 2):
-        raise InvalidInput(
-            f"solution: expected reactions ({problem.contacts}, 2), got {r.shape}"
-        )
-    return _Search(LoadProblem.of(problem), r, time_limit).run()
+    r, shape = np.asarray(solution.r), (problem.contacts, problem.dimension)
+    if r.shape != shape:
+        raise InvalidInput(f"solution: expected reactions {shape}, got {r.shape}")
+    return r
 
 
 class _Search:

@@ -21,7 +21,7 @@ from ..solutions.disc_sets import ON
 from ..solutions.enumerate import PieceSolution
 from ..solutions.multistart import Finder, described
 from ..solutions.newton_batch import Stack
-from .load_certificate import LoadCertificate, LoadOutcome
+from .load_certificate import LoadCertificate, LoadOutcome, reactions_of
 
 Array = NDArray[np.float64]
 TOLERANCE = 1e-8  # error by the judge of a solution
@@ -38,14 +38,7 @@ def certify_load_discs(
     are of the type `DiscBox`.  The global form is condensed.  Raises UnsupportedForm under
     Tresca's law, InvalidInput where `solution` does not solve the problem.
     """
-    if not time_limit > 0:
-        raise InvalidInput(f"time_limit: expected seconds > 0, got {time_limit!r}")
-    _ = problem.mu
-    r = np.asarray(solution.r)
-    if r.shape != (problem.contacts, 3):
-        raise InvalidInput(
-            f"solution: expected reactions ({problem.contacts}, 3), got {r.shape}"
-        )
+    r = reactions_of(problem, solution, time_limit)
     return _Certification(problem.condensed(), r, time_limit).run()
 
 

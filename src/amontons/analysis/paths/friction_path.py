@@ -28,11 +28,11 @@ from numpy.typing import NDArray
 from ...cones import Coulomb, Tresca
 from ...errors import InvalidInput, UnsupportedForm
 from ...problem import Form, FrictionProblem
-from ...solution import Convergence, FrictionSolution, Outcome, Step
+from ...solution import FrictionSolution
+from .path import judged
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-TOLERANCE = 1e-8  # error by the judge below which a point counts as a solution
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,12 +96,7 @@ class FrictionPath:
         r = (y * self.to_r).reshape(problem.contacts, problem.dimension)
         u, v = problem.velocity(r)
         error = problem.error(r, v)
-        seconds = time.perf_counter() - began
-        outcome = Outcome.CONVERGED if error <= TOLERANCE else Outcome.STAGNATED
-        record = Convergence(
-            outcome, 1, error, TOLERANCE, (Step(1, error, 0, seconds),), 0, seconds,
-            "continuation", problem.measure,
-        )  # fmt: skip
+        record = judged(error, problem.measure, time.perf_counter() - began)
         return FrictionSolution(problem, r, np.array(u), v, record)
 
     def state(self, r: Array) -> Array:

@@ -31,12 +31,12 @@ from ...errors import InvalidInput, InvertedCells, NotConverged, UnsupportedForm
 from ...evolution.system import Motion
 from ...model import Model
 from ...model.large_deformation import LargeDeformation, large_step
-from ...solution import ContactStatus, Convergence, FrictionSolution, Outcome, Step
+from ...solution import ContactStatus, FrictionSolution, Outcome
 from ...solve import drive
 from ...solvers.nonlinear_newton import NonlinearNewton
+from .path import SOLVED, judged
 
 Array = NDArray[np.float64]
-TOLERANCE = 1e-8  # of solutions by the judge
 STRAIGHT = 1e-9  # departure from a straight line in time, relative, that a load may have
 LETTERS = np.array(["f", "s", "+", "-"])  # of OPEN, STICK, SLIP, BACK as in `pattern`
 
@@ -168,12 +168,7 @@ class LoadPath:
         problem, began = self.at(p), time.perf_counter()
         r, u = problem.reactions(y), problem.local_velocity(y)
         error = problem.error(r, y)
-        seconds = time.perf_counter() - began
-        outcome = Outcome.CONVERGED if error <= TOLERANCE else Outcome.STAGNATED
-        record = Convergence(
-            outcome, 1, error, TOLERANCE, (Step(1, error, 0, seconds),), 0, seconds,
-            "continuation", problem.measure,
-        )  # fmt: skip
+        record = judged(error, problem.measure, time.perf_counter() - began)
         return problem.solved(FrictionSolution(problem, r, u, np.array(y), record))  # type: ignore[arg-type]
 
     def found_at(self, p: float) -> Array:
@@ -181,7 +176,7 @@ class LoadPath:
 
         Raises NotConverged where it finds none.
         """
-        found = drive(self.at(p), NonlinearNewton(), tolerance=TOLERANCE)  # type: ignore[arg-type]
+        found = drive(self.at(p), NonlinearNewton(), tolerance=SOLVED)  # type: ignore[arg-type]
         if found.convergence.outcome is not Outcome.CONVERGED:
             raise NotConverged(f"start: no solution at {p:g}: {found.convergence}", found)
         assert found.v is not None

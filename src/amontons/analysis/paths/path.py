@@ -22,8 +22,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ...judge import Measure
+from ...solution import Convergence, Outcome, Step
+
 Array = NDArray[np.float64]
+SOLVED = 1e-8  # error by the judge below which a point counts as a solution
 Matrix = Array | sparse.sparray
+
+
+def judged(error: float, measure: Measure, seconds: float) -> Convergence:
+    """The record of a point of a curve as a solution."""
+    outcome = Outcome.CONVERGED if error <= SOLVED else Outcome.STAGNATED
+    step = Step(1, error, 0, seconds)
+    return Convergence(outcome, 1, error, SOLVED, (step,), 0, seconds, "continuation", measure)
 
 
 @runtime_checkable
