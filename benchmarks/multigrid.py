@@ -34,7 +34,7 @@ from machine import describe
 sys.path.insert(0, str(Path(__file__).parents[1]))  # for reproduce/
 
 import amontons as am
-import amontons.problem
+import amontons.global_matrices
 from amontons.model import assembly
 from amontons.solve import drive
 from reproduce.hueeber2008.shell import model as shell
@@ -175,10 +175,10 @@ def two_bodies_row(model, repeats):
 
 def two_bodies_rows(model, sizes, repeats):
     """Rows of the sizes of a model; the judge reads residuals and forms no W."""
-    usual, amontons.problem.CHEAP = amontons.problem.CHEAP, 0.0
-    usual_work, amontons.problem.EXACT_WORK = amontons.problem.EXACT_WORK, 0.0
+    usual, amontons.global_matrices.CHEAP = amontons.global_matrices.CHEAP, 0.0
+    usual_work, amontons.global_matrices.EXACT_WORK = amontons.global_matrices.EXACT_WORK, 0.0
     rows = [two_bodies_row(model(size), repeats) for size in sizes]
-    amontons.problem.CHEAP, amontons.problem.EXACT_WORK = usual, usual_work
+    amontons.global_matrices.CHEAP, amontons.global_matrices.EXACT_WORK = usual, usual_work
     return rows
 
 

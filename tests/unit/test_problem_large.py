@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import amontons as am
-from amontons import problem as problem_module
+from amontons import global_matrices
 from amontons.linear.krylov import KrylovFactor
 from amontons.solve import drive
 
@@ -21,8 +21,8 @@ def model():
 
 def test_iterative_factor_gives_the_same_solution(model, monkeypatch):
     direct = drive(model.assemble())
-    monkeypatch.setattr(problem_module, "DIRECT_LIMIT", 10)
-    monkeypatch.setattr(problem_module, "EXACT_WORK", 0)
+    monkeypatch.setattr(global_matrices, "DIRECT_LIMIT", 10)
+    monkeypatch.setattr(global_matrices, "EXACT_WORK", 0)
     model = am.Model(model.bodies, model.supports, model.contacts)
     iterative = drive(model.assemble(), tolerance=1e-7)
     assert isinstance(iterative.problem.factor(), KrylovFactor)

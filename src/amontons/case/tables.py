@@ -7,10 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ..checked_arrays import LARGEST
 from ..errors import FileFormatError
 from ..expressions import nearest
-
-LARGEST = 1e100  # in any unit: squares must stay finite
 
 
 @dataclass(frozen=True)

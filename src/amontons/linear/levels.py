@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..checked_arrays import locked
 from ..errors import InvalidInput
 
 Levels = tuple[sparse.csr_array, ...]
@@ -29,10 +30,7 @@ def checked_levels(levels: Sequence[sparse.csr_array], size: int) -> Levels:
                 f"levels[{k}]: expected finite entries and at most {size} columns, got shape "
                 f"{level.shape}"
             )
-        matrix = sparse.csr_array(level)
-        for array in (matrix.data, matrix.indices, matrix.indptr):
-            array.flags.writeable = False
-        out.append(matrix)
+        out.append(locked(sparse.csr_array(level)))
         size = level.shape[1]
     return tuple(out)
 

@@ -1,4 +1,7 @@
-"""Inverse of a matrix that falls apart into small blocks: rigid bodies have 3 to 6 unknowns."""
+"""Inverses by small blocks: of a matrix that falls apart into them, of blocks of the diagonal.
+
+Rigid bodies have 3 to 6 unknowns, the nodes of a mesh 2 or 3.
+"""
 
 from __future__ import annotations
 
@@ -35,6 +38,19 @@ def block_diagonal_inverse(matrix: sparse.csc_array) -> sparse.csc_array | None:
         parts.append(_invert(coo, members, label, position, order, start, int(size)))
     rows, columns, data = (np.concatenate(p) for p in zip(*parts, strict=True))
     return sparse.csc_array((data, (rows, columns)), shape=(n, n))
+
+
+def diagonal_blocks_inverse(matrix: sparse.csc_array, size: int) -> sparse.bsr_array:
+    """Inverse of the size x size diagonal blocks, pseudo-inverse where one is singular."""
+    n = matrix.shape[0]
+    count = n // size
+    coo = matrix.tocoo()
+    own = coo.row // size == coo.col // size
+    row, column = coo.row[own], coo.col[own]
+    blocks = np.zeros((count, size, size))
+    np.add.at(blocks, (row // size, row % size, column % size), coo.data[own])
+    inverse = np.linalg.pinv(blocks)
+    return sparse.bsr_array((inverse, np.arange(count), np.arange(count + 1)), shape=(n, n))
 
 
 def _invert(coo, members, label, position, order, start, size):

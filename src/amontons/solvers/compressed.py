@@ -35,14 +35,15 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..blocks import spatial
+from ..condensation import SOLVE_COLUMNS
+from ..global_matrices import DENSE_LIMIT
 from ..linear import Direct
 from ..linear.distributed import DistributedMatrix
-from ..problem import DENSE_LIMIT, Form, FrictionProblem
+from ..problem import Form, FrictionProblem
 from .base import Breakdown, Iterate, Target, check_at_least, check_positive
 from .portfolio import Portfolio
 
 Array = NDArray[np.float64]
-SOLVE_COLUMNS = 64  # right-hand sides of one block solve
 TRUNCATION = 1e-12  # eigenvalues of Z^T Y dropped, relative to the largest
 
 

@@ -15,7 +15,7 @@
 
 A mesh is what has levels or rigid modes (`FrictionProblem.levels`, `near_nullspace`).
 
-When is W cheap (`FrictionProblem.condensing_is_cheap`; it then also judges)?
+When is W cheap (`GlobalMatrices.condensing_is_cheap`; it then also judges)?
 
     bodies of M                     W is formed
     rigid, at most 48 unknowns      always: W is sparse
