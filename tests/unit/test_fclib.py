@@ -184,7 +184,7 @@ def test_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
     def fail(*arguments):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("amontons.fclib._put_texts", fail)
+    monkeypatch.setattr("amontons.fclib.writing._put_texts", fail)
     with pytest.raises(InvalidInput, match="No space left"):
         write_fclib(box_tower(2), path)
     assert path.read_bytes() == old
