@@ -1,9 +1,14 @@
 """Figures: of one solution, of several, of convergence, of steps in time, of many methods."""
 
 from .branch import branch_figure, draw_branch
+from .convergence import convergence_figure
+from .energies import energy_figure
+from .profiles import profile_figure
+from .scene import Frame
 from .several import solutions_figure
-from .solution import COLOURS, convergence_figure, profile_figure, status_figure
-from .steps import SI, Frame, Units, draw_film, energy_figure, series_figure, step_figure
+from .solution import status_figure
+from .steps import draw_film, series_figure, step_figure
+from .style import COLOURS, SI, Units
 
 __all__ = [
     "COLOURS",

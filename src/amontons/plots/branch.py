@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from .solution import INK
+from .style import INK
 
 if TYPE_CHECKING:
     from ..analysis.paths.path import Branch

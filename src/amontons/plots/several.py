@@ -10,13 +10,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ..solution import ContactStatus, FrictionSolution
-from .solution import COLOURS, INK, MARKERS
-from .steps import Frame, Scene, magnification
+from .scene import Frame, Scene, magnification
+from .style import COLOURS, INK, MARKERS, status_marks
 
 if TYPE_CHECKING:
     from ..model import ContactFields, Model
@@ -60,11 +59,7 @@ def solutions_figure(
         axes.set_visible(False)
     left = f"; {len(solutions) - SHOWN} more not shown" if len(solutions) > SHOWN else ""
     figure.suptitle(f"{title}{note}{left}", color=INK, fontsize=11)
-    marks = [
-        Line2D([], [], linestyle="", marker=MARKERS[status], color=COLOURS[status],
-               markeredgecolor=INK, label=status.name.lower())
-        for status in ContactStatus
-    ]  # fmt: skip
+    marks = status_marks({status: status.name.lower() for status in ContactStatus})
     figure.legend(handles=marks, loc="outside lower center", ncols=3, frameon=False)
     return figure
 
