@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .tables import Table
 
@@ -24,7 +24,7 @@ class Evolution:
 
 
 def read_evolution(table: Table) -> Evolution:
-    """kind, step, until, and for dynamics the fields of MoreauJean."""
+    """kind, step, until, and the fields of QuasiStatic or MoreauJean; crossing: a switch."""
     from ..evolution import MoreauJean, QuasiStatic
 
     kind = table.choice("kind", KINDS, KINDS[0])
@@ -34,10 +34,15 @@ def read_evolution(table: Table) -> Evolution:
     until = table.number("until")
     if not until > 0:
         raise table.error("until", f"expected a time > 0, got {until}")
-    values: dict[str, float | bool] = {"step": table.number("step")}
+    values: dict[str, Any] = {"step": table.number("step")}
     for field in fields(method):
         if field.name in table.data and field.name != "step":
-            values[field.name] = _value(table, field.name, isinstance(field.default, bool))
+            switch = isinstance(field.default, bool) or field.name == "crossing"
+            values[field.name] = _value(table, field.name, switch)
+    if "crossing" in values:
+        from ..analysis.paths.path_crossing import PathCrossing
+
+        values["crossing"] = PathCrossing() if values["crossing"] else None
     return Evolution(method(**values), until)  # type: ignore[arg-type]
 
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 WORKS = tuple(field.name for field in fields_of(Energies))
 COLUMNS = ("index", "time", "open", "slip", "stick", *WORKS, "defect", "iterations", "error",
-           "seconds")  # fmt: skip
+           "seconds", "jump")  # fmt: skip
 
 
 def run(
@@ -120,7 +120,12 @@ def _row(step: TimeStep, seconds: float) -> list:
     e, record = step.energies, step.solution.convergence
     counts = [int((step.status == status).sum()) for status in ContactStatus]
     return [step.state.index, step.time, *counts, *(getattr(e, name) for name in WORKS),
-            e.defect, record.iterations, record.error, seconds]  # fmt: skip
+            e.defect, record.iterations, record.error, seconds, _jump(step)]  # fmt: skip
+
+
+def _jump(step: TimeStep) -> float | str:
+    """The time at which the body jumped, empty where it did not or no path was followed."""
+    return step.passage.folds[0] if step.passage is not None and step.passage.jumped else ""
 
 
 def _old_rows(path: Path, start: State | None) -> list[list]:
@@ -167,7 +172,8 @@ def _save(
 
 def _show(step: TimeStep, until: float, every: int) -> None:
     """A line per written step; on a terminal the steps between pass by on one line."""
-    if step.state.index % every == 0 or step.time >= until * (1 - 1e-9):
+    told = step.state.index % every == 0 or step.time >= until * (1 - 1e-9)
+    if told or (step.passage is not None and step.passage.jumped):
         click.echo(f"{'' if not sys.stdout.isatty() else chr(13)}{step}")
     elif sys.stdout.isatty():
         click.echo(f"\rt = {step.time:.6g} of {until:.6g} ", nl=False)
@@ -182,6 +188,10 @@ def _summary(rows: list[list], folder: Path) -> None:
         f"{len(rows)} steps; work of loads {sums['loads']:.4g}, supports "
         f"{sums['supports']:.4g}, contact {sums['contact']:.4g}; dissipated by damping "
         f"{sums['damping']:.4g}, by the scheme {sums['numerical']:.4g}; "
-        f"gain {sums['gain']:.4g}, defect {sum(float(r[-4]) for r in rows):.1e}"
+        f"gain {sums['gain']:.4g}, "
+        f"defect {sum(float(r[COLUMNS.index('defect')]) for r in rows):.1e}"
     )
+    jumps = [f"{float(row[-1]):.6g}" for row in rows if row[-1] != ""]
+    if jumps:
+        click.echo(f"jumps at t = {', '.join(jumps)}")
     click.echo(f"results in {folder}/")

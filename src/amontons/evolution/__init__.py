@@ -2,8 +2,18 @@
 
 from .energy import Energies
 from .moreau_jean import MoreauJean
+from .passage import Passage
 from .quasi_static import QuasiStatic
 from .state import State, TimeStep, at_rest
 from .stepping import evolve
 
-__all__ = ["Energies", "MoreauJean", "QuasiStatic", "State", "TimeStep", "at_rest", "evolve"]
+__all__ = [
+    "Energies",
+    "MoreauJean",
+    "Passage",
+    "QuasiStatic",
+    "State",
+    "TimeStep",
+    "at_rest",
+    "evolve",
+]

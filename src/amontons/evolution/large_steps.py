@@ -5,6 +5,8 @@ Every step begins from the last state and goes to its load in load steps where i
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,9 +14,9 @@ from ..contact import frames
 from ..model import Model
 from ..model.large_deformation import large_step
 from ..model.nonlinear_parts import nonlinear_parts
-from ..solvers.base import Iterate
 from .energy import Energies
 from .moreau_jean import Solve
+from .passage import Crossing, taken
 from .state import State, TimeStep
 from .system import Motion
 
@@ -24,8 +26,8 @@ Array = NDArray[np.float64]
 class LargeSlowModel:
     """A model with hyperelastic laws and without inertia; `advance` makes one step."""
 
-    def __init__(self, model: Model) -> None:
-        self.motion = Motion(model)
+    def __init__(self, model: Model, crossing: Crossing | None = None) -> None:
+        self.motion, self.crossing = Motion(model), crossing
 
     def _applied(self, time: float) -> tuple[Array, Array]:
         """Nodal forces and prescribed displacements (dofs,) at a time."""
@@ -42,7 +44,12 @@ class LargeSlowModel:
             self.motion.body, load, prescribed, at_contacts(self.motion.body, q0),
             (load_before, prescribed_before, q0[linear.free]),
         )  # fmt: skip
-        solution = problem.solved(solve(problem, Iterate(state.force), None))  # type: ignore[arg-type]
+        arrive = None
+        if self.crossing is not None:
+            drift = (time - state.time) * at_contacts(self.motion.body, state.velocity)
+            arrive = partial(self.crossing.along, problem, drift)
+        found, passage = taken(lambda start: solve(problem, start, None), arrive, state, time)  # type: ignore[arg-type]
+        solution = problem.solved(found)
         assert solution.v is not None
         q1 = problem.displacement(solution.v).ravel()
         axes = frames(problem.contact_point(solution.v).n)
@@ -55,7 +62,7 @@ class LargeSlowModel:
         new = State(state.index + 1, time, q1, velocity, solution.r, slip)
         active = np.arange(len(slip))
         return TimeStep(self.motion.body, new, solution, active, energies, solution.u[:, 0],
-                        axes)  # fmt: skip
+                        axes, passage)  # fmt: skip
 
     def _energies(self, q0: Array, q1: Array, load: Array, pushed: Array) -> Energies:
         """The balance of a step: all forces of its end times its motion.

@@ -2,21 +2,27 @@
 
 Loads and supports that depend on time are evaluated; where none does, all of them grow with
 the time as load factor.  Gaps are positions, so nothing drifts.
+
+A step may have several solutions, or none near the last one: then the body jumps.  A solver
+finds any of them; with `crossing` the step is followed from the last state, see `passage`.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InvalidInput
+from ..errors import InvalidInput, UnsupportedForm
 from ..model import Model
-from ..solvers.base import Iterate
+from ..nitsche_problem import NO_MULTIPLIERS
+from ..problem import FrictionProblem
 from .energy import Energies
 from .large_steps import LargeSlowModel
 from .moreau_jean import Solve
+from .passage import Crossing, taken
 from .state import State, TimeStep
 from .system import Motion
 
@@ -25,24 +31,36 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class QuasiStatic:
-    """Steps of size `step` in time, or in the load factor where nothing depends on time."""
+    """Steps of size `step` in time, or in the load factor where nothing depends on time.
+
+    crossing: follows the path of solutions from every step to the next, `PathCrossing()`; the
+    steps then say in `passage` whether and when the body jumped.
+    """
 
     step: float
+    crossing: Crossing | None = None
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.step) and self.step > 0):
             raise InvalidInput(f"step: expected a number > 0, got {self.step!r}")
+        if self.crossing is not None and not hasattr(self.crossing, "between"):
+            raise InvalidInput(
+                f"crossing: expected PathCrossing() or None, got {self.crossing!r}"
+            )
 
     def prepare(self, model: Model, tolerance: float) -> SlowModel | LargeSlowModel:
         """The matrices of all steps; equilibrium at the end never creates energy."""
-        return LargeSlowModel(model) if model.is_large else SlowModel(model)
+        if self.crossing is not None and model.contacts[0].nitsche is not None:
+            raise UnsupportedForm(f"crossing: {NO_MULTIPLIERS}")
+        kind = LargeSlowModel if model.is_large else SlowModel
+        return kind(model, self.crossing)
 
 
 class SlowModel:
     """A model without inertia; `advance` makes one step."""
 
-    def __init__(self, model: Model) -> None:
-        self.motion = Motion(model)
+    def __init__(self, model: Model, crossing: Crossing | None = None) -> None:
+        self.motion, self.crossing = Motion(model), crossing
 
     def advance(self, state: State, time: float, solve: Solve) -> TimeStep:
         """One step from a state to a time; solve(problem, start) solves its problem."""
@@ -53,7 +71,13 @@ class SlowModel:
             factor * self.motion.prescribed(time),
         )
         problem = self.motion.body.increment(load, prescribed, state.slip)
-        solution = solve(problem, Iterate(state.force), None)
+        arrive = None
+        if self.crossing is not None:
+            before = self._before(state, time)
+            arrive = partial(self.crossing.between, before, problem, state.force)
+        solution, passage = taken(
+            lambda start: solve(problem, start, None), arrive, state, time
+        )
         assert solution.v is not None
         q1 = prescribed.copy()
         q1[parts.free] = solution.v
@@ -64,7 +88,21 @@ class SlowModel:
         velocity = dq / time_step if time_step else np.zeros_like(dq)
         new = State(state.index + 1, time, q1, velocity, solution.r, u[:, 1:])
         active = np.arange(len(parts.gap))
-        return TimeStep(self.motion.body, new, solution, active, energies, parts.gap + u[:, 0])
+        return TimeStep(self.motion.body, new, solution, active, energies, parts.gap + u[:, 0],
+                        passage=passage)  # fmt: skip
+
+    def _before(self, state: State, time: float) -> FrictionProblem:
+        """The problem that the last state solves, slipping as it did: p = 0 of `passage`.
+
+        Its load is what the state balances, so that also a state at rest solves it.
+        """
+        parts, q = self.motion.parts, state.displacement
+        held = np.zeros_like(q)
+        held[parts.fixed] = q[parts.fixed]
+        load = parts.K @ q - parts.whole_H @ state.force.ravel()
+        motion = (parts.whole_H.T @ state.velocity).reshape(parts.carried.shape)
+        drift = (time - state.time) * motion[:, 1:]
+        return self.motion.body.increment(load, held, state.slip - drift)
 
     def _energies(self, state: State, q1: Array, load: Array, pushed: Array) -> Energies:
         """The balance of `energy` with theta = 1 and no mass."""

@@ -17,6 +17,7 @@ from ..model.values import VectorValue, vector_at
 from ..problem import FrictionProblem
 from ..solution import ContactStatus, FrictionSolution
 from .energy import Energies
+from .passage import Passage
 from .timed import part_at, steady
 
 Array = NDArray[np.float64]
@@ -54,7 +55,7 @@ class TimeStep:
 
     active (k,): the contacts that are in the problem, in order; the rest is open.  gap (nc,)
     after the step, unit of length.  frames (nc, d, d): those of the deformed state where it is
-    large, else those of the model hold.
+    large, else those of the model hold.  passage: the path of the step where it was followed.
     """
 
     model: Model
@@ -64,6 +65,7 @@ class TimeStep:
     energies: Energies
     gap: Array
     frames: Array | None = None
+    passage: Passage | None = None
 
     @property
     def time(self) -> float:

@@ -247,6 +247,37 @@ def _branch(problem: PathProblem, forth: Half, back: Half, began: float) -> Bran
     )  # fmt: skip
 
 
+# ----------------------------------------------------------- the way that suits a problem
+def is_exact(problem: PathProblem) -> bool:
+    """True where event tracking follows a problem."""
+    return isinstance(problem, FrictionPath) and problem.straight and not problem.tresca
+
+
+def leaving_from(
+    problem: PathProblem, y: Array, p: float, options: Continuation
+) -> tuple[Tangent, ...]:
+    """All one-sided tangents at a solution.
+
+    Raises SingularOperator with the reason where none could be found.
+    """
+    if not is_exact(problem):
+        return options.start(problem, y, p)
+    system = leaving(problem, y, p)  # type: ignore[arg-type]
+    if not system.tangents:
+        raise SingularOperator(system.reason or "solutions are not isolated there")
+    return system.tangents
+
+
+def steps_from(
+    problem: PathProblem, y: Array, p: float, tangent: Tangent,
+    interval: tuple[float, float], options: Continuation,
+) -> Steps:  # fmt: skip
+    """The points and events along a tangent, by event tracking or continuation."""
+    if is_exact(problem):
+        return track(problem, y, p, tangent, interval)  # type: ignore[arg-type]
+    return options.walk(problem, y, p, tangent, interval)
+
+
 # ---------------------------------------------------------------------- where to begin
 def exact_state(path: FrictionPath, p: float) -> Array:
     """One exact solution at a parameter, by event tracking from a state without contact.
@@ -343,9 +374,8 @@ def follow_path(
 
     The state is corrected first; raises InvalidInput where it is far from a solution.
     """
-    exact = isinstance(problem, FrictionPath) and problem.straight and not problem.tresca
     if method is None:
-        method = Method.EVENTS if exact and options is None else Method.GENERAL
+        method = Method.EVENTS if is_exact(problem) and options is None else Method.GENERAL
     y = polished(problem, np.asarray(y, dtype=float), p)
     if method is Method.GENERAL:
         return continue_both(problem, y, p, limits, options, known=known)

@@ -83,10 +83,11 @@ class LoadPath:
     def weight(self) -> float:
         """kappa of the weighted norm: 1 / n in the unit of the prescribed displacement.
 
-        Where none is prescribed a hundredth of the size of the bodies takes its place.
+        At least a hundredth of the size of the bodies: of less, as in small steps, rounding
+        of the positions would hide the last digits that the corrector waits for.
         """
         moved = float(np.abs(self.step.prescribed - self.prescribed).max(initial=0.0))
-        size = moved if moved > 0 else 0.01 * float(np.ptp(self.step.parts.X, axis=0).max())
+        size = max(moved, 0.01 * float(np.ptp(self.step.parts.X, axis=0).max()))
         return 1.0 / (self.step.unknowns * size**2)
 
     def residual(self, y: Array, p: float) -> Array:

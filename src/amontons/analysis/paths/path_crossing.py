@@ -16,24 +16,60 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InvalidInput
+from ...evolution.passage import Arrival
 from ...model.large_deformation import LargeDeformation
+from ...problem import FrictionProblem
 from ...solvers.base import Breakdown, Target
 from .continuation import Continuation
-from .following import polished
+from .following import leaving_from, polished, steps_from
+from .friction_path import FrictionPath
 from .load_path import LoadPath
 from .path import EventKind
 
 Array = NDArray[np.float64]
 BEFORE = (1e-4, 1e-3, 1e-2, 0.1)  # shares before the one at which load steps ended
-BACK = -1.0  # share of the load down to which a path may lead back
 
 
 @dataclass(frozen=True)
 class PathCrossing:
-    """Follows the path of a load step over its folds: a field of `NonlinearNewton`."""
+    """Follows the path of a step over its folds to the state at which it first arrives.
+
+    As `QuasiStatic(step, crossing=...)` it does so in every step, with the memory of the last
+    motion; as `NonlinearNewton(crossing=...)` where load steps end.
+
+    options: those of steps along paths that are not straight; max_points of a path; back: how
+    far it may lead back, in steps: small steps meet the second fold of a jump far behind.
+    """
 
     options: Continuation = Continuation()
     max_points: int = 2000
+    back: float = 1000.0
+
+    def __post_init__(self) -> None:
+        if self.max_points < 2:
+            raise InvalidInput(f"max_points: expected at least 2, got {self.max_points}")
+        if not 0 < self.back < np.inf:
+            raise InvalidInput(f"back: expected a number of steps > 0, got {self.back}")
+
+    def between(self, before: FrictionProblem, step: FrictionProblem, r: Array) -> Arrival:
+        """From reactions r (nc, d) of the problem at p = 0 to the step at p = 1.
+
+        Raises Breakdown with the reason where the path does not lead there.
+        """
+        path = FrictionPath(before, step)
+        y, folds = self._arrived(path, _start(path, path.state(r)), 0.0)
+        found = (y * path.to_r).reshape(r.shape)
+        return Arrival(found, step.velocity(found)[1], folds)
+
+    def along(self, step: LargeDeformation, drift: Array) -> Arrival:
+        """From the state that a step knows to the step; drift (nc, d): V of the memory.
+
+        Raises Breakdown like `between`, UnsupportedForm in 3D and under Tresca's law.
+        """
+        load, prescribed, v = step.known  # type: ignore[misc]
+        path = LoadPath(step, load, prescribed, drift)
+        y, folds = self._arrived(path, _start(path, v), 0.0)
+        return Arrival(step.reactions(y), y, folds)
 
     def across(
         self, problem: LargeDeformation, share: float, v: Array, target: Target
@@ -45,27 +81,43 @@ class PathCrossing:
         nothing = (np.zeros_like(problem.load), np.zeros_like(problem.prescribed))
         load, prescribed = nothing if problem.known is None else problem.known[:2]
         path = LoadPath(problem, load, prescribed)
-        y, share = _on_path(path, v, share)
-        tangents = [t for t in self.options.start(path, y, share) if t.rate > 0]
-        if not tangents:
-            raise Breakdown(f"no path leads on from {share:.6g} of the load")
+        y, folds = self._arrived(path, *_on_path(path, v, share), target)
+        return y, _told(folds)
+
+    def _arrived(
+        self, path: FrictionPath | LoadPath, y: Array, share: float,
+        target: Target | None = None,
+    ) -> tuple[Array, tuple[float, ...]]:  # fmt: skip
+        """(state at share 1, folds on the way) along the path from a solution."""
+        tangents = leaving_from(path, y, share, self.options)
+        onward = [tangent for tangent in tangents if tangent.rate > 0]
+        if not onward:
+            raise Breakdown(f"from {share:.6g} of the load none leads on")
         folds: list[float] = []
-        walk = self.options.walk(path, y, share, tangents[0], (BACK, 1.0))
+        walk = steps_from(path, y, share, onward[0], (-self.back, 1.0), self.options)
         for count, (point, event) in enumerate(walk):
             if event is not None and event.kind is EventKind.FOLD:
                 folds.append(event.parameter)
             if event is not None and event.stop is not None:
                 if point.parameter == 1.0:
-                    return point.state, _told(folds)
+                    return point.state, tuple(folds)
                 raise Breakdown(
                     f"the path of the load ends at {point.parameter:.4g} of it: "
                     f"{event.stop.advice}"
                 )
-            if count >= self.max_points or target.seconds_left <= 0:
+            if count >= self.max_points or (target is not None and target.seconds_left <= 0):
                 break
         raise Breakdown(
             f"the path of the load was followed to {point.parameter:.4g} of it only"
         )
+
+
+def _start(path: FrictionPath | LoadPath, y: Array) -> Array:
+    """The exact solution beside the last state."""
+    try:
+        return polished(path, y, 0.0)
+    except InvalidInput as reason:
+        raise Breakdown(f"the last state does not begin a path: {reason}") from reason
 
 
 def _on_path(path: LoadPath, v: Array, share: float) -> tuple[Array, float]:
@@ -78,7 +130,7 @@ def _on_path(path: LoadPath, v: Array, share: float) -> tuple[Array, float]:
     raise Breakdown(f"the path of the load: {reason}") from reason
 
 
-def _told(folds: list[float]) -> str:
+def _told(folds: tuple[float, ...]) -> str:
     shares = ", ".join(f"{fold:.6g}" for fold in folds)
     way = f"over folds at {shares} of the load: a jump" if folds else "without a fold"
     return f"followed the path {way}"
