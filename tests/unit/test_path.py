@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+import amontons as am
 from amontons.analysis.paths.path import (
     Branch,
     Event,
@@ -94,3 +95,30 @@ def test_singular_systems_are_refused():
     for matrix in (np.zeros((2, 2)), sparse.csc_array((2, 2))):
         with pytest.raises(np.linalg.LinAlgError):
             solve_linear(matrix, np.ones(2))
+
+
+def test_a_closed_branch_of_lines_ends_where_it_began():
+    """Begun in the middle of a line: that line is there as a whole."""
+    W = [[1.4, 0.1, -0.4, -0.6], [0.1, 1.1, -0.7, 0.5], [-0.4, -0.7, 0.7, -0.1],
+         [-0.6, 0.5, -0.1, 1.7]]  # fmt: skip
+    ends = [
+        am.FrictionProblem.from_delassus(W, q, [3.2, 7.1])
+        for q in ([[-2.1, 0.9], [1.4, -0.9]], [[0.0, -0.8], [0.2, -1.5]])
+    ]
+    diagram = am.diagram(ends[1], "load", (-1, 2), base=ends[0], at=[1.05])
+    (isola,) = [branch for branch in diagram if branch.closed]
+    assert 0.91 < isola[0].parameter < 1.16
+    np.testing.assert_allclose(isola[-1].state, isola[0].state, atol=1e-12)
+    assert isola[-1].parameter == isola[0].parameter
+    assert (np.diff(isola.arclength) > 0).all()
+    for p in (0.91, 0.95, 1.02, 1.1, 1.16):
+        assert len(isola.at(p)) == 2
+    assert len(isola.at(isola[0].parameter)) == 2  # the start counts once
+
+
+def test_a_branch_of_one_point_can_be_shown():
+    """Also where the user's interval has whole numbers."""
+    branch = am.follow(Parabola(), interval=(1, 4), start=[1.0], callback=lambda *_: True)
+    assert len(branch) == 1
+    assert "1 … 1" in str(branch)
+    assert branch.parameter.dtype == float

@@ -14,7 +14,7 @@ Comput. Methods Appl. Mech. Engrg. 280 (2014).
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any, Protocol, runtime_checkable
 
@@ -190,12 +190,12 @@ class Branch:
     @property
     def parameter(self) -> Array:
         """Values of the parameter, (points,)."""
-        return np.array([point.parameter for point in self.points])
+        return np.array([point.parameter for point in self.points], dtype=float)
 
     @property
     def arclength(self) -> Array:
         """Distance along the branch from its start, (points,)."""
-        return np.array([point.arclength for point in self.points])
+        return np.array([point.arclength for point in self.points], dtype=float)
 
     @property
     def states(self) -> Array:
@@ -324,10 +324,24 @@ def joined(
     forth: tuple[Sequence[Point], Sequence[Event], Stop],
     **options: Any,
 ) -> Branch:
-    """One branch from its two halves, which share their first point; back is turned round."""
+    """One branch from its two halves, which share their first point; back is turned round.
+
+    A closed one that began in the middle of a straight line ends with its first point.
+    """
     points = [point.reversed() for point in list(back[0])[:0:-1]] + list(forth[0])
+    if options.get("closed") and options.get("linear") and points[-1].piece == points[0].piece:
+        points += _back_to(points[0], points[-1], weight_of(problem, len(points[0].state)))
     events = [turned(event) for event in list(back[1])[::-1]] + list(forth[1])
     return Branch(problem, tuple(points), tuple(events), (back[2], forth[2]), **options)
+
+
+def _back_to(start: Point, last: Point, weight: float) -> list[Point]:
+    """The start as the point after the last, unless that is where the last one lies."""
+    way, change = start.state - last.state, start.parameter - last.parameter
+    length = float(np.sqrt(weight * way @ way + change**2))
+    if same(start.state, last.state) and abs(change) <= 1e-12:
+        return []
+    return [replace(start, arclength=last.arclength + length)]
 
 
 def turned(event: Event) -> Event:
