@@ -1,0 +1,244 @@
+"""A walk along a solution curve: steps inside of a piece, and what lies between two points.
+
+Algorithm 1 of [LR] takes the steps; the end of the interval, smooth folds, where p' changes
+sign, and branch points, where the determinant of the bordered matrix does, are located between
+them.  `walk_by_pieces` and `walk_by_switch` know how a kink is passed.
+
+[LR] T. Ligurský, Y. Renard, CMAME 280 (2014), section 2.2.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .corrector import Curve, Spot
+from .first_order import Tangent, kernel
+from .path import Event, EventKind, PathProblem, Point, Stop
+
+if TYPE_CHECKING:
+    from .continuation import Continuation
+
+Array = NDArray[np.float64]
+Found = list[tuple[Point, Event | None]]
+MOST_KINKS = 20  # passed at one point before the walk ends
+
+
+class Walk(ABC):
+    """Where the continuation is, and one step of it; how kinks are passed is left open."""
+
+    def __init__(
+        self, options: Continuation, problem: PathProblem, y: Array, p: float,
+        tangent: Tangent, interval: tuple[float, float], step: float,
+    ) -> None:  # fmt: skip
+        self.options, self.problem, self.interval = options, problem, interval
+        self.cosine = options.cosine(problem)
+        self.piece: Any = tangent.piece
+        self.curve = self._curve(len(y))
+        ty, tp = self.curve.unit(tangent.direction, tangent.rate)
+        self.spot = Spot(y, p, ty, tp)
+        self.step = min(max(step, options.min_step), options.max_step)
+        self.travelled = 0.0
+        self.stop: Stop | None = None
+        self.turn = self._sense(tp)
+        self.sign = 0  # of the bordered determinant on this piece, 0 unknown
+        self.kinks_here = 0  # kinks passed without getting on
+
+    def here(self) -> Point:
+        """The present point."""
+        s = self.spot
+        return Point(s.p, s.y, s.ty, s.tp, self.piece, self.travelled, self.step)
+
+    def advance(self) -> Found:
+        """One accepted step: points and events on the way; a kink at most."""
+        reduced = False
+        while True:
+            new = self._corrected(self.step)
+            if new is not None:
+                spot, count = new
+                if not self._leaves(spot):
+                    return self._accept(spot, count, reduced)
+                found = self._over_border(self.step)
+                if found is not None:
+                    return found
+            if self.step <= self.options.min_step:
+                return self._stuck()
+            self.step = max(self.step * self.options.shrink, self.options.min_step)
+            reduced = True
+
+    def _corrected(self, step: float) -> tuple[Spot, int] | None:
+        """Algorithm 1, steps 3 to 8: predict, correct, compare the tangents."""
+        s, o = self.spot, self.options
+        found = self.curve.correct(*s.ahead(step), s.ty, s.tp, o.tolerances)
+        if found is None:
+            return None
+        new = found[0]
+        if self.curve.product(new.ty, new.tp, s.ty, s.tp) < self.cosine:
+            return None
+        return found
+
+    # ---------------------------------------------------------------- inside of a piece
+    def _accept(self, spot: Spot, count: int, reduced: bool) -> Found:
+        """Step 8, and what lies between the old point and the new one."""
+        out = self._between(spot)
+        if self.stop is not None:
+            return out
+        self._move(spot)
+        if count <= self.options.quick and not reduced:
+            self.step = min(self.step * self.options.grow, self.options.max_step)
+        return [*out, (self.here(), None)]
+
+    def _between(self, spot: Spot) -> Found:
+        """Smooth folds, branch points and the end of the interval on the way to a point."""
+        out: Found = []
+        sign = spot.sign
+        if self.sign and sign and sign != self.sign:
+            out += self._branch_point(spot)
+        self.sign = sign or self.sign
+        sense = self._sense(spot.tp)
+        if sense and self.turn and sense != self.turn:
+            out += self._smooth_fold(spot)
+        self.turn = sense or self.turn
+        low, high = self.interval
+        if not low <= spot.p <= high:
+            out += self._end_of_interval(spot)
+        return out
+
+    def _move(self, spot: Spot) -> None:
+        old = self.spot
+        if spot is not old:
+            self.kinks_here = 0
+        self.travelled += self.curve.length(spot.y - old.y, spot.p - old.p)
+        self.spot = spot
+
+    def _smooth_fold(self, spot: Spot) -> Found:
+        """The point between the present one and `spot` where p' = 0."""
+        fold = self._zero(spot, lambda s: s.tp * self.turn)
+        if fold is None or not self.interval[0] <= fold.p <= self.interval[1]:
+            return []
+        self._move(fold)
+        event = self._event(EventKind.FOLD, self.piece, smooth=True)
+        return [(self.here(), event)]
+
+    def _branch_point(self, spot: Spot) -> Found:
+        """The point where the bordered determinant changes its sign, and the other line."""
+        was = self.sign
+        point = self._zero(spot, lambda s: float(was * s.sign))
+        if point is None:
+            point = spot
+        lines = kernel(*self.curve.jacobian(point.y, point.p), self.curve.weight, 1e-5)
+        rows = [np.append(point.ty, point.tp), -np.append(point.ty, point.tp)]
+        for line in lines.T:
+            along = self.curve.product(line[:-1], line[-1], point.ty, point.tp)
+            rest = line - along * np.append(point.ty, point.tp)
+            size = self.curve.length(rest[:-1], float(rest[-1]))
+            if size > 0.5:
+                rows += [rest / size, -rest / size]
+                break
+        event = Event(EventKind.BRANCH, point.p, point.y, self.travelled + self.curve.length(
+            point.y - self.spot.y, point.p - self.spot.p), self.piece, self.piece,
+            directions=np.array(rows), detail="other lines to first order")  # fmt: skip
+        return [(replace(self.here(), parameter=point.p, state=point.y,
+                         arclength=event.arclength), event)]  # fmt: skip
+
+    def _zero(self, spot: Spot, test: Any) -> Spot | None:
+        """Where a test function, positive here and negative at `spot`, vanishes."""
+        from scipy.optimize import brentq
+
+        def at(step: float) -> Spot | None:
+            if step == 0:
+                return replace(self.spot, sign=self.sign)
+            found = self.curve.correct(*self.spot.ahead(step), self.spot.ty, self.spot.tp,
+                                       self.options.tolerances)  # fmt: skip
+            return None if found is None else found[0]
+
+        # the corrector moves at right angles to the tangent, so this step leads to spot
+        whole = self.curve.product(spot.y - self.spot.y, spot.p - self.spot.p,
+                                   self.spot.ty, self.spot.tp)  # fmt: skip
+
+        def value(step: float) -> float:
+            found = at(step)
+            if found is None:
+                raise ArithmeticError
+            return float(test(found))
+
+        try:
+            if value(0.0) <= 0:
+                return self.spot
+            if value(whole) >= 0:
+                return None
+            return at(float(brentq(value, 0.0, whole, xtol=1e-14, rtol=1e-14)))
+        except ArithmeticError:
+            return None
+
+    def _end_of_interval(self, spot: Spot) -> Found:
+        """The point at the end of the interval, corrected at fixed parameter."""
+        bound = self.interval[int(spot.p > self.interval[1])]
+        s = self.spot
+        share = 1.0 if spot.p == s.p else (bound - s.p) / (spot.p - s.p)
+        y = s.y + np.clip(share, 0.0, 1.0) * (spot.y - s.y)
+        y_end = self.curve.at_parameter(y, bound, self.options.tolerances)
+        if y_end is None:
+            return [(self.here(), self._ended(Stop.STEP_TOO_SMALL, "at the end"))]
+        try:
+            ty, tp = self.curve.tangent(y_end, bound, s.ty, s.tp)
+        except np.linalg.LinAlgError:
+            ty, tp = s.ty, s.tp
+        last = Spot(y_end, bound, ty, tp)
+        self._move(last)
+        return [(self.here(), self._ended(Stop.INTERVAL))]
+
+    # ---------------------------------------------------------------- kinks
+    @abstractmethod
+    def _curve(self, n: int) -> Curve:
+        """The curve that the corrector follows."""
+
+    @abstractmethod
+    def _leaves(self, spot: Spot) -> bool:
+        """True where a point lies outside of the piece."""
+
+    @abstractmethod
+    def _over_border(self, step: float) -> Found | None:
+        """Over the border that lies before `step`; None where it can not be located."""
+
+    @abstractmethod
+    def _stuck(self) -> Found:
+        """What is left where the corrector fails at the smallest step."""
+
+    def _without_end(self) -> Event | None:
+        """The event END after one more kink at this point, where there have been too many."""
+        self.kinks_here += 1
+        if self.kinks_here <= MOST_KINKS:
+            return None
+        return self._ended(Stop.SINGULAR, "kinks without end")
+
+    def _enter(self, tangent: Tangent) -> None:
+        """Go on into another piece."""
+        self.piece = tangent.piece
+        self.curve = self._curve(len(self.spot.y))
+        ty, tp = self.curve.unit(tangent.direction, tangent.rate)
+        old = self.spot
+        self.spot, self.sign = Spot(old.y, old.p, ty, tp, old.sign), 0
+
+    # ---------------------------------------------------------------- events
+    def _sense(self, rate: float) -> int:
+        return int(np.sign(rate)) if abs(rate) > 1e-11 else 0
+
+    def _note_turn(self) -> bool:
+        """Remember the sense of the parameter; True where it turned."""
+        sense = self._sense(self.spot.tp)
+        turned = sense != 0 and self.turn != 0 and sense != self.turn
+        self.turn = sense or self.turn
+        return turned
+
+    def _event(self, kind: EventKind, before: Any, **more: Any) -> Event:
+        return Event(kind, self.spot.p, self.spot.y, self.travelled, before, self.piece, **more)
+
+    def _ended(self, stop: Stop, detail: str = "") -> Event:
+        self.stop = stop
+        return Event(EventKind.END, self.spot.p, self.spot.y, self.travelled, self.piece,
+                     stop=stop, detail=detail)  # fmt: skip
