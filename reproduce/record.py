@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -38,30 +38,37 @@ def regenerate(
 ) -> str:  # fmt: skip
     """Compute parts, each stored beside the others when it is there; the page, also written.
 
-    work(part): a name and the numbers to store under it.
+    work(part): a name and the numbers to store under it, or an iterator of dictionaries, one
+    per level, each stored when it is there beside those of other levels.
     """
     out.mkdir(parents=True, exist_ok=True)
     try:
         for part in parts:
             click.echo(f"{part} …")
-            _store(out, *work(part))
+            name, found = work(part)
+            if not isinstance(found, Iterator):
+                _store(out, name, found)
+                continue
+            for level in found:
+                _store(out, name, stored(out).get(name, {}) | level)
     except AmontonsError as reason:
         raise click.ClickException(str(reason)) from reason
-    text = page(_load(out))
+    text = page(stored(out))
     with replacing(out / "results.md") as path:
         path.write_text(text)
     return text
 
 
 def _store(out: Path, name: str, found: Any) -> None:
-    record = _load(out)
+    record = stored(out)
     record["machine"] = describe()
     record[name] = found
     with replacing(out / "results.json") as path:
         path.write_text(json.dumps(record) + "\n")
 
 
-def _load(out: Path) -> dict[str, Any]:
+def stored(out: Path) -> dict[str, Any]:
+    """All numbers of a folder of results, by part; empty where there are none."""
     target = out / "results.json"
     return json.loads(target.read_text()) if target.exists() else {}
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import click
 
-from ..record import check_parts, heading, levels_of, regenerate
+from ..record import check_parts, heading, levels_of, regenerate, stored
 from . import block, examples, tables, vee
 
 HERE = Path(__file__).parent
@@ -47,8 +47,9 @@ FIGURES = {"vee": ("9", "10"), "friction": ("11",), "block": ("12", "13"),
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("parts", nargs=-1, metavar="[PART]...")
-@click.option("--levels", default="1,2,3", show_default=True,
-              help="Refinements of the meshes: 1, 2, 3 are those of the paper.")  # fmt: skip
+@click.option("--levels", default="0,1,2,3", show_default=True,
+              help="Refinements of the meshes: 1, 2, 3 are those of the paper, 0 is for the "
+                   "V-shaped body.")  # fmt: skip
 @click.option(
     "--results", type=click.Path(path_type=Path), help="For tables and figures. [results/]"
 )
@@ -62,7 +63,10 @@ def main(parts: tuple[str, ...], levels: str, results: Path | None) -> None:
     chosen = levels_of(levels, min(vee.LEVELS), max(vee.LEVELS))
     out = results or HERE / "results"
     chosen_parts = parts or tuple(WORK)
-    click.echo(regenerate(out, chosen_parts, lambda p: (p, WORK[p](chosen, out)), page))
+    text = regenerate(out, chosen_parts, lambda p: (p, WORK[p](chosen, out)), page)
+    if "block" in chosen_parts:
+        block.draw_curves(stored(out)["block"], out / "figure12.png")
+    click.echo(text)
 
 
 def page(record: dict[str, Any]) -> str:

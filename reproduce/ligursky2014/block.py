@@ -8,7 +8,7 @@ length of boundary of a node.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,9 @@ from .tables import table
 LEVELS = {1: 20, 2: 40, 3: 80}  # cells along the width
 GAMMA = 0.495
 TURN = 0.023
+ALONG = (0.25, 0.45, 0.52, 0.75, 1.0)  # gamma where there is one solution
 MONITORED = (10.0, 0.0)
+NODE = ("u_nu", "u_tau", "T_nu", "T_tau")
 FRICTION = (0.6, 1.0, 1.4, 1.8, 2.2)  # figure 14
 SETTINGS = {  # of the steps; else the options of the library
     "steps up to 0.1": am.Continuation(),
@@ -70,6 +72,7 @@ def record(branch: am.Branch, cpu: float) -> dict[str, Any]:
         "status changes": sum(e.kind is am.EventKind.STATUS for e in branch.events),
         "ends": [stop.name.lower() for stop in branch.stops],
         "at 0.495": [solution_row(branch, y) for y in branch.at(GAMMA)],
+        "along": [{"gamma": p, **node_at(branch, y, p)} for p in ALONG for y in branch.at(p)],
     }  # fmt: skip
 
 
@@ -87,12 +90,14 @@ def solution_row(branch: am.Branch, y: np.ndarray) -> dict[str, Any]:
         "r_n gap": float(np.abs(r[:, 0] * u[:, 0]).max()),
         "beyond the cone": float(slide.max()),
         "friction with the slip": float((r[:, 1] * u[:, 1]).max()),
-        **node(problem, r, u),
+        **node_at(branch, y, GAMMA),
     }  # fmt: skip
 
 
-def node(problem: Any, r: np.ndarray, u: np.ndarray) -> dict[str, float]:
+def node_at(branch: am.Branch, y: np.ndarray, gamma: float) -> dict[str, float]:
     """Displacements (mm) and stresses (N/mm2) at the monitored node, signs of the paper."""
+    problem = branch.problem.at(gamma)
+    r, u = problem.reactions(y), problem.local_velocity(y)
     k = int(np.argmin(np.linalg.norm(problem.parts.points - MONITORED, axis=1)))
     h = float(np.diff(problem.parts.points[:2, 0])[0])
     return {"u_nu": -float(u[k, 0]), "u_tau": float(u[k, 1]),
@@ -101,19 +106,16 @@ def node(problem: Any, r: np.ndarray, u: np.ndarray) -> dict[str, float]:
 
 def curve(branch: am.Branch) -> dict[str, list[float]]:
     """The monitored node along the branch, as in figure 12."""
-    rows = []
-    for point in branch:
-        problem = branch.problem.at(point.parameter)
-        r, u = problem.reactions(point.state), problem.local_velocity(point.state)
-        rows.append({"gamma": point.parameter, **node(problem, r, u)})
+    rows = [
+        {"gamma": point.parameter, **node_at(branch, point.state, point.parameter)}
+        for point in branch
+    ]
     return {key: [row[key] for row in rows] for key in rows[0]}
 
 
-def run(levels: Sequence[int], out: Path) -> dict[str, Any]:
-    """The block on some levels, by two step settings; draws figures 12 and 13."""
-    found: dict[str, Any] = {}
-    curves = {}
-    for level in levels:
+def run(levels: Sequence[int], out: Path) -> Iterator[dict[str, Any]]:
+    """The block on each level by two step settings; draws figure 13 on the coarsest one."""
+    for level in (level for level in levels if level in LEVELS):
         cells = LEVELS[level]
         runs: dict[str, Any] = {}
         for name, options in SETTINGS.items():
@@ -121,12 +123,10 @@ def run(levels: Sequence[int], out: Path) -> dict[str, Any]:
             branch = follow(cells, options)
             runs[name] = record(branch, time.process_time() - began)
             if len(runs) == 1:
-                curves[2 * cells**2] = curve(branch)
-                if level == min(levels):
+                values = curve(branch)
+                if level == min(LEVELS):
                     draw_shapes(branch, out / "figure13.png")
-        found[str(2 * cells**2)] = runs
-    draw_curves(curves, out / "figure12.png")
-    return found
+        yield {str(2 * cells**2): {"runs": runs, "curve": values}}
 
 
 def run_friction(levels: Sequence[int], out: Path) -> dict[str, list[float]]:
@@ -134,8 +134,9 @@ def run_friction(levels: Sequence[int], out: Path) -> dict[str, list[float]]:
     figure = Figure(figsize=(6, 4.5))
     axes = figure.add_subplot()
     folds = {}
+    cells = LEVELS[max(min(levels), min(LEVELS))]
     for mu in FRICTION:
-        branch = follow(LEVELS[min(levels)], am.Continuation(), mu)
+        branch = follow(cells, am.Continuation(), mu)
         folds[str(mu)] = [event.parameter for event in branch.folds]
         values = curve(branch)
         axes.plot(values["gamma"], values["T_nu"], label=f"F = {mu}")
@@ -145,13 +146,14 @@ def run_friction(levels: Sequence[int], out: Path) -> dict[str, list[float]]:
     return folds
 
 
-def draw_curves(curves: dict[int, dict[str, list[float]]], path: Path) -> None:
-    """Figure 12."""
+def draw_curves(found: dict[str, Any], path: Path) -> None:
+    """Figure 12, of all levels that are stored."""
     figure = Figure(figsize=(9, 7), layout="constrained")
     for axes, key in zip(
-        figure.subplots(2, 2).ravel(), ("u_nu", "u_tau", "T_nu", "T_tau"), strict=True
+        figure.subplots(2, 2).ravel(), NODE, strict=True
     ):
-        for squares, values in curves.items():
+        for squares in sorted(found, key=int):
+            values = found[squares]["curve"]
             axes.plot(values["gamma"], values[key], lw=1, label=f"{squares} squares")
         axes.set(xlabel="gamma", ylabel=f"{key} (mm)" if key[0] == "u" else f"{key} (N/mm2)")
     axes.legend()
@@ -177,8 +179,9 @@ def draw_shapes(branch: am.Branch, path: Path) -> None:
 
 def page(found: dict[str, Any]) -> list[str]:
     """The tables of the block."""
-    folds, checks, nodes = [], [], []
-    for squares, runs in found.items():
+    folds, checks, nodes, along = [], [], [], []
+    for squares in sorted(found, key=int):
+        runs = found[squares]["runs"]
         for name, run_ in runs.items():
             row = {"squares": squares, "steps": name}
             row |= {f"fold {k + 1}": f"{fold:.10f}" for k, fold in enumerate(run_["folds"])}
@@ -187,13 +190,15 @@ def page(found: dict[str, Any]) -> list[str]:
         for one in next(iter(runs.values()))["at 0.495"]:
             head = {"squares": squares, "right corner": WORDS[one["corner"]]}
             checks.append(head | {key: one[key] for key in CHECKS})
-            nodes.append(head | {key: f"{one[key]:.10f}" for key in
-                                 ("u_nu", "u_tau", "T_nu", "T_tau")})  # fmt: skip
+            nodes.append(head | {key: f"{round(one[key], 10) + 0.0:.10f}" for key in NODE})
+        for one in next(iter(runs.values()))["along"]:
+            row = {"squares": squares, "gamma": one["gamma"]}
+            along.append(row | {key: f"{round(one[key], 10) + 0.0:.10f}" for key in NODE})
     return [
         "## Rectangular block (section 3.2.2)", "", *table(folds),
         "The solutions at gamma = 0.495; residual in N, lengths in mm, products in N mm:", "",
         *table(checks), "The node at (10, 0) there (mm, N/mm2), signs of the paper:", "",
-        *table(nodes),
+        *table(nodes), "and where the load has one solution:", "", *table(along),
     ]  # fmt: skip
 
 

@@ -21,7 +21,7 @@ from amontons.plots import solutions_figure
 from amontons.vee import vee
 
 HERE = Path(__file__).parent
-LEVELS = {1: 2220, 2: 8880, 3: 35520}
+LEVELS = {0: 555, 1: 2220, 2: 8880, 3: 35520}
 GAMMA = 0.38
 FRICTION = (0.6, 1.0, 1.4, 1.6, 1.8, 2.0)  # figure 11
 PAPER = {  # section 3.2.1
