@@ -21,7 +21,7 @@ from amontons.analysis.paths.following import (
 from amontons.analysis.paths.friction_path import FrictionPath
 from amontons.analysis.paths.path import EventKind, Stop
 from amontons.analysis.solutions.enumerate import enumerate_solutions
-from amontons.errors import InvalidInput
+from amontons.errors import InvalidInput, SingularOperator
 
 ONE = [[1.0, 0.8], [0.8, 1.0]]
 
@@ -239,6 +239,48 @@ def test_options_are_checked():
     with pytest.raises(InvalidInput, match="method"):
         follow_path(Black(one_contact()), np.zeros(2), 0.0, Limits((0.0, 1.0)),
                     method=Method.EVENTS)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["step", "grow", "residual", "corrections", "quick", "border"])
+@pytest.mark.parametrize("value", ["a", None, np.nan, -1.0])
+def test_options_are_numbers(name, value):
+    with pytest.raises(InvalidInput, match=f"{name}: expected"):
+        Continuation(**{name: value})
+
+
+def ellipse(width, height=1.0):
+    return Smooth(lambda y, p: (y / height) ** 2 + (p / width) ** 2 - 1,
+                  lambda y, p: np.diag(2 * y / height**2),
+                  lambda y, p: np.atleast_1d(2 * p / width**2))  # fmt: skip
+
+
+def test_a_sharp_turn_of_a_smooth_curve_is_no_kink():
+    """Folds with a radius of 1e-6: passed only with steps smaller than the default allows."""
+    start, limits = np.array([1e-3]), Limits((-2.0, 2.0))
+    branch = continue_both(ellipse(1.0, 1e-3), start, 0.0, limits)
+    assert branch.stops == (Stop.STEP_TOO_SMALL, Stop.STEP_TOO_SMALL)
+    assert not [e for e in branch.events if e.kind is EventKind.STATUS]
+    assert 0.999 < branch.parameter.max() < 1.0
+    finer = Continuation(min_step=1e-10, min_cosine=0.9, grow=3.0)
+    branch = continue_both(ellipse(1.0, 1e-3), start, 0.0, limits, finer)
+    assert branch.closed
+    np.testing.assert_allclose([e.parameter for e in branch.folds], [1, -1], atol=1e-9)
+
+
+def test_a_large_curve_is_followed_to_rounding():
+    """Residuals of 1e6 can not be reduced to 5e-12."""
+    large = Smooth(lambda y, p: y @ y + p**2 - 1e6, lambda y, p: 2 * y[None],
+                   lambda y, p: 2 * p)  # fmt: skip
+    options = Continuation(max_step=100.0, min_cosine=0.99)
+    branch = continue_both(large, np.array([1e3]), 0.0, Limits((-2e3, 2e3)), options)
+    assert branch.closed
+    np.testing.assert_allclose([e.parameter for e in branch.folds], [1e3, -1e3], rtol=1e-12)
+
+
+def test_a_start_where_smooth_curves_cross_is_refused():
+    cross = Smooth(lambda y, p: y * (y - p), lambda y, p: np.diag(2 * y - p), lambda y, p: -y)
+    with pytest.raises(SingularOperator, match="start: the tangent is not unique at 0"):
+        continue_both(cross, np.zeros(1), 0.0, Limits((-1.0, 1.0)))
 
 
 def test_a_corrector_that_fails_says_so():

@@ -11,16 +11,16 @@ else by the simple tangent switch (`walk_by_pieces`, `walk_by_switch`; `walk` fo
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InvalidInput
+from ...errors import InvalidInput, SingularOperator
 from .corrector import Curve, Tolerances
 from .first_order import Tangent, first_order
-from .path import Event, PathProblem, Point, name_of
+from .path import Event, PathProblem, Point, is_number, name_of
 from .walk_by_pieces import WalkByPieces
 from .walk_by_switch import WalkBySwitch
 
@@ -58,6 +58,18 @@ class Continuation:
     switch: Switch | None = None  # None: by the first-order system where the problem allows it
 
     def __post_init__(self) -> None:
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if value is None and item.default is None:
+                continue
+            if item.name == "switch":
+                if not isinstance(value, Switch):
+                    raise InvalidInput(f"switch: expected a Switch, got {value!r}")
+            elif not is_number(value):
+                raise InvalidInput(f"{item.name}: expected a number, got {value!r}")
+        self._check_ranges()
+
+    def _check_ranges(self) -> None:
         steps = (0 < self.min_step <= self.step <= self.max_step) and np.isfinite(self.max_step)
         checks = {
             "step": (steps, "0 < min_step <= step <= max_step"),
@@ -67,6 +79,7 @@ class Continuation:
             "change": (self.change > 0, "a number > 0"),
             "min_cosine": (self.min_cosine is None or self.min_cosine < 1, "a number < 1"),
             "corrections": (self.corrections >= 1, "at least 1"),
+            "quick": (self.quick >= 0, "at least 0"),
             "border": (self.border > 0, "a number > 0"),
         }
         for name, (holds, wanted) in checks.items():
@@ -88,13 +101,22 @@ class Continuation:
         return WITHIN if self._knows_pieces(problem) else ACROSS
 
     def start(self, problem: PathProblem, y: Array, p: float) -> tuple[Tangent, ...]:
-        """All one-sided tangents at a solution, as far as the problem tells its pieces."""
+        """All one-sided tangents at a solution, as far as the problem tells its pieces.
+
+        Raises SingularOperator where there are several and it does not tell.
+        """
         if self._knows_pieces(problem):
             found = first_order(problem, y, p, tolerance=self.border)
             if found.tangents:
                 return found.tangents
         curve = Curve(problem, len(y))
-        ty, tp = curve.any_tangent(y, p)
+        try:
+            ty, tp = curve.any_tangent(y, p)
+        except np.linalg.LinAlgError as reason:
+            raise SingularOperator(
+                f"start: the tangent is not unique at {p:g}: curves cross there, or solutions "
+                "are not isolated; start at another point of the curve"
+            ) from reason
         one = Tangent(ty, tp, name_of(problem.piece(y, p)))
         return one, -one
 

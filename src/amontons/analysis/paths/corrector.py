@@ -26,6 +26,7 @@ from .path import Matrix, PathProblem, weight_of
 
 Array = NDArray[np.float64]
 ROUNDED = 1e-12  # residual of a trial solve, relative, of a factor that is good enough
+UNIT = 4 * float(np.finfo(float).eps)  # relative, what no corrector can go below
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +52,8 @@ class Spot:
 class Tolerances:
     """When the corrector has converged, and when it has failed.
 
-    residual bounds |H|, change the weighted length of the last correction.
+    residual bounds |H|, change the weighted length of the last correction; both at least what
+    rounding resolves.
     """
 
     residual: float
@@ -130,11 +132,16 @@ class Curve:
             dy, dp = answer[:-1, 0], float(answer[-1, 0])
             y, p = y + dy, p + dp
             ty, tp = self.unit(answer[:-1, 1], float(answer[-1, 1]))
-            if self.length(dy, dp) <= tolerances.change:
+            if self.length(dy, dp) <= max(tolerances.change, UNIT * self.length(y, p)):
                 rest = float(np.linalg.norm(self.residual(y, p)))
-                if rest <= tolerances.residual:
+                if rest <= tolerances.residual or rest <= self._rounding(y, p):
                     return Spot(y, p, ty, tp, factor.sign), count
         return None
+
+    def _rounding(self, y: Array, p: float) -> float:
+        """What the last digits of y and p change in H."""
+        J, Jp = self.jacobian(y, p)
+        return UNIT * float(np.linalg.norm(abs(J) @ np.abs(y) + np.abs(Jp * p)))
 
     def orientation(self, y: Array, p: float, ty: Array, tp: float) -> int:
         """Sign of the determinant of the matrix bordered by a direction, 0 if singular."""
@@ -148,7 +155,7 @@ class Curve:
             except np.linalg.LinAlgError:
                 return None
             y = y + change
-            if self.length(change, 0.0) <= tolerances.change:
+            if self.length(change, 0.0) <= max(tolerances.change, UNIT * self.length(y, p)):
                 return y
         return None
 

@@ -275,6 +275,11 @@ def weight_of(problem: PathProblem, n: int) -> float:
     return 1.0 / max(n, 1) if given is None else float(given)
 
 
+def is_number(value: object) -> bool:
+    """True for one finite or infinite real number that is no truth value."""
+    return isinstance(value, int | float | np.number) and not isinstance(value, bool)
+
+
 def name_of(piece: Hashable | NDArray[Any]) -> Hashable:
     """A hashable name of a piece."""
     return piece.tobytes() if isinstance(piece, np.ndarray) else piece

@@ -78,6 +78,9 @@ class WalkBySwitch(Walk):
         ahead = (self.spot.y + BEHIND * tangent[0],
                  self.spot.p + BEHIND * tangent[1])  # fmt: skip
         after = name_of(self.problem.piece(*ahead))
+        if switch and after == before:  # a sharp turn of a smooth curve looks like a kink
+            detail = "the tangent turns, or jumps, inside of one piece"
+            return [*out, (self.here(), self._ended(Stop.STEP_TOO_SMALL, detail))]
         self._enter(Tangent(tangent[0], tangent[1], after))
         kind = EventKind.FOLD if self._note_turn() else EventKind.STATUS
         return [*out, (self.here(), self._event(kind, before))]
