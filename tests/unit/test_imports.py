@@ -84,6 +84,14 @@ def test_heavy_packages_are_imported_in_one_place(package):
     assert users <= set(ALONE[package].split())
 
 
+def test_no_kernel_assumes_that_numbers_are_finite():
+    for path in FILES:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.keyword) and node.arg == "fastmath":
+                allowed = ast.literal_eval(node.value)  # True would let a NaN become anything
+                assert allowed in ({"contract"}, {"contract", "reassoc"}), path
+
+
 def modules_after(code):
     """Names of all modules loaded by a fresh interpreter that runs `code`."""
     report = f"{code}\nimport sys\nprint(*sys.modules)"
