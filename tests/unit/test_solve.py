@@ -233,7 +233,7 @@ def test_interrupt_in_the_first_factorisation_is_not_repeated(monkeypatch):
     def interrupted(self):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(type(problem), "factor", interrupted)
+    monkeypatch.setattr(type(problem.matrices), "factor", interrupted)
     solution = drive(problem)
     assert solution.convergence.outcome is am.Outcome.STOPPED
     assert not solution.r.any()
