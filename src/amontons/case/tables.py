@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..checked_arrays import LARGEST
-from ..errors import FileFormatError
+from ..errors import FileFormatError, InvalidInput, MissingDependency
 from ..expressions import nearest
 
 
@@ -104,3 +104,20 @@ class Table:
         if not isinstance(values, list):
             raise self.error(key, f"expected an array of tables, written [[{key}]]")
         return [self.as_table(f"{key}[{k}]", value) for k, value in enumerate(values)]
+
+
+@dataclass(frozen=True)
+class Blame:
+    """Turns what the layers below reject into a complaint about a key of the file."""
+
+    table: Table
+    key: str
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: type | None, error: BaseException | None, trace: object) -> None:
+        if isinstance(error, FileFormatError | MissingDependency):
+            return
+        if isinstance(error, InvalidInput):
+            raise self.table.error(self.key, str(error)) from error
