@@ -131,16 +131,19 @@ def run(levels: Sequence[int], out: Path) -> Iterator[dict[str, Any]]:
 
 def run_friction(levels: Sequence[int], out: Path) -> dict[str, list[float]]:
     """Figure 14: T_nu at the monitored node for several coefficients, on the coarsest level."""
-    figure = Figure(figsize=(6, 4.5))
+    figure = Figure(figsize=(6, 4.5), layout="constrained")
     axes = figure.add_subplot()
-    folds = {}
-    cells = LEVELS[max(min(levels), min(LEVELS))]
+    folds, lowest = {}, 0.0
+    cells = LEVELS[min((level for level in levels if level in LEVELS), default=1)]
     for mu in FRICTION:
         branch = follow(cells, am.Continuation(), mu)
         folds[str(mu)] = [event.parameter for event in branch.folds]
         values = curve(branch)
         axes.plot(values["gamma"], values["T_nu"], label=f"F = {mu}")
-    axes.set(xlabel="gamma", ylabel="T_nu (N/mm2) at (10, 0)", xlim=(0.3, 0.7))
+        inside = [T for p, T in zip(values["gamma"], values["T_nu"], strict=True) if p < 0.7]
+        lowest = min(lowest, *inside)
+    axes.set(xlabel=r"$\gamma$", ylabel=r"$T_\nu$ (N/mm$^2$) at (10, 0)", xlim=(0.3, 0.7),
+             ylim=(1.1 * lowest, -0.05 * lowest))  # fmt: skip
     axes.legend()
     save(figure, out / "figure14.png")
     return folds
@@ -155,7 +158,9 @@ def draw_curves(found: dict[str, Any], path: Path) -> None:
         for squares in sorted(found, key=int):
             values = found[squares]["curve"]
             axes.plot(values["gamma"], values[key], lw=1, label=f"{squares} squares")
-        axes.set(xlabel="gamma", ylabel=f"{key} (mm)" if key[0] == "u" else f"{key} (N/mm2)")
+        symbol = rf"${key[0]}_\{key[2:]}$"
+        unit = "mm" if key[0] == "u" else "N/mm$^2$"
+        axes.set(xlabel=r"$\gamma$", ylabel=f"{symbol} ({unit})")
     axes.legend()
     save(figure, path)
 
