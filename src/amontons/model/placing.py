@@ -1,0 +1,171 @@
+"""The contacts of one pair, placed in a model: those that can meet and are free to react."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..contact import (
+    ContactRows,
+    Nitsche,
+    NitscheTerms,
+    contact_nodes,
+    mortar_contact,
+    mortar_obstacle,
+    nitsche_obstacle,
+    nitsche_pair,
+    nodal_contact,
+    pair_contact,
+)
+from ..errors import InvalidInput, UnsupportedForm
+from ..fem.elasticity import LinearElastic
+from ..fem.mesh import Mesh
+from .parts import Body, Contact
+from .supports import locate
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+TOUCHING = 1e-12  # penetration of held nodes, relative to the mesh, that is none
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """Contacts of one pair: body of the slave, kept (slave nodes,), rows of the kept ones.
+
+    H (dofs, nc d): the rows in the dofs of the whole model, with those of a master body.
+    By Nitsche's method Gauss points of the slave take the place of its nodes, and `nitsche`
+    holds their tractions, also in the dofs of the whole model.
+    """
+
+    body: int
+    kept: NDArray[np.bool_]
+    all_points: Array
+    rows: ContactRows
+    H: sparse.csc_array
+    nitsche: NitscheTerms | None = None
+
+
+def place(bodies: tuple[Body, ...], contact: Contact, values: Array, offsets: Index) -> Placed:
+    """Contacts of one pair without those whose normal the supports prescribe.
+
+    values (dofs,): prescribed displacements, NaN where free.
+    """
+    is_fixed = ~np.isnan(values)
+    k = locate(bodies, contact.slave)[0]
+    mesh = bodies[k].mesh
+    rows, H, met, points, terms = _met(bodies, contact, values, offsets)
+    d = mesh.dim
+    normal = sparse.csc_array(H[:, ::d]).multiply(~is_fixed[:, None])
+    kept = np.sqrt(np.asarray(normal.power(2).sum(axis=0)).ravel()) > 1e-9
+    prescribed = np.where(is_fixed, values, 0.0)
+    _check_supported(mesh, contact, rows.at(~kept), (H[:, ::d].T @ prescribed)[~kept])
+    kept &= _wanted(contact, points)[met]
+    all_kept = met.copy()
+    all_kept[met] = kept
+    terms = None if terms is None else terms.at(kept)
+    return Placed(k, all_kept, points, rows.at(kept), H[:, np.repeat(kept, d)], terms)
+
+
+def _met(
+    bodies: tuple[Body, ...], contact: Contact, values: Array, offsets: Index
+) -> tuple[ContactRows, sparse.csc_array, NDArray[np.bool_], Array, NitscheTerms | None]:
+    """Contacts of one pair, H in the dofs of the model, which of all points meet, and terms."""
+    if contact.nitsche is not None:
+        return _met_by_nitsche(bodies, contact, contact.nitsche, offsets)
+    k, surface = locate(bodies, contact.slave)
+    slave, size = bodies[k].mesh, int(offsets[-1])
+    points = slave.points[contact_nodes(slave, surface)[0]]
+    mortar = contact.method == "mortar"
+    given = [v.reshape(-1, slave.dim) for v in np.split(values, offsets[1:-1])]
+    if contact.obstacle is not None:
+        rows = nodal_contact(slave, surface, contact.obstacle)
+        met = np.ones(len(rows.nodes), dtype=bool)
+        if mortar:
+            _check_held(slave, contact, rows, given[k][rows.nodes])
+            rows, met = mortar_obstacle(slave, surface, contact.obstacle, prescribed=given[k])
+        return rows, _shifted(rows.H, int(offsets[k]), size), met, points, None
+    assert contact.master is not None
+    j, other = locate(bodies, contact.master)
+    master = bodies[j].mesh
+    if mortar:
+        rows, on_master, met = mortar_contact(
+            slave, surface, master, other, prescribed=given[k], master_prescribed=given[j]
+        )
+    else:
+        rows, on_master, met = pair_contact(slave, surface, master, other)
+    H = _shifted(rows.H, int(offsets[k]), size) + _shifted(on_master, int(offsets[j]), size)
+    return rows, sparse.csc_array(H), met, points, None
+
+
+def _met_by_nitsche(
+    bodies: tuple[Body, ...], contact: Contact, options: Nitsche, offsets: Index
+) -> tuple[ContactRows, sparse.csc_array, NDArray[np.bool_], Array, NitscheTerms | None]:
+    """The same for the Gauss points of Nitsche's method."""
+    k, surface = locate(bodies, contact.slave)
+    body, first, size = bodies[k], int(offsets[k]), int(offsets[-1])
+    if not isinstance(body.material, LinearElastic) and not all(
+        isinstance(law, LinearElastic) for law in dict(body.material).values()
+    ):
+        raise UnsupportedForm(
+            f"contact on {contact.slave!r}: Nitsche's method takes the stress from "
+            'LinearElastic; use method="nodal"'
+        )
+    if contact.obstacle is not None:
+        rows, terms = nitsche_obstacle(
+            body.mesh, surface, contact.obstacle, body.material, options
+        )
+        met, points = np.ones(len(rows.points), dtype=bool), rows.points
+        H = _shifted(rows.H, first, size)
+    else:
+        assert contact.master is not None
+        j, other = locate(bodies, contact.master)
+        rows, terms, on_master, met, points = nitsche_pair(
+            body.mesh, surface, bodies[j].mesh, other, body.material, options
+        )
+        H = _shifted(rows.H, first, size) + _shifted(on_master, int(offsets[j]), size)
+    terms = replace(terms, traction=_shifted(terms.traction, first, size))
+    return rows, sparse.csc_array(H), met, points, terms
+
+
+def _check_supported(mesh: Mesh, contact: Contact, rows: ContactRows, moved: Array) -> None:
+    """Raise InvalidInput when supports alone push a node into the obstacle."""
+    gap = rows.gap + moved
+    size = np.ptp(mesh.points, axis=0).max()
+    if gap.size and gap.min() < -TOUCHING * size:
+        k = int(gap.argmin())
+        raise InvalidInput(
+            f"contact on {contact.slave!r}: supports hold the node at "
+            f"{rows.points[k].tolist()} and push it {-gap[k]:.3g} into the other side, where "
+            "no contact force can act; change the prescribed displacement or free the node"
+        )
+
+
+def _check_held(mesh: Mesh, contact: Contact, rows: ContactRows, given: Array) -> None:
+    """The same for nodes that supports hold, before mortar leaves out their multipliers."""
+    normal = rows.frames[:, 0]
+    held = np.linalg.norm(normal * np.isnan(given), axis=1) < 1e-9
+    moved = np.einsum("pc,pc->p", normal, np.nan_to_num(given))
+    _check_supported(mesh, contact, rows.at(held), moved[held])
+
+
+def _wanted(contact: Contact, points: Array) -> NDArray[np.bool_]:
+    """Which slave nodes a contact asks for, (n,)."""
+    if contact.where is None:
+        return np.ones(len(points), dtype=bool)
+    wanted = np.asarray(contact.where(points))
+    if wanted.shape != (len(points),) or wanted.dtype != bool:
+        raise InvalidInput(
+            f"contact on {contact.slave!r}: expected where to return ({len(points)},) of bool "
+            f"for points {points.shape}, got {wanted.dtype} of shape {wanted.shape}"
+        )
+    return wanted
+
+
+def _shifted(H: sparse.csc_array, offset: int, size: int) -> sparse.csc_array:
+    """Columns on one body in the dofs of the whole model, (size, nc d)."""
+    part = H.tocoo()
+    entries = (part.data, (part.coords[0] + offset, part.coords[1]))
+    return sparse.coo_array(entries, shape=(size, H.shape[1])).tocsc()
