@@ -246,7 +246,7 @@ def test_the_clock():
 
 def test_shared_multipliers_are_complete_certificates(monkeypatch):
     # few multipliers on a subspace first, as for many contacts
-    monkeypatch.setattr("amontons.analysis.certificates.load_certificate.LARGE", 1)
+    monkeypatch.setattr("amontons.analysis.certificates.load_inequality.LARGE", 1)
     monkeypatch.setattr("amontons.analysis.certificates.load_reduction.SETS", 4)
     called = []
 
@@ -260,7 +260,7 @@ def test_shared_multipliers_are_complete_certificates(monkeypatch):
     for other in (problem, am.FrictionProblem.from_delassus(problem.W, q, problem.mu)):
         with monkeypatch.context() as patch:
             patch.setattr(
-                "amontons.analysis.certificates.load_certificate.find_multipliers", never
+                "amontons.analysis.certificates.load_inequality.find_multipliers", never
             )
             answer = certify_load(other, am.solve(other))
         assert not called
@@ -305,8 +305,8 @@ def test_a_rough_solution_is_good_enough():
 
 
 def test_too_many_contacts_are_undecided_where_sharing_fails(monkeypatch):
-    monkeypatch.setattr("amontons.analysis.certificates.load_certificate.LARGE", 1)
-    monkeypatch.setattr("amontons.analysis.certificates.load_certificate.LARGEST", 5)
+    monkeypatch.setattr("amontons.analysis.certificates.load_inequality.LARGE", 1)
+    monkeypatch.setattr("amontons.analysis.certificates.load_inequality.LARGEST", 5)
     monkeypatch.setattr("amontons.analysis.certificates.load_reduction.SETS", 2)
     problem = hild_triangle(15, mu=2.9).assemble().condensed()
     answer = certify_load(problem, am.solve(problem))

@@ -31,32 +31,14 @@ from numpy.typing import NDArray
 from ...errors import InvalidInput
 from ...problem import FrictionProblem
 from ...solution import FrictionSolution
-from ..multipliers.multiplier_lmi import (
-    SMALLEST,
-    LmiOutcome,
-    find_multipliers,
-    slacks_are_positive,
-)
 from ..solutions.enumerate import PieceSolution
-from ..solutions.multistart import Finder, certain_error, described
-from ..solutions.newton_batch import Stack
-from . import load_pieces as pieces
-from .load_pieces import Known, LoadProblem, States
-from .load_proof import BranchProof, prove
-from .load_reduction import shared_multipliers
+from .load_inequality import Failure, Inequality, too_many
+from .load_known import NEAR, contains, refined
+from .load_others import OtherSolutions
+from .load_problem import LoadProblem, States, word
+from .load_proof import BranchProof
 
 Array = NDArray[np.float64]
-NEAR = 1e-6  # of the size of reactions: a larger `distance` proves nothing of use
-HOPELESS = 1e-6  # eigenvalue of M, of mean 1, below which a branch is divided instead
-LARGEST = 600  # contacts up to which each can have a multiplier of its own: memory
-LARGE = 150  # contacts from which few different multipliers are tried first
-STARTS = 60  # of Newton's method once the first inequality has no multipliers
-STEP_WORK, RATE = 30.0, 1e10  # operations of a start per (2 nc)^3, and per second
-TOLERANCE = 1e-8  # error by the judge of another solution
-EXACT = 1e-12  # error of solutions that fill a segment
-GOOD = 1e-12  # by which a solution in scaled variables may miss the law
-SAME_SOLUTION = 1e-4  # scaled distance that refining a solution may move it
-DISTINCT = 1e-6  # scaled distance of two solutions that count as different
 
 
 class LoadOutcome(Enum):
@@ -134,6 +116,20 @@ def reactions_of(
     return r
 
 
+def without_search(local: FrictionProblem) -> tuple[LoadOutcome, str] | None:
+    """The answer and its reason where there is nothing to search, or no scale to measure by."""
+    if not local.contacts:
+        return LoadOutcome.CERTIFIED, "there is no contact"
+    if local.q_norm == 0:
+        return LoadOutcome.UNDECIDED, "q is zero: nothing sets a scale"
+    return None
+
+
+def proved_on(parts: int) -> str:
+    """The reason of a certificate that has so many parts."""
+    return "multipliers exclude all others" + (f" on {parts} parts" if parts > 1 else "")
+
+
 class _Search:
     """Branches that are not proved yet, and what was found on the way."""
 
@@ -151,20 +147,16 @@ class _Search:
 
     def run(self) -> LoadCertificate:
         """Root, other solutions, branches."""
-        root = self.local.root_branch
-        if not len(root):
-            return self._answer(LoadOutcome.CERTIFIED, "there is no contact")
-        if self.local.problem.q_norm == 0:
-            return self._answer(LoadOutcome.UNDECIDED, "q is zero: nothing sets a scale")
-        failure = self._prove(root)
+        if at_once := without_search(self.local.problem):
+            return self._answer(*at_once)
+        failure = self._prove(self.local.root_branch)
         if failure is None:
             return self._certified()
         self.other = OtherSolutions(self.local, self.known)
         found = self.other.near(failure, self.left) or self.other.far(0.2 * self.left)
         if found:
             return self._refuted(found)
-        if self.local.contacts > LARGEST:
-            reason = f"no shared multipliers, and more than {LARGEST} contacts for own ones"
+        if reason := too_many(self.local):
             return self._answer(LoadOutcome.UNDECIDED, reason)
         return self._divide(failure)
 
@@ -198,7 +190,7 @@ class _Search:
     def _prove(self, branch: States) -> Failure | None:
         """None where a branch is proved, which is kept."""
         self.examined += 1
-        known = self.known if pieces.contains(self.local, branch, self.known) else None
+        known = self.known if contains(self.local, branch, self.known) else None
         inequality = Inequality(self.local, branch, known)
         proof = inequality.solve(NEAR * self.size, self.left)
         if isinstance(proof, Failure):
@@ -208,9 +200,7 @@ class _Search:
 
     # ------------------------------------------------------------------ answers
     def _certified(self) -> LoadCertificate:
-        count = len(self.proofs)
-        parts = f" on {count} parts" if count > 1 else ""
-        return self._answer(LoadOutcome.CERTIFIED, f"multipliers exclude all others{parts}")
+        return self._answer(LoadOutcome.CERTIFIED, proved_on(len(self.proofs)))
 
     def _refuted(self, other: PieceSolution) -> LoadCertificate:
         return self._answer(LoadOutcome.REFUTED, f"another solution is {other.pattern}", other)
@@ -233,200 +223,4 @@ class _Search:
         unit[:, :2] = 1 / self.local.to_r.reshape(-1, 2)
         unit[:, 2:4] = 1 / self.local.to_u.reshape(-1, 2)
         W = proof.multipliers * unit[:, :, None] * unit[:, None, :]
-        return LoadBranch(pieces.word(proof.branch), W)
-
-
-@dataclass(frozen=True, eq=False)
-class Failure:
-    """A branch without multipliers, and the z (nc, k) in which the inequality fails most."""
-
-    branch: States
-    direction: Array
-    score: Array  # (nc,): z^T W z of the best multipliers
-
-    def contact(self, local: LoadProblem) -> int:
-        """The contact to be divided: undecided, and with the largest score; -1 for none."""
-        for p in np.argsort(-self.score):
-            if local.children(self.branch, int(p)):
-                return int(p)
-        return -1
-
-
-class Inequality:
-    """The matrix inequality of a branch, about a known solution in it or without one."""
-
-    def __init__(self, local: LoadProblem, branch: States, known: Known | None) -> None:
-        self.local, self.branch, self.known = local, branch, known
-        apex = known is None
-        if known is None:
-            self.cones = pieces.cones_with_apex(local, branch)
-        else:
-            self.cones = pieces.cones_about(local, branch, known)
-        self.groups = pieces.groups(self.cones, local.coordinates(branch))
-        self.Z, _ = pieces.energy_basis(local, branch, apex)
-
-    @property
-    def divisible(self) -> bool:
-        """True where some contact is not decided yet."""
-        return bool((self.branch >= pieces.UNDECIDED).any())
-
-    @property
-    def large(self) -> bool:
-        """Where few different multipliers are worth a try first."""
-        return (
-            self.local.contacts >= LARGE
-            and self.known is not None
-            and bool((self.branch == pieces.UNDECIDED).all())
-        )
-
-    def solve(self, near: float, time_limit: float) -> BranchProof | Failure:
-        """Its proof with a distance <= near, or where it fails."""
-        if not self.Z.shape[1]:  # nothing moves: any multipliers will do
-            W = self._whole_identity()
-            proof = prove(self.local, self.branch, W, self.known)
-            able = proof is not None and proof.distance <= near
-            return proof if able and proof else self._failure(np.zeros(0), W)
-        proofs: list[BranchProof] = []
-
-        def accept(W: tuple[Array, ...], extras: tuple[Array, ...]) -> bool:
-            own = tuple(e * g.factors for e, g in zip(extras, self.groups, strict=True))
-            if not slacks_are_positive([g.family for g in self.groups], W, own):
-                return False
-            proof = prove(self.local, self.branch, self._whole(W), self.known)
-            if proof is None or proof.distance > near:
-                return False
-            proofs.append(proof)
-            return True
-
-        share = 1.0 if self.local.contacts > LARGEST else 0.5
-        if self.large and shared_multipliers(
-            self.local, self.branch, self.groups, accept, time_limit=share * time_limit
-        ):
-            return proofs[-1]
-        if self.local.contacts > LARGEST:
-            return self._failure(np.zeros(self.Z.shape[1]), self._whole_identity())
-        answer = find_multipliers(
-            self.Z, [g.turned for g in self.groups], accept=accept, time_limit=time_limit,
-            smallest=HOPELESS if self.divisible else SMALLEST,
-        )  # fmt: skip
-        if answer.outcome is LmiOutcome.FOUND:
-            return proofs[-1]
-        return self._failure(answer.lowest, self._whole(answer.W))
-
-    def _whole(self, parts: tuple[Array, ...]) -> Array:
-        return pieces.whole(self.groups, parts, self.local.contacts, self.cones.G.shape[2])
-
-    def _whole_identity(self) -> Array:
-        """W = -I, which is never positive on the cones."""
-        return -np.tile(np.eye(self.cones.G.shape[2]), (self.local.contacts, 1, 1))
-
-    def _failure(self, lowest: Array, W: Array) -> Failure:
-        nc = self.local.contacts
-        z = (self.Z[: 4 * nc] @ lowest).reshape(nc, 4)
-        if self.known is None:
-            z = np.column_stack([z, np.full(nc, self.Z[-1] @ lowest)])
-        return Failure(self.branch, z, np.einsum("pa,pab,pb->p", z, W, z))
-
-
-# ------------------------------------------------------------------ solutions
-def refined(local: LoadProblem, r: Array) -> Known:
-    """The solution next to scaled reactions (2 nc,), on its piece or by Newton's method.
-
-    Raises InvalidInput where there is none.
-    """
-    best = pieces.known_solution(local, r)
-    for improve in (_on_piece, _by_newton):
-        if best.valid and best.off.max(initial=0.0) <= GOOD:
-            return best
-        for other in improve(local, best.r if best.valid else r):
-            known = pieces.known_solution(local, other)
-            near = np.abs(known.r - r).max() <= SAME_SOLUTION * (1 + np.abs(r).max())
-            better = not best.valid or known.off.max() < best.off.max()
-            if near and known.valid and better:
-                best = known
-    if not best.valid or best.off.max(initial=0.0) > NEAR:
-        error = local.problem.error((r * local.to_r).reshape(-1, 2))
-        raise InvalidInput(
-            f"solution: expected a solution of the problem, got one with error {error:.1e}; "
-            "solve again with a smaller tolerance"
-        )
-    return best
-
-
-def _on_piece(local: LoadProblem, r: Array) -> list[Array]:
-    """The reactions that the statuses of a solution determine."""
-    known = pieces.known_solution(local, r)
-    branch = np.argmax(known.touches, axis=1).astype(np.int8)
-    R, rows = local.reactions(branch), local.zero_velocities(branch)
-    if not known.valid or not len(rows):
-        return []
-    try:
-        y = np.linalg.solve((R.T @ local.W[rows].T).T, -local.q[rows])
-    except np.linalg.LinAlgError:
-        return []
-    return [np.asarray(R @ y)]
-
-
-def _by_newton(local: LoadProblem, r: Array) -> list[Array]:
-    """Where semismooth Newton steps lead."""
-    stack = Stack.of(local.problem)
-    reached = stack.newton(r.reshape(1, -1, 2), np.random.default_rng(0))
-    return [found.ravel() for found in reached]
-
-
-class OtherSolutions:
-    """Looks for solutions different from a known one."""
-
-    def __init__(self, local: LoadProblem, known: Known) -> None:
-        self.problem, self.known = local.problem, known.r.reshape(-1, 2)
-        self.stack = Stack.of(local.problem)
-        self.random = np.random.default_rng(0)
-        self.size = DISTINCT * (1 + np.abs(self.known).max(initial=0.0))
-
-    @property
-    def seconds(self) -> float:
-        """Of Newton's method from one start, at most and roughly."""
-        return STEP_WORK * self.stack.W.shape[0] ** 3 / RATE
-
-    def near(self, failure: Failure, seconds: float) -> PieceSolution | None:
-        """From where an inequality fails: along d, or at z / tau."""
-        z = failure.direction
-        if 4 * self.seconds > seconds or not z.any():
-            return None
-        if z.shape[1] == 5:
-            tau = z[0, 4]
-            starts = z[None, :, :2] / (tau if tau else 1.0)
-        else:
-            length = np.abs(z[:, :2]).max(initial=0.0)
-            steps = np.array([-3.0, -0.3, 0.3, 3.0])[:, None, None]
-            starts = self.known + steps * z[:, :2] / (length or 1.0)
-        return self._first(self.stack.newton(starts, self.random))
-
-    def far(self, seconds: float) -> PieceSolution | None:
-        """From many starts."""
-        began, finder = time.perf_counter(), Finder(self.stack, self.random, TOLERANCE)
-        finder.add(self.known)
-        if 2 * self.seconds > seconds:
-            return None
-        each = int(np.clip(0.2 / self.seconds, 2, STARTS))
-        for _ in range(0, STARTS, each):
-            finder.search(each)
-            found = self._first(np.array(finder.found).reshape(-1, *self.known.shape))
-            if found or time.perf_counter() - began > seconds:
-                return found
-        return None
-
-    def _first(self, reached: Array) -> PieceSolution | None:
-        for r in reached:
-            if np.abs(r - self.known).max() > self.size and self._solves(r):
-                return described(self.stack, r)
-        return None
-
-    def _solves(self, r: Array) -> bool:
-        """True where r is a solution, and not only because all between the two nearly are."""
-        error = self._error(r)
-        between = self._error((r + self.known) / 2)
-        return error <= TOLERANCE and (between > 100 * error or between <= EXACT)
-
-    def _error(self, r: Array) -> float:
-        return certain_error(self.problem, r * self.stack.to_r)
+        return LoadBranch(word(proof.branch), W)

@@ -21,7 +21,14 @@ from ..solutions.disc_sets import ON
 from ..solutions.enumerate import PieceSolution
 from ..solutions.multistart import Finder, described
 from ..solutions.newton_batch import Stack
-from .load_certificate import LoadCertificate, LoadOutcome, reactions_of
+from .load_certificate import (
+    LoadCertificate,
+    LoadOutcome,
+    proved_on,
+    reactions_of,
+    without_search,
+)
+from .load_known import not_a_solution
 
 Array = NDArray[np.float64]
 TOLERANCE = 1e-8  # error by the judge of a solution
@@ -52,20 +59,14 @@ class _Certification:
 
     def run(self) -> LoadCertificate:
         """Root, other solutions, regions."""
-        if not self.local.contacts:
-            return self._answer(LoadOutcome.CERTIFIED, "there is no contact")
-        if self.local.q_norm == 0:
-            return self._answer(LoadOutcome.UNDECIDED, "q is zero: nothing sets a scale")
+        if at_once := without_search(self.local):
+            return self._answer(*at_once)
         stack = Stack.of(self.local)
         r, _ = stack.polished(self.r / stack.to_r)
         finder = Finder(stack, np.random.default_rng(0), TOLERANCE)
         near = np.abs(r - self.r / stack.to_r).max() <= 1e-4 * (1 + np.abs(r).max())
         if not near or not finder.add(r):
-            error = self.local.error(self.r)
-            raise InvalidInput(
-                f"solution: expected a solution of the problem, got one with error {error:.1e};"
-                " solve again with a smaller tolerance"
-            )
+            raise not_a_solution(self.local, self.r)
         search = self.search = DiscSearch(stack, finder, self.began + self.limit)
         self.r = r * stack.to_r
         if not search.queue:
@@ -80,9 +81,8 @@ class _Certification:
             reason = f"another solution is {other.pattern}"
             return self._answer(LoadOutcome.REFUTED, reason, other)
         if search.complete:
-            count = len(search.proofs) + len(search.linear)
-            parts = f" on {count} parts" if count > 1 else ""
-            return self._answer(LoadOutcome.CERTIFIED, f"multipliers exclude all others{parts}")
+            reason = proved_on(len(search.proofs) + len(search.linear))
+            return self._answer(LoadOutcome.CERTIFIED, reason)
         return self._answer(LoadOutcome.UNDECIDED, search.reason(self.limit))
 
     def _answer(

@@ -25,7 +25,8 @@ from numpy.typing import NDArray
 from scipy import linalg, sparse
 
 from ..multipliers.rounding import gamma, is_positive_definite, unit_scale
-from .load_pieces import Known, LoadProblem, States
+from .load_known import Known
+from .load_problem import LoadProblem, States
 
 Array = NDArray[np.float64]
 PENALTIES = 10.0 ** np.arange(0, 9, 2)  # of velocities that vanish, times |W_p|

@@ -19,7 +19,8 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
 from ..multipliers.multiplier_lmi import Accept, LmiOutcome, find_multipliers
 from ..multipliers.multiplier_steps import Family
-from .load_pieces import Group, LoadProblem, States, whole
+from .load_groups import Group, whole
+from .load_problem import LoadProblem, States
 from .load_proof import diagonal_parts
 
 Array = NDArray[np.float64]
