@@ -48,7 +48,10 @@ class LargeSlowModel:
         if self.crossing is not None:
             drift = (time - state.time) * at_contacts(self.motion.body, state.velocity)
             arrive = partial(self.crossing.along, problem, drift)
-        found, passage = taken(lambda start: solve(problem, start, None), arrive, state, time)  # type: ignore[arg-type]
+        found, passage = taken(
+            lambda start: solve(problem, start, None),  # type: ignore[arg-type]
+            arrive, state.force, (state.time, time),
+        )  # fmt: skip
         solution = problem.solved(found)
         assert solution.v is not None
         q1 = problem.displacement(solution.v).ravel()

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,9 +27,6 @@ from ..model.large_deformation import LargeDeformation
 from ..problem import FrictionProblem
 from ..solution import FrictionSolution
 from ..solvers.base import Breakdown, Iterate
-
-if TYPE_CHECKING:
-    from .state import State
 
 Array = NDArray[np.float64]
 
@@ -92,15 +89,16 @@ class Passage:
 
 def taken(
     solve: Callable[[Iterate], FrictionSolution], arrive: Callable[[], Arrival] | None,
-    state: State, time: float,
+    r: Array, times: tuple[float, float],
 ) -> tuple[FrictionSolution, Passage | None]:  # fmt: skip
-    """The solution of a step from a state to a time, begun where its path arrives if any.
+    """The solution of a step between two times, begun where its path arrives if any.
 
-    solve(start) finds it; NotConverged then says what became of the path, too.
+    r (nc, d): reactions of the last state; solve(start) finds the solution.  NotConverged says
+    what became of the path, too.
     """
     if arrive is None:
-        return solve(Iterate(state.force)), None
-    start, passage = _passed(arrive, state, time)
+        return solve(Iterate(r)), None
+    start, passage = _passed(arrive, r, times)
     try:
         return passage.told(solve(start)), passage
     except NotConverged as failure:
@@ -108,12 +106,12 @@ def taken(
 
 
 def _passed(
-    arrive: Callable[[], Arrival], state: State, time: float
+    arrive: Callable[[], Arrival], r: Array, times: tuple[float, float]
 ) -> tuple[Iterate, Passage]:
     try:
         found = arrive()
     except (Breakdown, SingularOperator) as reason:
-        return Iterate(state.force), Passage((), False, str(reason))
-    span = time - state.time
-    folds = tuple(state.time + share * span for share in found.folds)
+        return Iterate(r), Passage((), False, str(reason))
+    before, after = times
+    folds = tuple(before + share * (after - before) for share in found.folds)
     return Iterate(found.r, found.v), Passage(folds, True)

@@ -76,7 +76,7 @@ class SlowModel:
             before = self._before(state, time)
             arrive = partial(self.crossing.between, before, problem, state.force)
         solution, passage = taken(
-            lambda start: solve(problem, start, None), arrive, state, time
+            lambda start: solve(problem, start, None), arrive, state.force, (state.time, time)
         )
         assert solution.v is not None
         q1 = prescribed.copy()
