@@ -126,7 +126,8 @@ class NonlinearNewton:
                     v, told = self.crossing.across(problem, share, v, target)
                     yield from shown.best(self._newton(problem, v, target), told)
                 raise Breakdown(
-                    f"no equilibrium found beyond {share:.4g} of the load: {reason}"
+                    f"no equilibrium found beyond {share:.4g} of the load: {reason}; if the body "
+                    "jumps there, NonlinearNewton(crossing=PathCrossing()) follows it (2D)"
                 )
             goal = min(1.0, share + step)
             try:
