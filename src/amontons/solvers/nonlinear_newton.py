@@ -33,6 +33,7 @@ MEMORY = 5  # values of |F| of which the largest counts in the line search
 ENOUGH = 1e-4  # least relative decrease of |F| over a full step
 LOOSE = 1e-5  # error, unit-free, at which a load step is good enough to go on
 REPEATED = 1e-12  # relative difference of |F| below which steps go round in circles
+JUMP = "; if the body jumps there, crossing=PathCrossing() of this solver follows it (2D)"
 EASY = 8  # Newton steps up to which the next load step may be longer
 
 
@@ -125,9 +126,9 @@ class NonlinearNewton:
                 if self.crossing is not None:
                     v, told = self.crossing.across(problem, share, v, target)
                     yield from shown.best(self._newton(problem, v, target), told)
+                hint = "" if self.crossing is not None else JUMP
                 raise Breakdown(
-                    f"no equilibrium found beyond {share:.4g} of the load: {reason}; if the body "
-                    "jumps there, NonlinearNewton(crossing=PathCrossing()) follows it (2D)"
+                    f"no equilibrium found beyond {share:.4g} of the load: {reason}{hint}"
                 )
             goal = min(1.0, share + step)
             try:
