@@ -271,24 +271,26 @@ def test_shared_multipliers_are_complete_certificates(monkeypatch):
 
 
 def test_few_unknowns_and_many_give_the_same_matrix(monkeypatch):
-    from amontons.analysis.multipliers import multiplier_steps as steps
-    from amontons.analysis.multipliers.multiplier_lmi import Family, Slacks, restricted
+    from amontons.analysis.multipliers import multiplier_program as program
+    from amontons.analysis.multipliers.multiplier_lmi import restricted
+    from amontons.analysis.multipliers.multiplier_normal import Normal
+    from amontons.analysis.multipliers.multiplier_steps import start
 
     random = np.random.default_rng(0)
     Z = random.standard_normal((4 * 30, 5))
     rows, each = np.arange(120).reshape(30, 4), np.arange(30)
     share = sparse.csr_array((np.ones(30), (each, each % 2)), shape=(30, 2))
-    slacks = (Slacks(each, restricted(np.tile(np.eye(4), (30, 1, 1)))),)
-    family = Family(rows, slacks, np.ones(0), share)
-    few = steps.Program(Z, (family,))
+    slacks = (program.Slacks(each, restricted(np.tile(np.eye(4), (30, 1, 1)))),)
+    family = program.Family(rows, slacks, np.ones(0), share)
+    few = program.Program(Z, (family,))
     assert few.few is not None
-    monkeypatch.setattr(steps, "FEW", 0)
-    many = steps.Program(Z, (family,))
+    monkeypatch.setattr(program, "FEW", 0)
+    many = program.Program(Z, (family,))
     assert many.few is None
-    point = few.start()
+    point = start(few)
     inverse = [np.linalg.inv(B) for B in point.S]
     right = random.standard_normal((few.unknowns, 2))
-    answers = [steps.Normal(p, point.X, inverse)(right) for p in (few, many)]
+    answers = [Normal(p, point.X, inverse)(right) for p in (few, many)]
     assert answers[0] == pytest.approx(answers[1], rel=1e-8)
 
 

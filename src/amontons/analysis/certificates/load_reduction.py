@@ -18,7 +18,7 @@ from scipy import linalg, sparse
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
 from ..multipliers.multiplier_lmi import Accept, LmiOutcome, find_multipliers
-from ..multipliers.multiplier_steps import Family
+from ..multipliers.multiplier_program import Family
 from .load_groups import Group, whole
 from .load_problem import LoadProblem, States
 from .load_proof import diagonal_parts

@@ -46,7 +46,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from .multiplier_steps import Family, Point, Program, Slacks, advance
+from .multiplier_program import Family, Point, Program, Slacks
+from .multiplier_steps import advance, start
 from .rounding import are_positive_definite, gamma
 
 Array = NDArray[np.float64]
@@ -156,7 +157,7 @@ def find_multipliers(
     """
     deadline = np.inf if time_limit is None else time.perf_counter() + time_limit
     program = Program(Z, tuple(families))
-    point = program.start()
+    point = start(program)
     refused, steps, outcome = 0, 0, LmiOutcome.STALLED
     while steps < STEPS and refused < REFUSALS:
         if _positive(point) and (not margin or point.t > margin * program.theta * point.lam):
