@@ -9,7 +9,8 @@ from amontons import gallery
 from amontons.cones import project_cone, project_disk
 from amontons.errors import InvalidInput, UnsupportedForm
 from amontons.solvers import Iterate, Target
-from amontons.solvers.gradient import _Identity, _Modes, projected_step
+from amontons.solvers.gradient import projected_step
+from amontons.solvers.gradient_motion import _Identity, _Modes
 
 
 def global_problem(seed=0, nc=4, d=3, mu=0.4):
