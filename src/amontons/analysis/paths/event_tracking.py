@@ -355,7 +355,7 @@ class _Walk:
         self.line = Line(self.path, chosen, y, p)
         self.y, self.p, self.u = self.line.point()
         self._aim()
-        detail = "" if system.complete else "solutions near this point are not isolated"
+        detail = system.reason
         if len(others) > 1 or system.sets:
             rows = np.array([np.append(t.direction, t.rate) for t in system.tangents])
             self._note_turn()

@@ -24,6 +24,7 @@ from scipy import linalg
 from .corrector import determinant_sign
 from .friction_path import FrictionPath
 from .path import PathProblem, name_of, weight_of
+from .rest import REASON, rates_from_rest, resting
 from .sparse_kernel import sparse_kernel
 
 Array = NDArray[np.float64]
@@ -96,7 +97,12 @@ def first_order(
             inward = _inward(problem, piece, y, p, direction, rate, tolerance)
             if inward is not None:
                 found.append(Tangent(direction, rate, name_of(piece), inward))
-    return FirstOrder(_merged(found, weight), tuple(sets), not sets)
+    return _first_order(_merged(found, weight), tuple(sets))
+
+
+def _first_order(tangents: tuple[Tangent, ...], sets: tuple[Hashable, ...]) -> FirstOrder:
+    reason = "solutions near this point are not isolated" if sets else ""
+    return FirstOrder(tangents, sets, not sets, reason)
 
 
 def orientation(problem: PathProblem, y: Array, p: float, rate: float) -> int:
@@ -163,7 +169,13 @@ def _merged(found: list[Tangent], weight: float) -> tuple[Tangent, ...]:
 def _friction(path: FrictionPath, y: Array, p: float, tolerance: float) -> FirstOrder:
     """Enumerates the statuses of the contacts at a border only, the others eliminated once."""
     choices = path.choices(y, p, tolerance)
-    count = float(np.prod([float(len(c)) for c in choices]))
+    count = _combinations(choices)
+    rest = resting(path, choices)
+    turning = path.start.dimension == 3 and not all(path.frictionless[rest])
+    if rest and (count > COMBINATIONS or turning):
+        count = _combinations([c for i, c in enumerate(choices) if i not in rest])
+        if count <= COMBINATIONS:
+            return _from_rest(path, y, p, tolerance, choices, rest)
     if count > COMBINATIONS:
         reason = f"{count:.3g} pieces meet at this point, too many to look at all"
         return FirstOrder((), (), False, reason)
@@ -186,7 +198,27 @@ def _friction(path: FrictionPath, y: Array, p: float, tolerance: float) -> First
         whole = basis @ c
         whole /= np.sqrt(weight * whole[:-1] @ whole[:-1] + whole[-1] ** 2)
         tangents.append(Tangent(whole[:-1], float(whole[-1]), name(word), strict))
-    return FirstOrder(_merged(tangents, weight), tuple(name(w) for w in sets), not sets)
+    return _first_order(_merged(tangents, weight), tuple(name(w) for w in sets))
+
+
+def _combinations(choices: Sequence[str]) -> float:
+    return float(np.prod([float(len(c)) for c in choices]))
+
+
+def _from_rest(
+    path: FrictionPath, y: Array, p: float, tolerance: float, choices: list[str],
+    rest: list[int],
+) -> FirstOrder:  # fmt: skip
+    """One tangent per sense of the parameter where contacts are at rest, see `rest`."""
+    weight = weight_of(path, len(y))
+    found = []
+    for piece, rates, sense in rates_from_rest(path, y, p, choices, rest):
+        size = float(np.sqrt(weight * rates @ rates + 1.0))
+        direction, rate = rates / size, sense / size
+        inward = _inward(path, piece, y, p, direction, rate, tolerance)
+        if inward is not None:
+            found.append(Tangent(direction, rate, piece, inward))
+    return FirstOrder(_merged(found, weight), (), False, REASON)
 
 
 def _others_eliminated(

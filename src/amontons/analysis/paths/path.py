@@ -26,6 +26,7 @@ from ...judge import Measure
 from ...solution import Convergence, Outcome, Step
 
 Array = NDArray[np.float64]
+ROUNDING = 1e-12  # of a parameter, relative to one and itself
 SOLVED = 1e-8  # error by the judge below which a point counts as a solution
 Matrix = Array | sparse.sparray
 
@@ -234,11 +235,13 @@ class Branch:
         """The states where the branch passes that value, in order along it.
 
         Exact on straight pieces; else a chord's point corrected by Newton steps at fixed
-        parameter (a point where that fails is left out).
+        parameter (a point where that fails is left out).  Ends count within rounding.
         """
         found: list[Array] = []
+        rounding = ROUNDING * max(1.0, abs(parameter))
         for a, b in zip(self.points, self.points[1:], strict=False):
-            if (a.parameter - parameter) * (b.parameter - parameter) > 0:
+            low, high = sorted((a.parameter - parameter, b.parameter - parameter))
+            if low > rounding or high < -rounding:
                 continue
             if a.parameter == b.parameter:
                 continue

@@ -18,6 +18,7 @@ from .path import EventKind, Stop
 from .walk import Found, Walk
 
 Array = NDArray[np.float64]
+NEARLY, AHEAD = 1e-3, 10.0  # over the smallest step: to measure rates, to look for a corner
 LOCATED = 1e-3  # margin of a located border, relative to the one that counts as zero
 
 
@@ -44,7 +45,28 @@ class WalkByPieces(Walk):
         return [*out, *self._first_order()]
 
     def _stuck(self) -> Found:
-        return [(self.here(), self._ended(Stop.STEP_TOO_SMALL))]
+        corner = self._corner_ahead()
+        if corner is None:
+            return [(self.here(), self._ended(Stop.STEP_TOO_SMALL))]
+        self._move(corner)
+        return self._first_order()
+
+    def _corner_ahead(self) -> Spot | None:
+        """A solution just ahead on the tangent, at a border beyond which no curve goes on.
+
+        So it is where contacts come to rest in 3D: the direction of slip ends there.
+        """
+        s, short = self.spot, self.options.min_step
+        y, p = s.ahead(NEARLY * short)
+        here, there = self._margins(s), self._margins(Spot(y, p, s.ty, s.tp))
+        falling = there < here  # not where both are infinite
+        rates = (here[falling] - there[falling]) / (NEARLY * short)
+        h = float((np.maximum(here[falling], 0.0) / rates).min(initial=np.inf))
+        if not h <= AHEAD * short:
+            return None
+        y, p = s.ahead(h)
+        rest = float(np.linalg.norm(self.problem.residual(y, p)))
+        return Spot(y, p, s.ty, s.tp, s.sign) if rest <= self.options.border else None
 
     def _to_border(self, step: float) -> Spot | None:
         """The point of this piece's curve where the first margin vanishes, by regula falsi.
@@ -121,7 +143,7 @@ class WalkByPieces(Walk):
         turned = self._note_turn()
         if several:
             rows = np.array([np.append(t.direction, t.rate) for t in system.tangents])
-            detail = "" if system.complete else "solutions near this point are not isolated"
+            detail = system.reason
             event = self._event(EventKind.BRANCH, before, directions=rows, detail=detail)
         else:
             event = self._event(EventKind.FOLD if turned else EventKind.STATUS, before)
