@@ -14,12 +14,12 @@ from amontons.analysis.paths.following import (
     Limits,
     Method,
     continue_both,
-    exact_state,
     follow_path,
     track_both,
 )
 from amontons.analysis.paths.friction_path import FrictionPath
 from amontons.analysis.paths.path import EventKind, Stop
+from amontons.analysis.paths.starting import exact_state
 from amontons.analysis.solutions.enumerate import enumerate_solutions
 from amontons.errors import InvalidInput, SingularOperator
 

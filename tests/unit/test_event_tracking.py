@@ -7,9 +7,10 @@ import amontons as am
 from amontons.analysis.paths.diagram import bifurcation_diagram
 from amontons.analysis.paths.event_tracking import leaving, track
 from amontons.analysis.paths.first_order import orientation
-from amontons.analysis.paths.following import Limits, exact_state, polished, track_both
+from amontons.analysis.paths.following import Limits, track_both
 from amontons.analysis.paths.friction_path import FrictionPath
 from amontons.analysis.paths.path import EventKind, Stop
+from amontons.analysis.paths.starting import exact_state, polished
 from amontons.analysis.solutions.enumerate import enumerate_solutions
 from amontons.errors import InvalidInput, UnsupportedForm
 

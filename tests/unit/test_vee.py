@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from amontons import Mesh, refined
-from amontons.analysis.paths.following import Limits, exact_state, track_both
+from amontons.analysis.paths.following import Limits, track_both
 from amontons.analysis.paths.friction_path import FrictionPath
+from amontons.analysis.paths.starting import exact_state
 from amontons.evolution.system import Motion
 from amontons.fem.facets import Cells, Facets
 from amontons.vee import vee

@@ -13,10 +13,10 @@ from ...evolution.system import Motion
 from ...problem import Form, FrictionProblem
 from ...solution import Outcome
 from ...solve import drive
-from .following import exact_state
 from .friction_path import FrictionPath
 from .load_path import LoadPath, load_path
 from .path import PathProblem
+from .starting import exact_state
 
 if TYPE_CHECKING:
     from ...model import Model

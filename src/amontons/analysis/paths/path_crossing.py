@@ -21,10 +21,11 @@ from ...model.large_deformation import LargeDeformation
 from ...problem import FrictionProblem
 from ...solvers.base import Breakdown, Target
 from .continuation import Continuation
-from .following import leaving_from, polished, steps_from
 from .friction_path import FrictionPath
 from .load_path import LoadPath
 from .path import EventKind
+from .starting import polished
+from .ways import way_of
 
 Array = NDArray[np.float64]
 BEFORE = (1e-4, 1e-3, 1e-2, 0.1)  # shares before the one at which load steps ended
@@ -89,12 +90,12 @@ class PathCrossing:
         target: Target | None = None,
     ) -> tuple[Array, tuple[float, ...]]:  # fmt: skip
         """(state at share 1, folds on the way) along the path from a solution."""
-        tangents = leaving_from(path, y, share, self.options)
-        onward = [tangent for tangent in tangents if tangent.rate > 0]
+        way = way_of(path, self.options)
+        onward = [tangent for tangent in way.leaving(path, y, share) if tangent.rate > 0]
         if not onward:
             raise Breakdown(f"from {share:.6g} of the load none leads on")
         folds: list[float] = []
-        walk = steps_from(path, y, share, onward[0], (-self.back, 1.0), self.options)
+        walk = way.steps(path, y, share, onward[0], (-self.back, 1.0))
         for count, (point, event) in enumerate(walk):
             if event is not None and event.kind is EventKind.FOLD:
                 folds.append(event.parameter)
