@@ -311,3 +311,31 @@ def test_files_and_a_start(tmp_path):
     assert solution.problem.error(solution.r, solution.v) < 1e-7
     again = am.solve(model.with_mu(0.301), start=solution)
     assert again.convergence.iterations < 4
+
+
+@pytest.mark.parametrize("cells", [4, 6])
+def test_contacts_that_close_all_at_once_find_their_statuses(cells):
+    """Newton's steps alone go round in circles here, at however small a load."""
+    mesh = am.box((1, 1), cells=cells)
+    model = block(mesh, NEO, am.Plane((0, 1)), (0.05, -0.1), mu=0.3)
+    solution = am.solve(model, tolerance=1e-12)
+    r = solution.r
+    assert (r[:, 0] >= 0).all()
+    assert (np.abs(r[:, 1]) <= 0.3 * r[:, 0] + 1e-14).all()
+    branch = am.follow(model)
+    assert branch.stops == (am.Stop.INTERVAL, am.Stop.INTERVAL)
+    followed = branch.problem.solution(branch[-1].state, 1.0).r
+    assert np.abs(followed - r).max() < 1e-9 * np.abs(r).max()
+
+
+def test_the_tangent_problem_towards_a_load_is_linear_elasticity_at_rest():
+    mesh = am.box((1, 1), cells=4)
+    loads = [am.Traction("right", (-0.01, 0.02))]
+    models = [block(mesh, law, am.Sphere((0.3, -1.01), 1.0), (0.05, -0.1), loads=loads)
+              for law in (NEO, am.LinearElastic(1.0, 0.3))]  # fmt: skip
+    problem = large_deformation(models[0])
+    tangent = problem.towards(0.0, 1.0, np.zeros(problem.unknowns))
+    found = am.solve(tangent, tolerance=1e-11).r
+    linear = am.solve(models[1], tolerance=1e-11).r
+    assert np.abs(linear).max() > 0.01
+    np.testing.assert_allclose(found, linear, atol=1e-9)

@@ -221,6 +221,19 @@ class LargeDeformation:
         here = now.linearisation(v)
         return here, here.shifted(then.load - now.load, then.prescribed - now.prescribed)
 
+    def towards(self, share: float, goal: float, v: Array) -> FrictionProblem:
+        """The tangent problem at a share and state v, under the load of another share."""
+        now, then = self.at_share(share), self.at_share(goal)
+        tangent = now.linearised(v)
+        moved = then.prescribed - now.prescribed
+        displaced = now.displacement(v)
+        _, blocks = self.parts.tangent(displaced)
+        force = then.load - now.load - self.parts.matrix(blocks) @ moved
+        normals = self.parts.contact.normals(now._moved(displaced)[0])
+        w = np.array(tangent.w)
+        w[:, 0] += (normals * moved[self.parts.at]).sum(axis=1)
+        return replace(tangent, f=tangent.f + force[self.parts.free], w=w)
+
     def closed_pieces(self, v: Array) -> list[Pieces]:
         """The active pieces with touching contacts stuck, then with all of them stuck."""
         point = self.contact_point(v)

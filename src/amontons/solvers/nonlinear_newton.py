@@ -7,6 +7,8 @@ steps from a state that is known, each begun by a tangent predictor,
     dF/dv dv = -(F(v) + dF/dload dload),
 
 which also moves the prescribed displacements: cells would be inverted by moving these alone.
+Where Newton's method fails from there, it starts from the solution of the tangent problem with
+contact: many contacts that close at once find their statuses together.
 
 Line search: halving until |F| falls below the largest of the last few values; states with
 inverted cells are never accepted.
@@ -16,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -24,7 +27,7 @@ from scipy import sparse
 
 from ..errors import InvertedCells, SingularOperator, UnsupportedForm
 from ..linear import Direct, LinearSolver
-from ..problem import Form
+from ..problem import Form, FrictionProblem
 from .base import Breakdown, Iterate, Patience, Target, check_at_least, check_positive
 from .hybrid import Auto
 
@@ -34,6 +37,8 @@ ENOUGH = 1e-4  # least relative decrease of |F| over a full step
 LOOSE = 1e-5  # error, unit-free, at which a load step is good enough to go on
 REPEATED = 1e-12  # relative difference of |F| below which steps go round in circles
 JUMP = "; if the body jumps there, crossing=PathCrossing() of this solver follows it (2D)"
+STATUSES = 1e-8  # error of a tangent problem with contact
+CONTACT_STEPS = 300  # iterates in which it has to be reached
 EASY = 8  # Newton steps up to which the next load step may be longer
 
 
@@ -69,6 +74,10 @@ class NonlinearProblem(Protocol):
 
     def predicted(self, share: float, goal: float, v: Array) -> tuple[Linear, Array]:
         """The linearisation at a share, and the first-order change of F, (n,), to another."""
+        ...
+
+    def towards(self, share: float, goal: float, v: Array) -> FrictionProblem:
+        """The tangent problem with contact at a share, under the load of another."""
         ...
 
     def closed_pieces(self, v: Array) -> list[Any]:
@@ -131,20 +140,25 @@ class NonlinearNewton:
                     f"no equilibrium found beyond {share:.4g} of the load: {reason}{hint}"
                 )
             goal = min(1.0, share + step)
-            try:
-                first = self._predict(problem, share, goal, v)
-                if goal == 1.0:
-                    yield from shown.best(self._newton(problem, first, target))
-                v, steps = self._equilibrium(problem.at_share(goal), first, target)
-            except (_Failed, InvertedCells) as failure:
-                reason = str(failure)
+            for predict in (self._predict, self._predict_contact):
+                try:
+                    first = predict(problem, share, goal, v, target)
+                    if goal == 1.0:
+                        yield from shown.best(self._newton(problem, first, target))
+                    v, steps = self._equilibrium(problem.at_share(goal), first, target)
+                    break
+                except (_Failed, InvertedCells) as failure:
+                    reason = str(failure)
+            else:
                 step /= 4 if share == 0 and step == 1.0 else 2
                 continue
             shown.waiting += steps
             share = goal
             step *= 2 if steps <= EASY else 1
 
-    def _predict(self, problem: NonlinearProblem, share: float, goal: float, v: Array) -> Array:
+    def _predict(
+        self, problem: NonlinearProblem, share: float, goal: float, v: Array, target: Target
+    ) -> Array:
         """The tangent predictor from a state at one share of the load to another."""
         try:
             here, change = problem.predicted(share, goal, v)
@@ -152,6 +166,27 @@ class NonlinearNewton:
             return v + self._solve(now, v, here, here.residual + change)
         except (InvertedCells, SingularOperator) as reason:
             raise _Failed(str(reason)) from reason
+
+    def _predict_contact(
+        self, problem: NonlinearProblem, share: float, goal: float, v: Array, target: Target
+    ) -> Array:
+        """The solution of the tangent problem with contact: its statuses are right together.
+
+        Newton's steps change them one after another, and may go round in circles where many
+        contacts close at once.
+        """
+        tangent = problem.towards(share, goal, v)
+        start = Iterate(np.zeros((tangent.contacts, tangent.dimension)))
+        try:
+            for iterate in islice(Auto().iterates(tangent, start, target), CONTACT_STEPS):
+                state = iterate.v if iterate.v is not None else tangent.velocity(iterate.r)[1]
+                if tangent.error(iterate.r, state) <= STATUSES and state is not None:
+                    return state
+                if target.seconds_left <= 0:
+                    break
+        except (Breakdown, SingularOperator) as reason:
+            raise _Failed(str(reason)) from reason
+        raise _Failed("the tangent problem with contact was not solved")
 
     def _equilibrium(
         self, problem: NonlinearProblem, v: Array, target: Target

@@ -21,9 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from ...errors import NotConverged
 from .corrector import determinant_sign
 from .friction_path import FrictionPath
-from .path import PathProblem, name_of, weight_of
+from .path import PathProblem, corrected, name_of, weight_of
 from .rest import REASON, rates_from_rest, resting
 from .sparse_kernel import sparse_kernel
 
@@ -31,6 +32,8 @@ Array = NDArray[np.float64]
 SINGULAR = 1e-10  # singular value, relative to the largest, that counts as zero
 INWARD = 1e-9  # rate, of a direction of length 1, below which a condition does not change
 SAME = 1e-7  # distance of two directions of length 1 that count as one
+BORDERS = 4  # near a point up to which all pieces are looked at one by one
+SMALL = (1e-3, 1e-5, 1e-7)  # changes of the parameter that tell where a curve goes
 COMBINATIONS = 20_000  # pieces at a point up to which all are looked at
 
 
@@ -83,6 +86,8 @@ def first_order(
     if isinstance(problem, FrictionPath) and pieces is None:
         return _friction(problem, y, p, tolerance)
     if pieces is None:
+        if _many_meet(problem, y, p, tolerance):
+            return _by_small_steps(problem, y, p, tolerance, "many pieces meet at this point")
         pieces = problem.pieces(y, p, tolerance)  # type: ignore[attr-defined]
     weight = weight_of(problem, len(y))
     found: list[Tangent] = []
@@ -103,6 +108,46 @@ def first_order(
 def _first_order(tangents: tuple[Tangent, ...], sets: tuple[Hashable, ...]) -> FirstOrder:
     reason = "solutions near this point are not isolated" if sets else ""
     return FirstOrder(tangents, sets, not sets, reason)
+
+
+def _many_meet(problem: Any, y: Array, p: float, tolerance: float) -> bool:
+    margins = problem.margins(problem.piece(y, p), y, p)
+    return int((np.abs(margins) <= tolerance).sum()) > BORDERS
+
+
+def _by_small_steps(
+    problem: PathProblem, y: Array, p: float, tolerance: float, reason: str
+) -> FirstOrder:
+    """One tangent per sense of the parameter: that of the piece in which Newton steps end."""
+    weight = weight_of(problem, len(y))
+    found = []
+    for sense in (1.0, -1.0):
+        for step in SMALL:
+            end = _solution_near(problem, y, p + sense * step)
+            if end is None:
+                continue
+            piece = problem.piece(end, p + sense * step)
+            lines = kernel(*problem.jacobian_of(piece, y, p), weight)  # type: ignore[attr-defined]
+            if lines.shape[1] != 1:
+                continue
+            line = lines[:, 0] * (sense if lines[-1, 0] > 0 else -sense)
+            inward = _inward(problem, piece, y, p, line[:-1], float(line[-1]), tolerance)
+            if inward is not None:
+                found.append(Tangent(line[:-1], float(line[-1]), name_of(piece), inward))
+                break
+    return FirstOrder(_merged(found, weight), (), False, f"{reason}: one way on per sense")
+
+
+def _solution_near(problem: PathProblem, y: Array, p: float) -> Array | None:
+    """A solution at p by Newton steps from y, else as the problem finds one."""
+    end = corrected(problem, y, p)
+    find = getattr(problem, "found_at", None)
+    if end is not None or find is None:
+        return end
+    try:
+        return np.array(find(p))
+    except NotConverged:
+        return None
 
 
 def orientation(problem: PathProblem, y: Array, p: float, rate: float) -> int:
@@ -177,8 +222,7 @@ def _friction(path: FrictionPath, y: Array, p: float, tolerance: float) -> First
         if count <= COMBINATIONS:
             return _from_rest(path, y, p, tolerance, choices, rest)
     if count > COMBINATIONS:
-        reason = f"{count:.3g} pieces meet at this point, too many to look at all"
-        return FirstOrder((), (), False, reason)
+        return _by_small_steps(path, y, p, tolerance, f"{count:.3g} pieces meet at this point")
     if path.start.dimension == 3 or path.tresca:
         return first_order(path, y, p, tolerance=tolerance, pieces=path.pieces(y, p, tolerance))
     at_border = [i for i, c in enumerate(choices) if len(c) > 1]
