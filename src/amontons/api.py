@@ -138,18 +138,25 @@ def follow(
     stops by returning True.
     Each end of the branch has a named reason.
     """
+    from .analysis.paths import checks
     from .analysis.paths.following import Limits, follow_path
     from .analysis.paths.parametrised import first_state, path_of, state_of
     from .analysis.paths.path import PathProblem
 
-    bounds = Limits(tuple(interval), **limits)
-    at = bounds.interval[0] if at is None else float(at)
+    checks.check_options(options)
+    bounds = Limits(checks.checked_interval(interval), **checks.checked_limits(limits))
+    at = bounds.interval[0] if at is None else checks.checked_value("at", at, bounds.interval)
     if isinstance(problem, PathProblem):
         if start is None:
             raise InvalidInput("start: a PathProblem needs the unknowns of a solution at `at`")
-        return follow_path(problem, state_of(problem, start), at, bounds, options=options)
-    path = path_of(_checked(problem), parameter, bounds.interval, base)
+        if base is not None:
+            raise InvalidInput("base: expected none, a PathProblem has a parameter of its own")
+        y = state_of(problem, start)
+        checks.check_start(problem, y, at)
+        return follow_path(problem, y, at, bounds, options=options)
+    path = path_of(_checked(problem), parameter, bounds.interval, _base(base))
     y = first_state(path, at) if start is None else state_of(path, start)
+    checks.check_size(path, y)
     return follow_path(path, y, at, bounds, options=options)
 
 
@@ -163,23 +170,29 @@ def diagram(
     at: by default both ends and the middle of the interval; all solutions there are searched
     for as in `all_solutions`, with time_limit seconds for each search.  Others as in `follow`.
     """
+    from .analysis.paths import checks
     from .analysis.paths.diagram import bifurcation_diagram
     from .analysis.paths.following import Limits
     from .analysis.paths.parametrised import path_of
 
-    bounds = Limits(tuple(interval), **limits)
+    checks.check_options(options)
+    bounds = Limits(checks.checked_interval(interval), **checks.checked_limits(limits))
     a, b = bounds.interval
-    path = path_of(_checked(problem), parameter, bounds.interval, base)
-    values = (a, (a + b) / 2, b) if at is None else tuple(float(p) for p in at)
+    values = (a, (a + b) / 2, b) if at is None else checks.checked_values(at, bounds.interval)
+    path = path_of(_checked(problem), parameter, bounds.interval, _base(base))
     return bifurcation_diagram(
         path, bounds, values, options=options, time_limit=bounds.time_limit
     )
 
 
-def _checked(problem: Any) -> FrictionProblem | Model:
+def _base(base: Any) -> FrictionProblem | Model | None:
+    return None if base is None else _checked(base, "base")
+
+
+def _checked(problem: Any, name: str = "problem") -> FrictionProblem | Model:
     if isinstance(problem, FrictionProblem) or hasattr(problem, "assemble"):
         return problem
-    raise InvalidInput(f"problem: expected a Model or a FrictionProblem, got {problem!r}")
+    raise InvalidInput(f"{name}: expected a Model or a FrictionProblem, got {problem!r}")
 
 
 def uniqueness(

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 import amontons as am
 from amontons.analysis.solutions.enumerate import enumerate_solutions
 from amontons.cli import main
-from amontons.errors import InvalidInput
+from amontons.errors import InvalidInput, UnsupportedForm
 from amontons.gallery import one_contact_2d
 from amontons.hild import hild_triangle
 from amontons.vee import vee
@@ -141,3 +141,79 @@ def test_command_line_with_all_branches(tmp_path):
     assert len(am.all_solutions(one_contact_2d(1.41))) == 3
     bad = CliRunner().invoke(main, ["follow", "example:vee", "--from", "1", "--to", "0"])
     assert bad.exit_code == 2
+
+
+class Circle:
+    """y^2 + p^2 = 1, with parts that can be replaced by broken ones."""
+
+    def __init__(self, **broken):
+        self.__dict__.update(broken)
+
+    def residual(self, y, p):
+        return y**2 + p**2 - 1
+
+    def jacobian(self, y, p):
+        return np.diag(2 * y), np.array([2 * p])
+
+    def piece(self, y, p):
+        return "circle"
+
+
+@pytest.mark.parametrize(
+    ("broken", "message"),
+    [
+        (
+            {"residual": lambda y, p: np.zeros(2)},
+            r"residual: .* shape \(1,\), got shape \(2,\)",
+        ),
+        ({"residual": lambda y, p: [0.0]}, "residual: .* got list"),
+        ({"residual": lambda y, p: y * np.nan}, "residual: expected finite"),
+        ({"jacobian": lambda y, p: np.eye(1)}, "jacobian: expected two"),
+        ({"jacobian": lambda y, p: (np.eye(3), y)}, r"jacobian by y: .* got shape \(3, 3\)"),
+        ({"jacobian": lambda y, p: (np.eye(1), 0.0)}, "jacobian by p: .* got float"),
+        ({"piece": lambda y, p: [1]}, "piece: expected a name"),
+        ({"weight": -1.0}, "weight: expected a number > 0, got -1"),
+    ],
+)
+def test_own_problems_that_break_the_protocol_are_told_where(broken, message):
+    with pytest.raises(InvalidInput, match=message):
+        am.follow(Circle(**broken), interval=(-2, 2), start=[1.0], at=0)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"interval": (0, 1, 2)}, "interval: expected two numbers"),
+        ({"interval": None}, "interval: expected two numbers"),
+        ({"interval": ("a", "b")}, "interval: expected two numbers"),
+        ({"at": 5}, "at: expected a number in 0 … 1, got 5"),
+        ({"at": "x"}, "at: expected a number"),
+        ({"at": np.nan}, "at: expected a number"),
+        ({"max_points": "x"}, "max_points: expected a number"),
+        ({"max_points": np.nan}, "max_points: expected a number"),
+        ({"time_limit": "x"}, "time_limit: expected seconds"),
+        ({"callback": 3}, "callback: expected a function"),
+        ({"options": {"step": 1}}, "options: expected a Continuation"),
+        ({"base": "x"}, "base: expected a Model"),
+        ({"steps": 3}, "steps: expected one of max_points"),
+    ],
+)
+def test_bad_arguments_are_named(options, message):
+    with pytest.raises(InvalidInput, match=message):
+        am.follow(one_contact_2d(), **options)
+
+
+@pytest.mark.parametrize("at", [[], 0.5, "x", [np.nan], [3.0]])
+def test_values_of_a_diagram_are_checked(at):
+    with pytest.raises(InvalidInput, match="at: expected"):
+        am.diagram(one_contact_2d(), at=at)
+
+
+def test_large_deformations_have_no_diagram_and_starts_of_their_size():
+    body = am.Body(am.box((1, 1), 2), am.NeoHookean(1.0, 0.3))
+    contact = am.Contact("bottom", am.Plane(normal=(0, 1)), mu=0.3)
+    model = am.Model([body], [am.Fix("top", (0, -0.1))], contacts=[contact])
+    with pytest.raises(UnsupportedForm, match="diagram: .* use follow"):
+        am.diagram(model)
+    with pytest.raises(InvalidInput, match="start: .* 12 entries, got 3"):
+        am.follow(model, start=np.zeros(3))

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import UnsupportedForm
 from .continuation import Continuation
 from .event_tracking import leaving
 from .first_order import Tangent
@@ -95,6 +96,11 @@ def bifurcation_diagram(
     """
     from ..solutions.enumerate import enumerate_solutions
 
+    if not isinstance(path, FrictionPath):
+        raise UnsupportedForm(
+            "diagram: all solutions of a model with hyperelastic laws can not be searched for; "
+            "use follow"
+        )
     began = time.perf_counter()
     branches: list[Branch] = []
     lost: list[tuple[float, Array]] = []
