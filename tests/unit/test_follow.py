@@ -217,3 +217,16 @@ def test_large_deformations_have_no_diagram_and_starts_of_their_size():
         am.diagram(model)
     with pytest.raises(InvalidInput, match="start: .* 12 entries, got 3"):
         am.follow(model, start=np.zeros(3))
+
+
+def test_a_contact_given_twice_is_no_error():
+    """How the two share their forces is not determined, so the equations can be singular."""
+    single = [[5, 4, 1, 3], [4, 22, 12, -4], [1, 12, 14, -3], [3, -4, -3, 16]]
+    twice = [0, 1, 0, 1, 2, 3]
+    W, mu = np.array(single, dtype=float)[np.ix_(twice, twice)], [1e6, 1e6, 2.0]
+    loads = [[-2, -1], [-2, -1], [0, 2]], [[0, -1], [0, -1], [-1, -2]]
+    base, end = (am.FrictionProblem.from_delassus(W, np.array(q, dtype=float), mu) for q in loads)
+    diagram = am.diagram(end, "load", (-1, 2), base=base)
+    assert not diagram.complete
+    assert "sets of solutions are no curves" in diagram.reason
+    assert all(isinstance(stop, am.Stop) for branch in diagram for stop in branch.stops)

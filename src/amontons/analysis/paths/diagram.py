@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import UnsupportedForm
+from ...errors import SingularOperator, UnsupportedForm
 from .continuation import Continuation
 from .event_tracking import leaving
 from .first_order import Tangent
@@ -115,7 +116,8 @@ def bifurcation_diagram(
             if solution.freedom:
                 sets.append((p, y))
             elif not _on_branches(branches, y, p):
-                _add(branches, path, y, p, limits, options)
+                with suppress(SingularOperator):
+                    _add(branches, path, y, p, limits, options)
                 if not _on_branches(branches, y, p):
                     lost.append((p, y))
     if lost:

@@ -22,7 +22,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InvalidInput, UnsupportedForm
+from ...errors import InvalidInput, SingularOperator, UnsupportedForm
 from .first_order import FirstOrder, Tangent, first_order
 from .friction_path import FrictionPath
 from .path import Event, EventKind, Point, Stop, weight_of
@@ -93,8 +93,14 @@ class Line:
         return W[rows, T] if k else W[rows, 2 * i] + self.sign[i] * self.mu[i] * W[rows, T]
 
     def renew(self) -> None:
-        """The inverse from scratch."""
-        self.inverse = np.linalg.inv(np.vstack([self.driver, self._matrix(self.rows)]))
+        """The inverse from scratch; raises SingularOperator where there is none."""
+        try:
+            self.inverse = np.linalg.inv(np.vstack([self.driver, self._matrix(self.rows)]))
+        except np.linalg.LinAlgError as reason:
+            raise SingularOperator(
+                f"{''.join(self.letters)}: the equations of this piece are singular, its "
+                "solutions are not isolated"
+            ) from reason
         self.age = 0
 
     def point(self) -> tuple[Array, float, Array]:
@@ -237,7 +243,8 @@ def track(
 ) -> Iterator[tuple[Point, Event | None]]:
     """From a solution along a tangent: every event, and the point where the next line begins.
 
-    Ends with an event END.  y must solve the problem at p to rounding; see `leaving`.
+    Ends with an event END.  y must solve the problem at p to rounding; see `leaving`.  Raises
+    SingularOperator where the equations at the start are singular.
     """
     check_straight(path)
     low, high = interval
@@ -288,6 +295,12 @@ class _Walk:
 
     def advance(self) -> Event:
         """To the next event, and over it."""
+        try:
+            return self._advanced()
+        except SingularOperator as reason:
+            return self._end(Stop.SINGULAR, str(reason))
+
+    def _advanced(self) -> Event:
         step, border = self._next()
         before = self.pattern
         if border is None and not np.isfinite(step):
