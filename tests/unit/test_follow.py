@@ -225,7 +225,9 @@ def test_a_contact_given_twice_is_no_error():
     twice = [0, 1, 0, 1, 2, 3]
     W, mu = np.array(single, dtype=float)[np.ix_(twice, twice)], [1e6, 1e6, 2.0]
     loads = [[-2, -1], [-2, -1], [0, 2]], [[0, -1], [0, -1], [-1, -2]]
-    base, end = (am.FrictionProblem.from_delassus(W, np.array(q, dtype=float), mu) for q in loads)
+    base, end = (
+        am.FrictionProblem.from_delassus(W, np.array(q, dtype=float), mu) for q in loads
+    )
     diagram = am.diagram(end, "load", (-1, 2), base=base)
     assert not diagram.complete
     assert "sets of solutions are no curves" in diagram.reason
