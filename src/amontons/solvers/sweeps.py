@@ -210,7 +210,7 @@ def _least_squares(gram, target, k, factor, weights):
     return largest > 0.0
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
 def _dot(a, b):
     """a . b; summed in any order, so that it is vectorised."""
     total = 0.0
