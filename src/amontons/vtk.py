@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from .blocks import spatial
 from .fem import cell_stress, von_mises
 from .fem.hyperelasticity import cauchy_stress, is_hyperelastic
 from .fem.write import write_meshes
@@ -43,7 +44,7 @@ def write_model(
         for body, moved in pairs
     ]
     owner = [np.full(body.mesh.cell_count, k) for k, (body, _) in enumerate(pairs)]
-    displacement = _spatial(np.concatenate(fields.displacement))
+    displacement = spatial(np.concatenate(fields.displacement))
     write_meshes(
         path,
         [body.mesh for body, _ in pairs],
@@ -68,7 +69,7 @@ def _contact_fields(
         "CSLIP": _gathered(np.maximum, slip, index),
         "CSTATUS": _gathered(np.maximum, solution.status.astype(np.int32), index),
         "CSLIDING": _gathered(np.maximum, solution.sliding.astype(np.int32), index),
-        "CFORCE": _spatial(_gathered(np.add, fields.force, index)),
+        "CFORCE": spatial(_gathered(np.add, fields.force, index)),
     }
     out = {}
     for name, values in found.items():
@@ -115,10 +116,3 @@ def _with_corners(values: Array, fields: ContactFields, starts: NDArray[np.int64
                     np.add.at(total, nodes[:, k], values[sides].mean(axis=1))
                     np.add.at(count, nodes[:, k], 1)
     return np.where(count > 0, total / np.maximum(count, 1), values)
-
-
-def _spatial(vectors: Array) -> Array:
-    """Rows of three components: VTK knows no plane."""
-    out = np.zeros((len(vectors), 3))
-    out[:, : vectors.shape[1]] = vectors
-    return out

@@ -13,6 +13,7 @@ from amontons import output
 from amontons.fclib import read_fclib, write_fclib
 from amontons.gallery import GALLERY, box_tower, one_contact_2d
 from amontons.plots import convergence_figure, profile_figure, status_figure
+from amontons.plots.style import round_below
 from amontons.solve import drive
 
 KEYS = {
@@ -237,3 +238,12 @@ def test_words_of_a_model_without_a_name(tmp_path):
     assert str(found).startswith("model: 7 contacts in 2D")
     assert output.summary(found.output)["title"] == "model"
     assert repr(found) == "<ModelSolution of model: 0 open, 3 slip, 4 stick; converged>"
+
+
+def test_round_numbers_are_not_above_what_they_stand_for():
+    just_below = np.nextafter(1000.0, 0.0)  # its logarithm is 3, rounded
+    assert round_below(just_below) == pytest.approx(1000.0)
+    for value in (1e-9, 0.3, 1.0, 1.9, 2.0, 4.99, 5.0, 77.0, 3e11):
+        rounded = round_below(value)
+        assert 1 - 1e-12 <= value / rounded < 2.5
+        assert f"{rounded:.6e}"[:8] in ("1.000000", "2.000000", "5.000000")

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..blocks import spatial
 from ..cones import Law, Tresca
 from ..linear.hierarchy import Hierarchy, Level, Nodes
 from ..linear.node_blocks import NodeBlocks
@@ -47,7 +48,7 @@ class ContactLevels:
     # ------------------------------------------------------------------ the finest level
     def finest(self, problem: FrictionProblem) -> tuple[ContactNodes, Array, float, float]:
         """Contacts under the problem's law, load (nodes, 3), sizes of load and of u."""
-        contacts = _under(self.contacts, problem.law, _three(problem.w), problem.rho)
+        contacts = _under(self.contacts, problem.law, spatial(problem.w), problem.rho)
         f = self.nodes.spread(self.basis.to_load(problem.f))
         load, length = problem.scales
         return contacts, f, max(load, TINY), max(length, TINY)
@@ -79,7 +80,7 @@ class ContactLevels:
         self.hierarchy.reclaim()
         levels[0].A.times(x, product)
         f -= product
-        w = _three(problem.w) + np.einsum("kai,ka->ki", self.contacts.H, x[self.contacts.node])
+        w = spatial(problem.w) + np.einsum("kai,ka->ki", self.contacts.H, x[self.contacts.node])
         bound = np.zeros(levels[0].A.nodes)
         bound[self.contacts.node] = problem.law.coefficient
         out = []
@@ -111,12 +112,6 @@ class ContactLevels:
         if run.change is not None:
             self.truncation.install(run.k, run.change)
         self.hierarchy.owner, self.hierarchy.undo = run, self.truncation.restore
-
-
-def _three(w: Array) -> Array:
-    out = np.zeros((len(w), 3))
-    out[:, : w.shape[1]] = w
-    return out
 
 
 def _under(contacts: ContactNodes, law: Law, w: Array, rho: Array) -> ContactNodes:
