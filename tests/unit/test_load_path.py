@@ -155,3 +155,21 @@ def test_an_evolution_crosses_a_jump():
             model, am.QuasiStatic(0.25), until=2.0, start=before.state,
             solver=am.NonlinearNewton(crossing=am.PathCrossing(max_points=2)),
         ))  # fmt: skip
+
+
+@pytest.mark.parametrize("cells", [3, 6])
+def test_contacts_without_friction_close_and_slip(cells):
+    """Each point of the curve is a solution: no contact may stick after it closes."""
+    body = am.Body(am.box((1, 1), cells=cells), am.NeoHookean(1.0, 0.3))
+    ground = am.Plane(point=(0, -0.03), normal=(0.1, 1))
+    model = am.Model([body], [am.Fix("top", (0.12, -0.17))],
+                     contacts=[am.Contact("bottom", ground, mu=0.0)])  # fmt: skip
+    branch = am.follow(model)
+    assert branch.stops == (am.Stop.INTERVAL, am.Stop.INTERVAL)
+    closing = [e for e in branch.events if e.kind is am.EventKind.STATUS]
+    assert len(closing) == cells + 1
+    assert set("".join(map(str, branch.status))) <= {"f", "+"}
+    errors = [s.convergence.error for s in branch.solutions[1:]]
+    assert max(errors) < 1e-8
+    solved = am.solve(model, tolerance=1e-10)
+    np.testing.assert_allclose(branch.solutions[-1].r, solved.r, atol=1e-8)

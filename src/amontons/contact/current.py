@@ -175,7 +175,10 @@ class ContactPoint:
         return self.force - normal - slip - (kind == STICK)[:, None] * self.z_tangent
 
     def margins(self, pieces: Pieces) -> Array:
-        """Distances to the borders of given pieces, (nc, 3): all positive inside of them."""
+        """Distances to the borders of given pieces, (nc, 3): all positive inside of them.
+
+        Contacts without friction slip: no point is inside of their other closed pieces.
+        """
         closed = (pieces > 0) & (pieces < 4)
         z = np.where(closed, self.z_normal, -self.z_normal)
         bound, kind = self._bound(closed), pieces % 4
@@ -183,9 +186,11 @@ class ContactPoint:
         borders = [bound - self.along, self.along - bound, -self.along - bound]
         ahead = np.select([kind == STICK, kind == SLIP, kind == BACK], borders, far)
         behind = np.where(kind == STICK, bound + self.along, far)
-        without = self.contact.law.coefficient == 0
         if isinstance(self.contact.law, Coulomb):
+            without = self.contact.law.mu == 0
+            other = without & ((kind == STICK) | (kind == BACK))  # pieces they do not have
             ahead[without], behind[without] = np.inf, np.inf
+            ahead[other] = -np.inf
         return np.stack([z, ahead, behind], axis=1)
 
     def derivatives(self, pieces: Pieces | None = None) -> tuple[Array, Array, Array]:
