@@ -170,3 +170,18 @@ def test_laws_refuse_what_they_can_not_be():
     law = CiarletGeymonat.from_lame(4000.0, 120.0)
     assert law.a == pytest.approx(30)
     assert law.coefficients == pytest.approx((30, 30, 970, 2120, 0))
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: am.NeoHookean("1", 0.3), "young: expected a number, got '1'"),
+        (lambda: am.NeoHookean(1.0, None), "poisson: expected a number, got None"),
+        (lambda: am.CiarletGeymonat(1.0, 0.3, "x"), "a: expected between"),
+        (lambda: am.CiarletGeymonat.from_lame("1", 1.0), "lame_lambda, shear: expected"),
+        (lambda: am.CiarletGeymonat.from_lame(np.nan, 1.0), "lame_lambda, shear: expected"),
+    ],
+)
+def test_constants_have_to_be_numbers(make, message):
+    with pytest.raises(InvalidInput, match=message):
+        make()

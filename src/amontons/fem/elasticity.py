@@ -38,6 +38,9 @@ class LinearElastic:
     density: float | None = None
 
     def __post_init__(self) -> None:
+        for name in ("young", "poisson"):
+            if not isinstance(getattr(self, name), int | float | np.number):
+                raise InvalidInput(f"{name}: expected a number, got {getattr(self, name)!r}")
         if not (np.isfinite(self.young) and self.young > 0):
             raise InvalidInput(f"young: expected a finite stress > 0, got {self.young!r}")
         if not -1 < self.poisson < 0.5:

@@ -85,7 +85,8 @@ class CiarletGeymonat:
         low, high = self._allowed
         if self.a is None:
             object.__setattr__(self, "a", (low + high) / 2)
-        if not low < self.a < high:  # type: ignore[operator]
+        number = isinstance(self.a, int | float | np.number)
+        if not (number and low < self.a < high):  # type: ignore[operator]
             raise InvalidInput(
                 f"a: expected between {low:g} and {high:g}, where the energy is polyconvex, "
                 f"got {self.a!r}"
@@ -96,7 +97,8 @@ class CiarletGeymonat:
         cls, lame_lambda: float, shear: float, a: float | None = None
     ) -> CiarletGeymonat:
         """The law of given Lamé constants at F = I, both > 0, unit of stress."""
-        if not (np.isfinite([lame_lambda, shear]).all() and lame_lambda > 0 and shear > 0):
+        numbers = all(isinstance(x, int | float | np.number) for x in (lame_lambda, shear))
+        if not (numbers and 0 < lame_lambda < np.inf and 0 < shear < np.inf):
             raise InvalidInput(
                 f"lame_lambda, shear: expected stresses > 0, got {lame_lambda!r}, {shear!r}"
             )
