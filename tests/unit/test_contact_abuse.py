@@ -477,3 +477,22 @@ def test_case_files_whose_loads_can_not_be_balanced(tmp_path, d, method):
     assert "there is no solution" in said
     assert "(part 2 of 2)' gives way" in said
     assert found["outcome"] != "converged"
+
+
+@pytest.mark.parametrize("share", [0.9, 0.97, -0.99])
+@pytest.mark.parametrize("size", [(2.0, 1.0), (1.0, 1.0)])
+def test_a_block_that_friction_just_holds(size, share):
+    """Newton's branches leave no stiffness against sliding; a solution exists all the same."""
+    mu, load = 0.2, np.array([0.2 * share, -1.0])
+    body = am.Body(am.box(size, cells=(8, 4)), am.LinearElastic(young=2e3, poisson=0.3))
+    model = am.Model(
+        [body],
+        loads=[am.Traction("top", load)],
+        contacts=[am.Contact("bottom", am.Plane(normal=(0, 1)), mu=mu)],
+    )
+    found = am.solve(model)
+    np.testing.assert_allclose(found.resultant, -load * size[0], rtol=1e-6)
+    r = found.solution.r
+    assert (np.abs(r[:, 1]) <= mu * r[:, 0] * (1 + 1e-6) + 1e-9).all()
+    moment = (found.fields.points - [size[0] / 2, 0.0])[:, 0] @ r[:, 0]
+    assert moment == pytest.approx(load[0] * size[0] * size[1], rel=1e-5)

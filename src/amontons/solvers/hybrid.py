@@ -10,7 +10,8 @@
                                     not; when it breaks down or stalls, as below
     global form, W dear             `CompressedDelassus`, then semismooth Newton without W, then
                                     the Delassus form after all if W fits into memory
-    global form, M singular         semismooth Newton with a factor of the whole system
+    global form, M singular         semismooth Newton with a factor of the whole system;
+                                    on a mesh `ContactMultigrid`; Newton on the natural map
     Nitsche's method                Newton, then proximal points (`nitsche_newton`)
 
 A mesh is what has levels or rigid modes (`FrictionProblem.levels`, `near_nullspace`).
@@ -34,7 +35,7 @@ sweeps and operation counts of Newton (`Joints.newton_cost`, `Portfolio.costs`).
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import ClassVar
 
@@ -50,6 +51,7 @@ from ..problem import Form, FrictionProblem
 from .base import Breakdown, Iterate, Patience, Solver, Target, check_at_least
 from .compressed import CompressedDelassus
 from .contact_multigrid import ContactMultigrid
+from .functions import NaturalMap
 from .gauss_seidel import GaussSeidel
 from .inexact import DeformablePortfolio
 from .newton import SemismoothNewton
@@ -114,8 +116,7 @@ class Auto:
             yield from _watched(ContactMultigrid(), problem, start, target, best)
         problem = problem.assembled()
         if problem.form is Form.GLOBAL and not _regular(problem):
-            whole = SemismoothNewton(linear=Direct())
-            yield from _watched(whole, problem, start, target, best)
+            yield from _held_by_contact(problem, start, target, best)
         elif problem.condensing_is_cheap:
             yield from DeformablePortfolio(
                 problem.condensed(), target, spatial(start.r)
@@ -135,14 +136,32 @@ class Auto:
         yield from DeformablePortfolio(condensed, target, spatial(best[0].r)).stages()
 
 
+def _held_by_contact(
+    problem: FrictionProblem, start: Iterate, target: Target, best: list[Iterate]
+) -> Iterator[Iterate]:
+    """Newton on the whole system, M being singular; then multigrid, and Newton from there.
+
+    Where contact just holds a body its branches may leave no stiffness against sliding.
+    """
+    whole = SemismoothNewton(linear=Direct())
+    yield from _watched(whole, problem, start, target, best)
+    if _is_mesh(problem):
+        yield from _watched(ContactMultigrid(), problem, start, target, best)
+    natural = replace(whole, function=NaturalMap())
+    yield from _watched(natural, problem, best[0], target, best)
+
+
+def _is_mesh(problem: FrictionProblem) -> bool:
+    return bool(problem.levels) or problem.near_nullspace is not None
+
+
 def _worth_multigrid(problem: FrictionProblem) -> bool:
     """True for meshes on which a factorisation takes longer than some cycles."""
     if problem.form is not Form.GLOBAL or problem.unknowns < MESH:
         return False
     if isinstance(problem.M, DistributedMatrix):
         return False  # its levels would have to be spread too
-    mesh = bool(problem.levels) or problem.near_nullspace is not None
-    return mesh and not problem.condensing_is_cheap
+    return _is_mesh(problem) and not problem.condensing_is_cheap
 
 
 def _regular(problem: FrictionProblem) -> bool:
