@@ -232,3 +232,19 @@ def test_a_contact_given_twice_is_no_error():
     assert not diagram.complete
     assert "sets of solutions are no curves" in diagram.reason
     assert all(isinstance(stop, am.Stop) for branch in diagram for stop in branch.stops)
+
+
+def test_a_change_of_status_at_the_start_is_an_event():
+    """One contact from open to closed at p = 1: also where the walk begins there."""
+    W = [[1.0, 0.2], [0.2, 1.0]]
+    open_, closed = (
+        am.FrictionProblem.from_delassus(W, [[q, 0.0]], [0.5]) for q in (1.0, -1.0)
+    )
+    away = am.follow(closed, base=open_, interval=(0, 1))
+    at = am.follow(closed, base=open_, interval=(0, 1), start=np.zeros((1, 2)), at=0.5)
+    for branch in (away, at):
+        (event,) = [e for e in branch.events if e.kind is am.EventKind.STATUS]
+        assert event.parameter == pytest.approx(0.5, abs=1e-12)
+        assert {event.before, event.after} == {"f", "s"}
+    ends = am.follow(closed, base=open_, interval=(0.5, 1), start=np.zeros((1, 2)), at=0.5)
+    assert not [e for e in ends.events if e.kind is am.EventKind.STATUS]

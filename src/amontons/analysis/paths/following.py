@@ -109,7 +109,7 @@ def _both(
             steps = way.steps(problem, y, p, one, limits.interval)
             halves.append(_collected(steps, limits, passed))
             seen.keep(halves[-1].points, halves[-1].events)
-    branch = _branch(problem, halves[0], halves[1], began)
+    branch = _branch(problem, halves[0], halves[1], began, extra)
     return _with_branch_point(branch, y, p, tangents if extra else ())
 
 
@@ -165,21 +165,32 @@ def _ended(point: Point, stop: Stop) -> Event:
                  before=point.piece, stop=stop)  # fmt: skip
 
 
-def _branch(problem: PathProblem, forth: Half, back: Half, began: float) -> Branch:
-    """Both halves as one branch; a fold at the very start belongs to neither and is added."""
+def _branch(
+    problem: PathProblem, forth: Half, back: Half, began: float, branches: bool
+) -> Branch:
+    """Both halves as one branch; branches: others leave the start, too."""
     if not forth.points:
         forth, back = back, forth
-    events = list(forth.events)
-    if back.points and forth.points and forth.points[0].rate * back.points[0].rate > 0:
-        start = forth.points[0]
-        events.insert(0, Event(EventKind.FOLD, start.parameter, start.state,
-                               before=back.points[0].piece, after=start.piece))  # fmt: skip
+    events = [*_at_start(forth, back, branches), *forth.events]
     return joined(
         problem, (back.points, back.events, back.stop), (forth.points, events, forth.stop),
         linear=isinstance(problem, FrictionPath) and problem.straight,
         seconds=time.perf_counter() - began, closed=forth.stop is Stop.CLOSED,
         name=getattr(problem, "name", "parameter"),
     )  # fmt: skip
+
+
+def _at_start(forth: Half, back: Half, branches: bool) -> list[Event]:
+    """A fold, or a change of status, at the very start belongs to neither half."""
+    if not (forth.points and back.points):
+        return []
+    one, other = forth.points[0], back.points[0]
+    turns = one.rate * other.rate > 0
+    changes = one.piece != other.piece and min(len(forth.points), len(back.points)) > 1
+    if not turns and (branches or not changes):
+        return []
+    kind = EventKind.FOLD if turns else EventKind.STATUS
+    return [Event(kind, one.parameter, one.state, before=other.piece, after=one.piece)]
 
 
 def _with_branch_point(
