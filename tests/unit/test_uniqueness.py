@@ -257,3 +257,24 @@ def test_friction_without_limits_is_refused(ask):
     with pytest.raises(InvalidInput, match="mu: expected friction of at most"):
         ask(problem)
     assert len(am.all_solutions(problem.with_mu(1e6)).solutions) == 1
+
+
+def test_a_tangent_that_supports_hold_makes_other_reactions_not_other_motions():
+    """Half of a block pressed on another: any r_T will do where the plane of symmetry is."""
+    steel = am.LinearElastic(young=1e3, poisson=0.3)
+    low = am.Body(am.box((1, 1), cells=(20, 2)), steel, name="low")
+    high = am.Body(am.box((1, 1), cells=(26, 2), origin=(0, 1)), steel, name="high")
+    fixes = [am.Fix("low.bottom", (None, 0)), am.Fix("high.top", (None, -0.01))]
+    sides = [am.Fix("low.left", (0, None)), am.Fix("high.left", (0, None))]
+    contact = am.Contact("high.bottom", master="low.top", mu=0.3, method="mortar")
+    found = am.uniqueness(am.Model([low, high], supports=fixes + sides, contacts=[contact]))
+    assert found.verdict is SEVERAL
+    assert "the motion is the same" in found.reason
+
+
+def test_no_w_is_told_in_plain_words():
+    block = am.Body(am.box((1, 1), cells=2), am.LinearElastic(young=1e3, poisson=0.3))
+    contact = am.Contact("bottom", am.Plane(normal=(0, 1)), mu=0.3)
+    found = am.uniqueness(am.Model([block], [], [contact], [am.Traction("top", (0, -1))]))
+    assert found.verdict is UNDECIDED
+    assert found.reason == "Contact alone holds a body, so there is no W."

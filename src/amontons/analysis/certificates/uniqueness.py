@@ -105,7 +105,7 @@ def assess(
         local = problem.condensed()
     except (SingularOperator, InvalidInput) as error:  # no W, or too large for the memory
         no_w = isinstance(error, SingularOperator)
-        reason = f"Contact alone holds a body, there is no W: {error}" if no_w else str(error)
+        reason = "Contact alone holds a body, so there is no W" if no_w else str(error)
         friction = 0.0 if isinstance(problem.law, Tresca) else problem.mu.max(initial=0.0)
         spent = time.perf_counter() - began
         return Uniqueness(Verdict.UNDECIDED, float(friction), 0.0, np.inf, "none",
@@ -251,7 +251,7 @@ def _this_load(
         return replace(verdict, verdict=Verdict.UNIQUE_THIS_LOAD, certificate=found,
                        reason=_sentence(found.reason))  # fmt: skip
     if found.outcome is LoadOutcome.REFUTED:
-        return _refuted(verdict, found.other, solution.u, _sentence(found.reason))
+        return _refuted(verdict, local, found.other, solution.u, _sentence(found.reason))
     return replace(verdict, reason=f"{verdict.reason} {_sentence(found.reason)}")
 
 
@@ -276,16 +276,22 @@ def _by_enumeration(
         other = other if isolated else s[0]
         count = f"{len(s)} solutions were found" if isolated else "a set of solutions was found"
         reason = f"{count[0].upper()}{count[1:]}: {', '.join(x.pattern for x in s[:5])}."
-        return _refuted(verdict, other, first.u, reason)
+        return _refuted(verdict, local, other, first.u, reason)
     return None
 
 
 def _refuted(
-    verdict: Uniqueness, other: PieceSolution | None, u: Array, reason: str
-) -> Uniqueness:
-    """NOT_UNIQUE, saying so where only reactions differ."""
-    if other is not None and other.freedom == 0:
-        size = max(float(np.abs(u).max(initial=0.0)), np.finfo(float).tiny)
+    verdict: Uniqueness, local: FrictionProblem, other: PieceSolution | None, u: Array,
+    reason: str,
+) -> Uniqueness:  # fmt: skip
+    """NOT_UNIQUE, saying so where only reactions differ: motions relative to the free one.
+
+    In a set of solutions without slip dr du = 0 for all contacts, so that W dr = du = 0.
+    """
+    if other is not None and (other.freedom == 0 or set(other.pattern) <= set("fs")):
+        assert local.q is not None
+        size = max(float(np.abs(x).max(initial=0.0)) for x in (u, local.q))
+        size = max(size, np.finfo(float).tiny)
         if np.abs(other.u - u).max() <= SAME * size:
             reason += " Reactions differ, the motion is the same."
     return replace(verdict, verdict=Verdict.NOT_UNIQUE, other=other, reason=reason)
