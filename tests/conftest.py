@@ -3,6 +3,9 @@
 import os
 from pathlib import Path
 
+# small matrices: threads of BLAS only wait for each other; set before NumPy is loaded
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 import hypothesis
 import matplotlib as mpl
 import pytest
