@@ -90,6 +90,32 @@ def test_solver_table(write):
     assert settings.solver() == GaussSeidel(batch=5)
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "key"),
+    [("coulomb = 1.0", 'coulomb = "0.2*t"', "contact[0].friction.coulomb"),
+     (PLANE, 'level_set = "z - t"', "contact[0].obstacle.level_set")],
+)  # fmt: skip
+def test_friction_and_obstacles_do_not_depend_on_time(write, old, new, key):
+    with pytest.raises(
+        FileFormatError, match="only loads and supports depend on the time"
+    ) as e:
+        read_case(write(old, new))
+    assert key in str(e.value)
+
+
+@pytest.mark.parametrize("friction", ["friction = 0.3", ""])
+def test_how_friction_is_written(write, friction):
+    with pytest.raises(FileFormatError, match=r"friction: .*\{ coulomb = COEFFICIENT \}"):
+        read_case(write("friction = { coulomb = 1.0 }", friction))
+
+
+def test_overrides_name_keys_as_messages_do(write):
+    ours = read_case(write(), ["contact[0].friction.coulomb=0.5", "fix[0].value[1]=0.3"])
+    theirs = read_case(write(), ["contact.0.friction.coulomb=0.5", "fix.0.value.1=0.3"])
+    assert ours.model.contacts[0].mu == theirs.model.contacts[0].mu == 0.5
+    np.testing.assert_array_equal(ours.model.assemble().f, theirs.model.assemble().f)
+
+
 def test_overrides(write):
     overrides = ["mesh.cells=1", "contact.friction.coulomb=0.5", "fix.0.value.1=x",
                  "solver.tolerance=1e-5", "title=other"]  # fmt: skip

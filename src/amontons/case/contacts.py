@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from ..fem import Mesh
     from ..model import Contact
 
+LAWS = "a table, { coulomb = COEFFICIENT } or { tresca = STRESS }"
+
 
 def read_contact(table: Table, mesh: Mesh) -> Contact:
     """The contact of a table [[contact]]."""
@@ -27,12 +29,12 @@ def read_contact(table: Table, mesh: Mesh) -> Contact:
                 mesh.surface(table.text(key))
     if ("obstacle" in table.data) == ("master" in table.data):
         raise table.error("", "expected either obstacle or master")
-    friction = table.table("friction")
+    friction = table.as_table("friction", table.need("friction", LAWS), LAWS)
     friction.only("coulomb", "tresca")
     if len(friction.data) != 1:
         raise friction.error("", "expected either coulomb, a coefficient, or tresca, a stress")
     key = next(iter(friction.data))
-    value = scalar(friction, key)
+    value = _steady(friction, key)
     if isinstance(value, float) and value < 0:
         raise friction.error(key, f"expected a number >= 0, got {value}")
     mu, tresca = (value, None) if key == "coulomb" else (None, value)
@@ -42,6 +44,15 @@ def read_contact(table: Table, mesh: Mesh) -> Contact:
             return Contact(slave, master=master, mu=mu, tresca=tresca, method=method)
         obstacle = _obstacle(table.table("obstacle"), mesh.dim)
         return Contact(slave, obstacle, mu=mu, tresca=tresca, method=method)
+
+
+def _steady(table: Table, key: str) -> float | Expression:
+    """A number or an expression without the time."""
+    value = scalar(table, key)
+    if isinstance(value, Expression) and "t" in value.names:
+        raise table.error(key, "expected an expression in x, y, z: only loads and supports "
+                          "depend on the time t")  # fmt: skip
+    return value
 
 
 def _contact_method(table: Table) -> str | Nitsche:
@@ -91,7 +102,7 @@ def _obstacle(table: Table, dim: int) -> Obstacle:
         raise table.error("", "expected one of plane, sphere, level_set")
     kind = next(iter(table.data))
     if kind == "level_set":
-        function = scalar(table, "level_set")
+        function = _steady(table, "level_set")
         if not isinstance(function, Expression):
             raise table.error(kind, f"expected an expression in x, y, z, got {function}")
         return LevelSet(function)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import re
 import tomllib
 from collections.abc import Sequence
 from typing import Any
@@ -11,9 +12,12 @@ from ..errors import InvalidInput
 
 
 def split_override(text: str) -> tuple[list[str], Any]:
-    """Dotted path and value of "a.b=value"; the value is read as TOML, else as a text."""
+    """Dotted path and value of "a.b=value"; the value is read as TOML, else as a text.
+
+    "a[0].b", as messages have it, is "a.0.b".
+    """
     key, sign, value = text.partition("=")
-    path = [part.strip() for part in key.split(".")]
+    path = [part.strip() for part in re.sub(r"\[(\d+)\]", r".\1", key).split(".")]
     if not sign or not all(path):
         raise InvalidInput(f"--set {text}: expected key=value, such as mesh.cells=32")
     return path, _value(value.strip())

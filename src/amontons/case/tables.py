@@ -91,11 +91,11 @@ class Table:
         """A table within this one."""
         return self.as_table(key, self.need(key, "a table"))
 
-    def as_table(self, key: str, value: Any) -> Table:
-        """A value that must be a table."""
+    def as_table(self, key: str, value: Any, expected: str = "a table") -> Table:
+        """A value that must be a table; `expected` says of what."""
         path = ".".join(part for part in (self.where, key) if part)
         if not isinstance(value, dict):
-            raise self.error(key, f"expected a table, got {value!r}")
+            raise self.error(key, f"expected {expected}, got {value!r}")
         return Table(self.file, path, value)
 
     def tables(self, key: str) -> list[Table]:
