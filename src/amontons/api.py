@@ -9,8 +9,14 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, overload
 
-from .cones import Coulomb
-from .errors import Interrupted, InvalidInput, NotConverged
+from .cones import Coulomb, Tresca
+from .errors import (
+    Interrupted,
+    InvalidInput,
+    NotConverged,
+    SingularOperator,
+    UnsupportedForm,
+)
 from .problem import Form, FrictionProblem
 from .results import ModelSolution
 from .solution import FrictionSolution, Outcome, Step
@@ -26,6 +32,7 @@ if TYPE_CHECKING:
     from .analysis.solutions.enumerate import Solutions
     from .model import Model
 
+FEW = 10  # starts of Newton's method where a search ends without any solution
 HUGE = 1e12  # friction above which rounding hides what the law says
 Start = Iterate | FrictionSolution | ModelSolution | None
 
@@ -81,6 +88,7 @@ def all_solutions(
     discrete = _discrete(problem)
     from .analysis.solutions import enumerate as exact
 
+    _searchable(discrete)
     if discrete.dimension == 3:
         from .analysis.solutions.disc_search import enumerate_discs
 
@@ -89,7 +97,11 @@ def all_solutions(
         found = multistart(discrete, time_limit=time_limit)
         reason = f"more than {exact.CONTACTS} contacts: {found.reason}"
         return replace(found, reason=reason)
-    return exact.enumerate_solutions(discrete, time_limit=time_limit, keep_proof=keep_proof)
+    found = exact.enumerate_solutions(discrete, time_limit=time_limit, keep_proof=keep_proof)
+    if found.complete or found.solutions:
+        return found
+    some = multistart(discrete, starts=FEW, time_limit=time_limit)
+    return replace(found, solutions=some.solutions)  # the search did not come to any
 
 
 def multistart(
@@ -105,6 +117,22 @@ def multistart(
     from .analysis.solutions.multistart import multistart as search
 
     return search(_discrete(problem), starts=starts, seed=seed, time_limit=time_limit)
+
+
+def _searchable(problem: FrictionProblem) -> None:
+    """Raise UnsupportedForm or SingularOperator where there are no W and mu to search with."""
+    if isinstance(problem.law, Tresca):
+        raise UnsupportedForm(
+            "all solutions: expected Coulomb friction; with given bounds (Tresca) there is one "
+            "motion, see uniqueness"
+        )
+    try:
+        problem.condensed()
+    except SingularOperator as reason:
+        raise SingularOperator(
+            "all solutions: contact alone holds a body, so there is no W to search with; hold "
+            "every body by supports"
+        ) from reason
 
 
 def _discrete(problem: FrictionProblem | Model) -> FrictionProblem:
@@ -305,7 +333,7 @@ def raise_unless_converged(result: FrictionSolution | ModelSolution) -> None:
     record = result.convergence
     if record.outcome is Outcome.CONVERGED:
         return
-    message = f"{record}. {record.outcome.advice}"
+    message = f"{record}. {record.advice}"
     by_user = record.outcome is Outcome.STOPPED and record.detail == "by the user"
     raise (Interrupted if by_user else NotConverged)(message, result)
 

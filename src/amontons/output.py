@@ -149,7 +149,7 @@ def summary(output: Output) -> dict[str, Any]:
         "schema": SCHEMA,
         "title": output.title or problem.name,
         "outcome": record.outcome.name.lower(),
-        "advice": record.outcome.advice,
+        "advice": record.advice,
         "detail": record.detail,
         "method": output.method or _method_name(record.solver),
         "error": record.error,

@@ -70,6 +70,15 @@ class Convergence:
     measure: Measure
     detail: str = ""
 
+    @property
+    def advice(self) -> str:
+        """What the user can do about it, knowing the detail and what was tried."""
+        if "there is no solution" in self.detail:
+            return "Hold what gives way by a support, or change loads or friction."
+        if self.outcome is Outcome.STAGNATED and self.solver == "Auto":
+            return "The error no longer falls: loosen the tolerance, or check the problem."
+        return self.outcome.advice
+
     def __str__(self) -> str:
         sign = "<=" if self.error <= self.tolerance else ">"
         text = (

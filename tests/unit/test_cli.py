@@ -13,6 +13,8 @@ from amontons.cli import main
 from amontons.cli.sources import open_source
 from amontons.fclib import read_fclib, write_fclib
 from amontons.gallery import box_tower, random_delassus
+from amontons.plots import solutions_figure
+from amontons.solvers import Iterate
 
 
 @pytest.fixture
@@ -221,6 +223,90 @@ def test_enumerate_draws_solutions_side_by_side(name, tmp_path):
     refused = run("enumerate", f"example:{name}", "--picture", str(tmp_path / "a.doc"))
     assert refused.exit_code == 2
     assert ".doc" in refused.stderr
+
+
+def test_pictures_of_several_solutions_and_of_none():
+    brake = open_source("example:brake")
+    problem = brake.discrete()
+    found = [am.solve(problem, start=Iterate(s.r.copy()))
+             for s in am.all_solutions(problem).solutions]  # fmt: skip
+    long = "word " * 60
+    figure = solutions_figure(found, model=brake.model, title=long)
+    assert len({axes.get_xlim() + axes.get_ylim() for axes in figure.axes}) == 1  # one scale
+    figure.canvas.draw()
+    title = figure._suptitle.get_window_extent()
+    assert 0 <= title.x0
+    assert title.x1 <= figure.bbox.width
+    for model in (brake.model, None):
+        empty = solutions_figure([], model=model)
+        texts = [text.get_text() for axes in empty.axes for text in axes.texts]
+        assert texts == ["no solution was found"]
+
+
+def test_enumerate_that_is_stopped_early_lists_what_newton_finds(tmp_path):
+    found = run("enumerate", "example:slab", "--time-limit", 0.01, "--json", "-")
+    assert found.exit_code == 1
+    record = json.loads(found.stdout)
+    assert not record["complete"]
+    solved = am.solve(open_source("example:slab").model)
+    patterns = [s["pattern"] for s in record["solutions"]]
+    assert solved.pattern in patterns
+
+
+@pytest.mark.parametrize(("name", "words"), [
+    ("tresca", "expected Coulomb friction"), ("wall", "contact alone holds a body")
+])  # fmt: skip
+def test_enumerate_names_what_it_has_no_use_for(name, words):
+    smaller = "wall.cells=[2,1,1]" if name == "wall" else "mesh.cells=2"
+    result = run("enumerate", f"example:{name}", "--set", smaller)
+    assert result.exit_code == 2
+    assert words in result.stderr
+
+
+@pytest.mark.parametrize("command", ["solve", "enumerate", "uniqueness"])
+def test_values_in_time_are_named_where_they_count_at_zero(command, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    limit = [] if command == "solve" else ["--time-limit", 0.5]
+    assert "this is t = 0" in run(command, "example:vee", *limit).stdout
+    assert "this is t = 0" not in run(command, "example:brake", *limit).stdout
+
+
+FREE = """
+[mesh]
+box = [2, 1]
+cells = [4, 2]
+[material.default]
+young = 200
+poisson = 0.3
+[[traction]]
+on = "top"
+value = [0.1, -1.0]
+[[contact]]
+slave = "bottom"
+obstacle = { plane = { normal = [0, 1] } }
+friction = { coulomb = 0.2 }
+"""
+
+
+def test_a_small_body_that_contact_alone_holds(tmp_path):
+    case = tmp_path / "case.toml"
+    case.write_text(FREE)
+    result = run("solve", case, "-o", tmp_path / "out")
+    assert result.exit_code == 0
+    assert "contact alone holds a body" in result.stdout
+    pushed = run("solve", case, "-o", tmp_path / "out", "--set", "traction.value=[1.0, -1.0]")
+    assert pushed.exit_code == 1
+    assert "there is no solution" in pushed.stderr
+    assert "Hold what gives way by a support" in pushed.stderr
+    assert "'auto'" not in pushed.stderr  # it was
+    told = run("info", case)
+    assert told.exit_code == 0
+    assert "none, contact alone holds a body" in told.stdout
+    assert "elastic bodies" in told.stdout
+    refused = run("enumerate", case)
+    assert refused.exit_code == 2
+    assert "contact alone holds a body" in refused.stderr
+    assert "contact alone holds a body" in run("uniqueness", case).stdout.lower()
 
 
 def test_a_brake_arm_jams_only_with_much_friction():

@@ -17,7 +17,7 @@ from ..problem import FrictionProblem
 from ..solve import drive
 from ..solvers import Iterate
 from .sources import Source, open_source
-from .terminal import check_writable, deliver_json, shortened, show_table
+from .terminal import check_writable, deliver_json, say_when, shortened, show_table
 
 Array = NDArray[np.float64]
 SCHEMA = "amontons/enumerate/1"
@@ -36,6 +36,7 @@ def run(
     found = all_solutions(problem, time_limit=time_limit)
     if json_copy != "-":
         _show(opened.title, found)
+        say_when(opened.model)
     if json_copy is not None:
         deliver_json(to_json(record(found)), json_copy)
     if picture is not None:

@@ -96,7 +96,9 @@ def _delassus_facts(problem: FrictionProblem) -> dict[str, Any]:
         if not problem.condensing_is_cheap:
             return {"W": "not formed, too large"}
         local = problem.condensed()
-    except (SingularOperator, InvalidInput) as reason:
+    except SingularOperator:
+        return {"W": "none, contact alone holds a body"}
+    except InvalidInput as reason:
         return {"W": str(reason)}
     assert local.W is not None
     facts: dict[str, Any] = {
@@ -124,7 +126,8 @@ def _scales(problem: FrictionProblem) -> str:
     if not rho.size:
         return "no contact can react"
     stiffness = f"1/|W_ii| from {rho.min():.2g} to {rho.max():.2g}"
-    if problem.form is Form.GLOBAL and problem.small_blocks is None:
+    is_mesh = problem.near_nullspace is not None  # also of few unknowns
+    if problem.form is Form.GLOBAL and (is_mesh or problem.small_blocks is None):
         return f"elastic bodies, u probably displacements; local stiffness {stiffness}"
     if problem.form is Form.GLOBAL:
         return f"rigid bodies, u probably velocities and r impulses; effective mass {stiffness}"
@@ -134,9 +137,13 @@ def _scales(problem: FrictionProblem) -> str:
 def fitting_methods(problem: FrictionProblem) -> list[str]:
     """Methods of this form, or that this command line reaches by condensing."""
     names = []
+    try:
+        condenses = problem.condensing_is_cheap
+    except SingularOperator:  # contact alone holds a body
+        condenses = False
     for name, kind in METHODS.items():
         fits = kind.form in (Form.ANY, problem.form)
-        if fits or (kind.form is Form.DELASSUS and problem.condensing_is_cheap):
+        if fits or (kind.form is Form.DELASSUS and condenses):
             names.append(name if fits else f"{name} (after condensing)")
     return names
 

@@ -19,7 +19,7 @@ from ..results import ModelSolution
 from ..solution import FrictionSolution, Outcome
 from .group import INTERRUPTED
 from .sources import Source, open_source, with_flags
-from .terminal import check_folder, check_writable
+from .terminal import check_folder, check_writable, say_when
 from .uniqueness import brief, describe, record
 
 
@@ -100,6 +100,7 @@ def _report(
     model = result.model
     if model is None or not (model.is_large or model.contacts[0].nitsche is not None):
         click.echo(describe(verdict) if full and verdict is not None else brief(verdict))
+    say_when(model)
     click.echo(f"results in {folder}/")
 
 
@@ -113,7 +114,7 @@ def _finish(found: FrictionSolution | ModelSolution) -> int:
     detail = f" ({in_words(record.detail)})" if record.detail else ""
     click.echo(
         f"Not converged: {name}{detail}, error {record.error:.1e} > {record.tolerance:.0e}. "
-        f"{record.outcome.advice}", err=True,
+        f"{record.advice}", err=True,
     )  # fmt: skip
     by_user = record.outcome is Outcome.STOPPED and record.detail == "by the user"
     return INTERRUPTED if by_user else 1

@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import click
 from rich.console import Console
@@ -14,6 +14,9 @@ from rich.table import Table
 
 from ..errors import InvalidInput
 from ..files import replacing
+
+if TYPE_CHECKING:
+    from ..model import Model
 
 
 def show_table(
@@ -37,6 +40,17 @@ def show_table(
 def shortened(pattern: str, letters: int = 60) -> str:
     """A pattern of statuses, its end left out where it is long."""
     return pattern if len(pattern) <= letters else f"{pattern[: letters - 1]}…"
+
+
+def say_when(model: Model | None) -> None:
+    """Print at which time values of a model were taken that depend on it."""
+    if model is None:
+        return
+    from ..evolution.timed import is_timed
+
+    if any(is_timed(part.value) for part in (*model.supports, *model.loads)):
+        click.echo("supports or loads depend on the time t: this is t = 0; `amontons follow` "
+                   "traces solutions over t, `amontons run` takes steps in time")  # fmt: skip
 
 
 def deliver_json(text: str, target: str | None) -> None:

@@ -14,7 +14,7 @@ from ..api import uniqueness
 from ..errors import InvalidInput
 from ..output import to_json, versions
 from .sources import open_source
-from .terminal import check_writable, deliver_json, shortened
+from .terminal import check_writable, deliver_json, say_when, shortened
 
 SCHEMA = "amontons/uniqueness/1"
 UNSETTLED = 1  # exit code
@@ -33,6 +33,7 @@ def run(
     found = uniqueness(problem, time_limit=time_limit)
     if json_copy != "-":
         click.echo(f"{opened.title}\n{describe(found)}")
+        say_when(opened.model)
     if json_copy is not None:
         deliver_json(to_json(record(found)), json_copy)
     return UNSETTLED if found.verdict is Verdict.UNDECIDED else 0

@@ -126,10 +126,12 @@ def quick_verdict(problem: FrictionProblem) -> Uniqueness | None:
     None for problems too large for it, and where contact alone holds a body.
     Never condenses a problem that is not condensed for other reasons.
     """
-    if problem.contacts * problem.dimension > QUICK or not problem.condensing_is_cheap:
+    if problem.contacts * problem.dimension > QUICK:
         return None
     began = time.perf_counter()
     try:
+        if not problem.condensing_is_cheap:
+            return None
         local = problem.condensed()
     except SingularOperator:  # contact alone holds a body
         return None
