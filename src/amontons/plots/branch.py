@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from .style import INK
 
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from ..analysis.paths.path import Branch
 
 LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+MARKS = {"FOLD": ("o", "fold"), "BRANCH": ("D", "branch point")}  # of kinds of events
 Quantity = Callable[[Any], float]  # of one solution
 
 
@@ -36,9 +38,20 @@ def branch_figure(
     axes.set_ylabel(label or ("size of the reactions" if quantity is None else "quantity"))
     if title:
         axes.set_title(title, loc="left", fontsize="medium")
-    if axes.get_legend_handles_labels()[1]:
-        axes.legend(frameon=False)
+    handles = axes.get_legend_handles_labels()[0] + _marks(several)
+    if handles:
+        axes.legend(handles=handles, frameon=False)
     return figure
+
+
+def _marks(branches: list[Branch]) -> list[Line2D]:
+    """What the marks mean that there are."""
+    kinds = {event.kind.name for branch in branches for event in branch.events}
+    return [
+        Line2D([], [], linestyle="", marker=marker, markersize=5, color="white",
+               markeredgecolor=INK, label=name)
+        for kind, (marker, name) in MARKS.items() if kind in kinds
+    ]  # fmt: skip
 
 
 def draw_branch(
@@ -47,9 +60,10 @@ def draw_branch(
 ) -> None:  # fmt: skip
     """One branch on given axes: a line, its folds as dots, branch points as diamonds."""
     values = _values(branch, quantity)
-    axes.plot(branch.parameter, values, color=colour, linewidth=1.4, label=label)
+    alone = "s" if len(values) == 1 else None  # a line of one point can not be seen
+    axes.plot(branch.parameter, values, color=colour, linewidth=1.4, label=label, marker=alone)
     length = branch.arclength
-    for kind, marker in (("FOLD", "o"), ("BRANCH", "D")):
+    for kind, (marker, _) in MARKS.items():
         at = [event for event in branch.events if event.kind.name == kind]
         if at:
             height = np.interp([event.arclength for event in at], length, values)

@@ -28,7 +28,7 @@ def convergence_figure(record: Convergence, title: str = "") -> Figure:
     iterations = np.array([step.iteration for step in record.history])
     time = f"seconds after the first iterate (set-up before: {setup:.2g} s)"
     for axes, x, label in ((left, iterations, "iterations"), (right, seconds - setup, time)):
-        last = max(x.max(initial=0.0), 1e-9)
+        last = x.max(initial=0.0) or 1.0  # a solve that ends where it starts
         axes.set(xlim=(-0.02 * last, 1.17 * last), ylim=(floor, ceiling), yscale="log")
         axes.plot(x, error, color=COLOURS[ContactStatus.STICK], marker=marker, markersize=4,
                       linewidth=1.2)  # fmt: skip

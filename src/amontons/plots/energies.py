@@ -54,11 +54,14 @@ def energy_figure(
     if gained.any():
         right.plot(t[gained], work[gained], "x", color="#D55E00", label="gained from contact")
     right.plot(t, defect, color=INK, linewidth=0.8, label="|defect of the balance|")
-    created = "creates" if gained.any() else "never creates"
     largest = f"{work.max():.1e} {units.energy}".rstrip()
+    told = f"Contact never creates energy: largest work {largest}"
+    if gained.any():
+        whole = f"{np.abs(put_in).max():.2g} {units.energy}".rstrip()
+        told = f"Contact creates energy: at most {largest} in a step,\nof {whole} put in so far"
     right.set(xlabel=with_unit("time", units.time), yscale="log",
               ylabel=with_unit("work in a step", units.energy),
-              title=f"Contact {created} energy: largest work {largest}",
+              title=told,
               xlim=left.get_xlim())  # fmt: skip
     for axes in (left, right):
         handles = axes.get_legend_handles_labels()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -25,6 +26,7 @@ SHOWN = 6  # solutions that get a panel
 COLUMNS = 3
 ARROW = 0.12  # longest arrow, relative to the bodies
 PANEL = 3.4  # width in inches
+LETTERS = 11  # of the title, per inch
 
 
 def solutions_figure(
@@ -46,9 +48,9 @@ def solutions_figure(
     figure = Figure(figsize=(PANEL * columns, 1.4 + height), dpi=150, layout="constrained")
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     note = ""
-    if drawn is not None:
+    if drawn is not None and shown:
         note = _bodies(panels, shown, drawn)
-    else:
+    elif shown:
         _reactions(panels, shown)
     for k, (axes, solution) in enumerate(zip(panels, shown, strict=False)):
         counts = ", ".join(f"{n} {name}" for name, n in solution.counts.items() if n)
@@ -58,7 +60,12 @@ def solutions_figure(
     for axes in panels[len(shown) :]:
         axes.set_visible(False)
     left = f"; {len(solutions) - SHOWN} more not shown" if len(solutions) > SHOWN else ""
-    figure.suptitle(f"{title}{note}{left}", color=INK, fontsize=11)
+    if not shown:
+        axes = figure.add_subplot()
+        axes.set_axis_off()
+        axes.text(0.5, 0.5, "no solution was found", ha="center", va="center")
+    text = textwrap.fill(f"{title}{note}{left}", int(LETTERS * PANEL * columns))
+    figure.suptitle(text, color=INK, fontsize=11)
     marks = status_marks({status: status.name.lower() for status in ContactStatus})
     figure.legend(handles=marks, loc="outside lower center", ncols=3, frameon=False)
     return figure
@@ -79,7 +86,8 @@ def _bodies(panels: Sequence[Axes], solutions: list[FrictionSolution], model: Mo
         scene,
         [Frame(0.0, f.displacement, s.status) for f, s in zip(fields, solutions, strict=True)],
     )
-    force = max(float(np.linalg.norm(f.force, axis=1).max(initial=0.0)) for f in fields)
+    force = max((float(np.linalg.norm(f.force, axis=1).max(initial=0.0)) for f in fields),
+                default=0.0)  # fmt: skip
     for axes, field, solution in zip(panels, fields, solutions, strict=False):
         for body, nodes in scene.sides:
             points = model.bodies[body].mesh.points
@@ -94,7 +102,18 @@ def _bodies(panels: Sequence[Axes], solutions: list[FrictionSolution], model: Mo
         axes.spines[["left", "bottom"]].set_visible(False)
         axes.margins(0.05)
         axes.autoscale_view()
+    _same_limits(panels[: len(fields)])
     return f", displacements × {factor:g}"
+
+
+def _same_limits(panels: Sequence[Axes]) -> None:
+    """Panels of the same size and place can be compared."""
+    if len(panels):
+        (left, right), (low, high) = (
+            np.array([getattr(axes, f"get_{side}lim")() for axes in panels]).T for side in "xy"
+        )
+        for axes in panels:
+            axes.set(xlim=(left.min(), right.max()), ylim=(low.min(), high.max()))
 
 
 def _contacts(
@@ -123,6 +142,7 @@ def _contacts(
 def _reactions(panels: Sequence[Axes], solutions: list[FrictionSolution]) -> None:
     """Normal reactions as bars in the colour of the status, tangential ones as ticks."""
     largest = max((float(np.abs(s.r).max(initial=0.0)) for s in solutions), default=0.0)
+    is_planar = all(s.r.shape[1] == 2 for s in solutions)
     for axes, solution in zip(panels, solutions, strict=False):
         r = solution.r
         number = np.arange(1, len(r) + 1)
@@ -136,11 +156,12 @@ def _reactions(panels: Sequence[Axes], solutions: list[FrictionSolution]) -> Non
             axes.scatter(number[chosen], np.zeros(chosen.sum()), s=12, zorder=3, linewidths=0.3,
                          marker=MARKERS[status], color=COLOURS[status],
                          edgecolors=INK)  # fmt: skip
-        low = min(0.0, min(float(s.r[:, 1:].min(initial=0.0)) for s in solutions))
+        low = min(float(s.r[:, 1].min(initial=0.0)) for s in solutions) if is_planar else 0.0
         axes.set(
             xlabel="contact",
             xlim=(0, len(r) + 1),
             ylim=(1.1 * low - 0.05 * largest, 1.1 * largest + 1e-300),
         )
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    panels[0].set_ylabel("$r_N$ (bars), $r_T$ (ticks)")
+    tangential = "$r_T$" if is_planar else "$|r_T|$"
+    panels[0].set_ylabel(f"$r_N$ (bars), {tangential} (ticks)")
