@@ -69,6 +69,50 @@ def test_a_circle_closes_and_has_two_smooth_folds(as_sparse):
     assert 2 * np.pi < length < 2 * np.pi + 0.2
 
 
+class BentPitchfork:
+    """z = sin p and x (z - c - x^2) = 0: branches at (0, c) of the bent trunk x = 0."""
+
+    def __init__(self, c, matrix):
+        self.c, self.matrix = c, matrix
+
+    def residual(self, y, p):
+        x, z = y
+        return np.array([z - np.sin(p), x * (z - self.c - x**2)])
+
+    def jacobian(self, y, p):
+        x, z = y
+        J = self.matrix(np.array([[0.0, 1.0], [z - self.c - 3 * x**2, x]]))
+        return J, np.array([-np.cos(p), 0.0])
+
+    def piece(self, y, p):
+        return 0
+
+
+@pytest.mark.parametrize("matrix", [np.array, sparse.csc_array])
+@pytest.mark.parametrize("c", [0.1, 0.5, 0.77])
+def test_a_branch_point_of_a_bent_curve_is_located_to_rounding(c, matrix):
+    branch = continue_both(
+        BentPitchfork(c, matrix), np.zeros(2), 0.0, Limits((-0.5, 1.4)), Continuation()
+    )
+    (event,) = [e for e in branch.events if e.kind is EventKind.BRANCH]
+    assert event.parameter == pytest.approx(np.arcsin(c), abs=1e-10)
+    assert event.state == pytest.approx([0.0, c], abs=1e-10)
+    assert len(event.directions) == 4
+    across = np.abs(event.directions @ [1.0, 0.0, 0.0]) > 0.5
+    assert across.sum() == 2  # the other line leaves along x
+
+
+def test_a_branch_point_of_a_bent_curve_is_located_to_rounding_on_the_fork_too():
+    """From the fork x^2 = sin p - c: p turns there, and the trunk crosses."""
+    problem = BentPitchfork(0.5, np.array)
+    p = 1.0
+    y = np.array([np.sqrt(np.sin(p) - 0.5), np.sin(p)])
+    branch = continue_both(problem, y, p, Limits((0.2, 1.2)), Continuation())
+    (event,) = [e for e in branch.events if e.kind is EventKind.BRANCH]
+    assert event.parameter == pytest.approx(np.pi / 6, abs=1e-8)
+    assert np.abs(event.state - [0.0, 0.5]).max() < 1e-5  # x is the root of what p misses
+
+
 def test_a_branch_point_is_found_with_its_other_line():
     """Example 2 of [LR]: x (x^2 - p)."""
     pitchfork = Smooth(lambda y, p: y * (y**2 - p), lambda y, p: np.diag(3 * y**2 - p),

@@ -100,7 +100,7 @@ class Curve:
         """
         right = np.zeros(len(y) + 1)
         right[-1] = 1.0
-        answer = Factored(self._bordered(*self.jacobian(y, p), ty, tp)).solve(right)
+        answer = Factored(self.bordered(*self.jacobian(y, p), ty, tp)).solve(right)
         return self.unit(answer[:-1], float(answer[-1]))
 
     def any_tangent(self, y: Array, p: float) -> tuple[Array, float]:
@@ -125,7 +125,7 @@ class Curve:
             right = np.zeros((len(y) + 1, 2))
             right[:-1, 0], right[-1, 1] = -H, 1.0
             try:
-                factor = Factored(self._bordered(*self.jacobian(y, p), ty, tp))
+                factor = Factored(self.bordered(*self.jacobian(y, p), ty, tp))
                 answer = factor.solve(right)
             except np.linalg.LinAlgError:
                 return None
@@ -145,7 +145,7 @@ class Curve:
 
     def orientation(self, y: Array, p: float, ty: Array, tp: float) -> int:
         """Sign of the determinant of the matrix bordered by a direction, 0 if singular."""
-        return determinant_sign(self._bordered(*self.jacobian(y, p), ty, tp))
+        return determinant_sign(self.bordered(*self.jacobian(y, p), ty, tp))
 
     def at_parameter(self, y: Array, p: float, tolerances: Tolerances) -> Array | None:
         """y after Newton steps at a fixed parameter, None without convergence."""
@@ -159,7 +159,8 @@ class Curve:
                 return y
         return None
 
-    def _bordered(self, J: Matrix, Jp: Array, ty: Array, tp: float) -> Matrix:
+    def bordered(self, J: Matrix, Jp: Array, ty: Array, tp: float) -> Matrix:
+        """[J Jp; w T], (n + 1, n + 1), of derivatives and a tangent."""
         row = self.weight * ty
         if isinstance(J, np.ndarray):
             return np.block([[J, Jp[:, None]], [row[None, :], np.array([[tp]])]])

@@ -17,6 +17,7 @@ from scipy.sparse.linalg import splu
 Array = NDArray[np.float64]
 ALONG = 0.1  # cosine between b and the line from which b serves as it is
 ROUNDS = 4  # of inverse iteration
+BESIDE = 1e-13  # change of a matrix with rows of length 1 that only moves it off a singular one
 
 
 def sparse_kernel(J: sparse.sparray, Jp: Array, weight: float, singular: float) -> Array:
@@ -50,30 +51,32 @@ def _scaled(A: sparse.sparray) -> sparse.csr_array:
 
 
 def _line(A: sparse.csr_array, random: np.random.Generator) -> tuple[Array, Any] | None:
-    """(t, factor of [A; t]): first with the last unit vector for b, then with random ones."""
+    """(t, factor of [A; b]), t in the kernel and b along it, or t itself if b was not."""
     n = A.shape[1]
     last = np.zeros(n)
     last[-1] = 1.0
     for border in (last, random.standard_normal(n), random.standard_normal(n)):
         try:
-            for _ in range(2):  # the second time b is the line itself
-                factor = _bordered(A, border)
-                t = factor.solve(last)
-                if not np.isfinite(t).all():
-                    raise RuntimeError
-                cosine = 1 / (np.linalg.norm(t) * np.linalg.norm(border))
-                border = t / np.linalg.norm(t)
-                if cosine > ALONG:
-                    break
-            return border, factor
+            factor = _bordered(A, border, random)
+            t = factor.solve(last)
+            line = t / np.linalg.norm(t)
+            if 1 / (np.linalg.norm(t) * np.linalg.norm(border)) <= ALONG:
+                factor = _bordered(A, line, random)  # singular still with a second line
         except RuntimeError:  # "Factor is exactly singular"
             continue
+        if np.isfinite(line).all():
+            return line, factor
     return None
 
 
-def _bordered(A: sparse.csr_array, border: Array) -> Any:
+def _bordered(A: sparse.csr_array, border: Array, random: np.random.Generator) -> Any:
+    """LU factors of [A; b]; of a matrix beside it where it is singular to the last bit."""
     matrix = sparse.csc_array(sparse.vstack([A, sparse.csr_array(border[None, :])]))
-    return splu(matrix, permc_spec="MMD_AT_PLUS_A")
+    try:
+        return splu(matrix, permc_spec="MMD_AT_PLUS_A")
+    except RuntimeError:  # "Factor is exactly singular"
+        beside = sparse.diags_array(BESIDE * random.uniform(1, 2, len(border)))
+        return splu(sparse.csc_array(matrix + beside), permc_spec="MMD_AT_PLUS_A")
 
 
 def _least(factor: Any, x: Array) -> tuple[Array, float]:

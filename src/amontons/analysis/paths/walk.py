@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .branch_point import branch_point
 from .corrector import Curve, Spot
 from .first_order import Tangent, kernel
 from .path import Event, EventKind, PathProblem, Point, Stop
@@ -126,10 +127,7 @@ class Walk(ABC):
 
     def _branch_point(self, spot: Spot) -> Found:
         """The point where the bordered determinant changes its sign, and the other line."""
-        was = self.sign
-        point = self._zero(spot, lambda s: float(was * s.sign))
-        if point is None:
-            point = spot
+        point = branch_point(self.curve, self.spot, spot, self.options.tolerances) or spot
         lines = kernel(*self.curve.jacobian(point.y, point.p), self.curve.weight, 1e-5)
         rows = [np.append(point.ty, point.tp), -np.append(point.ty, point.tp)]
         for line in lines.T:
