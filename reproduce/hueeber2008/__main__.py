@@ -38,9 +38,8 @@ RESULTANTS = HERE.parents[1] / "tests/data/cube.json"
     "--results", type=click.Path(path_type=Path), help="For tables and figures. [results/]"
 )
 def main(parts: tuple[str, ...], levels: str, results: Path | None) -> None:
-    r"""Active sets and multigrid for contact with friction, as in the paper of 2008.
+    """Active sets and multigrid for contact with friction, as in the paper of 2008.
 
-    \b
     PART is one of table4.1, table4.2, table4.3, figure4.3, table5.1, newton (the cube),
     table6.1, section6 (the shell, up to level 3), section7 (ring and tool, coarse up to level
     2); all of them by default.  Numbers of other parts stay as they are stored.
