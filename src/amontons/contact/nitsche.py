@@ -128,7 +128,8 @@ def nitsche_pair(  # noqa: PLR0913
     facets = master.surface(master_surface)
     if other := {block.kind for block in facets} - set(KINDS):
         raise InvalidInput(
-            f"master {master_surface!r}: expected facets of first order, got {other.pop()!r}"
+            f"master {master_surface!r}: expected facets of first order, got {other.pop()!r}; "
+            "take order = 1 and finer cells"
         )
     at = surface_points(slave, surface, material, options.points)
     hit = project(at.points, master.points, facets, facing=at.normals)

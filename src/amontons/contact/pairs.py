@@ -85,7 +85,8 @@ def pair_contact(
     facets = master.surface(master_surface)
     if other := {block.kind for block in facets} - set(KINDS):
         raise InvalidInput(
-            f"master {master_surface!r}: expected facets of first order, got {other.pop()!r}"
+            f"master {master_surface!r}: expected facets of first order, got {other.pop()!r}; "
+            "take order = 1 and finer cells"
         )
     points = slave.points[nodes]
     normals = nodal_normals(slave.points, slave.surface(surface))[nodes]

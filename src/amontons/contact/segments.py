@@ -59,7 +59,8 @@ class Surface:
         """The table; raises InvalidInput for facets of second order or without area."""
         if other := {block.kind for block in facets} - set(KINDS):
             raise InvalidInput(
-                f"surface {name!r}: expected facets of first order, got {other.pop()!r}"
+                f"surface {name!r}: expected facets of first order, got {other.pop()!r}; "
+                "take order = 1 and finer cells"
             )
         blocks = tuple(block for block in facets if len(block.nodes))
         nodes = np.concatenate([_padded(block.nodes) for block in blocks])
