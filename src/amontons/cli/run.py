@@ -40,7 +40,8 @@ def run(
     read = read_case(path, overrides)
     if read.evolution is None:
         raise FileFormatError(
-            f"{path}: evolution: missing, expected a table with kind, step, until"
+            f"{case}: evolution: missing, expected a table with kind, step, until; one state "
+            f"without time is found by: amontons solve {case}"
         )
     place = check_folder(f"{path.stem}-results" if folder is None else folder)
     exported = None if export is None else check_folder(export, "--export-fclib")

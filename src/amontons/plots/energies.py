@@ -13,6 +13,7 @@ from ..evolution import Energies
 from .style import INK, UNKNOWN, Units, with_unit
 
 Array = NDArray[np.float64]
+ROUNDING = 1e-12  # work of contact that says nothing, relative to all that was put in
 
 
 def energy_figure(
@@ -50,7 +51,7 @@ def energy_figure(
     work = np.array([e.contact for e in energies])
     defect = np.abs([e.defect for e in energies])
     right.plot(t, np.maximum(-work, 0), color="#E69F00", label="dissipated by contact")
-    gained = work > 0
+    gained = work > ROUNDING * max(np.abs(put_in).max(), np.abs(work).max())
     if gained.any():
         right.plot(t[gained], work[gained], "x", color="#D55E00", label="gained from contact")
     right.plot(t, defect, color=INK, linewidth=0.8, label="|defect of the balance|")

@@ -172,7 +172,7 @@ class _Search:
             for child in self.local.children(failure.branch, contact):
                 if time.perf_counter() - self.began > self.limit:
                     reason = (
-                        f"stopped after {self.limit:g} s with {len(stack) + 1} branches left"
+                        f"stopped after {self.limit:.2g} s with {len(stack) + 1} branches left"
                     )
                     return self._answer(LoadOutcome.UNDECIDED, reason)
                 following = self._prove(child)
