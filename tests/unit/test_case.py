@@ -109,6 +109,14 @@ def test_how_friction_is_written(write, friction):
         read_case(write("friction = { coulomb = 1.0 }", friction))
 
 
+def test_built_in_cases_are_read_by_name():
+    case = read_case("example:release", ["evolution.step=0.1"])
+    assert case.evolution.method.step == 0.1
+    assert case.model.bodies[0].mesh.dim == 2
+    with pytest.raises(InvalidInput, match="example:relase: no such .* did you mean 'release'"):
+        read_case("example:relase")
+
+
 def test_overrides_name_keys_as_messages_do(write):
     ours = read_case(write(), ["contact[0].friction.coulomb=0.5", "fix[0].value[1]=0.3"])
     theirs = read_case(write(), ["contact.0.friction.coulomb=0.5", "fix.0.value.1=0.3"])

@@ -6,10 +6,12 @@ import os
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import FileFormatError
+from ..errors import FileFormatError, InvalidInput
+from ..expressions import nearest
 from .bodies import read_material, read_materials, read_mesh_table
 from .contacts import read_contact, refuse_repeated
 from .evolution import Evolution, read_evolution, read_wall
@@ -21,6 +23,8 @@ from .values import on_named, on_surface, vector
 if TYPE_CHECKING:
     from ..model import Model
 
+EXAMPLE = "example:"  # before the name of a built-in case
+DATA = files("amontons") / "examples_data"
 TOP = ("title", "mesh", "wall", "material", "fix", "traction", "body_force", "contact",
        "solver", "evolution")  # fmt: skip
 
@@ -39,14 +43,26 @@ class Case:
 def read_case(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Case:
     """The case in a TOML file; overrides such as "mesh.cells=32" replace single values.
 
-    Raises FileFormatError naming the file, the key, what was found and what was expected.
+    path: also "example:NAME", a case that comes with amontons.  Raises FileFormatError naming
+    the file, the key, what was found and what was expected.
     """
-    path = Path(path)
+    text = os.fspath(path)
+    is_example = text.startswith(EXAMPLE)
+    path = example_file(text.removeprefix(EXAMPLE)) if is_example else Path(path)
     top = Table(str(path), "", apply_overrides(_load(path), overrides, str(path)))
     top.only(*TOP)
     title = top.text("title", path.stem if path.stem != "case" else path.parent.name)
     model = _wall_model(top, title) if "wall" in top.data else _model(top, path, title)
     return Case(model, _settings(top), title, path, _evolution(top))
+
+
+def example_file(name: str) -> Path:
+    """The file of a built-in case; InvalidInput names the nearest where there is none."""
+    path = Path(str(DATA / f"{name}.toml"))
+    known = [file.name[:-5] for file in DATA.iterdir() if file.name.endswith(".toml")]
+    if name not in known:
+        raise InvalidInput(f"{EXAMPLE}{name}: no such example of a case{nearest(name, known)}")
+    return path
 
 
 def _load(path: Path) -> dict[str, Any]:

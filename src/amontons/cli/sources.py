@@ -10,11 +10,18 @@ import tomllib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..case import Settings, key_of, make_solver, method_class, read_case
+from ..case import (
+    DATA,
+    Settings,
+    example_file,
+    key_of,
+    make_solver,
+    method_class,
+    read_case,
+)
 from ..case.overrides import set_value, split_override
 from ..case.settings import LIMITS
 from ..errors import FileFormatError, InvalidInput, SingularOperator
@@ -27,7 +34,6 @@ if TYPE_CHECKING:
     from ..model.large_deformation import LargeDeformation
 
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
-DATA = files("amontons") / "examples_data"
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,14 +142,7 @@ def _case(path: Path, name: str, overrides: Sequence[str]) -> Source:
 def case_file(text: str) -> Path:
     """The case file that a CASE names: a path to one, or example:NAME."""
     if text.startswith("example:"):
-        name = text.removeprefix("example:")
-        path = Path(str(DATA / f"{name}.toml"))
-        if not path.is_file():
-            cases = [
-                known.name[:-5] for known in DATA.iterdir() if known.name.endswith(".toml")
-            ]
-            raise InvalidInput(f"{text}: no such example of a case{nearest(name, cases)}")
-        return path
+        return example_file(text.removeprefix("example:"))
     path = Path(text)
     if path.suffix.lower() != ".toml":
         raise FileFormatError(f"{text}: expected a TOML case file (.toml) or example:NAME")
