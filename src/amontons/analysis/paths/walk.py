@@ -63,7 +63,7 @@ class Walk(ABC):
                 spot, count = new
                 if not self._leaves(spot):
                     return self._accept(spot, count, reduced)
-                found = self._over_border(self.step)
+                found = self._over_border(self.step, spot)
                 if found is not None:
                     return found
             if self.step <= self.options.min_step:
@@ -200,8 +200,8 @@ class Walk(ABC):
         """True where a point lies outside of the piece."""
 
     @abstractmethod
-    def _over_border(self, step: float) -> Found | None:
-        """Over the border that lies before `step`; None where it can not be located."""
+    def _over_border(self, step: float, spot: Spot) -> Found | None:
+        """Over the border before the spot a step ahead; None where it can not be located."""
 
     @abstractmethod
     def _stuck(self) -> Found:

@@ -31,7 +31,7 @@ class WalkBySwitch(Walk):
     def _leaves(self, spot: Spot) -> bool:
         return name_of(self.problem.piece(spot.y, spot.p)) != self.piece
 
-    def _over_border(self, step: float) -> Found | None:
+    def _over_border(self, step: float, spot: Spot) -> Found | None:
         return self._bisected(step, switch=False)
 
     def _stuck(self) -> Found:
