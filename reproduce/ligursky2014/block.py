@@ -176,9 +176,9 @@ def draw_shapes(branch: am.Branch, path: Path) -> None:
                                            edgecolors="tab:blue", linewidths=0.5))  # fmt: skip
         axes.axhline(0.0, color="black")
         low, high = x[X[:, 1] == 0, 0].min(), x[X[:, 1] == 0, 0].max()
+        corner = WORDS[branch.problem.solution(y, GAMMA).pattern[-1]]
         axes.set(xlim=(low - 2, high + 6), ylim=(-1, 14), aspect="equal",
-                 title=branch.problem.solution(y, GAMMA).pattern)  # fmt: skip
-        axes.title.set_fontsize(7)
+                 title=f"right corner: {corner}")  # fmt: skip
     save(figure, path)
 
 

@@ -59,7 +59,7 @@ def evolve(
             solution = replace(found, problem=problem, u=u, v=v)
         if check and not solution.converged:
             record = solution.convergence
-            raise NotConverged(f"step {state.index + 1}: {record}. {record.outcome.advice}",
+            raise NotConverged(f"step {state.index + 1}: {record}. {record.advice}",
                                solution)  # fmt: skip
         return solution
 

@@ -19,7 +19,7 @@ from collections.abc import Hashable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,6 +53,7 @@ class LoadPath:
     load: Array
     prescribed: Array
     drift: Array | None = None
+    name: ClassVar[str] = "load"
 
     def __post_init__(self) -> None:
         if not isinstance(self.step.law, Coulomb):
