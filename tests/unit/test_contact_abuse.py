@@ -496,3 +496,22 @@ def test_a_block_that_friction_just_holds(size, share):
     assert (np.abs(r[:, 1]) <= mu * r[:, 0] * (1 + 1e-6) + 1e-9).all()
     moment = (found.fields.points - [size[0] / 2, 0.0])[:, 0] @ r[:, 0]
     assert moment == pytest.approx(load[0] * size[0] * size[1], rel=1e-5)
+
+
+@SOME
+def test_an_obstacle_behind_the_slave_is_named(d, method):
+    """A normal turned the wrong way left all contacts open without a word."""
+
+    def on(normal, surface="bottom"):
+        model = am.Model(
+            [am.Body(block(d, 2), SOFT)],
+            [am.Fix("top", up(d, -0.1))],
+            [am.Contact(surface, am.Plane(normal), mu=0.3, method=method)],
+        )
+        return am.solve(model, tolerance=1e-8)
+
+    assert on(up(d, 1.0)).resultant[-1] > 1
+    for wrong in (up(d, -1.0), (1.0, *up(d - 1, -0.5))):
+        with pytest.raises(am.InvalidInput, match="no facet of it faces the obstacle"):
+            on(wrong)
+    on((1.0, *up(d - 1, 0.0)))  # at right angles: an edge of the slave may touch

@@ -23,11 +23,13 @@ from ..contact import (
 from ..errors import InvalidInput, UnsupportedForm
 from ..fem.elasticity import LinearElastic
 from ..fem.mesh import Mesh
+from ..fem.surfaces import facet_normals
 from .parts import Body, Contact
 from .supports import locate
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+AWAY = 0.1  # cosine between outward normal and obstacle's above which a facet looks away
 TOUCHING = 1e-12  # penetration of held nodes, relative to the mesh, that is none
 
 
@@ -82,6 +84,7 @@ def _met(
     given = [v.reshape(-1, slave.dim) for v in np.split(values, offsets[1:-1])]
     if contact.obstacle is not None:
         rows = nodal_contact(slave, surface, contact.obstacle)
+        _check_faces(slave, surface, contact, rows)
         met = np.ones(len(rows.nodes), dtype=bool)
         if mortar:
             _check_held(slave, contact, rows, given[k][rows.nodes])
@@ -128,6 +131,23 @@ def _met_by_nitsche(
         H = _shifted(rows.H, first, size) + _shifted(on_master, int(offsets[j]), size)
     terms = replace(terms, traction=_shifted(terms.traction, first, size))
     return rows, sparse.csc_array(H), met, points, terms
+
+
+def _check_faces(mesh: Mesh, surface: str, contact: Contact, rows: ContactRows) -> None:
+    """Raise InvalidInput when the slave looks away from its obstacle everywhere."""
+    normal = np.full(mesh.points.shape, np.nan)
+    normal[rows.nodes] = rows.frames[:, 0]
+    toward = -1.0
+    for facets in mesh.surface(surface):
+        outward = facet_normals(mesh.points, facets)
+        outward /= np.linalg.norm(outward, axis=1)[:, None]
+        cosine = -np.einsum("fc,fkc->fk", outward, normal[facets.nodes])
+        toward = max(toward, float(np.where(np.isnan(cosine), -1.0, cosine).max(initial=-1.0)))
+    if toward < -AWAY:
+        raise InvalidInput(
+            f"contact on {contact.slave!r}: no facet of it faces the obstacle; a normal of the "
+            f"obstacle points into the body, here it is {rows.frames[0, 0].round(3).tolist()}"
+        )
 
 
 def _check_supported(mesh: Mesh, contact: Contact, rows: ContactRows, moved: Array) -> None:
