@@ -21,7 +21,8 @@ import numpy as np
 from machine import describe
 
 import amontons as am
-from amontons.analysis.certificates.load_certificate import LoadOutcome, certify_load
+from amontons.analysis.certificates.load_answer import LoadOutcome
+from amontons.analysis.certificates.load_certificate import certify_load
 from amontons.hild import hild_triangle
 from amontons.problem import FrictionProblem
 

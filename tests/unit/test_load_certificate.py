@@ -8,7 +8,8 @@ from load_certificate_checker import check_load
 from scipy import sparse
 
 import amontons as am
-from amontons.analysis.certificates.load_certificate import LoadOutcome, certify_load
+from amontons.analysis.certificates.load_answer import LoadOutcome
+from amontons.analysis.certificates.load_certificate import certify_load
 from amontons.errors import InvalidInput, UnsupportedForm
 from amontons.gallery import one_contact_2d, random_delassus
 from amontons.hild import hild_triangle

@@ -6,7 +6,8 @@ from brute_force_3d import random_problem_3d, solutions_by_brute_force
 from disc_checker import accepted
 
 import amontons as am
-from amontons.analysis.certificates.load_certificate import LoadOutcome, certify_load
+from amontons.analysis.certificates.load_answer import LoadOutcome
+from amontons.analysis.certificates.load_certificate import certify_load
 from amontons.analysis.solutions.disc_search import DiscProof
 from amontons.gallery import random_delassus
 

@@ -22,16 +22,22 @@ and optimization", thesis, Caltech (2000), chapter 5 (copositive matrices).
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
-from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InvalidInput
 from ...problem import FrictionProblem
 from ...solution import FrictionSolution
 from ..solutions.enumerate import PieceSolution
+from .load_answer import (
+    LoadBranch,
+    LoadCertificate,
+    LoadOutcome,
+    proved_on,
+    reactions_of,
+    without_search,
+)
+from .load_certificate_discs import certify_load_discs
 from .load_inequality import Failure, Inequality, too_many
 from .load_known import NEAR, contains, refined
 from .load_others import OtherSolutions
@@ -39,50 +45,6 @@ from .load_problem import LoadProblem, States, word
 from .load_proof import BranchProof
 
 Array = NDArray[np.float64]
-
-
-class LoadOutcome(Enum):
-    """What is known about other solutions for the same load."""
-
-    CERTIFIED = "certified"  # there is no other
-    REFUTED = "refuted"  # here is another
-    UNDECIDED = "undecided"
-
-
-@dataclass(frozen=True, eq=False)
-class LoadBranch:
-    """One part of a certificate: no other solution has statuses of this pattern.
-
-    pattern: per contact f free, s stick, + or - slip, x slip, c closed, . anything.
-    multipliers: (nc, 4, 4) for z - z0, or (nc, 5, 5) for (z, 1), z = (r_N, r_T, u_N, u_T), in
-    the units of the problem.
-    """
-
-    pattern: str
-    multipliers: Array
-
-
-@dataclass(frozen=True, eq=False)
-class LoadCertificate:
-    """The answer of `certify_load`.
-
-    other: a second solution where REFUTED.  branches: what proves CERTIFIED; together they have
-    all patterns.  distance: bound of the difference of reactions to r0 (nc, 2), relative to
-    the largest reaction or, if that is larger, to what the load can make.  examined:
-    inequalities that were solved.
-    """
-
-    outcome: LoadOutcome
-    other: PieceSolution | None
-    branches: tuple[LoadBranch, ...]
-    r0: Array
-    distance: float
-    examined: int
-    reason: str
-    seconds: float
-
-    def __str__(self) -> str:
-        return f"{self.outcome.value}: {self.reason}"
 
 
 def certify_load(
@@ -96,38 +58,9 @@ def certify_load(
     where `solution` does not solve the problem.
     """
     if problem.dimension == 3:
-        from .load_certificate_discs import certify_load_discs
-
         return certify_load_discs(problem, solution, time_limit=time_limit)
     r = reactions_of(problem, solution, time_limit)
     return _Search(LoadProblem.of(problem), r, time_limit).run()
-
-
-def reactions_of(
-    problem: FrictionProblem, solution: FrictionSolution | PieceSolution, time_limit: float
-) -> Array:
-    """Reactions (nc, d) of a solution under Coulomb's law; raises for what can not be meant."""
-    if not time_limit > 0:
-        raise InvalidInput(f"time_limit: expected seconds > 0, got {time_limit!r}")
-    _ = problem.mu
-    r, shape = np.asarray(solution.r), (problem.contacts, problem.dimension)
-    if r.shape != shape:
-        raise InvalidInput(f"solution: expected reactions {shape}, got {r.shape}")
-    return r
-
-
-def without_search(local: FrictionProblem) -> tuple[LoadOutcome, str] | None:
-    """The answer and its reason where there is nothing to search, or no scale to measure by."""
-    if not local.contacts:
-        return LoadOutcome.CERTIFIED, "there is no contact"
-    if local.q_norm == 0:
-        return LoadOutcome.UNDECIDED, "q is zero: nothing sets a scale"
-    return None
-
-
-def proved_on(parts: int) -> str:
-    """The reason of a certificate that has so many parts."""
-    return "multipliers exclude all others" + (f" on {parts} parts" if parts > 1 else "")
 
 
 class _Search:

@@ -21,7 +21,7 @@ from ..solutions.disc_sets import ON
 from ..solutions.enumerate import PieceSolution
 from ..solutions.multistart import Finder, described
 from ..solutions.newton_batch import Stack
-from .load_certificate import (
+from .load_answer import (
     LoadCertificate,
     LoadOutcome,
     proved_on,

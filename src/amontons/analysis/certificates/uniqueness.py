@@ -23,7 +23,8 @@ from ..multipliers.scales import UNRESOLVED, contact_sizes, resolves
 from ..solutions.enumerate import PieceSolution, enumerate_solutions
 from .critical_friction import CriticalFriction, Witness, critical_friction
 from .energy_bound import energy_bound
-from .load_certificate import LoadCertificate, LoadOutcome, certify_load
+from .load_answer import LoadCertificate, LoadOutcome
+from .load_certificate import certify_load
 from .status_pieces import friction_shape
 
 Array = NDArray[np.float64]

@@ -1,0 +1,87 @@
+"""What is answered about other solutions for the same load, in 2D and 3D, and when at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InvalidInput
+from ...problem import FrictionProblem
+from ...solution import FrictionSolution
+from ..solutions.enumerate import PieceSolution
+
+Array = NDArray[np.float64]
+
+
+class LoadOutcome(Enum):
+    """What is known about other solutions for the same load."""
+
+    CERTIFIED = "certified"  # there is no other
+    REFUTED = "refuted"  # here is another
+    UNDECIDED = "undecided"
+
+
+@dataclass(frozen=True, eq=False)
+class LoadBranch:
+    """One part of a certificate: no other solution has statuses of this pattern.
+
+    pattern: per contact f free, s stick, + or - slip, x slip, c closed, . anything.
+    multipliers: (nc, 4, 4) for z - z0, or (nc, 5, 5) for (z, 1), z = (r_N, r_T, u_N, u_T), in
+    the units of the problem.
+    """
+
+    pattern: str
+    multipliers: Array
+
+
+@dataclass(frozen=True, eq=False)
+class LoadCertificate:
+    """The answer of `certify_load`.
+
+    other: a second solution where REFUTED.  branches: what proves CERTIFIED; together they have
+    all patterns.  distance: bound of the difference of reactions to r0 (nc, 2), relative to
+    the largest reaction or, if that is larger, to what the load can make.  examined:
+    inequalities that were solved.
+    """
+
+    outcome: LoadOutcome
+    other: PieceSolution | None
+    branches: tuple[LoadBranch, ...]
+    r0: Array
+    distance: float
+    examined: int
+    reason: str
+    seconds: float
+
+    def __str__(self) -> str:
+        return f"{self.outcome.value}: {self.reason}"
+
+
+def reactions_of(
+    problem: FrictionProblem, solution: FrictionSolution | PieceSolution, time_limit: float
+) -> Array:
+    """Reactions (nc, d) of a solution under Coulomb's law; raises for what can not be meant."""
+    if not time_limit > 0:
+        raise InvalidInput(f"time_limit: expected seconds > 0, got {time_limit!r}")
+    _ = problem.mu
+    r, shape = np.asarray(solution.r), (problem.contacts, problem.dimension)
+    if r.shape != shape:
+        raise InvalidInput(f"solution: expected reactions {shape}, got {r.shape}")
+    return r
+
+
+def without_search(local: FrictionProblem) -> tuple[LoadOutcome, str] | None:
+    """The answer and its reason where there is nothing to search, or no scale to measure by."""
+    if not local.contacts:
+        return LoadOutcome.CERTIFIED, "there is no contact"
+    if local.q_norm == 0:
+        return LoadOutcome.UNDECIDED, "q is zero: nothing sets a scale"
+    return None
+
+
+def proved_on(parts: int) -> str:
+    """The reason of a certificate that has so many parts."""
+    return "multipliers exclude all others" + (f" on {parts} parts" if parts > 1 else "")
