@@ -12,7 +12,7 @@ import numpy as np
 from .errors import FileFormatError, InvalidInput
 from .evolution import State, TimeStep
 from .fclib import DAMAGE, write_fclib
-from .files import replacing
+from .files import make_folder, replacing
 
 GROUP = "amontons_state"
 ARRAYS = {"displacement": 1, "velocity": 1, "force": 2, "slip": 2}  # name: dimensions
@@ -64,7 +64,7 @@ def export_fclib(
     problem and no file.
     """
     folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     for step in steps:
         if step.problem.contacts:
             write_fclib(

@@ -8,7 +8,7 @@ import shutil
 import stat
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from .errors import InvalidInput
@@ -35,6 +35,27 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         raise InvalidInput(
             f"{shown}: can not be written: {reason.strerror or reason}"
         ) from None
+
+
+def make_folder(folder: Path) -> list[Path]:
+    """Make a folder with those above it; returns the new ones, from below.
+
+    Raises InvalidInput where that fails; nothing half made stays.
+    """
+    new = [part for part in (folder, *folder.parents) if not os.path.exists(part)]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as reason:
+        remove_empty(new)
+        raise InvalidInput(f"{folder}: can not be made: {reason.strerror}") from None
+    return new
+
+
+def remove_empty(folders: list[Path]) -> None:
+    """Remove folders that hold nothing, those from below first."""
+    for folder in folders:
+        with suppress(OSError):
+            folder.rmdir()
 
 
 def is_stream(path: Path) -> bool:

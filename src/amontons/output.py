@@ -7,7 +7,7 @@ import math
 import os
 import platform
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InvalidInput
-from .files import replacing
+from .files import make_folder, remove_empty, replacing
 from .solution import FrictionSolution
 from .solvers import METHODS
 
@@ -114,23 +114,12 @@ def save(
 @contextmanager
 def _made(folder: Path) -> Iterator[None]:
     """The folder, made with those above it; the new ones go again when the block fails."""
-    new = [part for part in (folder, *folder.parents) if not os.path.exists(part)]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as reason:
-        _remove_empty(new)
-        raise InvalidInput(f"{folder}: can not be made: {reason.strerror}") from None
+    new = make_folder(folder)
     try:
         yield
     except BaseException:
-        _remove_empty(new)
+        remove_empty(new)
         raise
-
-
-def _remove_empty(folders: list[Path]) -> None:
-    for folder in folders:
-        with suppress(OSError):
-            folder.rmdir()
 
 
 def _write_text(path: Path, text: str) -> None:

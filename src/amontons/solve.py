@@ -159,7 +159,8 @@ def _run(
                 return Outcome.STAGNATED, ""
         return Outcome.STAGNATED, "the method has nothing left to try"
     except Breakdown as reason:
-        return Outcome.BREAKDOWN, str(reason)
+        late = time.perf_counter() > target.deadline
+        return Outcome.TIME_LIMIT if late else Outcome.BREAKDOWN, str(reason)
     except SingularOperator as reason:
         return Outcome.BREAKDOWN, str(reason)
     except ArithmeticError as reason:

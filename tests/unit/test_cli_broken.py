@@ -272,6 +272,21 @@ def test_broken_command(name, tmp_path, monkeypatch):
     assert (tmp_path / "good.hdf5").read_bytes() == old
 
 
+@pytest.mark.parametrize(
+    "arguments", [["solve", "case.toml"], ["run", "example:release"],
+                  ["follow", "case.toml", "--parameter", "friction", "--to", "0.2"]],
+)  # fmt: skip
+def test_a_folder_that_can_not_be_made(arguments, tmp_path, monkeypatch):
+    """The disk says no after the name looked right."""
+    (tmp_path / "case.toml").write_text(CASE)
+
+    def refuse(self, *arguments, **options):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "mkdir", refuse)
+    check_refused(*run([*arguments, "-o", "new"], tmp_path, monkeypatch), ["new", "denied"])
+
+
 @pytest.mark.parametrize("name", ["pipe.toml", "pipe.hdf5"])
 def test_pipe_as_source(name, tmp_path, monkeypatch):
     os.mkfifo(tmp_path / name)

@@ -282,6 +282,8 @@ def test_what_can_not_be_is_said():
         am.solve(deep)
     assert not failure.value.solution.converged
     assert np.isfinite(failure.value.solution.v).all()
+    late = am.solve(deep, time_limit=1e-6, check=False).convergence
+    assert late.outcome is am.Outcome.TIME_LIMIT
     fine = block(mesh, NEO, am.Plane((0, 1)), (0, -0.1))
     for ask in (fine.assemble, lambda: am.all_solutions(fine)):
         with pytest.raises(am.UnsupportedForm, match="hyperelastic"):

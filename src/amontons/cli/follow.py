@@ -11,7 +11,7 @@ import click
 from .. import api
 from ..analysis.paths.path import Branch, Event, EventKind, Stop
 from ..errors import InvalidInput
-from ..files import replacing
+from ..files import make_folder, replacing
 from ..output import to_json, versions
 from .sources import open_source
 from .terminal import check_folder, check_writable, deliver_json, shortened, show_table
@@ -75,7 +75,7 @@ def record(
 def _write(place: Path, text: str, branches: list[Branch], title: str) -> None:
     from ..plots import branch_figure
 
-    place.mkdir(parents=True, exist_ok=True)
+    make_folder(place)
     with replacing(place / "follow.json") as path:
         path.write_text(text, encoding="utf-8")
     if branches:

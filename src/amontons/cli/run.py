@@ -16,7 +16,7 @@ from ..case import Case, read_case
 from ..checkpoint import export_fclib, load_state, save_state
 from ..errors import FileFormatError, NotConverged
 from ..evolution import Energies, State, TimeStep, evolve
-from ..files import replacing
+from ..files import make_folder, replacing
 from ..solution import ContactStatus
 from ..vtk import write_model
 from .group import INTERRUPTED
@@ -63,7 +63,7 @@ def _follow(
 ) -> int:  # fmt: skip
     """Take the steps; the state is written whenever a picture is, and at the end."""
     assert case.evolution is not None
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     rows = _old_rows(folder / "steps.csv", start)
     written, frames = _old_pictures(folder, start), []
     last: TimeStep | None = None

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from PIL import Image  # comes with matplotlib
 
 from ..errors import InvalidInput
-from ..files import replacing
+from ..files import make_folder, replacing
 from ..model import Model
 from ..solution import ContactStatus
 from .scene import Frame, Scene, magnification, room_needed
@@ -142,7 +142,7 @@ def draw_film(
     Returns the paths, the film last.
     """
     folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     scene = Scene(model)
     factor = magnification(scene, frames)
     room = factor * room_needed(scene, frames)
