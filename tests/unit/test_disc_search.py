@@ -10,7 +10,7 @@ from disc_checker import accepted, balance_is_positive, law_is_negative
 import amontons as am
 from amontons.analysis.solutions.disc_search import enumerate_discs
 from amontons.analysis.solutions.disc_sets import Law, Region, copositive, negative_on_arc
-from amontons.gallery import random_delassus
+from amontons.gallery import random_delassus, sphere_packing
 
 
 def same(r, other):
@@ -156,3 +156,14 @@ def test_a_form_that_is_positive_between_samples_is_refused():
     assert min(abs(angle - 1.0), abs(abs(angle - 1.0) - np.pi)) < 0.3
     away = Region("l", 1.0 + np.pi / 2, 0.8)
     assert negative_on_arc(law, away, V, 0.0) is None
+
+
+@pytest.mark.parametrize("search", [am.all_solutions, am.multistart])
+def test_a_stopped_search_lists_what_a_solver_finds(search):
+    """780 unknowns: a batch of Newton's method takes longer than the limit."""
+    problem = sphere_packing().condensed()
+    am.solve(problem)  # compiles, so that the limit is one of computing
+    found = search(problem, time_limit=2.0)
+    assert not found.complete
+    assert len(found.solutions) >= 1
+    assert max(solution.error for solution in found.solutions) <= 1e-8

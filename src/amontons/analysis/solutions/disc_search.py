@@ -115,12 +115,13 @@ class DiscSearch:
 
     def begin(self, deadline: float | None = None) -> None:
         """Solutions from many starts, more where one is known to be missing."""
-        used = 0
         deadline = self.deadline if deadline is None else deadline
+        self.finder.begin(deadline)
+        used = 0
         while used < STARTS or (self.finder.lacks_one and used < EXTRA * STARTS):
             if time.perf_counter() > deadline:
                 return
-            used += self.finder.search(ROUND if self.stack.width > ROUND else 10)
+            used += self.finder.search(ROUND if self.stack.width > ROUND else 10, deadline)
 
     @property
     def complete(self) -> bool:

@@ -20,11 +20,13 @@ from numpy.typing import NDArray
 
 from ...errors import InvalidInput
 from ...problem import FrictionProblem
+from ...solve import drive
 from .enumerate import PieceSolution, Solutions
 from .newton_batch import FREE, SLIP, STICK, Stack
 
 Array = NDArray[np.float64]
 ROUND = 100  # starts between two looks at the clock and at the solutions known so far
+SOLVER = 10.0  # seconds for a solver, where Newton's method is dear
 EXTRA = 3  # times the starts while a solution is known to be missing
 SAME = 1e-7  # scaled distance of two solutions that count as one
 BORDER = 1e-8  # scaled distance from a border of the law at which a solution has both patterns
@@ -52,11 +54,13 @@ def multistart(
     if local.q_norm == 0:
         return without_load(local)
     finder = Finder(Stack.of(local), np.random.default_rng(seed), tolerance)
+    deadline = np.inf if time_limit is None else began + time_limit
+    finder.begin(deadline)
     used = 0
     while used < starts or (finder.lacks_one and used < EXTRA * starts):
-        if time_limit is not None and time.perf_counter() - began > time_limit:
+        if time.perf_counter() > deadline:
             break
-        used += finder.search(min(ROUND, EXTRA * starts - used))
+        used += finder.search(min(ROUND, EXTRA * starts - used), deadline)
     seconds = time.perf_counter() - began
     return Solutions(tuple(finder.solutions()), False, finder.reason(used), used, seconds)
 
@@ -77,14 +81,21 @@ class Finder:
         self.found: list[Array] = []  # scaled reactions
         self.sign: list[int] = []  # orientations
 
-    def search(self, count: int) -> int:
-        """Newton from `count` starts; returns count."""
+    def begin(self, deadline: float = np.inf) -> None:
+        """What a solver finds, where Newton's method is dear."""
+        if self.stack.width <= ROUND:
+            left = min(max(deadline - time.perf_counter(), 0.01), SOLVER)
+            found = drive(self.stack.problem, tolerance=self.tolerance, time_limit=left)
+            self.add(found.r / self.stack.to_r)
+
+    def search(self, count: int, deadline: float = np.inf) -> int:
+        """Newton from `count` starts, until the deadline at most; returns count."""
         plain = self._starts(count)
-        for r in self.stack.newton(plain, self.random):
+        for r in self.stack.newton(plain, self.random, deadline=deadline):
             self.add(r)
         if self.found:
-            some = plain[: max(1, count // 4)]
-            for r in self.stack.newton(some, self.random, np.array(self.found)):
+            some, known = plain[: max(1, count // 4)], np.array(self.found)
+            for r in self.stack.newton(some, self.random, known, deadline):
                 self.add(r)
         return count
 

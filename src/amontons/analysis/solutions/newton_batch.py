@@ -13,6 +13,7 @@ of nonlinear partial differential equations", SIAM J. Sci. Comput. 37 (2015).
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -140,18 +141,23 @@ class Stack:
 
     # ---------------------------------------------------------------- Newton
     def newton(
-        self, starts: Array, random: np.random.Generator, known: Array | None = None
-    ) -> Array:
+        self, starts: Array, random: np.random.Generator, known: Array | None = None,
+        deadline: float = np.inf,
+    ) -> Array:  # fmt: skip
         """Solutions reached from starts, (k, nc, d) -> (j, nc, d) with repetitions.
 
-        known, (s, nc, d): solutions to be deflated.
+        known, (s, nc, d): solutions to be deflated.  deadline, of time.perf_counter: those
+        reached until then.
         """
         reached = []
         for first in range(0, len(starts), self.width):
-            reached.append(self._newton(starts[first : first + self.width], random, known))
+            some = starts[first : first + self.width]
+            reached.append(self._newton(some, random, known, deadline))
         return np.concatenate(reached) if reached else np.zeros((0, *self.shape))
 
-    def _newton(self, r: Array, random: np.random.Generator, known: Array | None) -> Array:
+    def _newton(
+        self, r: Array, random: np.random.Generator, known: Array | None, deadline: float
+    ) -> Array:
         nc, d = self.shape
         rho = np.repeat(10.0 ** random.uniform(-1, 1, (len(r), 1)), nc, axis=1)
         reached = []
@@ -162,7 +168,7 @@ class Stack:
             done = value <= CONVERGED * (1 + size)
             reached.append(r[done])
             going = ~done & (size < LONGEST)
-            if not going.any():
+            if not going.any() or time.perf_counter() > deadline:
                 break
             r, rho = r[going], rho[going]
             dr = self._solve(A[going], B[going], -F[going])
