@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from .model import Model
 
 FEW = 10  # starts of Newton's method where a search ends without any solution
+LEAST = 1.0  # seconds for them, however short the search was
 HUGE = 1e12  # friction above which rounding hides what the law says
 Start = Iterate | FrictionSolution | ModelSolution | None
 
@@ -100,7 +101,8 @@ def all_solutions(
     found = exact.enumerate_solutions(discrete, time_limit=time_limit, keep_proof=keep_proof)
     if found.complete or found.solutions:
         return found
-    some = multistart(discrete, starts=FEW, time_limit=time_limit)
+    left = None if time_limit is None else max(time_limit, LEAST)
+    some = multistart(discrete, starts=FEW, time_limit=left)
     return replace(found, solutions=some.solutions)  # the search did not come to any
 
 
