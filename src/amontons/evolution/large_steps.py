@@ -29,16 +29,11 @@ class LargeSlowModel:
     def __init__(self, model: Model, crossing: Crossing | None = None) -> None:
         self.motion, self.crossing = Motion(model), crossing
 
-    def _applied(self, time: float) -> tuple[Array, Array]:
-        """Nodal forces and prescribed displacements (dofs,) at a time."""
-        factor = 1.0 if self.motion.is_timed else time
-        return factor * self.motion.load(time), factor * self.motion.prescribed(time)
-
     def advance(self, state: State, time: float, solve: Solve) -> TimeStep:
         """One step from a state to a time; solve(problem, start) solves its problem."""
         linear = self.motion.parts
-        load, prescribed = self._applied(time)
-        load_before, prescribed_before = self._applied(state.time)
+        load, prescribed = self.motion.applied(time)
+        load_before, prescribed_before = self.motion.applied(state.time)
         q0 = state.displacement
         problem = large_step(
             self.motion.body, load, prescribed, at_contacts(self.motion.body, q0),

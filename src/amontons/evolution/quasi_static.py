@@ -65,11 +65,7 @@ class SlowModel:
     def advance(self, state: State, time: float, solve: Solve) -> TimeStep:
         """One step from a state to a time; solve(problem, start) solves its problem."""
         parts = self.motion.parts
-        factor = 1.0 if self.motion.is_timed else time
-        load, prescribed = (
-            factor * self.motion.load(time),
-            factor * self.motion.prescribed(time),
-        )
+        load, prescribed = self.motion.applied(time)
         problem = self.motion.body.increment(load, prescribed, state.slip)
         arrive = None
         if self.crossing is not None:

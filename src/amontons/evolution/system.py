@@ -9,12 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..errors import InvalidInput
 from ..fem.mass import lumped, mass
 from ..model import Fix, Model
 from ..model.assembly import Discretisation, external_load, prescribed_values
 from .timed import is_timed, part_at, steady
 
 Array = NDArray[np.float64]
+BENT = 1e-9  # departure from a straight line in time, relative, that a load may have
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +65,33 @@ class Motion:
         if not self._supports_move:
             return self._steady_displacement
         return self._prescribed(t)
+
+    def applied(self, t: float) -> tuple[Array, Array]:
+        """(nodal forces, prescribed displacement) at time t, (dofs,) each.
+
+        Where nothing depends on time all grow with it as load factor.
+        """
+        factor = 1.0 if self.is_timed else t
+        return factor * self.load(t), factor * self.prescribed(t)
+
+    def straight(
+        self, interval: tuple[float, float], otherwise: str
+    ) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        """What is applied at both ends of an interval of time.
+
+        Raises InvalidInput, which says what to do `otherwise`, unless it changes along a
+        straight line in between.
+        """
+        a, b = interval
+        ends = [self.applied(t) for t in (a, b, (a + b) / 2)]
+        for first, last, middle in zip(*ends, strict=True):
+            size = max(float(np.abs(first).max(initial=0)), float(np.abs(last).max(initial=0)))
+            if np.abs((first + last) / 2 - middle).max(initial=0) > BENT * size:
+                raise InvalidInput(
+                    f"interval: the loads are no straight line in time between {a:g} and "
+                    f"{b:g}; {otherwise}"
+                )
+        return ends[0], ends[1]
 
     @cached_property
     def _steady_displacement(self) -> Array:

@@ -27,7 +27,7 @@ from scipy import sparse
 
 from ...cones import Coulomb
 from ...contact.current import BACK, OPEN, SLIP, STICK, Pieces
-from ...errors import InvalidInput, InvertedCells, NotConverged, UnsupportedForm
+from ...errors import InvertedCells, NotConverged, UnsupportedForm
 from ...evolution.system import Motion
 from ...model import Model
 from ...model.large_deformation import LargeDeformation, large_step
@@ -37,7 +37,6 @@ from ...solvers.nonlinear_newton import NonlinearNewton
 from .path import SOLVED, judged
 
 Array = NDArray[np.float64]
-STRAIGHT = 1e-9  # departure from a straight line in time, relative, that a load may have
 LETTERS = np.array(["f", "s", "+", "-"])  # of OPEN, STICK, SLIP, BACK as in `pattern`
 
 
@@ -213,19 +212,8 @@ def load_path(model: Model, interval: tuple[float, float]) -> LoadPath:
     if not motion.is_timed:
         interval = (0.0, 1.0)
     a, b = interval
-    shares = (0.0, 1.0, 0.5) if not motion.is_timed else (1.0, 1.0, 1.0)
-    ends = [
-        (share * motion.load(t), share * motion.prescribed(t))
-        for share, t in zip(shares, (a, b, (a + b) / 2), strict=True)
-    ]
     lines = []
-    for first, last, middle in zip(*ends, strict=True):
-        size = max(float(np.abs(first).max(initial=0)), float(np.abs(last).max(initial=0)))
-        if np.abs((first + last) / 2 - middle).max(initial=0) > STRAIGHT * size:
-            raise InvalidInput(
-                f"interval: the loads are no straight line in time between {a:g} and {b:g}; "
-                "follow it in parts"
-            )
+    for first, last in zip(*motion.straight(interval, "follow it in parts"), strict=True):
         slope = (last - first) / (b - a)
         lines.append((first - a * slope, first + (1 - a) * slope))
     (load_0, load_1), (prescribed_0, prescribed_1) = lines

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 PARAMETERS = ("load", "friction")
-BENT = 1e-9  # departure from a straight line in time, relative, that a load may have
 START = 1e-10  # error of the solution from which continuation starts
 
 
@@ -67,17 +66,12 @@ def path_of(
 def _in_time(motion: Motion, interval: tuple[float, float]) -> FrictionPath:
     """Loads and supports at the time t, straight lines between the ends of the interval."""
     a, b = interval
-    ends = [(motion.load(t), motion.prescribed(t)) for t in (a, b, (a + b) / 2)]
-    for first, last, middle in zip(*ends, strict=True):
-        size = max(float(np.abs(first).max(initial=0)), float(np.abs(last).max(initial=0)))
-        if np.abs((first + last) / 2 - middle).max(initial=0) > BENT * size:
-            raise InvalidInput(
-                f"interval: the loads are no straight line in time between {a:g} and {b:g}; "
-                "follow it in parts, or with base=, from one load to another"
-            )
+    ends = motion.straight(
+        interval, "follow it in parts, or with base=, from one load to another"
+    )
     whole = motion.parts
     before = np.zeros((len(whole.gap), whole.carried.shape[1] - 1))
-    first, last = (motion.body.increment(*end, before) for end in ends[:2])
+    first, last = (motion.body.increment(*end, before) for end in ends)
     path = _between(first, last)
     return _between(path.at(-a / (b - a)), path.at((1 - a) / (b - a)))
 
