@@ -15,7 +15,7 @@ from .nitsche_problem import NO_MULTIPLIERS, NitscheProblem
 from .problem import Form, FrictionProblem
 from .solution import Convergence, FrictionSolution, Outcome, Step
 from .solvers import Auto
-from .solvers.base import Breakdown, Iterate, Solver, Target
+from .solvers.base import Breakdown, Iterate, Solver, Target, check_seconds
 
 Array = NDArray[np.float64]
 Callback = Callable[[Step, Iterate], bool | None]
@@ -273,5 +273,5 @@ def _check_options(tolerance: float, max_iterations: int | None, limit: float | 
         raise InvalidInput(f"tolerance: expected between 0 and 1, got {tolerance}")
     if max_iterations is not None and max_iterations < 1:
         raise InvalidInput(f"max_iterations: expected at least 1, got {max_iterations}")
-    if limit is not None and not limit > 0:
-        raise InvalidInput(f"time_limit: expected seconds > 0, got {limit}")
+    if limit is not None:
+        check_seconds(limit)

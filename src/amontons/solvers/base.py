@@ -93,6 +93,12 @@ def check_positive(**fields: float) -> None:
             raise InvalidInput(f"{name}: expected a positive number, got {value}")
 
 
+def check_seconds(time_limit: float) -> None:
+    """Raise InvalidInput unless a time limit is above zero; it may be infinite."""
+    if not time_limit > 0:
+        raise InvalidInput(f"time_limit: expected seconds > 0, got {time_limit}")
+
+
 def check_at_least(minimum: int, **fields: int) -> None:
     """Raise InvalidInput for the first option below `minimum`."""
     for name, value in fields.items():

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from ...errors import InvalidInput
 from ...problem import FrictionProblem
+from ...solvers.base import check_seconds
 from .determinant_search import NEGATIVE, POSITIVE, STICK, STOPPED, UNKNOWN
 from .energy_bound import energy_bound
 from .exact_threshold import LARGEST, Threshold, exact_threshold, search_windows
@@ -99,8 +100,7 @@ def critical_friction(
     friction of interest, which is proved to be safe before others if it can be.  Raises
     UnsupportedForm in 3D and under Tresca's law.
     """
-    if not time_limit > 0:
-        raise InvalidInput(f"time_limit: expected seconds > 0, got {time_limit!r}")
+    check_seconds(time_limit)
     if not 0 < gap < 1:
         raise InvalidInput(f"gap: expected a number between 0 and 1, got {gap!r}")
     began = time.perf_counter()

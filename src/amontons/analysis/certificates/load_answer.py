@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...errors import InvalidInput
 from ...problem import FrictionProblem
 from ...solution import FrictionSolution
+from ...solvers.base import check_seconds
 from ..solutions.enumerate import PieceSolution
 
 Array = NDArray[np.float64]
@@ -64,8 +65,7 @@ def reactions_of(
     problem: FrictionProblem, solution: FrictionSolution | PieceSolution, time_limit: float
 ) -> Array:
     """Reactions (nc, d) of a solution under Coulomb's law; raises for what can not be meant."""
-    if not time_limit > 0:
-        raise InvalidInput(f"time_limit: expected seconds > 0, got {time_limit!r}")
+    check_seconds(time_limit)
     _ = problem.mu
     r, shape = np.asarray(solution.r), (problem.contacts, problem.dimension)
     if r.shape != shape:

@@ -19,6 +19,7 @@ from ...errors import InvalidInput, SingularOperator
 from ...problem import FrictionProblem
 from ...solution import FrictionSolution
 from ...solve import drive
+from ...solvers.base import check_seconds
 from ..multipliers.scales import UNRESOLVED, contact_sizes, resolves
 from ..solutions.enumerate import PieceSolution, enumerate_solutions
 from .critical_friction import CriticalFriction, Witness, critical_friction
@@ -99,8 +100,7 @@ def assess(
 
     solution: one that was found; by default the problem is solved.  time_limit: seconds.
     """
-    if not time_limit > 0:
-        raise InvalidInput(f"time_limit: expected seconds > 0, got {time_limit!r}")
+    check_seconds(time_limit)
     began = time.perf_counter()
     try:
         local = problem.condensed()

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InvalidInput
+from ...solvers.base import check_seconds
 from .continuation import Continuation
 from .first_order import Tangent
 from .friction_path import FrictionPath
@@ -49,8 +50,8 @@ class Limits:
             raise InvalidInput(f"interval: expected two numbers a < b, got {self.interval}")
         if self.max_points < 2:
             raise InvalidInput(f"max_points: expected at least 2, got {self.max_points}")
-        if self.time_limit is not None and not self.time_limit > 0:
-            raise InvalidInput(f"time_limit: expected seconds > 0, got {self.time_limit!r}")
+        if self.time_limit is not None:
+            check_seconds(self.time_limit)
 
 
 @dataclass(frozen=True, eq=False)

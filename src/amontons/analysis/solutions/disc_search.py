@@ -17,8 +17,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InvalidInput
 from ...problem import FrictionProblem
+from ...solvers.base import check_seconds
 from ..multipliers.scales import UNRESOLVED, resolves
 from .disc_multipliers import EXACT, BoxProblem, BoxProof, contains
 from .disc_sets import ON, Law, Region
@@ -77,8 +77,8 @@ def enumerate_discs(
     tolerance: error by the judge that a solution may have.  keep_proof: fill `Solutions.proof`
     with a DiscProof.  Raises UnsupportedForm under Tresca's law.
     """
-    if time_limit is not None and not time_limit > 0:
-        raise InvalidInput(f"time_limit: expected seconds > 0, got {time_limit!r}")
+    if time_limit is not None:
+        check_seconds(time_limit)
     _ = problem.mu
     began = time.perf_counter()
     local = problem.condensed()

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ...errors import InvalidInput, UnsupportedForm
 from ...problem import FrictionProblem
+from ...solvers.base import check_seconds
 from ..multipliers.scales import UNRESOLVED, resolves
 from . import pattern_search as search
 from .scaled_problem import REACH, SAME, ScaledProblem, States
@@ -106,8 +107,8 @@ def enumerate_solutions(
     that a solution may have.  keep_proof: fill `Solutions.proof`.  Raises
     UnsupportedForm in 3D and under Tresca's law.
     """
-    if time_limit is not None and not time_limit > 0:
-        raise InvalidInput(f"time_limit: expected seconds > 0, got {time_limit!r}")
+    if time_limit is not None:
+        check_seconds(time_limit)
     if problem.dimension != 2:
         raise UnsupportedForm("all solutions: expected a 2D problem, this one is in 3D")
     if problem.contacts > CONTACTS:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ...errors import InvalidInput
 from ...problem import FrictionProblem
 from ...solve import drive
+from ...solvers.base import check_seconds
 from .enumerate import PieceSolution, Solutions
 from .newton_batch import FREE, SLIP, STICK, Stack
 
@@ -46,8 +47,8 @@ def multistart(
     """
     if not starts >= 1:
         raise InvalidInput(f"starts: expected at least 1, got {starts!r}")
-    if time_limit is not None and not time_limit > 0:
-        raise InvalidInput(f"time_limit: expected seconds > 0, got {time_limit!r}")
+    if time_limit is not None:
+        check_seconds(time_limit)
     _ = problem.mu
     began = time.perf_counter()
     local = problem.condensed()
