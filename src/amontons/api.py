@@ -139,8 +139,7 @@ def _searchable(problem: FrictionProblem) -> None:
 
 def _discrete(problem: FrictionProblem | Model) -> FrictionProblem:
     """The problem, or that of a model; raises InvalidInput for friction without limits."""
-    if not (isinstance(problem, FrictionProblem) or hasattr(problem, "assemble")):
-        raise InvalidInput(f"problem: expected a Model or a FrictionProblem, got {problem!r}")
+    problem = _checked(problem)
     discrete = problem if isinstance(problem, FrictionProblem) else problem.assemble()
     largest = float(discrete.law.coefficient.max(initial=0.0))
     if isinstance(discrete.law, Coulomb) and largest > HUGE:

@@ -46,9 +46,9 @@ def say_when(model: Model | None) -> None:
     """Print at which time values of a model were taken that depend on it."""
     if model is None:
         return
-    from ..evolution.timed import is_timed
+    from ..evolution.timed import depends_on_time
 
-    if any(is_timed(part.value) for part in (*model.supports, *model.loads)):
+    if depends_on_time(model):
         click.echo("supports or loads depend on the time t: this is t = 0; `amontons follow` "
                    "traces solutions over t, `amontons run` takes steps in time")  # fmt: skip
 

@@ -13,7 +13,7 @@ from ..errors import InvalidInput
 from ..fem.mass import lumped, mass
 from ..model import Fix, Model
 from ..model.assembly import Discretisation, external_load, prescribed_values
-from .timed import is_timed, part_at, steady
+from .timed import depends_on_time, is_timed, part_at, steady
 
 Array = NDArray[np.float64]
 BENT = 1e-9  # departure from a straight line in time, relative, that a load may have
@@ -41,7 +41,7 @@ class Motion:
     @cached_property
     def is_timed(self) -> bool:
         """True when a load or a support depends on time."""
-        return any(is_timed(p.value) for p in (*self.model.supports, *self.model.loads))
+        return depends_on_time(self.model)
 
     @cached_property
     def _steady_load(self) -> Array:

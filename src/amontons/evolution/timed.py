@@ -21,6 +21,11 @@ def is_timed(value: Any) -> bool:
     return callable(value) and _takes_time(value)
 
 
+def depends_on_time(model: Model) -> bool:
+    """True where a load or a support of a model depends on time."""
+    return any(is_timed(part.value) for part in (*model.supports, *model.loads))
+
+
 def at_time(value: Any, t: float) -> Any:
     """The value at time t: a number, or a function of position alone."""
     if isinstance(value, list | tuple):
@@ -39,8 +44,7 @@ def part_at(part: Part, t: float) -> Part:
 
 def steady(model: Model) -> Model:
     """The model with supports and loads as they are at time 0: the one that is assembled."""
-    parts = (*model.supports, *model.loads)
-    if not any(is_timed(part.value) for part in parts):
+    if not depends_on_time(model):
         return model
     if "steady" not in model._shared:
         model._shared["steady"] = replace(
