@@ -39,6 +39,7 @@ _HOME = {
     "checkpoint": ("export_fclib", "load_state", "save_state"),
     "case": ("read_case",),
     "results": ("ModelSolution",),
+    "warned": ("ResultWarning",),
     "api": ("all_solutions", "critical_friction", "diagram", "follow", "multistart", "solve",
             "uniqueness"),
     "analysis": ("Branch", "Continuation", "CriticalFriction", "Diagram", "Event", "EventKind",

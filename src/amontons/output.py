@@ -20,6 +20,7 @@ from .errors import InvalidInput
 from .files import make_folder, remove_empty, replacing
 from .solution import FrictionSolution
 from .solvers import METHODS
+from .warned import ResultWarning
 
 if TYPE_CHECKING:
     from .model import ContactFields, Model
@@ -45,6 +46,7 @@ class Output:
     assemble_seconds: float = 0.0
     from_fclib: bool = False
     uniqueness: dict[str, Any] | None = None  # what is known about other solutions
+    warnings: tuple[ResultWarning, ...] = ()
 
 
 # ------------------------------------------------------------------------------- choosing
@@ -160,6 +162,7 @@ def summary(output: Output) -> dict[str, Any]:
         "max_penetration": found.max_penetration,
         "max_cone_violation": found.max_cone_violation,
         "uniqueness": output.uniqueness,
+        "warnings": [warning.record for warning in output.warnings],
         "versions": versions(),
     }
     return finite(data)
@@ -216,6 +219,7 @@ def describe(output: Output) -> str:
         force = ", ".join(f"{name} {value:.6g}" for name, value in pairs)
         lines.append(f"resultant on the slave: {force}")
         lines.append(f"largest pressure: {output.fields.pressure.max(initial=0.0):.6g}")
+    lines += map(str, output.warnings)
     return "\n".join(lines)
 
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from . import output
 from .solution import FrictionSolution
+from .warned import ResultWarning
 
 if TYPE_CHECKING:
     from .model import ContactFields, Model
@@ -51,6 +53,13 @@ class ModelSolution:
         outcome = self.solution.convergence.outcome.name.lower().replace("_", " ")
         return f"<ModelSolution of {self.model.name or 'model'}: {counts}; {outcome}>"
 
+    @cached_property
+    def warnings(self) -> tuple[ResultWarning, ...]:
+        """Reasons to doubt a result that has converged, each with a name."""
+        from .model.doubts import model_warnings
+
+        return self.solution.warnings + model_warnings(self.model, self.fields)
+
     def __str__(self) -> str:
         return output.describe(self.output)
 
@@ -63,6 +72,7 @@ class ModelSolution:
             self.fields,
             title=self.model.name or "model",
             assemble_seconds=self.assemble_seconds,
+            warnings=self.warnings,
         )
 
     def write(self, path: str | os.PathLike[str]) -> None:

@@ -17,6 +17,7 @@ from .judge import Measure
 from .nitsche_problem import NitscheProblem
 from .problem import FrictionProblem
 from .status import ContactStatus, classify
+from .warned import ResultWarning
 
 Array = NDArray[np.float64]
 
@@ -93,7 +94,8 @@ class Convergence:
 class FrictionSolution:
     """Reactions and velocities of a discrete problem, and what they mean.
 
-    r, u: (nc, d) in the local frames; v: (n,) or None in the Delassus form.
+    r, u: (nc, d) in the local frames; v: (n,) or None in the Delassus form; warnings: reasons
+    to doubt a result that has converged.
     """
 
     problem: FrictionProblem | NitscheProblem
@@ -101,6 +103,7 @@ class FrictionSolution:
     u: Array
     v: Array | None
     convergence: Convergence
+    warnings: tuple[ResultWarning, ...] = ()
 
     @cached_property
     def _classified(self) -> tuple[NDArray[np.int8], NDArray[np.bool_], Array]:

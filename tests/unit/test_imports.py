@@ -11,8 +11,8 @@ import amontons
 
 PACKAGE = Path(amontons.__file__).parent
 ORDER = (
-    "errors < files < checked_arrays < cones < linear < blocks < condensation < "
-    "global_matrices < judge < problem < "
+    "errors < clock < warned < files < checked_arrays < cones < linear < blocks < "
+    "condensation < global_matrices < judge < problem < "
     "nitsche_problem < one_sided < one_contact < status < solution < solvers < solve < fem < "
     "contact < model < masonry < granular < hild < vee < evolution < analysis < gallery < "
     "fclib < checkpoint < expressions < case < vtk < plots < output < results < report < api "

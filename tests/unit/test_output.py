@@ -19,7 +19,7 @@ from amontons.solve import drive
 KEYS = {
     "outcome", "advice", "method", "error", "fclib_error", "tolerance", "iterations",
     "linear_iterations", "seconds", "dimension", "unknowns", "contacts", "resultant", "measure",
-    "max_penetration", "max_cone_violation", "versions", "schema",
+    "max_penetration", "max_cone_violation", "versions", "schema", "warnings",
 }  # fmt: skip
 
 

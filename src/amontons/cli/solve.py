@@ -67,10 +67,11 @@ def _output(
     source: Source, found: FrictionSolution | ModelSolution, method: str, assembled: float
 ) -> output.Output:
     if isinstance(found, ModelSolution):
-        return output.Output(found.solution, found.model, found.fields, source.title, method,
-                             assembled)  # fmt: skip
+        return replace(
+            found.output, title=source.title, method=method, assemble_seconds=assembled
+        )
     return output.Output(found, title=source.title, method=method,
-                         from_fclib=source.from_fclib)  # fmt: skip
+                         from_fclib=source.from_fclib, warnings=found.warnings)  # fmt: skip
 
 
 def _verdict(found: FrictionSolution | ModelSolution, full: bool) -> Uniqueness | None:

@@ -13,9 +13,11 @@ from ..contact import forces
 from ..errors import InvalidInput
 from ..model import ContactFields, Fix, Model
 from ..model.assembly import locate, prescribed_values
+from ..model.doubts import model_warnings
 from ..model.values import VectorValue, vector_at
 from ..problem import FrictionProblem
 from ..solution import ContactStatus, FrictionSolution
+from ..warned import ResultWarning
 from .energy import Energies
 from .passage import Passage
 from .timed import part_at, steady
@@ -130,6 +132,11 @@ class TimeStep:
             node=np.concatenate([r.nodes for r in rows]),
             facets=tuple((k, self.model.bodies[k].mesh.surface(name)) for k, name in surfaces),
         )  # fmt: skip
+
+    @cached_property
+    def warnings(self) -> tuple[ResultWarning, ...]:
+        """Reasons to doubt a step that has converged, each with a name."""
+        return self.solution.warnings + model_warnings(self.model, self.fields)
 
     @property
     def _force(self) -> Array:
