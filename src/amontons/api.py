@@ -41,23 +41,27 @@ Start = Iterate | FrictionSolution | ModelSolution | None
 @overload
 def solve(
     problem: FrictionProblem, solver: Solver | None = None, *, tolerance: float = 1e-8,
-    max_iterations: int | None = None, time_limit: float | None = None, start: Start = None,
-    callback: Callback | None = None, check: bool = True,
+    contact_tolerance: float | None = None, max_iterations: int | None = None,
+    time_limit: float | None = None, start: Start = None, callback: Callback | None = None,
+    check: bool = True,
 ) -> FrictionSolution: ...  # fmt: skip
 @overload
 def solve(
     problem: Model, solver: Solver | None = None, *, tolerance: float = 1e-8,
-    max_iterations: int | None = None, time_limit: float | None = None, start: Start = None,
-    callback: Callback | None = None, check: bool = True,
+    contact_tolerance: float | None = None, max_iterations: int | None = None,
+    time_limit: float | None = None, start: Start = None, callback: Callback | None = None,
+    check: bool = True,
 ) -> ModelSolution: ...  # fmt: skip
-def solve(problem, solver=None, *, tolerance=1e-8, max_iterations=None, time_limit=None,
-          start=None, callback=None, check=True):  # fmt: skip
+def solve(problem, solver=None, *, tolerance=1e-8, contact_tolerance=None, max_iterations=None,
+          time_limit=None, start=None, callback=None, check=True):  # fmt: skip
     """Solve a model or a discrete problem until the independent error is below `tolerance`.
 
-    solver: by default the portfolio `Auto`.  time_limit: seconds.  start: a solution of a
-    neighbouring problem.  callback(step, iterate) is called after every iterate, True stops; it
-    replaces the progress line that a terminal shows.  check: raise NotConverged (Interrupted
-    after Ctrl-C), which carries the best solution, instead of returning it.
+    contact_tolerance: on the error of every single contact on its own scale (`judge`), by
+    default the square root of tolerance.  solver: by default the portfolio `Auto`.  time_limit:
+    seconds.  start: a solution of a neighbouring problem.  callback(step, iterate) is called
+    after every iterate, True stops; it replaces the progress line that a terminal shows.
+    check: raise NotConverged (Interrupted after Ctrl-C), which carries the best solution,
+    instead of returning it.
 
     A model is condensed for solvers that need the Delassus form; a FrictionProblem has the form
     its owner chose, and the wrong one raises UnsupportedForm.  A model with hyperelastic laws
@@ -65,8 +69,9 @@ def solve(problem, solver=None, *, tolerance=1e-8, max_iterations=None, time_lim
     tangent one of the deformed state.
     """
     run = drive if isinstance(problem, FrictionProblem) else drive_any_form
-    options = {"tolerance": tolerance, "max_iterations": max_iterations,
-               "time_limit": time_limit, "start": start}  # fmt: skip
+    options = {"tolerance": tolerance, "contact_tolerance": contact_tolerance,
+               "max_iterations": max_iterations, "time_limit": time_limit,
+               "start": start}  # fmt: skip
     result = _solve(problem, solver, run, callback, options)
     if check:
         raise_unless_converged(result)

@@ -29,6 +29,7 @@ from .linear.geometric import prepared
 from .linear.grid_matrix import GridMatrix
 from .linear.hierarchy import Hierarchy
 from .linear.levels import Levels
+from .linear.loose_modes import loose_modes
 from .linear.small_blocks import block_diagonal_inverse, diagonal_blocks_inverse
 
 Array = NDArray[np.float64]
@@ -110,6 +111,13 @@ class GlobalMatrices:
             return bodies.factor(M)
         solver: LinearSolver = ConjugateGradient() if iterative else Direct()
         return solver.factor(M, modes)
+
+    @property
+    def loose_modes(self) -> Array:
+        """Rigid modes that M does not resist, orthonormal columns (n, k), see `linear`."""
+        return self._kept(
+            "loose modes", lambda: loose_modes(self.M, self.bodies, self.near_nullspace)
+        )
 
     def solve(self, b: Array) -> Array:
         """M^-1 b, b of shape (n,) or (n, k)."""

@@ -8,7 +8,23 @@ and does not change with units.  With û = u + mu |u_T| n (Coulomb) or u (Tresca
 *residual*:  rho_i = 1 / |H_i^T D^-1 H_i|_2 with D the block diagonal of M, u = H^T v + w,
              error = max(|M v - H r - f| / |load|,
                          |(r_i - P(r_i - rho_i û_i)) / rho_i| / |u_ref|).
+             With rigid modes R of bodies that contact alone holds, M R = 0, it is at least
+             |R_k^T (H r + f)| / (|R_k^T f| + |R_k^T H| |r|): no large load elsewhere hides
+             a body that is out of balance.
 *nitsche*:   where v alone is unknown, see `nitsche_problem`.
+
+These are sums over all contacts, in which a contact with a small load is lost beside one with a
+large: q_N = (-1, 1e8) is solved to 1e-8 by r = 0.  So the worst contact is measured too, on its
+own scale, which a change of the units of any one contact leaves as it is:
+
+*contactwise*: error = max_i z_i / s_i, z_i = max(|natural map|_i / rho_i, penetration_i / 2),
+             s_i = |q_i| + sum_j |W_ij r_j|, to which FLOOR eps (|w_i| + |H_i|^T |M^-1 f|) is
+             added where q_i was made of these and may be what rounding left of them.
+             Without W: s_i = |q_i| + |u_i - q_i| + |r_i| / rho_i, no larger but for q_i, which
+             is the local velocity of the problem with its contacts open, to some per cent.
+
+A reaction has converged when the first error is below its tolerance and the second below its
+own, by default the square root of the first.
 
 At r = 0 the map of a penetrating contact is |u_N| / sqrt(1 + mu^2) only, and would vanish for
 "glued" contacts with a huge mu; each contact counts at least half its penetration, which
@@ -21,6 +37,7 @@ twin is `cones.natural_map`, and the tests compare the two.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
@@ -32,6 +49,8 @@ from .cones import Law
 Array = NDArray[np.float64]
 EPSILON = float(np.finfo(float).eps)
 PENETRATION = 0.5  # share of a penetration that counts at least, whatever mu
+FLOOR = 16.0  # roundings that may be what is left of a q_i whose parts cancel
+STUCK = 1.0 - 1e-9  # |r_T| below this part of mu r_N: a contact that sticks
 
 
 class Measure(Enum):
@@ -40,6 +59,17 @@ class Measure(Enum):
     EXACT = "exact"
     RESIDUAL = "residual"
     NITSCHE = "nitsche"
+
+
+@dataclass(frozen=True)
+class Weakest:
+    """The contact that is farthest from its law on its own scale.
+
+    error: unit-free; contact: its index, None where all contacts obey their law exactly.
+    """
+
+    error: float
+    contact: int | None
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -116,33 +146,89 @@ def natural_error(indptr, indices, data, q, coefficient, tresca, rho, r):
     return math.sqrt(total) if math.isfinite(total) else math.inf
 
 
-@njit(cache=True, error_model="numpy")
-def rounding_error(rho, r):
-    """eps |r / rho|, unit of u: what rounding may hide in the velocities that reactions make.
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def weakest_contact(indptr, indices, data, q, coefficient, tresca, rho, r, floor):
+    """(largest contactwise error, its contact or -1); arguments as in `natural_error`.
 
-    Huge reactions that cancel, as of a body between two closing walls, swallow q, and with it
-    any error; r (nc, d), rho as in `natural_error`.
+    floor (nc,): unit of u, added to the scale of each contact.
+    """
+    worst, contact = 0.0, -1
+    for i in range(len(coefficient)):
+        u0, u1, u2 = q[i, 0], q[i, 1], q[i, 2]
+        scale = floor[i] + math.sqrt(u0 * u0 + u1 * u1 + u2 * u2)
+        for k in range(uint64(indptr[i]), uint64(indptr[i + 1])):
+            j = uint64(indices[k])
+            r0, r1, r2 = r[j, 0], r[j, 1], r[j, 2]
+            d0 = data[k, 0, 0] * r0 + data[k, 0, 1] * r1 + data[k, 0, 2] * r2
+            d1 = data[k, 1, 0] * r0 + data[k, 1, 1] * r1 + data[k, 1, 2] * r2
+            d2 = data[k, 2, 0] * r0 + data[k, 2, 1] * r1 + data[k, 2, 2] * r2
+            u0, u1, u2 = u0 + d0, u1 + d1, u2 + d2
+            scale += math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+        if rho[i] > 0.0:
+            e0, e1, e2 = contact_residual(
+                r[i, 0], r[i, 1], r[i, 2], u0, u1, u2, rho[i], coefficient[i], tresca
+            )
+            size = max(math.sqrt(e0 * e0 + e1 * e1 + e2 * e2), -PENETRATION * u0)
+        elif r[i, 0] != 0.0 or r[i, 1] != 0.0 or r[i, 2] != 0.0:
+            size = math.inf
+        else:
+            size = max(-u0, 0.0)
+        if not size <= worst * scale:  # also where it is not a number
+            worst, contact = (size / scale if scale > 0.0 else math.inf), i
+    return worst if worst == worst else math.inf, contact
+
+
+@njit(cache=True, error_model="numpy")
+def rounding_error(coefficient, tresca, rho, r):
+    """What rounding may hide in the velocities that reactions make, unit of u.
+
+    eps |r / rho|: huge reactions that cancel, as of a body between two closing walls, swallow
+    q, and with it any error.  With large friction the rounding of the slip of a contact that
+    sticks counts mu times, as the slip does.  r (nc, d), rho as in `natural_error`.
     """
     total = 0.0
     for i in range(len(rho)):
         if rho[i] > 0.0:
+            size = 0.0
             for k in range(r.shape[1]):
-                total += (r[i, k] / rho[i]) ** 2
+                size += (r[i, k] / rho[i]) ** 2
+            if not tresca and coefficient[i] > 1.0:
+                tangential = 0.0
+                for k in range(1, r.shape[1]):
+                    tangential += r[i, k] * r[i, k]
+                if math.sqrt(tangential) < STUCK * coefficient[i] * r[i, 0]:
+                    size *= coefficient[i] * coefficient[i]
+            total += size
     return EPSILON * math.sqrt(total)
+
+
+def weakest_of(r: Array, u: Array, law: Law, rho: Array, scale: Array) -> Weakest:
+    """NumPy form of `weakest_contact` with u and the scales (nc,) given."""
+    if len(r) == 0:
+        return Weakest(0.0, None)
+    size = residual_sizes(r, u, law, rho)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        error = np.where(size > 0, size / scale, 0.0)
+    contact = int(np.argmax(error))
+    worst = float(error[contact])
+    return Weakest(worst, contact) if worst > 0 else Weakest(0.0, None)
 
 
 def scaled_residual(r: Array, u: Array, law: Law, rho: Array) -> float:
     """NumPy form of `natural_error` with u given; unit of u."""
     if not (np.isfinite(r).all() and np.isfinite(u).all()):
         return math.inf
-    able = rho > 0
-    if r[~able].any():
-        return math.inf
-    index = np.flatnonzero(able)
+    return float(np.linalg.norm(residual_sizes(r, u, law, rho)))
+
+
+def residual_sizes(r: Array, u: Array, law: Law, rho: Array) -> Array:
+    """The scaled natural map of each contact, (nc,), unit of u; infinite as `natural_error`."""
+    index = np.flatnonzero(rho > 0)
     inner = law.at(index).natural_map(r[index], u[index], rho[index]) / rho[index, None]
-    penetration = np.minimum(u[:, 0], 0)
-    size = np.maximum(np.linalg.norm(inner, axis=1), PENETRATION * -penetration[index])
-    return float(np.hypot(np.linalg.norm(size), np.linalg.norm(penetration[~able])))
+    size = np.maximum(-u[:, 0], 0.0)
+    size[index] = np.maximum(np.linalg.norm(inner, axis=1), PENETRATION * size[index])
+    size[(rho <= 0) & r.any(axis=1)] = math.inf
+    return size
 
 
 def published_fclib_error(r: Array, u: Array, q: Array, law: Law) -> float:
@@ -186,6 +272,7 @@ def max_cone_violation(r: Array, law: Law) -> float:
 
 __all__ = [
     "Measure",
+    "Weakest",
     "contact_residual",
     "max_cone_violation",
     "max_penetration",
@@ -193,6 +280,9 @@ __all__ = [
     "published_fclib_error",
     "published_natural_error",
     "ratio",
+    "residual_sizes",
     "rounding_error",
     "scaled_residual",
+    "weakest_contact",
+    "weakest_of",
 ]

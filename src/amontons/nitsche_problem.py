@@ -34,7 +34,7 @@ from scipy import sparse
 from . import judge
 from .cones import Law, augmented_reaction, augmented_reaction_jacobian
 from .errors import SingularOperator, UnsupportedForm
-from .judge import Measure
+from .judge import Measure, Weakest
 from .linear import Direct, Factor, LinearSolver
 from .problem import Form
 
@@ -220,6 +220,14 @@ class NitscheProblem:
             return np.inf
         error = judge.ratio(self.size(self.residual(v)), self.scale)
         return error if np.isfinite(error) else np.inf
+
+    def weakest(self, r: Array, v: Array | None = None) -> Weakest | None:
+        """None: r obeys the law at every point by construction, all error is in the balance."""
+        return None
+
+    def certain_error(self, r: Array, v: Array | None = None) -> float:
+        """The error, or what rounding may hide in it where that is more."""
+        return max(self.error(r, v), self.rounding(r))
 
     def rounding(self, r: Array) -> float:
         """What rounding of huge reactions may hide in `error`."""

@@ -144,9 +144,12 @@ def summary(output: Output) -> dict[str, Any]:
         "detail": record.detail,
         "method": output.method or _method_name(record.solver),
         "error": record.error,
+        "contact_error": record.contact_error,
+        "weakest": record.weakest,
         "fclib_error": found.fclib_error,
         "measure": record.measure.value,
         "tolerance": record.tolerance,
+        "contact_tolerance": record.contact_tolerance,
         "iterations": record.iterations,
         "linear_iterations": record.linear_iterations,
         "seconds": {

@@ -33,7 +33,8 @@ from .checked_arrays import (
 from .cones import Coulomb, Law, Tresca
 from .errors import InvalidInput, SingularOperator, UnsupportedForm
 from .global_matrices import OPERATORS, GlobalMatrices, Shared, made_once
-from .judge import Measure
+from .judge import Measure, Weakest
+from .judge_sharp import sharp_error
 from .linear import Factor
 from .linear.bodies import Bodies
 from .linear.distributed import DistributedMatrix
@@ -65,6 +66,8 @@ class FrictionProblem:
     rows, levels[1] with as many as levels[0] has columns, …: geometric multigrid uses them.
     guess, (n,): some v near the solution, such as prescribed displacements continued into the
     bodies: iterative solvers start there.
+    blur (nc,), unit of u: what rounding may have left of each q_i (Delassus form of a global
+    problem); it is added to the scale of the contact in the contactwise error.
     """
 
     law: Law
@@ -79,6 +82,7 @@ class FrictionProblem:
     guess: Array | None = None
     load_scale: float | None = None
     u_scale: float | None = None
+    blur: Array | None = None
     name: str = ""
     _shared: Shared = field(default_factory=dict, repr=False)
 
@@ -172,7 +176,7 @@ class FrictionProblem:
             return replace(self, f=numbers("f", load, (self.unknowns,)), guess=None)
         q = contact_rows("q", load, self.contacts)
         expect_shape("q", q.shape, (self.contacts, self.dimension))
-        return replace(self, q=q)
+        return replace(self, q=q, blur=None)
 
     def assembled(self) -> FrictionProblem:
         """The same problem with M as a stored matrix, for solvers that need its entries.
@@ -195,7 +199,9 @@ class FrictionProblem:
     @cached_property
     def _condensed(self) -> FrictionProblem:
         base = self._kept("condensed", (self.M, self.H), self._condense)
-        return replace(base, law=self.law, q=self.free_velocity, name=self.name)
+        return replace(
+            base, law=self.law, q=self.free_velocity, blur=self.free_blur, name=self.name
+        )
 
     def _condense(self) -> FrictionProblem:
         W = self.matrices.delassus()
@@ -349,10 +355,24 @@ class FrictionProblem:
         """q, (nc, d): local velocity without reactions, w + H^T M^-1 f in the global form."""
         if self.q is not None:
             return self.q
-        assert self.f is not None
-        q = self.local_velocity(self.solve_M(self.f))
-        q.flags.writeable = False
-        return q
+        return self._free[0]
+
+    @property
+    def free_blur(self) -> Array:
+        """What rounding may have left of the free velocity, (nc,), unit of u."""
+        return self._free[1]
+
+    @cached_property
+    def _free(self) -> tuple[Array, Array]:
+        """H^T M^-1 f + w, and its blur (global form only)."""
+        assert self.f is not None and self.H is not None and self.w is not None
+        v = self.solve_M(self.f)
+        q = self.local_velocity(v)
+        terms = (abs(self.H).T @ np.abs(v)).reshape(self.w.shape) + np.abs(self.w)
+        blur = judge.FLOOR * judge.EPSILON * np.linalg.norm(terms, axis=1)
+        for array in (q, blur):
+            array.flags.writeable = False
+        return q, blur
 
     def velocity(self, r: Array) -> tuple[Array, Array | None]:
         """(u, v) of reactions r, (nc, d); v is None in the Delassus form."""
@@ -401,8 +421,41 @@ class FrictionProblem:
         """What rounding alone may hide in `error`, unit-free: no smaller error can be known."""
         if self.measure is Measure.EXACT:
             p = self.condensed()
-            return judge.ratio(judge.rounding_error(p.rho, r), p.q_norm)
-        return judge.ratio(judge.rounding_error(self.rho, r), self.scales[1])
+            return judge.ratio(p._hidden(p.rho, r), p.q_norm)
+        return judge.ratio(self._hidden(self.rho, r), self.scales[1])
+
+    def certain_error(self, r: Array, v: Array | None = None) -> float:
+        """`error`, evaluated sharply where rounding could hide one in it."""
+        error, hidden = self.error(r, v), self.rounding(r)
+        if hidden <= error or self.measure is not Measure.EXACT:
+            return max(error, hidden)
+        p = self.condensed()
+        found, left = sharp_error(*p.kernel_data, np.ascontiguousarray(spatial(r)))
+        return judge.ratio(max(found, left), p.q_norm)
+
+    def _hidden(self, rho: Array, r: Array) -> float:
+        tresca = isinstance(self.law, Tresca)
+        return judge.rounding_error(self.law.coefficient, tresca, rho, r)
+
+    def weakest(self, r: Array, v: Array | None = None) -> Weakest:
+        """The contact farthest from its law on its own scale; arguments as in `error`."""
+        if self.measure is Measure.EXACT:
+            return self.condensed()._weakest_exact(r)
+        if v is None:
+            return Weakest(np.inf, None)
+        if not (np.isfinite(r).all() and np.isfinite(v).all()):
+            return Weakest(np.inf, None)
+        u, q = self.local_velocity(v), self.open_velocity
+        rho = np.where(self.rho > 0, self.rho, np.inf)
+        parts = (q, u - q, r / rho[:, None])
+        scale = sum(np.linalg.norm(part, axis=1) for part in parts)
+        return judge.weakest_of(r, u, self.law, self.rho, scale)
+
+    def _weakest_exact(self, r: Array) -> Weakest:
+        floor = self.blur if self.blur is not None else np.zeros(self.contacts)
+        rows = np.ascontiguousarray(spatial(r))
+        error, contact = judge.weakest_contact(*self.kernel_data, rows, floor)
+        return Weakest(error, int(contact) if contact >= 0 else None)
 
     def exact_error(self, r: Array) -> float:
         """The exact measure of the Delassus form."""
@@ -418,8 +471,38 @@ class FrictionProblem:
         balance = np.linalg.norm(self.M @ v - self.H @ r.ravel() - self.f)
         law = judge.scaled_residual(r, u, self.law, self.rho)
         load, reference = self.scales
-        error = max(judge.ratio(balance, load), judge.ratio(law, reference))
+        error = max(judge.ratio(balance, load), judge.ratio(law, reference), self.unbalanced(r))
         return float(error) if np.isfinite(error) else np.inf
+
+    def unbalanced(self, r: Array) -> float:
+        """Largest force that moves a loose body as a whole, relative to those on it.
+
+        A loose body is one that contact alone holds; 0 where there is none, and in the Delassus
+        form, which has none.
+        """
+        modes = self.loose_modes
+        if modes.shape[1] == 0:
+            return 0.0
+        assert self.f is not None and self.H is not None
+        load = modes.T @ self.f
+        pushes = (self.H.T @ modes).reshape(*r.shape, -1) * r[:, :, None]
+        least = judge.FLOOR * judge.EPSILON * (np.abs(modes).T @ np.abs(self.f))
+        size = np.abs(load) + np.abs(pushes).sum(axis=(0, 1)) + least
+        rest = np.abs(load + pushes.sum(axis=(0, 1)))
+        return float(np.divide(rest, size, out=np.zeros_like(rest), where=size > 0).max())
+
+    @cached_property
+    def loose_modes(self) -> Array:
+        """Rigid modes of bodies that contact alone holds, orthonormal columns (n, k)."""
+        loose = self.u_scale is not None and self.guess is not None
+        if self.form is Form.GLOBAL and not loose:
+            try:
+                _ = self.open_velocity if self._is_estimated else self.free_velocity
+            except SingularOperator:
+                loose = True
+        if not loose:
+            return np.zeros((self.unknowns, 0))
+        return self.matrices.loose_modes
 
     @cached_property
     def rho(self) -> Array:
@@ -435,25 +518,38 @@ class FrictionProblem:
         load = self.load_scale if self.load_scale is not None else float(np.linalg.norm(self.f))
         if self.u_scale is not None:
             return load, self.u_scale
-        try:
-            free = self._free_size()
-        except SingularOperator:
-            free = float(np.linalg.norm(self.w))
-        return load, free
+        return load, float(np.linalg.norm(self.open_velocity))
 
-    def _free_size(self) -> float:
-        """|u| without reactions; of large meshes from a coarse level, to some per cent."""
+    @cached_property
+    def open_velocity(self) -> Array:
+        """u without reactions, (nc, d); of large meshes from a coarse level, to some per cent.
+
+        Where contact alone holds a body: u of the guess, else w (global form only).
+        """
+        assert self.w is not None
+        if self.u_scale is not None and self.guess is not None:
+            return self.local_velocity(self.guess)
+        try:
+            return self._open_velocity()
+        except SingularOperator:
+            return self.w
+
+    @property
+    def _is_estimated(self) -> bool:
+        """True for large meshes, where M^-1 f would cost too much only to judge."""
         large = self.unknowns > ESTIMATED and not isinstance(self.M, DistributedMatrix)
-        nested = self.levels or self.near_nullspace is not None
-        hierarchy = self.hierarchy if large and nested else None
+        return large and (bool(self.levels) or self.near_nullspace is not None)
+
+    def _open_velocity(self) -> Array:
+        hierarchy = self.hierarchy if self._is_estimated else None
         if hierarchy is None:
-            return float(np.linalg.norm(self.free_velocity))
+            return self.free_velocity
         assert self.f is not None and self.M is not None
         v = self.guess if self.guess is not None else np.zeros(self.unknowns)
         rest = self.f - self.M @ v if self.guess is not None else self.f
         nodes = hierarchy.nodes
         v = v + nodes.gather(hierarchy.estimate(nodes.spread(rest), ESTIMATED // 9))
-        return float(np.linalg.norm(self.local_velocity(v)))
+        return self.local_velocity(v)
 
 
 def _law(mu: ArrayLike | Law) -> Law:

@@ -38,6 +38,11 @@ class Outcome(Enum):
     )
     NON_FINITE = "The iterates overflowed: check units and friction, or try method 'auto'."
     BREAKDOWN = "The method can not go on here: see the detail, and try method 'auto'."
+    WEAK_CONTACTS = (
+        "The sum of all errors is below the tolerance, but single contacts with small loads "
+        "are not settled: see `weakest`; allow more time, or raise contact_tolerance where "
+        "only the sum matters."
+    )
     STOPPED = "Stopped on request; the best iterate so far is kept."
 
     @property
@@ -70,6 +75,9 @@ class Convergence:
     solver: str
     measure: Measure
     detail: str = ""
+    contact_error: float | None = None  # of the weakest contact on its own scale
+    contact_tolerance: float = np.inf
+    weakest: int | None = None  # that contact; None where all obey their laws exactly
 
     @property
     def advice(self) -> str:
@@ -80,12 +88,19 @@ class Convergence:
             return "The error no longer falls: loosen the tolerance, or check the problem."
         return self.outcome.advice
 
+    @property
+    def _of_contacts(self) -> str:
+        """The error of the weakest contact where that is too large."""
+        if self.contact_error is None or self.contact_error <= self.contact_tolerance:
+            return ""
+        return f", of contact {self.weakest} {self.contact_error:.1e}"
+
     def __str__(self) -> str:
         sign = "<=" if self.error <= self.tolerance else ">"
         text = (
             f"{self.outcome.name.lower().replace('_', ' ')} with {self.solver}: error "
-            f"{self.error:.1e} {sign} {self.tolerance:.0e} after {self.iterations} iterations "
-            f"in {self.seconds:.3g} s"
+            f"{self.error:.1e} {sign} {self.tolerance:.0e}{self._of_contacts} after "
+            f"{self.iterations} iterations in {self.seconds:.3g} s"
         )
         return f"{text} ({self.detail})" if self.detail else text
 

@@ -1,4 +1,10 @@
-"""The driver: it alone judges, stops, records, and turns the best iterate into a solution."""
+"""The driver: it alone judges, stops, records, and turns the best iterate into a solution.
+
+An iterate has converged when its error is below the tolerance and so is, on its own scale, that
+of its weakest contact (`judge`).  Where only the first holds, the solver is started again from
+there with a tolerance that promises the second; where that does not come about, the outcome is
+WEAK_CONTACTS.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +15,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .cones import Coulomb
 from .errors import InvalidInput, SingularOperator, UnsupportedForm
-from .judge import Measure
+from .judge import EPSILON, Measure, Weakest
 from .nitsche_problem import NO_MULTIPLIERS, NitscheProblem
 from .problem import Form, FrictionProblem
 from .solution import Convergence, FrictionSolution, Outcome, Step
@@ -22,6 +29,10 @@ Callback = Callable[[Step, Iterate], bool | None]
 MEMORY = 64  # iterates among which a repetition counts as a cycle
 PATIENCE = 500  # iterates without any progress before a solve counts as stagnated
 PROGRESS = 0.99  # the best error must fall at least by this factor within PATIENCE
+BLUR = 1e-2  # rounding, relative to the tolerance, above which an error is evaluated sharply
+BLURRED = 20  # iterates that would do if rounding could hide no error in them
+TIGHTER = 0.3  # goal of a second start, relative to what would just do
+TIGHTEST = 1e-300  # smallest goal: contacts far smaller than others need tiny sums
 
 
 @dataclass
@@ -30,31 +41,85 @@ class _Watch:
 
     problem: FrictionProblem | NitscheProblem
     tolerance: float
+    contact_tolerance: float
     started: float = field(default_factory=time.perf_counter)
     best: Iterate | None = None
     error: float = np.inf
+    weakest: Weakest | None = None  # contact of the best iterate, once its error will do
     iterations: int = 0
     linear_iterations: int = 0
     history: list[Step] = field(default_factory=list)
     seen: list[tuple[float, Array]] = field(default_factory=list)
+    blurred: int = 0  # iterates whose error rounding hides
     mark: tuple[int, float] = (0, np.inf)  # iterate and error of the last real progress
 
     def judge(self, iterate: Iterate) -> Step:
         """Judge an iterate and remember it if it is the best."""
-        error = self.problem.error(iterate.r, iterate.v)
+        error, weakest = self.problem.error(iterate.r, iterate.v), None
         if error <= self.tolerance:
-            hidden = self.problem.rounding(iterate.r)  # by huge reactions that cancel
-            error = hidden if hidden > self.tolerance else error
+            if self.problem.rounding(iterate.r) > BLUR * self.tolerance:
+                error = self.problem.certain_error(iterate.r, iterate.v)
+            if error <= self.tolerance:
+                weakest = self.problem.weakest(iterate.r, iterate.v)
+            else:
+                self.blurred += 1
         self.iterations += iterate.iterations
         self.linear_iterations += iterate.linear_iterations
         seconds = time.perf_counter() - self.started
         step = Step(self.iterations, error, self.linear_iterations, seconds)
         self.history.append(step)
-        if self.best is None or error < self.error:
-            self.best, self.error = iterate, error
+        if self.best is None or self._better(error, weakest):
+            self.best, self.error, self.weakest = iterate, error, weakest
         if error < PROGRESS * self.mark[1]:
             self.mark = (len(self.history), error)
         return step
+
+    def _better(self, error: float, weakest: Weakest | None) -> bool:
+        """True for an error below the best; of those that will do, for the better contacts."""
+        if weakest is None or self.weakest is None:
+            return error < self.error
+        return weakest.error < self.weakest.error
+
+    @property
+    def converged(self) -> bool:
+        """True when the best iterate will do in the sum and at every contact."""
+        good = self.error <= self.tolerance
+        return good and (self.weakest is None or self.weakest.error <= self.contact_tolerance)
+
+    @property
+    def weak(self) -> bool:
+        """True when the best iterate will do in the sum alone."""
+        return self.error <= self.tolerance and not self.converged
+
+    @property
+    def in_words(self) -> str:
+        """Why the best iterate will not do though its error is small; "" where it would."""
+        if self.best is not None and not self.converged:
+            hidden = self.problem.rounding(self.best.r)
+            law = self.problem.law
+            mu = law.mu.max(initial=0.0) if isinstance(law, Coulomb) else 0.0
+            if mu * EPSILON > self.tolerance:
+                return (
+                    f"rounding of the slip, times friction of {mu:.0e}, is above the tolerance: "
+                    "hold contacts that can not slip by supports, or take mu below 1e7"
+                )
+            if hidden > self.tolerance:
+                return (
+                    f"rounding alone may hide an error of {hidden:.1e}: reactions are huge "
+                    "beside what loads the contacts"
+                )
+        if not self.weak or self.weakest is None:
+            return ""
+        return (
+            f"contact {self.weakest.contact} misses its law by {self.weakest.error:.1e} on its "
+            f"own scale, {self.contact_tolerance:.0e} is allowed"
+        )
+
+    def tighter(self, goal: float) -> float:
+        """The next goal for the error, so that the weakest contact will do too."""
+        assert self.weakest is not None
+        share = TIGHTER * self.contact_tolerance / self.weakest.error
+        return min(self.error * share, TIGHTER * goal)
 
     def cycled(self, iterate: Iterate, error: float) -> bool:
         """True when this iterate was here before, with other iterates in between."""
@@ -72,8 +137,11 @@ class _Watch:
 
     @property
     def stagnated(self) -> bool:
-        """True when the best error has not moved for PATIENCE iterates."""
-        return len(self.history) - self.mark[0] > PATIENCE
+        """True when the best error has not moved for PATIENCE iterates.
+
+        Or when rounding has hidden that of BLURRED ones: more of them will not be known better.
+        """
+        return len(self.history) - self.mark[0] > PATIENCE or self.blurred > BLURRED
 
 
 def drive(
@@ -81,6 +149,7 @@ def drive(
     solver: Solver | None = None,
     *,
     tolerance: float = 1e-8,
+    contact_tolerance: float | None = None,
     max_iterations: int | None = None,
     time_limit: float | None = None,
     start: Iterate | FrictionSolution | None = None,
@@ -88,7 +157,9 @@ def drive(
 ) -> FrictionSolution:
     """Run a solver until the judge is content or a limit is met; never raises for a failure.
 
-    tolerance: on the unit-free error of `judge`.  time_limit in seconds.
+    tolerance: on the unit-free error of `judge`; contact_tolerance: on the contactwise one, by
+    default the square root of the tolerance, infinite to ask for the first alone.  time_limit
+    in seconds.
     callback(step, iterate) is called after every iterate; returning True stops.  Ctrl-C gives
     the outcome STOPPED with the best iterate.  Raises UnsupportedForm when the solver needs
     the other form.
@@ -100,7 +171,7 @@ def drive(
         )
     if callback is not None and not callable(callback):
         raise InvalidInput(f"callback: expected a function, got {callback!r}")
-    _check_options(tolerance, max_iterations, time_limit)
+    _check_options(tolerance, contact_tolerance, max_iterations, time_limit)
     if problem.form is Form.NITSCHE:
         if not getattr(solver, "nitsche", False):
             raise UnsupportedForm(f"{type(solver).__name__}: {NO_MULTIPLIERS}")
@@ -114,7 +185,8 @@ def drive(
         )
     if not getattr(solver, "matrix_free", False):
         problem = problem.assembled()
-    watch = _Watch(problem, tolerance)
+    allowed = np.sqrt(tolerance) if contact_tolerance is None else contact_tolerance
+    watch = _Watch(problem, tolerance, float(allowed))
     deadline = watch.started + (time_limit if time_limit is not None else np.inf)
     outcome, detail = _run(
         watch,
@@ -135,15 +207,45 @@ def _run(
     limit: float,
     callback: Callback | None,
 ) -> tuple[Outcome, str]:
-    """The loop; returns why it ended."""
+    """Start the solver, and again with a tighter goal while only contacts are not settled."""
     try:
-        step = watch.judge(_with_motion(watch.problem, start))
-        if step.error <= target.tolerance:
+        watch.judge(_with_motion(watch.problem, start))
+        if watch.converged:
             return Outcome.CONVERGED, ""
+        ended = (Outcome.STAGNATED, "")
+        while target.tolerance >= TIGHTEST:
+            if watch.weak:
+                goal = watch.tighter(target.tolerance)
+                start, target = watch.best or start, replace(target, tolerance=goal)
+            ended = _once(watch, solver, start, target, limit, callback)
+            if ended is not None:
+                break
+        outcome, detail = ended or (Outcome.STAGNATED, "")
+    except KeyboardInterrupt:
+        return Outcome.STOPPED, "by the user"
+    gave_up = outcome in (Outcome.STAGNATED, Outcome.BREAKDOWN, Outcome.CYCLED)
+    if watch.weak and gave_up:
+        return Outcome.WEAK_CONTACTS, watch.in_words
+    return outcome, "; ".join(text for text in (detail, watch.in_words) if text)
+
+
+def _once(
+    watch: _Watch,
+    solver: Solver,
+    start: Iterate,
+    target: Target,
+    limit: float,
+    callback: Callback | None,
+) -> tuple[Outcome, str] | None:
+    """The loop over the iterates of one start.
+
+    Returns why it ended; None when the error is below the target, but not that of contacts.
+    """
+    try:
         for iterate in solver.iterates(watch.problem, start, target):
             step = watch.judge(iterate)
             stop = callback is not None and callback(step, iterate)
-            if step.error <= target.tolerance:
+            if watch.converged:
                 return Outcome.CONVERGED, iterate.stage
             if stop:
                 return Outcome.STOPPED, "by the callback"
@@ -153,6 +255,8 @@ def _run(
                 return Outcome.MAX_ITERATIONS, ""
             if time.perf_counter() > target.deadline:
                 return Outcome.TIME_LIMIT, ""
+            if watch.weak and step.error <= target.tolerance:
+                return None
             if watch.cycled(iterate, step.error):
                 return Outcome.CYCLED, ""
             if watch.stagnated:
@@ -165,8 +269,6 @@ def _run(
         return Outcome.BREAKDOWN, str(reason)
     except ArithmeticError as reason:
         return Outcome.NON_FINITE, str(reason)
-    except KeyboardInterrupt:
-        return Outcome.STOPPED, "by the user"
 
 
 def _finish(watch: _Watch, outcome: Outcome, detail: str, solver: Solver) -> FrictionSolution:
@@ -179,11 +281,16 @@ def _finish(watch: _Watch, outcome: Outcome, detail: str, solver: Solver) -> Fri
         u, v = _at_rest(problem)  # stopped in the first factorisation: do not start it again
     else:
         u, v = _velocity(problem, best.r)
+    error, weakest = watch.error, watch.weakest
+    if watch.best is not None and problem.rounding(best.r) > BLUR * error:
+        error = max(error, problem.certain_error(best.r, best.v))
+    if weakest is None and watch.best is not None:
+        weakest = problem.weakest(best.r, best.v)
     seconds = time.perf_counter() - watch.started
     record = Convergence(
         outcome,
         watch.iterations,
-        watch.error,
+        error,
         watch.tolerance,
         tuple(watch.history),
         watch.linear_iterations,
@@ -191,6 +298,9 @@ def _finish(watch: _Watch, outcome: Outcome, detail: str, solver: Solver) -> Fri
         type(solver).__name__,
         measure,
         detail,
+        contact_error=None if weakest is None else weakest.error,
+        contact_tolerance=watch.contact_tolerance,
+        weakest=None if weakest is None else weakest.contact,
     )
     return FrictionSolution(problem, best.r, u, v, record)
 
@@ -263,8 +373,17 @@ def _check_number(name: str, value: object) -> None:
         raise InvalidInput(f"{name}: expected a number, got {value!r}")
 
 
-def _check_options(tolerance: float, max_iterations: int | None, limit: float | None) -> None:
+def _check_options(
+    tolerance: float, contact_tolerance: float | None, max_iterations: int | None,
+    limit: float | None,
+) -> None:  # fmt: skip
     _check_number("tolerance", tolerance)
+    if contact_tolerance is not None:
+        _check_number("contact_tolerance", contact_tolerance)
+        if not contact_tolerance > 0:
+            raise InvalidInput(
+                f"contact_tolerance: expected a number > 0, got {contact_tolerance}"
+            )
     if max_iterations is not None:
         _check_number("max_iterations", max_iterations)
     if limit is not None:

@@ -73,7 +73,7 @@ def test_reactions_that_swallow_q_are_no_solution(d):
     start = am.solvers.Iterate(r)
     found = am.solve(problem, am.GaussSeidel(), start=start, max_iterations=3, check=False)
     assert not found.converged
-    assert found.convergence.error > 1
+    assert found.convergence.error >= 1  # the exact error of these reactions
 
 
 def test_rounding_is_small_for_honest_reactions():

@@ -12,7 +12,7 @@ import amontons
 PACKAGE = Path(amontons.__file__).parent
 ORDER = (
     "errors < clock < warned < files < checked_arrays < cones < linear < blocks < "
-    "condensation < global_matrices < judge < problem < "
+    "condensation < global_matrices < judge < judge_sharp < problem < "
     "nitsche_problem < one_sided < one_contact < status < solution < solvers < solve < fem < "
     "contact < model < masonry < granular < hild < vee < evolution < analysis < gallery < "
     "fclib < checkpoint < expressions < case < vtk < plots < output < results < report < api "

@@ -50,6 +50,7 @@ ENDINGS = [
     (Scripted([0.5]), {}, Outcome.STAGNATED, 1),
     (Scripted([0.5, 0.3, 0.5, 0.3]), {}, Outcome.CYCLED, 3),
     (Scripted([0.5, np.nan, 0.0]), {}, Outcome.NON_FINITE, 2),
+    (Scripted([0.5, 1e-9]), {"contact_tolerance": 1e-12}, Outcome.WEAK_CONTACTS, 4),
     (Scripted([0.5], Breakdown("no direction")), {}, Outcome.BREAKDOWN, 1),
     (Scripted([0.5], KeyboardInterrupt()), {}, Outcome.STOPPED, 1),
     (

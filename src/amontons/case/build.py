@@ -143,15 +143,18 @@ def _settings(top: Table) -> Settings:
     tolerance = table.number("tolerance", 1e-8)
     if not 0 < tolerance < 1:
         raise table.error("tolerance", f"expected a number between 0 and 1, got {tolerance}")
+    single = table.number("contact_tolerance") if "contact_tolerance" in table.data else None
+    if single is not None and not single > 0:
+        raise table.error("contact_tolerance", f"expected a number > 0, got {single}")
     limits = [table.whole(key) for key in LIMITS]
     seconds = table.number("time_limit") if "time_limit" in table.data else None
     if seconds is not None and not seconds > 0:
         raise table.error("time_limit", f"expected seconds > 0, got {seconds}")
-    used = ("method", "tolerance", "time_limit", *LIMITS)
+    used = ("method", "tolerance", "contact_tolerance", "time_limit", *LIMITS)
     options = {key: value for key, value in table.data.items() if key not in used}
     with Blame(table, "method"):
         method_class(method)
     with Blame(top, ""):  # its messages begin with solver.FIELD
         make_solver(method, options)
     limit = next((value for value in limits if value is not None), None)
-    return Settings(method, tolerance, limit, seconds, options)
+    return Settings(method, tolerance, single, limit, seconds, options)

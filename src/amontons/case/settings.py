@@ -25,6 +25,8 @@ from ..solvers.base import Solver
 
 LIMITS = ("max_iterations", "max_sweeps")  # one limit; the second in Gauss-Seidel's words
 
+NUMBERS = ("tolerance", "contact_tolerance", "time_limit")
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -32,6 +34,7 @@ class Settings:
 
     method: str = "auto"
     tolerance: float = 1e-8
+    contact_tolerance: float | None = None  # of every contact; the root of tolerance
     max_iterations: int | None = None
     time_limit: float | None = None  # seconds
     options: dict[str, Any] = field(default_factory=dict)

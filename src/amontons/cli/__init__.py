@@ -46,6 +46,8 @@ Examples:
 @click.argument("source")
 @click.option("--method", metavar="NAME", help="Solver, such as auto or gauss-seidel.")
 @click.option("--tolerance", type=float, metavar="X", help="Unit-free error to reach. [1e-8]")
+@click.option("--contact-tolerance", type=float, metavar="X",
+              help="Error of every contact on its own scale. [root of the tolerance]")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
               help="Replace a value of the case, mesh.cells=32, or of the solver, "
               "solver.tolerance=1e-6; may be repeated.")  # fmt: skip

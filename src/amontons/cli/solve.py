@@ -27,6 +27,7 @@ def run(
     source: str, method: str | None, tolerance: float | None, overrides: Sequence[str],
     max_iterations: int | None, time_limit: float | None, folder: str | None,
     json_copy: str | None, quiet: bool, full_verdict: bool,
+    contact_tolerance: float | None = None,
 ) -> int:  # fmt: skip
     """Solve and write; returns the exit code."""
     opened = open_source(source, overrides)
@@ -34,7 +35,9 @@ def run(
         raise FileFormatError(
             f"{source}: a case in time, it has [evolution]; use: amontons run {source}"
         )
-    settings = with_flags(opened.settings, method, tolerance, max_iterations, time_limit)
+    settings = with_flags(
+        opened.settings, method, tolerance, max_iterations, time_limit, contact_tolerance
+    )
     place = check_folder(f"{opened.name}-results" if folder is None else folder)
     check_writable(json_copy, "--json")
     began = time.perf_counter()
@@ -44,6 +47,7 @@ def run(
     try:
         found = api.solve_any_form(
             opened.target, settings.solver(), tolerance=settings.tolerance,
+            contact_tolerance=settings.contact_tolerance,
             max_iterations=settings.max_iterations, time_limit=settings.time_limit,
             callback=(lambda step, iterate: None) if silent else None,
         )  # fmt: skip

@@ -23,7 +23,7 @@ from ..case import (
     read_case,
 )
 from ..case.overrides import set_value, split_override
-from ..case.settings import LIMITS
+from ..case.settings import LIMITS, NUMBERS
 from ..errors import FileFormatError, InvalidInput, SingularOperator
 from ..expressions import nearest
 from ..nitsche_problem import NitscheProblem
@@ -179,7 +179,7 @@ def override_settings(settings: Settings, overrides: Sequence[str]) -> Settings:
     """Settings changed by `solver.field=value`; `make_solver` checks the fields."""
     for text in overrides:
         path, value = split_override(text)
-        named = path[1:2] and path[1] in (*LIMITS, "tolerance", "time_limit", "method")
+        named = path[1:2] and path[1] in (*LIMITS, *NUMBERS, "method")
         if path[0] != "solver" or len(path) < 2 or (named and len(path) > 2):
             raise InvalidInput(
                 f"--set {text}: expected solver.FIELD=VALUE, as this is not a case file"
@@ -189,7 +189,7 @@ def override_settings(settings: Settings, overrides: Sequence[str]) -> Settings:
             if type(value) is not int or value < 1:
                 raise InvalidInput(f"--set {text}: expected a whole number >= 1")
             settings = replace(settings, max_iterations=value)
-        elif key in ("tolerance", "time_limit"):
+        elif key in NUMBERS:
             if not isinstance(value, int | float) or isinstance(value, bool):
                 raise InvalidInput(f"--set {text}: expected a number")
             settings = replace(settings, **{key: float(value)})
@@ -206,6 +206,7 @@ def override_settings(settings: Settings, overrides: Sequence[str]) -> Settings:
 def with_flags(
     settings: Settings, method: str | None, tolerance: float | None,
     max_iterations: int | None = None, time_limit: float | None = None,
+    contact_tolerance: float | None = None,
 ) -> Settings:  # fmt: skip
     """Settings with the flags of the command line, which win; the solver is checked here."""
     if method is not None:
@@ -215,13 +216,17 @@ def with_flags(
             raise InvalidInput(f"--method: {reason}") from None
         settings = replace(settings, method=method)
     for key, value in (("tolerance", tolerance), ("max_iterations", max_iterations),
-                       ("time_limit", time_limit)):  # fmt: skip
+                       ("time_limit", time_limit),
+                       ("contact_tolerance", contact_tolerance)):  # fmt: skip
         if value is not None:
             settings = replace(settings, **{key: value})
     if not 0 < settings.tolerance < 1:
         raise InvalidInput(
             f"tolerance: expected a number between 0 and 1, got {settings.tolerance}"
         )
+    single = settings.contact_tolerance
+    if single is not None and not single > 0:
+        raise InvalidInput(f"contact-tolerance: expected a number > 0, got {single}")
     if settings.time_limit is not None and not settings.time_limit > 0:
         raise InvalidInput(f"time-limit: expected seconds > 0, got {settings.time_limit}")
     make_solver(settings.method, settings.options)

@@ -184,8 +184,10 @@ class MovingModel:
         active = self._last_active[0]
         if self._last_part is None or not np.array_equal(self._last_part[0], active):
             self._last_part = (active, self._whole.restricted(active))
-        q = problem.free_velocity
-        return replace(self._last_part[1], q=q, law=problem.law, name=problem.name)
+        return replace(
+            self._last_part[1], q=problem.free_velocity, blur=problem.free_blur,
+            law=problem.law, name=problem.name,
+        )  # fmt: skip
 
     def _creating(self, impulse: Array, v_theta: Array, energies: Energies) -> Mask:
         """Contacts whose impulse creates energy, (nc,); none if all together dissipate."""

@@ -35,7 +35,7 @@ from ..cones import Law
 from ..contact.current import STICK, ContactPoint, Pieces
 from ..contact.nodal import contact_columns
 from ..errors import InvertedCells
-from ..judge import Measure
+from ..judge import Measure, Weakest
 from ..problem import Form, FrictionProblem
 from ..solution import FrictionSolution
 from .assembly import external_load
@@ -195,6 +195,21 @@ class LargeDeformation:
         length = np.hypot(np.linalg.norm(u), np.linalg.norm(r / self.rho[:, None]))
         least = self.parts.resolved
         return max(float(load), least[0]), max(float(length), least[1])
+
+    def weakest(self, r: Array, v: Array | None = None) -> Weakest:
+        """The contact farthest from its law beside its own gap, slip and r / rho."""
+        if v is None or not (np.isfinite(v).all() and np.isfinite(r).all()):
+            return Weakest(np.inf, None)
+        try:
+            u = self._local(v)[1]
+        except InvertedCells:
+            return Weakest(np.inf, None)
+        own = np.linalg.norm(u, axis=1) + np.linalg.norm(r / self.rho[:, None], axis=1)
+        return judge.weakest_of(r, u, self.law, self.rho, own + self.parts.resolved[1])
+
+    def certain_error(self, r: Array, v: Array | None = None) -> float:
+        """The error, or what rounding may hide in it where that is more."""
+        return max(self.error(r, v), self.rounding(r))
 
     def rounding(self, r: Array) -> float:
         """What rounding alone may hide in `error`: its scales take care of that."""

@@ -12,7 +12,7 @@ three-dimensional contact problems with Coulomb friction", SIAM J. Sci. Comput. 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import ClassVar, Protocol
 
@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..cones import Coulomb
+from ..cones import Coulomb, Law
 from ..errors import InvalidInput, SingularOperator
 from ..linear import Direct, LinearSolver
 from ..one_sided import HELD, OneSided, one_sided
@@ -36,10 +36,10 @@ from .active_multigrid import ContactCycles, MultigridCycle
 from .active_nested import coarser
 from .augmentation import own_blocks
 from .base import Breakdown, Iterate, Target, check_at_least, check_positive
+from .driven import able_directions, driven_directions, sliding_rho
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-NO_STIFFNESS = 1e-13  # relative compliance below which a direction can not react
 EXACT = 1e-12  # relative residual at which cycles count as an exact solution
 NESTED = 1e-8  # relative change at which a coarse solution is good enough as a start
 MOST_NESTED = 100  # steps on a coarse level after which its last state has to do
@@ -118,9 +118,12 @@ class ActiveSet:
         state = system.state(start)
         bound = _Bound(self, problem, state)
         settings = self._settings(problem)
+        driven = driven_directions(problem).any(axis=1)
         first = not start.r.any()
         while True:
-            given = self._conditions(problem, state, bound.update(state), first, settings)
+            g = bound.update(state)
+            now = _sliding(settings, driven, problem.law, state, g)
+            given = self._conditions(problem, state, g, first, now)
             try:
                 new = system.step(given, state)
             except SingularOperator as reason:
@@ -184,6 +187,11 @@ class ActiveSet:
                 "multigrid needs a slave node of its own for every contact; use the direct "
                 "solver (multigrid = None)"
             )
+        if driven_directions(problem).any():
+            raise Breakdown(
+                "multigrid needs contact nodes that supports do not move along the surface; "
+                "use the direct solver (multigrid = None)"
+            )
         return Cycles(problem, basis, self.multigrid, self.cycles)
 
 
@@ -237,6 +245,19 @@ class _Bound:
         return float(np.linalg.norm(new.v - self.v)) / size
 
 
+def _sliding(
+    settings: Settings, driven: Mask, law: Law, state: State, g: Array
+) -> Settings:
+    """The settings with which driven contacts are seen to slide."""
+    if not driven.any():
+        return settings
+    pressed = state.r.copy()
+    pressed[:, 0] -= np.minimum(settings.c_normal * state.u[:, 0], 0.0)
+    reached = np.maximum(g, law.bound(pressed))
+    c = sliding_rho(settings.c_tangential, driven, reached, state.u)
+    return replace(settings, c_tangential=c)
+
+
 def _bonded(problem: FrictionProblem) -> Conditions:
     """All contacts closed and sticking: M alone may be singular in the first step."""
     nc, d = problem.contacts, problem.dimension
@@ -250,9 +271,8 @@ class Saddle:
 
     def __init__(self, problem: FrictionProblem, linear: LinearSolver) -> None:
         self.problem, self.linear = problem, linear
+        self.able, self.driven = able_directions(problem), driven_directions(problem)
         own = np.diagonal(own_blocks(problem), axis1=1, axis2=2)
-        self.able = own > NO_STIFFNESS * own.max(axis=1, keepdims=True, initial=0.0)
-        self.able &= self.able[:, :1]
         largest = own.max(axis=1, initial=0.0)
         self.rho = 1 / np.where(largest > 0, largest, 1.0)
 
@@ -262,18 +282,22 @@ class Saddle:
 
     def step(self, given: Conditions, state: State) -> State:
         """A sparse factorisation; rows of displacements are scaled to the unit of r."""
-        p, able = self.problem, self.able[:, :, None]
+        p, able = self.problem, self._able(given)[:, :, None]
         assert p.M is not None and p.H is not None and p.f is not None and p.w is not None
         nc, d = p.contacts, p.dimension
         scale = np.where(np.einsum("kii->ki", given.G_r) == 0, self.rho[:, None], 1.0)
         rows_u = given.G_u * scale[:, :, None] * able
         rows_r = given.G_r * scale[:, :, None] * able + (~able) * np.eye(d)
-        b = (given.b * scale - np.einsum("kij,kj->ki", rows_u, p.w)) * self.able
+        b = (given.b * scale - np.einsum("kij,kj->ki", rows_u, p.w)) * able[:, :, 0]
         G_u, G_r = _block_diagonal(rows_u), _block_diagonal(rows_r)
         matrix = sparse.block_array([[p.M, -p.H], [G_u @ p.H.T, G_r]], format="csc")
         x = self.linear.factor(matrix).solve(np.concatenate([p.f, b.ravel()]))
         v, r = x[: p.unknowns], x[p.unknowns :].reshape(nc, d)
         return State(r, p.local_velocity(v), v, 1)
+
+    def _able(self, given: Conditions) -> Mask:
+        """Directions with a condition on r: driven ones while it is not that they stick."""
+        return self.able | (self.driven & given.G_r.any(axis=2))
 
     def displacement(self, state: State) -> Array:
         """v as it is."""

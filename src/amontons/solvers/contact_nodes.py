@@ -19,6 +19,9 @@ The tangent at the states found, in the displacements of the node, n and T the c
 
 t: direction of slip as a vector of the node.  The test space of Coulomb slip holds all
 directions in which a force r_N (n - mu t) does no work.  Under Tresca's law W = V.
+
+A tangent that a support drives (`driven`) has no column in H and no row in W; its part of r
+moves nothing and is the friction that the law gives for u.
 """
 
 from __future__ import annotations
@@ -35,6 +38,7 @@ from ..linear.hierarchy import Nodes
 from ..linear.node_blocks import NodeBlocks, row_product
 from ..one_contact import OPEN, SLIP, solve_contact
 from ..one_sided import HELD, OneSided
+from .driven import moves
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -63,6 +67,7 @@ class ContactNodes:
     w: Array = field(default_factory=lambda: np.zeros((0, 3)))
     coefficient: Array = field(default_factory=lambda: np.zeros(0))
     tresca: bool = False
+    driven: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 3), dtype=bool))
     r: Array = field(init=False)
     u: Array = field(init=False)
     state: NDArray[np.int8] = field(init=False)
@@ -88,7 +93,14 @@ class ContactNodes:
 
     def with_law(self, w: Array, coefficient: Array, tresca: bool, rho: Array) -> ContactNodes:
         """The contacts under a law, without states."""
-        return replace(self, w=w, coefficient=coefficient, tresca=tresca, rho=rho)
+        driven = (np.abs(self.H).max(axis=1, initial=0.0) == 0) & moves(w)
+        compliance = self.compliance
+        if driven.any():
+            compliance = compliance.copy()
+            k, i = np.nonzero(driven)
+            compliance[k, i, i] = 0.0
+        return replace(self, w=w, coefficient=coefficient, tresca=tresca, rho=rho,
+                       driven=driven, compliance=compliance)  # fmt: skip
 
     @classmethod
     def of(
@@ -121,7 +133,7 @@ class ContactNodes:
         """
         return _natural_map(
             self.node, self.H, self.to_reaction, self.w, self.coefficient, self.tresca,
-            self.rho, x, residual, self.r, self.u,
+            self.rho, self.driven, x, residual, self.r, self.u,
         )  # fmt: skip
 
     def tangent(self) -> tuple[Array, Array, Array]:
@@ -223,7 +235,7 @@ def _code(kind, r1, r2, coefficient, tresca):
 
 
 @njit(cache=True, error_model="numpy")
-def _natural_map(node, H, to_reaction, w, coefficient, tresca, rho, x, residual, r, u):  # noqa: PLR0913
+def _natural_map(node, H, to_reaction, w, coefficient, tresca, rho, driven, x, residual, r, u):  # noqa: PLR0913
     total = 0.0
     for c in range(len(node)):
         p = node[c]
@@ -235,6 +247,12 @@ def _natural_map(node, H, to_reaction, w, coefficient, tresca, rho, x, residual,
                 force -= to_reaction[c, i, a] * residual[p, a]
             u[c, i] = s
             r[c, i] = force
+        if driven[c, 1] or driven[c, 2]:
+            bound = coefficient[c] if tresca else coefficient[c] * max(r[c, 0], 0.0)
+            slip = np.sqrt(u[c, 1] ** 2 + u[c, 2] ** 2)
+            for i in range(1, 3):
+                if driven[c, i] and slip > 0.0:
+                    r[c, i] = -bound * u[c, i] / slip
         if rho[c] > 0.0:
             e0, e1, e2 = contact_residual(
                 r[c, 0], r[c, 1], r[c, 2], u[c, 0], u[c, 1], u[c, 2], rho[c], coefficient[c],

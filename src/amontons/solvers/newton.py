@@ -37,9 +37,10 @@ from ..errors import InvalidInput, SingularOperator
 from ..linear import Direct, LinearSolver
 from ..nitsche_problem import NitscheProblem
 from ..problem import Form, FrictionProblem
-from .augmentation import RhoStrategy, augmentation, own_blocks
+from .augmentation import RhoStrategy, augmentation
 from .base import Breakdown, Iterate, Target, check_positive
 from .block_lu import Symbolic, newton_step_inplace
+from .driven import able_directions, driven_directions, sliding_rho
 from .functions import AlartCurnier, ComplementarityFunction, Linearised, NaturalMap, columns
 from .line_search import LineSearch, NonMonotone
 from .nitsche_newton import newton_iterates
@@ -51,7 +52,6 @@ DENSE_UNKNOWNS = (
 BLOCK_CONTACTS = 1000  # above, minimum degree itself would take long
 BLOCK_WORK, BLOCK_SHARE = 4e6, 0.25  # products of blocks: number, part of those of a full W
 TRUSTED = 1e-6  # residual of a step, relative to F, up to which an LU in blocks is believed
-NO_STIFFNESS = 1e-13  # relative compliance below which a direction can not react
 FORCING = (1e-10, 0.1)  # smallest and largest relative tolerance of GMRES
 
 
@@ -166,14 +166,16 @@ class _Residual:
     """A complementarity function on one problem.
 
     Directions that can not react keep r = 0: contacts with W_ii = 0, and tangents that a
-    support holds already.
+    support holds already at rest.  Those that it drives have a rho with which they slide.
     """
 
     def __init__(
         self, function: ComplementarityFunction, problem: FrictionProblem, rho: Array
     ) -> None:
         self.function, self.law, self.rho = function, problem.law, rho
-        self.able = _able(problem)
+        driven = driven_directions(problem)
+        self.able, self.driven = able_directions(problem) | driven, driven.any(axis=1)
+        self.now = rho
         self.rows = columns(rho, problem.dimension)
         self.blocked = (~self.able)[:, :, None] * np.eye(problem.dimension)
 
@@ -183,24 +185,31 @@ class _Residual:
 
     def evaluate(self, state: State) -> Array:
         """F, (nc, d), unit of r."""
-        return self.admissible(self.function.residual(state.r, state.u, self.law, self.rho))
+        return self.admissible(self.function.residual(state.r, state.u, self.law, self.now))
 
     def linearise(self, state: State) -> Linearised:
         """(F, A, B), with rows A = 1 and B = 0 in directions that can not react."""
-        F, A, B = self.function.linearise(state.r, state.u, self.law, self.rho)
+        self.now = self._sliding(state)
+        F, A, B = self.function.linearise(state.r, state.u, self.law, self.now)
         able = self.able[:, :, None]
         return self.admissible(F), A * able + self.blocked, B * able
+
+    def _sliding(self, state: State) -> Array:
+        """rho, (nc,) or (nc, 2), for the next step: driven contacts slide with it."""
+        if not self.driven.any():
+            return self.rho
+        normal, tangent = columns(self.rho, 2).T if self.rho.ndim == 2 else (self.rho,) * 2
+        pressed = state.r.copy()
+        pressed[:, 0] = np.maximum(state.r[:, 0], state.r[:, 0] - normal * state.u[:, 0])
+        bound = np.maximum(self.law.bound(pressed), 0.0)
+        tangent = sliding_rho(tangent, self.driven, bound, state.u)
+        if isinstance(self.function, NaturalMap):
+            return tangent
+        return np.column_stack([normal, tangent])
 
     def size(self, F: Array) -> float:
         """|F / rho|, unit of u."""
         return float(np.linalg.norm(F / self.rows))
-
-
-def _able(problem: FrictionProblem) -> NDArray[np.bool_]:
-    """Directions, (nc, d), in which a reaction moves its own contact; none without a normal."""
-    own = np.diagonal(own_blocks(problem), axis1=1, axis2=2)
-    able = own > NO_STIFFNESS * own.max(axis=1, keepdims=True, initial=0.0)
-    return able & able[:, :1]
 
 
 def block_diagonal(blocks: Array) -> sparse.csr_array:

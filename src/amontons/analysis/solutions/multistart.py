@@ -238,7 +238,7 @@ def orientation(stack: Stack, r: Array) -> tuple[int, int]:
 
 def certain_error(problem: FrictionProblem, r: Array) -> float:
     """Error by the judge, or what rounding of huge reactions may hide of it, if more."""
-    return max(problem.error(r), problem.rounding(r))
+    return problem.certain_error(r)
 
 
 def described(stack: Stack, r: Array) -> PieceSolution:
