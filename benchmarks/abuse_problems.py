@@ -251,6 +251,22 @@ def scaled_rows(random: Random) -> Case:
     return Case(FrictionProblem.from_delassus(W, q, law), r, True)
 
 
+def contacts_in_own_units(case: Case, random: Random) -> Case:
+    """The same problem with every contact in units of its own, apart by up to 1e18.
+
+    Where there is no solution, growing forces may yet come as close to one as both errors ask.
+    """
+    p = case.problem
+    nc, d = p.contacts, p.dimension
+    scale = 10.0 ** random.uniform(-9, 9, nc)
+    S = np.repeat(scale, d)
+    W = S[:, None] * p.W * S
+    law = Tresca(p.law.limit / scale) if isinstance(p.law, Tresca) else p.law
+    other = FrictionProblem.from_delassus(W, scale[:, None] * np.asarray(p.q), law)
+    known = None if case.known is None else case.known / scale[:, None]
+    return replace(case, problem=other, known=known, solvable=case.solvable or None)
+
+
 def small_load(random: Random) -> Case:
     """q tiny or zero."""
     case = regular(random)
@@ -284,6 +300,32 @@ def dead_contacts(random: Random) -> Case:
             r[i, 2] = -law.coefficient[i] * r[i, 0] * np.sign(u[i, 2])
     q = u - (W @ r.ravel()).reshape(nc, d)
     return Case(FrictionProblem.from_delassus(W, q, law), r, True)
+
+
+def driven_contacts(random: Random) -> Case:
+    """Tangents that supports drive: W is zero there, and they slide at a given speed."""
+    nc, d = sizes(random)
+    W = full(random, nc * d)
+    driven = random.random(nc) < 0.5
+    rows = np.zeros((nc, d), bool)
+    rows[driven, 1] = True
+    W[rows.ravel()] = 0
+    W[:, rows.ravel()] = 0
+    law = coulomb(random, nc)
+    r, u = obeying(random, law, d)
+    for i in np.flatnonzero(driven):
+        u[i, 1] = random.choice([-1.0, 1.0]) * 10.0 ** random.uniform(-6, 1)
+        if d == 3 and r[i, 0] > 0:
+            u[i, 2] = random.standard_normal()
+        r[i, 1:] = -law.coefficient[i] * r[i, 0] * u[i, 1:] / norm_of(u[i, 1:])
+    q = u - (W @ r.ravel()).reshape(nc, d)
+    q[rows] = u[rows]
+    return Case(FrictionProblem.from_delassus(W, q, law), r, True)
+
+
+def norm_of(x: Array) -> float:
+    """Euclidean length."""
+    return float(np.linalg.norm(x))
 
 
 def unsymmetric(random: Random) -> Case:
@@ -381,10 +423,23 @@ FAMILIES: dict[str, Callable[[Random], Case]] = {
     for family in (
         regular, rank_deficient, hyperstatic, frictionless, friction_5, friction_mixed,
         friction_huge, uniform_state, kinks, repeated, units, units_extreme, mixed_bodies,
-        scaled_rows, small_load, dead_contacts, unsymmetric, tresca, one_contact,
-        many_contacts, single_precision, global_form, held_by_contact, impossible,
+        scaled_rows, small_load, dead_contacts, driven_contacts, unsymmetric, tresca,
+        one_contact, many_contacts, single_precision, global_form, held_by_contact, impossible,
     )
 }  # fmt: skip
+
+
+RESCALED = tuple(
+    name for name in FAMILIES
+    if name not in ("units extreme", "single precision", "global form", "held by contact")
+)  # fmt: skip
+
+
+def draw_rescaled(seed: int, number: int) -> tuple[str, Case]:
+    """Problem `number` of a run of families in the Delassus form, contacts in own units."""
+    name = RESCALED[number % len(RESCALED)]
+    random = np.random.default_rng([seed, number, 2])
+    return name, contacts_in_own_units(FAMILIES[name](random), random)
 
 
 def draw(seed: int, number: int) -> tuple[str, Case]:

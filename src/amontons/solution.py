@@ -89,18 +89,21 @@ class Convergence:
         return self.outcome.advice
 
     @property
-    def _of_contacts(self) -> str:
-        """The error of the weakest contact where that is too large."""
+    def errors(self) -> str:
+        """The error beside its tolerance, and that of the weakest contact where it decides."""
+        sign = "<=" if self.error <= self.tolerance else ">"
+        text = f"error {self.error:.1e} {sign} {self.tolerance:.0e}"
         if self.contact_error is None or self.contact_error <= self.contact_tolerance:
-            return ""
-        return f", of contact {self.weakest} {self.contact_error:.1e}"
+            return text
+        return (
+            f"{text}, contact {self.weakest} {self.contact_error:.1e} > "
+            f"{self.contact_tolerance:.0e} of its own scale"
+        )
 
     def __str__(self) -> str:
-        sign = "<=" if self.error <= self.tolerance else ">"
         text = (
-            f"{self.outcome.name.lower().replace('_', ' ')} with {self.solver}: error "
-            f"{self.error:.1e} {sign} {self.tolerance:.0e}{self._of_contacts} after "
-            f"{self.iterations} iterations in {self.seconds:.3g} s"
+            f"{self.outcome.name.lower().replace('_', ' ')} with {self.solver}: {self.errors} "
+            f"after {self.iterations} iterations in {self.seconds:.3g} s"
         )
         return f"{text} ({self.detail})" if self.detail else text
 

@@ -100,8 +100,9 @@ class _Watch:
             mu = law.mu.max(initial=0.0) if isinstance(law, Coulomb) else 0.0
             if mu * EPSILON > self.tolerance:
                 return (
-                    f"rounding of the slip, times friction of {mu:.0e}, is above the tolerance: "
-                    "hold contacts that can not slip by supports, or take mu below 1e7"
+                    f"rounding of the slip, times friction of {mu:.0e}, is above the "
+                    "tolerance: hold contacts that can not slip by supports, or take mu below "
+                    "1e7"
                 )
             if hidden > self.tolerance:
                 return (

@@ -12,7 +12,7 @@ from amontons.errors import InvalidInput
 from amontons.problem import FrictionProblem
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
-PROBLEMS, SEED = 96, 20
+PROBLEMS, SEED = 100, 20
 MISSED = 3  # solvable problems that Auto may leave, of those that are solvable
 HOURS = 3600.0  # no time limit: iterations end what does not converge
 
@@ -40,6 +40,11 @@ def test_unkind_problems(abuse):
     assert len(missed) <= MISSED, missed
 
 
+def test_contacts_in_units_of_their_own(abuse):
+    runs = abuse.abuse_rescaled(len(abuse.RESCALED), SEED, limit=HOURS, iterations=2000)
+    assert [text for run in runs for text in run.findings] == []
+
+
 def test_the_check_sees_a_wrong_answer(abuse):
     """The same checks on an answer that is none."""
     case = abuse.FAMILIES["regular"](np.random.default_rng(1))
@@ -51,7 +56,11 @@ def test_the_check_sees_a_wrong_answer(abuse):
         case.problem, r, case.problem.velocity(r)[0], None, found.convergence
     )
     assert any("reported" in text for text in abuse.faults(case, wrong))
-    assert any("called converged" in text for text in abuse.faults(case, wrong))
+    assert any("called converged at" in text for text in abuse.faults(case, wrong))
+    weak = FrictionProblem.from_delassus(np.eye(4), [[-1, 0], [1e9, 0]], [0.3, 0.3])
+    found = am.solve(weak, contact_tolerance=np.inf)
+    texts = abuse.faults(abuse.Case(weak, None, True), found)
+    assert [text for text in texts if "of its own scale" in text]
 
 
 def closing_walls(d):

@@ -90,6 +90,16 @@ def test_solver_table(write):
     assert settings.solver() == GaussSeidel(batch=5)
 
 
+def test_contact_tolerance(write):
+    text = "[solver]\ncontact_tolerance = 1e-5\n"
+    settings = read_case(write("[[contact]]", f"{text}[[contact]]")).settings
+    assert settings.contact_tolerance == 1e-5
+    for wrong in ("0", "-1", '"small"'):
+        text = f"[solver]\ncontact_tolerance = {wrong}\n"
+        with pytest.raises(FileFormatError, match=r"solver\.contact_tolerance"):
+            read_case(write("[[contact]]", f"{text}[[contact]]"))
+
+
 @pytest.mark.parametrize(
     ("old", "new", "key"),
     [("coulomb = 1.0", 'coulomb = "0.2*t"', "contact[0].friction.coulomb"),

@@ -87,6 +87,22 @@ def test_not_converged_is_exit_code_1_with_results(folder):
     assert data["outcome"] == "max_iterations"
 
 
+def test_contacts_are_judged_one_by_one(folder):
+    weak = am.FrictionProblem.from_delassus(np.eye(6), [[-1, 0, 0], [1e9, 0, 0]], [0.3, 0.3])
+    write_fclib(weak, "weak.hdf5")
+    data = json.loads(run("solve", "weak.hdf5", "--json", "-").stdout)
+    assert (data["outcome"], data["contact_tolerance"]) == ("converged", 1e-4)
+    assert data["contact_error"] <= 1e-4
+    flags = ["--contact-tolerance", 10, "--json", "-"]
+    data = json.loads(run("solve", "weak.hdf5", *flags).stdout)
+    assert (data["weakest"], data["outcome"]) == (0, "converged")
+    assert data["contact_error"] > 0.5
+    flags = ["--set", "solver.contact_tolerance=0.5", "--json", "-"]
+    assert json.loads(run("solve", "weak.hdf5", *flags).stdout)["contact_tolerance"] == 0.5
+    for flags in (["--contact-tolerance", 0], ["--set", "solver.contact_tolerance=-1"]):
+        assert run("solve", "weak.hdf5", *flags).exit_code == 2
+
+
 def test_interrupted_is_exit_code_130_with_results(folder, monkeypatch):
     def iterates(self, problem, start, target):
         from amontons.solvers import Iterate

@@ -112,7 +112,7 @@ def test_named_outcome():
     assert found.convergence.outcome is Outcome.WEAK_CONTACTS
     assert "contact 0" in found.convergence.detail
     assert found.convergence.error <= 1e-8
-    assert "of contact 0" in str(found.convergence)
+    assert ", contact 0 " in str(found.convergence)
     data = output.summary(output.Output(found))
     assert data["outcome"] == "weak_contacts"
     assert data["contact_error"] == pytest.approx(1 / (1 + 0.3**2) ** 0.5, rel=0.1)

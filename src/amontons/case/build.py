@@ -157,4 +157,4 @@ def _settings(top: Table) -> Settings:
     with Blame(top, ""):  # its messages begin with solver.FIELD
         make_solver(method, options)
     limit = next((value for value in limits if value is not None), None)
-    return Settings(method, tolerance, single, limit, seconds, options)
+    return Settings(method, tolerance, limit, seconds, options, single)

@@ -34,10 +34,10 @@ class Settings:
 
     method: str = "auto"
     tolerance: float = 1e-8
-    contact_tolerance: float | None = None  # of every contact; the root of tolerance
     max_iterations: int | None = None
     time_limit: float | None = None  # seconds
     options: dict[str, Any] = field(default_factory=dict)
+    contact_tolerance: float | None = None  # of every contact; the root of tolerance
 
     def solver(self) -> Solver:
         """The solver; raises InvalidInput for an unknown method or field."""
