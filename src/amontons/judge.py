@@ -37,8 +37,8 @@ twin is `cones.natural_map`, and the tests compare the two.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit, uint64
@@ -61,15 +61,16 @@ class Measure(Enum):
     NITSCHE = "nitsche"
 
 
-@dataclass(frozen=True)
-class Weakest:
+class Weakest(NamedTuple):
     """The contact that is farthest from its law on its own scale.
 
     error: unit-free; contact: its index, None where all contacts obey their law exactly.
+    hidden: error in the sum over all contacts that rounding may hide, unit-free.
     """
 
     error: float
     contact: int | None
+    hidden: float = 0.0
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -146,13 +147,24 @@ def natural_error(indptr, indices, data, q, coefficient, tresca, rho, r):
     return math.sqrt(total) if math.isfinite(total) else math.inf
 
 
+@njit(cache=True, error_model="numpy", inline="always")
+def hidden_square(r0, r1, r2, rho, coefficient, tresca):  # noqa: PLR0913
+    """|r / rho|^2 of a contact, times mu^2 where it sticks with mu > 1; unit of u squared."""
+    tangential = r1 * r1 + r2 * r2
+    size = (r0 * r0 + tangential) / (rho * rho)
+    if not tresca and coefficient > 1.0:
+        if math.sqrt(tangential) < STUCK * coefficient * r0:
+            size *= coefficient * coefficient
+    return size
+
+
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def weakest_contact(indptr, indices, data, q, coefficient, tresca, rho, r, floor):
-    """(largest contactwise error, its contact or -1); arguments as in `natural_error`.
+    """(largest contactwise error, its contact or -1, `rounding_error`), as `natural_error`.
 
     floor (nc,): unit of u, added to the scale of each contact.
     """
-    worst, contact = 0.0, -1
+    worst, contact, hidden = 0.0, -1, 0.0
     for i in range(len(coefficient)):
         u0, u1, u2 = q[i, 0], q[i, 1], q[i, 2]
         scale = floor[i] + math.sqrt(u0 * u0 + u1 * u1 + u2 * u2)
@@ -169,13 +181,16 @@ def weakest_contact(indptr, indices, data, q, coefficient, tresca, rho, r, floor
                 r[i, 0], r[i, 1], r[i, 2], u0, u1, u2, rho[i], coefficient[i], tresca
             )
             size = max(math.sqrt(e0 * e0 + e1 * e1 + e2 * e2), -PENETRATION * u0)
+            hidden += hidden_square(r[i, 0], r[i, 1], r[i, 2], rho[i], coefficient[i], tresca)
         elif r[i, 0] != 0.0 or r[i, 1] != 0.0 or r[i, 2] != 0.0:
             size = math.inf
         else:
             size = max(-u0, 0.0)
         if not size <= worst * scale:  # also where it is not a number
             worst, contact = (size / scale if scale > 0.0 else math.inf), i
-    return worst if worst == worst else math.inf, contact
+    if worst != worst or hidden != hidden:
+        worst = hidden = math.inf
+    return worst, contact, EPSILON * math.sqrt(hidden)
 
 
 @njit(cache=True, error_model="numpy")
@@ -184,21 +199,12 @@ def rounding_error(coefficient, tresca, rho, r):
 
     eps |r / rho|: huge reactions that cancel, as of a body between two closing walls, swallow
     q, and with it any error.  With large friction the rounding of the slip of a contact that
-    sticks counts mu times, as the slip does.  r (nc, d), rho as in `natural_error`.
+    sticks counts mu times, as the slip does.  r (nc, 3), rho as in `natural_error`.
     """
     total = 0.0
     for i in range(len(rho)):
         if rho[i] > 0.0:
-            size = 0.0
-            for k in range(r.shape[1]):
-                size += (r[i, k] / rho[i]) ** 2
-            if not tresca and coefficient[i] > 1.0:
-                tangential = 0.0
-                for k in range(1, r.shape[1]):
-                    tangential += r[i, k] * r[i, k]
-                if math.sqrt(tangential) < STUCK * coefficient[i] * r[i, 0]:
-                    size *= coefficient[i] * coefficient[i]
-            total += size
+            total += hidden_square(r[i, 0], r[i, 1], r[i, 2], rho[i], coefficient[i], tresca)
     return EPSILON * math.sqrt(total)
 
 

@@ -430,36 +430,39 @@ class FrictionProblem:
         if hidden <= error or self.measure is not Measure.EXACT:
             return max(error, hidden)
         p = self.condensed()
-        found, left = sharp_error(*p.kernel_data, np.ascontiguousarray(spatial(r)))
+        found, left = sharp_error(*p.kernel_data, _rows(r))
         return judge.ratio(max(found, left), p.q_norm)
 
     def _hidden(self, rho: Array, r: Array) -> float:
         tresca = isinstance(self.law, Tresca)
-        return judge.rounding_error(self.law.coefficient, tresca, rho, r)
+        return judge.rounding_error(self.law.coefficient, tresca, rho, _rows(r))
 
     def weakest(self, r: Array, v: Array | None = None) -> Weakest:
         """The contact farthest from its law on its own scale; arguments as in `error`."""
         if self.measure is Measure.EXACT:
             return self.condensed()._weakest_exact(r)
-        if v is None:
-            return Weakest(np.inf, None)
-        if not (np.isfinite(r).all() and np.isfinite(v).all()):
+        if v is None or not (np.isfinite(r).all() and np.isfinite(v).all()):
             return Weakest(np.inf, None)
         u, q = self.local_velocity(v), self.open_velocity
         rho = np.where(self.rho > 0, self.rho, np.inf)
         parts = (q, u - q, r / rho[:, None])
         scale = sum(np.linalg.norm(part, axis=1) for part in parts)
-        return judge.weakest_of(r, u, self.law, self.rho, scale)
+        found = judge.weakest_of(r, u, self.law, self.rho, scale)
+        return found._replace(hidden=self.rounding(r))
 
     def _weakest_exact(self, r: Array) -> Weakest:
-        floor = self.blur if self.blur is not None else np.zeros(self.contacts)
-        rows = np.ascontiguousarray(spatial(r))
-        error, contact = judge.weakest_contact(*self.kernel_data, rows, floor)
-        return Weakest(error, int(contact) if contact >= 0 else None)
+        data = self.kernel_data
+        error, contact, hidden = judge.weakest_contact(*data, _rows(r), self._floor)
+        hidden = judge.ratio(hidden, self.q_norm)
+        return Weakest(error, contact if contact >= 0 else None, hidden)
+
+    @cached_property
+    def _floor(self) -> Array:
+        return self.blur if self.blur is not None else np.zeros(self.contacts)
 
     def exact_error(self, r: Array) -> float:
         """The exact measure of the Delassus form."""
-        rows = r if r.shape[1] == 3 and r.flags.c_contiguous else spatial(r)
+        rows = _rows(r)
         size = self.q_norm
         if size == 0:
             return 0.0 if not rows.any() else np.inf
@@ -550,6 +553,11 @@ class FrictionProblem:
         nodes = hierarchy.nodes
         v = v + nodes.gather(hierarchy.estimate(nodes.spread(rest), ESTIMATED // 9))
         return self.local_velocity(v)
+
+
+def _rows(r: Array) -> Array:
+    """r as kernels take it, (nc, 3); the same array where it is so already."""
+    return r if r.shape[1] == 3 and r.flags.c_contiguous else spatial(r)
 
 
 def _law(mu: ArrayLike | Law) -> Law:

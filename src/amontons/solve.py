@@ -57,12 +57,12 @@ class _Watch:
         """Judge an iterate and remember it if it is the best."""
         error, weakest = self.problem.error(iterate.r, iterate.v), None
         if error <= self.tolerance:
-            if self.problem.rounding(iterate.r) > BLUR * self.tolerance:
+            weakest = self.problem.weakest(iterate.r, iterate.v)
+            if weakest is not None and weakest.hidden > BLUR * self.tolerance:
                 error = self.problem.certain_error(iterate.r, iterate.v)
-            if error <= self.tolerance:
-                weakest = self.problem.weakest(iterate.r, iterate.v)
-            else:
-                self.blurred += 1
+                if error > self.tolerance:
+                    weakest = None
+                    self.blurred += 1
         self.iterations += iterate.iterations
         self.linear_iterations += iterate.linear_iterations
         seconds = time.perf_counter() - self.started
@@ -186,8 +186,8 @@ def drive(
         )
     if not getattr(solver, "matrix_free", False):
         problem = problem.assembled()
-    allowed = np.sqrt(tolerance) if contact_tolerance is None else contact_tolerance
-    watch = _Watch(problem, tolerance, float(allowed))
+    allowed = tolerance**0.5 if contact_tolerance is None else contact_tolerance
+    watch = _Watch(problem, tolerance, allowed)
     deadline = watch.started + (time_limit if time_limit is not None else np.inf)
     outcome, detail = _run(
         watch,
@@ -283,10 +283,10 @@ def _finish(watch: _Watch, outcome: Outcome, detail: str, solver: Solver) -> Fri
     else:
         u, v = _velocity(problem, best.r)
     error, weakest = watch.error, watch.weakest
-    if watch.best is not None and problem.rounding(best.r) > BLUR * error:
-        error = max(error, problem.certain_error(best.r, best.v))
     if weakest is None and watch.best is not None:
         weakest = problem.weakest(best.r, best.v)
+        if weakest is not None and weakest.hidden > BLUR * error:
+            error = max(error, problem.certain_error(best.r, best.v))
     seconds = time.perf_counter() - watch.started
     record = Convergence(
         outcome,
