@@ -97,10 +97,11 @@ def page(pairs, options):
     machine = "; ".join(f"{key} {value}" for key, value in describe().items())
     lines = [
         "# This version against the one before", "",
-        f"Regenerate: `python benchmarks/against_before.py BEFORE/src --runs {options.runs}`; "
-        f"before: {options.name}.", "",
-        f"{machine}; one thread. CPU seconds, {options.runs} pairs of processes in turns: median "
-        "(lower and upper quartile) of the ratios. Of all files: the geometric mean in a pair.",
+        "Regenerate: `python benchmarks/against_before.py BEFORE/src --runs "
+        f"{options.runs}` (before: {options.name}).", "",
+        f"{machine}; one thread. CPU seconds, {options.runs} pairs of processes in turns: "
+        "median (lower and upper quartile) of the ratios. Of all files: the geometric mean in "
+        "a pair.",
     ]  # fmt: skip
     titles = {
         f"Now / before, converged by the error {SUM}": lambda now, before, key: (
