@@ -17,7 +17,7 @@ from ..model.nonlinear_parts import nonlinear_parts
 from .energy import Energies
 from .moreau_jean import Solve
 from .passage import Crossing, taken
-from .state import State, TimeStep
+from .state import State, TimeStep, undeformed
 from .system import Motion
 
 Array = NDArray[np.float64]
@@ -29,15 +29,27 @@ class LargeSlowModel:
     def __init__(self, model: Model, crossing: Crossing | None = None) -> None:
         self.motion, self.crossing = Motion(model), crossing
 
+    def begin(self, state: State) -> State:
+        """The state before the first step: undeformed, also where supports hold the body."""
+        return undeformed(state, self.motion)
+
+    def _known(self, state: State) -> tuple[Array, Array, Array]:
+        """Load, prescribed values (dofs,) and free displacements (n,) of the last state.
+
+        Those that the time of the state says, but none for a body at rest that is undeformed.
+        """
+        q = state.displacement
+        if not q.any() and not state.force.any():
+            return np.zeros_like(q), np.zeros_like(q), q[self.motion.parts.free]
+        return *self.motion.applied(state.time), q[self.motion.parts.free]
+
     def advance(self, state: State, time: float, solve: Solve) -> TimeStep:
         """One step from a state to a time; solve(problem, start) solves its problem."""
-        linear = self.motion.parts
         load, prescribed = self.motion.applied(time)
-        load_before, prescribed_before = self.motion.applied(state.time)
         q0 = state.displacement
         problem = large_step(
             self.motion.body, load, prescribed, at_contacts(self.motion.body, q0),
-            (load_before, prescribed_before, q0[linear.free]),
+            self._known(state),
         )  # fmt: skip
         arrive = None
         if self.crossing is not None:

@@ -111,6 +111,10 @@ class MovingModel:
         self._last_part: tuple[Index, FrictionProblem] | None = None
         self._last_active: tuple[Index, FrictionProblem] = (np.arange(nc), self.base)
 
+    def begin(self, state: State) -> State:
+        """The state before the first step: as it is."""
+        return state
+
     def advance(self, state: State, time: float, solve: Solve) -> TimeStep:
         """One step from a state to a time; solve(problem, start) solves its problem."""
         parts, method = self.motion.parts, self.method
@@ -153,8 +157,7 @@ class MovingModel:
 
     def _local(self, v: Array) -> Array:
         """Local values of motions (dofs,): (nc, d)."""
-        parts = self.motion.parts
-        return (parts.whole_H.T @ v).reshape(parts.carried.shape)
+        return self.motion.parts.local(v)
 
     def _problem(self, active: Index, f: Array, w: Array) -> FrictionProblem:
         """The problem of the active contacts, with the matrices of the last one if it can."""

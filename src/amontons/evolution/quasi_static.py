@@ -1,7 +1,10 @@
 """Quasi-static steps: equilibrium at each time, friction on the slip since the last one.
 
-Loads and supports that depend on time are evaluated; where none does, all of them grow with
-the time as load factor.  Gaps are positions, so nothing drifts.
+Loads and supports that depend on time are evaluated, and those beside them that do not are
+there in full from the first step on; where none does, all of them grow with the time as load
+factor.  The first step goes from the undeformed body to what is applied at its end, and
+friction speaks of the whole way: it is what `solve` finds.  Gaps are positions, so nothing
+drifts.
 
 A step may have several solutions, or none near the last one: then the body jumps.  A solver
 finds any of them; with `crossing` the step is followed from the last state, see `passage`.
@@ -23,7 +26,7 @@ from .energy import Energies
 from .large_steps import LargeSlowModel
 from .moreau_jean import Solve
 from .passage import Crossing, taken
-from .state import State, TimeStep
+from .state import State, TimeStep, undeformed
 from .system import Motion
 
 Array = NDArray[np.float64]
@@ -32,6 +35,9 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True)
 class QuasiStatic:
     """Steps of size `step` in time, or in the load factor where nothing depends on time.
+
+    Where anything depends on time, loads and supports that do not are applied in full in the
+    first step: write them as expressions in t (or functions of (x, t)) to let them grow.
 
     crossing: follows the path of solutions from every step to the next, `PathCrossing()`; the
     steps then say in `passage` whether and when the body jumped.
@@ -62,6 +68,10 @@ class SlowModel:
     def __init__(self, model: Model, crossing: Crossing | None = None) -> None:
         self.motion, self.crossing = Motion(model), crossing
 
+    def begin(self, state: State) -> State:
+        """The state before the first step: undeformed, also where supports hold the body."""
+        return undeformed(state, self.motion)
+
     def advance(self, state: State, time: float, solve: Solve) -> TimeStep:
         """One step from a state to a time; solve(problem, start) solves its problem."""
         parts = self.motion.parts
@@ -78,7 +88,7 @@ class SlowModel:
         q1 = prescribed.copy()
         q1[parts.free] = solution.v
         dq = q1 - state.displacement
-        u = (parts.whole_H.T @ q1).reshape(parts.carried.shape)
+        u = parts.local(q1)
         energies = self._energies(state, q1, load, parts.whole_H @ solution.r.ravel())
         time_step = time - state.time
         velocity = dq / time_step if time_step else np.zeros_like(dq)
