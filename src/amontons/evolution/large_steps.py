@@ -14,7 +14,7 @@ from ..contact import frames
 from ..model import Model
 from ..model.large_deformation import large_step
 from ..model.nonlinear_parts import nonlinear_parts
-from .energy import Energies
+from .energy import Energies, Forces, slow_energies
 from .moreau_jean import Solve
 from .passage import Crossing, taken
 from .state import State, TimeStep, undeformed
@@ -34,14 +34,12 @@ class LargeSlowModel:
         return undeformed(state, self.motion)
 
     def _known(self, state: State) -> tuple[Array, Array, Array]:
-        """Load, prescribed values (dofs,) and free displacements (n,) of the last state.
-
-        Those that the time of the state says, but none for a body at rest that is undeformed.
-        """
-        q = state.displacement
-        if not q.any() and not state.force.any():
-            return np.zeros_like(q), np.zeros_like(q), q[self.motion.parts.free]
-        return *self.motion.applied(state.time), q[self.motion.parts.free]
+        """Load, prescribed values (dofs,) and free displacements (n,) of the last state."""
+        free = state.displacement[self.motion.parts.free]
+        if state.is_unloaded:
+            nothing = np.zeros_like(state.displacement)
+            return nothing, nothing, free
+        return *self.motion.applied(state.time), free
 
     def advance(self, state: State, time: float, solve: Solve) -> TimeStep:
         """One step from a state to a time; solve(problem, start) solves its problem."""
@@ -63,9 +61,7 @@ class LargeSlowModel:
         assert solution.v is not None
         q1 = problem.displacement(solution.v).ravel()
         axes = frames(problem.contact_point(solution.v).n)
-        pushed = np.zeros_like(q1)
-        pushed[problem.parts.at] = np.einsum("pkc,pk->pc", axes, solution.r)
-        energies = self._energies(q0, q1, load, pushed)
+        energies = self._energies(state, q1, load, solution.r, solution.u)
         passed = time - state.time
         velocity = (q1 - q0) / passed if passed else np.zeros_like(q1)
         slip = state.slip + solution.u[:, 1:]
@@ -74,23 +70,21 @@ class LargeSlowModel:
         return TimeStep(self.motion.body, new, solution, active, energies, solution.u[:, 0],
                         axes, passage)  # fmt: skip
 
-    def _energies(self, q0: Array, q1: Array, load: Array, pushed: Array) -> Energies:
-        """The balance of a step: all forces of its end times its motion.
+    def _energies(self, state: State, q1: Array, load: Array, r: Array, u: Array) -> Energies:
+        """The balance of `slow_energies`; r, u (nc, d): reactions, [gap, slip] of the step."""
+        before = self._forces(state.displacement, self.motion.load_of(state), state.force)
+        after, dq = self._forces(q1, load, r), q1 - state.displacement
+        friction = float((r[:, 1:] * u[:, 1:]).sum())
+        return slow_energies(before, after, dq, self.motion.parts.fixed, friction)
 
-        What is left of the work after the gain is that of a path of one step.
-        """
-        parts, linear = nonlinear_parts(self.motion.body), self.motion.parts
-        shape = parts.X.shape
-        dq = q1 - q0
-        after, before = parts.energy(q1.reshape(shape)), parts.energy(q0.reshape(shape))
-        inner = parts.forces(q1.reshape(shape))
-        held = np.zeros_like(dq)
-        held[linear.fixed] = (inner - load - pushed)[linear.fixed]
-        gain = after - before
-        return Energies(
-            elastic=after, gain=gain, loads=float(load @ dq), supports=float(held @ dq),
-            contact=float(pushed @ dq), numerical=float(inner @ dq) - gain,
-        )  # fmt: skip
+    def _forces(self, q: Array, load: Array, r: Array) -> Forces:
+        """All forces at displacements q (dofs,); r (nc, d): in the frames there."""
+        parts = nonlinear_parts(self.motion.body)
+        axes = frames(parts.contact.normals(parts.points + q[parts.at]))
+        pushed = np.zeros_like(q)
+        pushed[parts.at] = np.einsum("pkc,pk->pc", axes, r)
+        moved = q.reshape(parts.X.shape)
+        return Forces(parts.forces(moved), load, pushed, parts.energy(moved))
 
 
 def at_contacts(model: Model, displacement: Array) -> Array:

@@ -22,7 +22,7 @@ from ..errors import InvalidInput, UnsupportedForm
 from ..model import Model
 from ..nitsche_problem import NO_MULTIPLIERS
 from ..problem import FrictionProblem
-from .energy import Energies
+from .energy import Energies, Forces, slow_energies
 from .large_steps import LargeSlowModel
 from .moreau_jean import Solve
 from .passage import Crossing, taken
@@ -89,7 +89,7 @@ class SlowModel:
         q1[parts.free] = solution.v
         dq = q1 - state.displacement
         u = parts.local(q1)
-        energies = self._energies(state, q1, load, parts.whole_H @ solution.r.ravel())
+        energies = self._energies(state, q1, load, solution.r)
         time_step = time - state.time
         velocity = dq / time_step if time_step else np.zeros_like(dq)
         new = State(state.index + 1, time, q1, velocity, solution.r, u[:, 1:])
@@ -110,16 +110,16 @@ class SlowModel:
         drift = (time - state.time) * motion[:, 1:]
         return self.motion.body.increment(load, held, state.slip - drift)
 
-    def _energies(self, state: State, q1: Array, load: Array, pushed: Array) -> Energies:
-        """The balance of `energy` with theta = 1 and no mass."""
-        parts, K = self.motion.parts, self.motion.parts.K
-        dq = q1 - state.displacement
-        held = np.zeros_like(dq)
-        held[parts.fixed] = (K @ q1 - load - pushed)[parts.fixed]
-        elastic = 0.5 * q1 @ (K @ q1)
-        before = 0.5 * state.displacement @ (K @ state.displacement)
-        return Energies(
-            elastic=float(elastic), gain=float(elastic - before), loads=float(load @ dq),
-            supports=float(held @ dq), contact=float(pushed @ dq),
-            numerical=float(0.5 * dq @ (K @ dq)),
-        )  # fmt: skip
+    def _energies(self, state: State, q1: Array, load: Array, r: Array) -> Energies:
+        """The balance of `slow_energies`; r (nc, d): reactions after the step."""
+        parts, dq = self.motion.parts, q1 - state.displacement
+        before = self._forces(
+            state.displacement, self.motion.load_of(state), parts.whole_H @ state.force.ravel()
+        )
+        after = self._forces(q1, load, parts.whole_H @ r.ravel())
+        friction = float((r[:, 1:] * parts.local(dq)[:, 1:]).sum())
+        return slow_energies(before, after, dq, parts.fixed, friction)
+
+    def _forces(self, q: Array, load: Array, pushed: Array) -> Forces:
+        inner = self.motion.parts.K @ q
+        return Forces(inner, load, pushed, float(0.5 * q @ inner))

@@ -51,6 +51,11 @@ class State:
             array.flags.writeable = False
             object.__setattr__(self, name, array)
 
+    @property
+    def is_unloaded(self) -> bool:
+        """True without displacements and contact forces: no load acts in equilibrium."""
+        return not (self.displacement.any() or self.force.any())
+
 
 @dataclass(frozen=True, eq=False)
 class TimeStep:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,9 @@ from ..model import Fix, Model
 from ..model.assembly import Discretisation
 from ..model.supports import external_load, locate, prescribed_values
 from .timed import depends_on_time, is_timed, part_at, steady
+
+if TYPE_CHECKING:
+    from .state import State
 
 Array = NDArray[np.float64]
 # where a line is compared with what is applied: at no simple shares, which waves may hit
@@ -30,6 +34,7 @@ class Motion:
     """
 
     model: Model
+    _loads: dict[float, Array] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def body(self) -> Model:
@@ -60,8 +65,18 @@ class Motion:
         moving = tuple(part_at(p, t) for p in self.model.loads if is_timed(p.value))
         if not moving:
             return self._steady_load
-        forces = external_load(self.model.bodies, moving, self.parts.offsets)  # type: ignore[arg-type]
-        return self._steady_load + forces
+        if t not in self._loads:
+            forces = external_load(self.model.bodies, moving, self.parts.offsets)  # type: ignore[arg-type]
+            for old in list(self._loads)[:-1]:
+                del self._loads[old]
+            self._loads[t] = self._steady_load + forces
+        return self._loads[t]
+
+    def load_of(self, state: State) -> Array:
+        """Nodal forces (dofs,) that are said to act at the time of a quasi-static state."""
+        if state.is_unloaded:
+            return np.zeros(self.parts.dofs)
+        return (1.0 if self.is_timed else state.time) * self.load(state.time)
 
     def prescribed(self, t: float) -> Array:
         """Prescribed displacement at time t, (dofs,), zero on the free dofs.

@@ -15,6 +15,7 @@ from ..fem.elasticity import LinearElastic, stiffness
 from ..linear.distributed import DistributedMatrix
 from ..linear.grid_matrix import GridMatrix
 from ..linear.levels import Levels, continued, free_levels
+from .held import check_outside
 from .parts import Body, BodyForce, Contact, Fix, Traction
 from .placing import Placed, place
 from .rigid import Piece, near_nullspace, pieces
@@ -79,7 +80,12 @@ class Discretisation:
 
         Where both sides move by the same they are zero: rounding would tell friction a way.
         """
-        return _local(self.whole_H, displacement, self.carried.shape[1])
+        return _local(self.whole_H, self._sizes, displacement, self.carried.shape[1])
+
+    @cached_property
+    def _sizes(self) -> sparse.csc_array:
+        """|H| of the whole model, (dofs, nc d)."""
+        return abs(self.whole_H)
 
     @property
     def stored_stiffness(self) -> sparse.csr_array:
@@ -113,6 +119,8 @@ def discretise(
     _check_once(bodies, contacts, placed)
     whole_H = sparse.hstack([p.H for p in placed], format="csc")
     if not whole_H.shape[1]:
+        for held in (p.held for p in placed if p.held is not None):
+            check_outside(held, held.left(prescribed), bodies, supports, offsets, "")
         raise InvalidInput(
             "contacts: every slave node is fixed by a support, no contact is left"
         )
@@ -124,7 +132,7 @@ def discretise(
         H=sparse.csc_array(whole_H.tocsr()[free]),
         load=(load - K @ prescribed)[free],
         gap=np.concatenate([p.rows.gap for p in placed]),
-        carried=_local(whole_H, prescribed, d),
+        carried=_local(whole_H, abs(whole_H), prescribed, d),
         placed=placed,
         parts=[
             piece
@@ -141,10 +149,12 @@ def discretise(
     )  # fmt: skip
 
 
-def _local(H: sparse.csc_array, displacement: Array, d: int) -> Array:
-    """H^T displacement in rows of d, without what rounding leaves of differences."""
+def _local(
+    H: sparse.csc_array, sizes: sparse.csc_array, displacement: Array, d: int
+) -> Array:  # fmt: skip
+    """H^T displacement in rows of d, without what rounding leaves of differences; |H|."""
     out = H.T @ displacement
-    out[np.abs(out) <= ROUNDING * (abs(H).T @ np.abs(displacement))] = 0.0
+    out[np.abs(out) <= ROUNDING * (sizes.T @ np.abs(displacement))] = 0.0
     return out.reshape(-1, d)
 
 
