@@ -14,7 +14,7 @@ from ..contact import frames
 from ..model import Model
 from ..model.large_deformation import large_step
 from ..model.nonlinear_parts import nonlinear_parts
-from .energy import Energies, Forces, slow_energies
+from .energy import Energies, Forces, path_work, slow_energies
 from .moreau_jean import Solve
 from .passage import Crossing, taken
 from .state import State, TimeStep, undeformed
@@ -75,7 +75,8 @@ class LargeSlowModel:
         before = self._forces(state.displacement, self.motion.load_of(state), state.force)
         after, dq = self._forces(q1, load, r), q1 - state.displacement
         friction = float((r[:, 1:] * u[:, 1:]).sum())
-        return slow_energies(before, after, dq, self.motion.parts.fixed, friction)
+        path = path_work(before, after, dq)
+        return slow_energies(before, after, dq, self.motion.parts.fixed, friction, path)
 
     def _forces(self, q: Array, load: Array, r: Array) -> Forces:
         """All forces at displacements q (dofs,); r (nc, d): in the frames there."""

@@ -152,7 +152,7 @@ class MovingModel:
             impulse = np.zeros_like(parts.carried)
             impulse[active] = solution.r
             energies = self._energies(state, v1, q1, force, impulse)
-            excess = energies.created - self._allowed(energies)
+            excess = energies.contact - self._allowed(energies)
             changed = excess > 0 and shifts.changed(solution.r, self._local(v1)[active], excess)
             if not changed:
                 break
@@ -199,7 +199,7 @@ class MovingModel:
         )  # fmt: skip
 
     def _allowed(self, energies: Energies) -> float:
-        """Energy that contacts may seem to create: what the tolerance of the solve leaves."""
+        """Energy that contacts may create, (1) of `energy`: that of the solve's tolerance."""
         size = energies.total + abs(energies.loads) + abs(energies.supports)
         return CREATED * self.tolerance * size
 
@@ -218,13 +218,14 @@ class MovingModel:
         held[parts.fixed] = rest[parts.fixed]
         kinetic, elastic = 0.5 * v1 @ (M @ v1), 0.5 * q1 @ (K @ q1)
         v0, q0 = state.velocity, state.displacement
-        jump = (theta - 0.5) * float(pushed @ dv)  # part of the loss that is of the impulses
+        work = float(pushed @ dq) / h
+        lost = float((theta - 0.5) * (dv @ (M @ dv) + dq @ (K @ dq)))
+        jump = min(max((theta - 0.5) * float(pushed @ dv), work), lost)
         gain = kinetic + elastic - 0.5 * v0 @ (M @ v0) - 0.5 * q0 @ (K @ q0)
         return Energies(
             kinetic=float(kinetic), elastic=float(elastic), gain=float(gain),
             loads=float(force @ dq), supports=float(held @ dq) / h,
-            contact=float(pushed @ dq) / h - jump, damping=float(dq @ (C @ dq)) / h,
-            numerical=float((theta - 0.5) * (dv @ (M @ dv) + dq @ (K @ dq))) - jump,
+            contact=work - jump, damping=float(dq @ (C @ dq)) / h, numerical=lost - jump,
         )  # fmt: skip
 
 
