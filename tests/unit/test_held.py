@@ -8,6 +8,7 @@ import pytest
 import amontons as am
 from amontons.evolution import MoreauJean, QuasiStatic, at_rest, evolve
 from amontons.evolution.system import Motion
+from amontons.evolution.timed import growth_in_words
 from amontons.expressions import Expression
 from amontons.model.timing import AtTime, is_timed, lasting
 
@@ -272,3 +273,19 @@ def test_a_wave_is_no_straight_line():
         Motion(am.Model([body], [wave], contact)).straight((0.0, 1.0), "so")
     line = am.Fix("top", (0, lambda x, t: -0.1 * t))
     assert Motion(am.Model([body], [line], contact)).straight((0.0, 1.0), "so")
+
+
+@pytest.mark.parametrize(("supports", "loads", "words"), [
+    ([am.Fix("top", (0, -1))], [], "nothing depends on the time t"),
+    ([am.Fix("top", (0, Expression("-t")))], [], ""),
+    ([am.Fix("top", (0, Expression("-t")))], [am.Traction("left", (1, 0))],
+     "full from the first step on: traction on 'left'"),
+    ([am.Fix("top", (0.1, None))], [am.BodyForce((0, lambda x, t: t)), am.BodyForce((0, 0))],
+     "full from the first step on: fix on 'top'"),
+])  # fmt: skip
+def test_words_for_how_loads_grow(supports, loads, words):
+    body = am.Body(am.box((1, 1), 2), STEEL)
+    model = am.Model([body], supports, [am.Contact("bottom", am.Plane((0, 1)), mu=0.2)], loads)
+    found = growth_in_words(model)
+    assert words in found
+    assert bool(found) == bool(words)

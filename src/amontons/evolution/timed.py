@@ -9,7 +9,7 @@ from ..model.timing import at_time, is_timed
 
 Part = Fix | Traction | BodyForce
 
-__all__ = ["at_time", "depends_on_time", "is_timed", "part_at", "steady"]
+__all__ = ["at_time", "depends_on_time", "growth_in_words", "is_timed", "part_at", "steady"]
 
 
 def depends_on_time(model: Model) -> bool:
@@ -39,3 +39,30 @@ def steady(model: Model) -> Model:
         found._shared["steady"] = found
         model._shared["steady"] = found
     return model._shared["steady"]
+
+
+def growth_in_words(model: Model) -> str:
+    """How loads and supports of quasi-static steps come to act, where that may surprise."""
+    parts = [part for part in (*model.supports, *model.loads) if _is_something(part.value)]
+    if not depends_on_time(model):
+        return (
+            "nothing depends on the time t: loads and supports grow with it, in full at t = 1"
+        )
+    at_once = [_name(part) for part in parts if not is_timed(part.value)]
+    if not at_once:
+        return ""
+    names = ", ".join(dict.fromkeys(at_once))
+    return f"what does not depend on the time t acts in full from the first step on: {names}"
+
+
+def _is_something(value: object) -> bool:
+    """False for zero and for components that are free."""
+    if isinstance(value, list | tuple):
+        return any(_is_something(entry) for entry in value)
+    return value is not None and (callable(value) or bool(value))
+
+
+def _name(part: Part) -> str:
+    if isinstance(part, BodyForce):
+        return "body force" if part.region is None else f"body force in {part.region!r}"
+    return f"{'fix' if isinstance(part, Fix) else 'traction'} on {part.on!r}"
