@@ -63,6 +63,25 @@ def test_moved_together_then_apart(method):
     assert second[1] == pytest.approx(-0.2 * second[2], rel=5e-3)
 
 
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("later", [0.01, 0.012, 0.006])
+def test_held_after_sliding_the_shear_stays(method, later):
+    """Nothing moves along y any more: it is as it was, or as much as less pressure allows."""
+    model = pair([am.Fix("s.bottom", (None, lambda x, t: 0.01 * min(t, 1), None)),
+                  am.Fix("m.top", (None, 0, None))], method)  # fmt: skip
+    press = am.Fix("s.top", (0, 0, lambda x, t: -np.interp(t, [0, 1, 2], [0, 0.01, later])))
+    model = replace(model, supports=[press, *model.supports[1:]])
+    first, second = evolve(model, QuasiStatic(1.0), until=2)
+    assert second.solution.converged
+    bound = 0.2 * second.state.force[:, 0] * (1 + 1e-6)
+    shear = np.linalg.norm(second.state.force[:, 1:], axis=1)
+    assert (shear <= bound).all()
+    before, now = first.resultant(), second.resultant()
+    expected = before[1] if later >= 0.01 else -0.2 * now[2]
+    assert now[1] == pytest.approx(expected, rel=2e-2)  # but for slip across
+    assert second.problem.error(second.solution.r, second.solution.v) <= 1e-8
+
+
 def press_fit(end, method, mu=0.15):
     """A quarter of a shaft in a hub, pressed together, the shaft pulled at z = 0."""
 

@@ -28,6 +28,7 @@ from .moreau_jean import Solve
 from .passage import Crossing, taken
 from .state import State, TimeStep, undeformed
 from .system import Motion
+from .undetermined import carried_on
 
 Array = NDArray[np.float64]
 
@@ -84,6 +85,7 @@ class SlowModel:
         solution, passage = taken(
             lambda start: solve(problem, start, None), arrive, state.force, (state.time, time)
         )
+        solution = carried_on(solution, state.force)
         assert solution.v is not None
         q1 = prescribed.copy()
         q1[parts.free] = solution.v
