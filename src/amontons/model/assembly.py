@@ -154,7 +154,10 @@ def _local(
 ) -> Array:  # fmt: skip
     """H^T displacement in rows of d, without what rounding leaves of differences; |H|."""
     out = H.T @ displacement
-    out[np.abs(out) <= ROUNDING * (sizes.T @ np.abs(displacement))] = 0.0
+    small = np.abs(out)
+    most = ROUNDING * float(np.abs(displacement).max(initial=0.0)) * len(displacement)
+    if ((small > 0) & (small <= most)).any():
+        out[small <= ROUNDING * (sizes.T @ np.abs(displacement))] = 0.0
     return out.reshape(-1, d)
 
 
