@@ -18,7 +18,7 @@ def key_of(model: Model, error: AmontonsError, *, wall: bool = False) -> str:
 
     wall: contacts come from [wall] and have no tables of their own.
     """
-    from ..model.assembly import external_load, prescribed_values
+    from ..model.supports import external_load, prescribed_values
 
     bodies = tuple(model.bodies)
     offsets = np.cumsum([0, *(body.mesh.points.size for body in bodies)])

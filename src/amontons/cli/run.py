@@ -19,9 +19,10 @@ from ..evolution import Energies, State, TimeStep, evolve
 from ..files import make_folder, replacing
 from ..solution import ContactStatus
 from ..vtk import write_model
+from .doubts import Doubts
 from .group import INTERRUPTED
 from .sources import case_file, naming_keys, with_flags
-from .terminal import check_folder
+from .terminal import check_folder, say_growth
 
 if TYPE_CHECKING:
     from ..plots import Frame
@@ -48,6 +49,8 @@ def run(
     with naming_keys(read.model, str(path)):
         _ = read.model.discretisation, read.model.law
     start = load_state(place / "state.h5") if restart else None
+    if not quiet:
+        say_growth(read)
     settings = with_flags(read.settings, None, tolerance)
     steps = evolve(
         read.model, read.evolution.method, until=read.evolution.until, start=start,
@@ -67,12 +70,14 @@ def _follow(
     rows = _old_rows(folder / "steps.csv", start)
     written, frames = _old_pictures(folder, start), []
     last: TimeStep | None = None
+    doubts = Doubts()
     try:
         began = time.perf_counter()
         for step in steps:
             now = time.perf_counter()
             rows.append(_row(step, now - began))
             began, last = now, step
+            doubts.note(step, quiet=quiet)
             if step.state.index % every == 0:
                 written.append(_write(step, folder))
                 _save(step, rows, written, folder)
@@ -97,6 +102,8 @@ def _follow(
             _draw(case, frames, rows, folder)
     if not quiet:
         _summary(rows, folder)
+        for line in doubts.lines():
+            click.echo(line)
     return code
 
 

@@ -16,6 +16,7 @@ from ..errors import InvalidInput
 from ..files import replacing
 
 if TYPE_CHECKING:
+    from ..case import Case
     from ..model import Model
 
 
@@ -51,6 +52,17 @@ def say_when(model: Model | None) -> None:
     if depends_on_time(model):
         click.echo("supports or loads depend on the time t: this is t = 0; `amontons follow` "
                    "traces solutions over t, `amontons run` takes steps in time")  # fmt: skip
+
+
+def say_growth(case: Case) -> None:
+    """Print how the loads of quasi-static steps come to act, where that may surprise."""
+    from ..evolution import QuasiStatic
+    from ..evolution.timed import growth_in_words
+
+    assert case.evolution is not None
+    words = growth_in_words(case.model)
+    if words and isinstance(case.evolution.method, QuasiStatic):
+        click.echo(words)
 
 
 def deliver_json(text: str, target: str | None) -> None:

@@ -15,8 +15,9 @@ facets.  Small strains: all is taken once, in the reference configuration.
 No multiplier is there for nodes that supports hold in the normal direction, and for those of
 which hardly anything faces the other side; their neighbours take their share, and feel their
 displacement: u_p then has the term R_p (int psi_p phi_s / D_p) v_s of such a node s.
-Components of the displacement that supports hold on both sides (planes of symmetry) are left
-out of u, and of the normals.
+Components of the displacement that supports hold on both sides for good (planes of symmetry)
+are left out of u, and of the normals.  For good means to one value that does not depend on
+time: sides that are held at first and then moved apart slide, and friction acts.
 
 [HSW] S. Hüeber, G. Stadler, B. Wohlmuth, "A primal-dual active set algorithm for
 three-dimensional contact problems with Coulomb friction", SIAM J. Sci. Comput. 30 (2008).
@@ -52,17 +53,18 @@ EXACT = 1e-9  # the same for the normals of obstacles
 HARDLY = 0.1  # covered part of a node's weight below which it gets no multiplier
 ROUNDING = 1e-14  # averages below this are zeros with rounding errors
 SAME = 1e-12  # prescribed values that differ by less, relative to the largest, agree
+IN_PLANE = 1e-6  # of the surface's, or a facet's, size: how far a plane's nodes lie from it
 BESIDE = 1e-3  # of a facet: how far outside of it a point is asked for
 COVERED = 1e-6  # part of a facet that may be missing where it faces the other side as a whole
 RULES = {"line": line_rule(4), "tri": triangle_rule(4), "quad": square_rule(4)}
 
 
 def mortar_obstacle(
-    mesh: Mesh, surface: str, obstacle: Obstacle, *, prescribed: Array | None = None
+    mesh: Mesh, surface: str, obstacle: Obstacle, *, held: Mask | None = None
 ) -> tuple[ContactRows, Mask]:
     """Contacts of a surface with a rigid obstacle in the mesh's own dofs, and found.
 
-    prescribed (n, dim): displacements that supports prescribe, NaN where free (default: all).
+    held (n, dim): components that supports prescribe, by default none.
     found, (slave nodes,): nodes with a multiplier; only these have rows.
     """
     check_exterior(mesh, surface)
@@ -72,8 +74,8 @@ def mortar_obstacle(
     on = np.unique(slave.nodes)
     normals[on] = obstacle.normals(mesh.points[on])
     mass, moment = _against(slave, obstacle)
-    held = _held(normals, _values(prescribed, mesh), EXACT)
-    average = _Average.of(slave, np.arange(len(slave.nodes)), mass, held)
+    without = _held(normals, held, EXACT)
+    average = _Average.of(slave, np.arange(len(slave.nodes)), mass, without)
     nodes = average.nodes
     gap = average.of_moments(np.arange(len(moment)), moment[:, :, None])[:, 0]
     rows = average.rows(frames(normals[nodes]), gap, None)
@@ -86,14 +88,16 @@ def mortar_contact(
     master: Mesh,
     master_surface: str,
     *,
-    prescribed: Array | None = None,
-    master_prescribed: Array | None = None,
+    held: Mask | None = None,
+    lasting: Array | None = None,
+    master_lasting: Array | None = None,
 ) -> tuple[ContactRows, sparse.csc_array, Mask]:
     """Contacts of a slave with a master surface: rows, their part on the master, and found.
 
     As `pair_contact`: rows.H in the dofs of the slave mesh, the second matrix (n_master, nc d)
-    in those of the master; found, (slave nodes,): nodes with a multiplier.  prescribed,
-    master_prescribed (n, dim): displacements that supports prescribe, NaN where free.
+    in those of the master; found, (slave nodes,): nodes with a multiplier.  held (n, dim):
+    components of the slave that supports prescribe; lasting, master_lasting (n, dim): values
+    that they prescribe at all times, NaN elsewhere.
     Raises InvalidInput when the bodies do not face each other, for a surface in contact with
     itself, and for facets without area.  Cost linear in the facets.
     """
@@ -109,11 +113,12 @@ def mortar_contact(
     facets, of = np.unique(parts.slave, return_inverse=True)
     mass = np.zeros((len(facets), MAX_NODES, MAX_NODES))
     np.add.at(mass, of, parts.mass)
-    values, on_master = _values(prescribed, slave), _values(master_prescribed, master)
-    held = _held(normals, values, NO_MOTION)
-    average = _Average.of(over, facets, mass, held)
+    average = _Average.of(over, facets, mass, _held(normals, held, NO_MOTION))
     across = average.onto(parts, of, under)
-    fixed = _held_together(average.nodes, across, values, on_master)
+    fixed = _held_together(
+        average.nodes, across, (slave.points, _values(lasting, slave)),
+        (master.points, _values(master_lasting, master)), _at_end(over),
+    )  # fmt: skip
     axes = frames(_within(normals[average.nodes], fixed))
     apart = average.onto_slave @ slave.points - across @ master.points
     apart += average.of_moments(of, parts.bulge)
@@ -264,27 +269,61 @@ def _gauss_points(side: Surface) -> Iterator[tuple[Index, Array, Array, Array]]:
 
 
 # -------------------------------------------------------------------- supports
-def _values(prescribed: Array | None, mesh: Mesh) -> Array:
-    return np.full(mesh.points.shape, np.nan) if prescribed is None else prescribed
+def _values(lasting: Array | None, mesh: Mesh) -> Array:
+    return np.full(mesh.points.shape, np.nan) if lasting is None else lasting
 
 
-def _held(normals: Array, prescribed: Array, threshold: float) -> Mask:
-    """Nodes (n,) that supports hold in the direction of their normal."""
-    free = np.isnan(prescribed)
+def _held(normals: Array, held: Mask | None, threshold: float) -> Mask:
+    """Nodes (n,) that supports hold in the direction of their normal; held (n, dim)."""
+    free = np.ones(normals.shape, dtype=bool) if held is None else ~held
     return np.linalg.norm(normals * free, axis=1) < threshold
 
 
 def _held_together(
-    nodes: Index, across: sparse.csr_array, prescribed: Array, master: Array
-) -> Mask:
-    """Components (nc, d) with the same prescribed value at the slave and a node opposite."""
+    nodes: Index, across: sparse.csr_array, slave: tuple[Array, Array],
+    master: tuple[Array, Array], at_end: Mask,
+) -> Mask:  # fmt: skip
+    """Components (nc, d) held for good to one value at the slave and at what lies opposite.
+
+    slave, master: points and lasting values, (n, d) each.  All nodes opposite are held so, or
+    those on the plane at which the slave ends (at_end (n, d)) and which stays a plane, as one
+    of symmetry: there the mirror image of the others brings their average to the same value.
+    """
     contact, node = across.tocoo().coords
-    size = np.nanmax(np.abs(np.concatenate([prescribed, master, np.zeros_like(master[:1])])))
+    own, (x, values), (y, others) = nodes[contact], slave, master
+    size = np.nanmax(np.abs(np.concatenate([values, others, np.zeros_like(others[:1])])))
     with np.errstate(invalid="ignore"):
-        agree = np.abs(prescribed[nodes[contact]] - master[node]) <= SAME * size
-    out = np.zeros((len(nodes), prescribed.shape[1]), dtype=bool)
-    np.logical_or.at(out, contact, agree)
-    return out
+        agree = np.abs(values[own] - others[node]) <= SAME * size
+    near = IN_PLANE * float(np.ptp(x[nodes], axis=0).max())
+    in_plane = np.abs(x[own] - y[node]) <= near
+    every = np.ones((len(nodes), x.shape[1]), dtype=bool)
+    some, beside = np.zeros_like(every), np.zeros_like(every)
+    np.logical_and.at(every, contact, agree)
+    np.logical_or.at(some, contact, agree)
+    np.logical_or.at(beside, contact, agree & in_plane)
+    mirror = beside & at_end[nodes]
+    for k in range(x.shape[1]):
+        for first in _planes(x[nodes[mirror[:, k]], k], near):
+            on = np.abs(x[:, k] - first) <= near
+            if np.nanmax(values[on, k]) - np.nanmin(values[on, k]) > SAME * size:
+                mirror[on[nodes], k] = False
+    return some & (every | mirror)
+
+
+def _planes(coordinates: Array, near: float) -> Array:
+    """One coordinate of each group of them that are as near."""
+    ordered = np.unique(coordinates)
+    return ordered[np.diff(ordered, prepend=-np.inf) > near]
+
+
+def _at_end(side: Surface) -> Mask:
+    """Components (n, d) in which all facets of a node lie on one side of it."""
+    x = side.points[side.nodes]  # padded by the last: minima and maxima stay
+    low, high = np.full(side.points.shape, np.inf), np.full(side.points.shape, -np.inf)
+    np.minimum.at(low, side.nodes, np.broadcast_to(x.min(axis=1, keepdims=True), x.shape))
+    np.maximum.at(high, side.nodes, np.broadcast_to(x.max(axis=1, keepdims=True), x.shape))
+    near = IN_PLANE * np.maximum(high - low, 0.0).max(axis=1, keepdims=True)
+    return (side.points <= low + near) | (side.points >= high - near)
 
 
 def _within(normals: Array, fixed: Mask) -> Array:

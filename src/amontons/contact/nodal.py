@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,10 +52,15 @@ class ContactRows:
 
         Averages may act on several nodes: their sum, so that all forces balance the loads.
         """
-        nc, d = r.shape
+        return np.einsum("pkc,pk->pc", self._sums, r)
+
+    @cached_property
+    def _sums(self) -> Array:
+        """Sums of the columns of H over all nodes, (nc, d, d): axes times total weights."""
+        nc, d = len(self.nodes), self.points.shape[1]
         rows = self.H.tocsr()
         sums = np.stack([np.asarray(rows[c::d].sum(axis=0)).ravel() for c in range(d)], axis=1)
-        return np.einsum("pkc,pk->pc", sums.reshape(nc, d, d), r)
+        return sums.reshape(nc, d, d)
 
     def at(self, kept: NDArray[np.bool_]) -> ContactRows:
         """A selection of these contacts."""

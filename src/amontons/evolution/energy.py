@@ -2,10 +2,41 @@
 
 With v_theta = theta v1 + (1 - theta) v0 and dq = h v_theta, a step of the theta method obeys
 
-    gain of kinetic + elastic = loads + supports + contact - damping - numerical,
-    numerical = (theta - 1/2) (|v1 - v0|_M^2 + |q1 - q0|_K^2) >= 0,
+    gain of kinetic + elastic = loads + supports + r . u_theta - damping - lost,
+    lost = (theta - 1/2) (|v1 - v0|_M^2 + |q1 - q0|_K^2) >= 0,                              (1)
 
-up to the residual of the contact solve, which `defect` holds.
+r being the impulses of contact.  Part of `lost` is what their jump loses: where a ball stops
+dead, no work is done on u_theta = u1 = 0 with theta = 1, and still its energy is gone.  So
+
+    contact = r . u_theta - x,    numerical = lost - x,    x = (theta - 1/2) r . (u1 - u0), (2)
+
+contact being r . (u0 + u1) / 2, the work of an impulse in the classical theory of impacts:
+-(1 - e^2) m v^2 / 2 for a rigid body and a restitution e, whatever theta.  Loads and waves
+within the step shift that a little; x is cut off at r . u_theta and at `lost`, so that contact
+is never positive and numerical never negative.  There is such an x where r . u_theta <= lost,
+which is what every step is made to obey: contact and scheme together create no energy.
+
+A quasi-static step, with the forces K q = load + held + H r before and after, obeys
+
+    gain of elastic = (f0 + f1) / 2 . dq,    f = load + held + H r,                         (3)
+
+exactly for linear elasticity: works are booked by the means of both forces, as they grow along
+a straight line.  For contact this is
+
+    mean = (r0 + r1) . du / 2,                                                              (4)
+
+the true work where both grow in proportion or stay.  Where it is more than the force at the end
+says, friction = r1_T . du_T <= 0 (the pressure has fallen), and where it is positive (friction
+has turned round, or contact has opened, within the step), contact is booked by friction, and
+
+    numerical = friction - mean                                                             (5)
+
+is what the straight line misses of the path: zero without friction or slip while contacts stay
+closed; else of second order in the step, but for what a jump sets free.  Negative says that
+the loads did more work than their means tell: take smaller steps.  At finite strains (3) has
+the mean of the inner forces, and the rest of the gain, of third order, is part of `numerical`.
+
+All balances hold up to the residual of the contact solve, which `defect` holds.
 """
 
 from __future__ import annotations
@@ -16,6 +47,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+TOLERATED = 1e-7  # work of contact, relative to all of the step, that is the solve's error
 
 
 @dataclass(frozen=True)
@@ -23,7 +56,9 @@ class Energies:
     """Energies at the end of a step, and works within it, all in the unit of work.
 
     loads, supports: work done on the bodies.  contact: work of all contacts and impacts, never
-    positive.  damping, numerical: dissipated, never negative.  gain: of kinetic + elastic.
+    positive.  damping: dissipated, never negative.  numerical: lost in the time scheme, never
+    negative in dynamics, in quasi-static steps what a straight line misses.  gain: of kinetic +
+    elastic.
     """
 
     kinetic: float = 0.0
@@ -52,3 +87,46 @@ class Energies:
         parts = (self.gain, self.loads, self.supports, self.contact, self.damping,
                  self.numerical)  # fmt: skip
         return sum(abs(part) for part in parts)
+
+
+@dataclass(frozen=True, eq=False)
+class Forces:
+    """Forces (dofs,) on all dofs at one end of a quasi-static step, and the stored energy.
+
+    inner: those that the bodies need; load: external ones; pushed: those of contact.
+    """
+
+    inner: Array
+    load: Array
+    pushed: Array
+    elastic: float
+
+
+def slow_energies(  # noqa: PLR0913
+    before: Forces, after: Forces, dq: Array, fixed: Index, friction: float, path: float = 0.0
+) -> Energies:  # fmt: skip
+    """The balance (3) to (5) of a quasi-static step that moves the dofs by dq (dofs,).
+
+    The load before is the one that the state balances, whatever was said of that time: a load
+    that is there at once grows along the step.  fixed: prescribed dofs; friction: r1_T . du_T;
+    path: `path_work` at finite strains.
+    """
+    balanced = before.inner - before.pushed
+    load = balanced.copy()
+    load[fixed] = before.load[fixed]
+    held = np.zeros_like(dq)
+    held[fixed] = (balanced - load + after.inner - after.load - after.pushed)[fixed]
+    gain = after.elastic - before.elastic
+    works = {"loads": 0.5 * (load + after.load) @ dq, "supports": 0.5 * held @ dq}
+    mean = 0.5 * (before.pushed + after.pushed) @ dq
+    size = abs(gain) + sum(map(abs, works.values()))
+    contact = friction if mean > TOLERATED * size else max(friction, mean)
+    return Energies(elastic=after.elastic, gain=gain, contact=float(contact),
+                    numerical=float(path + contact - mean),
+                    **{name: float(work) for name, work in works.items()})  # fmt: skip
+
+
+def path_work(before: Forces, after: Forces, dq: Array) -> float:
+    """What the mean of the inner forces does beyond the stored energy, of third order in dq."""
+    mean = 0.5 * (before.inner + after.inner)
+    return float(mean @ dq - (after.elastic - before.elastic))

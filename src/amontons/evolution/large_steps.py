@@ -14,10 +14,10 @@ from ..contact import frames
 from ..model import Model
 from ..model.large_deformation import large_step
 from ..model.nonlinear_parts import nonlinear_parts
-from .energy import Energies
+from .energy import Energies, Forces, path_work, slow_energies
 from .moreau_jean import Solve
 from .passage import Crossing, taken
-from .state import State, TimeStep
+from .state import State, TimeStep, undeformed
 from .system import Motion
 
 Array = NDArray[np.float64]
@@ -29,15 +29,25 @@ class LargeSlowModel:
     def __init__(self, model: Model, crossing: Crossing | None = None) -> None:
         self.motion, self.crossing = Motion(model), crossing
 
+    def begin(self, state: State) -> State:
+        """The state before the first step: undeformed, also where supports hold the body."""
+        return undeformed(state, self.motion)
+
+    def _known(self, state: State) -> tuple[Array, Array, Array]:
+        """Load, prescribed values (dofs,) and free displacements (n,) of the last state."""
+        free = state.displacement[self.motion.parts.free]
+        if state.is_unloaded:
+            nothing = np.zeros_like(state.displacement)
+            return nothing, nothing, free
+        return *self.motion.applied(state.time), free
+
     def advance(self, state: State, time: float, solve: Solve) -> TimeStep:
         """One step from a state to a time; solve(problem, start) solves its problem."""
-        linear = self.motion.parts
         load, prescribed = self.motion.applied(time)
-        load_before, prescribed_before = self.motion.applied(state.time)
         q0 = state.displacement
         problem = large_step(
             self.motion.body, load, prescribed, at_contacts(self.motion.body, q0),
-            (load_before, prescribed_before, q0[linear.free]),
+            self._known(state),
         )  # fmt: skip
         arrive = None
         if self.crossing is not None:
@@ -51,9 +61,7 @@ class LargeSlowModel:
         assert solution.v is not None
         q1 = problem.displacement(solution.v).ravel()
         axes = frames(problem.contact_point(solution.v).n)
-        pushed = np.zeros_like(q1)
-        pushed[problem.parts.at] = np.einsum("pkc,pk->pc", axes, solution.r)
-        energies = self._energies(q0, q1, load, pushed)
+        energies = self._energies(state, q1, load, solution.r, solution.u)
         passed = time - state.time
         velocity = (q1 - q0) / passed if passed else np.zeros_like(q1)
         slip = state.slip + solution.u[:, 1:]
@@ -62,23 +70,22 @@ class LargeSlowModel:
         return TimeStep(self.motion.body, new, solution, active, energies, solution.u[:, 0],
                         axes, passage)  # fmt: skip
 
-    def _energies(self, q0: Array, q1: Array, load: Array, pushed: Array) -> Energies:
-        """The balance of a step: all forces of its end times its motion.
+    def _energies(self, state: State, q1: Array, load: Array, r: Array, u: Array) -> Energies:
+        """The balance of `slow_energies`; r, u (nc, d): reactions, [gap, slip] of the step."""
+        before = self._forces(state.displacement, self.motion.load_of(state), state.force)
+        after, dq = self._forces(q1, load, r), q1 - state.displacement
+        friction = float((r[:, 1:] * u[:, 1:]).sum())
+        path = path_work(before, after, dq)
+        return slow_energies(before, after, dq, self.motion.parts.fixed, friction, path)
 
-        What is left of the work after the gain is that of a path of one step.
-        """
-        parts, linear = nonlinear_parts(self.motion.body), self.motion.parts
-        shape = parts.X.shape
-        dq = q1 - q0
-        after, before = parts.energy(q1.reshape(shape)), parts.energy(q0.reshape(shape))
-        inner = parts.forces(q1.reshape(shape))
-        held = np.zeros_like(dq)
-        held[linear.fixed] = (inner - load - pushed)[linear.fixed]
-        gain = after - before
-        return Energies(
-            elastic=after, gain=gain, loads=float(load @ dq), supports=float(held @ dq),
-            contact=float(pushed @ dq), numerical=float(inner @ dq) - gain,
-        )  # fmt: skip
+    def _forces(self, q: Array, load: Array, r: Array) -> Forces:
+        """All forces at displacements q (dofs,); r (nc, d): in the frames there."""
+        parts = nonlinear_parts(self.motion.body)
+        axes = frames(parts.contact.normals(parts.points + q[parts.at]))
+        pushed = np.zeros_like(q)
+        pushed[parts.at] = np.einsum("pkc,pk->pc", axes, r)
+        moved = q.reshape(parts.X.shape)
+        return Forces(parts.forces(moved), load, pushed, parts.energy(moved))
 
 
 def at_contacts(model: Model, displacement: Array) -> Array:

@@ -9,9 +9,17 @@ A contact takes part when its gap, predicted as gap + prediction h u_N, is not p
 the law holds between r and u1 + e (u_N of before, 0), e being the restitution ([J], [AB] 10.1).
 
 That law alone can create energy, of the order of the step size, where a closed contact is about
-to open or a sliding one turns round: the work of its impulse is r . u_theta, the law speaks of
-u1.  Where the contacts of a step together would do so, those that do are solved again with the
-law on u_theta, which never creates energy.
+to open or a sliding one turns round: the law speaks of u1, the work of an impulse is that on
+(u0 + u1) / 2, see `energy`.  Where contacts would add more in a step than the scheme loses in
+it, those that do are solved again with the law on u_theta, which creates no energy at all.
+
+Restitution never does so but for the loads within its step: implicit steps lift a body that
+leaves the ground at once.  It is then made smaller by as much as that takes, of the order of
+h g / |u_N|; impacts at some h g or less, of bodies that come to rest, lose it.
+
+The law is one of contacts, so of nodes: e is the restitution of a body only where all of it
+moves with its nodes, as one that is stiff against the step (a period below h).  A soft body
+leaves after its waves have run through it, with what they bring back, whatever e.
 
 M_hat does not change, and its W falls apart into the bodies: it is formed once, and every step
 cuts the active contacts out of it.
@@ -51,6 +59,8 @@ Mask = NDArray[np.bool_]
 Local = Callable[[FrictionProblem], FrictionProblem]
 Solve = Callable[[FrictionProblem, Iterate, Local | None], FrictionSolution]
 TOUCHING = 1e-9  # gaps below this part of the size of a contact's area count as closed
+TRIES = 3  # times that restitution is made smaller before the law on u_theta replaces it
+ENOUGH = 1.05  # times what a first-order estimate says that takes
 CREATED = 1.0  # energy contacts may create in a step, relative to the total, per tolerance
 W_LIMIT = 1e9  # bytes of W above which it is not formed
 
@@ -61,7 +71,7 @@ class MoreauJean:
 
     step: float
     theta: float = 0.5  # 1/2: no numerical damping; 1: implicit Euler
-    restitution: float = 0.0  # normal velocity after over before an impact
+    restitution: float = 0.0  # of contacts: normal velocity after over before an impact
     prediction: float = 0.5  # part of a step by which gaps are predicted
     mass_damping: float = 0.0  # Rayleigh, per time
     stiffness_damping: float = 0.0  # Rayleigh, time
@@ -111,6 +121,10 @@ class MovingModel:
         self._last_part: tuple[Index, FrictionProblem] | None = None
         self._last_active: tuple[Index, FrictionProblem] = (np.arange(nc), self.base)
 
+    def begin(self, state: State) -> State:
+        """The state before the first step: as it is."""
+        return state
+
     def advance(self, state: State, time: float, solve: Solve) -> TimeStep:
         """One step from a state to a time; solve(problem, start) solves its problem."""
         parts, method = self.motion.parts, self.method
@@ -130,31 +144,26 @@ class MovingModel:
         carried = self._local(v1)[active]  # by the supports
         start = Iterate(h * state.force[active])
         local = self._local_problem if self._condenses else None
-        shift = np.zeros_like(carried)
-        shift[:, 0] = method.restitution * u0[active, 0]
-        solved = np.zeros(len(active), dtype=bool)  # with the law on u_theta
+        shifts = _Shifts.of(u0[active], method)
         while True:
-            solution = solve(self._problem(active, f, carried + shift), start, local)
+            solution = solve(self._problem(active, f, carried + shifts.values), start, local)
             v1[parts.free] = _velocity(solution)
-            v_theta = theta * v1 + (1 - theta) * v0
-            q1 = q0 + h * v_theta
+            q1 = q0 + h * (theta * v1 + (1 - theta) * v0)
             impulse = np.zeros_like(parts.carried)
             impulse[active] = solution.r
             energies = self._energies(state, v1, q1, force, impulse)
-            wrong = self._creating(impulse, v_theta, energies)[active] & ~solved
-            if not wrong.any():
+            excess = energies.contact - self._allowed(energies)
+            changed = excess > 0 and shifts.changed(solution.r, self._local(v1)[active], excess)
+            if not changed:
                 break
-            solved |= wrong
-            shift[solved] = (1 - theta) / theta * u0[active][solved]
-            start = Iterate(solution.r)
+            shifts, start = changed, Iterate(solution.r)
         u = self._local(q1)
         new = State(state.index + 1, time, q1, v1, impulse / h, u[:, 1:])
         return TimeStep(self.motion.body, new, solution, active, energies, parts.gap + u[:, 0])
 
     def _local(self, v: Array) -> Array:
         """Local values of motions (dofs,): (nc, d)."""
-        parts = self.motion.parts
-        return (parts.whole_H.T @ v).reshape(parts.carried.shape)
+        return self.motion.parts.local(v)
 
     def _problem(self, active: Index, f: Array, w: Array) -> FrictionProblem:
         """The problem of the active contacts, with the matrices of the last one if it can."""
@@ -189,12 +198,10 @@ class MovingModel:
             law=problem.law, name=problem.name,
         )  # fmt: skip
 
-    def _creating(self, impulse: Array, v_theta: Array, energies: Energies) -> Mask:
-        """Contacts whose impulse creates energy, (nc,); none if all together dissipate."""
+    def _allowed(self, energies: Energies) -> float:
+        """Energy that contacts may create, (1) of `energy`: that of the solve's tolerance."""
         size = energies.total + abs(energies.loads) + abs(energies.supports)
-        if energies.contact <= CREATED * self.tolerance * size:
-            return np.zeros(len(impulse), dtype=bool)
-        return (impulse * self._local(v_theta)).sum(axis=1) > 0
+        return CREATED * self.tolerance * size
 
     def _energies(
         self, state: State, v1: Array, q1: Array, force: Array, impulse: Array
@@ -211,13 +218,66 @@ class MovingModel:
         held[parts.fixed] = rest[parts.fixed]
         kinetic, elastic = 0.5 * v1 @ (M @ v1), 0.5 * q1 @ (K @ q1)
         v0, q0 = state.velocity, state.displacement
+        work = float(pushed @ dq) / h
+        lost = float((theta - 0.5) * (dv @ (M @ dv) + dq @ (K @ dq)))
+        jump = min(max((theta - 0.5) * float(pushed @ dv), work), lost)
         gain = kinetic + elastic - 0.5 * v0 @ (M @ v0) - 0.5 * q0 @ (K @ q0)
         return Energies(
             kinetic=float(kinetic), elastic=float(elastic), gain=float(gain),
             loads=float(force @ dq), supports=float(held @ dq) / h,
-            contact=float(pushed @ dq) / h, damping=float(dq @ (C @ dq)) / h,
-            numerical=float((theta - 0.5) * (dv @ (M @ dv) + dq @ (K @ dq))),
+            contact=work - jump, damping=float(dq @ (C @ dq)) / h, numerical=lost - jump,
         )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Shifts:
+    """What is added to u1 in the law of the active contacts, (k, d).
+
+    before (k, d): u0; theta; restitution: that of contacts with the law on u1; on_mean (k,):
+    those with the law on u_theta; tries: how often restitution was made smaller.
+    """
+
+    before: Array
+    theta: float
+    restitution: float
+    on_mean: Mask
+    tries: int = 0
+
+    @classmethod
+    def of(cls, before: Array, method: MoreauJean) -> _Shifts:
+        """Those of a step that begins with u0 (k, d)."""
+        none = np.zeros(len(before), dtype=bool)
+        return cls(before, method.theta, method.restitution, none)
+
+    @property
+    def values(self) -> Array:
+        """(k, d), unit of velocity."""
+        out = np.zeros_like(self.before)
+        out[:, 0] = self.restitution * self.before[:, 0]
+        mean = (1 - self.theta) / self.theta * self.before
+        return np.where(self.on_mean[:, None], mean, out)
+
+    def changed(self, r: Array, after: Array, excess: float) -> _Shifts | None:
+        """Laws that create less than r and u1 = after, (k, d), did by `excess`; None: no other.
+
+        First those on u_theta for contacts that create energy by themselves, then a smaller
+        restitution, then the law on u_theta for all that do work on it.
+        """
+        creating = (r * (self.before + after)).sum(axis=1) > 0
+        if (creating & ~self.on_mean).any():
+            return replace(self, on_mean=self.on_mean | creating)
+        impact = (self.before[:, 0] < 0) & ~self.on_mean
+        power = float(r[impact, 0] @ -self.before[impact, 0])
+        e = self.restitution
+        if e > 0 and power > 0 and self.tries < TRIES:
+            # impacts take (1 - e) power / 2, power ~ 1 + e: with e it changes by this slope
+            smaller = max(0.0, e - ENOUGH * excess * (1 + e) / (e * power))
+            return replace(self, restitution=smaller, tries=self.tries + 1)
+        mean = self.theta * after + (1 - self.theta) * self.before
+        working = (r * mean).sum(axis=1) > 0
+        if (working & ~self.on_mean).any():
+            return replace(self, on_mean=self.on_mean | working)
+        return None
 
 
 def _velocity(solution: FrictionSolution) -> Array:

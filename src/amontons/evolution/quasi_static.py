@@ -1,7 +1,10 @@
 """Quasi-static steps: equilibrium at each time, friction on the slip since the last one.
 
-Loads and supports that depend on time are evaluated; where none does, all of them grow with
-the time as load factor.  Gaps are positions, so nothing drifts.
+Loads and supports that depend on time are evaluated, and those beside them that do not are
+there in full from the first step on; where none does, all of them grow with the time as load
+factor.  The first step goes from the undeformed body to what is applied at its end, and
+friction speaks of the whole way: it is what `solve` finds.  Gaps are positions, so nothing
+drifts.
 
 A step may have several solutions, or none near the last one: then the body jumps.  A solver
 finds any of them; with `crossing` the step is followed from the last state, see `passage`.
@@ -19,12 +22,13 @@ from ..errors import InvalidInput, UnsupportedForm
 from ..model import Model
 from ..nitsche_problem import NO_MULTIPLIERS
 from ..problem import FrictionProblem
-from .energy import Energies
+from .energy import Energies, Forces, slow_energies
 from .large_steps import LargeSlowModel
 from .moreau_jean import Solve
 from .passage import Crossing, taken
-from .state import State, TimeStep
+from .state import State, TimeStep, undeformed
 from .system import Motion
+from .undetermined import carried_on
 
 Array = NDArray[np.float64]
 
@@ -32,6 +36,9 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True)
 class QuasiStatic:
     """Steps of size `step` in time, or in the load factor where nothing depends on time.
+
+    Where anything depends on time, loads and supports that do not are applied in full in the
+    first step: write them as expressions in t (or functions of (x, t)) to let them grow.
 
     crossing: follows the path of solutions from every step to the next, `PathCrossing()`; the
     steps then say in `passage` whether and when the body jumped.
@@ -62,6 +69,10 @@ class SlowModel:
     def __init__(self, model: Model, crossing: Crossing | None = None) -> None:
         self.motion, self.crossing = Motion(model), crossing
 
+    def begin(self, state: State) -> State:
+        """The state before the first step: undeformed, also where supports hold the body."""
+        return undeformed(state, self.motion)
+
     def advance(self, state: State, time: float, solve: Solve) -> TimeStep:
         """One step from a state to a time; solve(problem, start) solves its problem."""
         parts = self.motion.parts
@@ -74,12 +85,13 @@ class SlowModel:
         solution, passage = taken(
             lambda start: solve(problem, start, None), arrive, state.force, (state.time, time)
         )
+        solution = carried_on(solution, state.force)
         assert solution.v is not None
         q1 = prescribed.copy()
         q1[parts.free] = solution.v
         dq = q1 - state.displacement
-        u = (parts.whole_H.T @ q1).reshape(parts.carried.shape)
-        energies = self._energies(state, q1, load, parts.whole_H @ solution.r.ravel())
+        u = parts.local(q1)
+        energies = self._energies(state, q1, load, solution.r)
         time_step = time - state.time
         velocity = dq / time_step if time_step else np.zeros_like(dq)
         new = State(state.index + 1, time, q1, velocity, solution.r, u[:, 1:])
@@ -100,16 +112,16 @@ class SlowModel:
         drift = (time - state.time) * motion[:, 1:]
         return self.motion.body.increment(load, held, state.slip - drift)
 
-    def _energies(self, state: State, q1: Array, load: Array, pushed: Array) -> Energies:
-        """The balance of `energy` with theta = 1 and no mass."""
-        parts, K = self.motion.parts, self.motion.parts.K
-        dq = q1 - state.displacement
-        held = np.zeros_like(dq)
-        held[parts.fixed] = (K @ q1 - load - pushed)[parts.fixed]
-        elastic = 0.5 * q1 @ (K @ q1)
-        before = 0.5 * state.displacement @ (K @ state.displacement)
-        return Energies(
-            elastic=float(elastic), gain=float(elastic - before), loads=float(load @ dq),
-            supports=float(held @ dq), contact=float(pushed @ dq),
-            numerical=float(0.5 * dq @ (K @ dq)),
-        )  # fmt: skip
+    def _energies(self, state: State, q1: Array, load: Array, r: Array) -> Energies:
+        """The balance of `slow_energies`; r (nc, d): reactions after the step."""
+        parts, dq = self.motion.parts, q1 - state.displacement
+        before = self._forces(
+            state.displacement, self.motion.load_of(state), parts.whole_H @ state.force.ravel()
+        )
+        after = self._forces(q1, load, parts.whole_H @ r.ravel())
+        friction = float((r[:, 1:] * parts.local(dq)[:, 1:]).sum())
+        return slow_energies(before, after, dq, parts.fixed, friction)
+
+    def _forces(self, q: Array, load: Array, pushed: Array) -> Forces:
+        inner = self.motion.parts.K @ q
+        return Forces(inner, load, pushed, float(0.5 * q @ inner))

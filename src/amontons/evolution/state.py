@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 from ..contact import forces
 from ..errors import InvalidInput
 from ..model import ContactFields, Fix, Model
-from ..model.assembly import locate, prescribed_values
 from ..model.doubts import model_warnings
+from ..model.supports import locate, prescribed_values
 from ..model.values import VectorValue, vector_at
 from ..problem import FrictionProblem
 from ..solution import ContactStatus, FrictionSolution
 from ..warned import ResultWarning
 from .energy import Energies
 from .passage import Passage
+from .system import Motion
 from .timed import part_at, steady
 
 Array = NDArray[np.float64]
@@ -49,6 +50,11 @@ class State:
                 raise InvalidInput(f"state: {name} holds a number that is not finite")
             array.flags.writeable = False
             object.__setattr__(self, name, array)
+
+    @property
+    def is_unloaded(self) -> bool:
+        """True without displacements and contact forces: no load acts in equilibrium."""
+        return not (self.displacement.any() or self.force.any())
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +180,8 @@ def at_rest(
     """The undeformed model at a time, moving with a velocity.
 
     velocity: a value per component, a function of x, or a list of one of these per body.  Fixed
-    dofs start with their prescribed displacement and without velocity.
+    dofs start with their prescribed displacement and without velocity; quasi-static steps begin
+    without displacements.
     """
     parts = steady(model).discretisation
     q, v = np.zeros(parts.dofs), np.zeros(parts.dofs)
@@ -186,9 +193,20 @@ def at_rest(
     v[parts.fixed] = 0.0
     supports: tuple[Fix, ...] = tuple(part_at(s, time) for s in model.supports)  # type: ignore[misc]
     q[parts.fixed] = prescribed_values(model.bodies, supports, parts.offsets)[parts.fixed]
-    nc, d = parts.carried.shape
-    u = (parts.whole_H.T @ q).reshape(nc, d)
-    return State(0, time, q, v, np.zeros((nc, d)), u[:, 1:])
+    u = parts.local(q)
+    return State(0, time, q, v, np.zeros_like(u), u[:, 1:])
+
+
+def undeformed(state: State, motion: Motion) -> State:
+    """A state `at_rest` with all displacements zero, also prescribed ones; others as they are.
+
+    Quasi-static steps begin there: what supports prescribe at first is part of the first step.
+    """
+    moved = state.displacement[motion.parts.free].any() or state.velocity.any()
+    if state.index or moved or state.force.any():
+        return state
+    zero = np.zeros_like
+    return replace(state, displacement=zero(state.displacement), slip=zero(state.slip))
 
 
 def _one_each(velocity: object, bodies: int) -> list:

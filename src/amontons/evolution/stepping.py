@@ -38,7 +38,9 @@ def evolve(
     start: by default the undeformed model at rest at time 0; any `step.state` goes on from
     there and gives the same numbers as an evolution without a stop.  Supports and loads may
     depend on time: expressions in t, or functions of (x, t).  check: raise NotConverged, which
-    carries the solution of the step, instead of going on with it.
+    carries the solution of the step, instead of going on with it.  Raises InvalidInput at the
+    time at which supports hold other components than at time 0, or push a contact node that
+    they hold into what it meets.
 
     The problem of a step is `step.problem`.
     """
@@ -47,6 +49,7 @@ def evolve(
         solver = nonlinear_solver(solver)  # type: ignore[assignment]
     state = start if start is not None else at_rest(model)
     _check(state, prepared.motion, method.step, until)
+    state = prepared.begin(state)
 
     def solve(
         problem: FrictionProblem, first: Iterate, local: Local | None

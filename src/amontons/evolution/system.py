@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +13,16 @@ from scipy import sparse
 from ..errors import InvalidInput
 from ..fem.mass import lumped, mass
 from ..model import Fix, Model
-from ..model.assembly import Discretisation, external_load, prescribed_values
+from ..model.assembly import Discretisation
+from ..model.supports import external_load, locate, prescribed_values
 from .timed import depends_on_time, is_timed, part_at, steady
 
+if TYPE_CHECKING:
+    from .state import State
+
 Array = NDArray[np.float64]
+# where a line is compared with what is applied: at no simple shares, which waves may hit
+INSIDE = tuple((k * 0.6180339887498949) % 1.0 for k in range(1, 9))
 BENT = 1e-9  # departure from a straight line in time, relative, that a load may have
 
 
@@ -27,10 +34,11 @@ class Motion:
     """
 
     model: Model
+    _loads: dict[float, Array] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def body(self) -> Model:
-        """The model at time 0."""
+        """The model at time 0, for matrices and for what supports hold; not for values."""
         return steady(self.model)
 
     @cached_property
@@ -57,22 +65,37 @@ class Motion:
         moving = tuple(part_at(p, t) for p in self.model.loads if is_timed(p.value))
         if not moving:
             return self._steady_load
-        forces = external_load(self.model.bodies, moving, self.parts.offsets)  # type: ignore[arg-type]
-        return self._steady_load + forces
+        if t not in self._loads:
+            forces = external_load(self.model.bodies, moving, self.parts.offsets)  # type: ignore[arg-type]
+            for old in list(self._loads)[:-1]:
+                del self._loads[old]
+            self._loads[t] = self._steady_load + forces
+        return self._loads[t]
+
+    def load_of(self, state: State) -> Array:
+        """Nodal forces (dofs,) that are said to act at the time of a quasi-static state."""
+        if state.is_unloaded:
+            return np.zeros(self.parts.dofs)
+        return (1.0 if self.is_timed else state.time) * self.load(state.time)
 
     def prescribed(self, t: float) -> Array:
-        """Prescribed displacement at time t, (dofs,), zero on the free dofs."""
-        if not self._supports_move:
-            return self._steady_displacement
-        return self._prescribed(t)
+        """Prescribed displacement at time t, (dofs,), zero on the free dofs.
+
+        Raises InvalidInput where it pushes a node that supports hold into what it meets.
+        """
+        return self._checked(self._displaced(t), t)
 
     def applied(self, t: float) -> tuple[Array, Array]:
         """(nodal forces, prescribed displacement) at time t, (dofs,) each.
 
-        Where nothing depends on time all grow with it as load factor.
+        Where nothing depends on time all grow with it as load factor.  Raises as `prescribed`.
         """
         factor = 1.0 if self.is_timed else t
-        return factor * self.load(t), factor * self.prescribed(t)
+        return factor * self.load(t), self._checked(factor * self._displaced(t), t)
+
+    def _checked(self, prescribed: Array, t: float) -> Array:
+        self.body.check_outside(prescribed, f" at t = {t:.6g}")
+        return prescribed
 
     def straight(
         self, interval: tuple[float, float], otherwise: str
@@ -83,26 +106,52 @@ class Motion:
         straight line in between.
         """
         a, b = interval
-        ends = [self.applied(t) for t in (a, b, (a + b) / 2)]
-        for first, last, middle in zip(*ends, strict=True):
-            size = max(float(np.abs(first).max(initial=0)), float(np.abs(last).max(initial=0)))
-            if np.abs((first + last) / 2 - middle).max(initial=0) > BENT * size:
-                raise InvalidInput(
-                    f"interval: the loads are no straight line in time between {a:g} and "
-                    f"{b:g}; {otherwise}"
-                )
-        return ends[0], ends[1]
+        first, last = self.applied(a), self.applied(b)
+        for share in INSIDE if self.is_timed else ():
+            now = self.applied(a + share * (b - a))
+            for start, end, value in zip(first, last, now, strict=True):
+                size = max(float(np.abs(x).max(initial=0)) for x in (start, end, value))
+                line = (1 - share) * start + share * end
+                if np.abs(line - value).max(initial=0) > BENT * size:
+                    raise InvalidInput(
+                        f"interval: the loads are no straight line in time between {a:g} and "
+                        f"{b:g}; {otherwise}"
+                    )
+        return first, last
 
     @cached_property
     def _steady_displacement(self) -> Array:
         return self._prescribed(0.0)
 
+    def _displaced(self, t: float) -> Array:
+        """What supports prescribe at time t, (dofs,), without a load factor."""
+        return self._prescribed(t) if self._supports_move else self._steady_displacement
+
     def _prescribed(self, t: float) -> Array:
         supports: tuple[Fix, ...] = tuple(part_at(s, t) for s in self.model.supports)  # type: ignore[misc]
         values = prescribed_values(self.model.bodies, supports, self.parts.offsets)
-        out = np.zeros(self.parts.dofs)
-        out[self.parts.fixed] = values[self.parts.fixed]
-        return out
+        changed = np.flatnonzero(np.isnan(values) == self.parts.is_fixed)
+        if changed.size:
+            raise InvalidInput(self._comes_or_goes(int(changed[0]), t))
+        return np.where(self.parts.is_fixed, values, 0.0)
+
+    def _comes_or_goes(self, dof: int, t: float) -> str:
+        """What to say of a dof that is free at t and was held at time 0, or the other way."""
+        bodies, offsets, d = self.model.bodies, self.parts.offsets, self.model.dimension
+        k = int(np.searchsorted(offsets, dof, side="right")) - 1
+        node, axis = divmod(dof - int(offsets[k]), d)
+        mesh = bodies[k].mesh
+        names = [s.on for s in self.model.supports
+                 if is_timed(s.value) and (found := locate(bodies, s.on))[0] == k
+                 and node in mesh.surface_nodes(found[1])]  # fmt: skip
+        held = bool(self.parts.is_fixed[dof])
+        before, now = ("held", "free") if held else ("free", "held")
+        return (
+            f"fix on {', '.join(map(repr, names))}: component {axis} at "
+            f"{mesh.points[node].tolist()} is {before} at t = 0 and {now} at t = {t:.6g}; a "
+            "support holds the same components at all times; for one that comes or goes begin "
+            "another evolution, of a model with other supports, from the state (start=)"
+        )
 
 
 @dataclass(frozen=True, eq=False)

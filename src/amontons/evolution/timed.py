@@ -1,40 +1,20 @@
-"""Values that depend on time: expressions in t, and functions of (x, t)."""
+"""Models whose supports and loads depend on time."""
 
 from __future__ import annotations
 
-import inspect
-from dataclasses import is_dataclass, replace
-from functools import partial
-from typing import Any
+from dataclasses import replace
 
 from ..model import BodyForce, Fix, Model, Traction
+from ..model.timing import at_time, is_timed
 
 Part = Fix | Traction | BodyForce
 
-
-def is_timed(value: Any) -> bool:
-    """True for an expression with t in it, a function of (x, t), or a list with one of them."""
-    if isinstance(value, list | tuple):
-        return any(is_timed(entry) for entry in value)
-    if _is_expression(value):
-        return "t" in value.names
-    return callable(value) and _takes_time(value)
+__all__ = ["at_time", "depends_on_time", "growth_in_words", "is_timed", "part_at", "steady"]
 
 
 def depends_on_time(model: Model) -> bool:
     """True where a load or a support of a model depends on time."""
     return any(is_timed(part.value) for part in (*model.supports, *model.loads))
-
-
-def at_time(value: Any, t: float) -> Any:
-    """The value at time t: a number, or a function of position alone."""
-    if isinstance(value, list | tuple):
-        return [at_time(entry, t) for entry in value]
-    if not is_timed(value):
-        return value
-    if _is_expression(value):
-        return replace(value, time=float(t))
-    return partial(_swapped, value, float(t))
 
 
 def part_at(part: Part, t: float) -> Part:
@@ -43,33 +23,46 @@ def part_at(part: Part, t: float) -> Part:
 
 
 def steady(model: Model) -> Model:
-    """The model with supports and loads as they are at time 0: the one that is assembled."""
+    """The model with supports and loads as they are at time 0: the one that is assembled.
+
+    Only what does not depend on that time may be taken from it: matrices, which components
+    supports hold, and gaps.
+    """
     if not depends_on_time(model):
         return model
     if "steady" not in model._shared:
-        model._shared["steady"] = replace(
+        found = replace(
             model,
             supports=[part_at(part, 0.0) for part in model.supports],
             loads=[part_at(part, 0.0) for part in model.loads],
         )
+        found._shared["steady"] = found
+        model._shared["steady"] = found
     return model._shared["steady"]
 
 
-def _swapped(function: Any, t: float, x: Any) -> Any:
-    return function(x, t)
+def growth_in_words(model: Model) -> str:
+    """How loads and supports of quasi-static steps come to act, where that may surprise."""
+    parts = [part for part in (*model.supports, *model.loads) if _is_something(part.value)]
+    if not depends_on_time(model):
+        return (
+            "nothing depends on the time t: loads and supports grow with it, in full at t = 1"
+        )
+    at_once = [_name(part) for part in parts if not is_timed(part.value)]
+    if not at_once:
+        return ""
+    names = ", ".join(dict.fromkeys(at_once))
+    return f"what does not depend on the time t acts in full from the first step on: {names}"
 
 
-def _is_expression(value: Any) -> bool:
-    """An amontons.expressions.Expression, which lies above this layer: known by its fields."""
-    return is_dataclass(value) and hasattr(value, "names") and hasattr(value, "time")
+def _is_something(value: object) -> bool:
+    """False for zero and for components that are free."""
+    if isinstance(value, list | tuple):
+        return any(_is_something(entry) for entry in value)
+    return value is not None and (callable(value) or bool(value))
 
 
-def _takes_time(function: Any) -> bool:
-    """True for a function with two arguments without default."""
-    try:
-        parameters = inspect.signature(function).parameters.values()
-    except (TypeError, ValueError):  # a builtin without signature takes x alone
-        return False
-    plain = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
-    needed = [p for p in parameters if p.kind in plain and p.default is inspect.Parameter.empty]
-    return len(needed) == 2
+def _name(part: Part) -> str:
+    if isinstance(part, BodyForce):
+        return "body force" if part.region is None else f"body force in {part.region!r}"
+    return f"{'fix' if isinstance(part, Fix) else 'traction'} on {part.on!r}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +15,15 @@ from ..fem.elasticity import LinearElastic, stiffness
 from ..linear.distributed import DistributedMatrix
 from ..linear.grid_matrix import GridMatrix
 from ..linear.levels import Levels, continued, free_levels
+from .held import check_outside
 from .parts import Body, BodyForce, Contact, Fix, Traction
 from .placing import Placed, place
 from .rigid import Piece, near_nullspace, pieces
-from .supports import external_load, locate, prescribed_values
+from .supports import Prescribed, external_load, locate
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+ROUNDING = 1e-14  # of the displacements, up to which their difference is none
 GRID_FROM = 50_000  # dofs of a box of equal cells from which its stiffness is not stored
 
 
@@ -56,14 +59,33 @@ class Discretisation:
         if not any(self.nodal_levels):
             return None
         counts = np.diff(self.offsets) // self.placed[0].rows.points.shape[1]
-        fixed = np.zeros(self.dofs, dtype=bool)
-        fixed[self.fixed] = True
-        return continued(self.nodal_levels, counts.tolist(), prescribed, fixed)[self.free]
+        return continued(
+            self.nodal_levels, counts.tolist(), prescribed, self.is_fixed
+        )[self.free]  # fmt: skip
+
+    @cached_property
+    def is_fixed(self) -> NDArray[np.bool_]:
+        """Dofs (dofs,) that supports prescribe."""
+        out = np.zeros(self.dofs, dtype=bool)
+        out[self.fixed] = True
+        return out
 
     @property
     def dofs(self) -> int:
         """Free and fixed degrees of freedom."""
         return len(self.prescribed)
+
+    def local(self, displacement: Array) -> Array:
+        """Local displacements (nc, d) of displacements (dofs,), gaps not included.
+
+        Where both sides move by the same they are zero: rounding would tell friction a way.
+        """
+        return _local(self.whole_H, self._sizes, displacement, self.carried.shape[1])
+
+    @cached_property
+    def _sizes(self) -> sparse.csc_array:
+        """|H| of the whole model, (dofs, nc d)."""
+        return abs(self.whole_H)
 
     @property
     def stored_stiffness(self) -> sparse.csr_array:
@@ -85,18 +107,20 @@ def discretise(
 ) -> Discretisation:
     """Assemble everything that depends on neither friction nor load factor; K if not given."""
     offsets = np.cumsum([0, *(body.mesh.points.size for body in bodies)])
-    values = prescribed_values(bodies, supports, offsets)
-    is_fixed = ~np.isnan(values)
+    given = Prescribed.of(bodies, supports, offsets)
+    is_fixed = given.is_fixed
     free, fixed = np.flatnonzero(~is_fixed), np.flatnonzero(is_fixed)
     if not free.size:
         raise InvalidInput("supports: every degree of freedom is fixed, nothing left to solve")
     if K is None:
         K = _stiffness(bodies)
-    prescribed = np.where(is_fixed, values, 0.0)
-    placed = tuple(place(bodies, contact, values, offsets) for contact in contacts)
+    prescribed = np.where(is_fixed, given.values, 0.0)
+    placed = tuple(place(bodies, contact, given, offsets) for contact in contacts)
     _check_once(bodies, contacts, placed)
     whole_H = sparse.hstack([p.H for p in placed], format="csc")
     if not whole_H.shape[1]:
+        for held in (p.held for p in placed if p.held is not None):
+            check_outside(held, held.left(prescribed), bodies, supports, offsets, "")
         raise InvalidInput(
             "contacts: every slave node is fixed by a support, no contact is left"
         )
@@ -108,7 +132,7 @@ def discretise(
         H=sparse.csc_array(whole_H.tocsr()[free]),
         load=(load - K @ prescribed)[free],
         gap=np.concatenate([p.rows.gap for p in placed]),
-        carried=(whole_H.T @ prescribed).reshape(-1, d),
+        carried=_local(whole_H, abs(whole_H), prescribed, d),
         placed=placed,
         parts=[
             piece
@@ -123,6 +147,18 @@ def discretise(
         ),
         nodal_levels=tuple(body.mesh.levels for body in bodies),
     )  # fmt: skip
+
+
+def _local(
+    H: sparse.csc_array, sizes: sparse.csc_array, displacement: Array, d: int
+) -> Array:  # fmt: skip
+    """H^T displacement in rows of d, without what rounding leaves of differences; |H|."""
+    out = H.T @ displacement
+    small = np.abs(out)
+    most = ROUNDING * float(np.abs(displacement).max(initial=0.0)) * len(displacement)
+    if ((small > 0) & (small <= most)).any():
+        out[small <= ROUNDING * (sizes.T @ np.abs(displacement))] = 0.0
+    return out.reshape(-1, d)
 
 
 def _stiffness(bodies: tuple[Body, ...]) -> sparse.csr_array | GridMatrix:

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING
 
 from ..warned import ResultWarning
 from .fields import ContactFields
+from .rotation import large_rotation
 
 if TYPE_CHECKING:
     from .model import Model
 
 Check = Callable[["Model", ContactFields], list[ResultWarning]]
-CHECKS: tuple[Check, ...] = ()
+CHECKS: tuple[Check, ...] = (large_rotation,)
 
 
 def model_warnings(model: Model, fields: ContactFields) -> tuple[ResultWarning, ...]:

@@ -351,6 +351,7 @@ def large_deformation(model: Model) -> LargeDeformation:
     linear = model.discretisation
     load = external_load(model.bodies, model.loads, linear.offsets)
     factor = model.load_factor
+    model.check_outside(factor * linear.prescribed)
     return large_step(model, factor * load, factor * linear.prescribed)
 
 

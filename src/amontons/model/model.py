@@ -23,6 +23,7 @@ from ..solution import FrictionSolution
 from .assembly import Discretisation, discretise, locate
 from .balance import imbalance
 from .fields import ContactFields, recover_fields
+from .held import check_outside
 from .large_deformation import LargeDeformation, large_deformation
 from .large_fields import recover_large
 from .nitsche import nitsche_matrices, nitsche_problem
@@ -123,9 +124,20 @@ class Model:
         parts = self.discretisation
         w = self.load_factor * parts.carried
         w[:, 0] += parts.gap
-        return self._discrete(
-            self.load_factor * parts.load, w, self.load_factor * parts.prescribed
-        )
+        prescribed = self.load_factor * parts.prescribed
+        self.check_outside(prescribed)
+        return self._discrete(self.load_factor * parts.load, w, prescribed)
+
+    def check_outside(self, prescribed: Array, when: str = "") -> None:
+        """Raise InvalidInput where supports push a node that they hold into the other side.
+
+        prescribed (dofs,): displacements on the fixed dofs, else zero; when: for the message.
+        """
+        parts = self.discretisation
+        for held in (placed.held for placed in parts.placed if placed.held is not None):
+            gap = (held.left_where_moved(prescribed, parts.is_fixed) if self.is_large
+                   else held.left(prescribed))  # fmt: skip
+            check_outside(held, gap, self.bodies, self.supports, parts.offsets, when)
 
     def increment(
         self, load: Array, prescribed: Array, before: Array
@@ -136,7 +148,7 @@ class Model:
         before (nc, d-1): tangential displacement at the end of the last step.
         """
         parts = self.discretisation
-        w = (parts.whole_H.T @ prescribed).reshape(parts.carried.shape)
+        w = parts.local(prescribed)
         w[:, 0] += parts.gap
         w[:, 1:] -= before
         return self._discrete((load - parts.K @ prescribed)[parts.free], w, prescribed)
@@ -193,9 +205,7 @@ class Model:
 
     def _loose(self, parts: Discretisation) -> list[tuple[Piece, Array]]:
         """Pieces with the rigid modes that supports leave free."""
-        fixed = np.zeros(parts.dofs, dtype=bool)
-        fixed[parts.fixed] = True
-        return loose_modes(parts.parts, fixed)
+        return loose_modes(parts.parts, parts.is_fixed)
 
     def _loose_but_held(self, parts: Discretisation, law: Law) -> bool:
         """True when contact alone holds a body; raises SingularOperator when nothing does."""

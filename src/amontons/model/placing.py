@@ -24,13 +24,15 @@ from ..errors import InvalidInput, UnsupportedForm
 from ..fem.elasticity import LinearElastic
 from ..fem.mesh import Mesh
 from ..fem.surfaces import facet_normals
+from .held import HeldNodes
 from .parts import Body, Contact
-from .supports import locate
+from .supports import Prescribed, locate
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 AWAY = 0.1  # cosine between outward normal and obstacle's above which a facet looks away
-TOUCHING = 1e-12  # penetration of held nodes, relative to the mesh, that is none
+FREE = 1e-9  # free part of a normal up to which supports hold it
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +40,7 @@ class Placed:
     """Contacts of one pair: body of the slave, kept (slave nodes,), rows of the kept ones.
 
     H (dofs, nc d): the rows in the dofs of the whole model, with those of a master body.
+    held: slave nodes without a contact, as supports hold them along the normal.
     By Nitsche's method Gauss points of the slave take the place of its nodes, and `nitsche`
     holds their tractions, also in the dofs of the whole model.
     """
@@ -47,32 +50,62 @@ class Placed:
     all_points: Array
     rows: ContactRows
     H: sparse.csc_array
+    held: HeldNodes | None = None
     nitsche: NitscheTerms | None = None
 
 
-def place(bodies: tuple[Body, ...], contact: Contact, values: Array, offsets: Index) -> Placed:
-    """Contacts of one pair without those whose normal the supports prescribe.
-
-    values (dofs,): prescribed displacements, NaN where free.
-    """
-    is_fixed = ~np.isnan(values)
+def place(
+    bodies: tuple[Body, ...], contact: Contact, given: Prescribed, offsets: Index
+) -> Placed:
+    """Contacts of one pair without those whose normal the supports prescribe."""
     k = locate(bodies, contact.slave)[0]
-    mesh = bodies[k].mesh
-    rows, H, met, points, terms = _met(bodies, contact, values, offsets)
-    d = mesh.dim
-    normal = sparse.csc_array(H[:, ::d]).multiply(~is_fixed[:, None])
-    kept = np.sqrt(np.asarray(normal.power(2).sum(axis=0)).ravel()) > 1e-9
-    prescribed = np.where(is_fixed, values, 0.0)
-    _check_supported(mesh, contact, rows.at(~kept), (H[:, ::d].T @ prescribed)[~kept])
-    kept &= _wanted(contact, points)[met]
+    d = bodies[k].mesh.dim
+    rows, H, met, points, terms = _met(bodies, contact, given, offsets)
+    kept = ~_has_held_normal(H, d, given.is_fixed) & _wanted(contact, points)[met]
     all_kept = met.copy()
     all_kept[met] = kept
+    held = _held_nodes(bodies, contact, given.is_fixed, offsets)
     terms = None if terms is None else terms.at(kept)
-    return Placed(k, all_kept, points, rows.at(kept), H[:, np.repeat(kept, d)], terms)
+    return Placed(k, all_kept, points, rows.at(kept), H[:, np.repeat(kept, d)], held, terms)
+
+
+def _has_held_normal(H: sparse.csc_array, d: int, is_fixed: Mask) -> Mask:
+    """Contacts (nc,) whose normal only has dofs that supports prescribe, of both sides."""
+    normal = sparse.csc_array(H[:, ::d]).multiply(~is_fixed[:, None])
+    return np.sqrt(np.asarray(normal.power(2).sum(axis=0)).ravel()) <= FREE
+
+
+def _held_nodes(
+    bodies: tuple[Body, ...], contact: Contact, is_fixed: Mask, offsets: Index
+) -> HeldNodes | None:
+    """Slave nodes that take part and can not move along the normal, whatever the method."""
+    k, surface = locate(bodies, contact.slave)
+    slave, first, total = bodies[k].mesh, int(offsets[k]), int(offsets[-1])
+    nodes = contact_nodes(slave, surface)[0]
+    d = slave.dim
+    if not is_fixed[first + nodes[:, None] * d + np.arange(d)].any():
+        return None
+    if contact.obstacle is not None:
+        rows = nodal_contact(slave, surface, contact.obstacle)
+        H = _shifted(rows.H, first, total)
+    else:
+        assert contact.master is not None
+        j, other = locate(bodies, contact.master)
+        try:
+            rows, on_master, _ = pair_contact(slave, surface, bodies[j].mesh, other)
+        except InvalidInput:
+            return None  # no node faces the master: averages may still do
+        H = _shifted(rows.H, first, total) + _shifted(on_master, int(offsets[j]), total)
+    held = _has_held_normal(sparse.csc_array(H), d, is_fixed) & _wanted(contact, rows.points)
+    if not held.any():
+        return None
+    size = np.abs(slave.points).max() + np.ptp(slave.points, axis=0).max()
+    columns = sparse.csc_array(sparse.csc_array(H)[:, np.repeat(held, d)])
+    return HeldNodes.of(contact, rows.at(held), columns, first, size)
 
 
 def _met(
-    bodies: tuple[Body, ...], contact: Contact, values: Array, offsets: Index
+    bodies: tuple[Body, ...], contact: Contact, given: Prescribed, offsets: Index
 ) -> tuple[ContactRows, sparse.csc_array, NDArray[np.bool_], Array, NitscheTerms | None]:
     """Contacts of one pair, H in the dofs of the model, which of all points meet, and terms."""
     if contact.nitsche is not None:
@@ -81,22 +114,22 @@ def _met(
     slave, size = bodies[k].mesh, int(offsets[-1])
     points = slave.points[contact_nodes(slave, surface)[0]]
     mortar = contact.method == "mortar"
-    given = [v.reshape(-1, slave.dim) for v in np.split(values, offsets[1:-1])]
+    held, lasting = given.by_body(offsets, slave.dim)
     if contact.obstacle is not None:
         rows = nodal_contact(slave, surface, contact.obstacle)
         _check_faces(slave, surface, contact, rows)
         met = np.ones(len(rows.nodes), dtype=bool)
         if mortar:
-            _check_held(slave, contact, rows, given[k][rows.nodes])
-            rows, met = mortar_obstacle(slave, surface, contact.obstacle, prescribed=given[k])
+            rows, met = mortar_obstacle(slave, surface, contact.obstacle, held=held[k])
         return rows, _shifted(rows.H, int(offsets[k]), size), met, points, None
     assert contact.master is not None
     j, other = locate(bodies, contact.master)
     master = bodies[j].mesh
     if mortar:
         rows, on_master, met = mortar_contact(
-            slave, surface, master, other, prescribed=given[k], master_prescribed=given[j]
-        )
+            slave, surface, master, other, held=held[k], lasting=lasting[k],
+            master_lasting=lasting[j],
+        )  # fmt: skip
     else:
         rows, on_master, met = pair_contact(slave, surface, master, other)
     H = _shifted(rows.H, int(offsets[k]), size) + _shifted(on_master, int(offsets[j]), size)
@@ -148,27 +181,6 @@ def _check_faces(mesh: Mesh, surface: str, contact: Contact, rows: ContactRows) 
             f"contact on {contact.slave!r}: no facet of it faces the obstacle; a normal of the "
             f"obstacle points into the body, here it is {rows.frames[0, 0].round(3).tolist()}"
         )
-
-
-def _check_supported(mesh: Mesh, contact: Contact, rows: ContactRows, moved: Array) -> None:
-    """Raise InvalidInput when supports alone push a node into the obstacle."""
-    gap = rows.gap + moved
-    size = np.ptp(mesh.points, axis=0).max()
-    if gap.size and gap.min() < -TOUCHING * size:
-        k = int(gap.argmin())
-        raise InvalidInput(
-            f"contact on {contact.slave!r}: supports hold the node at "
-            f"{rows.points[k].tolist()} and push it {-gap[k]:.3g} into the other side, where "
-            "no contact force can act; change the prescribed displacement or free the node"
-        )
-
-
-def _check_held(mesh: Mesh, contact: Contact, rows: ContactRows, given: Array) -> None:
-    """The same for nodes that supports hold, before mortar leaves out their multipliers."""
-    normal = rows.frames[:, 0]
-    held = np.linalg.norm(normal * np.isnan(given), axis=1) < 1e-9
-    moved = np.einsum("pc,pc->p", normal, np.nan_to_num(given))
-    _check_supported(mesh, contact, rows.at(held), moved[held])
 
 
 def _wanted(contact: Contact, points: Array) -> NDArray[np.bool_]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,11 +12,43 @@ from ..fem.elasticity import body_load
 from ..fem.mesh import unknown
 from ..fem.surfaces import surface_load
 from .parts import Body, BodyForce, Fix, Traction
+from .timing import lasting
 from .values import vector_at
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 SAME = 1e-12  # prescribed values that differ by less, relative to the largest, agree
+
+
+@dataclass(frozen=True, eq=False)
+class Prescribed:
+    """What supports say: values (dofs,), NaN where free, as they are now.
+
+    lasting (dofs,): the values that do not depend on time, NaN elsewhere.
+    """
+
+    values: Array
+    lasting: Array
+
+    @classmethod
+    def of(
+        cls, bodies: tuple[Body, ...], supports: tuple[Fix, ...], offsets: Index
+    ) -> Prescribed:
+        """Of all supports of a model, those of (x, t) at t = 0 unless they have a time."""
+        values = prescribed_values(bodies, supports, offsets)
+        same = tuple(replace(s, value=lasting(s.value)) for s in supports)
+        return cls(values, prescribed_values(bodies, same, offsets))
+
+    @property
+    def is_fixed(self) -> NDArray[np.bool_]:
+        """Dofs (dofs,) that supports prescribe."""
+        return ~np.isnan(self.values)
+
+    def by_body(self, offsets: Index, dim: int) -> tuple[list[NDArray[np.bool_]], list[Array]]:
+        """Which components are prescribed, and lasting values: of every body (nodes, dim)."""
+        split = [np.split(a, offsets[1:-1]) for a in (self.is_fixed, self.lasting)]
+        held, values = ([a.reshape(-1, dim) for a in parts] for parts in split)
+        return held, values
 
 
 def locate(bodies: tuple[Body, ...], on: str) -> tuple[int, str]:

@@ -8,19 +8,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InvalidInput
+from .timing import steady_value
 
 Array = NDArray[np.float64]
-Component = float | Callable[[Array], float] | None
-VectorValue = float | Sequence[Component] | Callable[[Array], Sequence[float | None]]
+Component = float | Callable[..., float] | None
+VectorValue = float | Sequence[Component] | Callable[..., Sequence[float | None]]
 ScalarValue = ArrayLike | Callable[[Array], ArrayLike]
 
 
 def vector_at(value: VectorValue, points: Array, what: str, *, free: bool = False) -> Array:
     """A vector value at points (n, dim): (n, dim); a free component (None) becomes NaN.
 
-    Callables take one point x of shape (dim,): the whole value, or one component each.
+    Callables take one point x of shape (dim,): the whole value, or one component each; those
+    of (x, t) are taken at t = 0.
     """
     dim = points.shape[1]
+    value = steady_value(value)
     if callable(value):
         rows = [_row(value(x), dim, what, free) for x in points]
         return np.array(rows, dtype=float).reshape(len(points), dim)

@@ -39,9 +39,10 @@ def energy_figure(
     lost = total("damping") + total("numerical")
     figure = Figure(figsize=(10.8, 4.4), dpi=130, layout="constrained")
     left, right = figure.subplots(1, 2)
-    left.stackplot(t, stored, lost, dissipated, colors=("#56B4E9", "#BBBBBB", "#E69F00"),
-                   labels=("stored (kinetic + elastic)", "lost in time scheme and damping",
-                           "dissipated by contact and friction"))  # fmt: skip
+    # losses of the scheme last: those of quasi-static steps may be negative
+    left.stackplot(t, stored, dissipated, lost, colors=("#56B4E9", "#E69F00", "#BBBBBB"),
+                   labels=("stored (kinetic + elastic)", "dissipated by contact and friction",
+                           "lost in time scheme and damping"))  # fmt: skip
     left.plot(t, put_in, color=INK, linewidth=1.6, linestyle="--",
               label="work of loads and supports")  # fmt: skip
     left.set(xlabel=with_unit("time", units.time),
