@@ -40,9 +40,9 @@ from .curvature import heights
 from .dual import dual_functions, nodes_with_multiplier
 from .geometry import Obstacle, frames
 from .nodal import ContactRows, Field, check_exterior, contact_nodes
-from .overlap import check_different, inside, not_facing
+from .overlap import check_different, not_facing
 from .pairs import KINDS, MAX_NODES
-from .segments import Segments, Surface, is_deep, nearest, segments
+from .segments import Segments, Surface, in_front
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -52,7 +52,6 @@ EXACT = 1e-9  # the same for the normals of obstacles
 HARDLY = 0.1  # covered part of a node's weight below which it gets no multiplier
 ROUNDING = 1e-14  # averages below this are zeros with rounding errors
 SAME = 1e-12  # prescribed values that differ by less, relative to the largest, agree
-BESIDE = 1e-3  # of a facet: how far outside of it a point is asked for
 COVERED = 1e-6  # part of a facet that may be missing where it faces the other side as a whole
 RULES = {"line": line_rule(4), "tri": triangle_rule(4), "quad": square_rule(4)}
 
@@ -102,7 +101,7 @@ def mortar_contact(
     check_different(slave, surface, master, master_surface)
     over = Surface.of(slave.points, slave.surface(surface), surface)
     under = Surface.of(master.points, master.surface(master_surface), master_surface)
-    parts = _in_front(over, under, master, joined=slave is master)
+    parts = in_front(over, under, master, joined=slave is master)
     if not len(parts.slave):
         raise InvalidInput(not_facing(slave, surface, master, master_surface))
     normals = -nodal_normals(slave.points, over.blocks)
@@ -229,16 +228,6 @@ def coupled_columns(weights: sparse.csr_array, axes: Array, fixed: Mask) -> spar
 
 
 # -------------------------------------------------------------------- the two sides
-def _in_front(over: Surface, under: Surface, master: Mesh, *, joined: bool) -> Segments:
-    """Segments that count: the nearest, and deep ones only where the bodies really overlap."""
-    every = segments(over, under, joined=joined)
-    deep = is_deep(over, under, every)
-    facets = np.unique(every.slave[deep])
-    beside = over.centre[facets] + BESIDE * over.radius[facets, None] * over.normal[facets]
-    counts = ~deep | np.isin(every.slave, facets[inside(master, beside)])
-    return nearest(over, every.at(counts))
-
-
 def _against(slave: Surface, obstacle: Obstacle) -> tuple[Array, Array]:
     """int phi phi (f, 4, 4) and int g phi (f, 4) of whole facets, g the obstacle's gap."""
     mass = np.zeros((len(slave.nodes), MAX_NODES, MAX_NODES))

@@ -120,17 +120,17 @@ def _met_by_nitsche(
         rows, terms = nitsche_obstacle(
             body.mesh, surface, contact.obstacle, body.material, options
         )
-        met, points = np.ones(len(rows.points), dtype=bool), rows.points
         H = _shifted(rows.H, first, size)
     else:
         assert contact.master is not None
         j, other = locate(bodies, contact.master)
-        rows, terms, on_master, met, points = nitsche_pair(
+        rows, terms, on_master = nitsche_pair(
             body.mesh, surface, bodies[j].mesh, other, body.material, options
         )
         H = _shifted(rows.H, first, size) + _shifted(on_master, int(offsets[j]), size)
     terms = replace(terms, traction=_shifted(terms.traction, first, size))
-    return rows, sparse.csc_array(H), met, points, terms
+    met = np.ones(len(rows.points), dtype=bool)
+    return rows, sparse.csc_array(H), met, rows.points, terms
 
 
 def _check_faces(mesh: Mesh, surface: str, contact: Contact, rows: ContactRows) -> None:
