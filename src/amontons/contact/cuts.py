@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..fem.cells import CELLS, SECOND
+from ..fem.traces import FacetPoints
 from .clipping import clip, line_rule, quadrature
 from .geometry import frames
 from .pairs import KINDS, shapes
@@ -82,6 +83,24 @@ def cuts(
             for chosen, rule in ((straight, _straight_cuts), (~straight, _bent_cuts)):
                 if chosen.any():
                     yield s[chosen], t[chosen], rule(x[chosen], y[chosen], kinds, points)
+
+
+def points_on(
+    slave: Surface, master: Surface, of: Index, facet: Index, points: int
+) -> tuple[FacetPoints, Index, Array]:
+    """Points on the slave in the order of its facets, master facets (q,), where on them.
+
+    Of given pairs (of, facet), (k,); points: as in `cuts`.
+    """
+    tables = []
+    for one, other, cut in cuts(slave, master, of, facet, points):
+        q, e = cut.weight.shape[1], cut.at.shape[2]
+        tables.append((np.repeat(one[cut.pair], q), cut.at.reshape(-1, e), cut.weight.ravel(),
+                       np.repeat(other[cut.pair], q), cut.opposite.reshape(-1, e)))  # fmt: skip
+    columns = [np.concatenate(column) for column in zip(*tables, strict=True)]
+    order = np.argsort(columns[0], kind="stable")
+    slaves, at, weight, masters, opposite = (column[order] for column in columns)
+    return FacetPoints(slaves, at, weight), masters, opposite
 
 
 def _functions(corners: int, order: int) -> str:

@@ -39,19 +39,18 @@ from ..errors import InvalidInput
 from ..fem.elasticity import LinearElastic, Materials
 from ..fem.mesh import Mesh
 from ..fem.traces import (
-    FacetPoints,
     SurfacePoints,
     facet_traces,
     gauss_points,
     node_columns,
     surface_points,
 )
-from .cuts import cuts, functions
+from .cuts import functions, points_on
 from .geometry import Obstacle, frames
 from .nodal import ContactRows, check_exterior
 from .overlap import check_different, not_facing
-from .pairs import KINDS
-from .segments import Segments, Surface, in_front, outside_of
+from .pairs import KINDS, MAX_NODES
+from .segments import Surface, bulge, in_front
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -147,40 +146,26 @@ def nitsche_pair(  # noqa: PLR0913
     met = in_front(over, under, master, joined=slave is master)
     if not len(met.slave):
         raise InvalidInput(not_facing(slave, surface, master, master_surface))
-    where, facet, opposite = _points_on(over, under, met, (options.points + 1) // 2)
+    points = (options.points + 1) // 2
+    where, facet, opposite = points_on(over, under, met.slave, met.master, points)
     at = surface_points(slave, surface, material, where)
     nodes, shape = facet_traces(master, master_surface, facet, opposite)
     axes = frames(-over.normal[where.facet])
     apart = at.points - np.einsum("qa,qac->qc", shape, master.points[nodes])
-    apart += _bulge(over, where.facet, where.at) - _bulge(under, facet, opposite)
+    apart += bulge(over, where.facet, _on_corners(over, where.facet, where.at))
+    apart -= bulge(under, facet, _on_corners(under, facet, opposite))
     gap = np.einsum("qc,qc->q", axes[:, 0], apart)
     rows, terms = _rows(at, gap, axes, slave.points.size, options)
     values = np.einsum("qa,qkc->qack", shape, -axes)
     return rows, terms, node_columns(nodes, values, master.points.size)
 
 
-def _points_on(
-    over: Surface, under: Surface, met: Segments, count: int
-) -> tuple[FacetPoints, Index, Array]:
-    """Points on the slave in the order of its facets, master facets (q,), where on them."""
-    tables = []
-    for of, facet, cut in cuts(over, under, met.slave, met.master, count):
-        q, e = cut.weight.shape[1], cut.at.shape[2]
-        tables.append((np.repeat(of[cut.pair], q), cut.at.reshape(-1, e), cut.weight.ravel(),
-                       np.repeat(facet[cut.pair], q), cut.opposite.reshape(-1, e)))  # fmt: skip
-    columns = [np.concatenate(column) for column in zip(*tables, strict=True)]
-    order = np.argsort(columns[0], kind="stable")
-    of, at, weight, facet, opposite = (column[order] for column in columns)
-    return FacetPoints(of, at, weight), facet, opposite
-
-
-def _bulge(side: Surface, facet: Index, at: Array) -> Array:
-    """Vectors (q, dim) from points of facets to the curved surface."""
-    out = np.zeros((len(facet), side.points.shape[1]))
+def _on_corners(side: Surface, facet: Index, at: Array) -> Array:
+    """Shape functions of first order (q, 4) at points of facets, padded with zeros."""
+    out = np.zeros((len(facet), MAX_NODES))
     for n in np.unique(side.corners[facet]):
-        mine = np.flatnonzero(side.corners[facet] == n)
-        values = functions(KINDS[n - 2], at[mine, None])
-        out[mine] = outside_of(side, facet[mine], values)[:, 0]
+        mine = side.corners[facet] == n
+        out[mine, :n] = functions(KINDS[n - 2], at[mine, None])[:, 0]
     return out
 
 

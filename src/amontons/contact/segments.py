@@ -239,7 +239,7 @@ def _summed(
     np.add.at(mass[:, :n, :n], pair, weighted @ phi)
     np.add.at(cross[:, :n, :m], pair, weighted @ psi)
     for side, facets, values, sign in ((slave, of, phi, 1), (master, facet, psi, -1)):
-        outside = outside_of(side, facets[pair], values)
+        outside = _outside(side, facets[pair], values)
         np.add.at(bulge[:, :n], pair, sign * (weighted @ outside))
     area = mass.sum(axis=(1, 2))
     on_slave = np.einsum("ka,kac->kc", mass.sum(axis=2), slave.points[slave.nodes[of]])
@@ -249,8 +249,17 @@ def _summed(
     return Segments(of, facet, mass, cross, bulge, area, gap).at(area > 0)
 
 
-def outside_of(side: Surface, facets: Index, values: Array) -> Array:
+def _outside(side: Surface, facets: Index, values: Array) -> Array:
     """Vectors (t, q, dim) from facets (t,) to the curved surface; values (t, q, a): phi."""
     n = values.shape[2]
     x, slope = side.points[side.nodes[facets, :n]], side.slopes[facets, :n]
     return heights(values, slope, x)[:, :, None] * side.normal[facets, None]
+
+
+def bulge(side: Surface, facet: Index, shape: Array) -> Array:
+    """Vectors (q, dim) from points of facets (q,) to the curved surface; shape (q, 4): phi."""
+    out = np.zeros((len(facet), side.points.shape[1]))
+    for n in np.unique(side.corners[facet]):
+        mine = side.corners[facet] == n
+        out[mine] = _outside(side, facet[mine], shape[mine, None, :n])[:, 0]
+    return out

@@ -11,12 +11,18 @@ from typing import TYPE_CHECKING
 
 from ..warned import ResultWarning
 from .fields import ContactFields
+from .matching import nodal_on_non_matching
+from .sliding import sliding_beyond_curvature, sliding_beyond_pairs
 
 if TYPE_CHECKING:
     from .model import Model
 
 Check = Callable[["Model", ContactFields], list[ResultWarning]]
-CHECKS: tuple[Check, ...] = ()
+CHECKS: tuple[Check, ...] = (
+    nodal_on_non_matching,
+    sliding_beyond_pairs,
+    sliding_beyond_curvature,
+)
 
 
 def model_warnings(model: Model, fields: ContactFields) -> tuple[ResultWarning, ...]:

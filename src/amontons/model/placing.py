@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +11,11 @@ from scipy import sparse
 
 from ..contact import (
     ContactRows,
+    Mismatch,
     Nitsche,
     NitscheTerms,
     contact_nodes,
+    mismatch,
     mortar_contact,
     mortar_obstacle,
     nitsche_obstacle,
@@ -20,6 +23,7 @@ from ..contact import (
     nodal_contact,
     pair_contact,
 )
+from ..contact.segments import Surface
 from ..errors import InvalidInput, UnsupportedForm
 from ..fem.elasticity import LinearElastic
 from ..fem.mesh import Mesh
@@ -40,6 +44,7 @@ class Placed:
     H (dofs, nc d): the rows in the dofs of the whole model, with those of a master body.
     By Nitsche's method Gauss points of the slave take the place of its nodes, and `nitsche`
     holds their tractions, also in the dofs of the whole model.
+    sides: mesh and surface of slave and master, None with an obstacle.
     """
 
     body: int
@@ -48,6 +53,26 @@ class Placed:
     rows: ContactRows
     H: sparse.csc_array
     nitsche: NitscheTerms | None = None
+    sides: tuple[Mesh, str, Mesh, str] | None = None
+
+    @cached_property
+    def mismatch(self) -> Mismatch:
+        """How far the meshes of a nodal pair are from each other, slave nodes as in kept."""
+        assert self.sides is not None
+        return mismatch(*self.sides)
+
+    @cached_property
+    def master(self) -> Surface:
+        """Facets of the master."""
+        assert self.sides is not None
+        _, _, mesh, name = self.sides
+        return Surface.of_corners(mesh.points, mesh.surface(name), name)
+
+    @cached_property
+    def narrowest(self) -> float:
+        """Length than which no facet of the master is narrower."""
+        power = self.master.points.shape[1] - 2
+        return float((self.master.area / (2 * self.master.radius) ** power).min())
 
 
 def place(bodies: tuple[Body, ...], contact: Contact, values: Array, offsets: Index) -> Placed:
@@ -68,7 +93,16 @@ def place(bodies: tuple[Body, ...], contact: Contact, values: Array, offsets: In
     all_kept = met.copy()
     all_kept[met] = kept
     terms = None if terms is None else terms.at(kept)
-    return Placed(k, all_kept, points, rows.at(kept), H[:, np.repeat(kept, d)], terms)
+    return Placed(k, all_kept, points, rows.at(kept), H[:, np.repeat(kept, d)], terms,
+                  _sides(bodies, contact))  # fmt: skip
+
+
+def _sides(bodies: tuple[Body, ...], contact: Contact) -> tuple[Mesh, str, Mesh, str] | None:
+    """Mesh and surface of slave and master."""
+    if contact.master is None:
+        return None
+    (k, surface), (j, other) = (locate(bodies, n) for n in (contact.slave, contact.master))
+    return bodies[k].mesh, surface, bodies[j].mesh, other
 
 
 def _met(
