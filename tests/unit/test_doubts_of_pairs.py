@@ -312,7 +312,7 @@ def test_no_slip_is_too_long_along_a_plane(kind):
 
 def test_an_obstacle_that_ends_before_the_slip_does():
     wide = am.LevelSet(lambda x: np.where(x[:, 0] > 7, np.nan, x[:, 1] + x[:, 0] ** 2 / 100))
-    model = on_a_ball(50.0, 3.0)
+    model = on_a_ball(50.0, 3.0, load=-0.5)
     model = am.Model(model.bodies, model.supports, [am.Contact("bottom", wide, mu=0.1)])
     (warning,) = am.solve(model).warnings
     assert warning.name == "sliding-beyond-curvature"
