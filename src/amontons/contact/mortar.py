@@ -33,6 +33,7 @@ from scipy import sparse
 
 from ..errors import InvalidInput
 from ..fem.cells import CELLS
+from ..fem.facets import Facets
 from ..fem.mesh import Mesh
 from ..fem.surfaces import nodal_normals, nodal_weights
 from .clipping import line_rule, square_rule, triangle_rule
@@ -50,6 +51,7 @@ Mask = NDArray[np.bool_]
 NO_MOTION = 0.1  # free part of an averaged normal below which supports hold the node in it
 EXACT = 1e-9  # the same for the normals of obstacles
 HARDLY = 0.1  # covered part of a node's weight below which it gets no multiplier
+AROUND = 0.7  # cosine between normals below which a facet lies around an edge
 ROUNDING = 1e-14  # averages below this are zeros with rounding errors
 SAME = 1e-12  # prescribed values that differ by less, relative to the largest, agree
 COVERED = 1e-6  # part of a facet that may be missing where it faces the other side as a whole
@@ -104,8 +106,8 @@ def mortar_contact(
     parts = in_front(over, under, master, joined=slave is master)
     if not len(parts.slave):
         raise InvalidInput(not_facing(slave, surface, master, master_surface))
-    normals = -nodal_normals(slave.points, over.blocks)
     facets, of = np.unique(parts.slave, return_inverse=True)
+    normals = -_normals(over, facets)
     mass = np.zeros((len(facets), MAX_NODES, MAX_NODES))
     np.add.at(mass, of, parts.mass)
     values, on_master = _values(prescribed, slave), _values(master_prescribed, master)
@@ -228,6 +230,24 @@ def coupled_columns(weights: sparse.csr_array, axes: Array, fixed: Mask) -> spar
 
 
 # -------------------------------------------------------------------- the two sides
+def _normals(slave: Surface, facets: Index) -> Array:
+    """Normals at the nodes, (n, dim), averages without facets around an edge from `facets`.
+
+    Those that face the other side (f,) count, and all that turn from them by less than AROUND.
+    """
+    facing = np.zeros(len(slave.nodes), dtype=bool)
+    facing[facets] = True
+    first = np.zeros(slave.points.shape)
+    share = (slave.area / slave.corners)[facets, None, None] * slave.normal[facets, None]
+    np.add.at(first, slave.nodes[facets], share * slave.real[facets, :, None])
+    length = np.linalg.norm(first, axis=1)
+    along = np.einsum("fac,fc->fa", first[slave.nodes], slave.normal)
+    turned = ((along < AROUND * length[slave.nodes]) & slave.real).any(axis=1) & ~facing
+    blocks = np.split(turned, np.cumsum([len(b.nodes) for b in slave.blocks])[:-1])
+    kept = [Facets(b.kind, b.nodes[~out]) for b, out in zip(slave.blocks, blocks, strict=True)]
+    return nodal_normals(slave.points, tuple(kept))
+
+
 def _against(slave: Surface, obstacle: Obstacle) -> tuple[Array, Array]:
     """int phi phi (f, 4, 4) and int g phi (f, 4) of whole facets, g the obstacle's gap."""
     mass = np.zeros((len(slave.nodes), MAX_NODES, MAX_NODES))
