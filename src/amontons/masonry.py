@@ -142,7 +142,9 @@ class Wall:
                     free = self._overhangs(span[0], row)
                     above = None if free else _Above(row * self.size[-1] + self._tolerance)
                     left = f"row {row + 1} block {k}.right"
-                    out.append(Contact(f"{name}.left", master=left, mu=self.mu, where=above))
+                    joint = Contact(f"{name}.left", master=left, mu=self.mu, where=above,
+                                    method="nodal")  # fmt: skip
+                    out.append(joint)
         if self.plate:
             ends = (self.spans[-1][0][0], self.spans[-1][-1][1])
             out += self._beds("plate.bottom", ends, self.rows - 1, self.mu_support)
@@ -157,7 +159,8 @@ class Wall:
             if min(right, span[1]) - max(left, span[0]) > self._tolerance:
                 part = _Between(max(left - self._tolerance, taken), right + self._tolerance)
                 master = f"row {below + 1} block {k + 1}.top"
-                out.append(Contact(slave, master=master, mu=mu, where=part))
+                bed = Contact(slave, master=master, mu=mu, where=part, method="nodal")
+                out.append(bed)
                 taken = right + self._tolerance
         return out
 

@@ -22,7 +22,7 @@ def two_blocks(dim=3, lower=3, upper=2, supports=()):
     return am.Model(
         bodies,
         [am.Fix("lower.bottom", 0), am.Fix("upper.top", drop), *supports],
-        [am.Contact("upper.bottom", master="lower.top", mu=0.2)],
+        [am.Contact("upper.bottom", master="lower.top", mu=0.2, method="nodal")],
     )
 
 

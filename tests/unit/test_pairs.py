@@ -83,7 +83,7 @@ def stack(dim, lower_cells, upper_cells, mu=0.5, kind=None, **changes):
         "supports": [am.Fix("upper.top", (0,) * (dim - 1) + (None,))],
         "contacts": [
             am.Contact("lower.bottom", am.Plane(up), mu=mu),
-            am.Contact("upper.bottom", master="lower.top", mu=mu),
+            am.Contact("upper.bottom", master="lower.top", mu=mu, method="nodal"),
         ],
         "loads": [am.Traction("upper.top", (0,) * (dim - 1) + (-1,))],
     }
@@ -166,7 +166,7 @@ def test_two_pieces_of_one_mesh_touch():
     model = am.Model(
         [am.Body(mesh, SOFT)],
         [am.Fix("floor", 0), am.Fix("roof", (0, -0.02))],
-        [am.Contact("high", master="low", mu=0.3)],
+        [am.Contact("high", master="low", mu=0.3, method="nodal")],
     )
     solution = am.drive(model.assemble())
     assert solution.converged

@@ -275,10 +275,14 @@ def test_a_slave_of_second_order_on_a_master_of_first():
     lower = am.Body(am.box((2, 1), 2, "quad", origin=(-0.5, -1)), LAW)
     upper = am.Body(am.box((1, 1), 2, "tri"), LAW, order=2)
     supports = [am.Fix("body 1.bottom", 0), am.Fix("body 2.top", (0, -0.01))]
-    pair = am.Contact("body 2.bottom", master="body 1.top", mu=0.2)
+    with pytest.raises(InvalidInput, match='first order.*order = 1.*"nitsche"'):
+        am.Model([lower, upper], supports, [
+            am.Contact("body 2.bottom", master="body 1.top", mu=0.2)
+        ]).assemble()  # fmt: skip
+    pair = am.Contact("body 2.bottom", master="body 1.top", mu=0.2, method="nodal")
     solution = am.solve(am.Model([lower, upper], supports, [pair]))
     assert solution.fields.resultant[1] > 0
-    turned = am.Contact("body 1.top", master="body 2.bottom", mu=0.2)
+    turned = am.Contact("body 1.top", master="body 2.bottom", mu=0.2, method="nodal")
     with pytest.raises(InvalidInput, match="first order"):
         am.Model([lower, upper], supports, [turned]).assemble()
 

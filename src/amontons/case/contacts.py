@@ -55,12 +55,14 @@ def _steady(table: Table, key: str) -> float | Expression:
     return value
 
 
-def _contact_method(table: Table) -> str | Nitsche:
-    """A word, or a table { kind = "nitsche", kappa = …, theta = … } of options."""
+def _contact_method(table: Table) -> str | Nitsche | None:
+    """A word, or a table { kind = "nitsche", kappa = …, theta = … } of options, or None."""
     from ..contact import Nitsche
 
+    if "method" not in table.data:
+        return None
     if not isinstance(table.data.get("method"), dict):
-        return table.choice("method", ("nodal", "mortar", "dual-mortar", "nitsche"), "nodal")
+        return table.choice("method", ("nodal", "mortar", "dual-mortar", "nitsche"))
     options = table.table("method")
     options.only("kind", "kappa", "scale", "theta", "points")
     options.need("kind", "'nitsche', the method that has options")

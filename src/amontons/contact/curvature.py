@@ -111,7 +111,8 @@ def _continued(points: Array, normals: Array, sides: Index) -> Array:
     inverse = np.linalg.pinv(matrix, rcond=DETERMINED, hermitian=True)
     out = normals.copy()
     out[nodes] += np.einsum("kij,kj->ki", inverse, right)
-    out[nodes] /= np.linalg.norm(out[nodes], axis=1, keepdims=True)
+    length = np.linalg.norm(out[nodes], axis=1, keepdims=True)
+    out[nodes] /= np.where(length > 0, length, 1.0)  # zero: an edge, flat facets on both sides
     return out
 
 

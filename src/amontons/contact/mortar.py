@@ -34,6 +34,7 @@ from scipy import sparse
 
 from ..errors import InvalidInput
 from ..fem.cells import CELLS
+from ..fem.facets import Facets
 from ..fem.mesh import Mesh
 from ..fem.surfaces import nodal_normals, nodal_weights
 from .clipping import line_rule, square_rule, triangle_rule
@@ -41,9 +42,9 @@ from .curvature import heights
 from .dual import dual_functions, nodes_with_multiplier
 from .geometry import Obstacle, frames
 from .nodal import ContactRows, Field, check_exterior, contact_nodes
-from .overlap import check_different, inside, not_facing
+from .overlap import check_different, not_facing
 from .pairs import KINDS, MAX_NODES
-from .segments import Segments, Surface, is_deep, nearest, segments
+from .segments import Segments, Surface, in_front
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -51,10 +52,10 @@ Mask = NDArray[np.bool_]
 NO_MOTION = 0.1  # free part of an averaged normal below which supports hold the node in it
 EXACT = 1e-9  # the same for the normals of obstacles
 HARDLY = 0.1  # covered part of a node's weight below which it gets no multiplier
+AROUND = 0.7  # cosine between normals below which a facet lies around an edge
 ROUNDING = 1e-14  # averages below this are zeros with rounding errors
 SAME = 1e-12  # prescribed values that differ by less, relative to the largest, agree
 IN_PLANE = 1e-6  # of the surface's, or a facet's, size: how far a plane's nodes lie from it
-BESIDE = 1e-3  # of a facet: how far outside of it a point is asked for
 COVERED = 1e-6  # part of a facet that may be missing where it faces the other side as a whole
 RULES = {"line": line_rule(4), "tri": triangle_rule(4), "quad": square_rule(4)}
 
@@ -106,11 +107,11 @@ def mortar_contact(
     check_different(slave, surface, master, master_surface)
     over = Surface.of(slave.points, slave.surface(surface), surface)
     under = Surface.of(master.points, master.surface(master_surface), master_surface)
-    parts = _in_front(over, under, master, joined=slave is master)
+    parts = in_front(over, under, master, joined=slave is master)
     if not len(parts.slave):
         raise InvalidInput(not_facing(slave, surface, master, master_surface))
-    normals = -nodal_normals(slave.points, over.blocks)
     facets, of = np.unique(parts.slave, return_inverse=True)
+    normals = -_normals(over, facets)
     mass = np.zeros((len(facets), MAX_NODES, MAX_NODES))
     np.add.at(mass, of, parts.mass)
     average = _Average.of(over, facets, mass, _held(normals, held, NO_MOTION))
@@ -234,14 +235,22 @@ def coupled_columns(weights: sparse.csr_array, axes: Array, fixed: Mask) -> spar
 
 
 # -------------------------------------------------------------------- the two sides
-def _in_front(over: Surface, under: Surface, master: Mesh, *, joined: bool) -> Segments:
-    """Segments that count: the nearest, and deep ones only where the bodies really overlap."""
-    every = segments(over, under, joined=joined)
-    deep = is_deep(over, under, every)
-    facets = np.unique(every.slave[deep])
-    beside = over.centre[facets] + BESIDE * over.radius[facets, None] * over.normal[facets]
-    counts = ~deep | np.isin(every.slave, facets[inside(master, beside)])
-    return nearest(over, every.at(counts))
+def _normals(slave: Surface, facets: Index) -> Array:
+    """Normals at the nodes, (n, dim), averages without facets around an edge from `facets`.
+
+    Those that face the other side (f,) count, and all that turn from them by less than AROUND.
+    """
+    facing = np.zeros(len(slave.nodes), dtype=bool)
+    facing[facets] = True
+    first = np.zeros(slave.points.shape)
+    share = (slave.area / slave.corners)[facets, None, None] * slave.normal[facets, None]
+    np.add.at(first, slave.nodes[facets], share * slave.real[facets, :, None])
+    length = np.linalg.norm(first, axis=1)
+    along = np.einsum("fac,fc->fa", first[slave.nodes], slave.normal)
+    turned = ((along < AROUND * length[slave.nodes]) & slave.real).any(axis=1) & ~facing
+    blocks = np.split(turned, np.cumsum([len(b.nodes) for b in slave.blocks])[:-1])
+    kept = [Facets(b.kind, b.nodes[~out]) for b, out in zip(slave.blocks, blocks, strict=True)]
+    return nodal_normals(slave.points, tuple(kept))
 
 
 def _against(slave: Surface, obstacle: Obstacle) -> tuple[Array, Array]:

@@ -12,7 +12,9 @@ The discrete problem reads, for all test displacements z with local parts u(z) a
 theta = 0 is the unsymmetric variant of [Rey] section 3.2, theta = 1 the symmetric one, -1 the
 skew-symmetric one, [CHR].  Only the slave's stress is used; a master feels -p, so that action
 equals reaction.  The method is consistent: a field that solves the continuous problem and lies
-in the finite element space solves the discrete one, whatever kappa.
+in the finite element space solves the discrete one, whatever kappa.  Between meshes that do not
+match this needs integrals over the parts of a facet that face one facet of the other side each,
+see `cuts`.
 
 kappa is to be large against the stiffness of a cell behind the surface: with the smallest c of
 int_F |sigma nu|^2 <= c int_T sigma : epsilon (`fem.traces`), the frictionless problem is
@@ -36,10 +38,19 @@ from scipy import sparse
 from ..errors import InvalidInput
 from ..fem.elasticity import LinearElastic, Materials
 from ..fem.mesh import Mesh
-from ..fem.traces import SurfacePoints, node_columns, surface_points
+from ..fem.traces import (
+    SurfacePoints,
+    facet_traces,
+    gauss_points,
+    node_columns,
+    surface_points,
+)
+from .cuts import functions, points_on
 from .geometry import Obstacle, frames
 from .nodal import ContactRows, check_exterior
-from .pairs import KINDS, project
+from .overlap import check_different, not_facing
+from .pairs import KINDS, MAX_NODES
+from .segments import Surface, bulge, in_front
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -53,7 +64,9 @@ class Nitsche:
 
     kappa: stress per length; by default `scale` times the c of every facet, which grows like
     young / cell size.  theta: 0 unsymmetric with the least terms, 1 symmetric, -1
-    skew-symmetric.  points: Gauss points per direction of a facet.
+    skew-symmetric.  points: Gauss points per direction of a facet against an obstacle; half
+    as many on each part of it that faces one master facet, but never fewer than shape functions
+    need.
     """
 
     kappa: float | None = None
@@ -109,7 +122,8 @@ def nitsche_obstacle(
 ) -> tuple[ContactRows, NitscheTerms]:  # fmt: skip
     """Gauss points of a surface against a rigid obstacle, in the mesh's own dofs."""
     check_exterior(mesh, surface)
-    at = surface_points(mesh, surface, material, options.points)
+    where = gauss_points(mesh, surface, options.points)
+    at = surface_points(mesh, surface, material, where)
     axes = frames(obstacle.normals(at.points))
     return _rows(at, obstacle.gap(at.points), axes, mesh.points.size, options)
 
@@ -117,35 +131,42 @@ def nitsche_obstacle(
 def nitsche_pair(  # noqa: PLR0913
     slave: Mesh, surface: str, master: Mesh, master_surface: str,
     material: LinearElastic | Materials, options: Nitsche,
-) -> tuple[ContactRows, NitscheTerms, sparse.csc_array, Mask, Array]:  # fmt: skip
-    """Gauss points of the slave against the closest points of a master surface.
+) -> tuple[ContactRows, NitscheTerms, sparse.csc_array]:  # fmt: skip
+    """Gauss points on the parts of the slave that face one master facet each, see `cuts`.
 
-    Rows and terms in the dofs of the slave, the part of H in those of the master, which points
-    have a facet in front of them, (all points,), and all points, (all points, d).
+    Rows and terms in the dofs of the slave, and the part of H in those of the master.  A point
+    meets the one opposite, along the normal of its facet; the gap is that of the curved
+    surfaces for which the facets stand, see `curvature`.
     """
     check_exterior(slave, surface)
     check_exterior(master, master_surface)
-    facets = master.surface(master_surface)
-    if other := {block.kind for block in facets} - set(KINDS):
-        raise InvalidInput(
-            f"master {master_surface!r}: expected facets of first order, got {other.pop()!r}; "
-            "take order = 1 and finer cells"
-        )
-    at = surface_points(slave, surface, material, options.points)
-    hit = project(at.points, master.points, facets, facing=at.normals)
-    found = hit.found
-    if not found.any():
-        raise InvalidInput(
-            f"contact of {surface!r} with {master_surface!r}: no slave point has a master "
-            "facet in front of it"
-        )
-    normal = np.where(found[:, None], hit.normal, -at.normals)
-    axes = frames(normal)
-    gap = np.einsum("qc,qc->q", at.points - hit.closest, normal)
+    check_different(slave, surface, master, master_surface)
+    over = Surface.of_corners(slave.points, slave.surface(surface), surface)
+    under = Surface.of_corners(master.points, master.surface(master_surface), master_surface)
+    met = in_front(over, under, master, joined=slave is master)
+    if not len(met.slave):
+        raise InvalidInput(not_facing(slave, surface, master, master_surface))
+    points = (options.points + 1) // 2
+    where, facet, opposite = points_on(over, under, met.slave, met.master, points)
+    at = surface_points(slave, surface, material, where)
+    nodes, shape = facet_traces(master, master_surface, facet, opposite)
+    axes = frames(-over.normal[where.facet])
+    apart = at.points - np.einsum("qa,qac->qc", shape, master.points[nodes])
+    apart += bulge(over, where.facet, _on_corners(over, where.facet, where.at))
+    apart -= bulge(under, facet, _on_corners(under, facet, opposite))
+    gap = np.einsum("qc,qc->q", axes[:, 0], apart)
     rows, terms = _rows(at, gap, axes, slave.points.size, options)
-    values = np.einsum("qa,qkc->qack", hit.shape[found], -axes[found])
-    on_master = node_columns(hit.nodes[found], values, master.points.size)
-    return rows.at(found), terms.at(found), on_master, found, at.points
+    values = np.einsum("qa,qkc->qack", shape, -axes)
+    return rows, terms, node_columns(nodes, values, master.points.size)
+
+
+def _on_corners(side: Surface, facet: Index, at: Array) -> Array:
+    """Shape functions of first order (q, 4) at points of facets, padded with zeros."""
+    out = np.zeros((len(facet), MAX_NODES))
+    for n in np.unique(side.corners[facet]):
+        mine = side.corners[facet] == n
+        out[mine, :n] = functions(KINDS[n - 2], at[mine, None])[:, 0]
+    return out
 
 
 def _rows(

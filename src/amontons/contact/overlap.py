@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InvalidInput
+from ..fem.facets import corner_facets
 from ..fem.mesh import Mesh
 
 Array = NDArray[np.float64]
 
 
 def inside(mesh: Mesh, points: Array) -> NDArray[np.bool_]:
-    """Which points (k, dim) lie inside a mesh of first order, (k,); k times its facets."""
+    """Which points (k, dim) lie inside a mesh, (k,); k times its facets."""
     low, high = mesh.bounding_box()
     out = ((points > low) & (points < high)).all(axis=1)
     for k in np.flatnonzero(out):
@@ -62,13 +63,13 @@ def _shown(point: Array) -> str:
 
 
 def winding_number(mesh: Mesh, point: Array) -> float:
-    """How many times the boundary of a mesh of first order winds around a point (dim,).
+    """How many times the boundary of a mesh winds around a point (dim,).
 
     1 inside a body, 0 outside; the sum where pieces of the mesh overlap.
     """
     total = 0.0
     for block in mesh.boundary:
-        x = mesh.points[block.nodes] - point
+        x = mesh.points[corner_facets(block).nodes] - point
         if mesh.dim == 2:
             total += _angles(x) / (2 * np.pi)
         else:

@@ -48,17 +48,20 @@ AROUND = 16  # closest nodes among which one must lie on a facet that counts
 class Projection:
     """Closest facet of every point: found (k,); the rest (k, …) holds where found.
 
-    nodes (k, 4) and shape (k, 4): nodes of the facet and their shape functions, padded with
-    weight zero; closest (k, dim); normal (k, dim), unit, outwards; size (k,) of the facet;
-    deep (k,): some facet lies too far in front of the point, see `project`.
+    facet (k,): counted through the blocks; nodes (k, 4) and shape (k, 4): nodes of the facet
+    and their shape functions, padded with weight zero; closest (k, dim); normal (k, dim), unit,
+    outwards; size (k,) of the facet; beside (k,): how far beside it the point is; deep (k,):
+    some facet lies too far in front of the point, see `project`.
     """
 
     found: Mask
+    facet: Index
     nodes: Index
     shape: Array
     closest: Array
     normal: Array
     size: Array
+    beside: Array
     deep: Mask
 
 
@@ -78,6 +81,25 @@ def pair_contact(
     have one however deep they are.  Raises InvalidInput when the surfaces do not face each
     other, and when they share facets.  Cost linear in the nodes.
     """
+    nodes, weights, hit = meeting(slave, surface, master, master_surface, search)
+    points = slave.points[nodes]
+    found = hit.found
+    if not found.any():
+        raise InvalidInput(not_facing(slave, surface, master, master_surface))
+    points, normal = points[found], hit.normal[found]
+    gap = np.einsum("ic,ic->i", points - hit.closest[found], normal)
+    axes = frames(normal)
+    rows = ContactRows(
+        nodes[found], points, weights[found], gap, axes,
+        contact_columns(nodes[found], axes, slave.points.size),
+    )  # fmt: skip
+    return rows, _master_columns(hit, axes, master.points.size), found
+
+
+def meeting(
+    slave: Mesh, surface: str, master: Mesh, master_surface: str, search: float = np.inf
+) -> tuple[Index, Array, Projection]:
+    """Slave nodes (k,), their weights (k,), and the master facets that they meet, checked."""
     check_exterior(slave, surface)
     check_exterior(master, master_surface)
     check_different(slave, surface, master, master_surface)
@@ -98,17 +120,7 @@ def pair_contact(
             np.logical_or.at(overlap, node, inside(master, ahead))
         hit = project(points, master.points, facets, facing=normals, search=search, own=own,
                       free=overlap[nodes])  # fmt: skip
-    found = hit.found
-    if not found.any():
-        raise InvalidInput(not_facing(slave, surface, master, master_surface))
-    points, normal = points[found], hit.normal[found]
-    gap = np.einsum("ic,ic->i", points - hit.closest[found], normal)
-    axes = frames(normal)
-    rows = ContactRows(
-        nodes[found], points, weights[found], gap, axes,
-        contact_columns(nodes[found], axes, slave.points.size),
-    )  # fmt: skip
-    return rows, _master_columns(hit, axes, master.points.size), found
+    return nodes, weights, hit
 
 
 def _ahead(mesh: Mesh, surface: str, nodes: Index) -> Iterator[tuple[Index, Array]]:
@@ -153,14 +165,14 @@ def project(
     free, (k,): points that may be behind facets by any distance.
     """
     k, dim = points.shape
-    best = np.full(k, np.inf)
+    best, facet_of = np.full(k, np.inf), np.zeros(k, dtype=np.int64)
     nodes = np.zeros((k, MAX_NODES), dtype=np.int64)
     shape = np.zeros((k, MAX_NODES))
     closest, normal = np.zeros((k, dim)), np.zeros((k, dim))
     length, beside = np.ones(k), np.full(k, np.inf)
     deep, free = np.zeros(k, dtype=bool), np.zeros(k, dtype=bool) if free is None else free
     reach = _reach(points, coordinates, surface, facing, own)
-    for facets, size in _by_size(coordinates, surface):
+    for facets, members, size in _by_size(coordinates, surface):
         point, facet = _candidates(points, coordinates, facets, reach + size)
         if own is not None:
             keep = (facets.nodes[facet] != own[point, None]).all(axis=1)
@@ -181,7 +193,7 @@ def project(
         chosen = _first_of_smallest(point, distance)
         chosen = chosen[distance[chosen] < best[point[chosen]]]
         to, count = point[chosen], value.shape[1]
-        best[to] = distance[chosen]
+        best[to], facet_of[to] = distance[chosen], members[facet[chosen]]
         nodes[to], shape[to] = 0, 0.0
         nodes[to, :count], shape[to, :count] = facets.nodes[facet[chosen]], value[chosen]
         closest[to], normal[to] = foot[chosen], n[chosen]
@@ -192,7 +204,7 @@ def project(
         & (best <= search)
         & ~((beside > BESIDE * length) & _on_rim(surface, nodes, shape))
     )
-    return Projection(found, nodes, shape, closest, normal, length, deep)
+    return Projection(found, facet_of, nodes, shape, closest, normal, length, beside, deep)
 
 
 def _on_rim(surface: tuple[Facets, ...], nodes: Index, shape: Array) -> Mask:
@@ -243,11 +255,14 @@ def _reach(
     return np.where(np.isfinite(least), least, distance[:, -1])
 
 
-def _by_size(coordinates: Array, surface: tuple[Facets, ...]) -> Iterator[tuple[Facets, float]]:
-    """Facets in classes of kind and size, with the largest distance centre to corner of each.
+def _by_size(
+    coordinates: Array, surface: tuple[Facets, ...]
+) -> Iterator[tuple[Facets, Index, float]]:
+    """Facets in classes of kind and size, their numbers, the largest distance to the centre.
 
     One class spans a factor two, so that a few large facets do not widen every search.
     """
+    before = 0
     for block in surface:
         if not len(block.nodes):
             continue
@@ -255,8 +270,10 @@ def _by_size(coordinates: Array, surface: tuple[Facets, ...]) -> Iterator[tuple[
         radius = np.linalg.norm(x - x.mean(axis=1, keepdims=True), axis=2).max(axis=1)
         label = np.floor(np.log2(radius))
         for value in np.unique(label):
-            members = label == value
-            yield Facets(block.kind, block.nodes[members]), float(radius[members].max())
+            members = np.flatnonzero(label == value)
+            inside = Facets(block.kind, block.nodes[members])
+            yield inside, before + members, float(radius[members].max())
+        before += len(block.nodes)
 
 
 def _candidates(

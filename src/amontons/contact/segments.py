@@ -1,11 +1,7 @@
 """Segments: the parts of slave facets that face one master facet each, and integrals on them.
 
-Both facets are projected along the slave facet's normal onto the plane through its centre, and
-the intersection is triangulated ([PL]).  Quadrilaterals and triangles in 3D, lines in 2D; all
-pairs at once, with a search whose cost grows with the number of facets.
-
-[PL] M. Puso, T. Laursen, "A mortar segment-to-segment contact method for large deformation
-solid mechanics", Comput. Methods Appl. Mech. Engrg. 193 (2004) 601-629.
+The parts and the points on them are those of `cuts`; the cost of the search for pairs of facets
+grows with their number.
 """
 
 from __future__ import annotations
@@ -18,12 +14,13 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..errors import InvalidInput
-from ..fem.facets import Facets
+from ..fem.facets import Facets, corner_facets
+from ..fem.mesh import Mesh
 from ..fem.surfaces import facet_areas, facet_normals, nodal_normals
-from .clipping import clip, line_rule, quadrature
 from .curvature import heights, slopes
-from .geometry import frames
-from .pairs import AROUND, DEEP, EDGEWISE, KINDS, MAX_NODES, shapes
+from .cuts import Cuts, cuts, functions
+from .overlap import inside
+from .pairs import AROUND, BESIDE, DEEP, EDGEWISE, KINDS, MAX_NODES
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -31,9 +28,7 @@ Mask = NDArray[np.bool_]
 FLAT_FACET = 1e-12  # area, relative to the square of the longest side, of a degenerate facet
 SLIVER = 1e-8  # part of a facet; biorthogonal functions on less are lost in rounding
 TWICE = 1e-6  # coverage above 1 by less is rounding
-AFFINE = 1e-9  # sides of a parallelogram differ by less, relative to its size
 CHUNK = 2000  # slave facets at a time, for memory
-NEWTON = 30  # steps to the reference point of a quadrilateral
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +37,7 @@ class Surface:
 
     corners (f,): how many are real; centre, normal (f, dim), outward; radius, area (f,);
     slopes (f, 4, dim): of the curved surface that the facets stand for, see `curvature`.
+    order: 1, or 2 for displacements of second order on them.
     """
 
     points: Array
@@ -53,16 +49,23 @@ class Surface:
     area: Array
     slopes: Array
     blocks: tuple[Facets, ...]
+    order: int = 1
 
     @classmethod
     def of(cls, points: Array, facets: tuple[Facets, ...], name: str) -> Surface:
         """The table; raises InvalidInput for facets of second order or without area."""
         if other := {block.kind for block in facets} - set(KINDS):
             raise InvalidInput(
-                f"surface {name!r}: expected facets of first order, got {other.pop()!r}; "
-                "take order = 1 and finer cells"
+                f"surface {name!r}: expected facets of first order, got {other.pop()!r}; take "
+                'order = 1 and finer cells, or method="nitsche"'
             )
-        blocks = tuple(block for block in facets if len(block.nodes))
+        return cls.of_corners(points, facets, name)
+
+    @classmethod
+    def of_corners(cls, points: Array, facets: tuple[Facets, ...], name: str) -> Surface:
+        """The table of the corners of facets of any order, whose sides are straight."""
+        order = 2 if {block.kind for block in facets} - set(KINDS) else 1
+        blocks = tuple(corner_facets(block) for block in facets if len(block.nodes))
         nodes = np.concatenate([_padded(block.nodes) for block in blocks])
         corners = np.concatenate([np.full(len(b.nodes), b.nodes.shape[1]) for b in blocks])
         area = np.concatenate([facet_areas(points, block) for block in blocks])
@@ -82,7 +85,7 @@ class Surface:
             )
         normal = normal / length[:, None]
         curved = slopes(points, blocks, nodes, real, normal)
-        return cls(points, nodes, corners, centre, normal, radius, area, curved, blocks)
+        return cls(points, nodes, corners, centre, normal, radius, area, curved, blocks, order)
 
     @property
     def real(self) -> Mask:
@@ -124,8 +127,21 @@ def segments(slave: Surface, master: Surface, *, joined: bool = False) -> Segmen
             same = slave.nodes[chunk][:, :, None] == master.nodes[facet][:, None, :]
             apart = ~same.any(axis=(1, 2))
             chunk, facet = chunk[apart], facet[apart]
-        found += list(_integrated(slave, master, chunk, facet))
-    return _joined(found, slave.points.shape[1])
+        for of, opposite, parts in cuts(slave, master, chunk, facet):
+            found.append(_summed(slave, master, of, opposite, parts))
+    every = _joined(found, slave.points.shape[1])
+    reached = np.bincount(every.slave, every.area, minlength=len(slave.nodes))
+    return every.at((reached > SLIVER * slave.area)[every.slave])
+
+
+def in_front(over: Surface, under: Surface, master: Mesh, *, joined: bool) -> Segments:
+    """Segments that count: the nearest, and deep ones only where the bodies really overlap."""
+    every = segments(over, under, joined=joined)
+    deep = is_deep(over, under, every)
+    facets = np.unique(every.slave[deep])
+    beside = over.centre[facets] + BESIDE * over.radius[facets, None] * over.normal[facets]
+    counts = ~deep | np.isin(every.slave, facets[inside(master, beside)])
+    return nearest(over, every.at(counts))
 
 
 def is_deep(slave: Surface, master: Surface, every: Segments) -> Mask:
@@ -206,102 +222,16 @@ def _feet(centre: Array, normal: Array, tree: cKDTree, normals: Array) -> tuple[
 
 
 # -------------------------------------------------------------------- integrals
-def _integrated(slave: Surface, master: Surface, of: Index, facet: Index) -> Iterator[Segments]:
-    """Segments of given pairs, by kinds of facets."""
-    axes = frames(slave.normal[of])[:, 1:]
-    for n in np.unique(slave.corners[of]):
-        for m in np.unique(master.corners[facet]):
-            both = (slave.corners[of] == n) & (master.corners[facet] == m)
-            s, t, e = of[both], facet[both], axes[both]
-            origin = slave.centre[s][:, None]
-            x = np.einsum("kac,kec->kae", slave.points[slave.nodes[s, :n]] - origin, e)
-            y = np.einsum("kac,kec->kae", master.points[master.nodes[t, :m]] - origin, e)
-            near = ((x.max(axis=1) > y.min(axis=1)) & (x.min(axis=1) < y.max(axis=1))).all(
-                axis=1
-            )
-            x, y, s, t = x[near], y[near], s[near], t[near]
-            segment, phi, psi, weight = (_on_lines if n == 2 else _on_polygons)(x, y)
-            yield _summed(slave, master, s, t, segment, phi, psi, weight)
-
-
-def _on_lines(x: Array, y: Array) -> tuple[Index, Array, Array, Array]:
-    """Pair (t,), shape functions (t, q, 2) of slave and master, weights (t, q) on overlaps."""
-    x, y = x[:, :, 0], y[:, :, 0]
-    low = np.maximum(x.min(axis=1), y.min(axis=1))
-    high = np.minimum(x.max(axis=1), y.max(axis=1))
-    pair = np.flatnonzero(high > low)
-    x, y, low, high = x[pair], y[pair], low[pair], high[pair]
-    at, weight = line_rule(3)
-    where = low[:, None] + (high - low)[:, None] * at[:, 0]
-    functions = []
-    for ends in (x, y):
-        share = (where - ends[:, :1]) / (ends[:, 1:] - ends[:, :1])
-        functions.append(np.stack([1 - share, share], axis=2))
-    return pair, functions[0], functions[1], (high - low)[:, None] * weight
-
-
-def _on_polygons(x: Array, y: Array) -> tuple[Index, Array, Array, Array]:
-    """Pair (t,), shape functions (t, q, a) of slave and master, weights (t, q) on triangles."""
-    corners, count = clip(y[:, ::-1], x)  # seen from the slave, the master turns the other way
-    points = 3 if _is_affine(x) and _is_affine(y) else 5
-    pair, where, weight = quadrature(corners, count, points)
-    phi, psi = (_functions(z[pair], where) for z in (x, y))
-    return pair, phi, psi, weight
-
-
-def _functions(x: Array, where: Array) -> Array:
-    """Shape functions (t, q, a) of polygons x (t, a, 2) at points (t, q, 2)."""
-    at = _reference(x, where).reshape(-1, 2)
-    return shapes(KINDS[x.shape[1] - 2], at).reshape(*where.shape[:2], x.shape[1])
-
-
-def _is_affine(x: Array) -> bool:
-    """True when all polygons (k, a, 2) are triangles or parallelograms."""
-    if x.shape[1] == 3:
-        return True
-    bent = np.abs(x[:, 0] - x[:, 1] + x[:, 2] - x[:, 3]).max(initial=0.0, axis=1)
-    return bool((bent <= AFFINE * np.abs(x).max(axis=(1, 2), initial=0.0)).all())
-
-
-def _reference(x: Array, where: Array) -> Array:
-    """Reference coordinates (t, q, 2) of points in triangles or quadrilaterals x (t, a, 2)."""
-    if x.shape[1] == 3:
-        slopes = np.stack([x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]], axis=2)
-        inverse = _inverse(slopes)
-        return np.einsum("tij,tqj->tqi", inverse, where - x[:, None, 0])
-    a, b, c = (
-        x[:, None, 1] - x[:, None, 0],
-        x[:, None, 3] - x[:, None, 0],
-        (x[:, None, 0] - x[:, None, 1] + x[:, None, 2] - x[:, None, 3]),
-    )
-    at = np.full(where.shape, 0.5)
-    for _ in range(NEWTON):
-        s, t = at[..., :1], at[..., 1:]
-        rest = where - x[:, None, 0] - s * a - t * b - s * t * c
-        step = np.einsum(
-            "tqij,tqj->tqi", _inverse(np.stack([a + t * c, b + s * c], axis=3)), rest
-        )
-        at = at + step
-        if np.abs(step).max(initial=0.0) < 1e-14:
-            break
-    return at
-
-
-def _inverse(matrices: Array) -> Array:
-    """Inverses of (…, 2, 2), written out for speed."""
-    (a, b), (c, d) = (
-        (matrices[..., i, 0] for i in (0, 1)),
-        (matrices[..., i, 1] for i in (0, 1)),
-    )
-    rows = np.stack([np.stack([d, -c], axis=-1), np.stack([-b, a], axis=-1)], axis=-2)
-    return rows / (a * d - b * c)[..., None, None]
-
-
 def _summed(
-    slave: Surface, master: Surface, of: Index, facet: Index,
-    pair: Index, phi: Array, psi: Array, weight: Array,
-) -> Segments:  # fmt: skip
-    """Integrals of the pairs that have a segment; slivers are left out."""
+    slave: Surface, master: Surface, of: Index, facet: Index, parts: Cuts
+) -> Segments:
+    """Integrals of the pairs that have a segment."""
+    pair, weight = parts.pair, parts.weight
+    sides = ((slave, of, parts.at), (master, facet, parts.opposite))
+    phi, psi = (
+        functions(KINDS[side.corners[which].max(initial=2) - 2], at)
+        for side, which, at in sides
+    )
     k, n, m = len(of), phi.shape[2], psi.shape[2]
     mass, cross = np.zeros((k, MAX_NODES, MAX_NODES)), np.zeros((k, MAX_NODES, MAX_NODES))
     bulge = np.zeros((k, MAX_NODES, slave.points.shape[1]))
@@ -316,8 +246,7 @@ def _summed(
     on_master = np.einsum("kb,kbc->kc", cross.sum(axis=1), master.points[master.nodes[facet]])
     gap = np.einsum("kc,kc->k", on_master - on_slave, slave.normal[of])
     gap /= np.where(area > 0, area, 1.0)
-    kept = area > SLIVER * slave.area[of]
-    return Segments(of, facet, mass, cross, bulge, area, gap).at(kept)
+    return Segments(of, facet, mass, cross, bulge, area, gap).at(area > 0)
 
 
 def _outside(side: Surface, facets: Index, values: Array) -> Array:
@@ -325,3 +254,12 @@ def _outside(side: Surface, facets: Index, values: Array) -> Array:
     n = values.shape[2]
     x, slope = side.points[side.nodes[facets, :n]], side.slopes[facets, :n]
     return heights(values, slope, x)[:, :, None] * side.normal[facets, None]
+
+
+def bulge(side: Surface, facet: Index, shape: Array) -> Array:
+    """Vectors (q, dim) from points of facets (q,) to the curved surface; shape (q, 4): phi."""
+    out = np.zeros((len(facet), side.points.shape[1]))
+    for n in np.unique(side.corners[facet]):
+        mine = side.corners[facet] == n
+        out[mine] = _outside(side, facet[mine], shape[mine, None, :n])[:, 0]
+    return out

@@ -164,10 +164,11 @@ class TimeStep:
     def __str__(self) -> str:
         e = self.energies
         counts = ((s.name.lower(), int((self.status == s).sum())) for s in ContactStatus)
+        doubts = "".join(f"; warning: {warning.name}" for warning in self.warnings)
         return (
             f"t = {self.time:.6g}: {', '.join(f'{number} {name}' for name, number in counts)}; "
             f"kinetic {e.kinetic:.3e}, elastic {e.elastic:.3e}, contact {e.contact:.2e}; "
-            f"{self.solution.convergence}"
+            f"{self.solution.convergence}{doubts}"
         )
 
 

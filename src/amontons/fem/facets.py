@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InvalidInput
-from .cells import CELLS, FACET_KIND
+from .cells import CELLS, FACET_KIND, FIRST
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -32,6 +32,12 @@ class Facets:
 
     kind: str
     nodes: Index
+
+
+def corner_facets(facets: Facets) -> Facets:
+    """The same facets as those of first order on their corners; their sides are straight."""
+    kind = FIRST.get(facets.kind, facets.kind)
+    return Facets(kind, facets.nodes[:, : CELLS[kind].nodes])
 
 
 def sides(cells: tuple[Cells, ...], near: NDArray[np.bool_] | None = None) -> dict[int, Index]:

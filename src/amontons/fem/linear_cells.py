@@ -22,7 +22,7 @@ class ReferenceCell:
     """One kind of cell.
 
     corners (nodes, dim); facets: local nodes of every side, right-hand rule outwards;
-    shape(x) and gradient(x) at one reference point: (nodes,) and (nodes, dim);
+    shape(x) and gradient(x) at reference points (…, dim): (…, nodes) and (…, nodes, dim);
     gauss: points (k, dim) and weights (k,), exact for the integrals of shape functions.
     parents: of every node that is no corner, the corners that it is the middle of.
     """
@@ -57,46 +57,55 @@ class ReferenceCell:
         return self.corners.mean(axis=0)
 
     def jacobians(self, coordinates: Array, point: Array) -> Array:
-        """Slopes of x (k, nodes, space) at a reference point, (k, space, dim)."""
-        return np.einsum("kas,ad->ksd", coordinates, self.gradient(point))
+        """Slopes of x (k, nodes, space) at one reference point or one each, (k, space, dim)."""
+        return np.einsum("kas,ad->ksd" if point.ndim == 1 else "kas,kad->ksd",
+                         coordinates, self.gradient(point))  # fmt: skip
 
 
 def _simplex(dim: int) -> tuple[Array, Callable, Callable]:
     corners = np.vstack([np.zeros(dim), np.eye(dim)])
     slopes = np.vstack([-np.ones(dim), np.eye(dim)])
-    return corners, lambda x: np.concatenate([[1 - x.sum()], x]), lambda x: slopes
+
+    def shape(x: Array) -> Array:
+        return np.concatenate([1 - x.sum(axis=-1, keepdims=True), x], axis=-1)
+
+    def gradient(x: Array) -> Array:
+        return np.broadcast_to(slopes, (*x.shape[:-1], *slopes.shape))
+
+    return corners, shape, gradient
 
 
 def _tensor(corners: Array) -> tuple[Array, Callable, Callable]:
     """Multilinear shape functions with the given order of corners of the unit cube."""
 
     def factors(x: Array) -> Array:
-        return np.where(corners > 0, x, 1 - x)
+        return np.where(corners > 0, x[..., None, :], 1 - x[..., None, :])
 
     def gradient(x: Array) -> Array:
         value, sign = factors(x), np.where(corners > 0, 1.0, -1.0)
         columns = [
-            sign[:, k] * np.delete(value, k, axis=1).prod(axis=1)
+            sign[:, k] * np.delete(value, k, axis=-1).prod(axis=-1)
             for k in range(corners.shape[1])
         ]
-        return np.stack(columns, axis=1)
+        return np.stack(columns, axis=-1)
 
-    return corners, lambda x: factors(x).prod(axis=1), gradient
+    return corners, lambda x: factors(x).prod(axis=-1), gradient
 
 
 def _wedge() -> tuple[Array, Callable, Callable]:
     tri, shape, gradient = _simplex(2)
     corners = np.vstack([np.c_[tri, np.zeros(3)], np.c_[tri, np.ones(3)]])
 
-    def slopes(x: Array) -> Array:
-        s, g = shape(x[:2]), gradient(x[:2])
-        return np.vstack([np.c_[g * (1 - x[2]), -s], np.c_[g * x[2], s]])
+    def both(x: Array) -> Array:
+        s, z = shape(x[..., :2]), x[..., 2:]
+        return np.concatenate([s * (1 - z), s * z], axis=-1)
 
-    return (
-        corners,
-        lambda x: np.concatenate([shape(x[:2]) * (1 - x[2]), shape(x[:2]) * x[2]]),
-        slopes,
-    )
+    def slopes(x: Array) -> Array:
+        s, g, z = shape(x[..., :2])[..., None], gradient(x[..., :2]), x[..., 2:, None]
+        low = np.concatenate([g * (1 - z), -s], axis=-1)
+        return np.concatenate([low, np.concatenate([g * z, s], axis=-1)], axis=-2)
+
+    return corners, both, slopes
 
 
 def _pyramid() -> tuple[Array, Callable, Callable]:
@@ -104,18 +113,20 @@ def _pyramid() -> tuple[Array, Callable, Callable]:
     corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1.0]])
 
     def shape(x: Array) -> Array:
-        a, b, c = x
+        a, b, c = np.moveaxis(x, -1, 0)
         s = 1 - c
-        return np.array([(s - a) * (s - b), a * (s - b), a * b, (s - a) * b, c * s]) / s
+        values = [(s - a) * (s - b), a * (s - b), a * b, (s - a) * b, c * s]
+        return np.stack(values, axis=-1) / s[..., None]
 
     def gradient(x: Array) -> Array:
-        a, b, c = x
+        a, b, c = np.moveaxis(x, -1, 0)
         s = 1 - c
-        q = a * b / s**2  # d(ab / (1 - c)) / dc
-        return np.array([
+        q, none = a * b / s**2, np.zeros_like(s)  # q: d(ab / (1 - c)) / dc
+        rows = [
             [-(s - b) / s, -(s - a) / s, q - 1], [(s - b) / s, -a / s, -q], [b / s, a / s, q],
-            [-b / s, (s - a) / s, -q], [0, 0, 1.0],
-        ])  # fmt: skip
+            [-b / s, (s - a) / s, -q], [none, none, none + 1],
+        ]  # fmt: skip
+        return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
     return corners, shape, gradient
 

@@ -39,18 +39,18 @@ def _lagrange(nodes: Array, simplex: bool) -> tuple[Callable, Callable]:
     lower = np.maximum(powers - 1, 0)
 
     def monomials(x: Array) -> Array:
-        return (x**powers).prod(axis=1)
+        return (x[..., None, :] ** powers).prod(axis=-1)
 
     def slopes(x: Array) -> Array:
         columns = []
         for k in range(dim):
-            parts = x**powers
-            parts[:, k] = powers[:, k] * x[k] ** lower[:, k]
-            columns.append(parts.prod(axis=1))
-        return np.stack(columns, axis=1)
+            parts = x[..., None, :] ** powers
+            parts[..., k] = powers[:, k] * x[..., None, k] ** lower[:, k]
+            columns.append(parts.prod(axis=-1))
+        return np.stack(columns, axis=-1)
 
-    weights = np.linalg.inv([monomials(x) for x in nodes]).T
-    return lambda x: weights @ monomials(x), lambda x: weights @ slopes(x)
+    weights = np.linalg.inv(monomials(nodes)).T
+    return lambda x: monomials(x) @ weights.T, lambda x: weights @ slopes(x)
 
 
 def gauss(dim: int, simplex: bool, count: int = 3) -> tuple[Array, Array]:

@@ -20,7 +20,11 @@ def facet_normals(points: Array, facets: Facets, at: Array | None = None) -> Arr
     Shape (k, dim).  Their length is the ratio of areas ds / d reference.
     """
     cell = CELLS[facets.kind]
-    jac = cell.jacobians(points[facets.nodes], cell.centre if at is None else at)
+    return outward(cell.jacobians(points[facets.nodes], cell.centre if at is None else at))
+
+
+def outward(jac: Array) -> Array:
+    """The same from the slopes of facets (k, dim, dim - 1) at a reference point each."""
     if jac.shape[1] == 2:
         tangent = jac[:, :, 0]
         return np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)

@@ -1,4 +1,4 @@
-"""Displacement and stress at Gauss points of a surface, as weights of nodal values.
+"""Displacement and stress at points of a surface, as weights of nodal values.
 
 A point on a facet sees the displacement sum_a N_a v_a of the facet's nodes and, in the cell
 behind the facet, the gradient sum_b v_b (x) dN_b/dx, from which the traction sigma nu follows.
@@ -19,7 +19,7 @@ from .elasticity import LinearElastic, Materials, materials_by_region
 from .facets import Cells, Facets
 from .mesh import Mesh
 from .quadratic_cells import gauss
-from .surfaces import facet_areas, facet_normals
+from .surfaces import facet_areas, facet_normals, outward
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -27,7 +27,7 @@ Index = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class SurfacePoints:
-    """Gauss points of a surface, facet by facet; q points, tables padded with weight zero.
+    """Points of a surface; q points, tables padded with weight zero.
 
     points (q, dim); weights (q,), area; normals (q, dim), unit, outwards; nodes, shape (q, a):
     of the facet; cell_nodes (q, b), slopes (q, b, dim): of the cell behind it, 1 / length;
@@ -77,26 +77,70 @@ def node_columns(nodes: Index, values: Array, size: int) -> sparse.csc_array:
     return out
 
 
+@dataclass(frozen=True, eq=False)
+class FacetPoints:
+    """Where on a surface: facet (q,), counted through its blocks, and weight (q,), area.
+
+    at (q, dim - 1): reference coordinates in the facet.
+    """
+
+    facet: Index
+    at: Array
+    weight: Array
+
+
+def gauss_points(mesh: Mesh, surface: str, count: int) -> FacetPoints:
+    """`count` Gauss points per direction on every facet of a surface, facet by facet."""
+    parts, before = [], 0
+    for facets in mesh.surface(surface):
+        side, k = CELLS[facets.kind], len(facets.nodes)
+        at, weight = gauss(side.dim, side.corner_count == 3, count)
+        area = [np.linalg.norm(facet_normals(mesh.points, facets, x), axis=1) for x in at]
+        weights = (weight * np.stack(area, axis=1)).ravel()
+        parts.append((np.repeat(np.arange(before, before + k), len(at)),
+                      np.tile(at, (k, 1)), weights))  # fmt: skip
+        before += k
+    return FacetPoints(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+
 def surface_points(
-    mesh: Mesh, surface: str, material: LinearElastic | Materials, count: int
+    mesh: Mesh, surface: str, material: LinearElastic | Materials, where: FacetPoints
 ) -> SurfacePoints:
-    """`count` Gauss points per direction on every facet of an outer surface."""
+    """Displacement and stress at points of an outer surface, in their order."""
     laws = materials_by_region(mesh, material)
     parts, place, before = [], [], 0
     for facets in mesh.surface(surface):
         for rows, block, cells, local in _behind(mesh, facets):
+            row = np.full(before + len(facets.nodes), -1)
+            row[before + rows] = np.arange(len(rows))
+            mine = np.flatnonzero(where.facet < len(row))
+            mine = mine[row[where.facet[mine]] >= 0]
+            group = Facets(facets.kind, facets.nodes[rows])
+            here = FacetPoints(row[where.facet[mine]], where.at[mine], where.weight[mine])
             law = laws[block.region]
-            part = _points(mesh, Facets(facets.kind, facets.nodes[rows]), block, cells, local,
-                           law, count)  # fmt: skip
-            parts.append(part)
-            place.append(np.tile(before + rows, len(part.points) // len(rows)))
+            parts.append(_points(mesh, group, block, cells, local, law, here))
+            place.append(mine)
         before += len(facets.nodes)
     order = np.argsort(np.concatenate(place), kind="stable")
-    tables = [_stacked([getattr(part, f.name) for part in parts]) for f in fields(parts[0])]
+    tables = [stacked([getattr(part, f.name) for part in parts]) for f in fields(parts[0])]
     return SurfacePoints(*(table[order] for table in tables))
 
 
-def _stacked(tables: list[Array]) -> Array:
+def facet_traces(mesh: Mesh, surface: str, facet: Index, at: Array) -> tuple[Index, Array]:
+    """Nodes and shape functions (q, a) at points of facets, counted as in FacetPoints."""
+    tables, place, before = [], [], 0
+    for facets in mesh.surface(surface):
+        mine = np.flatnonzero((facet >= before) & (facet < before + len(facets.nodes)))
+        shape = CELLS[facets.kind].shape(at[mine])
+        tables.append((facets.nodes[facet[mine] - before], shape))
+        place.append(mine)
+        before += len(facets.nodes)
+    order = np.argsort(np.concatenate(place), kind="stable")
+    nodes, shape = (stacked(list(column))[order] for column in zip(*tables, strict=True))
+    return nodes, shape
+
+
+def stacked(tables: list[Array]) -> Array:
     """One table of several with different numbers of columns, padded with zeros."""
     width = max((table.shape[1] for table in tables if table.ndim > 1), default=0)
     return np.concatenate([
@@ -134,30 +178,23 @@ def _behind(mesh: Mesh, facets: Facets) -> Iterator[tuple[Index, Cells, Index, I
 
 def _points(  # noqa: PLR0913
     mesh: Mesh, facets: Facets, block: Cells, cells: Index, local: Index, law: LinearElastic,
-    count: int,
+    where: FacetPoints,
 ) -> SurfacePoints:  # fmt: skip
-    """Gauss points of facets whose nodes have the numbers `local` (a,) in their cells."""
-    side, cell = CELLS[facets.kind], CELLS[block.kind]
-    corners = mesh.points[block.nodes[cells]]
-    parts: list[tuple[Array, ...]] = []
-    k = len(cells)
-    for at, weight in zip(*gauss(side.dim, side.kind in ("tri", "tri6"), count), strict=True):
-        phi = side.shape(at)
-        where = phi @ cell.corners[local]
-        normal = facet_normals(mesh.points, facets, at)
-        area = np.linalg.norm(normal, axis=1)
-        slopes = cell.gradient(where) @ np.linalg.inv(cell.jacobians(corners, where))
-        parts.append((
-            np.einsum("a,kac->kc", phi, mesh.points[facets.nodes]), weight * area,
-            normal / area[:, None], facets.nodes, np.tile(phi, (k, 1)), block.nodes[cells],
-            slopes,
-        ))  # fmt: skip
-    tables = [np.concatenate(column) for column in zip(*parts, strict=True)]
+    """Points of facets whose nodes have the numbers `local` (a,) in their cells."""
+    side, cell, row = CELLS[facets.kind], CELLS[block.kind], where.facet
+    phi = side.shape(where.at)
+    x = mesh.points[facets.nodes[row]]
+    normal = outward(side.jacobians(x, where.at))
+    inside = phi @ cell.corners[local]  # of the cell
+    own = block.nodes[cells[row]]
+    slopes = cell.gradient(inside) @ np.linalg.inv(cell.jacobians(mesh.points[own], inside))
     lame, shear = law.lame_lambda(mesh.dim), law.shear
     stiffness = (lame + 2 * shear) * _trace_constant(mesh, facets, block, cells)
-    q = len(tables[0])
-    return SurfacePoints(*tables, np.full(q, lame), np.full(q, shear),
-                         np.tile(stiffness, len(parts)))  # fmt: skip
+    return SurfacePoints(
+        np.einsum("qa,qac->qc", phi, x), where.weight,
+        normal / np.linalg.norm(normal, axis=1)[:, None], facets.nodes[row], phi, own, slopes,
+        np.full(len(row), lame), np.full(len(row), shear), stiffness[row],
+    )  # fmt: skip
 
 
 def _trace_constant(mesh: Mesh, facets: Facets, block: Cells, cells: Index) -> Array:

@@ -11,13 +11,20 @@ from typing import TYPE_CHECKING
 
 from ..warned import ResultWarning
 from .fields import ContactFields
+from .matching import nodal_on_non_matching
 from .rotation import large_rotation
+from .sliding import sliding_beyond_curvature, sliding_beyond_pairs
 
 if TYPE_CHECKING:
     from .model import Model
 
 Check = Callable[["Model", ContactFields], list[ResultWarning]]
-CHECKS: tuple[Check, ...] = (large_rotation,)
+CHECKS: tuple[Check, ...] = (
+    large_rotation,
+    nodal_on_non_matching,
+    sliding_beyond_pairs,
+    sliding_beyond_curvature,
+)
 
 
 def model_warnings(model: Model, fields: ContactFields) -> tuple[ResultWarning, ...]:

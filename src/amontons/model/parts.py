@@ -92,7 +92,8 @@ class Contact:
     method: "nodal", every slave node against the closest point of the other side, or "mortar",
     averages with dual basis functions, exact also for a uniform pressure between meshes that do
     not match, or "nitsche", the law at Gauss points with stresses in the place of reactions;
-    `Nitsche(...)` sets its options.
+    `Nitsche(...)` sets its options.  By default "mortar" with a master and "nodal" with an
+    obstacle; nodal contact between meshes that do not match is wrong by tens of percent.
 
     Either mu, the coefficient of Coulomb friction, or tresca, the largest shear traction (a
     stress): a number, one number per slave node, or a function of points (n, dim) -> (n,).
@@ -106,7 +107,7 @@ class Contact:
     mu: ScalarValue | None = None
     tresca: ScalarValue | None = None
     master: str | None = None
-    method: str | Nitsche = "nodal"
+    method: str | Nitsche | None = None
     where: Callable[[Array], NDArray[np.bool_]] | None = None
 
     def __post_init__(self) -> None:
@@ -118,6 +119,8 @@ class Contact:
             raise InvalidInput(
                 f"contact on {self.slave!r}: expected either an obstacle or a master surface"
             )
+        if self.method is None:
+            object.__setattr__(self, "method", "nodal" if self.master is None else "mortar")
         if self.method == "dual-mortar":
             object.__setattr__(self, "method", "mortar")
         if self.method == "nitsche":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +11,11 @@ from scipy import sparse
 
 from ..contact import (
     ContactRows,
+    Mismatch,
     Nitsche,
     NitscheTerms,
     contact_nodes,
+    mismatch,
     mortar_contact,
     mortar_obstacle,
     nitsche_obstacle,
@@ -20,6 +23,7 @@ from ..contact import (
     nodal_contact,
     pair_contact,
 )
+from ..contact.segments import Surface
 from ..errors import InvalidInput, UnsupportedForm
 from ..fem.elasticity import LinearElastic
 from ..fem.mesh import Mesh
@@ -43,6 +47,7 @@ class Placed:
     held: slave nodes without a contact, as supports hold them along the normal.
     By Nitsche's method Gauss points of the slave take the place of its nodes, and `nitsche`
     holds their tractions, also in the dofs of the whole model.
+    sides: mesh and surface of slave and master, None with an obstacle.
     """
 
     body: int
@@ -52,6 +57,26 @@ class Placed:
     H: sparse.csc_array
     held: HeldNodes | None = None
     nitsche: NitscheTerms | None = None
+    sides: tuple[Mesh, str, Mesh, str] | None = None
+
+    @cached_property
+    def mismatch(self) -> Mismatch:
+        """How far the meshes of a nodal pair are from each other, slave nodes as in kept."""
+        assert self.sides is not None
+        return mismatch(*self.sides)
+
+    @cached_property
+    def master(self) -> Surface:
+        """Facets of the master."""
+        assert self.sides is not None
+        _, _, mesh, name = self.sides
+        return Surface.of_corners(mesh.points, mesh.surface(name), name)
+
+    @cached_property
+    def narrowest(self) -> float:
+        """Length than which no facet of the master is narrower."""
+        power = self.master.points.shape[1] - 2
+        return float((self.master.area / (2 * self.master.radius) ** power).min())
 
 
 def place(
@@ -66,7 +91,8 @@ def place(
     all_kept[met] = kept
     held = _held_nodes(bodies, contact, given.is_fixed, offsets)
     terms = None if terms is None else terms.at(kept)
-    return Placed(k, all_kept, points, rows.at(kept), H[:, np.repeat(kept, d)], held, terms)
+    return Placed(k, all_kept, points, rows.at(kept), H[:, np.repeat(kept, d)], held, terms,
+                  _sides(bodies, contact))  # fmt: skip
 
 
 def _has_held_normal(H: sparse.csc_array, d: int, is_fixed: Mask) -> Mask:
@@ -102,6 +128,14 @@ def _held_nodes(
     size = np.abs(slave.points).max() + np.ptp(slave.points, axis=0).max()
     columns = sparse.csc_array(sparse.csc_array(H)[:, np.repeat(held, d)])
     return HeldNodes.of(contact, rows.at(held), columns, first, size)
+
+
+def _sides(bodies: tuple[Body, ...], contact: Contact) -> tuple[Mesh, str, Mesh, str] | None:
+    """Mesh and surface of slave and master."""
+    if contact.master is None:
+        return None
+    (k, surface), (j, other) = (locate(bodies, n) for n in (contact.slave, contact.master))
+    return bodies[k].mesh, surface, bodies[j].mesh, other
 
 
 def _met(
@@ -153,17 +187,17 @@ def _met_by_nitsche(
         rows, terms = nitsche_obstacle(
             body.mesh, surface, contact.obstacle, body.material, options
         )
-        met, points = np.ones(len(rows.points), dtype=bool), rows.points
         H = _shifted(rows.H, first, size)
     else:
         assert contact.master is not None
         j, other = locate(bodies, contact.master)
-        rows, terms, on_master, met, points = nitsche_pair(
+        rows, terms, on_master = nitsche_pair(
             body.mesh, surface, bodies[j].mesh, other, body.material, options
         )
         H = _shifted(rows.H, first, size) + _shifted(on_master, int(offsets[j]), size)
     terms = replace(terms, traction=_shifted(terms.traction, first, size))
-    return rows, sparse.csc_array(H), met, points, terms
+    met = np.ones(len(rows.points), dtype=bool)
+    return rows, sparse.csc_array(H), met, rows.points, terms
 
 
 def _check_faces(mesh: Mesh, surface: str, contact: Contact, rows: ContactRows) -> None:
