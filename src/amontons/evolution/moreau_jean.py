@@ -34,6 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..clock import NEVER, Deadline
 from ..cones import Coulomb, Law, Tresca
 from ..errors import InvalidInput, UnsupportedForm
 from ..model import Model
@@ -111,7 +112,9 @@ class MovingModel:
         self._last_part: tuple[Index, FrictionProblem] | None = None
         self._last_active: tuple[Index, FrictionProblem] = (np.arange(nc), self.base)
 
-    def advance(self, state: State, time: float, solve: Solve) -> TimeStep:
+    def advance(
+        self, state: State, time: float, solve: Solve, limit: Deadline = NEVER
+    ) -> TimeStep:
         """One step from a state to a time; solve(problem, start) solves its problem."""
         parts, method = self.motion.parts, self.method
         h, theta = method.step, method.theta
