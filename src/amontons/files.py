@@ -107,6 +107,17 @@ def remove_parts(folder: Path, names: Iterable[re.Pattern[str]]) -> None:
                 path.unlink()
 
 
+@contextmanager
+def made(folder: Path) -> Iterator[None]:
+    """The folder, made with those above it; new ones that are empty go when the block fails."""
+    new = make_folder(folder)
+    try:
+        yield
+    except BaseException:
+        remove_empty(new)
+        raise
+
+
 def remove_empty(folders: list[Path]) -> None:
     """Remove folders that hold nothing, those from below first."""
     for folder in folders:

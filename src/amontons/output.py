@@ -6,8 +6,8 @@ import json
 import math
 import os
 import platform
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InvalidInput
-from .files import make_folder, put, remove_empty, replacing
+from .files import made, put, replacing
 from .solution import FrictionSolution
 from .solvers import METHODS
 from .warned import ResultWarning
@@ -111,21 +111,10 @@ def save(
     if copy is not None:
         jobs.append((Path(copy), writers["solution.json"]))
     with ExitStack() as stack:
-        stack.enter_context(_made(folder))
+        stack.enter_context(made(folder))
         for path, writer in jobs:
             writer(output, stack.enter_context(replacing(path)))
     return [path for path, _ in jobs]
-
-
-@contextmanager
-def _made(folder: Path) -> Iterator[None]:
-    """The folder, made with those above it; the new ones go again when the block fails."""
-    new = make_folder(folder)
-    try:
-        yield
-    except BaseException:
-        remove_empty(new)
-        raise
 
 
 def _write_text(path: Path, text: str) -> None:

@@ -31,10 +31,8 @@ def identity(case: Case, settings: Settings) -> dict[str, Any]:
     if "mesh" in tables:
         tables["mesh"] = {k: v for k, v in tables["mesh"].items() if k != "file"}
     assert case.evolution is not None
-    method = case.evolution.method
-    how = {"kind": type(method).__name__, **dataclasses.asdict(method)}
     solver = {"method": settings.method, "tolerance": settings.tolerance, **settings.options}
-    found = _flat({**tables, "evolution": how, "solver": solver})
+    found = _flat({**tables, "evolution": case.evolution.method, "solver": solver})
     return {**found, MESH: _digest([body.mesh for body in case.model.bodies])}
 
 
@@ -55,7 +53,15 @@ def _shown(values: dict[str, Any], key: str) -> str:
 
 
 def _flat(value: Any, key: str = "") -> dict[str, Any]:
-    """Tables and lists as one table with dotted keys; whole numbers like all numbers."""
+    """Tables, lists and options as one table with dotted keys; whole numbers like all numbers.
+
+    Options that are not set are not there.
+    """
+    if value is None:
+        return {}
+    if dataclasses.is_dataclass(value):
+        fields = {f.name: getattr(value, f.name) for f in dataclasses.fields(value)}
+        value = {"kind": type(value).__name__, **fields}
     if isinstance(value, dict):
         parts = [(f"{key}.{name}" if key else name, part) for name, part in value.items()]
     elif isinstance(value, list | tuple):
@@ -63,7 +69,7 @@ def _flat(value: Any, key: str = "") -> dict[str, Any]:
     elif isinstance(value, int) and not isinstance(value, bool) and abs(value) < EXACT:
         return {key: float(value)}
     else:
-        return {key: value if isinstance(value, bool | float | None | str) else str(value)}
+        return {key: value if isinstance(value, bool | float | str) else str(value)}
     found: dict[str, Any] = {}
     for name, part in parts:
         found |= _flat(part, name)

@@ -41,7 +41,8 @@ def locked(folder: Path) -> Iterator[None]:
         if place is not None:
             with suppress(OSError):
                 path.unlink(missing_ok=True)  # before others can have it
-            os.close(place)
+            with suppress(OSError):
+                os.close(place)
 
 
 def _taken(path: Path) -> int | None:
@@ -56,7 +57,8 @@ def _taken(path: Path) -> int | None:
             os.close(place)  # its last owner removed it meanwhile: take the next
         except OSError as reason:
             who = _who(place)
-            os.close(place)
+            with suppress(OSError):
+                os.close(place)
             if reason.errno in TAKEN:
                 raise NotWritten(
                     f"{path.parent}: in use by another `amontons run`{who}; wait for its end, "

@@ -22,7 +22,7 @@ from .state import State, TimeStep, at_rest
 from .system import Motion
 
 WHOLE = 1e-9  # the end may miss a whole number of steps by this part of a step
-LEAST = 1e-3  # seconds for a solve whose deadline has passed: it then says so itself
+LEAST = 1e-9  # seconds for a solve whose deadline has passed: it then says so itself
 
 
 def evolve(

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from PIL import Image  # comes with matplotlib
 
 from ..errors import InvalidInput
-from ..files import make_folder, write_bytes
+from ..files import made, write_bytes
 from ..model import Model
 from ..solution import ContactStatus
 from .saving import save_figure
@@ -144,25 +144,29 @@ def draw_film(
     Returns the paths, the film last.
     """
     folder = Path(folder)
-    make_folder(folder)
     scene = Scene(model)
     factor = magnification(scene, frames)
     room = factor * room_needed(scene, frames)
     paths, images = [], []
-    for k, frame in enumerate(frames, start=1):
-        figure = step_figure(scene, frame, magnify=factor, room=room, units=units)
-        path = folder / f"{name}-{k:05d}.png"
-        save_figure(figure, path)
-        paths.append(path)
-        images.append(_image(figure))
-    if images:
-        paths.append(folder / "film.gif")
-        durations = [int(1e3 * SECONDS)] * (len(images) - 1) + [int(1e3 * LAST)]
-        film = BytesIO()
-        images[0].save(film, format="gif", save_all=True, append_images=images[1:],
-                       duration=durations, loop=0, optimize=True)  # fmt: skip
-        write_bytes(paths[-1], film.getvalue())
+    with made(folder):
+        for k, frame in enumerate(frames, start=1):
+            figure = step_figure(scene, frame, magnify=factor, room=room, units=units)
+            paths.append(folder / f"{name}-{k:05d}.png")
+            save_figure(figure, paths[-1])
+            images.append(_image(figure))
+        if images:
+            paths.append(folder / "film.gif")
+            write_bytes(paths[-1], _film(images))
     return paths
+
+
+def _film(images: list[Image.Image]) -> bytes:
+    """The bytes of a GIF of them all."""
+    film = BytesIO()
+    durations = [int(1e3 * SECONDS)] * (len(images) - 1) + [int(1e3 * LAST)]
+    images[0].save(film, format="gif", save_all=True, append_images=images[1:],
+                   duration=durations, loop=0, optimize=True)  # fmt: skip
+    return film.getvalue()
 
 
 def _image(figure: Figure) -> Image.Image:
