@@ -31,7 +31,8 @@ def identity(case: Case, settings: Settings) -> dict[str, Any]:
     if "mesh" in tables:
         tables["mesh"] = {k: v for k, v in tables["mesh"].items() if k != "file"}
     assert case.evolution is not None
-    solver = {"method": settings.method, "tolerance": settings.tolerance, **settings.options}
+    solver = {"method": settings.method, "tolerance": settings.tolerance,
+              "contact_tolerance": settings.contact_tolerance, **settings.options}  # fmt: skip
     found = _flat({**tables, "evolution": case.evolution.method, "solver": solver})
     return {**found, MESH: _digest([body.mesh for body in case.model.bodies])}
 

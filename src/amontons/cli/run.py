@@ -103,7 +103,8 @@ def _prepared(
     steps = evolve(
         read.model, read.evolution.method, until=read.evolution.until, start=start,
         solver=settings.solver(), tolerance=settings.tolerance,
-        max_iterations=settings.max_iterations, time_limit=settings.time_limit,
+        contact_tolerance=settings.contact_tolerance, max_iterations=settings.max_iterations,
+        time_limit=settings.time_limit,
         deadline=asked.deadline,
     )  # fmt: skip
     if not restart:

@@ -118,7 +118,6 @@ def _finish(found: FrictionSolution | ModelSolution) -> int:
     name = record.outcome.name.lower().replace("_", " ")
     detail = f" ({in_words(record.detail)})" if record.detail else ""
     click.echo(
-    click.echo(
         f"Not converged: {name}{detail}, {record.errors}. {record.advice}", err=True
     )
     return INTERRUPTED if record.by_user else 1

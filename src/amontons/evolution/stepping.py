@@ -33,6 +33,7 @@ def evolve(
     start: State | None = None,
     solver: Solver | None = None,
     tolerance: float = 1e-8,
+    contact_tolerance: float | None = None,
     max_iterations: int | None = None,
     time_limit: float | None = None,
     deadline: Deadline = NEVER,
@@ -42,11 +43,11 @@ def evolve(
 
     start: by default the undeformed model at rest at time 0; any `step.state` goes on from
     there and gives the same numbers as an evolution without a stop.  Supports and loads may
-    depend on time: expressions in t, or functions of (x, t).  max_iterations: of each solve;
-    time_limit: seconds for each step; deadline: of all steps together, also met in the middle
-    of one.  check: raise NotConverged (Interrupted after Ctrl-C), which carries the solution of
-    the step, instead of going on with it.  What can not begin is refused at once, not with the
-    first step.
+    depend on time: expressions in t, or functions of (x, t).  tolerance, contact_tolerance,
+    max_iterations: of each solve; time_limit: seconds for each step; deadline: of all steps
+    together, also met in the middle of one.  check: raise NotConverged (Interrupted after
+    Ctrl-C), which carries the solution of the step, instead of going on with it.  What can not
+    begin is refused at once, not with the first step.
 
     The problem of a step is `step.problem`.
     """
@@ -62,8 +63,10 @@ def evolve(
 
     def solved(problem: FrictionProblem, first: Iterate, limit: Deadline) -> FrictionSolution:
         left = max(limit.left, LEAST)
-        return drive(problem, solver, tolerance=tolerance, start=first,
-                     max_iterations=max_iterations, time_limit=left)  # fmt: skip
+        return drive(
+            problem, solver, tolerance=tolerance, contact_tolerance=contact_tolerance,
+            start=first, max_iterations=max_iterations, time_limit=left,
+        )  # fmt: skip
 
     def advanced(state: State, time: float) -> TimeStep:
         limit = deadline if time_limit is None else deadline.within(time_limit)
