@@ -14,8 +14,8 @@ __version__ = "0.1.0"
 
 _HOME = {
     "errors": ("AmontonsError", "FileFormatError", "Interrupted", "InvalidInput",
-               "InvertedCells", "MissingDependency", "NotConverged", "SingularOperator",
-               "UnsupportedForm"),
+               "InvertedCells", "MissingDependency", "NotConverged", "NotWritten",
+               "SingularOperator", "UnsupportedForm"),
     "cones": ("Coulomb", "Tresca"),
     "linear": ("AlgebraicMultigrid", "ConjugateGradient", "Direct", "GeometricMultigrid",
                "Petsc"),

@@ -340,8 +340,7 @@ def raise_unless_converged(result: FrictionSolution | ModelSolution) -> None:
     if record.outcome is Outcome.CONVERGED:
         return
     message = f"{record}. {record.advice}"
-    by_user = record.outcome is Outcome.STOPPED and record.detail == "by the user"
-    raise (Interrupted if by_user else NotConverged)(message, result)
+    raise (Interrupted if record.by_user else NotConverged)(message, result)
 
 
 @contextmanager

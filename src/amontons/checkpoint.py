@@ -1,50 +1,94 @@
-"""Files of an evolution: its state, to go on from, and its discrete problems as FCLib files."""
+"""Files of an evolution: where it stands, to go on from, and its discrete problems."""
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, TypeVar
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from .errors import FileFormatError, InvalidInput
 from .evolution import State, TimeStep
-from .fclib import DAMAGE, write_fclib
-from .files import make_folder, replacing
+from .fclib import DAMAGE, write_fclib, write_hdf5
+from .files import make_folder
 
 GROUP = "amontons_state"
 ARRAYS = {"displacement": 1, "velocity": 1, "force": 2, "slip": 2}  # name: dimensions
+RUN = "amontons_run"  # beside the state, in the checkpoint of a run
+Read = TypeVar("Read")
+
+
+@dataclass(frozen=True, eq=False)
+class Checkpoint:
+    """All that a run needs to go on, in one file, so that its parts always belong together.
+
+    case: what decides the numbers, JSON data by key; table (steps,): a structured array, one
+    row for each step so far, with the field `index`; pictures: indices of the steps that have
+    a VTK file.
+    """
+
+    state: State
+    case: dict[str, Any]
+    table: NDArray[np.void]
+    pictures: NDArray[np.int64]
 
 
 def save_state(path: str | os.PathLike[str], state: State) -> None:
     """Write a state; nothing on failure."""
-    with replacing(path) as temporary, h5py.File(temporary, "w") as file:
-        group = file.create_group(GROUP)
-        group["index"], group["time"] = state.index, state.time
-        for name in ARRAYS:
-            group[name] = getattr(state, name)
+    write_hdf5(path, lambda file: _put_state(file, state))
 
 
 def load_state(path: str | os.PathLike[str]) -> State:
-    """The state in a file of `save_state`; raises FileFormatError naming file and dataset."""
-    path = Path(path)
+    """The state in a file of `save_state`, or in the checkpoint of a run.
+
+    Raises FileFormatError naming file and dataset.
+    """
+    return _read(Path(path), _state)
+
+
+def save_checkpoint(path: str | os.PathLike[str], checkpoint: Checkpoint) -> None:
+    """Write a checkpoint; nothing on failure."""
+    case = json.dumps(checkpoint.case, sort_keys=True)
+
+    def fill(file: h5py.File) -> None:
+        _put_state(file, checkpoint.state)
+        group = file.create_group(RUN)
+        group["case"] = np.frombuffer(case.encode(), dtype=np.uint8)
+        group["table"], group["pictures"] = checkpoint.table, checkpoint.pictures
+        group["digest"] = np.frombuffer(_digest(checkpoint, case), dtype=np.uint8)
+
+    write_hdf5(path, fill)
+
+
+def load_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
+    """The checkpoint in a file of `save_checkpoint`.
+
+    Raises FileFormatError for a state alone, and for a file that has changed since.
+    """
+    return _read(Path(path), _checkpoint)
+
+
+def _put_state(file: h5py.File, state: State) -> None:
+    group = file.create_group(GROUP)
+    group["index"], group["time"] = state.index, state.time
+    for name in ARRAYS:
+        group[name] = getattr(state, name)
+
+
+def _read(path: Path, reader: Callable[[Path, h5py.File], Read]) -> Read:
+    """What a reader finds in a file; any damage becomes a FileFormatError."""
     if not path.is_file():
         raise FileFormatError(f"{path}: no such file")
     try:
         with h5py.File(path, "r") as file:
-            if GROUP not in file:
-                raise FileFormatError(f"{path}: /{GROUP}: missing group")
-            group = file[GROUP]
-            values = {name: np.asarray(group[name][()], dtype=float) for name in ARRAYS}
-            for name, dimensions in ARRAYS.items():
-                if values[name].ndim != dimensions:
-                    raise FileFormatError(
-                        f"{path}: /{GROUP}/{name}: expected {dimensions} dimensions, "
-                        f"got shape {values[name].shape}"
-                    )
-            return State(int(group["index"][()]), float(group["time"][()]), **values)
+            return reader(path, file)
     except FileFormatError:
         raise
     except InvalidInput as reason:
@@ -53,6 +97,48 @@ def load_state(path: str | os.PathLike[str]) -> State:
         raise FileFormatError(
             f"{path}: expected a saved state (HDF5), got: {str(reason).splitlines()[0]}"
         ) from reason
+
+
+def _state(path: Path, file: h5py.File) -> State:
+    if GROUP not in file:
+        raise FileFormatError(f"{path}: /{GROUP}: missing group")
+    group = file[GROUP]
+    values = {name: np.asarray(group[name][()], dtype=float) for name in ARRAYS}
+    for name, dimensions in ARRAYS.items():
+        if values[name].ndim != dimensions:
+            raise FileFormatError(
+                f"{path}: /{GROUP}/{name}: expected {dimensions} dimensions, "
+                f"got shape {values[name].shape}"
+            )
+    return State(int(group["index"][()]), float(group["time"][()]), **values)
+
+
+def _checkpoint(path: Path, file: h5py.File) -> Checkpoint:
+    state = _state(path, file)
+    if RUN not in file:
+        raise FileFormatError(
+            f"{path}: /{RUN}: missing group: this is a state alone, without the table and the "
+            "case of its run; evolve(..., start=load_state(...)) goes on from it"
+        )
+    group = file[RUN]
+    case = group["case"][()].tobytes().decode()
+    found = Checkpoint(state, json.loads(case), group["table"][()], group["pictures"][()])
+    if group["digest"][()].tobytes() != _digest(found, case):
+        raise FileFormatError(f"{path}: has changed since it was written: the digest differs")
+    return found
+
+
+def _digest(checkpoint: Checkpoint, case: str) -> bytes:
+    """A hash of all that a checkpoint holds."""
+    state = checkpoint.state
+    parts = [np.array([state.index]), np.array([state.time]),
+             *(getattr(state, name) for name in ARRAYS),
+             checkpoint.table, checkpoint.pictures]  # fmt: skip
+    whole = hashlib.sha256(case.encode())
+    for part in parts:
+        whole.update(f"{part.dtype.descr} {part.shape}".encode())
+        whole.update(np.ascontiguousarray(part).tobytes())
+    return whole.digest()
 
 
 def export_fclib(

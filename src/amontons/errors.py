@@ -13,6 +13,10 @@ class InvalidInput(AmontonsError, ValueError):
     """An argument has the wrong shape, sign or value: "argument: expected …, got …"."""
 
 
+class NotWritten(InvalidInput):
+    """A file or folder can not be written: names it and says why, such as a full disk."""
+
+
 class UnsupportedForm(AmontonsError, TypeError):
     """The solver needs the other form of the problem; the message names those that fit."""
 

@@ -1,54 +1,121 @@
-"""Writing files so that a reader never meets half of one."""
+"""Writing files so that a reader never meets half of one, also after a power cut.
+
+HDF5 files and figures are made in memory, and `put` writes their bytes: on a full disk those
+libraries crash, or do not say why they failed.
+"""
 
 from __future__ import annotations
 
+import errno
 import os
+import re
 import secrets
 import shutil
 import stat
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from .errors import InvalidInput
+from .errors import NotWritten
 
 STREAMS = ("/dev/", "/proc/")  # /dev/stdout may lead to a plain file that is open elsewhere
 DESCRIPTORS = {"/dev/stdout": 1, "/dev/stderr": 2}  # these keep their place in such a file
+BINARY = getattr(os, "O_BINARY", 0)  # where lines would end in another way
+NO_SYNC = (errno.EINVAL, errno.ENOTSUP, errno.ENOSYS)  # of file systems without it
+KEPT = 20  # letters of a name that its temporary file keeps
+PART = re.compile(r"\.(?P<stem>.{1,20})-[0-9a-f]{8}(?P<suffix>(\.[^.]*)?)")
+
+
+def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
+    """Write a file, complete or not at all; raises like `replacing`."""
+    with replacing(path) as temporary:
+        put(temporary, data)
+
+
+def put(path: Path, data: bytes) -> None:
+    """Fill a new file, such as that of `replacing`, which gives errors their words."""
+    place = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | BINARY, 0o666)
+    try:
+        left = memoryview(data)
+        while left:
+            left = left[os.write(place, left) :]
+    finally:
+        os.close(place)
 
 
 @contextmanager
 def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A temporary path beside `path`, renamed onto it when the block ends without an error.
 
-    The suffix is kept, because writers choose their format by it.  A symbolic link stays, what
-    it points to is replaced; a device or a pipe stays too, and gets the bytes.  Raises
-    InvalidInput when the folder does not exist or can not be written.
+    The suffix is kept, because writers choose their format by it.  The bytes are on the disk
+    before the name is.  A symbolic link stays, what it points to is replaced; a device or a
+    pipe stays too, and gets the bytes.  Raises NotWritten, which says why, when the folder does
+    not exist, can not be written or is full; what was there before then stays.
     """
     shown = Path(path)
     try:
         if shown.is_dir():
-            raise InvalidInput(f"{shown}: expected the name of a file, this is a folder")
+            raise NotWritten(f"{shown}: expected the name of a file, this is a folder")
         with _filled(shown) if is_stream(shown) else _renamed(shown) as temporary:
             yield temporary
     except OSError as reason:
-        raise InvalidInput(
-            f"{shown}: can not be written: {reason.strerror or reason}"
-        ) from None
+        raise NotWritten(f"{shown}: can not be written: {_why(reason, shown)}") from None
+
+
+def _why(reason: OSError, path: Path) -> str:
+    """The reason in words; a folder that is missing is named, maybe that behind a link."""
+    folder = Path(os.path.realpath(path)).parent
+    if isinstance(reason, FileNotFoundError) and not folder.exists():
+        return f"the folder {folder if path.is_symlink() else path.parent} does not exist"
+    return reason.strerror or str(reason) or type(reason).__name__
 
 
 def make_folder(folder: Path) -> list[Path]:
     """Make a folder with those above it; returns the new ones, from below.
 
-    Raises InvalidInput where that fails; nothing half made stays.
+    Raises NotWritten where that fails; nothing half made stays.
     """
     new = [part for part in (folder, *folder.parents) if not os.path.exists(part)]
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as reason:
         remove_empty(new)
-        raise InvalidInput(f"{folder}: can not be made: {reason.strerror}") from None
+        broken = next((p for p in (folder, *folder.parents) if _leads_nowhere(p)), None)
+        why = reason.strerror or str(reason)
+        if broken is not None:
+            why = f"{broken} is a symbolic link to {os.readlink(broken)}, which does not exist"
+        raise NotWritten(f"{folder}: can not be made: {why}") from None
     return new
+
+
+def _leads_nowhere(path: Path) -> bool:
+    """True for a symbolic link to what does not exist."""
+    return os.path.islink(path) and not os.path.exists(path)
+
+
+def remove_parts(folder: Path, names: Iterable[re.Pattern[str]]) -> None:
+    """Remove temporary files that a process which was killed left of files with such names.
+
+    Only where nobody else writes such files into the folder.
+    """
+    for path in folder.iterdir():
+        left = PART.fullmatch(path.name)
+        name = "" if left is None else f"{left['stem']}{left['suffix']}"
+        if any(pattern.fullmatch(name) for pattern in names):
+            with suppress(OSError):
+                path.unlink()
+
+
+@contextmanager
+def made(folder: Path) -> Iterator[None]:
+    """The folder, made with those above it; new ones that are empty go when the block fails."""
+    new = make_folder(folder)
+    try:
+        yield
+    except BaseException:
+        remove_empty(new)
+        raise
 
 
 def remove_empty(folders: list[Path]) -> None:
@@ -70,14 +137,37 @@ def _renamed(path: Path) -> Iterator[Path]:
     """A path beside the file that `path` leads to, renamed onto that file at the end."""
     target = Path(os.path.realpath(path))
     if target.is_symlink():
-        raise InvalidInput(f"{path}: can not be written: symbolic links in a circle")
-    name = f".{target.stem[:20]}-{secrets.token_hex(4)}{target.suffix}"
+        raise NotWritten(f"{path}: can not be written: symbolic links in a circle")
+    name = f".{target.stem[:KEPT]}-{secrets.token_hex(4)}{target.suffix}"
     temporary = target.with_name(name)
     try:
         yield temporary
+        _sync(temporary)
         os.replace(temporary, target)
+        _sync(target.parent)
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def _sync(path: Path) -> None:
+    """Wait until a file, or the names in a folder, are on the disk, if the system can."""
+    is_folder = path.is_dir()
+    if is_folder and os.name == "nt":
+        return
+    try:
+        place = os.open(path, os.O_RDONLY if is_folder else os.O_RDWR | BINARY)
+    except PermissionError:
+        if is_folder:  # it may be written and not listed
+            return
+        raise
+    try:
+        os.fsync(place)
+    except OSError as reason:
+        if reason.errno not in NO_SYNC:
+            raise
+    finally:
+        os.close(place)
 
 
 @contextmanager

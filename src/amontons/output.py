@@ -6,8 +6,8 @@ import json
 import math
 import os
 import platform
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -17,12 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InvalidInput
-from .files import make_folder, remove_empty, replacing
+from .files import made, put, replacing
 from .solution import FrictionSolution
 from .solvers import METHODS
 from .warned import ResultWarning
 
 if TYPE_CHECKING:
+    from h5py import File
+
     from .model import ContactFields, Model
 
 Array = NDArray[np.float64]
@@ -75,16 +77,18 @@ def plot(output: Output, path: str | os.PathLike[str]) -> None:
 
 def plot_status(output: Output, path: Path) -> None:
     """Write status.png."""
-    from .plots import status_figure
+    from .plots import picture, status_figure
 
-    status_figure(output.solution, output.fields, output.title, output.model).savefig(path)
+    figure = status_figure(output.solution, output.fields, output.title, output.model)
+    put(path, picture(figure, path.suffix))
 
 
 def plot_convergence(output: Output, path: Path) -> None:
     """Write convergence.png."""
-    from .plots import convergence_figure
+    from .plots import convergence_figure, picture
 
-    convergence_figure(output.solution.convergence, output.title).savefig(path)
+    figure = convergence_figure(output.solution.convergence, output.title)
+    put(path, picture(figure, path.suffix))
 
 
 def save(
@@ -107,25 +111,14 @@ def save(
     if copy is not None:
         jobs.append((Path(copy), writers["solution.json"]))
     with ExitStack() as stack:
-        stack.enter_context(_made(folder))
+        stack.enter_context(made(folder))
         for path, writer in jobs:
             writer(output, stack.enter_context(replacing(path)))
     return [path for path, _ in jobs]
 
 
-@contextmanager
-def _made(folder: Path) -> Iterator[None]:
-    """The folder, made with those above it; the new ones go again when the block fails."""
-    new = make_folder(folder)
-    try:
-        yield
-    except BaseException:
-        remove_empty(new)
-        raise
-
-
 def _write_text(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")
+    put(path, text.encode("utf-8"))
 
 
 # ----------------------------------------------------------------------------------- JSON
@@ -232,7 +225,7 @@ def write_h5(output: Output, path: Path) -> None:
 
     The solution of an FCLib problem is written as an FCLib file, with the group /solution.
     """
-    from .fclib import write_arrays, write_fclib
+    from .fclib import hdf5_bytes, put_arrays, put_fclib
 
     found, fields = output.solution, output.fields
     arrays = {"r": found.r, "u": found.u, "v": found.v, "status": found.status,
@@ -241,11 +234,15 @@ def write_h5(output: Output, path: Path) -> None:
         arrays |= {"points": fields.points, "frames": fields.frames, "weights": fields.weights}
         for body, values in zip(output.model.bodies, fields.displacement, strict=True):
             arrays[f"displacement/{body.name}"] = values
-    if output.from_fclib:
-        write_fclib(found.problem, path, solution=found)
     notes = {"schema": SCHEMA, "outcome": found.convergence.outcome.name.lower(),
              "error": found.convergence.error}  # fmt: skip
-    write_arrays(path, {k: a for k, a in arrays.items() if a is not None}, notes)
+
+    def fill(file: File) -> None:
+        if output.from_fclib:
+            put_fclib(file, found.problem, solution=found)
+        put_arrays(file, {k: a for k, a in arrays.items() if a is not None}, notes)
+
+    put(path, hdf5_bytes(fill))
 
 
 def write_vtu(output: Output, path: Path) -> None:

@@ -80,6 +80,11 @@ class Convergence:
     weakest: int | None = None  # that contact; None where all obey their laws exactly
 
     @property
+    def by_user(self) -> bool:
+        """True where Ctrl-C ended the solve."""
+        return self.outcome is Outcome.STOPPED and self.detail == "by the user"
+
+    @property
     def advice(self) -> str:
         """What the user can do about it, knowing the detail and what was tried."""
         if "there is no solution" in self.detail:

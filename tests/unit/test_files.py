@@ -1,6 +1,7 @@
 """Replacing files: complete or not at all; links, pipes and devices stay what they are."""
 
 import os
+import re
 import stat
 import subprocess
 import sys
@@ -8,8 +9,8 @@ import threading
 
 import pytest
 
-from amontons.errors import InvalidInput
-from amontons.files import replacing
+from amontons.errors import InvalidInput, NotWritten
+from amontons.files import make_folder, remove_parts, replacing, write_bytes
 
 
 def write(path, text="new"):
@@ -72,7 +73,7 @@ def test_a_device_stays():
 @pytest.mark.parametrize("to_file", [True, False])
 def test_standard_output(tmp_path, to_file):
     code = (
-        "from amontons.files import replacing\n"
+        "from amontons.files import make_folder, remove_parts, replacing, write_bytes\n"
         "with replacing('/dev/stdout') as path: path.write_text('new')\n"
         "print(' after')"
     )
@@ -100,3 +101,33 @@ def test_what_can_not_be_written(tmp_path, name):
     with pytest.raises(InvalidInput):
         write(tmp_path / name)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_link_to_a_folder_that_is_missing_is_named(tmp_path):
+    (tmp_path / "a.json").symlink_to(tmp_path / "no" / "a.json")
+    with pytest.raises(NotWritten, match=rf"{tmp_path}/no does not exist"):
+        write(tmp_path / "a.json")
+    with pytest.raises(NotWritten, match=rf"the folder {tmp_path}/none does not exist"):
+        write_bytes(tmp_path / "none" / "a.json", b"")
+
+
+@pytest.mark.parametrize("below", [".", "deep/er"])
+def test_a_folder_that_is_a_link_to_nothing(tmp_path, below):
+    (tmp_path / "out").symlink_to("nowhere")
+    with pytest.raises(NotWritten, match="out is a symbolic link to nowhere, which does not"):
+        make_folder(tmp_path / "out" / below)
+    assert (tmp_path / "out").is_symlink()
+
+
+def test_a_folder_in_the_way(tmp_path):
+    (tmp_path / "a.json").mkdir()
+    with pytest.raises(NotWritten, match=r"a\.json: expected the name of a file"):
+        write_bytes(tmp_path / "a.json", b"")
+
+
+def test_only_parts_of_named_files_are_removed(tmp_path):
+    parts = [".a-01234567.json", ".b-01234567.json", ".a-0123456.json", ".a-01234567", ".a"]
+    for name in parts:
+        (tmp_path / name).write_text("")
+    remove_parts(tmp_path, [re.compile(r"a\.json")])
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(parts[1:])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,13 +31,17 @@ TOP = ("title", "mesh", "wall", "material", "fix", "traction", "body_force", "co
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A model, the settings of the [solver] table, a title, and how it goes on in time."""
+    """A model, the settings of the [solver] table, a title, and how it goes on in time.
+
+    tables: what the file says, with overrides.
+    """
 
     model: Model
     settings: Settings
     title: str
     path: Path
     evolution: Evolution | None = None
+    tables: dict[str, Any] = field(default_factory=dict)
 
 
 def read_case(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Case:
@@ -53,7 +57,7 @@ def read_case(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Ca
     top.only(*TOP)
     title = top.text("title", path.stem if path.stem != "case" else path.parent.name)
     model = _wall_model(top, title) if "wall" in top.data else _model(top, path, title)
-    return Case(model, _settings(top), title, path, _evolution(top))
+    return Case(model, _settings(top), title, path, _evolution(top), top.data)
 
 
 def example_file(name: str) -> Path:

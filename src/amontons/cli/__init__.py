@@ -248,12 +248,20 @@ Examples:
   amontons run example:wall --set wall.cells=[4,2,2] --pictures
   amontons run wall.toml -o out
   amontons run wall.toml -o out --restart --set evolution.until=2
+
+\b
+Exit codes: 0 all steps are made, 1 a step has not converged or the time is over,
+2 bad input, or a file can not be written, 130 interrupted, 143 terminated; what
+has been made is saved, go on with --restart.
 """
 )
 @click.argument("case")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
               help="Replace a value of the case, such as evolution.step=1e-3.")  # fmt: skip
 @click.option("--tolerance", type=float, metavar="X", help="Unit-free error of every step.")
+@click.option("--time-limit", type=float, metavar="SECONDS",
+              help="Stop after that time, ready for --restart; solver.time_limit is for each "
+              "step.")  # fmt: skip
 @click.option("-o", "--output", "folder", metavar="DIR",
               help="Folder for the results. [name of the case with -results]")  # fmt: skip
 @click.option("--export-fclib", "export", metavar="DIR",
@@ -262,7 +270,8 @@ Examples:
               help="Write a VTK file, and the state, every N steps.")  # fmt: skip
 @click.option("--pictures", is_flag=True,
               help="Draw the written steps, a film of them, and the energies.")  # fmt: skip
-@click.option("--restart", is_flag=True, help="Go on from the state in DIR.")
+@click.option("--restart", is_flag=True,
+              help="Go on from the state in DIR, of the same case, after any end.")  # fmt: skip
 @click.option("--quiet", is_flag=True, help="No progress, no summary.")
 def run(**options: object) -> int:
     """Follow a case in time: dynamics, or quasi-static steps.

@@ -16,7 +16,6 @@ from .. import api, output
 from ..analysis.profiles import performance_profile
 from ..case import Settings
 from ..errors import InvalidInput, SingularOperator, UnsupportedForm
-from ..files import replacing
 from ..problem import Form, FrictionProblem
 from ..solution import Convergence, Outcome
 from .sources import open_source, with_flags
@@ -172,7 +171,7 @@ def _cell(timing: Timing, best: float) -> str:
 
 def _draw(timings: list[Timing], names: list[str], goals: list[float], path: Path) -> None:
     """One panel per tolerance."""
-    from ..plots import profile_figure
+    from ..plots import profile_figure, save_figure
 
     profiles = {}
     for goal in goals:
@@ -181,5 +180,4 @@ def _draw(timings: list[Timing], names: list[str], goals: list[float], path: Pat
             for name in names
         ]
         profiles[goal] = performance_profile(np.array(columns).T)
-    with replacing(path) as temporary:
-        profile_figure(profiles, names).savefig(temporary)
+    save_figure(profile_figure(profiles, names), path)

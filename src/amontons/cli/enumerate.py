@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from ..analysis.solutions.enumerate import Solutions
 from ..api import all_solutions
-from ..files import replacing
 from ..output import FIGURES, to_json, versions
 from ..problem import FrictionProblem
 from ..solve import drive
@@ -65,12 +64,11 @@ def draw(
     picture: str,
 ) -> None:  # fmt: skip
     """Solutions of a problem, given by their reactions, side by side."""
-    from ..plots import solutions_figure
+    from ..plots import save_figure, solutions_figure
 
     solutions = [drive(problem, start=Iterate(np.array(r))) for r in reactions]
     figure = solutions_figure(solutions, names, title=opened.title, model=opened.model)
-    with replacing(picture) as temporary:
-        figure.savefig(temporary)
+    save_figure(figure, picture)
 
 
 def _show(title: str, found: Solutions) -> None:

@@ -11,7 +11,7 @@ import click
 from .. import api
 from ..analysis.paths.path import Branch, Event, EventKind, Stop
 from ..errors import InvalidInput
-from ..files import make_folder, replacing
+from ..files import made, write_bytes
 from ..output import to_json, versions
 from .sources import open_source
 from .terminal import check_folder, check_writable, deliver_json, shortened, show_table
@@ -73,14 +73,12 @@ def record(
 
 
 def _write(place: Path, text: str, branches: list[Branch], title: str) -> None:
-    from ..plots import branch_figure
+    from ..plots import branch_figure, save_figure
 
-    make_folder(place)
-    with replacing(place / "follow.json") as path:
-        path.write_text(text, encoding="utf-8")
-    if branches:
-        with replacing(place / "follow.png") as path:
-            branch_figure(branches, title=title).savefig(path)
+    with made(place):
+        write_bytes(place / "follow.json", text.encode("utf-8"))
+        if branches:
+            save_figure(branch_figure(branches, title=title), place / "follow.png")
 
 
 def _show(title: str, parameter: str, branches: list[Branch], reason: str, place: Path) -> None:

@@ -2,41 +2,63 @@
 
 from __future__ import annotations
 
-import csv
 import sys
-import time
 from collections.abc import Iterator, Sequence
-from dataclasses import fields as fields_of
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from ..case import Case, read_case
-from ..checkpoint import export_fclib, load_state, save_state
-from ..errors import FileFormatError, NotConverged
-from ..evolution import Energies, State, TimeStep, evolve
-from ..files import make_folder, replacing
-from ..solution import ContactStatus
-from ..vtk import write_model
+from ..case import Case, Settings, identity, read_case
+from ..checkpoint import export_fclib
+from ..clock import Deadline, now
+from ..errors import FileFormatError, InvalidInput, NotConverged, NotWritten
+from ..evolution import Energies, TimeStep, at_rest, evolve
+from ..evolution.stepping import at_end
+from ..files import make_folder, remove_empty
+from ..solution import Outcome
 from .doubts import Doubts
-from .group import INTERRUPTED
+from .locking import locked
+from .run_folder import BALANCE, PICTURES, WORKS, RunFolder, clear, continued
 from .sources import case_file, naming_keys, with_flags
+from .stopping import Stopping
 from .terminal import check_folder, say_growth
 
 if TYPE_CHECKING:
     from ..plots import Frame
 
-WORKS = tuple(field.name for field in fields_of(Energies))
-COLUMNS = ("index", "time", "open", "slip", "stick", *WORKS, "defect", "iterations", "error",
-           "seconds", "jump")  # fmt: skip
+
+@dataclass
+class _Run:
+    """One call: the case, what was asked for, and the frames that are drawn at the end."""
+
+    case: Case
+    settings: Settings
+    every: int
+    pictures: bool
+    quiet: bool
+    time_limit: float | None
+    deadline: Deadline
+    stop: Stopping
+    frames: list[Frame] = field(default_factory=list)
+
+    def ended(self, time: float) -> bool:
+        """True for the time of the last step."""
+        assert self.case.evolution is not None
+        return at_end(time, self.case.evolution.until, self.case.evolution.method.step)
 
 
 def run(
-    case: str, overrides: Sequence[str], tolerance: float | None, folder: str | None,
-    export: str | None, every: int, pictures: bool, restart: bool, quiet: bool,
+    case: str, overrides: Sequence[str], tolerance: float | None, time_limit: float | None,
+    folder: str | None, export: str | None, every: int, pictures: bool, restart: bool,
+    quiet: bool,
 ) -> int:  # fmt: skip
     """Step and write; returns the exit code."""
+    if time_limit is not None and not time_limit > 0:
+        raise InvalidInput(f"--time-limit: expected seconds > 0, got {time_limit}")
+    deadline = Deadline.after(time_limit)
     path = case_file(case)
     read = read_case(path, overrides)
     if read.evolution is None:
@@ -48,158 +70,165 @@ def run(
     exported = None if export is None else check_folder(export, "--export-fclib")
     with naming_keys(read.model, str(path)):
         _ = read.model.discretisation, read.model.law
-    start = load_state(place / "state.h5") if restart else None
     if not quiet:
         say_growth(read)
     settings = with_flags(read.settings, None, tolerance)
+    with Stopping() as stop, ExitStack() as stack:
+        asked = _Run(read, settings, every, pictures, quiet, time_limit, deadline, stop)
+        for each in {p.resolve(): p for p in (place, exported) if p is not None}.values():
+            stack.callback(remove_empty, make_folder(each))
+            stack.enter_context(locked(each))
+            clear(each, path.stem)
+        try:
+            with stop.breaking():
+                results, steps = _prepared(asked, place, restart=restart)
+        except KeyboardInterrupt:
+            click.echo(f"{stop.word}.", err=True)
+            return stop.code
+        with _saying_what_is_safe(results):
+            steps = steps if exported is None else export_fclib(steps, exported, path.stem)
+            return _follow(steps, results, asked)
+
+
+def _prepared(
+    asked: _Run, place: Path, *, restart: bool
+) -> tuple[RunFolder, Iterator[TimeStep]]:
+    """The folder of results and the steps, from the beginning or from the checkpoint."""
+    read, settings = asked.case, asked.settings
+    assert read.evolution is not None
+    case = identity(read, settings)
+    if restart:
+        results, start, changed = continued(place, case)
+        for text in changed:
+            click.echo(f"--restart: {text}, from step {start.index + 1} on", err=True)
+    else:
+        results, start = RunFolder(place, case), at_rest(read.model)
     steps = evolve(
         read.model, read.evolution.method, until=read.evolution.until, start=start,
         solver=settings.solver(), tolerance=settings.tolerance,
+        contact_tolerance=settings.contact_tolerance, max_iterations=settings.max_iterations,
+        time_limit=settings.time_limit,
+        deadline=asked.deadline,
     )  # fmt: skip
-    steps = export_fclib(steps, exported, path.stem) if exported is not None else steps
-    return _follow(steps, read, place, start, every, pictures=pictures, quiet=quiet)
+    if not restart:
+        results.save(start)
+    return results, steps
 
 
-def _follow(
-    steps: Iterator[TimeStep], case: Case, folder: Path, start: State | None, every: int,
-    *, pictures: bool, quiet: bool,
-) -> int:  # fmt: skip
-    """Take the steps; the state is written whenever a picture is, and at the end."""
-    assert case.evolution is not None
-    make_folder(folder)
-    rows = _old_rows(folder / "steps.csv", start)
-    written, frames = _old_pictures(folder, start), []
-    last: TimeStep | None = None
-    doubts = Doubts()
+@contextmanager
+def _saying_what_is_safe(results: RunFolder) -> Iterator[None]:
     try:
-        began = time.perf_counter()
-        for step in steps:
-            now = time.perf_counter()
-            rows.append(_row(step, now - began))
-            began, last = now, step
-            doubts.note(step, quiet=quiet)
-            if step.state.index % every == 0:
-                written.append(_write(step, folder))
-                _save(step, rows, written, folder)
-                frames += _frames(step) if pictures else []
-            if not quiet:
-                _show(step, case.evolution.until, every)
-    except NotConverged as problem:
-        sys.stdout.flush()
-        click.echo(f"Not converged: {problem}", err=True)
-        code = 1
+        yield
+    except NotWritten as reason:
+        raise NotWritten(
+            f"{reason}; the state after step {results.saved} is safe, go on with --restart"
+        ) from None
+
+
+def _follow(steps: Iterator[TimeStep], results: RunFolder, asked: _Run) -> int:
+    """Take the steps; the state is written whenever a picture is, and at the end."""
+    last, code, doubts = None, 0, Doubts()
+    try:
+        while True:
+            began = now()
+            with asked.stop.breaking():
+                step = next(steps, None)
+            if step is None:
+                break
+            results.add(step, now() - began)
+            last = step
+            doubts.note(step, quiet=asked.quiet)
+            if step.state.index % asked.every == 0:
+                _keep(step, results, asked)
+            if not asked.quiet:
+                _show(step, asked)
+            if asked.stop.received is not None:  # where a library has swallowed it
+                raise KeyboardInterrupt
+            if asked.deadline.passed and not asked.ended(step.time):
+                code = _stopped(asked, step.time)
+                break
     except KeyboardInterrupt:
-        click.echo("Interrupted; go on with --restart.", err=True)
-        code = INTERRUPTED
-    else:
-        code = 0
-    if last is not None:
-        if not written or written[-1][0] != last.time:
-            written.append(_write(last, folder))
-            frames += _frames(last) if pictures else []
-        _save(last, rows, written, folder)
-        if pictures:
-            _draw(case, frames, rows, folder)
-    if not quiet:
-        _summary(rows, folder)
+        click.echo(f"{asked.stop.word}; go on with --restart.", err=True)
+        code = asked.stop.code
+    except NotConverged as failure:
+        code = _failed(failure, results, asked)
+    if last is not None and results.saved < last.state.index:
+        _keep(last, results, asked)
+    if asked.frames:
+        _draw(results, asked)
+    if not asked.quiet:
+        _summary(results)
         for line in doubts.lines():
             click.echo(line)
     return code
 
 
-def _frames(step: TimeStep) -> list[Frame]:
-    """The frame of a step, in a list; matplotlib loads here."""
-    from ..plots import Frame
+def _failed(failure: NotConverged, results: RunFolder, asked: _Run) -> int:
+    """Say why a step was not made; returns the exit code."""
+    late = failure.solution.convergence.outcome is Outcome.TIME_LIMIT
+    if late and asked.deadline.passed:
+        time = results.rows[-1][1] if results.rows else 0.0
+        return _stopped(asked, time)
+    sys.stdout.flush()
+    click.echo(f"Not converged: {failure}", err=True)
+    return 1
 
-    return [Frame.of(step)]
+
+def _stopped(asked: _Run, time: float) -> int:
+    """Say that the time of the run is over; returns the exit code."""
+    assert asked.case.evolution is not None
+    sys.stdout.flush()
+    click.echo(
+        f"Stopped by --time-limit {asked.time_limit:g} at t = {time:.6g} of "
+        f"{asked.case.evolution.until:g}; go on with --restart.", err=True,
+    )  # fmt: skip
+    return 1
 
 
-def _draw(case: Case, frames: list[Frame], rows: list[list], folder: Path) -> None:
+def _keep(step: TimeStep, results: RunFolder, asked: _Run) -> None:
+    """Write the picture of a step and its state."""
+    results.draw(step)
+    results.save(step.state)
+    if asked.pictures:
+        from ..plots import Frame  # matplotlib loads here
+
+        asked.frames.append(Frame.of(step))
+
+
+def _draw(results: RunFolder, asked: _Run) -> None:
     """Pictures and film of the steps of this call, energies of all steps so far."""
-    from ..plots import draw_film, energy_figure
+    from ..plots import draw_film, energy_figure, save_figure
 
-    draw_film(case.model, frames, folder / "pictures")
-    works = [Energies(*map(float, row[5 : 5 + len(WORKS)])) for row in rows]
-    with replacing(folder / "energy.png") as temporary:
-        energy_figure([float(row[1]) for row in rows], works).savefig(temporary, format="png")
-
-
-def _row(step: TimeStep, seconds: float) -> list:
-    e, record = step.energies, step.solution.convergence
-    counts = [int((step.status == status).sum()) for status in ContactStatus]
-    return [step.state.index, step.time, *counts, *(getattr(e, name) for name in WORKS),
-            e.defect, record.iterations, record.error, seconds, _jump(step)]  # fmt: skip
+    draw_film(asked.case.model, asked.frames, results.folder / PICTURES)
+    table = results.table
+    works = [Energies(*row) for row in table[list(WORKS)].tolist()]
+    save_figure(energy_figure(table["time"].tolist(), works), results.folder / BALANCE)
 
 
-def _jump(step: TimeStep) -> float | str:
-    """The time at which the body jumped, empty where it did not or no path was followed."""
-    return step.passage.folds[0] if step.passage is not None and step.passage.jumped else ""
-
-
-def _old_rows(path: Path, start: State | None) -> list[list]:
-    """Rows of the evolution that is continued, up to its state."""
-    if start is None or not path.is_file():
-        return []
-    with path.open(newline="", encoding="utf-8") as file:
-        rows = list(csv.reader(file))[1:]
-    return [row for row in rows if row and int(row[0]) <= start.index]
-
-
-def _old_pictures(folder: Path, start: State | None) -> list[tuple[float, str]]:
-    rows = _old_rows(folder / "steps.csv", start)
-    named = ((float(row[1]), f"step-{int(row[0]):05d}.vtu") for row in rows)
-    return [(when, name) for when, name in named if (folder / name).is_file()]
-
-
-def _write(step: TimeStep, folder: Path) -> tuple[float, str]:
-    """One VTK file of a step: its time and name."""
-    name = f"step-{step.state.index:05d}.vtu"
-    with replacing(folder / name) as temporary:
-        write_model(step.model, step.fields, step, temporary)  # type: ignore[arg-type]
-    return step.time, name
-
-
-def _save(
-    step: TimeStep, rows: list[list], pictures: list[tuple[float, str]], folder: Path
-) -> None:
-    """State, table of energies, and the list of pictures that ParaView opens."""
-    save_state(folder / "state.h5", step.state)
-    with replacing(folder / "steps.csv") as temporary:
-        with temporary.open("w", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerows([COLUMNS, *rows])
-    entries = "\n".join(
-        f'    <DataSet timestep="{when:.12g}" file="{name}"/>' for when, name in pictures
-    )
-    text = (
-        '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
-        f"{entries}\n  </Collection>\n</VTKFile>\n"
-    )
-    with replacing(folder / "steps.pvd") as temporary:
-        temporary.write_text(text, encoding="utf-8")
-
-
-def _show(step: TimeStep, until: float, every: int) -> None:
+def _show(step: TimeStep, asked: _Run) -> None:
     """A line per written step; on a terminal the steps between pass by on one line."""
-    told = step.state.index % every == 0 or step.time >= until * (1 - 1e-9)
+    assert asked.case.evolution is not None
+    told = step.state.index % asked.every == 0 or asked.ended(step.time)
     if told or (step.passage is not None and step.passage.jumped):
         click.echo(f"{'' if not sys.stdout.isatty() else chr(13)}{step}")
     elif sys.stdout.isatty():
+        until = asked.case.evolution.until
         click.echo(f"\rt = {step.time:.6g} of {until:.6g} ", nl=False)
 
 
-def _summary(rows: list[list], folder: Path) -> None:
+def _summary(results: RunFolder) -> None:
     """Sums of all works, and where the results are."""
-    if not rows:
+    table = results.table
+    if not len(table):
         return
-    sums = {name: sum(float(r[5 + k]) for r in rows) for k, name in enumerate(WORKS)}
+    sums = {name: float(table[name].sum()) for name in (*WORKS, "defect")}
     click.echo(
-        f"{len(rows)} steps; work of loads {sums['loads']:.4g}, supports "
+        f"{len(table)} steps; work of loads {sums['loads']:.4g}, supports "
         f"{sums['supports']:.4g}, contact {sums['contact']:.4g}; dissipated by damping "
         f"{sums['damping']:.4g}, by the scheme {sums['numerical']:.4g}; "
-        f"gain {sums['gain']:.4g}, "
-        f"defect {sum(float(r[COLUMNS.index('defect')]) for r in rows):.1e}"
+        f"gain {sums['gain']:.4g}, defect {sums['defect']:.1e}"
     )
-    jumps = [f"{float(row[-1]):.6g}" for row in rows if row[-1] != ""]
+    jumps = [f"{time:.6g}" for time in table["jump"] if time == time]
     if jumps:
         click.echo(f"jumps at t = {', '.join(jumps)}")
-    click.echo(f"results in {folder}/")
+    click.echo(f"results in {results.folder}/")

@@ -120,5 +120,4 @@ def _finish(found: FrictionSolution | ModelSolution) -> int:
     click.echo(
         f"Not converged: {name}{detail}, {record.errors}. {record.advice}", err=True
     )
-    by_user = record.outcome is Outcome.STOPPED and record.detail == "by the user"
-    return INTERRUPTED if by_user else 1
+    return INTERRUPTED if record.by_user else 1

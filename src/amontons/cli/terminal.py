@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ..errors import InvalidInput
-from ..files import replacing
+from ..files import write_bytes
 
 if TYPE_CHECKING:
     from ..case import Case
@@ -70,8 +70,7 @@ def deliver_json(text: str, target: str | None) -> None:
     if target == "-":
         click.echo(text, nl=False)
     elif target is not None:
-        with replacing(target) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+        write_bytes(target, text.encode("utf-8"))
 
 
 def check_writable(

@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from ..clock import NEVER, Deadline
 from ..contact import frames
 from ..model import Model
 from ..model.large_deformation import large_step
@@ -41,8 +42,13 @@ class LargeSlowModel:
             return nothing, nothing, free
         return *self.motion.applied(state.time), free
 
-    def advance(self, state: State, time: float, solve: Solve) -> TimeStep:
-        """One step from a state to a time; solve(problem, start) solves its problem."""
+    def advance(
+        self, state: State, time: float, solve: Solve, limit: Deadline = NEVER
+    ) -> TimeStep:
+        """One step from a state to a time; solve(problem, start) solves its problem.
+
+        limit: of the path to it where that is followed.
+        """
         load, prescribed = self.motion.applied(time)
         q0 = state.displacement
         problem = large_step(
@@ -52,7 +58,7 @@ class LargeSlowModel:
         arrive = None
         if self.crossing is not None:
             drift = (time - state.time) * at_contacts(self.motion.body, state.velocity)
-            arrive = partial(self.crossing.along, problem, drift)
+            arrive = partial(self.crossing.along, problem, drift, limit)
         found, passage = taken(
             lambda start: solve(problem, start, None),  # type: ignore[arg-type]
             arrive, state.force, (state.time, time),

@@ -42,6 +42,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..clock import NEVER, Deadline
 from ..cones import Coulomb, Law, Tresca
 from ..errors import InvalidInput, UnsupportedForm
 from ..model import Model
@@ -125,7 +126,9 @@ class MovingModel:
         """The state before the first step: as it is."""
         return state
 
-    def advance(self, state: State, time: float, solve: Solve) -> TimeStep:
+    def advance(
+        self, state: State, time: float, solve: Solve, limit: Deadline = NEVER
+    ) -> TimeStep:
         """One step from a state to a time; solve(problem, start) solves its problem."""
         parts, method = self.motion.parts, self.method
         h, theta = method.step, method.theta

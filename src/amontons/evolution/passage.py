@@ -22,6 +22,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..clock import Deadline
 from ..errors import NotConverged, SingularOperator
 from ..model.large_deformation import LargeDeformation
 from ..problem import FrictionProblem
@@ -46,11 +47,13 @@ class Crossing(Protocol):
     Both raise Breakdown with the reason where the path does not lead to p = 1.
     """
 
-    def between(self, before: FrictionProblem, step: FrictionProblem, r: Array) -> Arrival:
+    def between(
+        self, before: FrictionProblem, step: FrictionProblem, r: Array, deadline: Deadline
+    ) -> Arrival:
         """From reactions r of the problem at p = 0 to the step."""
         ...
 
-    def along(self, step: LargeDeformation, drift: Array) -> Arrival:
+    def along(self, step: LargeDeformation, drift: Array, deadline: Deadline) -> Arrival:
         """From `step.known` to the step; drift (nc, d): V."""
         ...
 
@@ -102,7 +105,7 @@ def taken(
     try:
         return passage.told(solve(start)), passage
     except NotConverged as failure:
-        raise NotConverged(f"{failure} ({passage})", failure.solution) from failure
+        raise type(failure)(f"{failure} ({passage})", failure.solution) from failure
 
 
 def _passed(

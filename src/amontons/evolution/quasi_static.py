@@ -18,6 +18,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from ..clock import NEVER, Deadline
 from ..errors import InvalidInput, UnsupportedForm
 from ..model import Model
 from ..nitsche_problem import NO_MULTIPLIERS
@@ -73,15 +74,20 @@ class SlowModel:
         """The state before the first step: undeformed, also where supports hold the body."""
         return undeformed(state, self.motion)
 
-    def advance(self, state: State, time: float, solve: Solve) -> TimeStep:
-        """One step from a state to a time; solve(problem, start) solves its problem."""
+    def advance(
+        self, state: State, time: float, solve: Solve, limit: Deadline = NEVER
+    ) -> TimeStep:
+        """One step from a state to a time; solve(problem, start) solves its problem.
+
+        limit: of the path to it where that is followed.
+        """
         parts = self.motion.parts
         load, prescribed = self.motion.applied(time)
         problem = self.motion.body.increment(load, prescribed, state.slip)
         arrive = None
         if self.crossing is not None:
             before = self._before(state, time)
-            arrive = partial(self.crossing.between, before, problem, state.force)
+            arrive = partial(self.crossing.between, before, problem, state.force, limit)
         solution, passage = taken(
             lambda start: solve(problem, start, None), arrive, state.force, (state.time, time)
         )

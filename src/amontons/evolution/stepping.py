@@ -7,12 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..errors import InvalidInput, NotConverged
+from ..clock import NEVER, Deadline
+from ..errors import Interrupted, InvalidInput, NotConverged
 from ..model import Model
 from ..problem import Form, FrictionProblem
 from ..solution import FrictionSolution
 from ..solve import drive
-from ..solvers.base import Iterate, Solver
+from ..solvers.base import Iterate, Solver, check_at_least, check_seconds
 from ..solvers.nonlinear_newton import nonlinear_solver
 from .large_steps import LargeSlowModel
 from .moreau_jean import Local, MoreauJean
@@ -21,6 +22,7 @@ from .state import State, TimeStep, at_rest
 from .system import Motion
 
 WHOLE = 1e-9  # the end may miss a whole number of steps by this part of a step
+LEAST = 1e-9  # seconds for a solve whose deadline has passed: it then says so itself
 
 
 def evolve(
@@ -31,19 +33,30 @@ def evolve(
     start: State | None = None,
     solver: Solver | None = None,
     tolerance: float = 1e-8,
+    contact_tolerance: float | None = None,
+    max_iterations: int | None = None,
+    time_limit: float | None = None,
+    deadline: Deadline = NEVER,
     check: bool = True,
 ) -> Iterator[TimeStep]:
     """The steps of a model up to the time `until`, each solved from the reactions of the last.
 
     start: by default the undeformed model at rest at time 0; any `step.state` goes on from
     there and gives the same numbers as an evolution without a stop.  Supports and loads may
-    depend on time: expressions in t, or functions of (x, t).  check: raise NotConverged, which
-    carries the solution of the step, instead of going on with it.  Raises InvalidInput at the
-    time at which supports hold other components than at time 0, or push a contact node that
-    they hold into what it meets.
+    depend on time: expressions in t, or functions of (x, t).  tolerance, contact_tolerance,
+    max_iterations: of each solve; time_limit: seconds for each step; deadline: of all steps
+    together, also met in the middle of one.  check: raise NotConverged (Interrupted after
+    Ctrl-C), which carries the solution of the step, instead of going on with it.  What can not
+    begin is refused at once, not with the first step.  Raises InvalidInput at the time at which
+    supports hold other components than at time 0, or push a contact node that they hold into
+    what it meets.
 
     The problem of a step is `step.problem`.
     """
+    if time_limit is not None:
+        check_seconds(time_limit)
+    if max_iterations is not None:
+        check_at_least(1, max_iterations=max_iterations)
     prepared = method.prepare(model, tolerance)
     if isinstance(prepared, LargeSlowModel):
         solver = nonlinear_solver(solver)  # type: ignore[assignment]
@@ -51,26 +64,46 @@ def evolve(
     _check(state, prepared.motion, method.step, until)
     state = prepared.begin(state)
 
-    def solve(
-        problem: FrictionProblem, first: Iterate, local: Local | None
-    ) -> FrictionSolution:
-        if local is None or (solver is not None and solver.form is Form.GLOBAL):
-            solution = drive(problem, solver, tolerance=tolerance, start=first)
-        else:
-            found = drive(local(problem), solver, tolerance=tolerance, start=first)
-            u, v = problem.velocity(found.r)
-            solution = replace(found, problem=problem, u=u, v=v)
-        if check and not solution.converged:
-            record = solution.convergence
-            raise NotConverged(f"step {state.index + 1}: {record}. {record.advice}",
-                               solution)  # fmt: skip
-        return solution
+    def solved(problem: FrictionProblem, first: Iterate, limit: Deadline) -> FrictionSolution:
+        left = max(limit.left, LEAST)
+        return drive(
+            problem, solver, tolerance=tolerance, contact_tolerance=contact_tolerance,
+            start=first, max_iterations=max_iterations, time_limit=left,
+        )  # fmt: skip
 
-    first = state.time - state.index * method.step
-    while state.time < until - WHOLE * method.step:
-        step = prepared.advance(state, first + (state.index + 1) * method.step, solve)
-        state = step.state
-        yield step
+    def advanced(state: State, time: float) -> TimeStep:
+        limit = deadline if time_limit is None else deadline.within(time_limit)
+
+        def solve(
+            problem: FrictionProblem, first: Iterate, local: Local | None
+        ) -> FrictionSolution:
+            if local is None or (solver is not None and solver.form is Form.GLOBAL):
+                solution = solved(problem, first, limit)
+            else:
+                found = solved(local(problem), first, limit)
+                u, v = problem.velocity(found.r)
+                solution = replace(found, problem=problem, u=u, v=v)
+            if check and not solution.converged:
+                record = solution.convergence
+                kind = Interrupted if record.by_user else NotConverged
+                raise kind(f"step {state.index + 1}: {record}. {record.advice}", solution)
+            return solution
+
+        return prepared.advance(state, time, solve, limit)
+
+    def steps(state: State) -> Iterator[TimeStep]:
+        first = state.time - state.index * method.step
+        while not at_end(state.time, until, method.step):
+            step = advanced(state, first + (state.index + 1) * method.step)
+            state = step.state
+            yield step
+
+    return steps(state)
+
+
+def at_end(time: float, until: float, step: float) -> bool:
+    """True where steps of that size have come from `time` to the end."""
+    return time >= until - WHOLE * step
 
 
 def _check(state: State, motion: Motion, step: float, until: float) -> None:

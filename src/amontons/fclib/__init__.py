@@ -15,17 +15,21 @@ Left out: bilateral constraints (G, b; V, R, s), which raise an error, and the g
 and `guesses` of a file, which are not read: in the published files they are all zero.
 """
 
+from .memory import hdf5_bytes, write_hdf5
 from .reading import read_fclib
 from .source import DAMAGE
 from .stored import FclibProblem, StoredMatrix, StoredText
-from .writing import write_arrays, write_fclib
+from .writing import put_arrays, put_fclib, write_fclib
 
 __all__ = [
     "DAMAGE",
     "FclibProblem",
     "StoredMatrix",
     "StoredText",
+    "hdf5_bytes",
+    "put_arrays",
+    "put_fclib",
     "read_fclib",
-    "write_arrays",
     "write_fclib",
+    "write_hdf5",
 ]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -11,10 +10,10 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..errors import InvalidInput, UnsupportedForm
-from ..files import replacing
 from ..nitsche_problem import NO_MULTIPLIERS, NitscheProblem
 from ..problem import FrictionProblem
 from ..solution import FrictionSolution
+from .memory import write_hdf5
 from .stored import GROUPS, FclibProblem, StoredMatrix, StoredText
 
 PACKED = 2000  # entries above which an array is compressed
@@ -34,6 +33,17 @@ def write_fclib(
     description means the old text.  Raises UnsupportedForm for Tresca friction and for
     Nitsche's method, which FCLib does not know.
     """
+    def fill(file: h5py.File) -> None:
+        put_fclib(file, problem, solution=solution, title=title, description=description)
+
+    write_hdf5(path, fill)
+
+
+def put_fclib(
+    file: h5py.File, problem: FrictionProblem, *, solution: FrictionSolution | None = None,
+    title: str = "", description: str = "",
+) -> None:  # fmt: skip
+    """Put a problem into an empty file; raises like `write_fclib`."""
     if isinstance(problem, NitscheProblem):
         raise UnsupportedForm(f"fclib: {NO_MULTIPLIERS}")
     mu, problem = problem.mu, problem.assembled()
@@ -42,31 +52,31 @@ def write_fclib(
             f"solution: expected r of shape {(problem.contacts, problem.dimension)}, "
             f"got {solution.r.shape}"
         )
-    with replacing(path) as temporary, h5py.File(temporary, "w") as file:
-        root = file.create_group(next(k for k, form in GROUPS.items() if form is problem.form))
-        root["spacedim"] = np.array([problem.dimension], dtype=np.int32)
-        vectors = root.create_group("vectors")
-        for name in ("f", "w", "q"):
-            values = getattr(problem, name)
-            if values is not None:
-                _put(vectors, name, values.ravel())
-        _put(vectors, "mu", mu)
-        for name in ("M", "H", "W"):
-            if getattr(problem, name) is not None:
-                _put_matrix(root.create_group(name), _storage(problem, name))
-                _put_attributes(root[name], problem)
-        _put_texts(root.create_group("info"), problem, title, description)
-        _put_attributes(root["info"], problem)
-        if solution is not None:
-            _put_solution(file.create_group("solution"), solution)
+    root = file.create_group(next(k for k, form in GROUPS.items() if form is problem.form))
+    root["spacedim"] = np.array([problem.dimension], dtype=np.int32)
+    vectors = root.create_group("vectors")
+    for name in ("f", "w", "q"):
+        values = getattr(problem, name)
+        if values is not None:
+            _put(vectors, name, values.ravel())
+    _put(vectors, "mu", mu)
+    for name in ("M", "H", "W"):
+        if getattr(problem, name) is not None:
+            _put_matrix(root.create_group(name), _storage(problem, name))
+            _put_attributes(root[name], problem)
+    _put_texts(root.create_group("info"), problem, title, description)
+    _put_attributes(root["info"], problem)
+    if solution is not None:
+        _put_solution(file.create_group("solution"), solution)
 
 
-def write_arrays(path: Path, arrays: dict[str, NDArray], notes: dict[str, str | float]) -> None:
-    """Add datasets, and attributes of the file, to an HDF5 file that may not exist yet."""
-    with h5py.File(path, "a") as file:
-        file.attrs.update(notes)
-        for name, values in arrays.items():
-            file[name] = values
+def put_arrays(
+    file: h5py.File, arrays: dict[str, NDArray], notes: dict[str, str | float]
+) -> None:
+    """Add datasets to a file, and attributes of the file."""
+    file.attrs.update(notes)
+    for name, values in arrays.items():
+        file[name] = values
 
 
 def _put_solution(group: h5py.Group, solution: FrictionSolution) -> None:

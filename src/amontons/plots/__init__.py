@@ -4,6 +4,7 @@ from .branch import branch_figure, draw_branch
 from .convergence import convergence_figure
 from .energies import energy_figure
 from .profiles import profile_figure
+from .saving import picture, save_figure
 from .scene import Frame
 from .several import solutions_figure
 from .solution import status_figure
@@ -20,7 +21,9 @@ __all__ = [
     "draw_branch",
     "draw_film",
     "energy_figure",
+    "picture",
     "profile_figure",
+    "save_figure",
     "series_figure",
     "solutions_figure",
     "status_figure",

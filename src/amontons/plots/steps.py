@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -19,9 +20,10 @@ from numpy.typing import NDArray
 from PIL import Image  # comes with matplotlib
 
 from ..errors import InvalidInput
-from ..files import make_folder, replacing
+from ..files import made, write_bytes
 from ..model import Model
 from ..solution import ContactStatus
+from .saving import save_figure
 from .scene import Frame, Scene, magnification, room_needed
 from .style import UNKNOWN, Units
 
@@ -142,25 +144,29 @@ def draw_film(
     Returns the paths, the film last.
     """
     folder = Path(folder)
-    make_folder(folder)
     scene = Scene(model)
     factor = magnification(scene, frames)
     room = factor * room_needed(scene, frames)
     paths, images = [], []
-    for k, frame in enumerate(frames, start=1):
-        figure = step_figure(scene, frame, magnify=factor, room=room, units=units)
-        path = folder / f"{name}-{k:05d}.png"
-        with replacing(path) as temporary:
-            figure.savefig(temporary, format="png")
-        paths.append(path)
-        images.append(_image(figure))
-    if images:
-        paths.append(folder / "film.gif")
-        durations = [int(1e3 * SECONDS)] * (len(images) - 1) + [int(1e3 * LAST)]
-        with replacing(paths[-1]) as temporary:
-            images[0].save(temporary, format="gif", save_all=True, append_images=images[1:],
-                           duration=durations, loop=0, optimize=True)  # fmt: skip
+    with made(folder):
+        for k, frame in enumerate(frames, start=1):
+            figure = step_figure(scene, frame, magnify=factor, room=room, units=units)
+            paths.append(folder / f"{name}-{k:05d}.png")
+            save_figure(figure, paths[-1])
+            images.append(_image(figure))
+        if images:
+            paths.append(folder / "film.gif")
+            write_bytes(paths[-1], _film(images))
     return paths
+
+
+def _film(images: list[Image.Image]) -> bytes:
+    """The bytes of a GIF of them all."""
+    film = BytesIO()
+    durations = [int(1e3 * SECONDS)] * (len(images) - 1) + [int(1e3 * LAST)]
+    images[0].save(film, format="gif", save_all=True, append_images=images[1:],
+                   duration=durations, loop=0, optimize=True)  # fmt: skip
+    return film.getvalue()
 
 
 def _image(figure: Figure) -> Image.Image:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...clock import NEVER, Deadline
 from ...errors import InvalidInput
 from ...evolution.passage import Arrival
 from ...model.large_deformation import LargeDeformation
@@ -52,24 +53,29 @@ class PathCrossing:
         if not 0 < self.back < np.inf:
             raise InvalidInput(f"back: expected a number of steps > 0, got {self.back}")
 
-    def between(self, before: FrictionProblem, step: FrictionProblem, r: Array) -> Arrival:
+    def between(
+        self, before: FrictionProblem, step: FrictionProblem, r: Array,
+        deadline: Deadline = NEVER,
+    ) -> Arrival:  # fmt: skip
         """From reactions r (nc, d) of the problem at p = 0 to the step at p = 1.
 
         Raises Breakdown with the reason where the path does not lead there.
         """
         path = FrictionPath(before, step)
-        y, folds = self._arrived(path, _start(path, path.state(r)), 0.0)
+        y, folds = self._arrived(path, _start(path, path.state(r)), 0.0, deadline)
         found = (y * path.to_r).reshape(r.shape)
         return Arrival(found, step.velocity(found)[1], folds)
 
-    def along(self, step: LargeDeformation, drift: Array) -> Arrival:
+    def along(
+        self, step: LargeDeformation, drift: Array, deadline: Deadline = NEVER
+    ) -> Arrival:
         """From the state that a step knows to the step; drift (nc, d): V of the memory.
 
         Raises Breakdown like `between`, UnsupportedForm in 3D and under Tresca's law.
         """
         load, prescribed, v = step.known  # type: ignore[misc]
         path = LoadPath(step, load, prescribed, drift)
-        y, folds = self._arrived(path, _start(path, v), 0.0)
+        y, folds = self._arrived(path, _start(path, v), 0.0, deadline)
         return Arrival(step.reactions(y), y, folds)
 
     def across(
@@ -82,12 +88,13 @@ class PathCrossing:
         nothing = (np.zeros_like(problem.load), np.zeros_like(problem.prescribed))
         load, prescribed = nothing if problem.known is None else problem.known[:2]
         path = LoadPath(problem, load, prescribed)
-        y, folds = self._arrived(path, *_on_path(path, v, share), target)
+        limit = NEVER.within(target.seconds_left)
+        y, folds = self._arrived(path, *_on_path(path, v, share), limit)
         return y, _told(folds)
 
     def _arrived(
         self, path: FrictionPath | LoadPath, y: Array, share: float,
-        target: Target | None = None,
+        deadline: Deadline,
     ) -> tuple[Array, tuple[float, ...]]:  # fmt: skip
         """(state at share 1, folds on the way) along the path from a solution."""
         way = way_of(path, self.options)
@@ -106,7 +113,7 @@ class PathCrossing:
                     f"the path of the load ends at {point.parameter:.4g} of it: "
                     f"{event.stop.advice}"
                 )
-            if count >= self.max_points or (target is not None and target.seconds_left <= 0):
+            if count >= self.max_points or deadline.passed:
                 break
         raise Breakdown(
             f"the path of the load was followed to {point.parameter:.4g} of it only"

@@ -1,0 +1,61 @@
+"""Ctrl-C and SIGTERM in a run: they break into computing, and wait while files are written."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any
+
+SIGNALS = {signal.SIGINT: "Interrupted", signal.SIGTERM: "Terminated"}
+BY_SIGNAL = 128  # plus its number: the exit code of a process that a signal has ended
+
+
+class Stopping:
+    """Holds the handlers of both signals while its block runs.
+
+    A signal raises KeyboardInterrupt within `breaking`, and only there; elsewhere, and where
+    the exception is lost in a library, `received` remembers it.
+    """
+
+    def __init__(self) -> None:
+        self.received: signal.Signals | None = None
+        self._breakable = False
+        self._before: dict[signal.Signals, Any] = {}
+
+    def __enter__(self) -> Stopping:
+        if threading.current_thread() is threading.main_thread():  # others can not set handlers
+            self._before = {number: signal.signal(number, self._take) for number in SIGNALS}
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    @property
+    def code(self) -> int:
+        """The exit code that says which signal it was."""
+        return BY_SIGNAL + (self.received or signal.SIGINT)
+
+    @property
+    def word(self) -> str:
+        """What has happened, in a word."""
+        return SIGNALS[self.received or signal.SIGINT]
+
+    @contextmanager
+    def breaking(self) -> Iterator[None]:
+        """Signals raise KeyboardInterrupt here, also one that came before."""
+        try:
+            self._breakable = True
+            if self.received is not None:
+                raise KeyboardInterrupt
+            yield
+        finally:
+            self._breakable = False
+
+    def _take(self, number: int, frame: FrameType | None) -> None:
+        self.received = self.received or signal.Signals(number)
+        if self._breakable:
+            raise KeyboardInterrupt
