@@ -20,6 +20,7 @@ from .errors import InvalidInput, SingularOperator, UnsupportedForm
 from .judge import EPSILON, Measure, Weakest
 from .nitsche_problem import NO_MULTIPLIERS, NitscheProblem
 from .problem import Form, FrictionProblem
+from .settling import Motion, Settled, settled
 from .solution import Convergence, FrictionSolution, Outcome, Step
 from .solvers import Auto
 from .solvers.base import Breakdown, Iterate, Solver, Target, check_seconds
@@ -44,6 +45,7 @@ class _Watch:
     contact_tolerance: float
     started: float = field(default_factory=time.perf_counter)
     best: Iterate | None = None
+    told: tuple[Motion, Settled] | None = None  # of the best iterate where it is good enough
     error: float = np.inf
     weakest: Weakest | None = None  # contact of the best iterate, once its error will do
     iterations: int = 0
@@ -55,7 +57,9 @@ class _Watch:
 
     def judge(self, iterate: Iterate) -> Step:
         """Judge an iterate and remember it if it is the best."""
-        error, weakest = self.problem.error(iterate.r, iterate.v), None
+        error, weakest, told = self.problem.error(iterate.r, iterate.v), None, None
+        if error <= self.tolerance and not isinstance(self.problem, NitscheProblem):
+            iterate, error, told = _settled(self.problem, iterate, error)
         if error <= self.tolerance:
             weakest = self.problem.weakest(iterate.r, iterate.v)
             if weakest is not None and weakest.hidden > BLUR * self.tolerance:
@@ -70,6 +74,7 @@ class _Watch:
         self.history.append(step)
         if self.best is None or self._better(error, weakest):
             self.best, self.error, self.weakest = iterate, error, weakest
+            self.told = told
         if error < PROGRESS * self.mark[1]:
             self.mark = (len(self.history), error)
         return step
@@ -276,12 +281,13 @@ def _finish(watch: _Watch, outcome: Outcome, detail: str, solver: Solver) -> Fri
     problem = watch.problem
     best = watch.best if watch.best is not None else Iterate(_zero(problem))
     measure = problem.measure if watch.best is not None else Measure.EXACT
-    if measure is not Measure.EXACT and best.v is not None:  # the judge has read this v
-        u, v = problem.local_velocity(best.v), best.v
+    told = None if watch.told is None else watch.told[1]
+    if watch.told is not None and problem.form is Form.DELASSUS:
+        u, v = watch.told[0]
     elif watch.best is None and problem.form is Form.GLOBAL:
         u, v = _at_rest(problem)  # stopped in the first factorisation: do not start it again
     else:
-        u, v = _velocity(problem, best.r)
+        u, v = _motion(problem, best, measure)
     error, weakest = watch.error, watch.weakest
     if weakest is None and watch.best is not None:
         weakest = problem.weakest(best.r, best.v)
@@ -303,7 +309,33 @@ def _finish(watch: _Watch, outcome: Outcome, detail: str, solver: Solver) -> Fri
         contact_tolerance=watch.contact_tolerance,
         weakest=None if weakest is None else weakest.contact,
     )
-    return FrictionSolution(problem, best.r, u, v, record)
+    return FrictionSolution(problem, best.r, u, v, record, settled=told)
+
+
+def _settled(
+    problem: FrictionProblem, iterate: Iterate, error: float
+) -> tuple[Iterate, float, tuple[Motion, Settled]]:
+    """The iterate with reactions that keep to their statuses, its error, what they tell."""
+    measure = problem.measure
+    exact = problem.condensed() if measure is Measure.EXACT else problem  # what judges
+
+    def motion(r: Array) -> Motion:
+        return _motion(exact, replace(iterate, r=r), measure)
+
+    told = settled(problem.law, exact.rho, iterate.r, motion)
+    r = told[1].r
+    if r is iterate.r:
+        return iterate, error, told
+    return replace(iterate, r=r), problem.error(r, iterate.v), told
+
+
+def _motion(
+    problem: FrictionProblem, iterate: Iterate, measure: Measure
+) -> Motion:
+    """(u, v) of an iterate: of the v that the judge has read, else of its r."""
+    if measure is not Measure.EXACT and iterate.v is not None:
+        return problem.local_velocity(iterate.v), iterate.v
+    return _velocity(problem, iterate.r)
 
 
 def _velocity(problem: FrictionProblem, r: Array) -> tuple[Array, Array | None]:
