@@ -224,7 +224,9 @@ def _base(base: Any) -> FrictionProblem | Model | None:
 
 
 def _checked(problem: Any, name: str = "problem") -> FrictionProblem | Model:
-    if isinstance(problem, FrictionProblem) or hasattr(problem, "assemble"):
+    if not isinstance(problem, type) and (
+        isinstance(problem, FrictionProblem) or hasattr(problem, "assemble")
+    ):
         return problem
     raise InvalidInput(f"{name}: expected a Model or a FrictionProblem, got {problem!r}")
 
@@ -272,9 +274,7 @@ def _solve(
     callback: Callback | None, options: dict[str, Any],
 ) -> Any:  # fmt: skip
     """Assemble, drive, recover."""
-    model = None if isinstance(problem, FrictionProblem) else problem
-    if problem is None or not (model is None or hasattr(model, "assemble")):
-        raise InvalidInput(f"problem: expected a Model or a FrictionProblem, got {problem!r}")
+    model = None if isinstance(problem, FrictionProblem) else _checked(problem)
     if model is not None and getattr(model, "is_large", False):
         return _solve_large(model, solver, callback, options)
     began = time.perf_counter()
@@ -321,7 +321,8 @@ def drive_any_form(
     problem: FrictionProblem, solver: Solver | None = None, **options: Any
 ) -> FrictionSolution:
     """`drive`, condensing a global problem for a solver that needs the Delassus form."""
-    if solver is None or solver.form is not Form.DELASSUS or problem.form is Form.DELASSUS:
+    needed = getattr(solver, "form", Form.ANY)
+    if needed is not Form.DELASSUS or problem.form is Form.DELASSUS:
         return drive(problem, solver, **options)
     began = time.perf_counter()
     condensed = problem.condensed()

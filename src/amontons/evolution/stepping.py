@@ -54,7 +54,7 @@ def evolve(
     def solve(
         problem: FrictionProblem, first: Iterate, local: Local | None
     ) -> FrictionSolution:
-        if local is None or (solver is not None and solver.form is Form.GLOBAL):
+        if local is None or getattr(solver, "form", None) is Form.GLOBAL:
             solution = drive(problem, solver, tolerance=tolerance, start=first)
         else:
             found = drive(local(problem), solver, tolerance=tolerance, start=first)

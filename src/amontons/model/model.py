@@ -29,7 +29,7 @@ from .large_fields import recover_large
 from .nitsche import nitsche_matrices, nitsche_problem
 from .parts import Body, BodyForce, Contact, Fix, Traction
 from .rigid import Piece, check_held, loose_modes
-from .values import ScalarValue, scalar_at
+from .values import ScalarValue, is_number, scalar_at
 
 Array = NDArray[np.float64]
 
@@ -68,10 +68,14 @@ class Model:
             raise InvalidInput(
                 "contacts: expected Nitsche's method in all of them or in none, got both"
             )
-        if not np.isfinite(self.load_factor):
-            raise InvalidInput(f"load_factor: expected a finite number, got {self.load_factor}")
+        if not (is_number(self.load_factor) and np.isfinite(self.load_factor)):
+            raise InvalidInput(
+                f"load_factor: expected a finite number, got {self.load_factor!r}"
+            )
         object.__setattr__(self, "bodies", _named(self.bodies))
         for name in _surfaces(*self.supports, *self.contacts, *self.loads):
+            if not isinstance(name, str):
+                raise InvalidInput(f"surface: expected a name, got {name!r}")
             k, surface = locate(self.bodies, name)
             self.bodies[k].mesh.surface(surface)
 
@@ -289,13 +293,13 @@ def _bonded(parts: Discretisation, f: Array, w: Array) -> tuple[Array, float]:
 
 
 def _tuple_of(name: str, values: object, kind: object) -> tuple:
+    wanted = getattr(kind, "__name__", "Traction or BodyForce")
     if isinstance(values, kind):  # type: ignore[arg-type]
-        values = (values,)
+        raise InvalidInput(f"{name}: expected a list of {wanted}, got one alone; write [it]")
     try:
         items = tuple(values)  # type: ignore[arg-type]
     except TypeError as error:
         raise InvalidInput(f"{name}: expected a list, got {values!r}") from error
-    wanted = getattr(kind, "__name__", "Traction or BodyForce")
     for item in items:
         if not isinstance(item, kind):  # type: ignore[arg-type]
             raise InvalidInput(f"{name}: expected {wanted}, got {item!r}")
