@@ -17,6 +17,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from .cones import Law, Tresca
+from .errors import SingularOperator
+from .judge import Measure
+from .problem import FrictionProblem
 from .status import ContactStatus
 
 Array = NDArray[np.float64]
@@ -50,8 +53,34 @@ def settle(law: Law, rho: Array, r: Array, u: Array) -> Settled:
     return Settled(out if changed else r, status, sliding, changed)
 
 
+def motion(problem: FrictionProblem, r: Array, v: Array | None = None) -> Motion:
+    """(u, v) of a state whose v is given, else of its reactions; v = 0 where M is singular."""
+    if v is not None:
+        return problem.local_velocity(v), v
+    try:
+        return problem.velocity(r)
+    except SingularOperator:  # and no solver has found another v
+        return at_rest(problem)
+
+
+def at_rest(problem: FrictionProblem) -> Motion:
+    """(u, v) of v = 0."""
+    v = np.zeros(problem.unknowns)
+    return problem.local_velocity(v), v
+
+
+def settled_state(
+    problem: FrictionProblem, r: Array, v: Array | None
+) -> tuple[Motion, Settled]:
+    """`settled` for a state, by the form and the v that judge it."""
+    exact = problem.measure is Measure.EXACT
+    form = problem.condensed() if exact else problem
+    kept = None if exact else v
+    return settled(problem.law, form.rho, r, lambda r: motion(form, r, kept))
+
+
 def settled(
-    law: Law, rho: Array, r: Array, motion: Callable[[Array], Motion]
+    law: Law, rho: Array, r: Array, velocity: Callable[[Array], Motion]
 ) -> tuple[Motion, Settled]:
     """The motion of reactions that keep to the statuses of that motion, and these.
 
@@ -59,7 +88,7 @@ def settled(
     contact or takes away what friction does not allow, so that it ends.
     """
     while True:
-        moved = motion(r)
+        moved = velocity(r)
         found = settle(law, rho, r, moved[0])
         if not found.changed:
             return moved, found
@@ -101,4 +130,4 @@ def _settle(r, u, rho, coefficient, tresca):
     return out, status, sliding, changed
 
 
-__all__ = ["Motion", "Settled", "settle", "settled"]
+__all__ = ["Motion", "Settled", "at_rest", "motion", "settle", "settled", "settled_state"]

@@ -20,7 +20,7 @@ from .errors import InvalidInput, SingularOperator, UnsupportedForm
 from .judge import EPSILON, Measure, Weakest
 from .nitsche_problem import NO_MULTIPLIERS, NitscheProblem
 from .problem import Form, FrictionProblem
-from .settling import Motion, Settled, settled
+from .settling import Motion, Settled, at_rest, motion, settled_state
 from .solution import Convergence, FrictionSolution, Outcome, Step
 from .solvers import Auto
 from .solvers.base import Breakdown, Iterate, Solver, Target, check_seconds
@@ -59,7 +59,10 @@ class _Watch:
         """Judge an iterate and remember it if it is the best."""
         error, weakest, told = self.problem.error(iterate.r, iterate.v), None, None
         if error <= self.tolerance and not isinstance(self.problem, NitscheProblem):
-            iterate, error, told = _settled(self.problem, iterate, error)
+            told = settled_state(self.problem, iterate.r, iterate.v)
+            if told[1].r is not iterate.r:
+                iterate = replace(iterate, r=told[1].r)
+                error = self.problem.error(iterate.r, iterate.v)
         if error <= self.tolerance:
             weakest = self.problem.weakest(iterate.r, iterate.v)
             if weakest is not None and weakest.hidden > BLUR * self.tolerance:
@@ -285,9 +288,9 @@ def _finish(watch: _Watch, outcome: Outcome, detail: str, solver: Solver) -> Fri
     if watch.told is not None and problem.form is Form.DELASSUS:
         u, v = watch.told[0]
     elif watch.best is None and problem.form is Form.GLOBAL:
-        u, v = _at_rest(problem)  # stopped in the first factorisation: do not start it again
+        u, v = at_rest(problem)  # stopped in the first factorisation: do not start it again
     else:
-        u, v = _motion(problem, best, measure)
+        u, v = motion(problem, best.r, best.v if measure is not Measure.EXACT else None)
     error, weakest = watch.error, watch.weakest
     if weakest is None and watch.best is not None:
         weakest = problem.weakest(best.r, best.v)
@@ -310,46 +313,6 @@ def _finish(watch: _Watch, outcome: Outcome, detail: str, solver: Solver) -> Fri
         weakest=None if weakest is None else weakest.contact,
     )
     return FrictionSolution(problem, best.r, u, v, record, settled=told)
-
-
-def _settled(
-    problem: FrictionProblem, iterate: Iterate, error: float
-) -> tuple[Iterate, float, tuple[Motion, Settled]]:
-    """The iterate with reactions that keep to their statuses, its error, what they tell."""
-    measure = problem.measure
-    exact = problem.condensed() if measure is Measure.EXACT else problem  # what judges
-
-    def motion(r: Array) -> Motion:
-        return _motion(exact, replace(iterate, r=r), measure)
-
-    told = settled(problem.law, exact.rho, iterate.r, motion)
-    r = told[1].r
-    if r is iterate.r:
-        return iterate, error, told
-    return replace(iterate, r=r), problem.error(r, iterate.v), told
-
-
-def _motion(
-    problem: FrictionProblem, iterate: Iterate, measure: Measure
-) -> Motion:
-    """(u, v) of an iterate: of the v that the judge has read, else of its r."""
-    if measure is not Measure.EXACT and iterate.v is not None:
-        return problem.local_velocity(iterate.v), iterate.v
-    return _velocity(problem, iterate.r)
-
-
-def _velocity(problem: FrictionProblem, r: Array) -> tuple[Array, Array | None]:
-    """(u, v) of reactions; the state v = 0 when M is singular and no solver found another."""
-    try:
-        return problem.velocity(r)
-    except SingularOperator:
-        return _at_rest(problem)
-
-
-def _at_rest(problem: FrictionProblem) -> tuple[Array, Array]:
-    """(u, v) of v = 0."""
-    v = np.zeros(problem.unknowns)
-    return problem.local_velocity(v), v
 
 
 def _zero(problem: FrictionProblem) -> Array:
