@@ -85,6 +85,13 @@ class Convergence:
         """What the user can do about it, knowing the detail and what was tried."""
         if "there is no solution" in self.detail:
             return "Hold what gives way by a support, or change loads or friction."
+        if " is indefinite: " in self.detail:
+            return (
+                "No body stores negative energy: check the signs and the order of the rows of "
+                "the matrices."
+            )
+        if " can not react, " in self.detail:
+            return "No reaction can open that contact: check its rows of H or W, and its gap."
         if self.outcome is Outcome.STAGNATED and self.solver == "Auto":
             return "The error no longer falls: loosen the tolerance, or check the problem."
         return self.outcome.advice

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from .cones import Coulomb
 from .errors import InvalidInput, SingularOperator, UnsupportedForm
+from .indefinite import gains_energy, with_obstruction
 from .judge import EPSILON, Measure, Weakest
 from .nitsche_problem import NO_MULTIPLIERS, NitscheProblem
 from .problem import Form, FrictionProblem
@@ -30,6 +31,7 @@ Callback = Callable[[Step, Iterate], bool | None]
 MEMORY = 64  # iterates among which a repetition counts as a cycle
 PATIENCE = 500  # iterates without any progress before a solve counts as stagnated
 PROGRESS = 0.99  # the best error must fall at least by this factor within PATIENCE
+EARLY = 100  # iterates after which a problem that no method is made for is given up
 BLUR = 1e-2  # rounding, relative to the tolerance, above which an error is evaluated sharply
 BLURRED = 20  # iterates that would do if rounding could hide no error in them
 TIGHTER = 0.3  # goal of a second start, relative to what would just do
@@ -266,6 +268,8 @@ def _once(
                 return Outcome.TIME_LIMIT, ""
             if watch.weak and step.error <= target.tolerance:
                 return None
+            if len(watch.history) == EARLY and gains_energy(watch.problem):
+                return Outcome.BREAKDOWN, "stopped early"
             if watch.cycled(iterate, step.error):
                 return Outcome.CYCLED, ""
             if watch.stagnated:
@@ -296,6 +300,8 @@ def _finish(watch: _Watch, outcome: Outcome, detail: str, solver: Solver) -> Fri
         weakest = problem.weakest(best.r, best.v)
         if weakest is not None and weakest.hidden > BLUR * error:
             error = max(error, problem.certain_error(best.r, best.v))
+    if outcome not in (Outcome.CONVERGED, Outcome.STOPPED) and watch.best is not None:
+        detail = with_obstruction(problem, u, detail)
     seconds = time.perf_counter() - watch.started
     record = Convergence(
         outcome,
