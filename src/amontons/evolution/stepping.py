@@ -60,6 +60,7 @@ def evolve(
             found = drive(local(problem), solver, tolerance=tolerance, start=first)
             u, v = problem.velocity(found.r)
             solution = replace(found, problem=problem, u=u, v=v)
+        solution = prepared.explained(solution)
         if check and not solution.converged:
             record = solution.convergence
             raise NotConverged(f"step {state.index + 1}: {record}. {record.advice}",

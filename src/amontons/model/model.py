@@ -21,7 +21,7 @@ from ..nitsche_problem import NO_MULTIPLIERS, NitscheProblem
 from ..problem import FrictionProblem
 from ..solution import FrictionSolution
 from .assembly import Discretisation, discretise, locate
-from .balance import imbalance
+from .balance import imbalance, in_words
 from .fields import ContactFields, recover_fields
 from .held import check_outside
 from .large_deformation import LargeDeformation, large_deformation
@@ -202,10 +202,21 @@ class Model:
             both * np.concatenate([p.rows.weights for p in self.discretisation.placed])
         )
 
-    def imbalance(self) -> str:
-        """Which bodies contact alone holds, and whether it can, in words; "" if supports do."""
+    def imbalance(self, load: Array | None = None) -> str:
+        """Which bodies contact alone holds, and whether it can, in words; "" if supports do.
+
+        load (n,): forces on the free dofs, by default those of the model.  At finite strains,
+        where normals change, nothing is proved.
+        """
         parts = self.discretisation
-        return imbalance(parts, self._loose(parts), self.law, self.load_factor * parts.load)
+        given = self.load_factor * parts.load if load is None else load
+        force = np.zeros_like(parts.load) if self.is_large else given
+        return imbalance(parts, self._loose(parts), self.law, force)
+
+    @property
+    def held_by_contact(self) -> str:
+        """The bodies that contact alone holds, in words; "" if supports hold all."""
+        return in_words(self._loose(self.discretisation))
 
     def _loose(self, parts: Discretisation) -> list[tuple[Piece, Array]]:
         """Pieces with the rigid modes that supports leave free."""
