@@ -219,9 +219,10 @@ def diagram(
 def _check_has_W(problem: FrictionProblem | Model, verb: str) -> None:
     """Raise SingularOperator where `verb` needs W and contact alone holds a body."""
     if not getattr(problem, "is_large", False):  # those are followed in displacements
+        from .evolution.timed import steady
         from .model.diagnosis import check_has_W
 
-        check_has_W(problem, verb)
+        check_has_W(problem if isinstance(problem, FrictionProblem) else steady(problem), verb)
 
 
 def _base(base: Any) -> FrictionProblem | Model | None:

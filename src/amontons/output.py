@@ -214,6 +214,8 @@ def describe(output: Output) -> str:
     if output.model is not None and not output.solution.problem.name:
         text = f"{output.title or 'model'}: {text.partition(': ')[2]}"
     lines = [text]
+    if output.solution.convergence.stamp:
+        lines.append("NOT CONVERGED: what follows is no solution")
     if output.fields is not None:
         names = ("x", "y", "z")[: len(output.fields.resultant)]
         total = output.fields.resultant
@@ -244,7 +246,7 @@ def write_h5(output: Output, path: Path) -> None:
     if output.from_fclib:
         write_fclib(found.problem, path, solution=found)
     notes = {"schema": SCHEMA, "outcome": found.convergence.outcome.name.lower(),
-             "error": found.convergence.error}  # fmt: skip
+             "error": found.convergence.error, "converged": int(found.converged)}  # fmt: skip
     write_arrays(path, {k: a for k, a in arrays.items() if a is not None}, notes)
 
 

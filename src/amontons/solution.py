@@ -97,6 +97,13 @@ class Convergence:
         return self.outcome.advice
 
     @property
+    def stamp(self) -> str:
+        """What figures and files show of what has not converged; "" of what has."""
+        if self.outcome is Outcome.CONVERGED:
+            return ""
+        return f"NOT CONVERGED ({self.outcome.name.lower().replace('_', ' ')}, {self.errors})"
+
+    @property
     def errors(self) -> str:
         """The error beside its tolerance, and that of the weakest contact where it decides."""
         sign = "<=" if self.error <= self.tolerance else ">"

@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 CORNERS = 24  # of the polygon around the circle |u_T| <= 1
 WORKS = 1e-6  # work of the load, relative to the largest possible one, that is not rounding
 MOST = 20_000  # contacts for which the linear program takes seconds
+NAMED = 5  # bodies at most
 SMALL = 1e-6  # parts of a motion, relative to the largest, that are rounding
 
 
@@ -54,8 +55,10 @@ def imbalance(
 
 
 def in_words(loose: list[tuple[Piece, Array]]) -> str:
-    """The names of loose pieces."""
-    return ", ".join(f"body {piece.name!r}" for piece, _ in loose)
+    """The names of loose pieces, the first of many."""
+    names = [f"body {piece.name!r}" for piece, _ in loose]
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return ", ".join(names[:NAMED]) + more
 
 
 def _motion_in_words(motion: Array) -> str:

@@ -216,7 +216,11 @@ class Model:
     @property
     def held_by_contact(self) -> str:
         """The bodies that contact alone holds, in words; "" if supports hold all."""
-        return in_words(self._loose(self.discretisation))
+        names = in_words(self._loose(self.discretisation))
+        if not names:
+            return ""
+        alone = len(self.bodies) == 1 and names == f"body {self.bodies[0].name!r}"
+        return "a body" if alone else f"a body ({names})"  # the only one needs no name
 
     def _loose(self, parts: Discretisation) -> list[tuple[Piece, Array]]:
         """Pieces with the rigid modes that supports leave free."""

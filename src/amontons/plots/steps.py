@@ -23,7 +23,7 @@ from ..files import make_folder, replacing
 from ..model import Model
 from ..solution import ContactStatus
 from .scene import Frame, Scene, magnification, room_needed
-from .style import UNKNOWN, Units
+from .style import UNKNOWN, Units, stamp, stamp_panel
 
 Array = NDArray[np.float64]
 STONE, EDGE = "#F1EDE6", "#B9B2A6"
@@ -51,6 +51,7 @@ def step_figure(
     axes.set_title(f"{_moment(frame, units)}, displacements × {magnify:g}")
     labels = {s: f"{s.name.lower()}: {int((frame.status == s).sum())}" for s in ContactStatus}
     _joint_legend(figure, labels)
+    stamp(figure, frame.stamp)
     return figure
 
 
@@ -72,6 +73,7 @@ def series_figure(
         )
         axes.set_title(f"{_moment(frame, units)}\n{counted}", fontsize=10)
         axes.label_outer()
+        stamp_panel(axes, frame.stamp)
     _joint_legend(figure, {s: s.name.lower() for s in ContactStatus})
     figure.suptitle(f"Joints by status of their contacts, displacements × {factor:g}\n")
     return figure
