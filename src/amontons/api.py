@@ -14,7 +14,6 @@ from .errors import (
     Interrupted,
     InvalidInput,
     NotConverged,
-    SingularOperator,
     UnsupportedForm,
 )
 from .problem import Form, FrictionProblem
@@ -95,6 +94,7 @@ def all_solutions(
     from .analysis.solutions import enumerate as exact
 
     _searchable(discrete)
+    _check_has_W(problem, "all solutions")
     if discrete.dimension == 3:
         from .analysis.solutions.disc_search import enumerate_discs
 
@@ -123,23 +123,18 @@ def multistart(
     """
     from .analysis.solutions.multistart import multistart as search
 
-    return search(_discrete(problem), starts=starts, seed=seed, time_limit=time_limit)
+    discrete = _discrete(problem)
+    _check_has_W(problem, "multistart")
+    return search(discrete, starts=starts, seed=seed, time_limit=time_limit)
 
 
 def _searchable(problem: FrictionProblem) -> None:
-    """Raise UnsupportedForm or SingularOperator where there are no W and mu to search with."""
+    """Raise UnsupportedForm where there is no mu to search with."""
     if isinstance(problem.law, Tresca):
         raise UnsupportedForm(
             "all solutions: expected Coulomb friction; with given bounds (Tresca) there is one "
             "motion, see uniqueness"
         )
-    try:
-        problem.condensed()
-    except SingularOperator as reason:
-        raise SingularOperator(
-            "all solutions: contact alone holds a body, so there is no W to search with; hold "
-            "every body by supports"
-        ) from reason
 
 
 def _discrete(problem: FrictionProblem | Model) -> FrictionProblem:
@@ -188,7 +183,8 @@ def follow(
         y = state_of(problem, start)
         checks.check_start(problem, y, at)
         return follow_path(problem, y, at, bounds, options=options)
-    path = path_of(_checked(problem), parameter, bounds.interval, _base(base))
+    _check_has_W(_checked(problem), "follow")
+    path = path_of(problem, parameter, bounds.interval, _base(base))
     y = first_state(path, at) if start is None else state_of(path, start)
     checks.check_size(path, y)
     return follow_path(path, y, at, bounds, options=options)
@@ -213,10 +209,20 @@ def diagram(
     bounds = Limits(checks.checked_interval(interval), **checks.checked_limits(limits))
     a, b = bounds.interval
     values = (a, (a + b) / 2, b) if at is None else checks.checked_values(at, bounds.interval)
-    path = path_of(_checked(problem), parameter, bounds.interval, _base(base))
+    _check_has_W(_checked(problem), "diagram")
+    path = path_of(problem, parameter, bounds.interval, _base(base))
     return bifurcation_diagram(
         path, bounds, values, options=options, time_limit=bounds.time_limit
     )
+
+
+def _check_has_W(problem: FrictionProblem | Model, verb: str) -> None:
+    """Raise SingularOperator where `verb` needs W and contact alone holds a body."""
+    if not getattr(problem, "is_large", False):  # those are followed in displacements
+        from .evolution.timed import steady
+        from .model.diagnosis import check_has_W
+
+        check_has_W(problem if isinstance(problem, FrictionProblem) else steady(problem), verb)
 
 
 def _base(base: Any) -> FrictionProblem | Model | None:
@@ -224,7 +230,9 @@ def _base(base: Any) -> FrictionProblem | Model | None:
 
 
 def _checked(problem: Any, name: str = "problem") -> FrictionProblem | Model:
-    if isinstance(problem, FrictionProblem) or hasattr(problem, "assemble"):
+    if not isinstance(problem, type) and (
+        isinstance(problem, FrictionProblem) or hasattr(problem, "assemble")
+    ):
         return problem
     raise InvalidInput(f"{name}: expected a Model or a FrictionProblem, got {problem!r}")
 
@@ -243,7 +251,14 @@ def uniqueness(
     found = solution.solution if isinstance(solution, ModelSolution) else solution
     from .analysis.certificates.uniqueness import assess
 
-    return assess(discrete, found, time_limit=time_limit)
+    verdict = assess(discrete, found, time_limit=time_limit)
+    if isinstance(problem, FrictionProblem) or not problem.held_by_contact:
+        return verdict
+    reason = verdict.reason.replace("holds a body", f"holds {problem.held_by_contact}")
+    balance = problem.imbalance()
+    if "there is no solution" in balance:
+        reason += f" {balance[0].upper()}{balance[1:]}."
+    return replace(verdict, reason=reason)
 
 
 def critical_friction(
@@ -256,7 +271,10 @@ def critical_friction(
     """
     from .analysis.certificates.critical_friction import critical_friction as bounds
 
-    return bounds(_discrete(problem), gap=gap, time_limit=time_limit)
+    discrete = _discrete(problem)
+    if discrete.dimension == 2 and isinstance(discrete.law, Coulomb):  # else it says so
+        _check_has_W(problem, "critical friction")
+    return bounds(discrete, gap=gap, time_limit=time_limit)
 
 
 def solve_any_form(
@@ -272,9 +290,7 @@ def _solve(
     callback: Callback | None, options: dict[str, Any],
 ) -> Any:  # fmt: skip
     """Assemble, drive, recover."""
-    model = None if isinstance(problem, FrictionProblem) else problem
-    if problem is None or not (model is None or hasattr(model, "assemble")):
-        raise InvalidInput(f"problem: expected a Model or a FrictionProblem, got {problem!r}")
+    model = None if isinstance(problem, FrictionProblem) else _checked(problem)
     if model is not None and getattr(model, "is_large", False):
         return _solve_large(model, solver, callback, options)
     began = time.perf_counter()
@@ -286,17 +302,15 @@ def _solve(
         found = run(discrete, solver, callback=seen, **options)
     if model is None:
         return found
-    if found.convergence.outcome not in (Outcome.CONVERGED, Outcome.STOPPED):
-        found = _with_reason(found, model.imbalance())
+    found = _explained(found, model)
     return ModelSolution(model, found, model.recover(found), assembled)
 
 
-def _with_reason(found: FrictionSolution, reason: str) -> FrictionSolution:
-    """The same record, whose detail says why there may be no solution."""
-    if not reason:
-        return found
-    detail = "; ".join(text for text in (found.convergence.detail, reason) if text)
-    return replace(found, convergence=replace(found.convergence, detail=detail))
+def _explained(found: FrictionSolution, model: Model) -> FrictionSolution:
+    """The same record; one that failed says which bodies give way."""
+    from .model.diagnosis import with_diagnosis
+
+    return with_diagnosis(found, model)
 
 
 def _solve_large(
@@ -314,6 +328,7 @@ def _solve_large(
         options["start"] = options["start"].solution
     with _progress(callback, options["tolerance"]) as seen:
         found = problem.solved(drive(problem, method, callback=seen, **options))  # type: ignore[arg-type]
+    found = _explained(found, model)
     return ModelSolution(model, found, model.recover(found), assembled)
 
 
@@ -321,7 +336,8 @@ def drive_any_form(
     problem: FrictionProblem, solver: Solver | None = None, **options: Any
 ) -> FrictionSolution:
     """`drive`, condensing a global problem for a solver that needs the Delassus form."""
-    if solver is None or solver.form is not Form.DELASSUS or problem.form is Form.DELASSUS:
+    needed = getattr(solver, "form", Form.ANY)
+    if needed is not Form.DELASSUS or problem.form is Form.DELASSUS:
         return drive(problem, solver, **options)
     began = time.perf_counter()
     condensed = problem.condensed()

@@ -207,6 +207,8 @@ def describe(output: Output) -> str:
     if output.model is not None and not output.solution.problem.name:
         text = f"{output.title or 'model'}: {text.partition(': ')[2]}"
     lines = [text]
+    if output.solution.convergence.stamp:
+        lines.append("NOT CONVERGED: what follows is no solution")
     if output.fields is not None:
         names = ("x", "y", "z")[: len(output.fields.resultant)]
         total = output.fields.resultant
@@ -235,7 +237,7 @@ def write_h5(output: Output, path: Path) -> None:
         for body, values in zip(output.model.bodies, fields.displacement, strict=True):
             arrays[f"displacement/{body.name}"] = values
     notes = {"schema": SCHEMA, "outcome": found.convergence.outcome.name.lower(),
-             "error": found.convergence.error}  # fmt: skip
+             "error": found.convergence.error, "converged": int(found.converged)}  # fmt: skip
 
     def fill(file: File) -> None:
         if output.from_fclib:

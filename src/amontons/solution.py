@@ -16,7 +16,8 @@ from .errors import SingularOperator
 from .judge import Measure
 from .nitsche_problem import NitscheProblem
 from .problem import FrictionProblem
-from .status import ContactStatus, classify
+from .settling import Settled
+from .status import ContactStatus, classify, margins
 from .warned import ResultWarning
 
 Array = NDArray[np.float64]
@@ -89,9 +90,23 @@ class Convergence:
         """What the user can do about it, knowing the detail and what was tried."""
         if "there is no solution" in self.detail:
             return "Hold what gives way by a support, or change loads or friction."
+        if " is indefinite: " in self.detail:
+            return (
+                "No body stores negative energy: check the signs and the order of the rows of "
+                "the matrices."
+            )
+        if " can not react, " in self.detail:
+            return "No reaction can open that contact: check its rows of H or W, and its gap."
         if self.outcome is Outcome.STAGNATED and self.solver == "Auto":
             return "The error no longer falls: loosen the tolerance, or check the problem."
         return self.outcome.advice
+
+    @property
+    def stamp(self) -> str:
+        """What figures and files show of what has not converged; "" of what has."""
+        if self.outcome is Outcome.CONVERGED:
+            return ""
+        return f"NOT CONVERGED ({self.outcome.name.lower().replace('_', ' ')}, {self.errors})"
 
     @property
     def errors(self) -> str:
@@ -118,7 +133,8 @@ class FrictionSolution:
     """Reactions and velocities of a discrete problem, and what they mean.
 
     r, u: (nc, d) in the local frames; v: (n,) or None in the Delassus form; warnings: reasons
-    to doubt a result that has converged.
+    to doubt a result that has converged; settled: the statuses that a converged r keeps to,
+    told in the form in which it was solved, so that another form does not tell others.
     """
 
     problem: FrictionProblem | NitscheProblem
@@ -127,10 +143,14 @@ class FrictionSolution:
     v: Array | None
     convergence: Convergence
     warnings: tuple[ResultWarning, ...] = ()
+    settled: Settled | None = None
 
     @cached_property
     def _classified(self) -> tuple[NDArray[np.int8], NDArray[np.bool_], Array]:
         problem = self.problem
+        if self.settled is not None:
+            status = self.settled.status
+            return status, self.settled.sliding, margins(problem, self.r, self.u, status)
         if isinstance(problem, NitscheProblem):  # its r obeys the law with this displacement
             return classify(problem, self.r, problem.lawful(self.v))
         return classify(problem, self.r, self.u)

@@ -17,9 +17,11 @@ from numpy.typing import NDArray
 
 from .cones import Coulomb
 from .errors import InvalidInput, SingularOperator, UnsupportedForm
+from .indefinite import gains_energy, with_obstruction
 from .judge import EPSILON, Measure, Weakest
 from .nitsche_problem import NO_MULTIPLIERS, NitscheProblem
 from .problem import Form, FrictionProblem
+from .settling import Motion, Settled, at_rest, motion, settled_state
 from .solution import Convergence, FrictionSolution, Outcome, Step
 from .solvers import Auto
 from .solvers.base import Breakdown, Iterate, Solver, Target, check_seconds
@@ -29,6 +31,7 @@ Callback = Callable[[Step, Iterate], bool | None]
 MEMORY = 64  # iterates among which a repetition counts as a cycle
 PATIENCE = 500  # iterates without any progress before a solve counts as stagnated
 PROGRESS = 0.99  # the best error must fall at least by this factor within PATIENCE
+EARLY = 100  # iterates after which a problem that no method is made for is given up
 BLUR = 1e-2  # rounding, relative to the tolerance, above which an error is evaluated sharply
 BLURRED = 20  # iterates that would do if rounding could hide no error in them
 TIGHTER = 0.3  # goal of a second start, relative to what would just do
@@ -44,6 +47,7 @@ class _Watch:
     contact_tolerance: float
     started: float = field(default_factory=time.perf_counter)
     best: Iterate | None = None
+    told: tuple[Motion, Settled] | None = None  # of the best iterate where it is good enough
     error: float = np.inf
     weakest: Weakest | None = None  # contact of the best iterate, once its error will do
     iterations: int = 0
@@ -55,7 +59,12 @@ class _Watch:
 
     def judge(self, iterate: Iterate) -> Step:
         """Judge an iterate and remember it if it is the best."""
-        error, weakest = self.problem.error(iterate.r, iterate.v), None
+        error, weakest, told = self.problem.error(iterate.r, iterate.v), None, None
+        if error <= self.tolerance and not isinstance(self.problem, NitscheProblem):
+            told = settled_state(self.problem, iterate.r, iterate.v)
+            if told[1].r is not iterate.r:
+                iterate = replace(iterate, r=told[1].r)
+                error = self.problem.error(iterate.r, iterate.v)
         if error <= self.tolerance:
             weakest = self.problem.weakest(iterate.r, iterate.v)
             if weakest is not None and weakest.hidden > BLUR * self.tolerance:
@@ -70,6 +79,7 @@ class _Watch:
         self.history.append(step)
         if self.best is None or self._better(error, weakest):
             self.best, self.error, self.weakest = iterate, error, weakest
+            self.told = told
         if error < PROGRESS * self.mark[1]:
             self.mark = (len(self.history), error)
         return step
@@ -258,6 +268,8 @@ def _once(
                 return Outcome.TIME_LIMIT, ""
             if watch.weak and step.error <= target.tolerance:
                 return None
+            if len(watch.history) == EARLY and gains_energy(watch.problem):
+                return Outcome.BREAKDOWN, "stopped early"
             if watch.cycled(iterate, step.error):
                 return Outcome.CYCLED, ""
             if watch.stagnated:
@@ -276,17 +288,20 @@ def _finish(watch: _Watch, outcome: Outcome, detail: str, solver: Solver) -> Fri
     problem = watch.problem
     best = watch.best if watch.best is not None else Iterate(_zero(problem))
     measure = problem.measure if watch.best is not None else Measure.EXACT
-    if measure is not Measure.EXACT and best.v is not None:  # the judge has read this v
-        u, v = problem.local_velocity(best.v), best.v
+    told = None if watch.told is None else watch.told[1]
+    if watch.told is not None and problem.form is Form.DELASSUS:
+        u, v = watch.told[0]
     elif watch.best is None and problem.form is Form.GLOBAL:
-        u, v = _at_rest(problem)  # stopped in the first factorisation: do not start it again
+        u, v = at_rest(problem)  # stopped in the first factorisation: do not start it again
     else:
-        u, v = _velocity(problem, best.r)
+        u, v = motion(problem, best.r, best.v if measure is not Measure.EXACT else None)
     error, weakest = watch.error, watch.weakest
     if weakest is None and watch.best is not None:
         weakest = problem.weakest(best.r, best.v)
         if weakest is not None and weakest.hidden > BLUR * error:
             error = max(error, problem.certain_error(best.r, best.v))
+    if outcome not in (Outcome.CONVERGED, Outcome.STOPPED) and watch.best is not None:
+        detail = with_obstruction(problem, u, detail)
     seconds = time.perf_counter() - watch.started
     record = Convergence(
         outcome,
@@ -303,21 +318,7 @@ def _finish(watch: _Watch, outcome: Outcome, detail: str, solver: Solver) -> Fri
         contact_tolerance=watch.contact_tolerance,
         weakest=None if weakest is None else weakest.contact,
     )
-    return FrictionSolution(problem, best.r, u, v, record)
-
-
-def _velocity(problem: FrictionProblem, r: Array) -> tuple[Array, Array | None]:
-    """(u, v) of reactions; the state v = 0 when M is singular and no solver found another."""
-    try:
-        return problem.velocity(r)
-    except SingularOperator:
-        return _at_rest(problem)
-
-
-def _at_rest(problem: FrictionProblem) -> tuple[Array, Array]:
-    """(u, v) of v = 0."""
-    v = np.zeros(problem.unknowns)
-    return problem.local_velocity(v), v
+    return FrictionSolution(problem, best.r, u, v, record, settled=told)
 
 
 def _zero(problem: FrictionProblem) -> Array:

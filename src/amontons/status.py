@@ -40,12 +40,13 @@ def classify(
     status = np.where(
         closed, np.where(sliding, ContactStatus.SLIP, ContactStatus.STICK), ContactStatus.OPEN
     ).astype(np.int8)
-    return status, sliding, _margin(problem, r, u, status)
+    return status, sliding, margins(problem, r, u, status)
 
 
-def _margin(
+def margins(
     problem: FrictionProblem | NitscheProblem, r: Array, u: Array, status: NDArray[np.int8]
 ) -> Array:
+    """The margins of `classify` for given statuses, (nc,), unit of r_N."""
     slack = problem.law.bound(r) - np.linalg.norm(r[:, 1:], axis=1)
     slide = problem.rho * np.linalg.norm(u[:, 1:], axis=1)
     stick = status == ContactStatus.STICK

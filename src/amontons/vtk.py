@@ -32,6 +32,8 @@ def write_model(
     order are no contacts: the first four get the mean of the contacts around.  By Nitsche's
     method a node takes the Gauss points next to it: means of CPRESS and CSHEAR by area.
 
+    Field data CONVERGED, 0 or 1, and ERROR; a cell field CONVERGED as well, to be seen at once.
+
     Where several pairs meet at a node, CFORCE, CPRESS and CSHEAR are those of the sum of their
     forces, pressures and shear vectors; COPEN is the least, CSLIP, CSTATUS, CSLIDING the most.
     """
@@ -45,12 +47,18 @@ def write_model(
     ]
     owner = [np.full(body.mesh.cell_count, k) for k, (body, _) in enumerate(pairs)]
     displacement = spatial(np.concatenate(fields.displacement))
+    record = getattr(solution, "solution", solution).convergence  # of a step in time, too
+    converged = int(not record.stamp)
+    cells = len(np.concatenate(owner))
     write_meshes(
         path,
         [body.mesh for body, _ in pairs],
         {"displacement": displacement, **_contact_fields(model, fields, solution, starts)},
-        {"von_mises": von_mises(np.concatenate(stress)), "body": np.concatenate(owner)},
-    )
+        {"von_mises": von_mises(np.concatenate(stress)), "body": np.concatenate(owner),
+         "CONVERGED": np.full(cells, converged, dtype=np.int8)},
+        {"CONVERGED": converged, "ERROR": float(record.error)},
+        record.stamp,
+    )  # fmt: skip
 
 
 def _contact_fields(

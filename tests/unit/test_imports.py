@@ -13,10 +13,10 @@ PACKAGE = Path(amontons.__file__).parent
 ORDER = (
     "errors < clock < warned < files < checked_arrays < cones < linear < blocks < "
     "condensation < global_matrices < judge < judge_sharp < problem < "
-    "nitsche_problem < one_sided < one_contact < status < solution < solvers < solve < fem < "
-    "contact < model < masonry < granular < hild < vee < evolution < analysis < gallery < "
-    "fclib < checkpoint < expressions < case < vtk < plots < output < results < report < api "
-    "< cli"
+    "indefinite < nitsche_problem < one_sided < one_contact < status < settling < solution < "
+    "solvers < solve < fem < contact < model < masonry < granular < hild < vee < evolution < "
+    "analysis < gallery < fclib < checkpoint < expressions < case < vtk < plots < output < "
+    "results < report < api < cli"
 ).split(" < ")
 ALONE = {  # package: the file or folder that imports it, one for each kind of file
     "ngsolve": "fem", "netgen": "fem", "pyamg": "linear", "matplotlib": "plots", "click": "cli",

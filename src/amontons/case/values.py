@@ -33,7 +33,9 @@ def vector(table: Table, key: str, dim: int, *, free: bool = False) -> list:
     words = "numbers or expressions" + (' or "free"' if free else "")
     values = table.need(key, f"a list of {dim} {words}")
     if not isinstance(values, list) or len(values) != dim:
-        raise table.error(key, f"expected a list of {dim} {words}, got {values!r}")
+        alone = isinstance(values, int | float | str) and values != "free"
+        write = f"; write {[*[0] * (dim - 1), values]}" if alone else ""
+        raise table.error(key, f"expected a list of {dim} {words}, got {values!r}{write}")
     return [
         None if free and value == "free" else _entry(table, f"{key}[{k}]", value, dim)
         for k, value in enumerate(values)

@@ -32,7 +32,7 @@ def run(
     check_writable(picture, "--picture", FIGURES)
     opened = open_source(source, overrides)
     problem = opened.discrete_with(mu)
-    found = all_solutions(problem, time_limit=time_limit)
+    found = all_solutions(opened.target_with(mu), time_limit=time_limit)
     if json_copy != "-":
         _show(opened.title, found)
         say_when(opened.model)

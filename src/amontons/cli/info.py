@@ -10,6 +10,7 @@ import numpy as np
 
 from ..cones import Tresca
 from ..errors import InvalidInput, SingularOperator
+from ..indefinite import negative_direction
 from ..nitsche_problem import NitscheProblem
 from ..output import to_json
 from ..problem import Form, FrictionProblem
@@ -54,6 +55,7 @@ def describe(problem: FrictionProblem | NitscheProblem | LargeDeformation) -> di
     name = "friction bound" if isinstance(problem.law, Tresca) else "friction coefficient"
     facts[name] = [float(coefficient.min(initial=math.inf)), float(coefficient.max(initial=0))]
     facts |= _delassus_facts(problem)
+    facts |= _sign(problem)
     facts["scales (a guess)"] = _scales(problem)
     facts["methods that fit"] = fitting_methods(problem)
     return facts
@@ -112,6 +114,15 @@ def _delassus_facts(problem: FrictionProblem) -> dict[str, Any]:
         rank = int((values > m * np.finfo(float).eps * values[0]).sum()) if values.size else 0
         facts["rank of W"] = f"{rank} of {m}"
     return facts
+
+
+def _sign(problem: FrictionProblem) -> dict[str, Any]:
+    """The direction in which W or M is negative, where one is found."""
+    try:
+        found = negative_direction(problem)
+    except (SingularOperator, InvalidInput):
+        return {}
+    return {} if found is None else {"sign": str(found)}
 
 
 def _asymmetry(matrix: Any) -> float:

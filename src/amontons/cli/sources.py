@@ -72,6 +72,13 @@ class Source:
             raise InvalidInput(f"--mu: expected a friction coefficient >= 0, got {mu}")
         return problem.with_mu(mu)
 
+    def target_with(self, mu: float | None) -> Model | FrictionProblem:
+        """The same before it is assembled: questions about a model name its bodies."""
+        problem = self.discrete_with(mu)
+        if self.model is None:
+            return problem
+        return self.model if mu is None else self.model.with_mu(mu)
+
     def solvable(self) -> FrictionProblem | NitscheProblem | LargeDeformation:
         """What `solve` solves; assembles a model."""
         if self.problem is not None:

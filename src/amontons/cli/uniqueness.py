@@ -29,8 +29,7 @@ def run(
     if not time_limit > 0:
         raise InvalidInput(f"--time-limit: expected seconds > 0, got {time_limit}")
     opened = open_source(source, overrides)
-    problem = opened.discrete_with(mu)
-    found = uniqueness(problem, time_limit=time_limit)
+    found = uniqueness(opened.target_with(mu), time_limit=time_limit)
     if json_copy != "-":
         click.echo(f"{opened.title}\n{describe(found)}")
         say_when(opened.model)

@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 from ..clock import NEVER, Deadline
 from ..contact import frames
 from ..model import Model
+from ..model.diagnosis import with_diagnosis
 from ..model.large_deformation import large_step
 from ..model.nonlinear_parts import nonlinear_parts
+from ..solution import FrictionSolution
 from .energy import Energies, Forces, path_work, slow_energies
 from .moreau_jean import Solve
 from .passage import Crossing, taken
@@ -75,6 +77,10 @@ class LargeSlowModel:
         active = np.arange(len(slip))
         return TimeStep(self.motion.body, new, solution, active, energies, solution.u[:, 0],
                         axes, passage)  # fmt: skip
+
+    def explained(self, solution: FrictionSolution) -> FrictionSolution:
+        """The same record; one that failed says which bodies give way."""
+        return with_diagnosis(solution, self.motion.body)
 
     def _energies(self, state: State, q1: Array, load: Array, r: Array, u: Array) -> Energies:
         """The balance of `slow_energies`; r, u (nc, d): reactions, [gap, slip] of the step."""

@@ -164,6 +164,10 @@ class MovingModel:
         new = State(state.index + 1, time, q1, v1, impulse / h, u[:, 1:])
         return TimeStep(self.motion.body, new, solution, active, energies, parts.gap + u[:, 0])
 
+    def explained(self, solution: FrictionSolution) -> FrictionSolution:
+        """The same record: inertia balances any load."""
+        return solution
+
     def _local(self, v: Array) -> Array:
         """Local values of motions (dofs,): (nc, d)."""
         return self.motion.parts.local(v)

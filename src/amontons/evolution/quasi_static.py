@@ -21,8 +21,10 @@ from numpy.typing import NDArray
 from ..clock import NEVER, Deadline
 from ..errors import InvalidInput, UnsupportedForm
 from ..model import Model
+from ..model.diagnosis import with_diagnosis
 from ..nitsche_problem import NO_MULTIPLIERS
 from ..problem import FrictionProblem
+from ..solution import FrictionSolution
 from .energy import Energies, Forces, slow_energies
 from .large_steps import LargeSlowModel
 from .moreau_jean import Solve
@@ -117,6 +119,10 @@ class SlowModel:
         motion = (parts.whole_H.T @ state.velocity).reshape(parts.carried.shape)
         drift = (time - state.time) * motion[:, 1:]
         return self.motion.body.increment(load, held, state.slip - drift)
+
+    def explained(self, solution: FrictionSolution) -> FrictionSolution:
+        """The same record; one that failed says which bodies give way."""
+        return with_diagnosis(solution, self.motion.body, solution.problem.f)
 
     def _energies(self, state: State, q1: Array, load: Array, r: Array) -> Energies:
         """The balance of `slow_energies`; r (nc, d): reactions after the step."""

@@ -14,7 +14,7 @@ from ..errors import InvalidInput
 from ..model import ContactFields, Fix, Model
 from ..model.doubts import model_warnings
 from ..model.supports import locate, prescribed_values
-from ..model.values import VectorValue, vector_at
+from ..model.values import VectorValue, check_vector, vector_at
 from ..problem import FrictionProblem
 from ..solution import ContactStatus, FrictionSolution
 from ..warned import ResultWarning
@@ -190,6 +190,7 @@ def at_rest(
     for body, value, a, b in zip(
         model.bodies, per_body, parts.offsets[:-1], parts.offsets[1:], strict=True
     ):
+        check_vector(value, "velocity")
         v[a:b] = vector_at(value, body.mesh.points, "velocity").ravel()
     v[parts.fixed] = 0.0
     supports: tuple[Fix, ...] = tuple(part_at(s, time) for s in model.supports)  # type: ignore[misc]

@@ -77,12 +77,13 @@ def evolve(
         def solve(
             problem: FrictionProblem, first: Iterate, local: Local | None
         ) -> FrictionSolution:
-            if local is None or (solver is not None and solver.form is Form.GLOBAL):
+            if local is None or getattr(solver, "form", None) is Form.GLOBAL:
                 solution = solved(problem, first, limit)
             else:
                 found = solved(local(problem), first, limit)
                 u, v = problem.velocity(found.r)
                 solution = replace(found, problem=problem, u=u, v=v)
+            solution = prepared.explained(solution)
             if check and not solution.converged:
                 record = solution.convergence
                 kind = Interrupted if record.by_user else NotConverged

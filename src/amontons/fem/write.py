@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+import os
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +13,7 @@ from numpy.typing import NDArray
 from .mesh import Mesh
 
 Array = NDArray[np.float64]
+TAIL = 200  # bytes in which a VTU file ends
 CELL_TYPES = {
     "tri": "triangle", "quad": "quad", "tet": "tetra", "hex": "hexahedron", "wedge": "wedge",
     "pyramid": "pyramid", "tri6": "triangle6", "quad9": "quad9", "tet10": "tetra10",
@@ -22,11 +26,14 @@ def write_meshes(
     meshes: list[Mesh],
     point_data: dict[str, NDArray],
     cell_data: dict[str, NDArray],
+    field_data: Mapping[str, float] | None = None,
+    remark: str = "",
 ) -> None:
     """Write meshes as one file of the format that the suffix names.
 
     point_data, cell_data: one row per point or cell, in the order of the meshes.  In 2D the
-    third coordinate is zero.
+    third coordinate is zero.  field_data: numbers of the whole, and remark: a line for those
+    who look into the file, both in VTU files only.
     """
     import meshio
 
@@ -41,3 +48,23 @@ def write_meshes(
     points[:, : meshes[0].dim] = np.concatenate([mesh.points for mesh in meshes])
     split = {name: np.split(values, ends) for name, values in cell_data.items()}
     meshio.Mesh(points, cells, point_data=point_data, cell_data=split).write(path)
+    if path.suffix == ".vtu":
+        _add_fields(path, field_data or {}, remark)
+
+
+def _add_fields(path: Path, fields: Mapping[str, float], remark: str) -> None:
+    """Write field data before the end of a VTU file, whose writer knows none."""
+    arrays = "".join(
+        f'<DataArray type="{"Int32" if isinstance(value, int) else "Float64"}" Name="{name}" '
+        f'NumberOfTuples="1" format="ascii">{value!r}</DataArray>\n'
+        for name, value in fields.items()
+        if math.isfinite(value)
+    )
+    note = f"<!-- {remark.replace('--', '- ')} -->\n" if remark else ""
+    with path.open("r+b") as file:
+        file.seek(-min(TAIL, path.stat().st_size), os.SEEK_END)
+        start = file.tell()
+        head, end, rest = file.read().rpartition(b"</UnstructuredGrid>")
+        file.seek(start + len(head))
+        added = f"<FieldData>\n{arrays}</FieldData>\n{note}"
+        file.write(added.encode() + end + rest)

@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 CORNERS = 24  # of the polygon around the circle |u_T| <= 1
 WORKS = 1e-6  # work of the load, relative to the largest possible one, that is not rounding
 MOST = 20_000  # contacts for which the linear program takes seconds
+NAMED = 5  # bodies at most
 SMALL = 1e-6  # parts of a motion, relative to the largest, that are rounding
 
 
@@ -44,17 +45,23 @@ def imbalance(
     if size > 0 and len(law.coefficient) <= MOST:
         found = _escape(parts.whole_H.T @ motion, load @ motion[parts.free] / size, law, size)
     if found is None:
-        names = ", ".join(f"body {piece.name!r}" for piece, _ in loose)
-        return f"contact and friction alone hold {names}: perhaps they do not suffice"
+        return f"contact and friction alone hold {in_words(loose)}: perhaps they do not suffice"
     texts = [
-        f"body {piece.name!r} gives way by {_in_words(basis @ found[of == k])}"
+        f"body {piece.name!r} gives way by {_motion_in_words(basis @ found[of == k])}"
         for k, (piece, basis) in enumerate(loose)
         if np.abs(found[of == k]).max() > SMALL * np.abs(found).max()
     ]
     return "there is no solution, no contact forces balance the loads: " + "; ".join(texts)
 
 
-def _in_words(motion: Array) -> str:
+def in_words(loose: list[tuple[Piece, Array]]) -> str:
+    """The names of loose pieces, the first of many."""
+    names = [f"body {piece.name!r}" for piece, _ in loose]
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return ", ".join(names[:NAMED]) + more
+
+
+def _motion_in_words(motion: Array) -> str:
     """The parts of a rigid motion (3 or 6,)."""
     names = NAMES[2 if len(motion) == 3 else 3]
     large = np.abs(motion) > SMALL * np.abs(motion).max()

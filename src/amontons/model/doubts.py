@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 
 from ..warned import ResultWarning
 from .fields import ContactFields
+from .loading import no_load
+from .locking import volumetric_locking
 from .matching import nodal_on_non_matching
 from .rotation import large_rotation
 from .sliding import sliding_beyond_curvature, sliding_beyond_pairs
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
 
 Check = Callable[["Model", ContactFields], list[ResultWarning]]
 CHECKS: tuple[Check, ...] = (
+    no_load,
+    volumetric_locking,
     large_rotation,
     nodal_on_non_matching,
     sliding_beyond_pairs,

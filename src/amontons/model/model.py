@@ -21,7 +21,7 @@ from ..nitsche_problem import NO_MULTIPLIERS, NitscheProblem
 from ..problem import FrictionProblem
 from ..solution import FrictionSolution
 from .assembly import Discretisation, discretise, locate
-from .balance import imbalance
+from .balance import imbalance, in_words
 from .fields import ContactFields, recover_fields
 from .held import check_outside
 from .large_deformation import LargeDeformation, large_deformation
@@ -29,7 +29,7 @@ from .large_fields import recover_large
 from .nitsche import nitsche_matrices, nitsche_problem
 from .parts import Body, BodyForce, Contact, Fix, Traction
 from .rigid import Piece, check_held, loose_modes
-from .values import ScalarValue, scalar_at
+from .values import ScalarValue, is_number, scalar_at
 
 Array = NDArray[np.float64]
 
@@ -68,10 +68,14 @@ class Model:
             raise InvalidInput(
                 "contacts: expected Nitsche's method in all of them or in none, got both"
             )
-        if not np.isfinite(self.load_factor):
-            raise InvalidInput(f"load_factor: expected a finite number, got {self.load_factor}")
+        if not (is_number(self.load_factor) and np.isfinite(self.load_factor)):
+            raise InvalidInput(
+                f"load_factor: expected a finite number, got {self.load_factor!r}"
+            )
         object.__setattr__(self, "bodies", _named(self.bodies))
         for name in _surfaces(*self.supports, *self.contacts, *self.loads):
+            if not isinstance(name, str):
+                raise InvalidInput(f"surface: expected a name, got {name!r}")
             k, surface = locate(self.bodies, name)
             self.bodies[k].mesh.surface(surface)
 
@@ -198,10 +202,25 @@ class Model:
             both * np.concatenate([p.rows.weights for p in self.discretisation.placed])
         )
 
-    def imbalance(self) -> str:
-        """Which bodies contact alone holds, and whether it can, in words; "" if supports do."""
+    def imbalance(self, load: Array | None = None) -> str:
+        """Which bodies contact alone holds, and whether it can, in words; "" if supports do.
+
+        load (n,): forces on the free dofs, by default those of the model.  At finite strains,
+        where normals change, nothing is proved.
+        """
         parts = self.discretisation
-        return imbalance(parts, self._loose(parts), self.law, self.load_factor * parts.load)
+        given = self.load_factor * parts.load if load is None else load
+        force = np.zeros_like(parts.load) if self.is_large else given
+        return imbalance(parts, self._loose(parts), self.law, force)
+
+    @property
+    def held_by_contact(self) -> str:
+        """The bodies that contact alone holds, in words; "" if supports hold all."""
+        names = in_words(self._loose(self.discretisation))
+        if not names:
+            return ""
+        alone = len(self.bodies) == 1 and names == f"body {self.bodies[0].name!r}"
+        return "a body" if alone else f"a body ({names})"  # the only one needs no name
 
     def _loose(self, parts: Discretisation) -> list[tuple[Piece, Array]]:
         """Pieces with the rigid modes that supports leave free."""
@@ -289,13 +308,13 @@ def _bonded(parts: Discretisation, f: Array, w: Array) -> tuple[Array, float]:
 
 
 def _tuple_of(name: str, values: object, kind: object) -> tuple:
+    wanted = getattr(kind, "__name__", "Traction or BodyForce")
     if isinstance(values, kind):  # type: ignore[arg-type]
-        values = (values,)
+        raise InvalidInput(f"{name}: expected a list of {wanted}, got one alone; write [it]")
     try:
         items = tuple(values)  # type: ignore[arg-type]
     except TypeError as error:
         raise InvalidInput(f"{name}: expected a list, got {values!r}") from error
-    wanted = getattr(kind, "__name__", "Traction or BodyForce")
     for item in items:
         if not isinstance(item, kind):  # type: ignore[arg-type]
             raise InvalidInput(f"{name}: expected {wanted}, got {item!r}")

@@ -17,7 +17,7 @@ from ..fem.elasticity import LinearElastic, materials_by_region
 from ..fem.hyperelasticity import CiarletGeymonat, NeoHookean
 from ..fem.mesh import Mesh
 from ..fem.order import second_order
-from .values import ScalarValue, VectorValue
+from .values import ScalarValue, VectorValue, check_scalar, check_vector
 
 Array = NDArray[np.float64]
 Material = LinearElastic | NeoHookean | CiarletGeymonat
@@ -60,11 +60,14 @@ class Fix:
     """Prescribed displacement of a surface, unit of length.
 
     value: one number or None (free) or function x -> number per component, or one function
-    x -> components, x being the point (dim,) of a node.
+    x -> components, x being the point (dim,) of a node; 0 holds all components.
     """
 
     on: str
     value: VectorValue
+
+    def __post_init__(self) -> None:
+        check_vector(self.value, f"fix on {self.on!r}", free=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +77,9 @@ class Traction:
     on: str
     value: VectorValue
 
+    def __post_init__(self) -> None:
+        check_vector(self.value, f"traction on {self.on!r}")
+
 
 @dataclass(frozen=True, eq=False)
 class BodyForce:
@@ -81,6 +87,9 @@ class BodyForce:
 
     value: VectorValue
     region: str | None = None
+
+    def __post_init__(self) -> None:
+        check_vector(self.value, "body force")
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +130,7 @@ class Contact:
             )
         if self.method is None:
             object.__setattr__(self, "method", "nodal" if self.master is None else "mortar")
+        check_scalar(getattr(self, self.friction), f"{self.friction} on {self.slave!r}")
         if self.method == "dual-mortar":
             object.__setattr__(self, "method", "mortar")
         if self.method == "nitsche":
@@ -129,9 +139,9 @@ class Contact:
             raise InvalidInput(
                 f"method: expected one of {', '.join(METHODS)}, got {self.method!r}"
             )
-        if self.master is None and not (
+        if self.master is None and (isinstance(self.obstacle, type) or not (
             hasattr(self.obstacle, "gap") and hasattr(self.obstacle, "normals")
-        ):
+        )):
             raise InvalidInput(
                 f"obstacle: expected a Plane, Sphere or LevelSet, got {self.obstacle!r}"
             )

@@ -15,6 +15,7 @@ from ..fem.mesh import Mesh
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 RANK = 1e-9  # singular values below this part of the largest possible one count as zero
+UNNAMED = "default"  # the region of cells without a name
 NAMES = {
     2: ("translation along x", "translation along y", "rotation in the plane"),
     3: ("translation along x", "translation along y", "translation along z",
@@ -34,14 +35,38 @@ class Piece:
 def pieces(mesh: Mesh, name: str, offset: int) -> list[Piece]:
     """Connected pieces of a mesh whose dofs start at `offset`."""
     labels = _labels(mesh)
-    count = int(labels.max()) + 1
+    titles = _titles(mesh, name, labels)
     out = []
-    for label in range(count):
+    for label, title in enumerate(titles):
         nodes = np.flatnonzero(labels == label)
-        title = name if count == 1 else f"{name} (part {label + 1} of {count})"
         dofs = offset + (nodes[:, None] * mesh.dim + np.arange(mesh.dim)).ravel()
         out.append(Piece(title, dofs, rigid_modes(mesh.points[nodes])))
     return out
+
+
+def _titles(mesh: Mesh, name: str, labels: NDArray[np.int32]) -> list[str]:
+    """A name for every piece: of its regions where these are its alone, else a number.
+
+    The name of the body stands before it where the user gave one.
+    """
+    count = int(labels.max()) + 1
+    if count == 1:
+        return [name]
+    regions: list[dict[str, None]] = [{} for _ in range(count)]
+    for block in mesh.cells:
+        for label in np.unique(labels[block.nodes[:, 0]]):
+            regions[label][block.region] = None
+    titles = []
+    for label, own in enumerate(regions):
+        number = f"part {label + 1} of {count}"
+        others = {region for k, some in enumerate(regions) if k != label for region in some}
+        if UNNAMED in own or others & set(own):
+            titles.append(f"{name} ({number})")
+            continue
+        title = " and ".join(own)
+        title = title if name.startswith("body") else f"{name}.{title}"
+        titles.append(f"{title} ({number})" if UNNAMED in others else title)
+    return titles
 
 
 def _labels(mesh: Mesh) -> NDArray[np.int32]:

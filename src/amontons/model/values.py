@@ -16,6 +16,29 @@ VectorValue = float | Sequence[Component] | Callable[..., Sequence[float | None]
 ScalarValue = ArrayLike | Callable[[Array], ArrayLike]
 
 
+def check_vector(value: object, what: str, *, free: bool = False) -> None:
+    """Raise InvalidInput for one number other than 0 in the place of a vector.
+
+    It could only be meant along every axis, which is hardly ever what is wanted.
+    """
+    if is_number(value) and value != 0:
+        leave = f"; (None, None, {value}) leaves the others free" if free else ""
+        raise InvalidInput(
+            f"{what}: expected a vector or 0, got the number {value}, which would count along "
+            f"every axis; write (0, 0, {value}), or (0, {value}) in 2D{leave}"
+        )
+
+
+def check_scalar(value: object, what: str) -> None:
+    """Raise InvalidInput for a number below 0, or an array with one."""
+    try:
+        numbers = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):  # a function, or nothing of use, which `scalar_at` tells
+        return
+    if (numbers < 0).any():
+        raise InvalidInput(f"{what}: expected numbers >= 0, got {numbers.min():g}")
+
+
 def vector_at(value: VectorValue, points: Array, what: str, *, free: bool = False) -> Array:
     """A vector value at points (n, dim): (n, dim); a free component (None) becomes NaN.
 
@@ -75,8 +98,15 @@ def scalar_at(
     return out
 
 
+def is_number(value: object) -> bool:
+    """True for one number, in Python's or NumPy's form."""
+    return isinstance(value, int | float | np.number) or (
+        isinstance(value, np.ndarray) and value.ndim == 0
+    )
+
+
 def _entries(value: object, dim: int, what: str) -> list:
-    if np.ndim(value) == 0 and isinstance(value, int | float | np.number):  # type: ignore[arg-type]
+    if is_number(value):
         return [value] * dim
     if isinstance(value, str) or not hasattr(value, "__len__"):
         raise InvalidInput(f"{what}: expected {dim} components or a function, got {value!r}")
@@ -87,6 +117,10 @@ def _entries(value: object, dim: int, what: str) -> list:
 
 
 def _row(values: object, dim: int, what: str, free: bool) -> list[float]:
+    if is_number(values):
+        raise InvalidInput(
+            f"{what}: expected {dim} components of the function, got the number {values}"
+        )
     return [_number(entry, what, free) for entry in _entries(values, dim, what)]
 
 

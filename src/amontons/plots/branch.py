@@ -10,13 +10,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from .style import INK
+from .style import INK, stamp
 
 if TYPE_CHECKING:
     from ..analysis.paths.path import Branch
 
 LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 MARKS = {"FOLD": ("o", "fold"), "BRANCH": ("D", "branch point")}  # of kinds of events
+# names of `Stop` at which a branch is cut off, and may go on
+UNFINISHED = ("SINGULAR", "STEP_TOO_SMALL", "LOST", "MAX_POINTS", "TIME_LIMIT", "STOPPED")
 Quantity = Callable[[Any], float]  # of one solution
 
 
@@ -41,7 +43,18 @@ def branch_figure(
     handles = axes.get_legend_handles_labels()[0] + _marks(several)
     if handles:
         axes.legend(handles=handles, frameon=False)
+    stamp(figure, _unfinished(several))
     return figure
+
+
+def _unfinished(branches: list[Branch]) -> str:
+    """How many ends of branches are no ends of theirs, and why; "" where there are none."""
+    stops = [s.name for branch in branches for s in branch.stops if s.name in UNFINISHED]
+    if not stops:
+        return ""
+    reasons = ", ".join(dict.fromkeys(stops)).lower().replace("_", " ")
+    count = f"{len(stops)} end" + ("s" if len(stops) > 1 else "")
+    return f"NOT FINISHED ({count} of a branch: {reasons})"
 
 
 def _marks(branches: list[Branch]) -> list[Line2D]:

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from ..solution import ContactStatus, Convergence
-from .style import COLOURS, INK
+from .style import COLOURS, INK, stamp
 
 
 def convergence_figure(record: Convergence, title: str = "") -> Figure:
@@ -43,4 +43,5 @@ def convergence_figure(record: Convergence, title: str = "") -> Figure:
     left.set_ylabel(f"error ({record.measure.value} measure)")
     outcome = f"{record.outcome.name.lower().replace('_', ' ')} with {record.solver}"
     figure.suptitle(f"{title}: {outcome}" if title else outcome, color=INK)
+    stamp(figure, record.stamp)
     return figure

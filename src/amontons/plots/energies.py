@@ -10,18 +10,20 @@ from numpy.typing import NDArray
 
 from ..errors import InvalidInput
 from ..evolution import Energies
-from .style import INK, UNKNOWN, Units, with_unit
+from .style import INK, UNKNOWN, Units, stamp, with_unit
 
 Array = NDArray[np.float64]
 ROUNDING = 1e-12  # work of contact that says nothing, relative to all that was put in
 
 
 def energy_figure(
-    times: Sequence[float], energies: Sequence[Energies], *, units: Units = UNKNOWN
-) -> Figure:
+    times: Sequence[float], energies: Sequence[Energies], *, units: Units = UNKNOWN,
+    note: str = "",
+) -> Figure:  # fmt: skip
     """Where the work went: sums since the start (left), work of contact per step (right).
 
-    One entry for each step; raises InvalidInput when there is none.
+    One entry for each step; raises InvalidInput when there is none.  note: stamped on it, such
+    as the step that did not converge.
     """
     if not len(times) or len(times) != len(energies):
         raise InvalidInput(
@@ -71,4 +73,5 @@ def energy_figure(
                     frameon=False, fontsize=9)  # fmt: skip
         axes.grid(alpha=0.25)
         axes.spines[["top", "right"]].set_visible(False)
+    stamp(figure, note)
     return figure

@@ -24,16 +24,20 @@ FRONT = 1e-6  # part of the depth within which nodes lie on the side that is see
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """What a picture of a step needs: time, displacement per body, status of all contacts."""
+    """What a picture of a step needs: time, displacement per body, status of all contacts.
+
+    stamp: why the step is no solution, "" for one that has converged.
+    """
 
     time: float
     displacement: tuple[Array, ...]
     status: NDArray[np.int8]
+    stamp: str = ""
 
     @classmethod
     def of(cls, step: TimeStep) -> Frame:
         """The frame of a step."""
-        return cls(step.time, step.displacement, step.status)
+        return cls(step.time, step.displacement, step.status, step.solution.convergence.stamp)
 
 
 @dataclass(frozen=True, eq=False)

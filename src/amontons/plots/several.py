@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..solution import ContactStatus, FrictionSolution
 from .scene import Frame, Scene, magnification
-from .style import COLOURS, INK, MARKERS, status_marks
+from .style import COLOURS, INK, MARKERS, stamp_panel, status_marks
 
 if TYPE_CHECKING:
     from ..model import ContactFields, Model
@@ -56,6 +56,7 @@ def solutions_figure(
         counts = ", ".join(f"{n} {name}" for name, n in solution.counts.items() if n)
         name = names[k] if k < len(names) else ""
         axes.set_title(f"{name}\n{counts}" if name else counts, fontsize=10)
+        stamp_panel(axes, solution.convergence.stamp)
         axes.spines[["top", "right"]].set_visible(False)
     for axes in panels[len(shown) :]:
         axes.set_visible(False)

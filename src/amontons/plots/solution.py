@@ -10,7 +10,7 @@ from matplotlib.patches import Patch
 from ..solution import ContactStatus, FrictionSolution
 from .contact_pairs import contact_pairs
 from .reactions import cone_plane, ranked_reactions
-from .style import COLOURS, INK, status_marks
+from .style import COLOURS, INK, stamp, status_marks
 from .surface_curves import draw_curves
 from .surface_maps import draw_maps
 
@@ -44,6 +44,7 @@ def status_figure(
     _legend(figure, solution, markers=not maps)
     for axes in panels.flat:
         axes.spines[["top", "right"]].set_visible(False)
+    stamp(figure, solution.convergence.stamp)
     return figure
 
 

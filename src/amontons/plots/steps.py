@@ -25,7 +25,7 @@ from ..model import Model
 from ..solution import ContactStatus
 from .saving import save_figure
 from .scene import Frame, Scene, magnification, room_needed
-from .style import UNKNOWN, Units
+from .style import UNKNOWN, Units, stamp, stamp_panel
 
 Array = NDArray[np.float64]
 STONE, EDGE = "#F1EDE6", "#B9B2A6"
@@ -53,6 +53,7 @@ def step_figure(
     axes.set_title(f"{_moment(frame, units)}, displacements × {magnify:g}")
     labels = {s: f"{s.name.lower()}: {int((frame.status == s).sum())}" for s in ContactStatus}
     _joint_legend(figure, labels)
+    stamp(figure, frame.stamp)
     return figure
 
 
@@ -74,6 +75,7 @@ def series_figure(
         )
         axes.set_title(f"{_moment(frame, units)}\n{counted}", fontsize=10)
         axes.label_outer()
+        stamp_panel(axes, frame.stamp)
     _joint_legend(figure, {s: s.name.lower() for s in ContactStatus})
     figure.suptitle(f"Joints by status of their contacts, displacements × {factor:g}\n")
     return figure

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from ...cones import Coulomb, Tresca
 from ...errors import InvalidInput, UnsupportedForm
 from ...problem import Form, FrictionProblem
+from ...settling import settled
 from ...solution import FrictionSolution
 from .path import judged
 
@@ -94,10 +95,10 @@ class FrictionPath:
         """The point as a solution: reactions, velocities, status and the judge's error."""
         problem, began = self.at(p), time.perf_counter()
         r = (y * self.to_r).reshape(problem.contacts, problem.dimension)
-        u, v = problem.velocity(r)
-        error = problem.error(r, v)
+        (u, v), told = settled(problem.law, problem.rho, r, problem.velocity)
+        error = problem.error(told.r, v)
         record = judged(error, problem.measure, time.perf_counter() - began)
-        return FrictionSolution(problem, r, np.array(u), v, record)
+        return FrictionSolution(problem, told.r, np.array(u), v, record, settled=told)
 
     def state(self, r: Array) -> Array:
         """The unknowns y (m,) of reactions r, (nc, d)."""

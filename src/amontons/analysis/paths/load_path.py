@@ -31,6 +31,7 @@ from ...errors import InvertedCells, NotConverged, UnsupportedForm
 from ...evolution.system import Motion
 from ...model import Model
 from ...model.large_deformation import LargeDeformation, large_step
+from ...settling import settle
 from ...solution import ContactStatus, FrictionSolution, Outcome
 from ...solve import drive
 from ...solvers.nonlinear_newton import NonlinearNewton
@@ -167,10 +168,12 @@ class LoadPath:
     def solution(self, y: Array, p: float) -> FrictionSolution:
         """The point as a solution of its tangent problem, with the judge's error."""
         problem, began = self.at(p), time.perf_counter()
-        r, u = problem.reactions(y), problem.local_velocity(y)
-        error = problem.error(r, y)
+        u = problem.local_velocity(y)
+        told = settle(problem.law, problem.rho, problem.reactions(y), u)
+        error = problem.error(told.r, y)
         record = judged(error, problem.measure, time.perf_counter() - began)
-        return problem.solved(FrictionSolution(problem, r, u, np.array(y), record))  # type: ignore[arg-type]
+        found = FrictionSolution(problem, told.r, u, np.array(y), record, settled=told)  # type: ignore[arg-type]
+        return problem.solved(found)
 
     def found_at(self, p: float) -> Array:
         """A solution (n,) at a share of the load, by Newton's method with load steps.
