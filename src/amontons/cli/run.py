@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import sys
-import time
 from collections.abc import Iterator, Sequence
 from dataclasses import fields as fields_of
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from .. import clock
 from ..case import Case, read_case
 from ..checkpoint import export_fclib, load_state, save_state
 from ..errors import FileFormatError, NotConverged
@@ -72,9 +72,9 @@ def _follow(
     last: TimeStep | None = None
     doubts = Doubts()
     try:
-        began = time.perf_counter()
+        began = clock.now()
         for step in steps:
-            now = time.perf_counter()
+            now = clock.now()
             rows.append(_row(step, now - began))
             began, last = now, step
             doubts.note(step, quiet=quiet)
