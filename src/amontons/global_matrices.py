@@ -189,11 +189,16 @@ class GlobalMatrices:
         H = sparse.csc_array(self.H)
         m = H.shape[1]
         W = np.empty((m, m))
-        for first in range(0, m, SOLVE_COLUMNS):
+        for part in self.column_parts(m):
             deadline.check()
-            columns = H[:, first : first + SOLVE_COLUMNS].toarray()
-            W[:, first : first + SOLVE_COLUMNS] = H.T @ self.solve(columns)
+            W[:, part] = H.T @ self.solve(H[:, part].toarray())
         return W
+
+    def column_parts(self, count: int) -> list[slice]:
+        """Right-hand sides in parts that take no longer together than each for itself."""
+        exact = self.small_blocks is not None or self.factor().exact
+        size = SOLVE_COLUMNS if exact else 1
+        return [slice(first, first + size) for first in range(0, count, size)]
 
     @property
     def local_stiffness(self) -> Array:

@@ -129,6 +129,7 @@ class _FarField:
     random: np.random.Generator
     Z: Array
     Y: Array
+    deadline: Deadline
 
     @classmethod
     def of(
@@ -137,9 +138,8 @@ class _FarField:
         """Factorise the slab and probe the far field once."""
         near = _near_field(problem, options.layers, deadline)
         empty = np.empty((len(near), 0))
-        deadline.check()
         random = np.random.default_rng(options.seed)
-        far = cls(problem, near, options, random, empty, empty)
+        far = cls(problem, near, options, random, empty, empty, deadline)
         far.extend()
         return far
 
@@ -155,7 +155,10 @@ class _FarField:
         Z = np.linalg.qr(np.column_stack([self.Z, Z]))[0][:, self.rank :]
         H = self.source.H
         assert H is not None
-        Y = H.T @ self.source.solve_M(H @ Z) - self.near @ Z
+        Y = -self.near @ Z
+        for part in self.source.matrices.column_parts(Z.shape[1]):
+            self.deadline.check()
+            Y[:, part] += H.T @ self.source.solve_M(H @ Z[:, part])
         self.Z, self.Y = np.column_stack([self.Z, Z]), np.column_stack([self.Y, Y])
 
     def problem(self) -> FrictionProblem:

@@ -33,6 +33,7 @@ SURE = 1e-7  # scaled violation of the law that excludes the solution of a linea
 CODE = {"f": FREE, "s": STICK, "l": SLIP, ".": FREE, "c": STICK}
 GHOST_STEPS, TURN = 12, 1e-6  # Newton steps for directions, rad of their differences
 SECONDS = 60.0  # whose work a search without a time limit may take: it may grow without end
+LARGEST = 300  # contacts up to which regions have multipliers: memory
 LOOK = 50.0  # operations of looking at a region per cube of the reactions, at least
 VAGUE = 1e-9  # relative error of a solution that can not be a reference
 STARTS = 300  # of Newton's method before the search
@@ -144,6 +145,8 @@ class DiscSearch:
     @property
     def reason(self) -> str:
         """Why the list is complete, or why not."""
+        if self.stopped and len(self.stack.mu) > LARGEST:
+            return f"more than {LARGEST} contacts: regions were not looked at"
         if self.stopped:
             return f"stopped after {self.deadline}"
         if self.undecided:
@@ -181,8 +184,9 @@ class DiscSearch:
 
     @property
     def affords_step(self) -> bool:
-        """True where there is time to look at a region."""
-        return not self.deadline.passed and self.deadline.affords(self._look)
+        """True where there are time and memory to look at a region."""
+        few = len(self.stack.mu) <= LARGEST
+        return few and not self.deadline.passed and self.deadline.affords(self._look)
 
     @property
     def _look(self) -> float:
