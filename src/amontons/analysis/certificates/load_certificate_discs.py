@@ -33,6 +33,7 @@ from .load_known import not_a_solution
 
 Array = NDArray[np.float64]
 TOLERANCE = 1e-8  # error by the judge of a solution
+POLISHED = 10.0  # operations of refining the solution per cube of the reactions
 FINDING = 0.2  # share of the time left that may go into looking for another solution
 
 
@@ -67,9 +68,16 @@ class _Certification:
         self.search: DiscSearch | None = None
 
     def run(self) -> LoadCertificate:
-        """Root, other solutions, regions."""
+        """Root, other solutions, regions, as far as time allows."""
+        try:
+            return self._run()
+        except TimeUp as reason:
+            return self._answer(LoadOutcome.UNDECIDED, str(reason))
+
+    def _run(self) -> LoadCertificate:
         if at_once := without_search(self.local):
             return self._answer(*at_once)
+        self.deadline.pay(POLISHED * (3.0 * self.local.contacts) ** 3)
         stack = Stack.of(self.local)
         r, _ = stack.polished(self.r / stack.to_r)
         finder = Finder(stack, np.random.default_rng(0), TOLERANCE)

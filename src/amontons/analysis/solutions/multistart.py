@@ -244,10 +244,12 @@ def orientation(stack: Stack, r: Array) -> tuple[int, int]:
     LU where that is regular beyond doubt; the kernel of a large one is counted by its pivots.
     """
     matrix = stack.jacobian(r)
-    lu, _, _ = lapack.dgetrf(matrix)
+    lu, swaps, _ = lapack.dgetrf(matrix)
     size = float(np.abs(matrix).sum(axis=0).max(initial=0.0))
     if len(matrix) and lapack.dgecon(lu, size)[0] > len(matrix) * SINGULAR:
-        return int(np.linalg.slogdet(matrix)[0]), 0
+        odd = np.count_nonzero(swaps != np.arange(len(swaps)))
+        odd += np.count_nonzero(np.diag(lu) < 0)
+        return (-1 if odd % 2 else 1), 0
     if len(matrix) > RANKED:
         pivots = np.abs(np.diag(lu))
         return 0, max(1, int((pivots <= SINGULAR * pivots.max(initial=0.0)).sum()))
