@@ -15,7 +15,7 @@ __version__ = "0.1.0"
 _HOME = {
     "errors": ("AmontonsError", "FileFormatError", "Interrupted", "InvalidInput",
                "InvertedCells", "MissingDependency", "NotConverged", "NotWritten",
-               "SingularOperator", "UnsupportedForm"),
+               "SingularOperator", "TimeUp", "UnsupportedForm"),
     "cones": ("Coulomb", "Tresca"),
     "linear": ("AlgebraicMultigrid", "ConjugateGradient", "Direct", "GeometricMultigrid",
                "Petsc"),

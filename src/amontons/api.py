@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, overload
 
+from .clock import TimeLimit, compiling, deadline_of, now
 from .cones import Coulomb, Tresca
 from .errors import (
     Interrupted,
     InvalidInput,
     NotConverged,
+    TimeUp,
     UnsupportedForm,
 )
 from .problem import Form, FrictionProblem
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     from .model import Model
 
 FEW = 10  # starts of Newton's method where a search ends without any solution
-LEAST = 1.0  # seconds for them, however short the search was
+LEAST = 1.0  # seconds for them beyond a time limit
 HUGE = 1e12  # friction above which rounding hides what the law says
 Start = Iterate | FrictionSolution | ModelSolution | None
 
@@ -41,14 +42,14 @@ Start = Iterate | FrictionSolution | ModelSolution | None
 def solve(
     problem: FrictionProblem, solver: Solver | None = None, *, tolerance: float = 1e-8,
     contact_tolerance: float | None = None, max_iterations: int | None = None,
-    time_limit: float | None = None, start: Start = None, callback: Callback | None = None,
+    time_limit: TimeLimit = None, start: Start = None, callback: Callback | None = None,
     check: bool = True,
 ) -> FrictionSolution: ...  # fmt: skip
 @overload
 def solve(
     problem: Model, solver: Solver | None = None, *, tolerance: float = 1e-8,
     contact_tolerance: float | None = None, max_iterations: int | None = None,
-    time_limit: float | None = None, start: Start = None, callback: Callback | None = None,
+    time_limit: TimeLimit = None, start: Start = None, callback: Callback | None = None,
     check: bool = True,
 ) -> ModelSolution: ...  # fmt: skip
 def solve(problem, solver=None, *, tolerance=1e-8, contact_tolerance=None, max_iterations=None,
@@ -57,10 +58,10 @@ def solve(problem, solver=None, *, tolerance=1e-8, contact_tolerance=None, max_i
 
     contact_tolerance: on the error of every single contact on its own scale (`judge`), by
     default the square root of tolerance.  solver: by default the portfolio `Auto`.  time_limit:
-    seconds.  start: a solution of a neighbouring problem.  callback(step, iterate) is called
-    after every iterate, True stops; it replaces the progress line that a terminal shows.
-    check: raise NotConverged (Interrupted after Ctrl-C), which carries the best solution,
-    instead of returning it.
+    seconds, those of compiling not counted.  start: a solution of a neighbouring problem.
+    callback(step, iterate) is called after every iterate, True stops; it replaces the progress
+    line that a terminal shows.  check: raise NotConverged (Interrupted after Ctrl-C), which
+    carries the best solution, instead of returning it.
 
     A model is condensed for solvers that need the Delassus form; a FrictionProblem has the form
     its owner chose, and the wrong one raises UnsupportedForm.  A model with hyperelastic laws
@@ -78,42 +79,42 @@ def solve(problem, solver=None, *, tolerance=1e-8, contact_tolerance=None, max_i
 
 
 def all_solutions(
-    problem: FrictionProblem | Model, *, time_limit: float | None = None,
+    problem: FrictionProblem | Model, *, time_limit: TimeLimit = None,
     keep_proof: bool = False,
 ) -> Solutions:  # fmt: skip
     """All solutions of a Coulomb problem, and whether there can be no other.
 
-    time_limit: seconds, after which the list may lack some; in 3D 60 by default.  keep_proof:
-    keep what excludes all others, in `Solutions.proof`.  In 2D the search takes milliseconds
-    for ten contacts and grows exponentially: some ten contacts with much friction, some fifty
-    with little; more than 200 are left to `multistart`, which proves nothing.  In 3D some
-    contacts with much friction, some tens with little.  Raises UnsupportedForm under Tresca's
-    law.
+    time_limit: seconds, after which the list may lack some; in 3D by default the work of about
+    60 s, counted in operations, so that a busy machine finds the same.  keep_proof: keep what
+    excludes all others, in `Solutions.proof`.  In 2D the search takes milliseconds for ten
+    contacts and grows exponentially: some ten contacts with much friction, some fifty with
+    little; more than 200 are left to `multistart`, which proves nothing.  In 3D some contacts
+    with much friction, some tens with little.  Raises UnsupportedForm under Tresca's law.
     """
+    limit = _begun(time_limit)
     discrete = _discrete(problem)
     from .analysis.solutions import enumerate as exact
 
     _searchable(discrete)
-    _check_has_W(problem, "all solutions")
+    _check_has_W(problem, "all solutions", limit)
     if discrete.dimension == 3:
         from .analysis.solutions.disc_search import enumerate_discs
 
-        return enumerate_discs(discrete, time_limit=time_limit, keep_proof=keep_proof)
+        return enumerate_discs(discrete, time_limit=limit, keep_proof=keep_proof)
     if discrete.dimension == 2 and discrete.contacts > exact.CONTACTS:
-        found = multistart(discrete, time_limit=time_limit)
+        found = multistart(discrete, time_limit=limit)
         reason = f"more than {exact.CONTACTS} contacts: {found.reason}"
         return replace(found, reason=reason)
-    found = exact.enumerate_solutions(discrete, time_limit=time_limit, keep_proof=keep_proof)
+    found = exact.enumerate_solutions(discrete, time_limit=limit, keep_proof=keep_proof)
     if found.complete or found.solutions:
         return found
-    left = None if time_limit is None else max(time_limit, LEAST)
-    some = multistart(discrete, starts=FEW, time_limit=left)
+    some = multistart(discrete, starts=FEW, time_limit=None if limit is None else LEAST)
     return replace(found, solutions=some.solutions)  # the search did not come to any
 
 
 def multistart(
     problem: FrictionProblem | Model, *, starts: int = 1000, seed: int = 0,
-    time_limit: float | None = None,
+    time_limit: TimeLimit = None,
 ) -> Solutions:  # fmt: skip
     """Solutions of a Coulomb problem, 2D or 3D, by Newton's method from many starts; no proof.
 
@@ -123,9 +124,15 @@ def multistart(
     """
     from .analysis.solutions.multistart import multistart as search
 
+    limit = _begun(time_limit)
     discrete = _discrete(problem)
-    _check_has_W(problem, "multistart")
-    return search(discrete, starts=starts, seed=seed, time_limit=time_limit)
+    _check_has_W(problem, "multistart", limit)
+    return search(discrete, starts=starts, seed=seed, time_limit=limit)
+
+
+def _begun(time_limit: TimeLimit) -> TimeLimit:
+    """The limit as a deadline from now on, so that assembling counts too; None without one."""
+    return None if time_limit is None else deadline_of(time_limit)
 
 
 def _searchable(problem: FrictionProblem) -> None:
@@ -163,14 +170,14 @@ def follow(
     `at`, by default the lower end of the interval; without one the curve begins at a solution
     found there.  2D problems with Coulomb friction under a load are tracked exactly, from event
     to event; others are continued step by step, with `options`, which also asks for that.
-    limits: max_points (per direction), time_limit (seconds), callback(point, event), which
-    stops by returning True.
+    limits: max_points (per direction), time_limit (seconds for all), callback(point, event),
+    which stops by returning True.
     Each end of the branch has a named reason.
     """
     from .analysis.paths import checks
     from .analysis.paths.following import Limits, follow_path
     from .analysis.paths.parametrised import first_state, path_of, state_of
-    from .analysis.paths.path import PathProblem
+    from .analysis.paths.path import PathProblem, timed
 
     checks.check_options(options)
     bounds = Limits(checks.checked_interval(interval), **checks.checked_limits(limits))
@@ -183,8 +190,8 @@ def follow(
         y = state_of(problem, start)
         checks.check_start(problem, y, at)
         return follow_path(problem, y, at, bounds, options=options)
-    _check_has_W(_checked(problem), "follow")
-    path = path_of(problem, parameter, bounds.interval, _base(base))
+    _check_has_W(_checked(problem), "follow", bounds.deadline)
+    path = timed(path_of(problem, parameter, bounds.interval, _base(base)), bounds.deadline)
     y = first_state(path, at) if start is None else state_of(path, start)
     checks.check_size(path, y)
     return follow_path(path, y, at, bounds, options=options)
@@ -198,7 +205,7 @@ def diagram(
     """All branches through all solutions at the values `at` of a parameter, in 2D.
 
     at: by default both ends and the middle of the interval; all solutions there are searched
-    for as in `all_solutions`, with time_limit seconds for each search.  Others as in `follow`.
+    for as in `all_solutions`, with their share of the time each.  Others as in `follow`.
     """
     from .analysis.paths import checks
     from .analysis.paths.diagram import bifurcation_diagram
@@ -209,20 +216,20 @@ def diagram(
     bounds = Limits(checks.checked_interval(interval), **checks.checked_limits(limits))
     a, b = bounds.interval
     values = (a, (a + b) / 2, b) if at is None else checks.checked_values(at, bounds.interval)
-    _check_has_W(_checked(problem), "diagram")
+    _check_has_W(_checked(problem), "diagram", bounds.deadline)
     path = path_of(problem, parameter, bounds.interval, _base(base))
-    return bifurcation_diagram(
-        path, bounds, values, options=options, time_limit=bounds.time_limit
-    )
+    return bifurcation_diagram(path, bounds, values, options=options)
 
 
-def _check_has_W(problem: FrictionProblem | Model, verb: str) -> None:
+def _check_has_W(problem: FrictionProblem | Model, verb: str, limit: TimeLimit) -> None:
     """Raise SingularOperator where `verb` needs W and contact alone holds a body."""
     if not getattr(problem, "is_large", False):  # those are followed in displacements
         from .evolution.timed import steady
         from .model.diagnosis import check_has_W
 
-        check_has_W(problem if isinstance(problem, FrictionProblem) else steady(problem), verb)
+        examined = problem if isinstance(problem, FrictionProblem) else steady(problem)
+        with suppress(TimeUp):  # the verb says so
+            check_has_W(examined, verb, deadline_of(limit))
 
 
 def _base(base: Any) -> FrictionProblem | Model | None:
@@ -239,19 +246,21 @@ def _checked(problem: Any, name: str = "problem") -> FrictionProblem | Model:
 
 def uniqueness(
     problem: FrictionProblem | Model, solution: FrictionSolution | ModelSolution | None = None,
-    *, time_limit: float = 60.0,
+    *, time_limit: TimeLimit = None,
 ) -> Uniqueness:  # fmt: skip
     """Whether a problem has one solution: for every load, for this load, or more than one.
 
     solution: one that was found; by default the problem is solved.  time_limit: seconds, half
-    of them at most for the bounds on the critical friction.  The verdict is undecided, with the
-    reason, where there is neither a proof nor a second solution.
+    of them at most for the bounds on the critical friction; by default the work of about 60 s,
+    counted in operations, so that a busy machine comes to the same verdict.  The verdict is
+    undecided, with the reason, where there is neither a proof nor a second solution.
     """
+    limit = _begun(time_limit)
     discrete = _discrete(problem)
     found = solution.solution if isinstance(solution, ModelSolution) else solution
     from .analysis.certificates.uniqueness import assess
 
-    verdict = assess(discrete, found, time_limit=time_limit)
+    verdict = assess(discrete, found, time_limit=limit)
     if isinstance(problem, FrictionProblem) or not problem.held_by_contact:
         return verdict
     reason = verdict.reason.replace("holds a body", f"holds {problem.held_by_contact}")
@@ -262,19 +271,22 @@ def uniqueness(
 
 
 def critical_friction(
-    problem: FrictionProblem | Model, *, gap: float = 1e-2, time_limit: float = 60.0
+    problem: FrictionProblem | Model, *, gap: float = 1e-2,
+    time_limit: TimeLimit = None,
 ) -> CriticalFriction:
     """Bounds on the friction below which every load of a 2D problem has exactly one solution.
 
-    gap: relative distance of the bounds that is good enough.  time_limit: seconds.  Exact up to
+    gap: relative distance of the bounds that is good enough.  time_limit: seconds, by default
+    the work of about 60 s, counted in operations.  Exact up to
     13 contacts.  Raises UnsupportedForm in 3D and under Tresca's law.
     """
     from .analysis.certificates.critical_friction import critical_friction as bounds
 
+    limit = _begun(time_limit)
     discrete = _discrete(problem)
     if discrete.dimension == 2 and isinstance(discrete.law, Coulomb):  # else it says so
-        _check_has_W(problem, "critical friction")
-    return bounds(discrete, gap=gap, time_limit=time_limit)
+        _check_has_W(problem, "critical friction", limit)
+    return bounds(discrete, gap=gap, time_limit=limit)
 
 
 def solve_any_form(
@@ -293,15 +305,17 @@ def _solve(
     model = None if isinstance(problem, FrictionProblem) else _checked(problem)
     if model is not None and getattr(model, "is_large", False):
         return _solve_large(model, solver, callback, options)
-    began = time.perf_counter()
+    began, compiled = now(), compiling()
+    options["time_limit"] = deadline_of(options.get("time_limit"))
     discrete = problem if model is None else model.discrete_problem()
-    assembled = time.perf_counter() - began
+    assembled, compiled = now() - began, compiling() - compiled
     if isinstance(options.get("start"), ModelSolution):
         options["start"] = options["start"].solution
     with _progress(callback, options["tolerance"]) as seen:
         found = run(discrete, solver, callback=seen, **options)
     if model is None:
         return found
+    found = _with_record(found, compiling=found.convergence.compiling + compiled)
     found = _explained(found, model)
     return ModelSolution(model, found, model.recover(found), assembled)
 
@@ -313,6 +327,10 @@ def _explained(found: FrictionSolution, model: Model) -> FrictionSolution:
     return with_diagnosis(found, model)
 
 
+def _with_record(found: FrictionSolution, **changes: Any) -> FrictionSolution:
+    return replace(found, convergence=replace(found.convergence, **changes))
+
+
 def _solve_large(
     model: Model, solver: Solver | None, callback: Callback | None, options: dict[str, Any]
 ) -> ModelSolution:
@@ -321,13 +339,15 @@ def _solve_large(
     from .solvers.nonlinear_newton import nonlinear_solver
 
     method = nonlinear_solver(solver)
-    began = time.perf_counter()
+    began, compiled = now(), compiling()
+    options["time_limit"] = deadline_of(options.get("time_limit"))
     problem = large_deformation(model)
-    assembled = time.perf_counter() - began
+    assembled, compiled = now() - began, compiling() - compiled
     if isinstance(options.get("start"), ModelSolution):
         options["start"] = options["start"].solution
     with _progress(callback, options["tolerance"]) as seen:
         found = problem.solved(drive(problem, method, callback=seen, **options))  # type: ignore[arg-type]
+    found = _with_record(found, compiling=found.convergence.compiling + compiled)
     found = _explained(found, model)
     return ModelSolution(model, found, model.recover(found), assembled)
 
@@ -339,14 +359,20 @@ def drive_any_form(
     needed = getattr(solver, "form", Form.ANY)
     if needed is not Form.DELASSUS or problem.form is Form.DELASSUS:
         return drive(problem, solver, **options)
-    began = time.perf_counter()
-    condensed = problem.condensed()
-    spent = time.perf_counter() - began
+    began, compiled = now(), compiling()
+    deadline = options["time_limit"] = deadline_of(options.get("time_limit"))
+    try:
+        condensed = problem.condensed(deadline)
+    except TimeUp:
+        found = drive(problem, **options)  # says so in its record
+        return _with_record(found, solver=type(solver).__name__)
+    spent, compiled = now() - began, compiling() - compiled
     found = drive(condensed, solver, **options)
     u, v = problem.velocity(found.r)
     record = found.convergence
     history = tuple(replace(step, seconds=step.seconds + spent) for step in record.history)
-    record = replace(record, seconds=record.seconds + spent, history=history)
+    record = replace(record, seconds=record.seconds + spent, history=history,
+                     compiling=record.compiling + compiled)  # fmt: skip
     return replace(found, problem=problem, u=u, v=v, convergence=record)
 
 

@@ -3,6 +3,9 @@
 Compilation happens once per machine and says nothing about a method, so it belongs to no time
 that is reported and to no limit; `compiling()` says how long it took.  Numba announces with the
 event "numba:compiler_lock" when a thread prepares a kernel, be it compiled or read from disk.
+
+A limit that a user gives is one of the clock.  What has none is limited by operations, which
+searches count, so that a busy or a slow machine comes to the same answer, only later.
 """
 
 from __future__ import annotations
@@ -10,9 +13,12 @@ from __future__ import annotations
 import math
 import threading
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from numbers import Real
 
 from numba.core import event
+
+from .errors import InvalidInput, TimeUp
 
 
 class _Compiling(threading.local, event.Listener):
@@ -49,34 +55,105 @@ def now() -> float:
     return time.perf_counter() - _compiling.total
 
 
+RATE = 1e10  # operations that count as a second: dense linear algebra on one core of 2020
+
+
+@dataclass(eq=False)
+class Work:
+    """Operations done so far, in seconds of a core that does RATE of them in one."""
+
+    done: float = 0.0
+
+
 @dataclass(frozen=True)
 class Deadline:
-    """A moment of `now()` until which work may go on; infinite by default."""
+    """A moment until which work may go on; infinite by default.
+
+    moment: of `now()`, or of `work` where operations are counted: then what is found does not
+    depend on how busy a machine is.  seconds: how long it was when it was set.
+    """
 
     moment: float = math.inf
+    work: Work | None = None
+    seconds: float = math.inf
 
     @classmethod
     def after(cls, seconds: float | None) -> Deadline:
-        """So many seconds from now; never without a number."""
-        return cls(math.inf if seconds is None else now() + seconds)
+        """So many seconds from now by the clock; never without a number."""
+        return NEVER if seconds is None else cls(now() + seconds, None, float(seconds))
+
+    @classmethod
+    def counted(cls, seconds: float) -> Deadline:
+        """After as many operations as take about so many seconds."""
+        return cls(seconds, Work(), seconds)
+
+    @property
+    def time(self) -> float:
+        """What `moment` is compared with."""
+        return now() if self.work is None else self.work.done
 
     @property
     def left(self) -> float:
         """Seconds that are left, 0 when it has passed."""
-        return max(self.moment - now(), 0.0)
+        return max(self.moment - self.time, 0.0)
 
     @property
     def passed(self) -> bool:
         """True when no time is left."""
-        return now() >= self.moment
+        return self.time >= self.moment
+
+    def spend(self, operations: float) -> None:
+        """Count what was done; the clock needs no telling."""
+        if self.work is not None:
+            self.work.done += operations / RATE
+
+    def affords(self, operations: float) -> bool:
+        """True where that many, which nothing can interrupt, should be done in time."""
+        return operations <= RATE * self.left
+
+    def pay(self, operations: float) -> None:
+        """Spend what nothing can interrupt; raises TimeUp before where that takes too long."""
+        if not self.affords(operations):
+            raise TimeUp(f"the next step takes longer than is left of {self}")
+        self.spend(operations)
+
+    def check(self) -> None:
+        """Raise TimeUp when no time is left."""
+        if self.passed:
+            raise TimeUp(f"stopped after {self}")
 
     def share(self, part: float) -> Deadline:
         """The deadline of a stage that may take this part of what is left."""
-        return Deadline(now() + part * self.left)
+        return replace(self, moment=self.time + part * self.left)
 
     def within(self, seconds: float) -> Deadline:
         """This deadline, or one in so many seconds where that is earlier."""
-        return Deadline(min(self.moment, now() + seconds))
+        return replace(self, moment=min(self.moment, self.time + seconds))
+
+    def __str__(self) -> str:
+        return f"{self.seconds:g} s" if self.work is None else f"the work of {self.seconds:g} s"
 
 
 NEVER = Deadline()
+TimeLimit = float | Deadline | None
+
+
+def deadline_of(time_limit: TimeLimit, budget: float = math.inf) -> Deadline:
+    """The deadline that is given, or in seconds from now, else after the work of `budget`.
+
+    Raises InvalidInput unless the limit is a number above zero; it may be infinite.
+    """
+    if isinstance(time_limit, Deadline):
+        return time_limit
+    if time_limit is None:
+        return NEVER if budget == math.inf else Deadline.counted(budget)
+    check_seconds(time_limit)
+    return Deadline.after(time_limit)
+
+
+def check_seconds(time_limit: float) -> None:
+    """Raise InvalidInput unless a time limit is a number above zero; it may be infinite."""
+    if not isinstance(time_limit, Real) or isinstance(time_limit, bool):
+        raise InvalidInput(f"time_limit: expected a number, got {time_limit!r}")
+    if not time_limit > 0:
+        raise InvalidInput(f"time_limit: expected seconds > 0, got {time_limit}")

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from .blocks import BlockRows, embedded
+from .clock import NEVER, Deadline
 from .linear.bodies import Bodies, BodyFactor
 
 Array = NDArray[np.float64]
@@ -61,16 +62,17 @@ class Condensation:
         return self.d * self.nc * slab + WHOLE_SOLVES * whole
 
     # ------------------------------------------------------------------ W
-    def delassus(self, factor: BodyFactor) -> BlockRows:
-        """W in block rows."""
+    def delassus(self, factor: BodyFactor, deadline: Deadline = NEVER) -> BlockRows:
+        """W in block rows; raises TimeUp when it is not there in time."""
         d, nc = self.d, self.nc
         keys = self._pattern()
         rows, columns = np.divmod(keys, nc)
         data = np.zeros((len(keys), d, d))
         for kind, solve in enumerate(factor.kinds):
-            C = self._compliance(kind, solve)
+            C = self._compliance(kind, solve, deadline)
             seen = self._seen[kind]
             for unknowns in self.bodies.members[kind]:
+                deadline.check()
                 part, contacts = self._of_body(unknowns[seen])
                 W = part.T @ (part.T @ C.T).T
                 k = len(contacts)
@@ -109,11 +111,14 @@ class Condensation:
         keys = np.sort(np.concatenate(pairs))  # np.unique hashes, ten times slower here
         return keys[np.concatenate([[True], keys[1:] != keys[:-1]])] if len(keys) else keys
 
-    def _compliance(self, kind: int, solve: Callable[[Array], Array]) -> Array:
+    def _compliance(
+        self, kind: int, solve: Callable[[Array], Array], deadline: Deadline
+    ) -> Array:
         """Part of M_b^-1 at the unknowns that H sees."""
         n, seen = self.bodies.members[kind].shape[1], self._seen[kind]
         C = np.empty((len(seen), len(seen)))
         for first in range(0, len(seen), SOLVE_COLUMNS):
+            deadline.check()
             columns = seen[first : first + SOLVE_COLUMNS]
             unit = np.zeros((n, len(columns)))
             unit[columns, np.arange(len(columns))] = 1.0

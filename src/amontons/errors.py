@@ -29,6 +29,10 @@ class InvertedCells(AmontonsError, ArithmeticError):
     """A deformation turns cells inside out: no stress is defined; take smaller steps."""
 
 
+class TimeUp(AmontonsError, RuntimeError):
+    """The time limit has passed before there was anything to return."""
+
+
 class FileFormatError(AmontonsError, ValueError):
     """A file does not hold what its format asks for: names file, place and expectation."""
 

@@ -20,7 +20,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from .blocks import BlockRows
+from .clock import NEVER, Deadline
 from .condensation import SOLVE_COLUMNS, Condensation
+from .dense import DENSE_LIMIT
 from .errors import InvalidInput
 from .linear import ConjugateGradient, Direct, Factor, GeometricMultigrid, LinearSolver
 from .linear.bodies import Bodies, BodyFactor
@@ -35,7 +37,6 @@ from .linear.small_blocks import block_diagonal_inverse, diagonal_blocks_inverse
 Array = NDArray[np.float64]
 Shared = dict[str, tuple[tuple, Any]]  # by name: the matrices it was made of, and what was made
 OPERATORS = (GridMatrix, DistributedMatrix)  # which M may be instead of a stored matrix
-DENSE_LIMIT = 4e9  # bytes that W may fill
 DIRECT_LIMIT = 600_000  # unknowns of a mesh whose factor takes some 10 GB
 EXACT_WORK = 2e6  # n * nc * d up to which forming W costs nothing that matters
 LARGE_BODY = 10_000  # unknowns of a body with levels from which multigrid is the way
@@ -159,11 +160,11 @@ class GlobalMatrices:
         fits = 8.0 * self.dimension**2 * parts.blocks <= DENSE_LIMIT
         return fits and parts.work <= CHEAP * parts.compressed_work
 
-    def delassus(self) -> BlockRows | sparse.csr_array | Array:
+    def delassus(self, deadline: Deadline = NEVER) -> BlockRows | sparse.csr_array | Array:
         """W = H^T M^-1 H: block rows of several bodies, sparse of rigid ones, dense of one.
 
         Raises InvalidInput when it would not fit into memory, SingularOperator when M can not
-        be inverted.
+        be inverted, TimeUp when it is not there in time.
         """
         inverse = self.small_blocks
         if inverse is not None:
@@ -180,18 +181,24 @@ class GlobalMatrices:
                 "which does not form W"
             )
         if several:
-            return self.condensation.delassus(factor)  # type: ignore[arg-type]
-        return self._dense_delassus()
+            return self.condensation.delassus(factor, deadline)  # type: ignore[arg-type]
+        return self._dense_delassus(deadline)
 
-    def _dense_delassus(self) -> Array:
+    def _dense_delassus(self, deadline: Deadline) -> Array:
         """By blocks of right-hand sides, so that memory stays near that of W itself."""
         H = sparse.csc_array(self.H)
         m = H.shape[1]
         W = np.empty((m, m))
-        for first in range(0, m, SOLVE_COLUMNS):
-            columns = H[:, first : first + SOLVE_COLUMNS].toarray()
-            W[:, first : first + SOLVE_COLUMNS] = H.T @ self.solve(columns)
+        for part in self.column_parts(m):
+            deadline.check()
+            W[:, part] = H.T @ self.solve(H[:, part].toarray())
         return W
+
+    def column_parts(self, count: int) -> list[slice]:
+        """Right-hand sides in parts that take no longer together than each for itself."""
+        exact = self.small_blocks is not None or self.factor().exact
+        size = SOLVE_COLUMNS if exact else 1
+        return [slice(first, first + size) for first in range(0, count, size)]
 
     @property
     def local_stiffness(self) -> Array:

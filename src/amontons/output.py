@@ -46,6 +46,7 @@ class Output:
     title: str = ""
     method: str = ""  # as on the command line; empty: the name of the solver's class
     assemble_seconds: float = 0.0
+    assemble_compiling: float = 0.0  # seconds of compiling that are in no other number
     from_fclib: bool = False
     uniqueness: dict[str, Any] | None = None  # what is known about other solutions
     warnings: tuple[ResultWarning, ...] = ()
@@ -149,7 +150,8 @@ def summary(output: Output) -> dict[str, Any]:
             "assemble": output.assemble_seconds,
             "setup": setup,  # factorisation and all else before the first judgement
             "solve": record.seconds - setup,
-            "total": output.assemble_seconds + record.seconds,
+            "total": output.assemble_seconds + record.seconds,  # without compiling
+            "compiling": output.assemble_compiling + record.compiling,
         },
         "dimension": problem.dimension,
         "unknowns": problem.unknowns,

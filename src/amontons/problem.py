@@ -10,6 +10,7 @@ v are n displacements or velocities; r and u are (nc, d) in the local frames, ro
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
@@ -30,6 +31,7 @@ from .checked_arrays import (
     real,
     sparse_matrix,
 )
+from .clock import NEVER, Deadline
 from .cones import Coulomb, Law, Tresca
 from .errors import InvalidInput, SingularOperator, UnsupportedForm
 from .global_matrices import OPERATORS, GlobalMatrices, Shared, made_once
@@ -188,23 +190,27 @@ class FrictionProblem:
         levels = self.levels or self.matrices.stored_levels()
         return replace(self, M=self.matrices.stored(), levels=levels)
 
-    def condensed(self) -> FrictionProblem:
+    def condensed(self, deadline: Deadline = NEVER) -> FrictionProblem:
         """The Delassus form of this problem: W = H^T M^-1 H, q = H^T M^-1 f + w.
 
         Raises InvalidInput when W would not fit into memory, SingularOperator when M can not
-        be inverted (a body held by contact alone).
+        be inverted (a body held by contact alone), TimeUp when W is not there in time.
         """
-        return self if self.form is Form.DELASSUS else self._condensed
+        if self.form is Form.DELASSUS:
+            return self
+        if deadline is not NEVER:
+            self._kept("condensed", (self.M, self.H), lambda: self._condense(deadline))
+        return self._condensed
 
     @cached_property
     def _condensed(self) -> FrictionProblem:
-        base = self._kept("condensed", (self.M, self.H), self._condense)
+        base = self._kept("condensed", (self.M, self.H), lambda: self._condense(NEVER))
         return replace(
             base, law=self.law, q=self.free_velocity, blur=self.free_blur, name=self.name
         )
 
-    def _condense(self) -> FrictionProblem:
-        W = self.matrices.delassus()
+    def _condense(self, deadline: Deadline) -> FrictionProblem:
+        W = self.matrices.delassus(deadline)
         if isinstance(W, BlockRows):
             return FrictionProblem._from_blocks(W, self.free_velocity, self.law)
         return FrictionProblem.from_delassus(W, self.free_velocity, self.law)
@@ -401,6 +407,13 @@ class FrictionProblem:
         except SingularOperator:
             cheap = False
         return Measure.EXACT if cheap else Measure.RESIDUAL
+
+    def prepare(self, deadline: Deadline) -> None:
+        """Form W where `measure` asks for it; raises TimeUp when it is not there in time."""
+        if self.form is Form.GLOBAL:
+            with suppress(SingularOperator):
+                if self.condensing_is_cheap:
+                    self.condensed(deadline)
 
     def error(self, r: Array, v: Array | None = None) -> float:
         """Unit-free error of reactions r, (nc, d); v, (n,), is read by the residual measure.

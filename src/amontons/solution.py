@@ -21,6 +21,7 @@ from .status import ContactStatus, classify, margins
 from .warned import ResultWarning
 
 Array = NDArray[np.float64]
+TELLING = 0.1  # seconds of compiling from which the record says so
 
 
 class Outcome(Enum):
@@ -79,6 +80,7 @@ class Convergence:
     contact_error: float | None = None  # of the weakest contact on its own scale
     contact_tolerance: float = np.inf
     weakest: int | None = None  # that contact; None where all obey their laws exactly
+    compiling: float = 0.0  # seconds of preparing compiled code, which no other time holds
 
     @property
     def by_user(self) -> bool:
@@ -125,6 +127,8 @@ class Convergence:
             f"{self.outcome.name.lower().replace('_', ' ')} with {self.solver}: {self.errors} "
             f"after {self.iterations} iterations in {self.seconds:.3g} s"
         )
+        if self.compiling >= TELLING:
+            text += f", after {self.compiling:.2g} s of compiling"
         return f"{text} ({self.detail})" if self.detail else text
 
 

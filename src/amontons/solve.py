@@ -8,15 +8,15 @@ WEAK_CONTACTS.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .clock import Deadline, TimeLimit, compiling, deadline_of, now
 from .cones import Coulomb
-from .errors import InvalidInput, SingularOperator, UnsupportedForm
+from .errors import InvalidInput, SingularOperator, TimeUp, UnsupportedForm
 from .indefinite import gains_energy, with_obstruction
 from .judge import EPSILON, Measure, Weakest
 from .nitsche_problem import NO_MULTIPLIERS, NitscheProblem
@@ -24,7 +24,7 @@ from .problem import Form, FrictionProblem
 from .settling import Motion, Settled, at_rest, motion, settled_state
 from .solution import Convergence, FrictionSolution, Outcome, Step
 from .solvers import Auto
-from .solvers.base import Breakdown, Iterate, Solver, Target, check_seconds
+from .solvers.base import Breakdown, Iterate, Solver, Target
 
 Array = NDArray[np.float64]
 Callback = Callable[[Step, Iterate], bool | None]
@@ -45,7 +45,8 @@ class _Watch:
     problem: FrictionProblem | NitscheProblem
     tolerance: float
     contact_tolerance: float
-    started: float = field(default_factory=time.perf_counter)
+    started: float = field(default_factory=now)
+    compiled: float = field(default_factory=compiling)  # until then
     best: Iterate | None = None
     told: tuple[Motion, Settled] | None = None  # of the best iterate where it is good enough
     error: float = np.inf
@@ -74,7 +75,7 @@ class _Watch:
                     self.blurred += 1
         self.iterations += iterate.iterations
         self.linear_iterations += iterate.linear_iterations
-        seconds = time.perf_counter() - self.started
+        seconds = now() - self.started
         step = Step(self.iterations, error, self.linear_iterations, seconds)
         self.history.append(step)
         if self.best is None or self._better(error, weakest):
@@ -162,7 +163,7 @@ def drive(
     tolerance: float = 1e-8,
     contact_tolerance: float | None = None,
     max_iterations: int | None = None,
-    time_limit: float | None = None,
+    time_limit: TimeLimit = None,
     start: Iterate | FrictionSolution | None = None,
     callback: Callback | None = None,
 ) -> FrictionSolution:
@@ -170,7 +171,7 @@ def drive(
 
     tolerance: on the unit-free error of `judge`; contact_tolerance: on the contactwise one, by
     default the square root of the tolerance, infinite to ask for the first alone.  time_limit
-    in seconds.
+    in seconds, those of compiling not counted, or a Deadline.
     callback(step, iterate) is called after every iterate; returning True stops.  Ctrl-C gives
     the outcome STOPPED with the best iterate.  Raises UnsupportedForm when the solver needs
     the other form.
@@ -182,7 +183,8 @@ def drive(
         )
     if callback is not None and not callable(callback):
         raise InvalidInput(f"callback: expected a function, got {callback!r}")
-    _check_options(tolerance, contact_tolerance, max_iterations, time_limit)
+    _check_options(tolerance, contact_tolerance, max_iterations)
+    deadline = deadline_of(time_limit)
     if problem.form is Form.NITSCHE:
         if not getattr(solver, "nitsche", False):
             raise UnsupportedForm(f"{type(solver).__name__}: {NO_MULTIPLIERS}")
@@ -198,7 +200,6 @@ def drive(
         problem = problem.assembled()
     allowed = tolerance**0.5 if contact_tolerance is None else contact_tolerance
     watch = _Watch(problem, tolerance, allowed)
-    deadline = watch.started + (time_limit if time_limit is not None else np.inf)
     outcome, detail = _run(
         watch,
         solver,
@@ -220,6 +221,7 @@ def _run(
 ) -> tuple[Outcome, str]:
     """Start the solver, and again with a tighter goal while only contacts are not settled."""
     try:
+        _prepare(watch.problem, target.deadline)
         watch.judge(_with_motion(watch.problem, start))
         if watch.converged:
             return Outcome.CONVERGED, ""
@@ -232,6 +234,8 @@ def _run(
             if ended is not None:
                 break
         outcome, detail = ended or (Outcome.STAGNATED, "")
+    except TimeUp:
+        outcome, detail = Outcome.TIME_LIMIT, ""
     except KeyboardInterrupt:
         return Outcome.STOPPED, "by the user"
     gave_up = outcome in (Outcome.STAGNATED, Outcome.BREAKDOWN, Outcome.CYCLED)
@@ -253,7 +257,9 @@ def _once(
     Returns why it ended; None when the error is below the target, but not that of contacts.
     """
     try:
+        each = _operations(watch.problem) if target.deadline.work is not None else 0.0
         for iterate in solver.iterates(watch.problem, start, target):
+            target.deadline.spend(iterate.iterations * each)
             step = watch.judge(iterate)
             stop = callback is not None and callback(step, iterate)
             if watch.converged:
@@ -264,7 +270,7 @@ def _once(
                 return Outcome.NON_FINITE, ""
             if watch.iterations >= limit:
                 return Outcome.MAX_ITERATIONS, ""
-            if time.perf_counter() > target.deadline:
+            if target.deadline.passed:
                 return Outcome.TIME_LIMIT, ""
             if watch.weak and step.error <= target.tolerance:
                 return None
@@ -276,8 +282,10 @@ def _once(
                 return Outcome.STAGNATED, ""
         return Outcome.STAGNATED, "the method has nothing left to try"
     except Breakdown as reason:
-        late = time.perf_counter() > target.deadline
+        late = target.deadline.passed
         return Outcome.TIME_LIMIT if late else Outcome.BREAKDOWN, str(reason)
+    except TimeUp:
+        return Outcome.TIME_LIMIT, ""
     except SingularOperator as reason:
         return Outcome.BREAKDOWN, str(reason)
     except ArithmeticError as reason:
@@ -302,7 +310,7 @@ def _finish(watch: _Watch, outcome: Outcome, detail: str, solver: Solver) -> Fri
             error = max(error, problem.certain_error(best.r, best.v))
     if outcome not in (Outcome.CONVERGED, Outcome.STOPPED) and watch.best is not None:
         detail = with_obstruction(problem, u, detail)
-    seconds = time.perf_counter() - watch.started
+    seconds = now() - watch.started
     record = Convergence(
         outcome,
         watch.iterations,
@@ -317,8 +325,25 @@ def _finish(watch: _Watch, outcome: Outcome, detail: str, solver: Solver) -> Fri
         contact_error=None if weakest is None else weakest.error,
         contact_tolerance=watch.contact_tolerance,
         weakest=None if weakest is None else weakest.contact,
+        compiling=compiling() - watch.compiled,
     )
     return FrictionSolution(problem, best.r, u, v, record, settled=told)
+
+
+def _prepare(problem: FrictionProblem | NitscheProblem, deadline: Deadline) -> None:
+    """Form W where it judges, as far as time allows; raises TimeUp."""
+    if isinstance(problem, FrictionProblem):
+        problem.prepare(deadline)
+
+
+def _operations(problem: FrictionProblem | NitscheProblem) -> float:
+    """Of an iteration, roughly: some products with W, or a solve with M.
+
+    No Newton step, but those are few.
+    """
+    if problem.form is Form.DELASSUS:
+        return 100.0 * problem.blocks.data.size  # type: ignore[union-attr]
+    return 1000.0 * problem.unknowns
 
 
 def _zero(problem: FrictionProblem) -> Array:
@@ -376,9 +401,8 @@ def _check_number(name: str, value: object) -> None:
 
 
 def _check_options(
-    tolerance: float, contact_tolerance: float | None, max_iterations: int | None,
-    limit: float | None,
-) -> None:  # fmt: skip
+    tolerance: float, contact_tolerance: float | None, max_iterations: int | None
+) -> None:
     _check_number("tolerance", tolerance)
     if contact_tolerance is not None:
         _check_number("contact_tolerance", contact_tolerance)
@@ -388,11 +412,7 @@ def _check_options(
             )
     if max_iterations is not None:
         _check_number("max_iterations", max_iterations)
-    if limit is not None:
-        _check_number("time_limit", limit)
     if not (0 < tolerance < 1):
         raise InvalidInput(f"tolerance: expected between 0 and 1, got {tolerance}")
     if max_iterations is not None and max_iterations < 1:
         raise InvalidInput(f"max_iterations: expected at least 1, got {max_iterations}")
-    if limit is not None:
-        check_seconds(limit)

@@ -17,6 +17,7 @@ from amontons.analysis.certificates.pair_multipliers import (
     proves,
 )
 from amontons.analysis.certificates.status_pieces import Pieces
+from amontons.clock import NEVER, Deadline
 from amontons.hild import hild_triangle
 
 
@@ -44,11 +45,11 @@ def test_branching_agrees_with_all_determinants(seed):
     )
     upper = min(critical_friction(problem).upper, 20.0)
     for part in (0.7, 0.97):
-        safe = Branching(pieces, part * upper, np.inf)
+        safe = Branching(pieces, part * upper, NEVER)
         assert safe.run() == POSITIVE
         assert check_proof(pieces.W, part * upper * pieces.shape, safe.leaves)
     if upper < 20:
-        unsafe = Branching(pieces, 1.02 * upper, np.inf)
+        unsafe = Branching(pieces, 1.02 * upper, NEVER)
         assert unsafe.run() == NEGATIVE
         assert pieces.threshold(unsafe.failed)[0] <= 1.02 * upper
         assert smallest_determinant(pieces.W, 1.02 * upper * pieces.shape) < 0
@@ -56,11 +57,11 @@ def test_branching_agrees_with_all_determinants(seed):
 
 def test_the_triangle_is_proved_and_checked():
     pieces = Pieces.of(hild_triangle(6).assemble())
-    safe = Branching(pieces, 1.72, np.inf)
+    safe = Branching(pieces, 1.72, NEVER)
     assert safe.run() == POSITIVE
     assert any(leaf.multipliers is not None for leaf in safe.leaves)
     assert check_proof(pieces.W, np.full(6, 1.72), safe.leaves)
-    unsafe = Branching(pieces, 1.73, np.inf)
+    unsafe = Branching(pieces, 1.73, NEVER)
     assert unsafe.run() == NEGATIVE
     assert pieces.word(unsafe.failed) == "fff+-+"
 
@@ -70,11 +71,11 @@ def test_many_contacts_have_pairs_only_where_it_matters(monkeypatch):
     monkeypatch.setattr("amontons.analysis.certificates.friction_branching.FEW", 3)
     monkeypatch.setattr("amontons.analysis.certificates.pair_multipliers.ACTIVE", 0.95)
     pieces = Pieces.of(hild_triangle(7).assemble())
-    alone = Branching(pieces, 1.4, np.inf)  # multipliers of single contacts reach 1.48
+    alone = Branching(pieces, 1.4, NEVER)  # multipliers of single contacts reach 1.48
     assert alone.run() == POSITIVE
     assert [len(leaf.multipliers.pairs) for leaf in alone.leaves] == [0]
     assert check_proof(pieces.W, np.full(7, 1.4), alone.leaves)
-    mixed = Branching(pieces, 1.53, np.inf)
+    mixed = Branching(pieces, 1.53, NEVER)
     assert mixed.run() == POSITIVE
     found = [leaf.multipliers for leaf in mixed.leaves if leaf.multipliers is not None]
     assert any(len(x.pairs) and len(x.singles) for x in found)
@@ -83,7 +84,7 @@ def test_many_contacts_have_pairs_only_where_it_matters(monkeypatch):
 
 def test_the_checker_refuses_what_is_wrong():
     pieces = Pieces.of(hild_triangle(5).assemble())
-    safe = Branching(pieces, 1.7, np.inf)
+    safe = Branching(pieces, 1.7, NEVER)
     assert safe.run() == POSITIVE
     mu = np.full(5, 1.7)
     assert check_proof(pieces.W, mu, safe.leaves)
@@ -116,7 +117,7 @@ def test_multipliers_prove_only_what_they_prove():
 
 
 def test_time_is_respected():
-    branching = Branching(Pieces.of(hild_triangle(12).assemble()), 1.3, 0.0)
+    branching = Branching(Pieces.of(hild_triangle(12).assemble()), 1.3, Deadline.counted(0.0))
     assert branching.run() == STOPPED
     assert branching.leaves == []
 

@@ -11,7 +11,7 @@ import amontons
 
 PACKAGE = Path(amontons.__file__).parent
 ORDER = (
-    "errors < clock < warned < files < checked_arrays < cones < linear < blocks < "
+    "errors < clock < dense < warned < files < checked_arrays < cones < linear < blocks < "
     "condensation < global_matrices < judge < judge_sharp < problem < "
     "indefinite < nitsche_problem < one_sided < one_contact < status < settling < solution < "
     "solvers < solve < fem < contact < model < masonry < granular < hild < vee < evolution < "

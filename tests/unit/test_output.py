@@ -46,7 +46,7 @@ def test_json(solution, tmp_path):
     assert data["schema"] == "amontons/solution/1"
     assert data["outcome"] == "converged"
     assert data["method"] == "auto"
-    assert data["seconds"].keys() == {"assemble", "setup", "solve", "total"}
+    assert data["seconds"].keys() == {"assemble", "setup", "solve", "total", "compiling"}
     assert data["contacts"]["total"] == sum(
         data["contacts"][k] for k in ("open", "slip", "stick")
     )

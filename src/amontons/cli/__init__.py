@@ -183,8 +183,9 @@ Exit codes: 0 settled, either way, 1 undecided, 2 bad input.
 )
 @click.argument("source")
 @click.option("--mu", type=float, metavar="X", help="Friction coefficient of all contacts.")
-@click.option("--time-limit", type=float, default=60.0, show_default=True, metavar="SECONDS",
-              help="Stop after about that time, with the bounds reached by then.")  # fmt: skip
+@click.option("--time-limit", type=float, metavar="SECONDS",
+              help="Stop after that time, with the bounds reached by then. [after the work of "
+              "about 60 s, the same on a busy machine]")  # fmt: skip
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
               help="Replace a value of the case.")  # fmt: skip
 @click.option("--json", "json_copy", metavar="FILE", help="The same as JSON; - prints it.")
@@ -223,7 +224,7 @@ Exit codes: 0 every branch has come to its end, 1 one was given up, 2 bad input.
               help="Branches through all solutions at both ends and the middle.")  # fmt: skip
 @click.option("--max-points", type=click.IntRange(min=2), default=100_000, show_default=True,
               metavar="N", help="Points of a branch in each direction.")  # fmt: skip
-@click.option("--time-limit", type=float, metavar="SECONDS", help="For each direction.")
+@click.option("--time-limit", type=float, metavar="SECONDS", help="Stop after that time.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
               help="Replace a value of the case.")  # fmt: skip
 @click.option("-o", "--output", "folder", metavar="DIR",

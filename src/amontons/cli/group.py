@@ -6,9 +6,9 @@ from typing import Any
 
 import click
 
-from ..errors import AmontonsError
+from ..errors import AmontonsError, TimeUp
 
-BAD_INPUT, INTERRUPTED = 2, 130
+UNFINISHED, BAD_INPUT, INTERRUPTED = 1, 2, 130
 
 
 class Commands(click.Group):
@@ -18,6 +18,9 @@ class Commands(click.Group):
         """Run a command; a user's mistake becomes one message and exit code 2."""
         try:
             code = super().invoke(ctx)
+        except TimeUp as error:
+            click.echo(f"Not finished: {error}", err=True)
+            ctx.exit(UNFINISHED)
         except AmontonsError as error:
             click.echo(f"Error: {printable(str(error))}", err=True)
             ctx.exit(BAD_INPUT)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..cones import Tresca
+from ..dense import dense
 from ..errors import InvalidInput, SingularOperator
 from ..indefinite import negative_direction
 from ..nitsche_problem import NitscheProblem
@@ -109,8 +110,7 @@ def _delassus_facts(problem: FrictionProblem) -> dict[str, Any]:
     }
     m = local.W.shape[0]
     if m <= RANK_LIMIT:
-        dense = local.W if isinstance(local.W, np.ndarray) else local.W.toarray()
-        values = np.linalg.svd(dense, compute_uv=False)
+        values = np.linalg.svd(dense(local.W), compute_uv=False)
         rank = int((values > m * np.finfo(float).eps * values[0]).sum()) if values.size else 0
         facts["rank of W"] = f"{rank} of {m}"
     return facts

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +12,7 @@ import click
 from .. import api, output
 from ..analysis.certificates.uniqueness import Uniqueness, assess, quick_verdict
 from ..case import in_words
+from ..clock import Deadline, TimeLimit, compiling, now
 from ..errors import FileFormatError, InvalidInput, SingularOperator, UnsupportedForm
 from ..nitsche_problem import NO_MULTIPLIERS
 from ..results import ModelSolution
@@ -40,22 +40,25 @@ def run(
     )
     place = check_folder(f"{opened.name}-results" if folder is None else folder)
     check_writable(json_copy, "--json")
-    began = time.perf_counter()
+    began, compiled = now(), compiling()
+    deadline = Deadline.after(settings.time_limit)
     opened.solvable()
-    assembled = time.perf_counter() - began if opened.model is not None else 0.0
+    assembled = now() - began if opened.model is not None else 0.0
+    compiled = compiling() - compiled
     silent = quiet or json_copy == "-"
     try:
         found = api.solve_any_form(
             opened.target, settings.solver(), tolerance=settings.tolerance,
             contact_tolerance=settings.contact_tolerance,
-            max_iterations=settings.max_iterations, time_limit=settings.time_limit,
+            max_iterations=settings.max_iterations, time_limit=deadline,
             callback=(lambda step, iterate: None) if silent else None,
         )  # fmt: skip
     except (UnsupportedForm, SingularOperator, InvalidInput) as reason:
         text = f"{source}: --method {settings.method}: {in_words(str(reason))}"
         raise type(reason)(text) from reason
-    result = _output(opened, found, settings.method, assembled)
-    verdict = _verdict(found, full_verdict)
+    result = _output(opened, found, settings.method, assembled, compiled)
+    left = None if settings.time_limit is None else deadline
+    verdict = _verdict(found, full_verdict, left)
     if verdict is not None:
         result = replace(result, uniqueness=record(verdict))
     copy = None if json_copy in (None, "-") else Path(str(json_copy))
@@ -68,17 +71,21 @@ def run(
 
 
 def _output(
-    source: Source, found: FrictionSolution | ModelSolution, method: str, assembled: float
+    source: Source, found: FrictionSolution | ModelSolution, method: str, assembled: float,
+    compiled: float,
 ) -> output.Output:
     if isinstance(found, ModelSolution):
         return replace(
-            found.output, title=source.title, method=method, assemble_seconds=assembled
-        )
+            found.output, title=source.title, method=method, assemble_seconds=assembled,
+            assemble_compiling=compiled,
+        )  # fmt: skip
     return output.Output(found, title=source.title, method=method,
                          from_fclib=source.from_fclib, warnings=found.warnings)  # fmt: skip
 
 
-def _verdict(found: FrictionSolution | ModelSolution, full: bool) -> Uniqueness | None:
+def _verdict(
+    found: FrictionSolution | ModelSolution, full: bool, time_limit: TimeLimit
+) -> Uniqueness | None:
     """The verdict, or its cheap part; None where the problem is too large for that.
 
     None also for large deformations: that of the tangent problem would say little; and for
@@ -94,7 +101,8 @@ def _verdict(found: FrictionSolution | ModelSolution, full: bool) -> Uniqueness 
         return None
     solution = found.solution if isinstance(found, ModelSolution) else found
     if full:
-        return assess(solution.problem, solution if solution.converged else None)
+        known = solution if solution.converged else None
+        return assess(solution.problem, known, time_limit=time_limit)
     return quick_verdict(solution.problem)
 
 

@@ -21,12 +21,12 @@ UNSETTLED = 1  # exit code
 
 
 def run(
-    source: str, overrides: Sequence[str], mu: float | None, time_limit: float,
+    source: str, overrides: Sequence[str], mu: float | None, time_limit: float | None,
     json_copy: str | None,
 ) -> int:  # fmt: skip
     """Assess, show; the exit code."""
     check_writable(json_copy, "--json")
-    if not time_limit > 0:
+    if time_limit is not None and not time_limit > 0:
         raise InvalidInput(f"--time-limit: expected seconds > 0, got {time_limit}")
     opened = open_source(source, overrides)
     found = uniqueness(opened.target_with(mu), time_limit=time_limit)

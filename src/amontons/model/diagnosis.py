@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..clock import NEVER, Deadline
 from ..errors import SingularOperator
 from ..problem import FrictionProblem
 from ..solution import FrictionSolution, Outcome
@@ -34,14 +35,17 @@ def with_diagnosis(
     return replace(found, convergence=replace(record, detail=detail))
 
 
-def check_has_W(problem: FrictionProblem | Model, verb: str) -> None:
+def check_has_W(
+    problem: FrictionProblem | Model, verb: str, deadline: Deadline = NEVER
+) -> None:
     """Raise SingularOperator, naming the bodies, where contact alone holds one.
 
-    Then M is singular, and W = H^T M^-1 H, which `verb` works with, does not exist.
+    Then M is singular, and W = H^T M^-1 H, which `verb` works with, does not exist.  Raises
+    TimeUp where forming W takes longer than the deadline.
     """
     if isinstance(problem, FrictionProblem):
         try:
-            problem.condensed()
+            problem.condensed(deadline)
         except SingularOperator as reason:
             raise SingularOperator(f"{verb}: contact alone holds a body, {NO_W}") from reason
         return

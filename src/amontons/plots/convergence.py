@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from ..solution import ContactStatus, Convergence
+from ..solution import TELLING, ContactStatus, Convergence
 from .style import COLOURS, INK, stamp
 
 
@@ -26,7 +26,10 @@ def convergence_figure(record: Convergence, title: str = "") -> Figure:
     seconds = np.array([step.seconds for step in record.history])
     setup = float(seconds.min(initial=np.inf)) if len(seconds) else 0.0
     iterations = np.array([step.iteration for step in record.history])
-    time = f"seconds after the first iterate (set-up before: {setup:.2g} s)"
+    before = f"set-up before: {setup:.2g} s"
+    if record.compiling >= TELLING:
+        before += f"; {record.compiling:.2g} s of compiling not counted"
+    time = f"seconds after the first iterate ({before})"
     for axes, x, label in ((left, iterations, "iterations"), (right, seconds - setup, time)):
         last = x.max(initial=0.0) or 1.0  # a solve that ends where it starts
         axes.set(xlim=(-0.02 * last, 1.17 * last), ylim=(floor, ceiling), yscale="log")

@@ -152,7 +152,7 @@ class ActiveSet:
             return start
         zero = Iterate(np.zeros((coarse.problem.contacts, problem.dimension)))
         for k, found in enumerate(self.iterates(coarse.problem, zero, target)):
-            if found.change <= NESTED or k == MOST_NESTED or target.seconds_left < 0:
+            if found.change <= NESTED or k == MOST_NESTED or target.deadline.passed:
                 break
         return coarse.start(found)
 

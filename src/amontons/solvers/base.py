@@ -5,7 +5,6 @@ A solver never stops itself and never judges itself; the driver in `solve.py` do
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
@@ -13,6 +12,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..clock import NEVER, Deadline
 from ..errors import InvalidInput
 from ..problem import Form, FrictionProblem
 
@@ -39,12 +39,12 @@ class Target:
     """What the driver will ask for: a hint for stages that run inside one compiled call."""
 
     tolerance: float
-    deadline: float = np.inf  # time.perf_counter() at which the driver will stop
+    deadline: Deadline = NEVER  # at which the driver will stop
 
     @property
     def seconds_left(self) -> float:
-        """Time until the deadline."""
-        return self.deadline - time.perf_counter()
+        """Time until the deadline, 0 when it has passed."""
+        return self.deadline.left
 
 
 @dataclass
@@ -91,12 +91,6 @@ def check_positive(**fields: float) -> None:
     for name, value in fields.items():
         if not (value > 0 and np.isfinite(value)):
             raise InvalidInput(f"{name}: expected a positive number, got {value}")
-
-
-def check_seconds(time_limit: float) -> None:
-    """Raise InvalidInput unless a time limit is above zero; it may be infinite."""
-    if not time_limit > 0:
-        raise InvalidInput(f"time_limit: expected seconds > 0, got {time_limit}")
 
 
 def check_at_least(minimum: int, **fields: int) -> None:

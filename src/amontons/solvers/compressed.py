@@ -35,8 +35,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..blocks import spatial
+from ..clock import NEVER, Deadline
 from ..condensation import SOLVE_COLUMNS
-from ..global_matrices import DENSE_LIMIT
+from ..dense import DENSE_LIMIT
 from ..linear import Direct
 from ..linear.distributed import DistributedMatrix
 from ..problem import Form, FrictionProblem
@@ -69,7 +70,7 @@ class CompressedDelassus:
     ) -> Iterator[Iterate]:
         """Corrections from `start`; raises Breakdown when M is unsymmetric or W too large."""
         _check_fits(problem)
-        far = _FarField.of(problem, self)
+        far = _FarField.of(problem, self, target.deadline)
         compressed = far.problem()
         mixing = _Mixing(self.depth)
         r = start.r
@@ -128,14 +129,17 @@ class _FarField:
     random: np.random.Generator
     Z: Array
     Y: Array
+    deadline: Deadline
 
     @classmethod
-    def of(cls, problem: FrictionProblem, options: CompressedDelassus) -> _FarField:
+    def of(
+        cls, problem: FrictionProblem, options: CompressedDelassus, deadline: Deadline = NEVER
+    ) -> _FarField:
         """Factorise the slab and probe the far field once."""
-        near = _near_field(problem, options.layers)
+        near = _near_field(problem, options.layers, deadline)
         empty = np.empty((len(near), 0))
         random = np.random.default_rng(options.seed)
-        far = cls(problem, near, options, random, empty, empty)
+        far = cls(problem, near, options, random, empty, empty, deadline)
         far.extend()
         return far
 
@@ -151,7 +155,10 @@ class _FarField:
         Z = np.linalg.qr(np.column_stack([self.Z, Z]))[0][:, self.rank :]
         H = self.source.H
         assert H is not None
-        Y = H.T @ self.source.solve_M(H @ Z) - self.near @ Z
+        Y = -self.near @ Z
+        for part in self.source.matrices.column_parts(Z.shape[1]):
+            self.deadline.check()
+            Y[:, part] += H.T @ self.source.solve_M(H @ Z[:, part])
         self.Z, self.Y = np.column_stack([self.Z, Z]), np.column_stack([self.Y, Y])
 
     def problem(self) -> FrictionProblem:
@@ -166,7 +173,7 @@ class _FarField:
         )
 
 
-def _near_field(problem: FrictionProblem, layers: int) -> Array:
+def _near_field(problem: FrictionProblem, layers: int, deadline: Deadline) -> Array:
     """H_s^T M_s^-1 H_s with M_s the unknowns within `layers` couplings of the contact."""
     assert problem.M is not None and problem.H is not None
     H = sparse.csc_array(problem.H)
@@ -178,6 +185,7 @@ def _near_field(problem: FrictionProblem, layers: int) -> Array:
     m = H.shape[1]
     W = np.empty((m, m))
     for first in range(0, m, SOLVE_COLUMNS):
+        deadline.check()
         columns = Hs[:, first : first + SOLVE_COLUMNS].toarray()
         W[:, first : first + SOLVE_COLUMNS] = Hs.T @ slab.solve(columns)
     return 0.5 * (W + W.T)

@@ -95,7 +95,7 @@ class ContactMultigrid:
         for error in run.cycles(x):
             since += 1
             ready = error <= goal
-            if ready or since >= self.report or target.seconds_left < 0:
+            if ready or since >= self.report or target.deadline.passed:
                 yield Iterate(
                     run.contacts.r[:, : problem.dimension].copy(),
                     levels.displacement(x),

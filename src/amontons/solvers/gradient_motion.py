@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
+from ..dense import dense
 from ..errors import SingularOperator, UnsupportedForm
 from ..linear import Direct
 from ..problem import Form, FrictionProblem
@@ -218,7 +219,7 @@ class _Modes(_Identity):
     def _modes(self) -> tuple[Array, Array]:
         M = self.problem.M
         assert M is not None
-        return self.problem.kept("modes", lambda: np.linalg.eigh(M.toarray()))
+        return self.problem.kept("modes", lambda: np.linalg.eigh(dense(M, 2, "M")))
 
     @cached_property
     def _directions(self) -> Array:

@@ -88,7 +88,7 @@ def _run(
 ) -> Iterator[Iterate]:
     """Iterates of a solver, on the condensed problem if it needs the Delassus form."""
     if solver.form is Form.DELASSUS:
-        problem = problem.condensed()
+        problem = problem.condensed(target.deadline)
     elif solver.form is Form.GLOBAL and problem.form is Form.DELASSUS:
         raise InvalidInput(f"{type(solver).__name__}: the problem has no global form")
     return solver.iterates(problem, start, target)
@@ -119,7 +119,7 @@ class Auto:
             yield from _held_by_contact(problem, start, target, best)
         elif problem.condensing_is_cheap:
             yield from DeformablePortfolio(
-                problem.condensed(), target, spatial(start.r)
+                problem.condensed(target.deadline), target, spatial(start.r)
             ).stages()
         else:
             yield from self._on_meshes(problem, target, best)
@@ -130,7 +130,7 @@ class Auto:
         for solver in (CompressedDelassus(), SemismoothNewton()):
             yield from _watched(solver, problem, best[0], target, best)
         try:
-            condensed = problem.condensed()
+            condensed = problem.condensed(target.deadline)
         except InvalidInput as reason:
             raise Breakdown(str(reason)) from reason
         yield from DeformablePortfolio(condensed, target, spatial(best[0].r)).stages()

@@ -36,6 +36,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from ..blocks import velocity_inplace
+from ..clock import NEVER, Deadline
 from ..judge import natural_error
 from ..problem import Form, FrictionProblem
 from .base import Iterate, Target, check_at_least, check_positive
@@ -263,7 +264,7 @@ class InteriorPoint:
         d, goal = problem.dimension, target.tolerance * problem.q_norm
         data = sweep_data(problem, order=SweepOrder.APPROACH)
         while True:
-            count, r = self.relax(work, slip, goal)
+            count, r = self.relax(work, slip, goal, target.deadline)
             yield Iterate(r[:, :d].copy(), iterations=count, stage=STAGE)
             slip = sliding_speed(problem, r[:, :d])
             if self.sweeps:
@@ -273,7 +274,9 @@ class InteriorPoint:
                     memory.r[:, :d].copy(), iterations=count, stage=f"sweeps after {STAGE}"
                 )
 
-    def relax(self, work: Workspace, slip: Array, goal: float) -> tuple[int, Array]:
+    def relax(
+        self, work: Workspace, slip: Array, goal: float, deadline: Deadline = NEVER
+    ) -> tuple[int, Array]:
         """(steps, r) of the relaxation with frozen |u_T|, (nc,); goal: error, unit of u."""
         indptr, indices, data, q, mu, _, rho = work.problem.kernel_data
         size = work.problem.q_norm / math.sqrt(max(work.problem.contacts, 1))
@@ -282,7 +285,8 @@ class InteriorPoint:
         r = x / np.where(mu > 0, mu, 1.0)[:, None]
         steps = relax_inplace(
             indptr, indices, data, q, mu, rho, *work.symbolic.arrays,
-            r, x, y, np.where(mu > 0, slip, 0.0), self.shift, goal, self.steps,
+            r, x, y, np.where(mu > 0, slip, 0.0), self.shift, goal,
+            work.affordable(self.steps, deadline),
         )  # fmt: skip
         return max(steps, 1), r
 

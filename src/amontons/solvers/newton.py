@@ -33,6 +33,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
+from ..dense import dense
 from ..errors import InvalidInput, SingularOperator
 from ..linear import Direct, LinearSolver
 from ..nitsche_problem import NitscheProblem
@@ -276,7 +277,7 @@ def _sparse_step(A: Array, B: Array, W: sparse.csr_array, F: Array) -> Array:
 def _dense_step(A: Array, B: Array, W, F: Array) -> Array:
     """Solution of (A + B W) dr = -F; least squares when the matrix is singular."""
     nc, d = F.shape
-    full = W.toarray() if sparse.issparse(W) else W
+    full = dense(W)
     matrix = (B @ full.reshape(nc, d, nc * d)).reshape(nc * d, nc * d)
     own = matrix.reshape(nc, d, nc, d)
     own[np.arange(nc), :, np.arange(nc), :] += A

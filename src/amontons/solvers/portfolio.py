@@ -247,7 +247,9 @@ class Portfolio:
         x = self.r.copy()
         self.work.sweeps(x, 10)
         patience = Patience(25, mark=self.error)
-        for iterate in ProximalPoint(alpha=1e-2 * 0.1**round_).steps(self.work, x):
+        for iterate in ProximalPoint(alpha=1e-2 * 0.1**round_).steps(
+            self.work, x, self.target.deadline
+        ):
             self.budget += iterate.iterations * self.costs["newton"]
             yield self._offer(spatial(iterate.r), iterate.iterations, "proximal point")
             if patience.over(self.error):

@@ -34,6 +34,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from ..blocks import spatial
+from ..clock import NEVER, Deadline
 from ..cones import Tresca
 from ..errors import InvalidInput, UnsupportedForm
 from ..judge import PENETRATION, contact_residual, natural_error
@@ -44,6 +45,7 @@ from .sweeps import sweep_data, sweep_inplace
 
 Array = NDArray[np.float64]
 PINNED = 1e16  # relative stiffness that keeps r_T = 0 where mu = 0
+PRODUCT_SECONDS = 1e-8  # of a product of 3x3 blocks in a factor, on a slow core
 SMALLEST = 1e-18  # smoothing relative to |q|, far below rounding; smaller ones become denormal
 
 
@@ -284,6 +286,16 @@ class Workspace:
             )
         return cls(problem, Symbolic.of(problem))
 
+    @property
+    def step_seconds(self) -> float:
+        """Of a Newton step, roughly."""
+        return PRODUCT_SECONDS * (1 + self.symbolic.products)
+
+    def affordable(self, steps: int, deadline: Deadline) -> int:
+        """Steps of one compiled call that still fit before a deadline, one at least."""
+        left = deadline.left
+        return steps if math.isinf(left) else max(1, min(steps, int(left / self.step_seconds)))
+
     def newton(  # noqa: PLR0913
         self, x: Array, sigma: float, options: SmoothingNewton, *, goal: float, steps: int,
         alpha: float = 0.0, center: Array | None = None, patience: int = 10**9,
@@ -340,9 +352,11 @@ class ProximalPoint:
     ) -> Iterator[Iterate]:
         """Outer steps from `start`, for ever."""
         work = Workspace.of(problem)
-        yield from self.steps(work, spatial(start.r))
+        yield from self.steps(work, spatial(start.r), target.deadline)
 
-    def steps(self, work: Workspace, r: Array) -> Iterator[Iterate]:
+    def steps(
+        self, work: Workspace, r: Array, deadline: Deadline = NEVER
+    ) -> Iterator[Iterate]:
         """Outer steps from r, (nc, 3)."""
         d = work.problem.dimension
         root = math.sqrt(max(work.problem.contacts, 1))
@@ -352,7 +366,8 @@ class ProximalPoint:
             x = best.copy()
             count, _, _, found = work.newton(
                 x, sigma, self.inner, goal=self.inner_reduction * error,
-                steps=self.inner_steps, alpha=alpha, center=best.copy(),
+                steps=work.affordable(self.inner_steps, deadline), alpha=alpha,
+                center=best.copy(),
             )  # fmt: skip
             work.sweeps(found, self.sweeps)
             new = work.error(found)

@@ -35,6 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..clock import Deadline
 from ..cones import Coulomb, Law, project_disk, project_disk_jacobian
 from ..errors import InvalidInput, SingularOperator
 from ..linear import Direct, LinearSolver
@@ -99,7 +100,9 @@ class Uzawa:
             if self.inner_start is InnerStart.FIRST:
                 state = first
             try:
-                found, p, count = self._motion(system, springs, multiplier, state)
+                found, p, count = self._motion(
+                    system, springs, multiplier, state, target.deadline
+                )
             except Breakdown:  # softer springs close and stick more contacts
                 if self.growth == 1 or springs.softest:
                     raise
@@ -115,9 +118,13 @@ class Uzawa:
 
     @np.errstate(over="ignore", invalid="ignore")  # steps without a line search may run away
     def _motion(
-        self, system: System, springs: _Springs, multiplier: Array, state: State
-    ) -> tuple[State, Array, int]:
-        """The motion of a multiplier, its reactions p, and the Newton steps it took."""
+        self, system: System, springs: _Springs, multiplier: Array, state: State,
+        deadline: Deadline,
+    ) -> tuple[State, Array, int]:  # fmt: skip
+        """The motion of a multiplier, its reactions p, and the Newton steps it took.
+
+        Where time is up, what they have reached.
+        """
         values: list[float] = []
         for count in range(self.newton_steps + 1):
             p, B = springs.reaction(multiplier, state.u)
@@ -128,7 +135,7 @@ class Uzawa:
                 goal = REDUCTION * system.size(p - multiplier)
             else:
                 goal = self.newton_tolerance * system.load
-            if values[-1] <= goal or count == self.newton_steps:
+            if values[-1] <= goal or count == self.newton_steps or deadline.passed:
                 break
             step = system.step(state, p, B)
 

@@ -18,15 +18,14 @@ static and discrete friction problems", in [Rey] section 5.
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InvalidInput
+from ...clock import NEVER, Deadline, TimeLimit, deadline_of, now
+from ...errors import InvalidInput, TimeUp
 from ...problem import FrictionProblem
-from ...solvers.base import check_seconds
 from .determinant_search import NEGATIVE, POSITIVE, STICK, STOPPED, UNKNOWN
 from .energy_bound import energy_bound
 from .exact_threshold import LARGEST, Threshold, exact_threshold, search_windows
@@ -35,6 +34,8 @@ from .status_pieces import Pieces
 
 Array = NDArray[np.float64]
 ENUMERATED = 13  # contacts up to which all 4^n patterns are examined: 5 s
+SECONDS = 60.0  # whose work a search without a time limit may take
+WINDOWS = 0.2  # part of the time for windows of contacts
 COMPARED = 10  # contacts up to which the P-matrix threshold is computed: 5^n patterns
 DIRECT = 18  # contacts up to which the whole gap is tried at once
 PATIENCE = 0.75  # part of the time left for one attempt
@@ -91,32 +92,38 @@ class CriticalFriction:
 
 
 def critical_friction(
-    problem: FrictionProblem, *, gap: float = 1e-2, time_limit: float = 60.0,
+    problem: FrictionProblem, *, gap: float = 1e-2, time_limit: TimeLimit = None,
     first: float | None = None,
 ) -> CriticalFriction:  # fmt: skip
     """Bounds on the friction below which every load has exactly one solution.
 
-    gap: relative distance of the bounds that is good enough.  time_limit: seconds.  first: a
-    friction of interest, which is proved to be safe before others if it can be.  Raises
-    UnsupportedForm in 3D and under Tresca's law.
+    gap: relative distance of the bounds that is good enough.  time_limit: seconds; without it
+    operations are counted, as many as take about SECONDS.  first: a friction of interest, which
+    is proved to be safe before others if it can be.  Raises UnsupportedForm in 3D and under
+    Tresca's law.
     """
-    check_seconds(time_limit)
+    deadline = deadline_of(time_limit, SECONDS)
     if not 0 < gap < 1:
         raise InvalidInput(f"gap: expected a number between 0 and 1, got {gap!r}")
-    began = time.perf_counter()
-    pieces = Pieces.of(problem)
-    definite = energy_bound(pieces.W, pieces.shape)[0] > 0  # also where no contact reacts
+    began = now()
+    try:
+        pieces = Pieces.of(problem, deadline)
+        energy = energy_bound(pieces.W, pieces.shape, deadline)[0]
+    except TimeUp as reason:
+        return CriticalFriction(0.0, np.inf, "none", None, None, None, 0, now() - began,
+                                str(reason))  # fmt: skip
+    definite = energy > 0  # also where no contact reacts
     if definite and not pieces.couples:
         why = "no tangential force moves a contact along its normal"
         return CriticalFriction(np.inf, np.inf, "determinants", None, None, None, 0,
-                                time.perf_counter() - began, why)  # fmt: skip
-    search = _Search(pieces, began + time_limit, gap, first)
-    search.run(began + 0.2 * time_limit)
+                                now() - began, why)  # fmt: skip
+    search = _Search(pieces, deadline, energy, gap, first)
+    search.run()
     found = search.found
     witness = None if found.states is None else make_witness(pieces, found)
-    comparison = _comparison(pieces, found, began + time_limit)
+    comparison = _comparison(pieces, found, deadline)
     return CriticalFriction(found.lower, found.upper, search.criterion, witness, *comparison,
-                            found.seen, time.perf_counter() - began, search.reason,
+                            found.seen, now() - began, search.reason,
                             search.proof)  # fmt: skip
 
 
@@ -125,7 +132,8 @@ class _Search:
     """Upper bounds by windows, then a lower one by the strongest method that fits."""
 
     pieces: Pieces
-    deadline: float
+    deadline: Deadline
+    energy: float  # the bound of `energy_bound`
     gap: float
     first: float | None = None
     found: Threshold = field(default_factory=Threshold)
@@ -133,16 +141,16 @@ class _Search:
     reason: str = ""
     proof: tuple[Leaf, ...] = ()
 
-    def run(self, windows_until: float) -> None:
+    def run(self) -> None:
         """Close the bounds as far as time allows."""
         pieces, found = self.pieces, self.found
-        search_windows(pieces, found, windows_until)
+        search_windows(pieces, found, self.deadline.share(WINDOWS))
         if pieces.contacts <= ENUMERATED:
             exact_threshold(pieces, found, self.deadline)
             if found.proved:
                 self.criterion = "determinants"
                 return
-        found.lower = min(energy_bound(pieces.W, pieces.shape)[0], found.upper)
+        found.lower = min(self.energy, found.upper)
         if found.lower == 0:
             self.reason = "W is singular: reactions are not unique without friction either"
             return
@@ -161,13 +169,13 @@ class _Search:
         if n <= DIRECT:
             self._prove(min(found.upper, LARGEST) * (1 - self.gap / 2), 0.5)
         failed, part = 1.0, min(EASY / n, 0.9)
-        while time.perf_counter() < self.deadline:
+        while not self.deadline.passed:
             cap = min(found.upper, LARGEST)
             lower = found.lower / cap
             if lower >= 1 - self.gap or failed - lower < self.gap:
                 return
             part = lower + 0.5 * (failed - lower) if part <= lower else part
-            began = time.perf_counter()
+            began = self.deadline.time
             sign = self._prove(cap * part, PATIENCE)
             if sign == UNKNOWN:
                 return
@@ -181,8 +189,8 @@ class _Search:
 
         POSITIVE, NEGATIVE with a smaller upper bound, STOPPED, or UNKNOWN within rounding.
         """
-        found, now = self.found, time.perf_counter()
-        branching = Branching(self.pieces, t, now + share * (self.deadline - now))
+        found = self.found
+        branching = Branching(self.pieces, t, self.deadline.share(share))
         sign = branching.run()
         found.seen += branching.patterns + branching.inequalities
         if sign == POSITIVE:
@@ -197,8 +205,7 @@ class _Search:
 
     def _next(self, part: float, failed: float, began: float) -> float:
         """The next part of the upper bound to prove: further on where the last one was easy."""
-        now = time.perf_counter()
-        spent, left = now - began, self.deadline - now
+        spent, left = self.deadline.time - began, self.deadline.left
         further = part + (0.35 if spent < 0.03 * left else 0.2) * (1 - part)
         if failed < 1:
             further = min(further, 0.5 * (part + failed))
@@ -229,7 +236,7 @@ def make_witness(pieces: Pieces, found: Threshold) -> Witness:
 
 # ----------------------------------------------------------- the older criteria
 def _comparison(
-    pieces: Pieces, found: Threshold, deadline: float
+    pieces: Pieces, found: Threshold, deadline: Deadline
 ) -> tuple[float | None, float | None]:
     """(P-matrix threshold, full contact threshold), None where they would take too long."""
     p_matrix = None
@@ -241,7 +248,7 @@ def _comparison(
     return p_matrix, full
 
 
-def full_contact_threshold(pieces: Pieces, deadline: float = np.inf) -> float | None:
+def full_contact_threshold(pieces: Pieces, deadline: Deadline = NEVER) -> float | None:
     """Smallest t at which a pattern without free contacts is singular; not a safe friction.
 
     In terms of u = 0 off the slipping tangents, such a piece reads (K u)_T = m (K u)_N with

@@ -14,18 +14,26 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cholesky, solve_triangular
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
+from ...clock import NEVER, Deadline
 from ..multipliers.rounding import EPSILON, is_positive_definite, unit_scale
 
 Array = NDArray[np.float64]
 POWERS = (0.0, 0.5, 1.0)  # of |W_ii|, to which alpha is proportional
+EXACT = 400  # rows up to which norms come from all singular values
+ESTIMATED = 3.0  # operations of the estimate per cube of the rows, without its norms
+PROVED = 4.0  # the same of a proof
 
 
-def energy_bound(W: Array, shape: Array) -> tuple[float, Array]:
+def energy_bound(
+    W: Array, shape: Array, deadline: Deadline = NEVER
+) -> tuple[float, Array]:
     """(t, alpha (k,)): at friction t shape every load has one solution; t = 0 is no bound.
 
     W (k d, k d), shape (k,).  Proved in spite of rounding, for W as given.  Contacts that can
-    not react, with W_ii = 0, are left out; their alpha is 1.
+    not react, with W_ii = 0, are left out; their alpha is 1.  Takes some len(W)^3 operations;
+    raises TimeUp where the deadline is nearer than that.
     """
     k = len(shape)
     d = len(W) // max(k, 1)
@@ -36,40 +44,54 @@ def energy_bound(W: Array, shape: Array) -> tuple[float, Array]:
         return np.inf, np.ones(k)
     rows = np.flatnonzero(np.repeat(able, d))
     W, shape, size = W[np.ix_(rows, rows)], shape[able], size[able]
+    deadline.pay(ESTIMATED * len(W) ** 3)
     try:
         root = cholesky((W + W.T) / 2, lower=True)
     except LinAlgError:
         return 0.0, np.ones(k)
     to_energy = solve_triangular(root, np.eye(len(W)), lower=True)
+    normal, tangent = _directions(W, shape)
+    A, B = to_energy[:, normal], W[tangent] @ to_energy.T
     best, chosen = 0.0, np.ones(len(size))
     for power in POWERS:
-        t, alpha = _estimate(W, shape, to_energy, (size / size.max()) ** power)
+        t, alpha = _estimate(A, B, shape, (size / size.max()) ** power)
         if t > best:
             best, chosen = t, alpha
     whole = np.ones(k)
     whole[able] = chosen
-    for room in (1e-9, 1e-6, 1e-3, 1e-1):
-        if best > 0 and _holds(W, shape, best * (1 - room), chosen):
+    for room in (1e-9, 1e-6, 1e-3, 1e-1) if best > 0 else ():
+        deadline.pay(PROVED * len(W) ** 3)
+        if _holds(W, shape, best * (1 - room), chosen):
             return best * (1 - room), whole
     return 0.0, whole
 
 
-def _estimate(W: Array, shape: Array, to_energy: Array, relative: Array) -> tuple[float, Array]:
+def _estimate(A: Array, B: Array, shape: Array, relative: Array) -> tuple[float, Array]:
     """(t, alpha) with alpha in the given proportions, not proved.
 
-    W = 1 in the coordinates y = L^T r of its Cholesky factor L.
+    A^T, B: r_N and u_T in the coordinates y = L^T r of the Cholesky factor L of W, where W = 1.
     """
-    normal, tangent = _directions(W, shape)
-    weight = np.sqrt(shape * relative)
-    A = to_energy[:, normal] * weight
-    other = np.repeat(np.sqrt(shape / relative), len(tangent) // len(normal))
-    B = (W[tangent] @ to_energy.T) * other[:, None]
-    size_a, size_b = np.linalg.norm(A, 2) ** 2, np.linalg.norm(B, 2) ** 2
+    A = A * np.sqrt(shape * relative)
+    B = B * np.repeat(np.sqrt(shape / relative), len(B) // len(shape))[:, None]
+    size_a, size_b = _norm(A) ** 2, _norm(B) ** 2
     if not (size_a > 0 and size_b > 0):
         return 0.0, relative
     alpha = float(np.sqrt(size_b / size_a))
-    largest = float(np.linalg.norm(np.vstack([A.T * np.sqrt(alpha), B / np.sqrt(alpha)]), 2))
+    largest = _norm(np.vstack([A.T * np.sqrt(alpha), B / np.sqrt(alpha)]))
     return 2 / largest**2, alpha * relative
+
+
+def _norm(A: Array) -> float:
+    """|A|_2, of a large matrix by Lanczos' method; where that fails an upper bound."""
+    if min(A.shape) <= EXACT:
+        return float(np.linalg.norm(A, 2))
+    n = A.shape[1]
+    square = LinearOperator((n, n), matvec=lambda x: A.T @ (A @ x), dtype=float)
+    start = np.cos(np.arange(n) + 0.5)
+    try:
+        return float(np.sqrt(eigsh(square, 1, v0=start, return_eigenvectors=False)[0]))
+    except ArpackNoConvergence:
+        return float(np.linalg.norm(A))
 
 
 def _directions(W: Array, shape: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

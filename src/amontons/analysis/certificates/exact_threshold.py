@@ -7,12 +7,12 @@ of contacts, the others held in the statuses of the best pattern, find the upper
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...clock import NEVER, Deadline
 from . import determinant_search as search
 from .determinant_search import FREE, NEGATIVE, POSITIVE, STOPPED, UNKNOWN
 from .status_pieces import Pieces, States
@@ -21,8 +21,10 @@ Array = NDArray[np.float64]
 LARGEST = 1e4  # friction up to which a threshold is looked for
 CLOSE = 1e-6  # distance of lower and upper bound, relative
 WINDOW = 7  # contacts of a window: 4^7 patterns take about a millisecond
+WINDOW_WORK = 2e6  # operations of preparing a window
 STRIDES = (1, 2, 3, 4, 6)  # of the contacts of a window, by how strongly they are coupled
-PATTERNS = 2_000_000  # between two looks at the clock
+PATTERNS = 500_000  # between two looks at the clock
+PIVOT = 500.0  # operations that a pivot counts for, with its share of Schur complements
 
 
 @dataclass(eq=False)
@@ -50,7 +52,7 @@ class Threshold:
 
 
 def exact_threshold(
-    pieces: Pieces, threshold: Threshold, deadline: float,
+    pieces: Pieces, threshold: Threshold, deadline: Deadline,
     allowed: NDArray[np.bool_] | None = None,
 ) -> None:  # fmt: skip
     """Close the bounds of `threshold` by all patterns, as far as time allows.
@@ -75,7 +77,7 @@ def exact_threshold(
 
 
 def _below(
-    pieces: Pieces, threshold: Threshold, allowed: NDArray[np.bool_], deadline: float
+    pieces: Pieces, threshold: Threshold, allowed: NDArray[np.bool_], deadline: Deadline
 ) -> None:
     """A lower bound where rounding hides the signs just below the threshold."""
     for gap in (1e-5, 1e-4, 1e-3, 1e-2, 1e-1):
@@ -89,13 +91,13 @@ def _below(
 
 
 def first_failure(
-    W: Array, m: Array, allowed: NDArray[np.bool_], deadline: float = np.inf,
+    W: Array, m: Array, allowed: NDArray[np.bool_], deadline: Deadline = NEVER,
     rounding: Array | float = 0.0,
 ) -> tuple[int, States, int]:  # fmt: skip
     """(sign, pattern of the first contacts, pivots seen) of the first pivot that is not > 0.
 
     The sign is NEGATIVE or UNKNOWN (within rounding of zero); POSITIVE where all patterns pass,
-    STOPPED at the deadline (time.perf_counter).  rounding: of the entries of W.
+    STOPPED at the deadline.  rounding: of the entries of W.
     """
     n = len(m)
     if n == 0:
@@ -110,12 +112,13 @@ def first_failure(
             m, allowed, S, B, work, turn, states, level, PATTERNS
         )
         total += seen
-        if sign != STOPPED or time.perf_counter() > deadline:
+        deadline.spend(PIVOT * seen)
+        if sign != STOPPED or deadline.passed:
             return sign, states[: level + 1].copy(), total
 
 
 # ------------------------------------------------------------- upper bounds from windows
-def search_windows(pieces: Pieces, threshold: Threshold, deadline: float) -> None:
+def search_windows(pieces: Pieces, threshold: Threshold, deadline: Deadline) -> None:
     """Lower the upper bound by all patterns of windows of contacts, until none helps.
 
     A window is a contact with its nearest others, or every second one of them and so on: some
@@ -130,27 +133,29 @@ def search_windows(pieces: Pieces, threshold: Threshold, deadline: float) -> Non
     while idle < len(windows):
         for window in windows:
             idle += 1
-            while _improve(pieces, threshold, base, window):
+            while _improve(pieces, threshold, base, window, deadline):
                 assert threshold.states is not None
                 base, idle = threshold.states, 0
-                if time.perf_counter() > deadline:
+                if deadline.passed:
                     return
-            if idle >= len(windows) or time.perf_counter() > deadline:
+            if idle >= len(windows) or deadline.passed:
                 return
 
 
 def _improve(
-    pieces: Pieces, threshold: Threshold, base: States, window: NDArray[np.int64]
-) -> bool:
+    pieces: Pieces, threshold: Threshold, base: States, window: NDArray[np.int64],
+    deadline: Deadline,
+) -> bool:  # fmt: skip
     """Look for a singular pattern below the upper bound that differs from base in a window."""
     t = min(threshold.upper * (1 - CLOSE), LARGEST)
     outside = base.copy()
     outside[window] = FREE
+    deadline.spend(WINDOW_WORK + float((outside != FREE).sum() * 2) ** 3)
     S = remaining(pieces, outside, window, t)
     if S is None:
         return threshold.take(pieces, outside)
     allowed = pieces.allowed()[window]
-    sign, found, seen = first_failure(S, t * pieces.shape[window], allowed)
+    sign, found, seen = first_failure(S, t * pieces.shape[window], allowed, deadline)
     threshold.seen += seen
     if sign not in (NEGATIVE, UNKNOWN):
         return False

@@ -9,13 +9,13 @@ of a contact are tried for the others first.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...clock import Deadline
 from .determinant_search import FREE, POSITIVE, SLIP_MINUS, SLIP_PLUS, STICK, STOPPED, eliminate
 from .exact_threshold import first_failure
 from .pair_multipliers import FEW, PairMultipliers, find_pair_multipliers, proves
@@ -72,14 +72,14 @@ class Rest:
 
 @dataclass(eq=False)
 class Branching:
-    """Branch and bound at friction t shape until `deadline` (time.perf_counter).
+    """Branch and bound at friction t shape until `deadline`.
 
     sign: POSITIVE when proved, NEGATIVE or UNKNOWN with the pattern that failed, STOPPED.
     """
 
     pieces: Pieces
     t: float
-    deadline: float
+    deadline: Deadline
     leaves: list[Leaf] = field(default_factory=list)
     inequalities: int = 0
     patterns: int = 0
@@ -97,9 +97,10 @@ class Branching:
     def _examine(self, rest: Rest) -> int:
         if len(rest.contacts) <= ENUMERATED:
             return self._enumerate(rest)
-        if time.perf_counter() > self.deadline:
+        if self.deadline.passed:
             return STOPPED
         for multipliers in self.known.get(tuple(rest.contacts), []):
+            self.deadline.spend(10.0 * (4 * len(rest.contacts)) ** 3)
             if proves(multipliers, rest.S, rest.rounding):
                 return self._leave(rest, multipliers)
         found, weights = self._multipliers(rest)
@@ -111,10 +112,10 @@ class Branching:
         return self._branch(rest, weights)
 
     def _multipliers(self, rest: Rest) -> tuple[PairMultipliers | None, Array]:
-        left = max(self.deadline - time.perf_counter(), 1e-3)
         self.inequalities += 1
         return find_pair_multipliers(rest.S, rest.rounding, self.m[rest.contacts],
-                                     time_limit=left, undecided=rest.undecided)  # fmt: skip
+                                     time_limit=self.deadline,
+                                     undecided=rest.undecided)  # fmt: skip
 
     def _leave(self, rest: Rest, multipliers: PairMultipliers | None) -> int:
         left = tuple(int(i) for i in rest.contacts)
@@ -163,6 +164,7 @@ class Branching:
         others = np.delete(rest.contacts, p)
         for state in np.array([FREE, SLIP_PLUS, SLIP_MINUS, STICK])[order]:
             if self.allowed[contact, state]:
+                self.deadline.spend(50.0 * (2 * k) ** 2)
                 sign, T, C = eliminate(S, rounding, state, self.m[contact])
                 yield int(state), sign, Rest(
                     others, T, C, (*rest.decided, contact), (*rest.states, int(state)),

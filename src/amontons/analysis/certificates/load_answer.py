@@ -8,13 +8,14 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InvalidInput
+from ...clock import now
+from ...errors import InvalidInput, TimeUp
 from ...problem import FrictionProblem
 from ...solution import FrictionSolution
-from ...solvers.base import check_seconds
 from ..solutions.enumerate import PieceSolution
 
 Array = NDArray[np.float64]
+SECONDS = 60.0  # whose work a certificate without a time limit may take
 
 
 class LoadOutcome(Enum):
@@ -62,15 +63,20 @@ class LoadCertificate:
 
 
 def reactions_of(
-    problem: FrictionProblem, solution: FrictionSolution | PieceSolution, time_limit: float
+    problem: FrictionProblem, solution: FrictionSolution | PieceSolution
 ) -> Array:
     """Reactions (nc, d) of a solution under Coulomb's law; raises for what can not be meant."""
-    check_seconds(time_limit)
     _ = problem.mu
     r, shape = np.asarray(solution.r), (problem.contacts, problem.dimension)
     if r.shape != shape:
         raise InvalidInput(f"solution: expected reactions {shape}, got {r.shape}")
     return r
+
+
+def stopped(r: Array, reason: TimeUp, began: float) -> LoadCertificate:
+    """The answer where time was up before the search began."""
+    return LoadCertificate(LoadOutcome.UNDECIDED, None, (), r, np.inf, 0, str(reason),
+                           now() - began)  # fmt: skip
 
 
 def without_search(local: FrictionProblem) -> tuple[LoadOutcome, str] | None:

@@ -21,20 +21,22 @@ and optimization", thesis, Caltech (2000), chapter 5 (copositive matrices).
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 from numpy.typing import NDArray
 
+from ...clock import Deadline, TimeLimit, deadline_of, now
+from ...errors import TimeUp
 from ...problem import FrictionProblem
 from ...solution import FrictionSolution
 from ..solutions.enumerate import PieceSolution
 from .load_answer import (
+    SECONDS,
     LoadBranch,
     LoadCertificate,
     LoadOutcome,
     proved_on,
     reactions_of,
+    stopped,
     without_search,
 )
 from .load_certificate_discs import certify_load_discs
@@ -45,48 +47,61 @@ from .load_problem import LoadProblem, States, word
 from .load_proof import BranchProof
 
 Array = NDArray[np.float64]
+PREPARED = 20.0  # operations of preparing an inequality per cube of the reactions
+FINDING = 0.2  # share of the time left that goes into looking for another solution
 
 
 def certify_load(
     problem: FrictionProblem, solution: FrictionSolution | PieceSolution, *,
-    time_limit: float = 60.0,
+    time_limit: TimeLimit = None,
 ) -> LoadCertificate:  # fmt: skip
     """Certificate that a Coulomb problem has no solution but the given one, or another one.
 
-    time_limit: seconds, after which the answer is undecided.  The global form is condensed.
-    In 3D see `load_certificate_discs`.  Raises UnsupportedForm under Tresca's law, InvalidInput
-    where `solution` does not solve the problem.
+    time_limit: seconds, after which the answer is undecided; without it operations are counted,
+    as many as take about SECONDS.  The global form is condensed.  In 3D see
+    `load_certificate_discs`.  Raises UnsupportedForm under Tresca's law, InvalidInput where
+    `solution` does not solve the problem.
     """
     if problem.dimension == 3:
         return certify_load_discs(problem, solution, time_limit=time_limit)
-    r = reactions_of(problem, solution, time_limit)
-    return _Search(LoadProblem.of(problem), r, time_limit).run()
+    deadline, began = deadline_of(time_limit, SECONDS), now()
+    r = reactions_of(problem, solution)
+    try:
+        local = LoadProblem.of(problem, deadline)
+    except TimeUp as reason:
+        return stopped(r, reason, began)
+    return _Search(local, r, deadline, began).run()
 
 
 class _Search:
     """Branches that are not proved yet, and what was found on the way."""
 
-    def __init__(self, local: LoadProblem, r: Array, time_limit: float) -> None:
-        self.local, self.began, self.limit = local, time.perf_counter(), time_limit
+    def __init__(
+        self, local: LoadProblem, r: Array, deadline: Deadline, began: float
+    ) -> None:
+        self.local, self.began, self.deadline = local, began, deadline
         self.known = refined(local, r.ravel() / local.to_r)
         self.size = max(1.0, float(np.abs(self.known.r).max(initial=0.0)))
         self.proofs: list[BranchProof] = []
         self.examined = 0
 
-    @property
-    def left(self) -> float:
-        """Seconds until the time limit, at least a little."""
-        return max(self.limit - (time.perf_counter() - self.began), 1e-3)
-
     def run(self) -> LoadCertificate:
-        """Root, other solutions, branches."""
+        """Root, other solutions, branches, as far as time allows."""
+        try:
+            return self._run()
+        except TimeUp as reason:
+            return self._answer(LoadOutcome.UNDECIDED, str(reason))
+
+    def _run(self) -> LoadCertificate:
         if at_once := without_search(self.local.problem):
             return self._answer(*at_once)
         failure = self._prove(self.local.root_branch)
         if failure is None:
             return self._certified()
         self.other = OtherSolutions(self.local, self.known)
-        found = self.other.near(failure, self.left) or self.other.far(0.2 * self.left)
+        found = self.other.near(failure, self.deadline) or self.other.far(
+            self.deadline.share(FINDING)
+        )
         if found:
             return self._refuted(found)
         if reason := too_many(self.local):
@@ -103,15 +118,14 @@ class _Search:
                 undecided += 1
                 continue
             for child in self.local.children(failure.branch, contact):
-                if time.perf_counter() - self.began > self.limit:
-                    reason = (
-                        f"stopped after {self.limit:.2g} s with {len(stack) + 1} branches left"
-                    )
+                if self.deadline.passed:
+                    left = f"{len(stack) + 1} branches left"
+                    reason = f"stopped after {self.deadline} with {left}"
                     return self._answer(LoadOutcome.UNDECIDED, reason)
                 following = self._prove(child)
                 if following is None:
                     continue
-                found = self.other.near(following, self.left)
+                found = self.other.near(following, self.deadline)
                 if found:
                     return self._refuted(found)
                 stack.append(following)
@@ -122,10 +136,11 @@ class _Search:
 
     def _prove(self, branch: States) -> Failure | None:
         """None where a branch is proved, which is kept."""
+        self.deadline.pay(PREPARED * (2.0 * self.local.contacts) ** 3)
         self.examined += 1
         known = self.known if contains(self.local, branch, self.known) else None
         inequality = Inequality(self.local, branch, known)
-        proof = inequality.solve(NEAR * self.size, self.left)
+        proof = inequality.solve(NEAR * self.size, self.deadline)
         if isinstance(proof, Failure):
             return proof
         self.proofs.append(proof)
@@ -147,7 +162,7 @@ class _Search:
         r0 = (self.known.r * self.local.to_r).reshape(-1, 2)
         return LoadCertificate(
             outcome, other, branches, r0, distance if certified else np.inf, self.examined,
-            reason, time.perf_counter() - self.began,
+            reason, now() - self.began,
         )  # fmt: skip
 
     def _branch(self, proof: BranchProof) -> LoadBranch:

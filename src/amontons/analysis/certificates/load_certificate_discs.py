@@ -8,12 +8,11 @@ found or all are closed.  Solutions within 1e-7 (scaled) of each other count as 
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InvalidInput
+from ...clock import Deadline, TimeLimit, deadline_of, now
+from ...errors import InvalidInput, TimeUp
 from ...problem import FrictionProblem
 from ...solution import FrictionSolution
 from ..solutions.disc_search import DiscSearch
@@ -22,58 +21,77 @@ from ..solutions.enumerate import PieceSolution
 from ..solutions.multistart import Finder, described
 from ..solutions.newton_batch import Stack
 from .load_answer import (
+    SECONDS,
     LoadCertificate,
     LoadOutcome,
     proved_on,
     reactions_of,
+    stopped,
     without_search,
 )
 from .load_known import not_a_solution
 
 Array = NDArray[np.float64]
 TOLERANCE = 1e-8  # error by the judge of a solution
-FINDING = 0.2  # share of the time that may go into looking for another solution
+POLISHED = 10.0  # operations of refining the solution per cube of the reactions
+FINDING = 0.2  # share of the time left that may go into looking for another solution
 
 
 def certify_load_discs(
     problem: FrictionProblem, solution: FrictionSolution | PieceSolution, *,
-    time_limit: float = 60.0,
+    time_limit: TimeLimit = None,
 ) -> LoadCertificate:  # fmt: skip
     """Certificate that a 3D Coulomb problem has no solution but the given one, or another one.
 
-    time_limit: seconds, after which the answer is undecided.  The branches of the certificate
-    are of the type `DiscBox`.  The global form is condensed.  Raises UnsupportedForm under
+    time_limit: seconds, after which the answer is undecided; without it operations are counted,
+    as many as take about SECONDS.  The branches of the certificate are of the type `DiscBox`.
+     The global form is condensed.  Raises UnsupportedForm under
     Tresca's law, InvalidInput where `solution` does not solve the problem.
     """
-    r = reactions_of(problem, solution, time_limit)
-    return _Certification(problem.condensed(), r, time_limit).run()
+    deadline, began = deadline_of(time_limit, SECONDS), now()
+    r = reactions_of(problem, solution)
+    try:
+        local = problem.condensed(deadline)
+    except TimeUp as reason:
+        return stopped(r, reason, began)
+    return _Certification(local, r, deadline, began).run()
 
 
 class _Certification:
     """The search of one certificate."""
 
-    def __init__(self, local: FrictionProblem, r: Array, time_limit: float) -> None:
-        self.began, self.limit, self.local, self.r = time.perf_counter(), time_limit, local, r
+    def __init__(
+        self, local: FrictionProblem, r: Array, deadline: Deadline, began: float
+    ) -> None:
+        self.began, self.deadline, self.local, self.r = began, deadline, local, r
         self.examined = 0
         self.search: DiscSearch | None = None
 
     def run(self) -> LoadCertificate:
-        """Root, other solutions, regions."""
+        """Root, other solutions, regions, as far as time allows."""
+        try:
+            return self._run()
+        except TimeUp as reason:
+            return self._answer(LoadOutcome.UNDECIDED, str(reason))
+
+    def _run(self) -> LoadCertificate:
         if at_once := without_search(self.local):
             return self._answer(*at_once)
+        self.deadline.pay(POLISHED * (3.0 * self.local.contacts) ** 3)
         stack = Stack.of(self.local)
         r, _ = stack.polished(self.r / stack.to_r)
         finder = Finder(stack, np.random.default_rng(0), TOLERANCE)
         near = np.abs(r - self.r / stack.to_r).max() <= 1e-4 * (1 + np.abs(r).max())
         if not near or not finder.add(r):
             raise not_a_solution(self.local, self.r)
-        search = self.search = DiscSearch(stack, finder, self.began + self.limit)
+        search = self.search = DiscSearch(stack, finder, self.deadline)
         self.r = r * stack.to_r
         if not search.queue:
             raise InvalidInput("solution: a contact that can not react penetrates")
-        search.step()
+        if search.affords_step:
+            search.step()
         if not search.complete:
-            search.begin(self.began + FINDING * self.limit)
+            search.begin(self.deadline.share(FINDING))
             search.run(most_solutions=2)
         others = [other for other in finder.found if np.abs(other - finder.found[0]).max() > ON]
         if others:
@@ -83,7 +101,7 @@ class _Certification:
         if search.complete:
             reason = proved_on(len(search.proofs) + len(search.linear))
             return self._answer(LoadOutcome.CERTIFIED, reason)
-        return self._answer(LoadOutcome.UNDECIDED, search.reason(self.limit))
+        return self._answer(LoadOutcome.UNDECIDED, search.reason)
 
     def _answer(
         self, outcome: LoadOutcome, reason: str, other: PieceSolution | None = None
@@ -93,5 +111,5 @@ class _Certification:
         examined = 0 if self.search is None else self.search.examined
         return LoadCertificate(
             outcome, other, () if proof is None else proof.boxes, self.r,
-            ON if certified else np.inf, examined, reason, time.perf_counter() - self.began,
+            ON if certified else np.inf, examined, reason, now() - self.began,
         )  # fmt: skip

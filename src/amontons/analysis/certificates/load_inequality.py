@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...clock import Deadline
 from ..multipliers.multiplier_lmi import (
     SMALLEST,
     LmiOutcome,
@@ -76,7 +77,7 @@ class Inequality:
             and bool((self.branch == UNDECIDED).all())
         )
 
-    def solve(self, near: float, time_limit: float) -> BranchProof | Failure:
+    def solve(self, near: float, deadline: Deadline) -> BranchProof | Failure:
         """Its proof with a distance <= near, or where it fails."""
         if not self.Z.shape[1]:  # nothing moves: any multipliers will do
             W = self._whole_identity()
@@ -95,15 +96,15 @@ class Inequality:
             proofs.append(proof)
             return True
 
-        share = 1.0 if too_many(self.local) else 0.5
+        share = deadline if too_many(self.local) else deadline.share(0.5)
         if self.large and shared_multipliers(
-            self.local, self.branch, self.groups, accept, time_limit=share * time_limit
+            self.local, self.branch, self.groups, accept, deadline=share
         ):
             return proofs[-1]
         if too_many(self.local):
             return self._failure(np.zeros(self.Z.shape[1]), self._whole_identity())
         answer = find_multipliers(
-            self.Z, [g.turned for g in self.groups], accept=accept, time_limit=time_limit,
+            self.Z, [g.turned for g in self.groups], accept=accept, time_limit=deadline,
             smallest=HOPELESS if self.divisible else SMALLEST,
         )  # fmt: skip
         if answer.outcome is LmiOutcome.FOUND:

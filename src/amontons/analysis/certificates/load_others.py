@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 from numpy.typing import NDArray
 
+from ...clock import RATE, Deadline
 from ..solutions.enumerate import PieceSolution
 from ..solutions.multistart import Finder, certain_error, described
 from ..solutions.newton_batch import Stack
@@ -16,7 +15,7 @@ from .load_problem import LoadProblem
 
 Array = NDArray[np.float64]
 STARTS = 60  # of Newton's method once the first inequality has no multipliers
-STEP_WORK, RATE = 30.0, 1e10  # operations of a start per (2 nc)^3, and per second
+STEP_WORK = 30.0  # operations of a start per (2 nc)^3
 TOLERANCE = 1e-8  # error by the judge of another solution
 EXACT = 1e-12  # error of solutions that fill a segment
 DISTINCT = 1e-6  # scaled distance of two solutions that count as different
@@ -32,14 +31,14 @@ class OtherSolutions:
         self.size = DISTINCT * (1 + np.abs(self.known).max(initial=0.0))
 
     @property
-    def seconds(self) -> float:
-        """Of Newton's method from one start, at most and roughly."""
-        return STEP_WORK * self.stack.W.shape[0] ** 3 / RATE
+    def work(self) -> float:
+        """Operations of Newton's method from one start, at most and roughly."""
+        return STEP_WORK * self.stack.W.shape[0] ** 3
 
-    def near(self, failure: Failure, seconds: float) -> PieceSolution | None:
+    def near(self, failure: Failure, deadline: Deadline) -> PieceSolution | None:
         """From where an inequality fails: along d, or at z / tau."""
         z = failure.direction
-        if 4 * self.seconds > seconds or not z.any():
+        if not deadline.affords(4 * self.work) or not z.any():
             return None
         if z.shape[1] == 5:
             tau = z[0, 4]
@@ -48,19 +47,19 @@ class OtherSolutions:
             length = np.abs(z[:, :2]).max(initial=0.0)
             steps = np.array([-3.0, -0.3, 0.3, 3.0])[:, None, None]
             starts = self.known + steps * z[:, :2] / (length or 1.0)
-        return self._first(self.stack.newton(starts, self.random))
+        return self._first(self.stack.newton(starts, self.random, deadline=deadline))
 
-    def far(self, seconds: float) -> PieceSolution | None:
+    def far(self, deadline: Deadline) -> PieceSolution | None:
         """From many starts."""
-        began, finder = time.perf_counter(), Finder(self.stack, self.random, TOLERANCE)
-        finder.add(self.known)
-        if 2 * self.seconds > seconds:
+        if not deadline.affords(2 * self.work):
             return None
-        each = int(np.clip(0.2 / self.seconds, 2, STARTS))
+        finder = Finder(self.stack, self.random, TOLERANCE)
+        finder.add(self.known)
+        each = int(np.clip(0.2 * RATE / self.work, 2, STARTS))
         for _ in range(0, STARTS, each):
-            finder.search(each)
+            finder.search(each, deadline)
             found = self._first(np.array(finder.found).reshape(-1, *self.known.shape))
-            if found or time.perf_counter() - began > seconds:
+            if found or deadline.passed:
                 return found
         return None
 

@@ -20,6 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg, sparse
 
+from ...clock import NEVER, Deadline
+from ...dense import dense
 from ...problem import FrictionProblem
 from ..multipliers.scales import contact_sizes, load_size
 
@@ -51,12 +53,12 @@ class LoadProblem:
     reacts: NDArray[np.bool_]  # contacts with W_ii > 0
 
     @classmethod
-    def of(cls, problem: FrictionProblem) -> LoadProblem:
+    def of(cls, problem: FrictionProblem, deadline: Deadline = NEVER) -> LoadProblem:
         """The condensed problem, scaled."""
-        local = problem.condensed()
+        local = problem.condensed(deadline)
         nc = local.contacts
         assert local.W is not None and local.q is not None
-        W = local.W if isinstance(local.W, np.ndarray) else local.W.toarray()
+        W = dense(local.W, 6)
         size, reacts = contact_sizes(W, nc)
         root = np.repeat(_power_of_two(np.sqrt(size)), 2)
         q = local.q.ravel() / root

@@ -9,7 +9,6 @@ whole is proved positive definite as always (`load_proof`), so nothing is lost b
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from scipy import linalg, sparse
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
+from ...clock import Deadline
 from ..multipliers.multiplier_lmi import Accept, LmiOutcome, find_multipliers
 from ..multipliers.multiplier_program import Family
 from .load_groups import Group, whole
@@ -28,15 +28,19 @@ Index = NDArray[np.int64]
 SETS = 30  # of contacts with a multiplier of their own
 ROUNDS = 12  # of new directions
 DIRECTIONS = 24  # that one round adds at most
+ROUND_WORK = 2000.0  # operations of a round per square of the reactions
 MARGIN = 0.2  # part of the largest possible eigenvalue of M that multipliers must reach
 
 
 def shared_multipliers(
     local: LoadProblem, branch: States, groups: list[Group], accept: Accept, *,
-    time_limit: float,
+    deadline: Deadline,
 ) -> bool:  # fmt: skip
     """True when multipliers of a branch without vanishing velocities were accepted."""
-    deadline = time.perf_counter() + time_limit
+    n = 2.0 * local.contacts
+    if not deadline.affords(4 * n**3):
+        return False
+    deadline.spend(4 * n**3)
     signs, families = _shared(local, groups)
     R = local.reactions(branch)
     WR = np.asarray((R.T @ local.W.T).T)
@@ -47,6 +51,9 @@ def shared_multipliers(
         return False
     V = _first_directions(R, families, signs)
     for _ in range(ROUNDS):
+        if not deadline.affords(ROUND_WORK * n**2):
+            return False
+        deadline.spend(ROUND_WORK * n**2)
         basis = linalg.solve_triangular(L, linalg.qr(L.T @ V, mode="economic")[0],
                                         lower=True, trans="T")  # fmt: skip
         Z = _rows(R, WR, basis)
@@ -56,10 +63,7 @@ def shared_multipliers(
             kept.append((W, extras))
             return True
 
-        left = deadline - time.perf_counter()
-        if left <= 0:
-            return False
-        answer = find_multipliers(Z, families, accept=keep, time_limit=left, margin=MARGIN)
+        answer = find_multipliers(Z, families, accept=keep, time_limit=deadline, margin=MARGIN)
         if answer.outcome is not LmiOutcome.FOUND:
             return False
         if accept(*last[-1]):

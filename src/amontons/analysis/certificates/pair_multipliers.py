@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 from scipy.sparse.csgraph import minimum_spanning_tree
 
+from ...clock import TimeLimit
 from ..multipliers.multiplier_lmi import (
     Family,
     LmiOutcome,
@@ -124,8 +125,9 @@ def single_family(singles: NDArray[np.int64], m: Array) -> Family:
 
 
 def find_pair_multipliers(
-    S: Array, rounding: Array, m: Array, *, time_limit: float, undecided: Array | None = None
-) -> tuple[PairMultipliers | None, Array]:
+    S: Array, rounding: Array, m: Array, *, time_limit: TimeLimit,
+    undecided: Array | None = None,
+) -> tuple[PairMultipliers | None, Array]:  # fmt: skip
     """(proved multipliers or None, weight (k, 4) of every state where there are none).
 
     S, rounding (2 k, 2 k): u = (S + d) r with any |d| <= rounding.  The weights belong to the
@@ -227,6 +229,8 @@ def _weights(
     """Traces of the dual moments by contact and state, (k, 4)."""
     weights = np.zeros((contacts, STATES))
     moments = list(answer.moments[1:])
+    if not moments:  # no time for a single step
+        return weights
     if len(pairs):
         for a in range(STATES):
             for b in range(STATES):

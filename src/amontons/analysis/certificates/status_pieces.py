@@ -18,6 +18,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ...clock import NEVER, Deadline
+from ...dense import dense
 from ...errors import InvalidInput, UnsupportedForm
 from ...problem import FrictionProblem
 from ..multipliers.rounding import EPSILON, determinant_sign
@@ -45,14 +47,14 @@ class Pieces:
     total: int
 
     @classmethod
-    def of(cls, problem: FrictionProblem) -> Pieces:
+    def of(cls, problem: FrictionProblem, deadline: Deadline = NEVER) -> Pieces:
         """The pieces of a 2D Coulomb problem; raises UnsupportedForm for any other."""
         if problem.dimension != 2:
             raise UnsupportedForm("critical friction: expected a 2D problem, this one is 3D")
         mu = problem.mu
-        local = problem.condensed()
+        local = problem.condensed(deadline)
         nc = local.contacts
-        W = local.W if isinstance(local.W, np.ndarray) else local.W.toarray()
+        W = dense(local.W, 4)
         own = np.arange(nc)
         size = np.linalg.norm(W.reshape(nc, 2, nc, 2)[own, :, own], 2, axis=(1, 2))
         places = np.flatnonzero(size > 0)

@@ -7,19 +7,19 @@ was found), then a second solution.  What none of them settles is undecided, wit
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...clock import Deadline, TimeLimit, deadline_of, now
 from ...cones import Tresca
-from ...errors import InvalidInput, SingularOperator
+from ...dense import dense
+from ...errors import InvalidInput, SingularOperator, TimeUp
 from ...problem import FrictionProblem
 from ...solution import FrictionSolution
 from ...solve import drive
-from ...solvers.base import check_seconds
 from ..multipliers.scales import UNRESOLVED, contact_sizes, resolves
 from ..solutions.enumerate import PieceSolution, enumerate_solutions
 from .critical_friction import CriticalFriction, Witness, critical_friction
@@ -32,7 +32,10 @@ Array = NDArray[np.float64]
 ENUMERATED = 25  # contacts up to which all solutions are looked for before a certificate
 INSTANT = 8  # contacts up to which the quick verdict examines all patterns: milliseconds
 QUICK = 400  # rows of W up to which the quick verdict is given: some ten milliseconds
+SECONDS = 60.0  # whose work a verdict without a time limit may take
+QUICK_SECONDS = 1.0  # the same of a quick one
 BOUNDS = 0.5  # part of the time for the bounds on the critical friction
+COPIES = 6  # of a dense W that the questions hold at a time
 SAME = 1e-6  # distance of two solutions that count as one, relative to their size
 
 
@@ -94,31 +97,30 @@ class Uniqueness:
 
 def assess(
     problem: FrictionProblem, solution: FrictionSolution | None = None, *,
-    time_limit: float = 60.0,
+    time_limit: TimeLimit = None,
 ) -> Uniqueness:  # fmt: skip
     """The verdict on a problem; the global form is condensed.
 
-    solution: one that was found; by default the problem is solved.  time_limit: seconds.
+    solution: one that was found; by default the problem is solved.  time_limit: seconds;
+    without it operations are counted, as many as take about SECONDS.
     """
-    check_seconds(time_limit)
-    began = time.perf_counter()
+    deadline = deadline_of(time_limit, SECONDS)
+    began = now()
     try:
-        local = problem.condensed()
-    except (SingularOperator, InvalidInput) as error:  # no W, or too large for the memory
+        local = problem.condensed(deadline)
+        dense(local.W, COPIES)
+    except (SingularOperator, InvalidInput, TimeUp) as error:
         no_w = isinstance(error, SingularOperator)
         reason = "Contact alone holds a body, so there is no W" if no_w else str(error)
-        friction = 0.0 if isinstance(problem.law, Tresca) else problem.mu.max(initial=0.0)
-        spent = time.perf_counter() - began
-        return Uniqueness(Verdict.UNDECIDED, float(friction), 0.0, np.inf, "none",
-                          _sentence(reason), seconds=spent)  # fmt: skip
+        return _without_verdict(problem, _sentence(reason), began)
     if _blocked(local):
         return _without_solution(local, began)
     if isinstance(problem.law, Tresca):
-        return _given_friction(local, began)
-    verdict = _every_load(local, began + BOUNDS * time_limit)
+        return _given_friction(local, began, deadline)
+    verdict = _every_load(local, deadline.share(BOUNDS))
     if verdict.verdict is Verdict.UNDECIDED:
-        verdict = _this_load(local, solution, verdict, began + time_limit)
-    return replace(verdict, seconds=time.perf_counter() - began)
+        verdict = _this_load(local, solution, verdict, deadline)
+    return replace(verdict, seconds=now() - began)
 
 
 def quick_verdict(problem: FrictionProblem) -> Uniqueness | None:
@@ -129,7 +131,7 @@ def quick_verdict(problem: FrictionProblem) -> Uniqueness | None:
     """
     if problem.contacts * problem.dimension > QUICK:
         return None
-    began = time.perf_counter()
+    began, deadline = now(), Deadline.counted(QUICK_SECONDS)
     try:
         if not problem.condensing_is_cheap:
             return None
@@ -139,11 +141,11 @@ def quick_verdict(problem: FrictionProblem) -> Uniqueness | None:
     if _blocked(local):
         return _without_solution(local, began)
     if isinstance(problem.law, Tresca):
-        return _given_friction(local, began)
-    verdict = _by_energy(local)
+        return _given_friction(local, began, deadline)
+    verdict = _by_energy(local, deadline)
     if verdict.verdict is Verdict.UNDECIDED and _is_small(local):
-        verdict = _by_bounds(verdict, critical_friction(local, time_limit=1.0))
-    return replace(verdict, seconds=time.perf_counter() - began)
+        verdict = _by_bounds(verdict, critical_friction(local, time_limit=deadline))
+    return replace(verdict, seconds=now() - began)
 
 
 def _is_small(local: FrictionProblem) -> bool:
@@ -154,54 +156,65 @@ def _is_small(local: FrictionProblem) -> bool:
 def _blocked(local: FrictionProblem) -> bool:
     """True where a contact penetrates that can not react; rounding of a gap does not count."""
     assert local.q is not None
-    reacts = contact_sizes(_dense(local), local.contacts)[1]
+    reacts = local.rho > 0
     return bool((local.q[~reacts, 0] < -SAME * local.q_norm).any())
 
 
 def _without_solution(local: FrictionProblem, began: float) -> Uniqueness:
-    friction = 0.0 if isinstance(local.law, Tresca) else float(local.mu.max(initial=0.0))
     reason = "There is no solution: a contact penetrates that can not react."
-    return Uniqueness(Verdict.UNDECIDED, friction, 0.0, np.inf, "none", reason,
-                      seconds=time.perf_counter() - began)  # fmt: skip
+    return _without_verdict(local, reason, began)
+
+
+def _without_verdict(problem: FrictionProblem, reason: str, began: float) -> Uniqueness:
+    friction = 0.0 if isinstance(problem.law, Tresca) else problem.mu.max(initial=0.0)
+    return Uniqueness(Verdict.UNDECIDED, float(friction), 0.0, np.inf, "none", reason,
+                      seconds=now() - began)  # fmt: skip
 
 
 # ------------------------------------------------------------------- every load
-def _given_friction(local: FrictionProblem, began: float) -> Uniqueness:
+def _given_friction(local: FrictionProblem, began: float, deadline: Deadline) -> Uniqueness:
     """Tresca's law is monotone: one solution where W is definite."""
-    shape = np.ones(local.contacts)
-    definite = local.contacts == 0 or energy_bound(_dense(local), shape)[0] > 0
+    bound, late = _energy(local, np.ones(local.contacts), deadline)
+    definite = local.contacts == 0 or bound > 0
     verdict = Verdict.UNIQUE_EVERY_LOAD if definite else Verdict.UNDECIDED
-    reason = (
-        "With given friction bounds the law is monotone, and W is definite."
-        if definite
-        else "W is singular: reactions may not be unique."
-    )
+    reason = "W is singular: reactions may not be unique."
+    if definite:
+        reason = "With given friction bounds the law is monotone, and W is definite."
+    elif late:
+        reason = late
     return Uniqueness(verdict, 0.0, 0.0, np.inf, "given friction", reason,
-                      seconds=time.perf_counter() - began)  # fmt: skip
+                      seconds=now() - began)  # fmt: skip
 
 
-def _by_energy(local: FrictionProblem) -> Uniqueness:
+def _energy(local: FrictionProblem, shape: Array, deadline: Deadline) -> tuple[float, str]:
+    """(bound of `energy_bound`, empty or why there was no time for one)."""
+    try:
+        return energy_bound(dense(local.W), shape, deadline)[0], ""
+    except TimeUp as reason:
+        return 0.0, f"No bound on the friction is known: {reason}."
+
+
+def _by_energy(local: FrictionProblem, deadline: Deadline) -> Uniqueness:
     """The verdict of the cheapest bound."""
     friction = float(local.mu.max(initial=0.0))
-    lower = energy_bound(_dense(local), friction_shape(local.mu))[0]
+    lower, late = _energy(local, friction_shape(local.mu), deadline)
     if friction < lower or local.contacts == 0:
         reason = _is_below(friction, lower)
         return Uniqueness(Verdict.UNIQUE_EVERY_LOAD, friction, lower, np.inf, "energy", reason)
     reason = (
         f"The cheapest safe bound is {lower:.3g}."
         if lower > 0
-        else "W is singular: reactions may not be unique even without friction."
+        else late or "W is singular: reactions may not be unique even without friction."
     )
     return Uniqueness(Verdict.UNDECIDED, friction, lower, np.inf, "energy", reason)
 
 
-def _every_load(local: FrictionProblem, deadline: float) -> Uniqueness:
+def _every_load(local: FrictionProblem, deadline: Deadline) -> Uniqueness:
     """The verdict of the bounds on the critical friction."""
-    cheap = _by_energy(local)
-    if local.dimension != 2 or not local.contacts:
+    cheap = _by_energy(local, deadline)
+    if local.dimension != 2 or not local.contacts or deadline.passed:
         return cheap
-    left = max(deadline - time.perf_counter(), 0.1)
-    bounds = critical_friction(local, time_limit=left, first=cheap.friction)
+    bounds = critical_friction(local, time_limit=deadline, first=cheap.friction)
     return _by_bounds(cheap, bounds)
 
 
@@ -226,16 +239,16 @@ def _by_bounds(cheap: Uniqueness, bounds: CriticalFriction) -> Uniqueness:
 # --------------------------------------------------------------------- this load
 def _this_load(
     local: FrictionProblem, solution: FrictionSolution | None, verdict: Uniqueness,
-    deadline: float,
+    deadline: Deadline,
 ) -> Uniqueness:  # fmt: skip
     """All solutions where they can be enumerated, else the certificate about one."""
     if local.dimension == 2 and local.contacts <= ENUMERATED and local.q_norm > 0:
-        answer = _by_enumeration(local, solution, verdict, _left(deadline) / 2)
+        answer = _by_enumeration(local, solution, verdict, deadline.share(0.5))
         if answer is not None:
             return answer
     given = solution is not None
     if solution is None:
-        solution = drive(local, time_limit=_left(deadline))
+        solution = drive(local, time_limit=deadline)
     if not solution.converged:
         reason = f"No solution was found: {solution.convergence}."
         return replace(verdict, reason=reason)
@@ -244,7 +257,7 @@ def _this_load(
         reason = "Without load r = 0 is a solution; others were not looked for."
         return replace(verdict, reason=f"{verdict.reason} {reason}")
     try:
-        found = certify_load(local, solution, time_limit=_left(deadline))
+        found = certify_load(local, solution, time_limit=deadline)
     except InvalidInput as reason:
         why = f"No certificate: {reason}." if given else "The solution is too rough to certify."
         return replace(verdict, reason=f"{verdict.reason} {why}")
@@ -260,11 +273,11 @@ def _this_load(
 
 def _by_enumeration(
     local: FrictionProblem, solution: FrictionSolution | None, verdict: Uniqueness,
-    time_limit: float,
+    deadline: Deadline,
 ) -> Uniqueness | None:  # fmt: skip
     """The verdict of the list of all solutions, None where it settles nothing."""
     verdict = replace(verdict, solution=solution)
-    found = enumerate_solutions(local, time_limit=time_limit)
+    found = enumerate_solutions(local, time_limit=deadline)
     isolated = all(s.freedom == 0 for s in found.solutions)
     if found.complete and len(found) == 1 and isolated:
         reason = "All other patterns of statuses are excluded."
@@ -274,7 +287,7 @@ def _by_enumeration(
     if len(found) > 1 or not isolated:
         s = found.solutions
         first = s[0] if solution is None else solution
-        size = np.sqrt(contact_sizes(_dense(local), local.contacts)[0])[:, None]
+        size = np.sqrt(contact_sizes(dense(local.W), local.contacts)[0])[:, None]
         other = max(s, key=lambda x: float(np.linalg.norm(size * (x.r - first.r))))
         other = other if isolated else s[0]
         count = f"{len(s)} solutions were found" if isolated else "a set of solutions was found"
@@ -301,19 +314,10 @@ def _refuted(
 
 
 # ----------------------------------------------------------------------- helpers
-def _dense(local: FrictionProblem) -> Array:
-    W = local.W
-    return W if isinstance(W, np.ndarray) else W.toarray()  # type: ignore[union-attr]
-
-
 def _is_below(friction: float, lower: float) -> str:
     if np.isinf(lower):
         return "Every friction is safe."
     return f"Friction {friction:g} is below a safe bound of {lower:.4g}."
-
-
-def _left(deadline: float) -> float:
-    return max(deadline - time.perf_counter(), 0.1)
 
 
 def _sentence(text: str) -> str:

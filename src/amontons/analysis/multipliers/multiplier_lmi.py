@@ -37,7 +37,6 @@ S. Boyd, L. Vandenberghe, "Convex Optimization" (2004), sections 4.6.2 and 11.8.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -46,6 +45,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from ...clock import TimeLimit, deadline_of
 from .multiplier_program import Family, Point, Program, Slacks
 from .multiplier_steps import advance, start
 from .rounding import are_positive_definite, gamma
@@ -54,6 +54,7 @@ Array = NDArray[np.float64]
 SHORTEST = 1e-6  # step length below which rounding stands in the way
 STEPS = 200  # far more than a well-posed problem takes
 SMALLEST = 1e-9  # eigenvalue of M that could be told from rounding, the mean of all being 1
+OVERHEAD = 5e7  # operations that a step counts for, however small
 REFUSALS = 12  # of multipliers by the caller
 
 
@@ -145,7 +146,7 @@ def slacks_are_positive(families: Sequence[Family], W: Parts, extras: Parts) -> 
 # ------------------------------------------------------------------- solving it
 def find_multipliers(
     Z: Array, families: Sequence[Family], *, accept: Accept | None = None,
-    time_limit: float | None = None, smallest: float = SMALLEST,
+    time_limit: TimeLimit = None, smallest: float = SMALLEST,
     margin: float = 0.0,
 ) -> Multipliers:  # fmt: skip
     """Multipliers with M and all slacks positive definite, or why there are none.
@@ -155,7 +156,10 @@ def find_multipliers(
     eigenvalue of M above this is possible, the mean of all being 1.  margin: ask only when
     this part of the largest possible eigenvalue is reached.
     """
-    deadline = np.inf if time_limit is None else time.perf_counter() + time_limit
+    deadline = deadline_of(time_limit)
+    each = step_operations(Z, families)
+    if not deadline.affords(each):
+        return _not_begun(Z, families)
     program = Program(Z, tuple(families))
     point = start(program)
     refused, steps, outcome = 0, 0, LmiOutcome.STALLED
@@ -168,9 +172,10 @@ def find_multipliers(
         if program.theta * point.lam < smallest:
             outcome = LmiOutcome.NONE
             break
-        if time.perf_counter() > deadline:
+        if not deadline.affords(each):
             outcome = LmiOutcome.TIME_LIMIT
             break
+        deadline.spend(each)
         following = advance(program, point)
         if following is None or following[1] < SHORTEST:
             break
@@ -179,6 +184,28 @@ def find_multipliers(
     values, vectors = linalg.eigh(point.S[0][0], subset_by_index=[0, 0])
     least, bound = float(values[0]) + point.t, program.theta * point.lam
     return Multipliers(outcome, W, extras, least, bound, vectors[:, 0], steps, tuple(point.X))
+
+
+def step_operations(Z: Array, families: Sequence[Family]) -> float:
+    """Of one step, roughly: the linear system formed and factorised, inverses of M."""
+    unknowns, entries, slacks = 0, 0, 0.0
+    for f in families:
+        sets = len(f.rows)
+        entries += f.entries * sets
+        unknowns += f.entries * (sets if f.share is None else f.share.shape[1])
+        slacks += sum(float(np.prod(s.tensor.shape)) * s.tensor.shape[1] for s in f.slacks)
+    N = Z.shape[1]
+    form = min(4.0 * len(Z) ** 2 * N + 15.0 * entries**2,
+               4.0 * unknowns * N**3 + 2.0 * (unknowns * N) ** 2)  # fmt: skip
+    return OVERHEAD + form + unknowns**3 / 3 + 40.0 * N**3 + 25.0 * slacks
+
+
+def _not_begun(Z: Array, families: Sequence[Family]) -> Multipliers:
+    """The answer where there is no time for a single step: nothing is known."""
+    W = tuple(-np.tile(np.eye(f.size), (len(f.rows), 1, 1)) for f in families)
+    extras = tuple(np.zeros((len(f.rows), f.extras)) for f in families)
+    nothing = np.zeros(Z.shape[1])
+    return Multipliers(LmiOutcome.TIME_LIMIT, W, extras, -np.inf, np.inf, nothing, 0)
 
 
 def multipliers_at(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ...dense import dense
 from ...problem import FrictionProblem
 
 Array = NDArray[np.float64]
@@ -42,7 +43,7 @@ def resolves(problem: FrictionProblem, r: Array) -> bool:
     problem in Delassus form, r (nc, d).  The load of a contact is |q_i| + sum |W_ij| |r_j|.
     """
     assert problem.W is not None and problem.q is not None
-    W = problem.W if isinstance(problem.W, np.ndarray) else problem.W.toarray()
+    W = dense(problem.W)
     q, (nc, d) = problem.q, r.shape
     size, reacts = contact_sizes(W, nc)
     load = np.linalg.norm(np.abs(q) + (np.abs(W) @ np.abs(r).ravel()).reshape(nc, d), axis=1)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -11,13 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import SingularOperator, UnsupportedForm
+from ...clock import Deadline, now
+from ...errors import SingularOperator, TimeUp, UnsupportedForm
 from .continuation import Continuation
 from .event_tracking import leaving
 from .first_order import Tangent
 from .following import Limits, follow_path, track_both
 from .friction_path import FrictionPath
-from .path import Branch, EventKind, same
+from .path import Branch, EventKind, same, timed
 
 Array = NDArray[np.float64]
 NEAR = 1e-7  # scaled distance of a solution to a branch that goes through it
@@ -88,12 +88,12 @@ class Diagram:
 
 def bifurcation_diagram(
     path: FrictionPath, limits: Limits, at: Sequence[float], *,
-    options: Continuation | None = None, time_limit: float | None = None,
+    options: Continuation | None = None,
 ) -> Diagram:  # fmt: skip
     """The branches through all solutions at the values `at`, and those that leave them.
 
-    Solutions come from `enumerate_solutions`.  time_limit: seconds for each search.  options:
-    those of step-by-step continuation, also where the curves are straight.
+    Solutions come from `enumerate_solutions`, which at each value has half of its share of the
+    time.  options: those of step-by-step continuation, also where the curves are straight.
     """
     from ..solutions.enumerate import enumerate_solutions
 
@@ -102,24 +102,28 @@ def bifurcation_diagram(
             "diagram: all solutions of a model with hyperelastic laws can not be searched for; "
             "use follow"
         )
-    began = time.perf_counter()
+    began, deadline = now(), limits.deadline
+    path = timed(path, deadline)
     branches: list[Branch] = []
     lost: list[tuple[float, Array]] = []
     sets: list[tuple[float, Array]] = []
     doubts: list[str] = []
-    for p in at:
-        found = enumerate_solutions(path.at(p).condensed(), time_limit=time_limit)
+    for k, p in enumerate(at):
+        search = deadline.share(0.5 / (len(at) - k))
+        found = enumerate_solutions(path.at(p), time_limit=search)
         if not found.complete:
             doubts.append(f"at {p:g}: {found.reason}")
         for solution in found.solutions:
             y = path.state(solution.r)
             if solution.freedom:
                 sets.append((p, y))
-            elif not _on_branches(branches, y, p):
-                with suppress(SingularOperator):
-                    _add(branches, path, y, p, limits, options)
-                if not _on_branches(branches, y, p):
+                continue
+            try:
+                if not _found_again(branches, path, y, p, limits, options):
                     lost.append((p, y))
+            except TimeUp as reason:
+                doubts.append(f"at {p:g}: {reason}")
+                break
     if lost:
         doubts.append(f"{len(lost)} solutions lie on no branch")
     if sets:
@@ -127,14 +131,27 @@ def bifurcation_diagram(
     values = ", ".join(f"{p:g}" for p in at)
     reason = "; ".join(doubts) or f"all solutions at {values} are on these branches"
     return Diagram(tuple(branches), tuple(at), not doubts, reason, tuple(lost), tuple(sets),
-                   time.perf_counter() - began)  # fmt: skip
+                   now() - began)  # fmt: skip
 
 
-def _on_branches(branches: list[Branch], y: Array, p: float) -> bool:
+def _found_again(
+    branches: list[Branch], path: FrictionPath, y: Array, p: float, limits: Limits,
+    options: Continuation | None,
+) -> bool:  # fmt: skip
+    """Whether a solution lies on a branch, after it was followed where that had to be."""
+    limits.deadline.check()
+    if _on_branches(branches, y, p, limits.deadline):
+        return True
+    with suppress(SingularOperator):
+        _add(branches, path, y, p, limits, options)
+    return _on_branches(branches, y, p, limits.deadline)
+
+
+def _on_branches(branches: list[Branch], y: Array, p: float, deadline: Deadline) -> bool:
     return any(
         same(y, other, NEAR)
         for branch in branches
-        for other in (*branch.at(p), *_ends(branch, p))
+        for other in (*_ends(branch, p), *branch.at(p, deadline))
     )
 
 

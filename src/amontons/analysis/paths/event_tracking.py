@@ -253,6 +253,7 @@ def track(
     walk = _Walk(path, y, p, tangent, interval)
     yield walk.here(), None
     while walk.stop is None:
+        path.deadline.check()
         event = walk.advance()
         yield walk.here(), event
 

@@ -2,21 +2,32 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InvalidInput
-from ...solvers.base import check_seconds
+from ...clock import NEVER, Deadline, deadline_of, now
+from ...errors import InvalidInput, TimeUp
 from .continuation import Continuation
 from .first_order import Tangent
 from .friction_path import FrictionPath
 from .meeting import PassedEvents, PassedLines
-from .path import Branch, Event, EventKind, PathProblem, Point, Stop, joined, weight_of
+from .path import (
+    Branch,
+    Event,
+    EventKind,
+    PathProblem,
+    Point,
+    Stop,
+    joined,
+    name_of,
+    timed,
+    weight_of,
+)
 from .starting import polished
 from .ways import ByEvents, Steps, Stepwise, Way, is_straight
 
@@ -36,6 +47,7 @@ class Method(Enum):
 class Limits:
     """Where to end: the interval of the parameter, points per direction, seconds, a callback.
 
+    time_limit: for all that these limits are given to, from now on: `deadline`.
     callback(point, event) is called at every point; True stops.
     """
 
@@ -43,6 +55,7 @@ class Limits:
     max_points: int = 100_000
     time_limit: float | None = None
     callback: Callback | None = None
+    deadline: Deadline = field(default=NEVER, init=False)
 
     def __post_init__(self) -> None:
         low, high = self.interval
@@ -50,8 +63,7 @@ class Limits:
             raise InvalidInput(f"interval: expected two numbers a < b, got {self.interval}")
         if self.max_points < 2:
             raise InvalidInput(f"max_points: expected at least 2, got {self.max_points}")
-        if self.time_limit is not None:
-            check_seconds(self.time_limit)
+        object.__setattr__(self, "deadline", deadline_of(self.time_limit))
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,12 +104,15 @@ def _both(
     problem: PathProblem, y: Array, p: float, limits: Limits, way: Way,
     known: Sequence[Branch], tangent: Tangent | None,
 ) -> Branch:  # fmt: skip
-    began = time.perf_counter()
+    began, problem = now(), timed(problem, limits.deadline)
     seen = way.seen(problem, len(y), known)
     forth, back, extra = tangent, None, False
     tangents: tuple[Tangent, ...] = ()
     if tangent is None:
-        tangents = way.leaving(problem, y, p)
+        try:
+            tangents = way.leaving(problem, y, p)
+        except TimeUp:
+            return _start_alone(problem, y, p, began)
         forth, back, extra = _both_ways(tangents, weight_of(problem, len(y)))
     halves: list[Half] = []
     for one in (forth, back):
@@ -106,9 +121,9 @@ def _both(
         elif one is None:
             halves.append(Half([], [], Stop.NOT_STARTED if tangent else Stop.DEAD_END))
         else:
-            passed = seen.begin(Point(p, y, one.direction, one.rate, one.piece))
+            start = Point(p, y, one.direction, one.rate, one.piece)
             steps = way.steps(problem, y, p, one, limits.interval)
-            halves.append(_collected(steps, limits, passed))
+            halves.append(_collected(steps, limits, seen.begin(start), start))
             seen.keep(halves[-1].points, halves[-1].events)
     branch = _branch(problem, halves[0], halves[1], began, extra)
     return _with_branch_point(branch, y, p, tangents if extra else ())
@@ -127,12 +142,13 @@ def _both_ways(
     return forth, (rest[0] if rest else None), len(rest) > 1
 
 
-def _collected(steps: Steps, limits: Limits, passed: PassedLines | PassedEvents) -> Half:
+def _collected(
+    steps: Steps, limits: Limits, passed: PassedLines | PassedEvents, start: Point
+) -> Half:
     """The points of one direction until it ends, meets what is known, or a limit stops it."""
-    began = time.perf_counter()
     points: list[Point] = []
     events: list[Event] = []
-    for point, event in steps:
+    for point, event in _until_time_is_up(steps):
         points.append(point)
         if event is not None:
             events.append(event)
@@ -142,21 +158,36 @@ def _collected(steps: Steps, limits: Limits, passed: PassedLines | PassedEvents)
             return Half(points, events, event.stop)
         stop = passed(point, event)
         if stop is None:
-            stop = _limited(point, event, limits, len(points), began)
+            stop = _limited(point, event, limits, len(points))
         if stop is not None:
             return Half(points, [*events, _ended(point, stop)], stop)
-    raise AssertionError("a walk ends with an event")  # track and Continuation promise it
+    points = points or [start]
+    return Half(points, [*events, _ended(points[-1], Stop.TIME_LIMIT)], Stop.TIME_LIMIT)
+
+
+def _start_alone(problem: PathProblem, y: Array, p: float, began: float) -> Branch:
+    """The branch of one point where time is up before its tangent is known, which is zero."""
+    start = Point(p, y, np.zeros_like(y), 0.0, name_of(problem.piece(y, p)))
+    half = Half([start], [_ended(start, Stop.TIME_LIMIT)], Stop.TIME_LIMIT)
+    return _branch(problem, half, Half([], [], Stop.TIME_LIMIT), began, False)
+
+
+def _until_time_is_up(steps: Steps) -> Steps:
+    """The same, without an end where time is up in the middle of a step."""
+    with suppress(TimeUp):
+        yield from steps
+        raise AssertionError("a walk ends with an event")  # track and Continuation promise it
 
 
 def _limited(
-    point: Point, event: Event | None, limits: Limits, count: int, began: float
+    point: Point, event: Event | None, limits: Limits, count: int
 ) -> Stop | None:
     """The limit that is reached, if any."""
     if limits.callback is not None and limits.callback(point, event):
         return Stop.STOPPED
     if count >= limits.max_points:
         return Stop.MAX_POINTS
-    if limits.time_limit is not None and time.perf_counter() - began > limits.time_limit:
+    if limits.deadline.passed:
         return Stop.TIME_LIMIT
     return None
 
@@ -174,9 +205,10 @@ def _branch(
         forth, back = back, forth
     events = [*_at_start(forth, back, branches), *forth.events]
     return joined(
-        problem, (back.points, back.events, back.stop), (forth.points, events, forth.stop),
+        timed(problem, NEVER), (back.points, back.events, back.stop),
+        (forth.points, events, forth.stop),
         linear=isinstance(problem, FrictionPath) and problem.straight,
-        seconds=time.perf_counter() - began, closed=forth.stop is Stop.CLOSED,
+        seconds=now() - began, closed=forth.stop is Stop.CLOSED,
         name=getattr(problem, "name", "parameter"),
     )  # fmt: skip
 

@@ -15,7 +15,6 @@ In 2D every piece is linear in y; under a load parameter it is linear in (y, p).
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -25,7 +24,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...clock import NEVER, Deadline, now
 from ...cones import Coulomb, Tresca
+from ...dense import dense
 from ...errors import InvalidInput, UnsupportedForm
 from ...problem import Form, FrictionProblem
 from ...settling import settled
@@ -49,6 +50,7 @@ class FrictionPath:
     start: FrictionProblem
     end: FrictionProblem
     name: str = "load"
+    deadline: Deadline = NEVER  # of those who follow it, see `timed`
 
     def __post_init__(self) -> None:
         a, b = self.start, self.end
@@ -93,11 +95,11 @@ class FrictionPath:
 
     def solution(self, y: Array, p: float) -> FrictionSolution:
         """The point as a solution: reactions, velocities, status and the judge's error."""
-        problem, began = self.at(p), time.perf_counter()
+        problem, began = self.at(p), now()
         r = (y * self.to_r).reshape(problem.contacts, problem.dimension)
         (u, v), told = settled(problem.law, problem.rho, r, problem.velocity)
         error = problem.error(told.r, v)
-        record = judged(error, problem.measure, time.perf_counter() - began)
+        record = judged(error, problem.measure, now() - began)
         return FrictionSolution(problem, told.r, np.array(u), v, record, settled=told)
 
     def state(self, r: Array) -> Array:
@@ -107,9 +109,9 @@ class FrictionPath:
     # ---------------------------------------------------------------- scaled data
     @cached_property
     def _scaled(self) -> tuple[Array, Array, Array, Array]:
-        a = self.start.condensed()
+        a = self.start.condensed(self.deadline)
         nc, d = a.contacts, a.dimension
-        W = a.W if isinstance(a.W, np.ndarray) else a.W.toarray()  # type: ignore[union-attr]
+        W = dense(a.W, 4)
         own = np.arange(nc)
         size = np.linalg.norm(W.reshape(nc, d, nc, d)[own, :, own], 2, axis=(1, 2))
         root = np.repeat(np.sqrt(np.where(size > 0, size, 1.0)), d)
@@ -236,6 +238,7 @@ class FrictionPath:
 
     def jacobian_of(self, piece: str, y: Array, p: float) -> tuple[Array, Array]:
         """Derivatives by y and p of the selection function of a piece."""
+        self.deadline.check()
         nc, d = self.start.contacts, self.start.dimension
         _, z_N, z_T = self._trial(y, p)
         word, mu, m = Word(piece), self.coefficient(p), len(y)

@@ -14,7 +14,6 @@ V = 0 gives the static problem under a growing load.  2D, as slip has two senses
 
 from __future__ import annotations
 
-import time
 from collections.abc import Hashable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -25,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ...clock import NEVER, Deadline, now
 from ...cones import Coulomb
 from ...contact.current import BACK, OPEN, SLIP, STICK, Pieces
 from ...errors import InvertedCells, NotConverged, UnsupportedForm
@@ -53,6 +53,7 @@ class LoadPath:
     load: Array
     prescribed: Array
     drift: Array | None = None
+    deadline: Deadline = NEVER  # of those who follow it, see `timed`
     name: ClassVar[str] = "load"
 
     def __post_init__(self) -> None:
@@ -121,6 +122,7 @@ class LoadPath:
     def _slopes(
         self, y: Array, p: float, states: Pieces | None
     ) -> tuple[sparse.csc_array, Array]:
+        self.deadline.check()
         step = self.step
         try:
             here = self.at(p).linearisation(y, states)
@@ -167,11 +169,11 @@ class LoadPath:
     # ---------------------------------------------------------------- solutions
     def solution(self, y: Array, p: float) -> FrictionSolution:
         """The point as a solution of its tangent problem, with the judge's error."""
-        problem, began = self.at(p), time.perf_counter()
+        problem, began = self.at(p), now()
         u = problem.local_velocity(y)
         told = settle(problem.law, problem.rho, problem.reactions(y), u)
         error = problem.error(told.r, y)
-        record = judged(error, problem.measure, time.perf_counter() - began)
+        record = judged(error, problem.measure, now() - began)
         found = FrictionSolution(problem, told.r, u, np.array(y), record, settled=told)  # type: ignore[arg-type]
         return problem.solved(found)
 
@@ -180,7 +182,9 @@ class LoadPath:
 
         Raises NotConverged where it finds none.
         """
-        found = drive(self.at(p), NonlinearNewton(), tolerance=SOLVED)  # type: ignore[arg-type]
+        found = drive(
+            self.at(p), NonlinearNewton(), tolerance=SOLVED, time_limit=self.deadline
+        )  # type: ignore[arg-type]
         if found.convergence.outcome is not Outcome.CONVERGED:
             raise NotConverged(f"start: no solution at {p:g}: {found.convergence}", found)
         assert found.v is not None

@@ -117,7 +117,7 @@ def first_state(path: FrictionPath | LoadPath, p: float) -> Array:
             return exact_state(path, p)
         except SingularOperator:
             pass  # W is not positive definite: a solver may still find a solution
-    found = drive(path.at(p), tolerance=START)
+    found = drive(path.at(p), tolerance=START, time_limit=path.deadline)
     if found.convergence.outcome is not Outcome.CONVERGED:
         raise NotConverged(f"start: no solution at {p:g}: {found.convergence}", found)
     return path.state(found.r)

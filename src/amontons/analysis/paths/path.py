@@ -14,6 +14,7 @@ Comput. Methods Appl. Mech. Engrg. 280 (2014).
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any, Protocol, runtime_checkable
@@ -22,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ...clock import NEVER, Deadline
 from ...judge import Measure
 from ...solution import Convergence, Outcome, Step
 
@@ -231,11 +233,12 @@ class Branch:
             for point in self.points
         ]  # fmt: skip
 
-    def at(self, parameter: float) -> list[Array]:
+    def at(self, parameter: float, deadline: Deadline = NEVER) -> list[Array]:
         """The states where the branch passes that value, in order along it.
 
         Exact on straight pieces; else a chord's point corrected by Newton steps at fixed
-        parameter (a point where that fails is left out).  Ends count within rounding.
+        parameter (a point where that fails is left out).  Ends count within rounding.  Raises
+        TimeUp at the deadline.
         """
         found: list[Array] = []
         rounding = ROUNDING * max(1.0, abs(parameter))
@@ -245,6 +248,7 @@ class Branch:
                 continue
             if a.parameter == b.parameter:
                 continue
+            deadline.check()
             t = (parameter - a.parameter) / (b.parameter - a.parameter)
             guess = a.state + t * (b.state - a.state)
             state = guess if self.linear else corrected(self.problem, guess, parameter)
@@ -312,6 +316,18 @@ def corrected(
         if np.abs(change).max(initial=0) <= tolerance * max(1.0, np.abs(y).max(initial=0)):
             return y
     return None
+
+
+def timed(problem: Any, deadline: Deadline) -> Any:
+    """The same path, which raises TimeUp after a deadline where it knows of deadlines.
+
+    What it has prepared stays; problems of a user are asked between two points only.
+    """
+    if not hasattr(problem, "deadline"):
+        return problem
+    other = copy(problem)
+    object.__setattr__(other, "deadline", deadline)
+    return other
 
 
 def solve_linear(matrix: Matrix, right: Array) -> Array:

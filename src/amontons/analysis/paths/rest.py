@@ -22,6 +22,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from ...clock import Deadline
 from ...problem import FrictionProblem
 from ...solution import Outcome
 from ...solve import drive
@@ -83,7 +84,7 @@ def _rates(
     if np.abs(W - W.T).max() > SYMMETRIC * np.abs(W).max():
         return None  # others slide: no friction problem
     mu = None if path.tresca else np.maximum(path.coefficient(p)[rest], 0.0)
-    solved = _solved((W + W.T) / 2, q, mu, d)
+    solved = _solved((W + W.T) / 2, q, mu, d, path.deadline)
     if solved is None:
         return None
     out = np.empty(len(y))
@@ -92,16 +93,18 @@ def _rates(
     return out
 
 
-def _solved(W: Array, q: Array, mu: Array | None, d: int) -> Array | None:
+def _solved(
+    W: Array, q: Array, mu: Array | None, d: int, deadline: Deadline
+) -> Array | None:
     """Reactions of a friction problem, of one of normal components where mu is None."""
     if mu is None:
         normal, k = np.arange(len(q)) * d, len(q)
         whole, free = np.trace(W) / k * np.eye(k * d), np.zeros(k * d)
         whole[np.ix_(normal, normal)], free[normal] = W, q
-        r = _solved(whole, free, np.zeros(k), d)
+        r = _solved(whole, free, np.zeros(k), d, deadline)
         return None if r is None else r[normal]
     problem = FrictionProblem.from_delassus(W, q.reshape(len(mu), d), mu)
-    found = drive(problem, tolerance=RATES)
+    found = drive(problem, tolerance=RATES, time_limit=deadline)
     return found.r.ravel() if found.convergence.outcome is Outcome.CONVERGED else None
 
 

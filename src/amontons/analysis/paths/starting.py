@@ -9,7 +9,7 @@ from ...errors import InvalidInput, SingularOperator
 from ...problem import FrictionProblem
 from .event_tracking import leaving, track
 from .friction_path import FrictionPath
-from .path import PathProblem, Stop, corrected
+from .path import PathProblem, Stop, corrected, timed
 
 Array = NDArray[np.float64]
 ON_CURVE = 1e-9  # scaled residual of a state that counts as a solution
@@ -21,13 +21,14 @@ def exact_state(path: FrictionPath, p: float) -> Array:
     All contacts are lifted off and let down again.  Raises SingularOperator where that path
     ends before it comes down (W is not positive definite).
     """
-    problem = path.at(p).condensed()
+    problem = path.at(p).condensed(path.deadline)
     q = np.asarray(problem.q)
     size = float(np.abs(path.free(p)).max(initial=0)) or 1.0
     lift = np.zeros_like(q)
     lift[:, 0] = (2 * size * path.to_u.reshape(q.shape))[:, 0]
     lifted = FrictionProblem.from_delassus(problem.W, q + lift, problem.mu)
     down = FrictionPath(lifted, FrictionProblem.from_delassus(problem.W, q, problem.mu))
+    down = timed(down, path.deadline)
     tangent = next(t for t in leaving(down, np.zeros(q.size), 0.0).tangents if t.rate > 0)
     *_, (point, event) = track(down, np.zeros(q.size), 0.0, tangent, (-1.0, 1.0))
     assert event is not None

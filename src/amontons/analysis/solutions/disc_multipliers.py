@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from ...clock import TimeLimit
 from ..multipliers.multiplier_lmi import Family, LmiOutcome, Slacks, find_multipliers
 from ..multipliers.rounding import gamma, is_positive_definite
 from .disc_sets import ON, Inequalities, Law, Region, inequalities, negative_on_arc
@@ -102,7 +103,7 @@ class BoxProblem:
             letter, tangents + ([3] if letter in "cl" else [])
         )
 
-    def solve(self, time_limit: float | None = None) -> BoxAnswer:
+    def solve(self, time_limit: TimeLimit = None) -> BoxAnswer:
         """Look for multipliers; more directions of slip where a proof fails between two."""
         extra: list[tuple[float, ...]] = [()] * len(self.regions)
         basis = self.basis

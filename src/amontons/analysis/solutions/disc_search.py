@@ -10,20 +10,20 @@ which every contact is free or sticks are a linear system.  Solutions to begin w
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...clock import NEVER, Deadline, TimeLimit, deadline_of, now
+from ...errors import TimeUp
 from ...problem import FrictionProblem
-from ...solvers.base import check_seconds
 from ..multipliers.scales import UNRESOLVED, resolves
 from .disc_multipliers import EXACT, BoxProblem, BoxProof, contains
 from .disc_sets import ON, Law, Region
 from .enumerate import Solutions
-from .multistart import EXTRA, ROUND, Finder, without_load
+from .multistart import EXTRA, ROUND, Finder, nothing_found, without_load
 from .newton_batch import FREE, SLIP, STICK, Stack
 
 Array = NDArray[np.float64]
@@ -32,7 +32,9 @@ FINEST = 0.002  # rad: half of the smallest arc
 SURE = 1e-7  # scaled violation of the law that excludes the solution of a linear system
 CODE = {"f": FREE, "s": STICK, "l": SLIP, ".": FREE, "c": STICK}
 GHOST_STEPS, TURN = 12, 1e-6  # Newton steps for directions, rad of their differences
-SECONDS = 60.0  # of a search without a limit of its own: it may grow without end
+SECONDS = 60.0  # whose work a search without a time limit may take: it may grow without end
+LARGEST = 300  # contacts up to which regions have multipliers: memory
+LOOK = 50.0  # operations of looking at a region per cube of the reactions, at least
 VAGUE = 1e-9  # relative error of a solution that can not be a reference
 STARTS = 300  # of Newton's method before the search
 
@@ -68,31 +70,33 @@ class DiscProof:
 
 
 def enumerate_discs(
-    problem: FrictionProblem, *, time_limit: float | None = None, tolerance: float = 1e-8,
+    problem: FrictionProblem, *, time_limit: TimeLimit = None, tolerance: float = 1e-8,
     keep_proof: bool = False,
 ) -> Solutions:  # fmt: skip
     """All solutions of a 3D Coulomb problem; the global form is condensed.
 
-    time_limit: seconds, 60 where there is none, after which the list is not complete.
-    tolerance: error by the judge that a solution may have.  keep_proof: fill `Solutions.proof`
-    with a DiscProof.  Raises UnsupportedForm under Tresca's law.
+    time_limit: seconds, after which the list is not complete; without it operations are
+    counted, as many as take about SECONDS.  tolerance: error by the judge that a solution may
+    have.  keep_proof: fill `Solutions.proof` with a DiscProof.  Raises UnsupportedForm under
+    Tresca's law.
     """
-    if time_limit is not None:
-        check_seconds(time_limit)
+    deadline = deadline_of(time_limit, SECONDS)
     _ = problem.mu
-    began = time.perf_counter()
-    local = problem.condensed()
+    began = now()
+    try:
+        local = problem.condensed(deadline)
+    except TimeUp as reason:
+        return nothing_found(reason, began)
     if local.q_norm == 0:
         return without_load(local)
-    limit = SECONDS if time_limit is None else time_limit
     stack = Stack.of(local)
     finder = Finder(stack, np.random.default_rng(0), tolerance)
-    search = DiscSearch(stack, finder, began + limit)
+    search = DiscSearch(stack, finder, deadline)
     search.begin()
     search.run()
     return Solutions(
-        tuple(finder.solutions()), search.complete, search.reason(limit), search.examined,
-        time.perf_counter() - began, search.proof() if keep_proof else None,
+        tuple(finder.solutions()), search.complete, search.reason, search.examined,
+        now() - began, search.proof() if keep_proof else None,
     )  # fmt: skip
 
 
@@ -102,7 +106,7 @@ class DiscSearch:
 
     stack: Stack
     finder: Finder
-    deadline: float = np.inf
+    deadline: Deadline = NEVER
     examined: int = 0
     undecided: int = 0
     stopped: bool = False
@@ -113,13 +117,13 @@ class DiscSearch:
         self.errors: list[float] = []
         self.queue: list[Regions] = [] if self._penetrates else [self._root()]
 
-    def begin(self, deadline: float | None = None) -> None:
+    def begin(self, deadline: Deadline | None = None) -> None:
         """Solutions from many starts, more where one is known to be missing."""
         deadline = self.deadline if deadline is None else deadline
         self.finder.begin(deadline)
         used = 0
         while used < STARTS or (self.finder.lacks_one and used < EXTRA * STARTS):
-            if time.perf_counter() > deadline:
+            if deadline.passed:
                 return
             used += self.finder.search(ROUND if self.stack.width > ROUND else 10, deadline)
 
@@ -138,10 +142,13 @@ class DiscSearch:
         """True when a contact that can not react has u_N < 0, beyond rounding: no solution."""
         return bool((self.stack.c[~self.stack.able, 0] < -SURE).any())
 
-    def reason(self, limit: float) -> str:
+    @property
+    def reason(self) -> str:
         """Why the list is complete, or why not."""
+        if self.stopped and len(self.stack.mu) > LARGEST:
+            return f"more than {LARGEST} contacts: regions were not looked at"
         if self.stopped:
-            return f"stopped after {limit:g} s"
+            return f"stopped after {self.deadline}"
         if self.undecided:
             return f"{self.undecided} regions could be neither divided nor excluded"
         if not self._resolved:
@@ -168,15 +175,26 @@ class DiscSearch:
     def run(self, most_solutions: int | None = None) -> None:
         """Divide until all regions are closed, the clock runs out, or enough are found."""
         while self.queue:
-            if time.perf_counter() > self.deadline:
+            if not self.affords_step:
                 self.stopped = True
                 return
             if most_solutions is not None and len(self.finder.found) >= most_solutions:
                 return
             self.step()
 
+    @property
+    def affords_step(self) -> bool:
+        """True where there are time and memory to look at a region."""
+        few = len(self.stack.mu) <= LARGEST
+        return few and not self.deadline.passed and self.deadline.affords(self._look)
+
+    @property
+    def _look(self) -> float:
+        return LOOK * float(len(self.stack.W)) ** 3
+
     def step(self) -> None:
         """Close or divide the region that is next."""
+        self.deadline.spend(self._look)
         self.queue += reversed(self._look_at(self.queue.pop()))
 
     def _polish(self) -> None:
@@ -211,7 +229,7 @@ class DiscSearch:
             self.undecided += 1
             return []
         box = BoxProblem(self.stack, regions, inside[0] if inside else None, error=error)
-        answer = box.solve(max(self.deadline - time.perf_counter(), 0.01))
+        answer = box.solve(self.deadline)
         if answer.proof is not None:
             self.proofs.append(answer.proof)
             return []
@@ -241,8 +259,7 @@ class DiscSearch:
                     np.max(-u[~slip & ~stick, 0], initial=-np.inf))  # fmt: skip
         if worst <= SURE * size or not (r[slip, 0] > SURE * size).all():
             return False
-        left = max(self.deadline - time.perf_counter(), 0.01)
-        answer = BoxProblem(self.stack, regions, r, error=error).solve(left)
+        answer = BoxProblem(self.stack, regions, r, error=error).solve(self.deadline)
         if answer.proof is not None:
             self.proofs.append(answer.proof)
         return answer.proof is not None

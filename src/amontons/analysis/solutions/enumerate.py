@@ -7,7 +7,6 @@ problem is prepared for it, and what remains is solved pattern by pattern.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -15,9 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InvalidInput, UnsupportedForm
+from ...clock import Deadline, TimeLimit, deadline_of, now
+from ...errors import InvalidInput, TimeUp, UnsupportedForm
 from ...problem import FrictionProblem
-from ...solvers.base import check_seconds
 from ..multipliers.scales import UNRESOLVED, resolves
 from . import pattern_search as search
 from .scaled_problem import REACH, SAME, ScaledProblem, States
@@ -30,6 +29,8 @@ LETTERS = {search.OPEN_OR_CLOSED: ".", search.CLOSED: "c", search.OPEN: "f",
            search.STICK: "s", search.SLIP_PLUS: "+", search.SLIP_MINUS: "-",
            search.FRICTIONLESS: "+"}  # fmt: skip
 NODES = 2000  # patterns between two looks at the clock, up to 20 contacts
+NODE = 10.0  # operations of a pattern per square of the reactions
+LEAF = 2e6  # the same of a complete one, besides its linear system
 CONTACTS = 200  # up to which the dictionaries of all levels need less than 0.6 GB
 
 
@@ -98,7 +99,7 @@ class Solutions:
 
 
 def enumerate_solutions(
-    problem: FrictionProblem, *, time_limit: float | None = None, tolerance: float = 1e-8,
+    problem: FrictionProblem, *, time_limit: TimeLimit = None, tolerance: float = 1e-8,
     keep_proof: bool = False,
 ) -> Solutions:  # fmt: skip
     """All solutions of a 2D Coulomb problem; the global form is condensed.
@@ -107,8 +108,7 @@ def enumerate_solutions(
     that a solution may have.  keep_proof: fill `Solutions.proof`.  Raises
     UnsupportedForm in 3D and under Tresca's law.
     """
-    if time_limit is not None:
-        check_seconds(time_limit)
+    deadline = deadline_of(time_limit)
     if problem.dimension != 2:
         raise UnsupportedForm("all solutions: expected a 2D problem, this one is in 3D")
     if problem.contacts > CONTACTS:
@@ -117,8 +117,11 @@ def enumerate_solutions(
             "exponentially, take a coarser mesh"
         )
     _ = problem.mu
-    began = time.perf_counter()
-    local = problem.condensed()
+    began = now()
+    try:
+        local = problem.condensed(deadline)
+    except TimeUp as reason:
+        return Solutions((), False, str(reason), 0, now() - began)
     if local.q_norm == 0:
         r = np.zeros((local.contacts, 2))
         rest = PieceSolution("f" * local.contacts, (), r, r.copy(), 0.0, 1, 0.0)
@@ -126,10 +129,10 @@ def enumerate_solutions(
         return Solutions((rest,), local.contacts == 0, reason, 0, 0.0)
     piece = ScaledProblem(local)
     cuts: list[Cut] | None = [] if keep_proof else None
-    found, undecided, examined, stopped = _collect(piece, began, time_limit, tolerance, cuts)
+    found, undecided, examined, stopped = _collect(piece, deadline, tolerance, cuts)
     reason = "every other pattern is excluded"
     if stopped:
-        reason = f"stopped after {time_limit:g} s"
+        reason = f"stopped after {deadline}"
     elif undecided:
         reason = f"{undecided} patterns are too near to a solution to be excluded"
     elif not piece.bounded:
@@ -140,7 +143,7 @@ def enumerate_solutions(
         reason = UNRESOLVED
     complete = not stopped and not undecided and piece.bounded and resolved
     return Solutions(
-        solutions, complete, reason, examined, time.perf_counter() - began, _proof(piece, cuts)
+        solutions, complete, reason, examined, now() - began, _proof(piece, cuts)
     )
 
 
@@ -151,17 +154,21 @@ Cut = tuple[States, Array]  # pattern and multipliers
 
 def _collect(
     piece: ScaledProblem,
-    began: float,
-    time_limit: float | None,
+    deadline: Deadline,
     tolerance: float,
     cuts: list[Cut] | None,
 ) -> tuple[list[Found], int, int, bool]:
     """(solutions with their patterns, undecided patterns, nodes, stopped by the clock?)."""
     found: list[Found] = []
     undecided = examined = 0
+    node, leaf = NODE * (2.0 * piece.contacts) ** 2, LEAF + 10.0 * (2.0 * piece.contacts) ** 3
     for leaves, nodes, done in _leaves(piece, cuts):
         examined += nodes
-        for states in leaves:
+        deadline.spend(node * nodes)
+        for k, states in enumerate(leaves):
+            if k and deadline.passed:
+                return found, undecided, examined, True
+            deadline.spend(leaf)
             answer = piece.solve(states)
             if answer is None:
                 undecided += not piece.excluded(states)
@@ -173,7 +180,7 @@ def _collect(
                 found.append((states, r, u, error, orientation, freedom))
             else:
                 undecided += 1
-        if time_limit is not None and not done and time.perf_counter() - began > time_limit:
+        if not done and deadline.passed:
             return found, undecided, examined, True
     return found, undecided, examined, False
 

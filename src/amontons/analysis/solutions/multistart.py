@@ -12,32 +12,33 @@ the search goes on for up to EXTRA times the starts.
 from __future__ import annotations
 
 import itertools
-import time
 from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import lapack
 
-from ...errors import InvalidInput
+from ...clock import NEVER, Deadline, TimeLimit, deadline_of, now
+from ...errors import InvalidInput, TimeUp
 from ...problem import FrictionProblem
 from ...solve import drive
-from ...solvers.base import check_seconds
 from .enumerate import PieceSolution, Solutions
 from .newton_batch import FREE, SLIP, STICK, Stack
 
 Array = NDArray[np.float64]
 ROUND = 100  # starts between two looks at the clock and at the solutions known so far
-SOLVER = 10.0  # seconds for a solver, where Newton's method is dear
+SOLVER = 10.0  # seconds for a solver, where Newton's method is dear; counted without a limit
 EXTRA = 3  # times the starts while a solution is known to be missing
 SAME = 1e-7  # scaled distance of two solutions that count as one
 BORDER = 1e-8  # scaled distance from a border of the law at which a solution has both patterns
 SINGULAR = 1e-10  # smallest singular value of a regular Jacobian, relative to the largest
+RANKED = 1000  # rows up to which the kernel of a Jacobian comes from its singular values
 WORDS = 64  # touching patterns that are listed
 
 
 def multistart(
     problem: FrictionProblem, *, starts: int = 1000, seed: int = 0,
-    time_limit: float | None = None, tolerance: float = 1e-8,
+    time_limit: TimeLimit = None, tolerance: float = 1e-8,
 ) -> Solutions:  # fmt: skip
     """Solutions of a 2D or 3D Coulomb problem found from many starts; never complete.
 
@@ -47,23 +48,29 @@ def multistart(
     """
     if not starts >= 1:
         raise InvalidInput(f"starts: expected at least 1, got {starts!r}")
-    if time_limit is not None:
-        check_seconds(time_limit)
+    deadline = deadline_of(time_limit)
     _ = problem.mu
-    began = time.perf_counter()
-    local = problem.condensed()
+    began = now()
+    try:
+        local = problem.condensed(deadline)
+    except TimeUp as reason:
+        return nothing_found(reason, began)
     if local.q_norm == 0:
         return without_load(local)
     finder = Finder(Stack.of(local), np.random.default_rng(seed), tolerance)
-    deadline = np.inf if time_limit is None else began + time_limit
     finder.begin(deadline)
     used = 0
     while used < starts or (finder.lacks_one and used < EXTRA * starts):
-        if time.perf_counter() > deadline:
+        if deadline.passed:
             break
         used += finder.search(min(ROUND, EXTRA * starts - used), deadline)
-    seconds = time.perf_counter() - began
+    seconds = now() - began
     return Solutions(tuple(finder.solutions()), False, finder.reason(used), used, seconds)
+
+
+def nothing_found(reason: TimeUp, began: float) -> Solutions:
+    """The empty list of a search that was stopped before it began."""
+    return Solutions((), False, str(reason), 0, now() - began)
 
 
 def without_load(problem: FrictionProblem) -> Solutions:
@@ -82,16 +89,16 @@ class Finder:
         self.found: list[Array] = []  # scaled reactions
         self.sign: list[int] = []  # orientations
 
-    def begin(self, deadline: float = np.inf) -> None:
+    def begin(self, deadline: Deadline = NEVER) -> None:
         """What a solver finds, where Newton's method is dear."""
         if self.stack.width <= ROUND:
-            left = min(max(deadline - time.perf_counter(), 0.01), SOLVER)
-            found = drive(self.stack.problem, tolerance=self.tolerance, time_limit=left)
+            own = Deadline.counted(SOLVER) if deadline == NEVER else deadline.within(SOLVER)
+            found = drive(self.stack.problem, tolerance=self.tolerance, time_limit=own)
             self.add(found.r / self.stack.to_r)
 
-    def search(self, count: int, deadline: float = np.inf) -> int:
+    def search(self, count: int, deadline: Deadline = NEVER) -> int:
         """Newton from `count` starts, until the deadline at most; returns count."""
-        plain = self._starts(count)
+        plain = self._starts(count, deadline)
         for r in self.stack.newton(plain, self.random, deadline=deadline):
             self.add(r)
         if self.found:
@@ -138,8 +145,8 @@ class Finder:
         return f"{text}; orientations add up to 1"
 
     # ---------------------------------------------------------------- starts
-    def _starts(self, count: int) -> Array:
-        """Reactions to start from, (count, nc, d)."""
+    def _starts(self, count: int, deadline: Deadline) -> Array:
+        """Reactions to start from, (count, nc, d), fewer where time is up."""
         kinds = [self._patterns, self._in_the_cone]
         if self.found:
             kinds += [self._patterns, self._neighbours]
@@ -147,7 +154,7 @@ class Finder:
             kinds.append(self._between)
         parts = np.array_split(np.arange(count), len(kinds))
         return np.concatenate(
-            [kind(len(part)) for kind, part in zip(kinds, parts, strict=True)]
+            [kind(len(part), deadline) for kind, part in zip(kinds, parts, strict=True)]
         )
 
     def _directions(self, count: int) -> Array:
@@ -158,21 +165,26 @@ class Finder:
         each += common * self.random.choice([0.0, 5.0], (count, 1, 1))
         return each / np.maximum(np.linalg.norm(each, axis=2, keepdims=True), 1e-300)
 
-    def _solved(self, states: NDArray[np.int64], direction: Array) -> Array:
-        width = self.stack.width
-        return np.concatenate([
-            self.stack.on_piece(states[k : k + width], direction[k : k + width])
-            for k in range(0, max(len(states), 1), width)
-        ])  # fmt: skip
+    def _solved(
+        self, states: NDArray[np.int64], direction: Array, deadline: Deadline
+    ) -> Array:
+        width, out = self.stack.width, [np.zeros((0, *self.stack.shape))]
+        for k in range(0, len(states), width):
+            if deadline.passed:
+                break
+            some = states[k : k + width]
+            deadline.spend(len(some) * self.stack.solve_work)
+            out.append(self.stack.on_piece(some, direction[k : k + width]))
+        return np.concatenate(out)
 
-    def _patterns(self, count: int) -> Array:
+    def _patterns(self, count: int, deadline: Deadline) -> Array:
         """Points of random patterns, each with its own shares of the statuses."""
         shares = self.random.dirichlet([0.5, 0.5, 0.5], count)
         chance = self.random.random((count, self.stack.shape[0]))
         states = (chance[:, :, None] > shares.cumsum(axis=1)[:, None, :2]).sum(axis=2)
-        return self._solved(states, self._directions(count))
+        return self._solved(states, self._directions(count), deadline)
 
-    def _in_the_cone(self, count: int) -> Array:
+    def _in_the_cone(self, count: int, deadline: Deadline) -> Array:
         nc, d = self.stack.shape
         size = 10.0 ** self.random.uniform(-1.5, 1.5, (count, 1))
         normal = size * self.random.exponential(1.0, (count, nc))
@@ -181,7 +193,7 @@ class Finder:
         tangent = (self.stack.mu * normal)[:, :, None] * share * self._directions(count)
         return np.concatenate([normal[:, :, None], tangent], axis=2)
 
-    def _neighbours(self, count: int) -> Array:
+    def _neighbours(self, count: int, deadline: Deadline) -> Array:
         """Points of patterns that differ in some contacts from that of a known solution."""
         nc = self.stack.shape[0]
         which = self.random.integers(len(self.found), size=count)
@@ -192,9 +204,9 @@ class Finder:
         changed = self.random.random((count, nc)) < changed
         states = np.where(changed, self.random.integers(3, size=(count, nc)), states)
         other = self._directions(count)
-        return self._solved(states, np.where(changed[:, :, None], other, direction))
+        return self._solved(states, np.where(changed[:, :, None], other, direction), deadline)
 
-    def _between(self, count: int) -> Array:
+    def _between(self, count: int, deadline: Deadline) -> Array:
         """Points on the line through two known solutions, each contact for itself or all."""
         nc, _ = self.stack.shape
         pick = self.random.integers(len(self.found), size=(2, count))
@@ -228,9 +240,19 @@ def statuses(stack: Stack, r: Array) -> tuple[NDArray[np.int64], Array]:
 def orientation(stack: Stack, r: Array) -> tuple[int, int]:
     """(sign of the determinant of the generalised Jacobian or 0, dimension of its kernel).
 
-    +1 without friction: there A + B W belongs to a symmetric positive definite problem.
+    +1 without friction: there A + B W belongs to a symmetric positive definite problem.  By one
+    LU where that is regular beyond doubt; the kernel of a large one is counted by its pivots.
     """
     matrix = stack.jacobian(r)
+    lu, swaps, _ = lapack.dgetrf(matrix)
+    size = float(np.abs(matrix).sum(axis=0).max(initial=0.0))
+    if len(matrix) and lapack.dgecon(lu, size)[0] > len(matrix) * SINGULAR:
+        odd = np.count_nonzero(swaps != np.arange(len(swaps)))
+        odd += np.count_nonzero(np.diag(lu) < 0)
+        return (-1 if odd % 2 else 1), 0
+    if len(matrix) > RANKED:
+        pivots = np.abs(np.diag(lu))
+        return 0, max(1, int((pivots <= SINGULAR * pivots.max(initial=0.0)).sum()))
     values = np.linalg.svd(matrix, compute_uv=False)
     freedom = int((values <= SINGULAR * values.max(initial=0.0)).sum())
     return (0 if freedom else int(np.linalg.slogdet(matrix)[0])), freedom

@@ -13,13 +13,14 @@ of nonlinear partial differential equations", SIAM J. Sci. Comput. 37 (2015).
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...clock import NEVER, Deadline
 from ...cones import Coulomb
+from ...dense import dense
 from ...problem import FrictionProblem
 from ...solvers.functions import AlartCurnier
 from ..multipliers.scales import contact_sizes, load_size
@@ -28,6 +29,7 @@ Array = NDArray[np.float64]
 FREE, STICK, SLIP = 0, 1, 2
 STEPS = 40  # Newton steps from a start
 CONVERGED = 1e-12  # |F| relative to 1 + |r|, scaled
+SYSTEM = 2e5  # operations that a linear system counts for, however small
 LONGEST = 1e8  # scaled reactions that count as run away
 WIDE = 4e6  # entries of a stack of matrices
 
@@ -52,7 +54,7 @@ class Stack:
     def of(cls, problem: FrictionProblem) -> Stack:
         """The scaled form of a problem in Delassus form with q != 0."""
         assert problem.W is not None and problem.q is not None
-        W = problem.W if isinstance(problem.W, np.ndarray) else problem.W.toarray()
+        W = dense(problem.W, 4)
         nc, d = problem.q.shape
         size, reacts = contact_sizes(W, nc)
         root = _power_of_two(np.sqrt(size))[:, None]
@@ -70,6 +72,12 @@ class Stack:
     def width(self) -> int:
         """Starts that fit into one stack of matrices."""
         return max(1, int(WIDE / max(self.W.size, 1)))
+
+    @property
+    def solve_work(self) -> float:
+        """Operations of a linear system."""
+        n = float(self.W.shape[0])
+        return SYSTEM + n**3
 
     def velocity(self, r: Array) -> Array:
         """u of a stack of reactions, (k, nc, d)."""
@@ -142,21 +150,22 @@ class Stack:
     # ---------------------------------------------------------------- Newton
     def newton(
         self, starts: Array, random: np.random.Generator, known: Array | None = None,
-        deadline: float = np.inf,
+        deadline: Deadline = NEVER,
     ) -> Array:  # fmt: skip
         """Solutions reached from starts, (k, nc, d) -> (j, nc, d) with repetitions.
 
-        known, (s, nc, d): solutions to be deflated.  deadline, of time.perf_counter: those
-        reached until then.
+        known, (s, nc, d): solutions to be deflated.  deadline: those reached until then.
         """
         reached = []
         for first in range(0, len(starts), self.width):
+            if deadline.passed:
+                break
             some = starts[first : first + self.width]
             reached.append(self._newton(some, random, known, deadline))
         return np.concatenate(reached) if reached else np.zeros((0, *self.shape))
 
     def _newton(
-        self, r: Array, random: np.random.Generator, known: Array | None, deadline: float
+        self, r: Array, random: np.random.Generator, known: Array | None, deadline: Deadline
     ) -> Array:
         nc, d = self.shape
         rho = np.repeat(10.0 ** random.uniform(-1, 1, (len(r), 1)), nc, axis=1)
@@ -168,9 +177,10 @@ class Stack:
             done = value <= CONVERGED * (1 + size)
             reached.append(r[done])
             going = ~done & (size < LONGEST)
-            if not going.any() or time.perf_counter() > deadline:
+            if not going.any() or deadline.passed:
                 break
             r, rho = r[going], rho[going]
+            deadline.spend(len(r) * self.solve_work)
             dr = self._solve(A[going], B[going], -F[going])
             if known is not None and len(known):
                 dr = dr * deflation(r, dr, known)[:, None, None]

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
+from ...dense import dense
 from ...problem import FrictionProblem
 from ..multipliers.scales import contact_sizes, load_size
 from . import pattern_search as search
@@ -33,7 +34,7 @@ class ScaledProblem:
         assert problem.W is not None and problem.q is not None
         self.problem, self.mu = problem, problem.mu
         nc = self.contacts = problem.contacts
-        W = problem.W if isinstance(problem.W, np.ndarray) else problem.W.toarray()
+        W = dense(problem.W)
         size, self.reacts = contact_sizes(W, nc)
         root = np.repeat(np.sqrt(size), 2)
         self.unit = load_size(problem.q / root.reshape(nc, 2), self.mu, self.reacts)
