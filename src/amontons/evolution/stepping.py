@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..clock import NEVER, Deadline
+from ..clock import NEVER, Deadline, check_seconds
 from ..errors import Interrupted, InvalidInput, NotConverged
 from ..model import Model
 from ..problem import Form, FrictionProblem
 from ..solution import FrictionSolution
 from ..solve import drive
-from ..solvers.base import Iterate, Solver, check_at_least, check_seconds
+from ..solvers.base import Iterate, Solver, check_at_least
 from ..solvers.nonlinear_newton import nonlinear_solver
 from .large_steps import LargeSlowModel
 from .moreau_jean import Local, MoreauJean
