@@ -108,7 +108,7 @@ def meeting(
     if other := {block.kind for block in facets} - set(KINDS):
         raise InvalidInput(
             f"master {master_surface!r}: expected facets of first order, got {other.pop()!r}; "
-            "take order = 1 and finer cells"
+            'take order = 1 and finer cells, or method="nitsche"'
         )
     points = slave.points[nodes]
     normals = nodal_normals(slave.points, slave.surface(surface))[nodes]

@@ -20,15 +20,11 @@ Array = NDArray[np.float64]
 UNEVEN = 1e-2  # of a pressure, above which what does not match is told
 
 
-def pairs_of(
-    model: Model, fields: ContactFields
-) -> Iterator[tuple[Contact, Placed, NDArray[np.int64]]]:
-    """Contacts, what they are placed to, and the numbers of those of them that touch."""
-    first = 0
-    for contact, placed in zip(model.contacts, model.discretisation.placed, strict=True):
-        pressure = fields.pressure[first : first + len(placed.rows.nodes)]
-        yield contact, placed, first + np.flatnonzero(pressure > 0)
-        first += len(pressure)
+def pairs_of(model: Model) -> Iterator[tuple[Contact, Placed, NDArray[np.int64]]]:
+    """Contacts, what they are placed to, and their numbers in the fields."""
+    counts = [len(placed.rows.nodes) for placed in model.discretisation.placed]
+    numbers = np.split(np.arange(sum(counts)), np.cumsum(counts)[:-1])
+    return zip(model.contacts, model.discretisation.placed, numbers, strict=True)
 
 
 def nodal_on_non_matching(model: Model, fields: ContactFields) -> list[ResultWarning]:
@@ -37,10 +33,10 @@ def nodal_on_non_matching(model: Model, fields: ContactFields) -> list[ResultWar
     Or whose facets lie behind the surfaces that they stand for by more than this part of what
     contact closes: where a gap is off by as much as an overlap, so is the pressure.
     """
-    out, first = [], 0
-    for contact, placed, touching in pairs_of(model, fields):
-        rows, here = placed.rows, touching - first
-        first += len(rows.nodes)
+    out = []
+    for contact, placed, numbers in pairs_of(model):
+        here = np.flatnonzero(fields.pressure[numbers] > 0)
+        rows, touching = placed.rows, numbers[here]
         if contact.method != "nodal" or placed.sides is None or not len(touching):
             continue
         off = placed.mismatch.force[placed.kept][here]
