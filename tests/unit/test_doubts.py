@@ -28,6 +28,7 @@ def block(value=0.0, loads=(), *, gap=0.0, **options):
     [
         block(),
         block(gap=0.1),
+        block(lambda x: (0.0, 0.0)),
         block((0, None), [am.Traction("left", (0, 0)), am.BodyForce(np.zeros(2))]),
         block((0, -0.1), load_factor=0.0),
     ],

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..warned import ResultWarning
 from .fields import ContactFields
+from .timing import is_timed
 
 if TYPE_CHECKING:
     from .model import Model
@@ -14,8 +15,8 @@ if TYPE_CHECKING:
 def no_load(model: Model, fields: ContactFields) -> list[ResultWarning]:
     """A warning where nothing moves, and no value given to a load or support can.
 
-    Tractions, body forces, supports that move and overlaps (gap < 0) are loads.  Values that
-    are functions may be loads at another time, and are not judged.
+    Tractions, body forces, supports that move and overlaps (gap < 0) are loads.  Values
+    that depend on time may be loads at another time, and are not judged.
     """
     if fields.force.any() or any(moved.any() for moved in fields.displacement):
         return []
@@ -40,9 +41,12 @@ def _warning(reason: str) -> ResultWarning:
 
 
 def _may_load(value: Any) -> bool:
-    """True for a value that is a function, or not zero."""
+    """True for a value that depends on time, or a number that is not zero.
+
+    Functions of position were zero where it counts, as nothing moves.
+    """
     if isinstance(value, list | tuple):
         return any(_may_load(entry) for entry in value)
     if hasattr(value, "tolist"):
         return _may_load(value.tolist())
-    return callable(value) or (value is not None and value != 0)
+    return is_timed(value) or (not callable(value) and value is not None and value != 0)
