@@ -51,11 +51,13 @@ def record(found: Solutions) -> dict[str, Any]:
     solutions = [
         {"pattern": s.pattern, "touching": list(s.touching), "r": s.r.tolist(),
          "u": s.u.tolist(), "error": s.error, "orientation": s.orientation, "energy": s.energy,
-         "freedom": s.freedom}
+         "freedom": s.freedom, "sole": s.sole, "at_least": s.at_least,
+         "distance": s.distance}
         for s in found.solutions
     ]  # fmt: skip
     return {"schema": SCHEMA, "complete": found.complete, "reason": found.reason,
-            "examined": found.examined, "seconds": found.seconds, "solutions": solutions,
+            "resolution": found.resolution, "examined": found.examined,
+            "seconds": found.seconds, "solutions": solutions,
             "versions": versions()}  # fmt: skip
 
 
@@ -95,5 +97,5 @@ def _show(title: str, found: Solutions) -> None:
     )
     count = f"{len(found)} solution" + ("s" if len(found) != 1 else "")
     sure = "there is no other" if found.complete else "there may be others"
-    click.echo(f"{count}; {sure}: {found.reason} ({found.examined} partial patterns, "
-               f"{found.seconds:.3g} s)")  # fmt: skip
+    click.echo(f"{count}; {sure}: {found.reason}{found.resolved} "
+               f"({found.examined} partial patterns, {found.seconds:.3g} s)")  # fmt: skip

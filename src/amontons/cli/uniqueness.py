@@ -102,12 +102,14 @@ def record(found: Uniqueness) -> dict[str, Any]:
                    "null_vector": w.null_vector.tolist(), "residual": w.residual}  # fmt: skip
     if found.other is not None:
         s = found.other
-        other = {"pattern": s.pattern, "r": s.r.tolist(), "u": s.u.tolist(), "error": s.error}
+        other = {"pattern": s.pattern, "r": s.r.tolist(), "u": s.u.tolist(), "error": s.error,
+                 "distance": s.distance}  # fmt: skip
     if found.critical is not None:
         comparison = {"p_matrix": found.critical.p_matrix,
                       "full_contact": found.critical.full_contact}  # fmt: skip
     return {"schema": SCHEMA, "verdict": found.verdict.value, "reason": found.reason,
             "friction": found.friction, "lower": found.lower, "upper": found.upper,
             "criterion": found.criterion, "witness": witness, "other": other,
-            "comparison": comparison, "seconds": found.seconds,
+            "comparison": comparison, "resolution": found.resolution,
+            "seconds": found.seconds,
             "versions": versions()}  # fmt: skip

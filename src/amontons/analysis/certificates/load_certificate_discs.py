@@ -3,7 +3,7 @@
 The whole problem is one region about the given solution first: multipliers on friction discs
 (`disc_multipliers`) that leave no other.  Where there are none, Newton's method looks for
 another solution from many starts, and then the regions are divided (`disc_search`) until one is
-found or all are closed.  Solutions within 1e-7 (scaled) of each other count as one.
+found or all are closed.  Solutions within 1e-10 (scaled) of each other count as one.
 """
 
 from __future__ import annotations
@@ -109,7 +109,10 @@ class _Certification:
         certified = outcome is LoadOutcome.CERTIFIED
         proof = self.search.proof() if self.search is not None and certified else None
         examined = 0 if self.search is None else self.search.examined
+        distance = np.inf
+        if certified:
+            distance = ON if self.search is None else self.search.resolution
         return LoadCertificate(
-            outcome, other, () if proof is None else proof.boxes, self.r,
-            ON if certified else np.inf, examined, reason, now() - self.began,
+            outcome, other, () if proof is None else proof.boxes, self.r, distance, examined,
+            reason, now() - self.began,
         )  # fmt: skip

@@ -23,7 +23,7 @@ from scipy import linalg, sparse
 from ...clock import NEVER, Deadline
 from ...dense import dense
 from ...problem import FrictionProblem
-from ..multipliers.scales import contact_sizes, load_size
+from ..multipliers.scales import contact_sizes, load_size, power_of_two
 
 Array = NDArray[np.float64]
 States = NDArray[np.int8]
@@ -60,9 +60,9 @@ class LoadProblem:
         assert local.W is not None and local.q is not None
         W = dense(local.W, 6)
         size, reacts = contact_sizes(W, nc)
-        root = np.repeat(_power_of_two(np.sqrt(size)), 2)
+        root = np.repeat(power_of_two(np.sqrt(size)), 2)
         q = local.q.ravel() / root
-        unit = _power_of_two(np.array(load_size(q.reshape(nc, 2), local.mu, reacts) or 1.0))
+        unit = power_of_two(np.array(load_size(q.reshape(nc, 2), local.mu, reacts) or 1.0))
         W = W / root / root[:, None]
         return cls(local, W, q / unit, local.mu, unit / root, unit * root, reacts)
 
@@ -166,7 +166,3 @@ def _inverse_root(energy: Array) -> Array:
             continue
         return linalg.solve_triangular(L, np.eye(n), lower=True, trans="T")
     return np.eye(n)
-
-
-def _power_of_two(x: Array) -> Array:
-    return np.exp2(np.round(np.log2(x)))

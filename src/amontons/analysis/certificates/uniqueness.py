@@ -21,7 +21,9 @@ from ...problem import FrictionProblem
 from ...solution import FrictionSolution
 from ...solve import drive
 from ..multipliers.scales import UNRESOLVED, contact_sizes, resolves
-from ..solutions.enumerate import PieceSolution, enumerate_solutions
+from ..solutions.disc_search import enumerate_discs
+from ..solutions.enumerate import PieceSolution, Solutions, enumerate_solutions
+from ..solutions.existence import exist
 from .critical_friction import CriticalFriction, Witness, critical_friction
 from .energy_bound import energy_bound
 from .load_answer import LoadCertificate, LoadOutcome
@@ -30,13 +32,18 @@ from .status_pieces import friction_shape
 
 Array = NDArray[np.float64]
 ENUMERATED = 25  # contacts up to which all solutions are looked for before a certificate
+REGIONS = 10  # contacts in 3D up to which all solutions are looked for after it
 INSTANT = 8  # contacts up to which the quick verdict examines all patterns: milliseconds
 QUICK = 400  # rows of W up to which the quick verdict is given: some ten milliseconds
 SECONDS = 60.0  # whose work a verdict without a time limit may take
 QUICK_SECONDS = 1.0  # the same of a quick one
+ABOVE = 1e-9  # relative, at which a friction is proved to be safe
 BOUNDS = 0.5  # part of the time for the bounds on the critical friction
 COPIES = 6  # of a dense W that the questions hold at a time
-SAME = 1e-6  # distance of two solutions that count as one, relative to their size
+SAME = 1e-6  # penetration of a contact that can not react, relative to the load
+STILL = 1e-10  # of W dr relative to its terms, which counts as no other motion
+KNOWN = 1e-7  # to which solutions are known that a certificate found, scaled
+SAME_MOTION = " Reactions differ, the motion is the same."
 
 
 class Verdict(Enum):
@@ -69,6 +76,9 @@ class Uniqueness:
     lower every load has one solution (criterion: what proves it), from upper on some load has
     several (witness).  solution, other: the one found, and a second one or None.  certificate:
     of UNIQUE_THIS_LOAD at larger sizes.  critical: the bounds with all details.
+    resolution: of UNIQUE_THIS_LOAD, any other solution would differ by less; of NOT_UNIQUE, to
+    which both are known; relative to the largest reaction or, if that is larger, to what the
+    load can make.  0 for every load, None where nothing is known.
     """
 
     verdict: Verdict
@@ -83,6 +93,7 @@ class Uniqueness:
     certificate: LoadCertificate | None = None
     critical: CriticalFriction | None = None
     seconds: float = 0.0
+    resolution: float | None = None
 
     def __str__(self) -> str:
         upper = "unknown" if np.isinf(self.upper) else f"{self.upper:.4g}"
@@ -214,7 +225,8 @@ def _every_load(local: FrictionProblem, deadline: Deadline) -> Uniqueness:
     cheap = _by_energy(local, deadline)
     if local.dimension != 2 or not local.contacts or deadline.passed:
         return cheap
-    bounds = critical_friction(local, time_limit=deadline, first=cheap.friction)
+    above = cheap.friction * (1 + ABOVE)  # safe up to there means safe at the friction itself
+    bounds = critical_friction(local, time_limit=deadline, first=above)
     return _by_bounds(cheap, bounds)
 
 
@@ -243,7 +255,8 @@ def _this_load(
 ) -> Uniqueness:  # fmt: skip
     """All solutions where they can be enumerated, else the certificate about one."""
     if local.dimension == 2 and local.contacts <= ENUMERATED and local.q_norm > 0:
-        answer = _by_enumeration(local, solution, verdict, deadline.share(0.5))
+        listed = enumerate_solutions(local, time_limit=deadline.share(0.5))
+        answer = _by_list(local, solution, replace(verdict, solution=solution), listed)
         if answer is not None:
             return answer
     given = solution is not None
@@ -264,53 +277,99 @@ def _this_load(
     if found.outcome is LoadOutcome.CERTIFIED and not resolves(local, solution.r):
         return replace(verdict, reason=f"{verdict.reason} {_sentence(UNRESOLVED)}")
     if found.outcome is LoadOutcome.CERTIFIED:
-        return replace(verdict, verdict=Verdict.UNIQUE_THIS_LOAD, certificate=found,
-                       reason=_sentence(found.reason))  # fmt: skip
+        verdict = replace(verdict, certificate=found)
+        return _alone(verdict, _sentence(found.reason), found.distance)
     if found.outcome is LoadOutcome.REFUTED:
-        return _refuted(verdict, local, found.other, solution.u, _sentence(found.reason))
+        return _refuted(verdict, local, found)
+    unsettled = found.reason != UNRESOLVED and not deadline.passed
+    if local.dimension == 3 and local.contacts <= REGIONS and unsettled:
+        answer = _by_list(
+            local, solution, verdict, enumerate_discs(local, time_limit=deadline)
+        )
+        if answer is not None:
+            return answer
     return replace(verdict, reason=f"{verdict.reason} {_sentence(found.reason)}")
 
 
-def _by_enumeration(
+def _by_list(
     local: FrictionProblem, solution: FrictionSolution | None, verdict: Uniqueness,
-    deadline: Deadline,
+    found: Solutions,
 ) -> Uniqueness | None:  # fmt: skip
-    """The verdict of the list of all solutions, None where it settles nothing."""
-    verdict = replace(verdict, solution=solution)
-    found = enumerate_solutions(local, time_limit=deadline)
-    isolated = all(s.freedom == 0 for s in found.solutions)
-    if found.complete and len(found) == 1 and isolated:
+    """The verdict of a list of solutions, None where it settles nothing."""
+    if found.one:
         reason = "All other patterns of statuses are excluded."
-        return replace(verdict, verdict=Verdict.UNIQUE_THIS_LOAD, reason=reason)
+        return _alone(verdict, reason, found.resolution)
     if found.complete and not found.solutions:
         return replace(verdict, reason="There is no solution: all patterns are excluded.")
-    if len(found) > 1 or not isolated:
-        s = found.solutions
-        first = s[0] if solution is None else solution
-        size = np.sqrt(contact_sizes(dense(local.W), local.contacts)[0])[:, None]
-        other = max(s, key=lambda x: float(np.linalg.norm(size * (x.r - first.r))))
-        other = other if isolated else s[0]
-        count = f"{len(s)} solutions were found" if isolated else "a set of solutions was found"
-        reason = f"{count[0].upper()}{count[1:]}: {', '.join(x.pattern for x in s[:5])}."
-        return _refuted(verdict, local, other, first.u, reason)
+    if found.at_least > 1:
+        return _several(verdict, local, found, solution)
+    if found.complete:  # but the degree of a solution leaves open how many it stands for
+        words = ", ".join("=".join((s.pattern, *s.touching[:3])) for s in found.solutions[:5])
+        reason = f"Rounding of W, q and mu decides whether there is more than one of: {words}."
+        return replace(verdict, reason=reason)
+    if found.reason == UNRESOLVED:  # a certificate would not tell more
+        return replace(verdict, reason=f"{verdict.reason} {_sentence(UNRESOLVED)}")
     return None
 
 
-def _refuted(
-    verdict: Uniqueness, local: FrictionProblem, other: PieceSolution | None, u: Array,
-    reason: str,
+def _several(
+    verdict: Uniqueness, local: FrictionProblem, found: Solutions,
+    solution: FrictionSolution | None,
 ) -> Uniqueness:  # fmt: skip
-    """NOT_UNIQUE, saying so where only reactions differ: motions relative to the free one.
+    """NOT_UNIQUE by a list of solutions."""
+    s = [entry for entry in found.solutions if entry.at_least]
+    sets = [entry for entry in s if entry.freedom]
+    first = s[0] if solution is None else solution
+    size = np.sqrt(contact_sizes(dense(local.W), local.contacts)[0])[:, None]
+    far = max(s, key=lambda x: float(np.linalg.norm(size * (x.r - first.r))))
+    count = "A set of solutions was found" if sets else f"{len(s)} solutions were found"
+    words = [entry.pattern for entry in s]
+    if len(s) == 1 and not sets:  # only their patterns tell
+        count = f"{found.at_least} solutions are within {found.resolution:.1e} of each other"
+        words = [s[0].pattern, *s[0].touching]
+    reason = f"{count}: {', '.join(words[:5])}."
+    alike = len(s) > 1 or bool(sets)
+    alike = alike and all(entry.still for entry in sets)
+    if alike and all(same_motion(local, entry.r - s[0].r) for entry in s[1:]):
+        reason += SAME_MOTION
+    other = sets[0] if sets else far
+    return replace(verdict, verdict=Verdict.NOT_UNIQUE, other=other, reason=reason,
+                   resolution=found.resolution)  # fmt: skip
 
-    In a set of solutions without slip dr du = 0 for all contacts, so that W dr = du = 0.
+
+def _alone(verdict: Uniqueness, reason: str, resolution: float) -> Uniqueness:
+    """UNIQUE_THIS_LOAD, saying up to which difference."""
+    reason += f" Any other would differ by less than {resolution:.1e} of the largest reaction."
+    return replace(verdict, verdict=Verdict.UNIQUE_THIS_LOAD, reason=reason,
+                   resolution=resolution)  # fmt: skip
+
+
+def same_motion(local: FrictionProblem, dr: Array) -> bool:
+    """True where reactions that differ by dr (nc, d) move nothing, as far as rounding tells.
+
+    W dr is compared with sqrt|W_ii| sum_j sqrt|W_jj| |dr_j|, so that it does not matter how
+    small dr is: solutions of different status that are near to each other do not pass.
     """
-    if other is not None and (other.freedom == 0 or set(other.pattern) <= set("fs")):
-        assert local.q is not None
-        size = max(float(np.abs(x).max(initial=0.0)) for x in (u, local.q))
-        size = max(size, np.finfo(float).tiny)
-        if np.abs(other.u - u).max() <= SAME * size:
-            reason += " Reactions differ, the motion is the same."
-    return replace(verdict, verdict=Verdict.NOT_UNIQUE, other=other, reason=reason)
+    W = dense(local.W)
+    root = np.sqrt(contact_sizes(W, local.contacts)[0])
+    terms = root * (root @ np.abs(dr).sum(axis=1))
+    motion = np.abs((W @ dr.ravel()).reshape(dr.shape)).max(axis=1, initial=0.0)
+    return bool((motion <= STILL * terms).all())
+
+
+def _refuted(
+    verdict: Uniqueness, local: FrictionProblem, found: LoadCertificate
+) -> Uniqueness:
+    """NOT_UNIQUE by a second solution, if both are proved to exist (`existence`)."""
+    other = found.other
+    assert other is not None
+    reason = _sentence(found.reason)
+    if not exist(local, [found.r0, other.r]):
+        return replace(verdict, reason=f"{reason} Rounding decides whether it is one.")
+    if same_motion(local, other.r - found.r0):
+        reason += SAME_MOTION
+    return replace(verdict, verdict=Verdict.NOT_UNIQUE, other=other, reason=reason,
+                   resolution=KNOWN)  # fmt: skip
 
 
 # ----------------------------------------------------------------------- helpers

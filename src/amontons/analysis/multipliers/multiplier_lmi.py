@@ -159,9 +159,12 @@ def find_multipliers(
     deadline = deadline_of(time_limit)
     each = step_operations(Z, families)
     if not deadline.affords(each):
-        return _not_begun(Z, families)
+        return _not_begun(Z, families, LmiOutcome.TIME_LIMIT)
     program = Program(Z, tuple(families))
-    point = start(program)
+    try:
+        point = start(program)
+    except np.linalg.LinAlgError:  # Z has rows of very different size
+        return _not_begun(Z, families, LmiOutcome.STALLED)
     refused, steps, outcome = 0, 0, LmiOutcome.STALLED
     while steps < STEPS and refused < REFUSALS:
         if _positive(point) and (not margin or point.t > margin * program.theta * point.lam):
@@ -200,12 +203,12 @@ def step_operations(Z: Array, families: Sequence[Family]) -> float:
     return OVERHEAD + form + unknowns**3 / 3 + 40.0 * N**3 + 25.0 * slacks
 
 
-def _not_begun(Z: Array, families: Sequence[Family]) -> Multipliers:
-    """The answer where there is no time for a single step: nothing is known."""
+def _not_begun(Z: Array, families: Sequence[Family], outcome: LmiOutcome) -> Multipliers:
+    """The answer where no step was made: nothing is known."""
     W = tuple(-np.tile(np.eye(f.size), (len(f.rows), 1, 1)) for f in families)
     extras = tuple(np.zeros((len(f.rows), f.extras)) for f in families)
     nothing = np.zeros(Z.shape[1])
-    return Multipliers(LmiOutcome.TIME_LIMIT, W, extras, -np.inf, np.inf, nothing, 0)
+    return Multipliers(outcome, W, extras, -np.inf, np.inf, nothing, 0)
 
 
 def multipliers_at(

@@ -66,11 +66,16 @@ def _small_extras(family: Family, sets: Array) -> Array:
 # --------------------------------------------------------------------------- one step
 def advance(program: Program, point: Point) -> tuple[Point, float] | None:
     """(next point, shorter one of its two step lengths), None where rounding forbids."""
-    inverse = [_inverse(B) for B in point.S]
     try:
-        normal = Normal(program, point.X, inverse)
+        return _advanced(program, point)
     except np.linalg.LinAlgError:
         return None
+
+
+def _advanced(program: Program, point: Point) -> tuple[Point, float] | None:
+    """`advance`, raising LinAlgError where a block is not definite, the first ones included."""
+    inverse = [_inverse(B) for B in point.S]
+    normal = Normal(program, point.X, inverse)
     objective = np.zeros(program.unknowns)
     objective[-1] = 1.0
     gradient = program.adjoint(inverse)

@@ -40,14 +40,37 @@ def load_size(q: Array, mu: Array, reacts: NDArray[np.bool_]) -> float:
 def resolves(problem: FrictionProblem, r: Array) -> bool:
     """False where a contact is loaded so much less than others that tolerances swallow it.
 
-    problem in Delassus form, r (nc, d).  The load of a contact is |q_i| + sum |W_ij| |r_j|.
+    problem in Delassus form, r (nc, d).  The load of contact i is
+    |q_i + sum_{j != i} W_ij r_j|, what it would have to balance alone: its terms may cancel,
+    and what is left of them decides its status.  Where all are zero r_i = 0 is known exactly.
+    """
+    share, _ = load_shares(problem, r)
+    return bool((share >= RESOLVED).all())
+
+
+def load_shares(problem: FrictionProblem, r: Array) -> tuple[Array, Array]:
+    """(load of every contact, its terms without their signs), (nc,) each.
+
+    Both relative to the largest reaction or load, scaled; infinite for a contact that can not
+    react, or is not loaded by anything.
     """
     assert problem.W is not None and problem.q is not None
     W = dense(problem.W)
     q, (nc, d) = problem.q, r.shape
     size, reacts = contact_sizes(W, nc)
-    load = np.linalg.norm(np.abs(q) + (np.abs(W) @ np.abs(r).ravel()).reshape(nc, d), axis=1)
-    load /= np.sqrt(size)
-    largest = np.linalg.norm(np.sqrt(size)[:, None] * r, axis=1).max(initial=0.0)
-    largest = max(largest, load_size(q / np.sqrt(size)[:, None], problem.mu, reacts))
-    return not bool((reacts & (load > 0) & (load < RESOLVED * largest)).any())
+    root = np.sqrt(size)
+    others = W.reshape(nc, d, nc, d).copy()
+    others[np.arange(nc), :, np.arange(nc)] = 0.0
+    others = others.reshape(nc * d, nc * d)
+    load = np.linalg.norm(q + (others @ r.ravel()).reshape(nc, d), axis=1)
+    terms = np.abs(q) + (np.abs(others) @ np.abs(r).ravel()).reshape(nc, d)
+    largest = np.linalg.norm(root[:, None] * r, axis=1).max(initial=0.0)
+    largest = max(largest, load_size(q / root[:, None], problem.mu, reacts)) or 1.0
+    counts = reacts & terms.any(axis=1)
+    share = np.where(counts, load / root / largest, np.inf)
+    return share, np.where(counts, np.linalg.norm(terms, axis=1) / root / largest, np.inf)
+
+
+def power_of_two(x: Array | float) -> Array:
+    """The nearest power of two, to multiply by without rounding."""
+    return np.exp2(np.round(np.log2(x)))

@@ -19,11 +19,12 @@ from numpy.typing import NDArray
 from ...clock import NEVER, Deadline, TimeLimit, deadline_of, now
 from ...errors import TimeUp
 from ...problem import FrictionProblem
-from ..multipliers.scales import UNRESOLVED, resolves
+from ..multipliers.scales import RESOLVED, UNRESOLVED, resolves
 from .disc_multipliers import EXACT, BoxProblem, BoxProof, contains
 from .disc_sets import ON, Law, Region
-from .enumerate import Solutions
-from .multistart import EXTRA, ROUND, Finder, nothing_found, without_load
+from .enumerate import Solutions, missing
+from .existence import exist
+from .multistart import EXTRA, ROUND, Finder, nothing_found, statuses, without_load
 from .newton_batch import FREE, SLIP, STICK, Stack
 
 Array = NDArray[np.float64]
@@ -94,9 +95,12 @@ def enumerate_discs(
     search = DiscSearch(stack, finder, deadline)
     search.begin()
     search.run()
+    entries = [replace(entry, distance=search.resolution, at_least=int(exist(local, [entry.r])),
+                       sole=search.complete and not (entry.freedom or entry.touching))
+               for entry in finder.solutions()]  # fmt: skip
     return Solutions(
-        tuple(finder.solutions()), search.complete, search.reason, search.examined,
-        now() - began, search.proof() if keep_proof else None,
+        tuple(entries), search.complete, search.reason, search.examined, now() - began,
+        search.proof() if keep_proof else None, search.resolution,
     )  # fmt: skip
 
 
@@ -130,12 +134,35 @@ class DiscSearch:
     @property
     def complete(self) -> bool:
         """True when every region was closed, and solutions can be told apart."""
-        return not self.queue and not self.undecided and self._resolved
+        closed = not self.queue and not self.undecided
+        return closed and self._resolved and not self._missing
+
+    @property
+    def resolution(self) -> float:
+        """How far another solution can be, scaled, from one that is taken to be on a border.
+
+        A reference within ON of another status counts as having both.  What it is off by, other
+        solutions may be off by as much more as W is soft.
+        """
+        off = max((_off_border(self.stack, r) for r in self.finder.found), default=0.0)
+        if off == 0.0:
+            return ON
+        W = (self.stack.W + self.stack.W.T) / 2
+        softest = max(float(np.linalg.eigvalsh(W)[0]), np.finfo(float).tiny)
+        return max(ON, off / softest)
+
+    @property
+    def _missing(self) -> str | None:
+        """What the orientations of the solutions say, see `local_degree`."""
+        if 0 in self.finder.sign:
+            return None
+        return missing(sum(self.finder.sign), 0 if self._penetrates else 1)
 
     @property
     def _resolved(self) -> bool:
         stack = self.stack
-        return all(resolves(stack.problem, r * stack.to_r) for r in self.finder.found)
+        loaded = all(resolves(stack.problem, r * stack.to_r) for r in self.finder.found)
+        return loaded and self.resolution <= RESOLVED
 
     @property
     def _penetrates(self) -> bool:
@@ -153,6 +180,8 @@ class DiscSearch:
             return f"{self.undecided} regions could be neither divided nor excluded"
         if not self._resolved:
             return UNRESOLVED
+        if self._missing is not None:
+            return self._missing
         return "every region was searched and all others are excluded"
 
     def proof(self) -> DiscProof:
@@ -390,6 +419,16 @@ class DiscSearch:
     def _known(self, r: Array) -> bool:
         size = 1 + np.abs(r).max()
         return any(np.abs(r - other).max() <= 10 * ON * size for other in self.finder.found)
+
+
+def _off_border(stack: Stack, r: Array) -> float:
+    """Largest distance from another status, scaled, that counts as none without being it."""
+    u, states = stack.velocity(r[None])[0], statuses(stack, r)[0]
+    stick = np.minimum(r[:, 0], stack.mu * r[:, 0] - np.linalg.norm(r[:, 1:], axis=1))
+    slip = np.where(stack.mu > 0, np.linalg.norm(u[:, 1:], axis=1), np.inf)
+    distance = np.choose(states, [np.abs(u[:, 0]), stick, np.minimum(r[:, 0], slip)])
+    distance = np.abs(distance[stack.able])
+    return float(distance[distance <= ON].max(initial=0.0))
 
 
 def _ill_conditioned(matrix: Array) -> bool:

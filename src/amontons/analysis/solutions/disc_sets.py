@@ -34,7 +34,7 @@ from ..multipliers.multiplier_lmi import restricted
 Array = NDArray[np.float64]
 SAMPLES = 16  # directions of a full circle
 FEWEST = 6  # of an arc: a form of e has five coefficients
-ON = 1e-7  # scaled distance at which a reference counts as on a border of the law
+ON = 1e-10  # scaled distance at which a reference counts as on a border of the law
 INTERVALS, PARTS, DIVISIONS = 96, 12, 5  # of directions: at first, of one, how often divided
 MOST = 20_000  # intervals at a time
 NEAR = 0.3  # rad from e0 within which the span replaces the cone

@@ -2,12 +2,17 @@
 
 Every contact is free, sticks, or slips in one of two directions; each of the 4^nc patterns
 makes the problem linear.  `pattern_search` excludes most patterns in large groups; here the
-problem is prepared for it, and what remains is solved pattern by pattern.
+problem is prepared for it, and what remains is solved pattern by pattern, with bounds of all
+errors (`piece_solution`).  Solutions on borders of the law belong to several patterns
+(`local_degree`); the degrees of all of them have to add up to one.
+
+A complete list means: every solution of the problem with W, q and mu as given is within
+`resolution` of one of the list, and has its pattern or one of those that touch it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -17,9 +22,11 @@ from numpy.typing import NDArray
 from ...clock import Deadline, TimeLimit, deadline_of, now
 from ...errors import InvalidInput, TimeUp, UnsupportedForm
 from ...problem import FrictionProblem
-from ..multipliers.scales import UNRESOLVED, resolves
+from ..multipliers.scales import RESOLVED, UNRESOLVED, load_shares
 from . import pattern_search as search
-from .scaled_problem import REACH, SAME, ScaledProblem, States
+from .local_degree import degree
+from .piece_solution import DATA, Existence, PieceAnswer, examined
+from .scaled_problem import REACH, SLACK, ScaledProblem, States
 
 if TYPE_CHECKING:
     from .disc_search import DiscProof
@@ -41,9 +48,15 @@ class PieceSolution:
     pattern: status of every contact, f free, s stick, slip + (r_T = mu r_N) or -, in 3D l.
     touching: further patterns that the same solution has, being on their border.  r, u (nc, d).
     error: by the judge.  orientation: sign of the determinant of the piece, 1 as without
-    friction, 0 where it is singular.  energy: r W r / 2, the potential energy above that of
-    the state without contact.  freedom: dimension of the set of solutions on this piece, 0 for
-    an isolated one; r is then a point inside.
+    friction, 0 where it is singular; on a border the sum of those of its pieces that have a
+    solution for loads nearby, 0 also where that is not known.  energy: r W r / 2, the potential
+    energy above that of the state without contact.  freedom: dimension of the set of solutions
+    on this piece, 0 for an isolated one; r is then a point inside.  sole: exactly one solution
+    is here, whatever rounding does; without it there may be two of different status within
+    `distance`, or on a border none.  at_least: so many are here for W, q and mu as given, 2
+    for a set, which is one within rounding.  distance: bound of how far the solutions that
+    this one stands for are from r, relative to the largest reaction or, if that is larger, to
+    what the load can make.  still: all of a set have the same motion.
     """
 
     pattern: str
@@ -54,6 +67,10 @@ class PieceSolution:
     orientation: int
     energy: float
     freedom: int = 0
+    sole: bool = False
+    at_least: int = 0
+    distance: float = np.inf
+    still: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +92,9 @@ class Solutions:
     """What `all_solutions` found; complete: every other pattern was excluded by a proof.
 
     examined: partial patterns that were looked at.  reason: why complete, or why not.
+    resolution: what is nearer to one of the solutions than this may be listed as the same,
+    being on its border; relative to the largest reaction or, if that is larger, to what the
+    load can make.  Where the list is complete, no solution is farther from all of them.
     """
 
     solutions: tuple[PieceSolution, ...]
@@ -83,6 +103,7 @@ class Solutions:
     examined: int
     seconds: float
     proof: Proof | DiscProof | None = None
+    resolution: float = np.inf
 
     def __len__(self) -> int:
         return len(self.solutions)
@@ -95,7 +116,25 @@ class Solutions:
         ]
         count = f"{len(self)} solution" + ("s" if len(self) != 1 else "")
         return "\n".join([f"{count}, {'complete' if self.complete else 'not complete'}: "
-                          f"{self.reason}", *lines])  # fmt: skip
+                          f"{self.reason}{self.resolved}", *lines])  # fmt: skip
+
+    @property
+    def resolved(self) -> str:
+        """The resolution in words, to follow the reason."""
+        if not np.isfinite(self.resolution):
+            return ""
+        differs = "any other differs" if self.complete else "solutions count as one that differ"
+        return f"; {differs} by less than {self.resolution:.1e} of the largest reaction"
+
+    @property
+    def at_least(self) -> int:
+        """So many solutions there are for W, q and mu as given."""
+        return sum(s.at_least for s in self.solutions)
+
+    @property
+    def one(self) -> bool:
+        """True where the list proves that there is exactly one solution."""
+        return self.complete and len(self) == 1 and self.solutions[0].sole
 
 
 def enumerate_solutions(
@@ -130,25 +169,45 @@ def enumerate_solutions(
     piece = ScaledProblem(local)
     cuts: list[Cut] | None = [] if keep_proof else None
     found, undecided, examined, stopped = _collect(piece, deadline, tolerance, cuts)
-    reason = "every other pattern is excluded"
+    entries = list(_merged(piece, found))
+    solutions = tuple(solution for solution, _ in entries)
+    doubt = _doubt(piece, solutions, [known for _, known in entries])
     if stopped:
-        reason = f"stopped after {deadline}"
+        doubt = f"stopped after {deadline}"
     elif undecided:
-        reason = f"{undecided} patterns are too near to a solution to be excluded"
-    elif not piece.bounded:
-        reason = f"W is singular: reactions above {REACH:g} times the size of q / W may exist"
-    solutions = tuple(_merged(piece, found))
-    resolved = all(resolves(local, s.r) for s in solutions)
-    if not resolved:
-        reason = UNRESOLVED
-    complete = not stopped and not undecided and piece.bounded and resolved
+        doubt = f"{undecided} patterns are too near to a solution to be excluded"
+    elif not piece.box.bounded:
+        doubt = f"W is singular: reactions above {REACH:g} times the size of q / W may exist"
     return Solutions(
-        solutions, complete, reason, examined, now() - began, _proof(piece, cuts)
-    )
+        solutions, doubt is None, doubt or "every other pattern is excluded", examined,
+        now() - began, _proof(piece, cuts),
+        max((s.distance for s in solutions), default=0.0),
+    )  # fmt: skip
+
+
+def _doubt(
+    piece: ScaledProblem, solutions: Sequence[PieceSolution], degrees: Sequence[int | None]
+) -> str | None:
+    """What speaks against a list that has everything that the search left."""
+    for solution in solutions:
+        share, terms = load_shares(piece.problem, solution.r)
+        if ((share < RESOLVED) & (share > DATA * terms)).any():
+            return UNRESOLVED
+    penetrates = bool((piece.c[0::2][~piece.reacts] < 0).any())
+    known = [value for value in degrees if value is not None]
+    if len(known) < len(degrees):
+        return None
+    return missing(sum(known), 0 if penetrates else 1)
+
+
+def missing(total: int, expected: int = 1) -> str | None:
+    """What a wrong sum of orientations says."""
+    if total == expected:
+        return None
+    return f"orientations add up to {total}, not {expected}: one is missing or too many"
 
 
 # ------------------------------------------------------------------- the search
-Found = tuple[States, Array, Array, float, int, int]
 Cut = tuple[States, Array]  # pattern and multipliers
 
 
@@ -157,32 +216,30 @@ def _collect(
     deadline: Deadline,
     tolerance: float,
     cuts: list[Cut] | None,
-) -> tuple[list[Found], int, int, bool]:
-    """(solutions with their patterns, undecided patterns, nodes, stopped by the clock?)."""
-    found: list[Found] = []
-    undecided = examined = 0
+) -> tuple[list[PieceAnswer], int, int, bool]:
+    """(pieces with solutions, undecided patterns, nodes, stopped by the clock?)."""
+    found: list[PieceAnswer] = []
+    undecided = nodes = 0
     node, leaf = NODE * (2.0 * piece.contacts) ** 2, LEAF + 10.0 * (2.0 * piece.contacts) ** 3
-    for leaves, nodes, done in _leaves(piece, cuts):
-        examined += nodes
-        deadline.spend(node * nodes)
+    for leaves, more, done in _leaves(piece, cuts):
+        nodes += more
+        deadline.spend(node * more)
         for k, states in enumerate(leaves):
             if k and deadline.passed:
-                return found, undecided, examined, True
+                return found, undecided, nodes, True
             deadline.spend(leaf)
-            answer = piece.solve(states)
-            if answer is None:
-                undecided += not piece.excluded(states)
-                continue
-            r, orientation, freedom = answer
-            u = piece.W @ r + piece.c
-            error = piece.problem.error((r * piece.to_r).reshape(-1, 2))
-            if error <= tolerance:
-                found.append((states, r, u, error, orientation, freedom))
-            else:
+            answer = examined(piece, states)
+            if answer.existence is Existence.UNKNOWN:
                 undecided += 1
+            elif answer.existence is not Existence.NONE:
+                error = piece.problem.error((answer.r * piece.to_r).reshape(-1, 2))
+                if error <= tolerance:
+                    found.append(answer)
+                else:
+                    undecided += 1
         if not done and deadline.passed:
-            return found, undecided, examined, True
-    return found, undecided, examined, False
+            return found, undecided, nodes, True
+    return found, undecided, nodes, False
 
 
 def _leaves(piece: ScaledProblem, cuts: list[Cut] | None) -> Iterator[tuple[States, int, bool]]:
@@ -195,11 +252,12 @@ def _leaves(piece: ScaledProblem, cuts: list[Cut] | None) -> Iterator[tuple[Stat
     nodes = max(20, NODES * 20**2 // max(20, nc) ** 2)  # a node costs some nc^2 and more
     leaves, cut = np.empty((2, nodes, nc), dtype=np.int8)
     proofs = np.empty((nodes, m))
+    box = piece.box
     search.start_inplace(D, basic, nonbasic, states, piece.A, piece.c)
     done, level = False, 0
     while not done:
         done, level, nodes, count, excluded = search.search_inplace(
-            piece.A, piece.c, piece.low, piece.high, piece.reacts, piece.mu > 0,
+            piece.A, box.spread, piece.c, box.low, box.high, piece.reacts, piece.mu > 0,
             D, basic, nonbasic, states, turn, level, leaves, cut, proofs,
         )  # fmt: skip
         if cuts is not None:
@@ -207,25 +265,71 @@ def _leaves(piece: ScaledProblem, cuts: list[Cut] | None) -> Iterator[tuple[Stat
         yield leaves[:count].copy(), nodes, done
 
 
-def _merged(piece: ScaledProblem, found: list[Found]) -> Iterator[PieceSolution]:
-    """One entry per solution: sets first, then isolated ones that are not in them."""
-    kept: list[tuple[Found, list[str]]] = []
-    for item in sorted(found, key=lambda f: (-f[5], -int((f[0] == search.STICK).sum()))):
-        states, r, u = item[:3]
-        for other, touching in kept:
-            size = max(1.0, float(np.abs(r).max()))
-            near = np.abs(r - other[1]).max() <= SAME * size and item[5] == 0
-            if near or (other[5] > item[5] and piece.holds(other[0], r, u)):
-                touching.append(_word(states))
-                break
+def _merged(
+    piece: ScaledProblem, found: list[PieceAnswer]
+) -> Iterator[tuple[PieceSolution, int | None]]:
+    """Solutions with their degrees: sets first, then isolated ones that are not in them.
+
+    Solutions that are sure of their status are never put together with each other.
+    """
+    groups: list[list[PieceAnswer]] = []
+    for item in sorted(found, key=_rank):
+        group = None
+        if item.existence is Existence.NEAR:
+            group = next((g for g in groups if _belongs(piece, item, g)), None)
+        if group is None:
+            groups.append([item])
         else:
-            kept.append((item, []))
-    for (states, r, _, error, orientation, freedom), touching in kept:
-        reaction = (r * piece.to_r).reshape(-1, 2)
-        velocity = piece.problem.velocity(reaction)[0]
-        energy = float(r @ piece.W @ r) / 2 * piece.unit**2
-        yield PieceSolution(_word(states), tuple(touching), reaction, np.array(velocity), error,
-                            orientation, energy, freedom)  # fmt: skip
+            group.append(item)
+    largest = max((float(np.abs(g[0].r).max(initial=0.0)) for g in groups), default=0.0)
+    for group in groups:
+        yield _entry(piece, group, max(largest, 1.0))
+
+
+def _rank(answer: PieceAnswer) -> tuple[int, bool, int]:
+    """Sets first, then what is sure, then what sticks most."""
+    near = answer.existence is Existence.NEAR
+    return -answer.freedom, near, -int((answer.states == search.STICK).sum())
+
+
+def _belongs(piece: ScaledProblem, item: PieceAnswer, group: list[PieceAnswer]) -> bool:
+    """True where a solution can not be told from one of a group, or lies in its set."""
+    first = group[0]
+    if first.freedom > item.freedom:
+        P, Q = piece.slack_matrices(first.states)
+        R, rows = piece.system(first.states)
+        outside = item.r - R @ np.linalg.lstsq(R, item.r, rcond=None)[0]
+        off = max(np.abs(item.u[rows]).max(initial=0), np.abs(outside).max(initial=0))
+        size = max(1.0, float(np.abs(item.r).max(initial=0.0)))
+        least = (P @ item.r + Q @ item.u).min(initial=0.0)
+        return bool(max(off, -least) <= SLACK * size)
+    return not item.freedom and any(
+        float(np.abs(item.r - other.r).max(initial=0.0)) <= item.off + other.off
+        for other in group
+    )
+
+
+def _entry(
+    piece: ScaledProblem, group: list[PieceAnswer], largest: float
+) -> tuple[PieceSolution, int | None]:
+    """What a group of answers stands for, and its degree; None of a set, or where not known."""
+    first, known, sole = group[0], None, False
+    if first.existence is Existence.SURE and len(group) == 1:
+        known, sole = first.sign, True
+    elif not first.freedom:
+        known, sole = degree(piece, group)
+    least = max(abs(known or 0), sum(a.exists for a in group), 2 if first.freedom else 0)
+    apart = max(float((np.abs(a.r - first.r) + a.off_r).max(initial=0.0))
+                for a in group if not a.freedom or a is first)  # fmt: skip
+    reaction = (first.r * piece.to_r).reshape(-1, 2)
+    velocity = np.array(piece.problem.velocity(reaction)[0])
+    error = piece.problem.error(reaction)
+    energy = float(first.r @ piece.W @ first.r) / 2 * piece.unit**2
+    entry = PieceSolution(
+        _word(first.states), tuple(_word(a.states) for a in group[1:]), reaction, velocity,
+        error, known or 0, energy, first.freedom, sole, least, apart / largest, first.still,
+    )  # fmt: skip
+    return entry, known
 
 
 def _proof(piece: ScaledProblem, cuts: list[Cut] | None) -> Proof | None:

@@ -30,6 +30,8 @@ ROUND = 100  # starts between two looks at the clock and at the solutions known 
 SOLVER = 10.0  # seconds for a solver, where Newton's method is dear; counted without a limit
 EXTRA = 3  # times the starts while a solution is known to be missing
 SAME = 1e-7  # scaled distance of two solutions that count as one
+FLAT = 1e-4  # of their distance: an error between two solutions that makes them connected
+ROUNDING = 1e-11  # scaled distance below which a difference of status counts as none
 BORDER = 1e-8  # scaled distance from a border of the law at which a solution has both patterns
 SINGULAR = 1e-10  # smallest singular value of a regular Jacobian, relative to the largest
 RANKED = 1000  # rows up to which the kernel of a Jacobian comes from its singular values
@@ -64,8 +66,8 @@ def multistart(
         if deadline.passed:
             break
         used += finder.search(min(ROUND, EXTRA * starts - used), deadline)
-    seconds = now() - began
-    return Solutions(tuple(finder.solutions()), False, finder.reason(used), used, seconds)
+    return Solutions(tuple(finder.solutions()), False, finder.reason(used), used, now() - began,
+                     resolution=SAME)  # fmt: skip
 
 
 def nothing_found(reason: TimeUp, began: float) -> Solutions:
@@ -110,7 +112,7 @@ class Finder:
     def add(self, r: Array) -> bool:
         """Keep scaled reactions that the judge accepts and that are new."""
         size = 1 + np.abs(r).max(initial=0.0)
-        if any(np.abs(r - other).max() <= SAME * size for other in self.found):
+        if any(self._same(r, other, size) for other in self.found):
             return False
         if certain_error(self.stack.problem, r * self.stack.to_r) > self.tolerance:
             return False
@@ -124,11 +126,19 @@ class Finder:
         self.sign.append(orientation(self.stack, r)[0])
         return True
 
+    def _same(self, r: Array, other: Array, size: float) -> bool:
+        """True for a solution again: same place, of different status only by rounding."""
+        apart = float(np.abs(r - other).max(initial=0.0))
+        if apart > SAME * size or apart <= ROUNDING * size:
+            return apart <= SAME * size
+        return bool((statuses(self.stack, r)[0] == statuses(self.stack, other)[0]).all())
+
     def _connected(self, r: Array, other: Array) -> bool:
         """True where the segment between two solutions consists of solutions."""
         points = np.array([(1 - t) * r + t * other for t in (0.25, 0.5, 0.75)])
         F = self.stack.linearise(points, np.ones(points.shape[:2]))[0]
-        return bool(np.abs(F).max() <= BORDER * (1 + np.abs(r).max()))
+        apart, size = np.abs(r - other).max(), 1 + np.abs(r).max()
+        return bool(np.abs(F).max() <= min(BORDER * size, FLAT * apart))
 
     @property
     def lacks_one(self) -> bool:

@@ -23,7 +23,7 @@ from ...cones import Coulomb
 from ...dense import dense
 from ...problem import FrictionProblem
 from ...solvers.functions import AlartCurnier
-from ..multipliers.scales import contact_sizes, load_size
+from ..multipliers.scales import contact_sizes, load_size, power_of_two
 
 Array = NDArray[np.float64]
 FREE, STICK, SLIP = 0, 1, 2
@@ -57,8 +57,8 @@ class Stack:
         W = dense(problem.W, 4)
         nc, d = problem.q.shape
         size, reacts = contact_sizes(W, nc)
-        root = _power_of_two(np.sqrt(size))[:, None]
-        unit = float(_power_of_two(load_size(problem.q / root, problem.mu, reacts)))
+        root = power_of_two(np.sqrt(size))[:, None]
+        unit = float(power_of_two(load_size(problem.q / root, problem.mu, reacts)))
         each = np.repeat(root[:, 0], d)
         return cls(problem, W / each / each[:, None], problem.q / (unit * root), problem.mu,
                    reacts, unit / root, unit * root)  # fmt: skip
@@ -186,11 +186,6 @@ class Stack:
                 dr = dr * deflation(r, dr, known)[:, None, None]
             r = r + dr * _lengths(random, step, len(r))[:, None, None]
         return np.concatenate(reached)
-
-
-def _power_of_two(x: Array | float) -> Array:
-    """The nearest one, to multiply by without rounding."""
-    return np.exp2(np.round(np.log2(x)))
 
 
 def _lengths(random: np.random.Generator, step: int, count: int) -> Array:

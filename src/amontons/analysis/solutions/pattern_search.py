@@ -48,10 +48,13 @@ def _bounds(kind, low, high):
 
 
 @njit(cache=True)
-def _proved(y, A, c, states, low, high):
-    """True when no (x, u) within the bounds has y u - (A^T y) x = y c, rounding included."""
+def _excluded(y, A, spread, c, states, low, high):
+    """True when no (x, u) within the bounds has y u - (A^T y) x = y c, rounding included.
+
+    spread (m,): of A x, by what A itself is off.
+    """
     m = len(c)
-    least = most = constant = size = 0.0
+    least = most = constant = size = more = 0.0
     for j in range(m):
         lam = total = 0.0
         for k in range(m):
@@ -68,8 +71,15 @@ def _proved(y, A, c, states, low, high):
             size += (total if part == 0 else abs(weight)) * max(abs(lo), abs(hi))
         constant += y[j] * c[j]
         size += abs(y[j] * c[j])
-    margin = 4 * EPSILON * (m + 4) * size
+        more += abs(y[j]) * spread[j]
+    margin = 4 * EPSILON * (m + 4) * size + 2 * more
     return constant > most + margin or constant < least - margin
+
+
+@njit(cache=True)
+def _proved(y, A, c, states, low, high):
+    """`_excluded` where A is exact."""
+    return _excluded(y, A, np.zeros(len(c)), c, states, low, high)
 
 
 @njit(cache=True)
@@ -172,7 +182,9 @@ def _renew_inplace(D, basic, nonbasic, A, c):
 
 
 @njit(cache=True)
-def _feasible_inplace(D, basic, nonbasic, states, A, c, low, high, age, proof):  # noqa: PLR0913
+def _feasible_inplace(  # noqa: PLR0913
+    D, basic, nonbasic, states, A, spread, c, low, high, age, proof
+):
     """Look for values within the bounds of these states: FEASIBLE, INFEASIBLE or UNDECIDED.
 
     age: pivots since the dictionary was computed anew; returned as the second value.  proof
@@ -193,7 +205,7 @@ def _feasible_inplace(D, basic, nonbasic, states, A, c, low, high, age, proof): 
         j = _entering(D, nonbasic, states, i, up, careful)
         if iteration % 4 == 0 or j < 0:
             y = _row_multipliers(D, basic, nonbasic, i, m)
-            if _proved(y, A, c, states, low, high):
+            if _excluded(y, A, spread, c, states, low, high):
                 for k in range(m):
                     proof[k] = y[k]
                 return INFEASIBLE, age
@@ -263,8 +275,8 @@ def _copy_inplace(D, basic, nonbasic, states, level):
 
 @njit(cache=True)
 def search_inplace(  # noqa: PLR0913
-    A, c, low, high, reacts, frictional, D, basic, nonbasic, states, turn, level, leaves,
-    cut, proofs,
+    A, spread, c, low, high, reacts, frictional, D, basic, nonbasic, states, turn, level,
+    leaves, cut, proofs,
 ):  # fmt: skip
     """Go on from `level` for at most len(leaves) nodes: (done?, level, nodes, leaves, cuts).
 
@@ -287,8 +299,8 @@ def search_inplace(  # noqa: PLR0913
         states[level, p] = state
         nodes += 1
         answer, turn[level, 2] = _feasible_inplace(
-            D[level], basic[level], nonbasic[level], states[level], A, c, low, high,
-            turn[level - 1, 2], proofs[cuts],
+            D[level], basic[level], nonbasic[level], states[level], A, spread, c, low,
+            high, turn[level - 1, 2], proofs[cuts],
         )  # fmt: skip
         following = -1
         if answer == INFEASIBLE:

@@ -1,34 +1,52 @@
 """A 2D Coulomb problem in scaled variables: the box of its solutions, and its linear pieces.
 
 Scaled variables: r sqrt|W_ii| and u / sqrt|W_ii|, divided by |q / sqrt|W_ii|| of the contacts
-that q can press (`load_size`).  Every solution dissipates, r u <= 0, so r W r + q r <= 0: where
-W is positive definite that ellipsoid bounds all reactions and velocities beforehand, and proofs
-hold without further assumption; so they do where W is singular but no reaction in the cone has
+that q can press (`load_size`), all rounded to powers of two: the scaled problem is the given
+one without rounding.  Every solution dissipates, r u <= 0, so r W r + q r <= 0: where W is
+positive definite that ellipsoid bounds all reactions and velocities beforehand, and proofs hold
+without further assumption; so they do where W is singular but no reaction in the cone has
 W r = 0.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 from scipy.optimize import linprog
 
 from ...dense import dense
 from ...problem import FrictionProblem
-from ..multipliers.scales import contact_sizes, load_size
+from ..multipliers.rounding import EPSILON, gamma
+from ..multipliers.scales import contact_sizes, load_size, power_of_two
 from . import pattern_search as search
 
 Array = NDArray[np.float64]
 States = NDArray[np.int8]
-DEFINITE = 1e-10  # smallest eigenvalue of a positive definite scaled W, relative to the largest
 REACH = 1e6  # size of scaled reactions up to which proofs hold where W is singular
-SINGULAR = 1e-11  # smallest singular value of a piece that has an isolated solution, relative
-SAME = 1e-8  # scaled distance of two solutions that count as one
-SLACK = 1e-9  # violation of the law by a solution, in scaled variables, that counts as none
+SLACK = 1e-9  # violation of the law by a set of solutions, scaled, that counts as none
+SYMMETRIC = 1e-12  # of W where only a symmetric one is bounded
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """Bounds of a, b, u_N, u_T of every contact, low and high (4 nc,).
+
+    spread (2 nc,): bound of the error of A x by the rounding of A.  bounded: every solution is
+    in the box; otherwise there may be some with larger reactions.
+    """
+
+    low: Array
+    high: Array
+    spread: Array
+    bounded: bool
 
 
 class ScaledProblem:
-    """The problem in scaled variables, u = A x + c, and the box of all solutions."""
+    """The problem in scaled variables, u = W r + c = A x + c, and the box of all solutions."""
 
     def __init__(self, problem: FrictionProblem) -> None:
         assert problem.W is not None and problem.q is not None
@@ -36,75 +54,108 @@ class ScaledProblem:
         nc = self.contacts = problem.contacts
         W = dense(problem.W)
         size, self.reacts = contact_sizes(W, nc)
-        root = np.repeat(np.sqrt(size), 2)
-        self.unit = load_size(problem.q / root.reshape(nc, 2), self.mu, self.reacts)
+        root = np.repeat(power_of_two(np.sqrt(size)), 2)
+        load = load_size(problem.q / root.reshape(nc, 2), self.mu, self.reacts)
+        self.unit = float(power_of_two(load or 1.0))
         self.to_r, self.to_u = self.unit / root, self.unit * root
         self.W = W / root / root[:, None]
         self.c = problem.q.ravel() / self.to_u
         normal = self.c[0::2]  # a view: rounding of the gap of a contact that can not react
         normal[~self.reacts & (np.abs(normal) <= SLACK)] = 0.0
         generators = np.zeros((2 * nc, 2 * nc))  # r = generators x
-        shrink = 1 / np.maximum(self.mu, 1.0)
+        self.shrink = 1 / power_of_two(np.maximum(self.mu, 1.0))
         for i in range(nc):
-            generators[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = shrink[i] * np.array(
+            generators[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = self.shrink[i] * np.array(
                 [[1.0, 1.0], [self.mu[i], -self.mu[i]]]
             )
         self.generators = generators
         self.A = self.W @ generators
-        self.low, self.high = self._box(shrink)
 
-    def _box(self, shrink: Array) -> tuple[Array, Array]:
-        """Bounds of a, b, u_N, u_T of every contact, (4 nc,) each."""
-        W = (self.W + self.W.T) / 2
-        values = np.linalg.eigvalsh(W)
-        if values[0] <= DEFINITE * values[-1]:
-            semidefinite = values[0] >= -DEFINITE * values[-1]
-            size = self._cone_bound(W) if semidefinite else np.inf
-            self.bounded = size < REACH
-            return self._wide_box(min(size, REACH))
-        self.bounded = True
-        inverse = np.linalg.inv(W)
-        centre = -inverse @ self.c / 2
-        radius = np.sqrt(-self.c @ centre / 2)
-        mu = np.where(self.mu > 0, self.mu, np.inf)
-        low, high = np.empty((2, self.contacts, 4))
-        for i in range(self.contacts):
-            part = slice(2 * i, 2 * i + 2)
-            along = np.array([[0.5, 0.5 / mu[i]], [0.5, -0.5 / mu[i]]]) / shrink[i]
-            if self.mu[i] == 0:
-                along[0] = [1.0, 0.0]  # a is r_N, b is zero
-            middle = along @ centre[part]
-            reach = radius * np.sqrt(np.diag(along @ inverse[part, part] @ along.T))
-            low[i, :2], high[i, :2] = middle - reach, middle + reach
-        # u is bounded through r, whatever the symmetry of W
-        centre_u = self.W @ centre + self.c
-        root = np.linalg.cholesky(inverse)
-        reach_u = radius * np.linalg.norm(self.W @ root, axis=1)
-        low[:, 2:] = (centre_u - reach_u).reshape(-1, 2)
-        high[:, 2:] = (centre_u + reach_u).reshape(-1, 2)
-        room = 1e-5 * (np.abs(low) + np.abs(high))  # rounding of the inverse, by DEFINITE
-        return (low - room).ravel(), (high + room).ravel()
+    @cached_property
+    def box(self) -> Box:
+        """What bounds the solutions."""
+        found = self._ellipsoid()
+        bounded = found is not None
+        if found is None:
+            size = self._cone_bound()
+            bounded = size < REACH
+            found = self._wide_box(min(size, REACH))
+        low, high = found
+        most = high.reshape(-1, 4)[:, :2].ravel()
+        terms = np.abs(self.W) @ (np.abs(self.generators) @ np.maximum(most, 0.0))
+        return Box(low, high, gamma(2 * self.contacts + 4) * terms, bounded)
 
-    def _cone_bound(self, W: Array) -> float:
-        """Bound of the sum of all a and b where no reaction in the cone has W r = 0, else inf.
+    def _ellipsoid(self) -> tuple[Array, Array] | None:
+        """The box of r W r + c r <= 0, rounding included; None where W is not surely definite.
 
-        With A^T y >= 1/2 it is S <= 2 y W r <= 2 |y|_W |r|_W, and |r|_W^2 <= -q r <= Q S.
+        L L^T <= W, for L is the factor of W less what rounding can do to it (`rounding`).  So
+        x = L^T r lies in the ball about -p / 2 through 0, p = L^-1 c, and g r = (L^-1 g) x.
+        With X the computed L^-1 and |X L - 1| <= rho, |L^-1 g - X g| <= rho / (1 - rho) |X g|
+        in the maximum norm.
         """
-        m = 2 * self.contacts
+        m = len(self.W)
+        W = (self.W + self.W.T) / 2
+        shift = 4 * (m + 3) * EPSILON * np.abs(np.diag(W)).sum()
+        try:
+            L = np.linalg.cholesky(W - shift * np.eye(m))
+        except np.linalg.LinAlgError:
+            return None
+        X = solve_triangular(L, np.eye(m), lower=True)
+        off = np.abs(X @ L - np.eye(m)) + gamma(m + 2) * (np.abs(X) @ np.abs(L))
+        rho = float(off.sum(axis=1).max(initial=0.0))
+        if not rho < 0.5:
+            return None
+        G = np.zeros((m, 2 * m))  # what is bounded, as functions of r: a, b, u_N, u_T
+        along = np.repeat(0.5 / self.shrink, 2)
+        slope = np.where(self.mu > 0, self.mu, np.inf)
+        for i, (n, t) in enumerate(np.arange(m).reshape(-1, 2)):
+            G[n, 4 * i : 4 * i + 2] = along[n] if self.mu[i] > 0 else 2 * along[n]
+            G[t, 4 * i : 4 * i + 2] = np.array([1.0, -1.0]) * along[t] / slope[i]
+            G[:, 4 * i + 2 : 4 * i + 4] = self.W[[n, t]].T
+        H, dH = _inverted(X, G, rho)
+        p, dp = (x[:, 0] for x in _inverted(X, self.c[:, None], rho))
+        size, dsize = np.linalg.norm(H, axis=0), np.linalg.norm(dH, axis=0)
+        ball, dball = float(np.linalg.norm(p)), float(np.linalg.norm(dp))
+        middle, reach = -(p @ H) / 2, (size + dsize) * (ball + dball) / 2
+        reach += (dsize * ball + size * dball + dsize * dball) / 2
+        reach += 8 * gamma(m + 4) * (size + dsize) * (ball + dball)
+        start = np.zeros((self.contacts, 4))
+        start[:, 2:] = self.c.reshape(-1, 2)
+        reach += 4 * EPSILON * (np.abs(start).ravel() + np.abs(middle))
+        return start.ravel() + middle - reach, start.ravel() + middle + reach
+
+    def _cone_bound(self) -> float:
+        """Bound of the sum S of all a, b where no reaction in the cone has W r = 0, else inf.
+
+        W + e is positive semidefinite.  With A^T y >= 1/2 it is S <= 2 y W r, hence
+        (1 - 2 e |y| g) S <= 2 |y|_(W + e) |r|_(W + e), and |r|_(W + e)^2 <= Q S + e g^2 S^2
+        by dissipation, g the largest |r| that S = 1 allows.
+        """
+        W = (self.W + self.W.T) / 2
+        if not self.contacts or np.abs(self.W - W).max() > SYMMETRIC:
+            return np.inf
+        m = len(W)
+        values = np.linalg.eigvalsh(W)
+        indefinite = max(0.0, -float(values[0])) + 4 * m * EPSILON * float(np.abs(values).max())
         able = np.repeat(self.reacts, 2)
         left = -np.hstack([self.A.T, -self.A.T])[able]
         answer = linprog(np.ones(2 * m), left, -np.ones(len(left)), method="highs")
         if not answer.success:
             return np.inf
         y = answer.x[:m] - answer.x[m:]
-        if (self.A.T @ y)[able].min(initial=1.0) < 0.5 or np.abs(self.W - W).max() > 1e-12:
+        if (self.A.T @ y)[able].min(initial=1.0) < 0.5 + 1e-6:
             return np.inf
+        g = float(np.linalg.norm(self.generators, axis=0).max())
         Q = max(0.0, -float((self.generators.T @ self.c)[able].min(initial=0.0)))
-        return 4 * float(y @ W @ y) * Q * (1 + 1e-6) + 1e-6
+        Y = 4 * float(y @ W @ y + indefinite * (y @ y)) * (1 + 1e-6) + 1e-6
+        rest = max(0.0, 1 - 2 * indefinite * float(np.linalg.norm(y)) * g)
+        rest = rest**2 - Y * indefinite * g**2
+        return Y * Q / rest if rest > 0.1 else np.inf
 
     def _wide_box(self, size: float) -> tuple[Array, Array]:
         """Bounds of all variables where the reactions are bounded by their sum alone."""
-        reach_u = np.abs(self.A).max(axis=1, initial=0.0) * size
+        reach_u = np.abs(self.A).max(axis=1, initial=0.0) * size * (1 + 1e-12)
+        reach_u += 1e-12 * np.abs(self.c)
         low, high = np.zeros((2, self.contacts, 4))
         high[:, :2] = size
         low[:, 2:] = (self.c - reach_u).reshape(-1, 2)
@@ -113,7 +164,7 @@ class ScaledProblem:
 
     # ---------------------------------------------------------------- one pattern
     def system(self, states: States) -> tuple[Array, Array]:
-        """(r = R y, rows E of u that vanish): the linear system E (W R y + c) = 0."""
+        """(r = R y, rows of u that vanish): the linear system (W R y + c)[rows] = 0."""
         columns, rows = [], []
         for i, state in enumerate(states):
             n, t = 2 * i, 2 * i + 1
@@ -121,7 +172,8 @@ class ScaledProblem:
             if state == search.OPEN:
                 continue
             rows.append(n)
-            columns.append({n: 1.0, t: slope.get(state, 0.0)})
+            unit = self.shrink[i] if state in slope else 1.0
+            columns.append({n: unit, t: unit * slope.get(state, 0.0)})
             if state == search.STICK:
                 rows.append(t)
                 columns.append({t: 1.0})
@@ -130,84 +182,30 @@ class ScaledProblem:
             R[list(column), k] = list(column.values())
         return R, np.array(rows, dtype=int)
 
-    def slacks(self, states: States, r: Array, u: Array) -> Array:
-        """What must be >= 0 on a piece, for r and u flat or with directions in columns."""
-        rows = []
+    def slack_matrices(self, states: States) -> tuple[Array, Array]:
+        """(P, Q), each (s, 2 nc): on the piece of a pattern P r + Q u must be >= 0."""
+        rows: list[tuple[dict[int, float], dict[int, float]]] = []
         for i, state in enumerate(states):
-            n, t, mu = 2 * i, 2 * i + 1, self.mu[i]
+            n, t, mu = 2 * i, 2 * i + 1, float(self.mu[i])
             if state == search.OPEN:
-                rows.append(u[n])
+                rows.append(({}, {n: 1.0}))
             elif state == search.STICK:
-                rows += [mu * r[n] - r[t], mu * r[n] + r[t]]
+                rows += [({n: mu, t: -1.0}, {}), ({n: mu, t: 1.0}, {})]
             else:
-                rows.append(r[n])
+                rows.append(({n: 1.0}, {}))
                 if state == search.SLIP_PLUS:
-                    rows.append(-u[t])
+                    rows.append(({}, {t: -1.0}))
                 elif state == search.SLIP_MINUS:
-                    rows.append(u[t])
-        return np.array(rows)
+                    rows.append(({}, {t: 1.0}))
+        P, Q = np.zeros((2, len(rows), 2 * self.contacts))
+        for k, (on_r, on_u) in enumerate(rows):
+            P[k, list(on_r)], Q[k, list(on_u)] = list(on_r.values()), list(on_u.values())
+        return P, Q
 
-    def holds(self, states: States, r: Array, u: Array) -> bool:
-        """True where r, u lie on the closed piece."""
-        R, rows = self.system(states)
-        outside = r - R @ np.linalg.lstsq(R, r, rcond=None)[0] if R.size else r
-        off = max(np.abs(u[rows]).max(initial=0), np.abs(outside).max(initial=0))
-        return off <= SAME and self.slacks(states, r, u).min() >= -SAME
 
-    def solve(self, states: States) -> tuple[Array, int, int] | None:
-        """(r, orientation, freedom) on the piece of a pattern, None without a solution."""
-        R, rows = self.system(states)
-        E = (self.W @ R)[rows]
-        if not len(rows):
-            r = np.zeros(2 * self.contacts)
-            return (r, 1, 0) if self.slacks(states, r, self.c).min() >= -SLACK else None
-        left, values, right = np.linalg.svd(E)
-        rank = int((values > SINGULAR * max(values[0], 1.0)).sum())
-        if rank == len(rows):
-            r = R @ np.linalg.solve(E, -self.c[rows])
-            sign = int(np.linalg.slogdet(E)[0])
-            fits = self.slacks(states, r, self.W @ r + self.c).min() >= -SLACK
-            return (r, sign, 0) if fits else None
-        if np.abs(left[:, rank:].T @ self.c[rows]).max() > SLACK:
-            return None
-        y = -right[:rank].T @ ((left[:, :rank].T @ self.c[rows]) / values[:rank])
-        return self._inside(states, R @ y, R @ right[rank:].T)
-
-    def _inside(
-        self, states: States, r: Array, directions: Array
-    ) -> tuple[Array, int, int] | None:
-        """A point inside the solutions r + directions t on a singular piece.
-
-        Homogeneous in (t, scale), so that one linear program finds every slack that can be
-        positive; those that can not reduce the dimension.
-        """
-        k = directions.shape[1]
-        G = self.slacks(states, directions, self.W @ directions)
-        g = self.slacks(states, r, self.W @ r + self.c)
-        left = np.hstack([-G, -g[:, None], np.eye(len(g))])
-        bounds = [(None, None)] * k + [(1, None)] + [(0, 1)] * len(g)
-        cost = np.concatenate([np.zeros(k + 1), -np.ones(len(g))])
-        answer = linprog(cost, left, np.full(len(g), SLACK), bounds=bounds, method="highs")
-        if not answer.success:
-            return None
-        tight = answer.x[k + 1 :] < 0.5
-        freedom = k - (np.linalg.matrix_rank(G[tight], tol=SAME) if tight.any() else 0)
-        return r + directions @ (answer.x[:k] / answer.x[k]), 0, int(freedom)
-
-    def excluded(self, states: States) -> bool:
-        """True when a pattern has no solution by a margin far above rounding.
-
-        Only for the few patterns that the search left: a well-conditioned system whose only
-        solution violates the law.
-        """
-        R, rows = self.system(states)
-        if not len(rows):
-            return bool(self.slacks(states, 0 * self.c, self.c).min() < -SLACK)
-        E = (self.W @ R)[rows]
-        values = np.linalg.svd(E, compute_uv=False)
-        if values[-1] <= SINGULAR * max(values[0], 1.0):
-            return False
-        r = R @ np.linalg.solve(E, -self.c[rows])
-        rounding = len(rows) * np.finfo(float).eps * values[0] / values[-1] * np.abs(r).max()
-        worst = -self.slacks(states, r, self.W @ r + self.c).min()
-        return bool(worst > 100 * rounding * (1 + self.mu.max()) + SLACK)
+def _inverted(X: Array, G: Array, rho: float) -> tuple[Array, Array]:
+    """(X G, bound of its difference from L^-1 G), X being L^-1 within rho."""
+    H = X @ G
+    rounding = gamma(len(X) + 2) * (np.abs(X) @ np.abs(G))
+    most = (np.abs(H) + rounding).max(axis=0, initial=0.0)
+    return H, rounding + rho / (1 - rho) * most

@@ -1,0 +1,276 @@
+"""Lists of all solutions and verdicts on uniqueness against exact arithmetic.
+
+    python benchmarks/exact_lists.py [--plane 5000] [--space 300] [--seed 1] [--output FOLDER]
+
+Random problems with loads that cancel, W that is nearly singular, contacts of very different
+size, and what else makes solutions hard to tell apart.  The truth comes from rational numbers
+(`exact_oracle`, `exact_oracle_discs`), not from the package.  Writes exact_lists.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import exact_oracle
+import exact_oracle_discs
+import numpy as np
+from machine import describe
+from numpy.typing import NDArray
+
+import amontons as am
+from amontons.analysis.certificates.uniqueness import Verdict
+
+Array = NDArray[np.float64]
+Generator = np.random.Generator
+LIMIT = 10.0  # seconds for one question
+ROUNDING = 1e-13  # smallest eigenvalue of W, relative, below which a set is one by rounding
+Case = tuple[Array, Array, Array]  # W, q, mu
+NOTE = """\
+{plane} problems in 2D (up to five contacts) and {space} in 3D (up to two), seed {seed}.
+False: a verdict that exact arithmetic refutes, or an entry that is said to be exactly one
+solution and is none. Missed: a solution that a complete list lacks, by place or by pattern.
+Border: a determinant or sign is zero in exact arithmetic too; there only missed solutions are
+counted.
+"""
+
+
+# ---------------------------------------------------------------- problems
+def _spd(random: Generator, m: int, least: float = 0.05) -> Array:
+    A = random.standard_normal((m, m + 1))
+    return A @ A.T / m + least * np.eye(m)
+
+
+def _friction(random: Generator, nc: int) -> Array:
+    mu = random.uniform(0.1, 3.0, nc) * 10.0 ** random.uniform(-0.5, 0.5)
+    mu[random.random(nc) < 0.05] = 0.0
+    return mu
+
+
+def plain(random: Generator, nc: int, d: int) -> Case:
+    """Nothing special but strong coupling."""
+    return _spd(random, nc * d), random.standard_normal((nc, d)), _friction(random, nc)
+
+
+def several(random: Generator, nc: int, d: int) -> Case:
+    """Contacts that have three solutions each, weakly coupled."""
+    one = np.eye(d)
+    one[0, 1] = one[1, 0] = 0.8
+    W = np.kron(np.eye(nc), one) + 0.02 * _spd(random, nc * d)
+    q = np.abs(random.standard_normal((nc, d)))
+    return W, q, random.uniform(1.0, 4.0, nc)
+
+
+def cancelling(random: Generator, nc: int, d: int) -> Case:
+    """The load of the last contact is the small rest of large terms."""
+    W, q, mu = several(random, nc, d) if random.random() < 0.7 else plain(random, nc, d)
+    if nc == 1:
+        return W, q, mu
+    mix = random.standard_normal((d, (nc - 1) * d)) * 0.5
+    L = np.eye(nc * d)
+    L[-d:, :-d] = mix  # W stays definite, the last contact feels the others
+    W = L @ W @ L.T
+    pressed = np.zeros((nc, d))
+    pressed[:-1, 0] = random.uniform(0.5, 2.0, nc - 1)
+    pressed[:-1, 1] = random.uniform(-0.5, 0.5, nc - 1) * mu[:-1] * pressed[:-1, 0]
+    small = 10.0 ** random.uniform(-14, -1)
+    rest = q.copy()
+    rest[:-1] *= random.choice([0.0, 1.0])
+    return W, small * rest - (W @ pressed.ravel()).reshape(nc, d), mu
+
+
+def nearly_singular(random: Generator, nc: int, d: int) -> Case:
+    """Some tiny eigenvalues."""
+    m = nc * d
+    Q = np.linalg.qr(random.standard_normal((m, m)))[0]
+    values = random.uniform(0.05, 2.0, m)
+    values[: random.integers(1, max(2, m // 2) + 1)] = 10.0 ** random.uniform(-13, -3)
+    W = Q @ np.diag(values) @ Q.T
+    return (W + W.T) / 2, random.standard_normal((nc, d)), _friction(random, nc)
+
+
+def mixed_scales(random: Generator, nc: int, d: int) -> Case:
+    """Each contact in units of its own, loads far apart."""
+    W, q, mu = (several, plain, cancelling)[random.integers(3)](random, nc, d)
+    scale = 10.0 ** random.uniform(-9, 9, nc)
+    each = np.repeat(scale, d)
+    load = 10.0 ** random.uniform(-5, 0, (nc, 1)) if random.random() < 0.5 else 1.0
+    return W * each * each[:, None], q * scale[:, None] * load, mu
+
+
+def not_symmetric(random: Generator, nc: int, d: int) -> Case:
+    """A definite W with a skew part."""
+    W, q, mu = plain(random, nc, d)
+    skew = random.standard_normal(W.shape)
+    return W + random.uniform(0, 1) * (skew - skew.T), q, mu
+
+
+def near_border(random: Generator, nc: int, d: int) -> Case:
+    """A solution next to a border of the law, or on it."""
+    W, _, mu = several(random, nc, d) if random.random() < 0.5 else plain(random, nc, d)
+    r, u = np.zeros((2, nc, d))
+    for i in range(nc):
+        kind = random.integers(4)
+        if kind == 0:
+            u[i, 0] = random.choice([0.0, 1.0])
+        else:
+            r[i, 0] = random.uniform(0.5, 1.5)
+            r[i, 1] = mu[i] * r[i, 0] * (1.0 if kind > 1 else random.uniform(-1, 1))
+            u[i, 1] = -random.uniform(0.1, 1) if kind == 3 and mu[i] else 0.0
+    q = u - (W @ r.ravel()).reshape(nc, d)
+    return W, q + 10.0 ** random.uniform(-16, -6) * random.standard_normal((nc, d)), mu
+
+
+FAMILIES: dict[str, Callable[[Generator, int, int], Case]] = {
+    "plain": plain, "several": several, "cancelling": cancelling,
+    "nearly singular": nearly_singular, "mixed scales": mixed_scales,
+    "not symmetric": not_symmetric, "near a border": near_border,
+}  # fmt: skip
+
+
+def draw(number: int, seed: int, d: int) -> tuple[str, Case]:
+    """Problem `number`: its family, and W, q, mu."""
+    random = np.random.default_rng([seed, d, number])
+    names = list(FAMILIES)
+    name = names[number % len(names)]
+    nc = int(random.integers(1, 6 if d == 2 else 3))
+    return name, FAMILIES[name](random, nc, d)
+
+
+# ---------------------------------------------------------------- comparing
+@dataclass
+class Tally:
+    """What one family came to; faults: what was found wrong, in words."""
+
+    problems: int = 0
+    complete: int = 0
+    solutions: int = 0
+    verdicts: Counter = field(default_factory=Counter)
+    border: int = 0
+    seconds: float = 0.0
+    faults: list[str] = field(default_factory=list)
+
+
+def compare(case: Case, tally: Tally, label: str) -> None:
+    """Ask the package and the oracle, and add what they say."""
+    W, q, mu = case
+    d = q.shape[1]
+    truth = (exact_oracle if d == 2 else exact_oracle_discs).all_exact(W, q, mu)
+    problem = am.FrictionProblem.from_delassus(W, q, mu)
+    began = time.process_time()
+    found = am.all_solutions(problem, time_limit=LIMIT)
+    verdict = am.uniqueness(problem, time_limit=LIMIT)
+    tally.seconds += time.process_time() - began
+    tally.problems += 1
+    tally.solutions += len(truth)
+    tally.complete += found.complete
+    tally.verdicts[verdict.verdict.value] += 1
+    tally.border += bool(truth.singular)
+    tally.faults += [f"{label}: {text}" for text in faults(case, truth, found, verdict)]
+
+
+def faults(
+    case: Case, truth: exact_oracle.Answer, found: am.Solutions, verdict: am.Uniqueness
+) -> list[str]:
+    """What the truth refutes."""
+    W, q, mu = case
+    out = []
+    root = np.repeat(np.sqrt(_sizes(W, len(mu))), q.shape[1])
+    exact = [root * x.r for x in truth.solutions]
+    listed = [(s, root * s.r.ravel()) for s in found.solutions]
+    size = max([np.abs(r).max() for r in exact] + [np.abs(r).max() for _, r in listed]
+               + [np.linalg.norm(q.ravel() / root)], default=1.0)  # fmt: skip
+    reach = 2 * found.resolution * size
+    if found.complete:
+        for x, r in zip(truth.solutions, exact, strict=True):
+            near = [s for s, own in listed if np.abs(own - r).max() <= reach or s.freedom]
+            if not near:
+                out.append(f"missed {x.pattern}")
+            elif not x.border and not any(_has(s, x.pattern) for s in near):
+                out.append(f"missed pattern {x.pattern}")
+    if truth.singular:
+        return out
+    for s, own in listed:
+        count = sum(np.abs(own - r).max() <= max(reach, 1e-12 * size) for r in exact)
+        if s.sole and count < 1:
+            out.append(f"extra {s.pattern}")
+    several = verdict.verdict is Verdict.NOT_UNIQUE
+    by_rounding = several and verdict.other is not None and verdict.other.freedom > 0
+    if by_rounding and _lowest(W, root) < ROUNDING:
+        return out
+    if several and len(truth) < 2:
+        out.append(f"false not_unique: {verdict.reason}")
+    unique = verdict.verdict in (Verdict.UNIQUE_EVERY_LOAD, Verdict.UNIQUE_THIS_LOAD)
+    if unique and len(truth) != 1:
+        out.append(f"false {verdict.verdict.value}, {len(truth)} exist")
+    return out
+
+
+def _has(entry: am.PieceSolution, pattern: str) -> bool:
+    return bool(entry.freedom) or pattern in (entry.pattern, *entry.touching)
+
+
+def _sizes(W: Array, nc: int) -> Array:
+    d = len(W) // nc
+    return np.array([np.linalg.norm(W[d * i : d * i + d, d * i : d * i + d], 2)
+                     or 1.0 for i in range(nc)])  # fmt: skip
+
+
+def _lowest(W: Array, root: Array) -> float:
+    values = np.linalg.eigvalsh((W + W.T) / 2 / root / root[:, None])
+    return float(values[0] / values[-1])
+
+
+# ---------------------------------------------------------------- the table
+def run(count: int, seed: int, d: int) -> dict[str, Tally]:
+    """Compare `count` problems of dimension d."""
+    tallies = {name: Tally() for name in FAMILIES}
+    for number in range(count):
+        name, case = draw(number, seed, d)
+        compare(case, tallies[name], f"{d}D {number}")
+    return tallies
+
+
+def table(tallies: dict[str, Tally]) -> str:
+    """One row per family."""
+    head = ["family", "problems", "exact solutions", "lists complete", "every load",
+            "this load", "not unique", "undecided", "border", "false or missed",
+            "CPU s"]  # fmt: skip
+    rows = [" | ".join(head), " | ".join(["---"] * len(head))]
+    for name, t in tallies.items():
+        counts = [t.verdicts[v.value] for v in Verdict]
+        row = [name, t.problems, t.solutions, t.complete, *counts, t.border, len(t.faults),
+               f"{t.seconds:.0f}"]  # fmt: skip
+        rows.append(" | ".join(map(str, row)))
+    return "\n".join(f"| {row} |" for row in rows)
+
+
+def main() -> None:
+    """Run, print what is wrong, write the page."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--plane", type=int, default=5000)
+    parser.add_argument("--space", type=int, default=300)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--output", type=Path, default=Path(__file__).parent / "results")
+    options = parser.parse_args()
+    info = describe()
+    lines = ["# Lists and verdicts against exact arithmetic", "",
+             f"`python benchmarks/exact_lists.py --plane {options.plane} --space "
+             f"{options.space} --seed {options.seed}`, {info['cores']} cores, Python "
+             f"{info['python']}, numpy {info['numpy']}.", "",
+             NOTE.format(**vars(options))]  # fmt: skip
+    for title, count, d in (("2D", options.plane, 2), ("3D", options.space, 3)):
+        tallies = run(count, options.seed, d)
+        lines += [f"## {title}", "", table(tallies), ""]
+        print(table(tallies))
+        for tally in tallies.values():
+            print(*tally.faults, sep="\n", end="\n" if tally.faults else "")
+    (options.output / "exact_lists.md").write_text("\n".join(lines))
+
+
+if __name__ == "__main__":
+    main()

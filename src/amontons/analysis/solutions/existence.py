@@ -1,0 +1,91 @@
+"""Do reactions that nearly solve a problem belong to a solution of it?  Proofs for a few.
+
+A small error alone does not tell: past a fold there is none, however small the error near it.
+In 2D the linear piece is examined (`piece_solution`).  In 3D Newton's method converges to a
+solution in a ball about r when its first step is small against the curvature of the equations
+([Kantorovich]: beta K eta <= 1/2, beta the norm of the inverse Jacobian, eta of the step), and
+statuses do not change in that ball.
+
+[Kantorovich] J. Ortega, W. Rheinboldt, "Iterative solution of nonlinear equations in several
+variables" (1970), theorem 12.6.2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...problem import FrictionProblem
+from . import pattern_search as search
+from .multistart import certain_error, described, statuses
+from .newton_batch import FREE, SLIP, STICK, Stack
+from .piece_solution import examined
+from .scaled_problem import ScaledProblem
+
+Array = NDArray[np.float64]
+STATES = {"f": search.OPEN, "s": search.STICK, "+": search.SLIP_PLUS, "-": search.SLIP_MINUS}
+WORDS = 8  # patterns of one solution that are tried
+NEAR = 1e-6  # scaled distance of a solution from the reactions that it belongs to
+SAFE = 0.1  # of beta K eta
+ROUNDING = 1e-14  # of equations, scaled
+EXACT = 1e-12  # error of solutions that fill a segment
+
+
+def exist(local: FrictionProblem, reactions: Sequence[Array]) -> bool:
+    """True where each of some reactions (nc, d) surely belongs to a solution nearby.
+
+    Also where they all are solutions within rounding, and everything between them.
+    """
+    stack = Stack.of(local)
+    pairs = [(reactions[0], r) for r in reactions[1:]]
+    if pairs and all(_on_segment(stack, *pair) for pair in pairs):
+        return True
+    if local.dimension == 3:
+        return all(_newton_converges(stack, r / stack.to_r) for r in reactions)
+    scaled = ScaledProblem(local)
+    return all(_on_its_piece(stack, scaled, r / stack.to_r) for r in reactions)
+
+
+def _on_segment(stack: Stack, r: Array, other: Array) -> bool:
+    points = (r + t * (other - r) for t in (0.0, 0.25, 0.5, 0.75, 1.0))
+    return all(certain_error(stack.problem, point) <= EXACT for point in points)
+
+
+def _on_its_piece(stack: Stack, scaled: ScaledProblem, r: Array) -> bool:
+    """2D: the solution of a pattern that r has is inside of the piece."""
+    entry = described(stack, r)
+    for word in (entry.pattern, *entry.touching)[:WORDS]:
+        states = np.array([STATES[letter] for letter in word], dtype=np.int8)
+        states[(stack.mu == 0) & (states != search.OPEN)] = search.FRICTIONLESS
+        answer = examined(scaled, states)
+        found = answer.r * scaled.to_r / stack.to_r.repeat(2)
+        near = np.abs(found - r.ravel()).max() <= NEAR * (1 + np.abs(r).max())
+        if near and (answer.exists or answer.freedom):
+            return True
+    return False
+
+
+def _newton_converges(stack: Stack, r: Array) -> bool:
+    """3D: the condition of Kantorovich, with statuses that do not change in the ball."""
+    r, step = stack.polished(r)
+    u, size = stack.velocity(r[None])[0], 1 + float(np.abs(r).max(initial=0.0))
+    values = np.linalg.svd(stack.jacobian(r), compute_uv=False)
+    if not len(values) or values[-1] == 0:
+        return False
+    beta = np.sqrt(len(values)) / values[-1]
+    eta = step + beta * ROUNDING * size * (1 + np.abs(stack.W).sum(axis=1).max())
+    states, mu = statuses(stack, r)[0], stack.mu
+    grows = 2 * (1 + np.abs(stack.W).sum(axis=1).max()) * (1 + mu)
+    margin = np.where(states == FREE, u[:, 0], np.inf)
+    stick = mu * r[:, 0] - np.linalg.norm(r[:, 1:], axis=1)
+    margin = np.where(states == STICK, np.minimum(stick, r[:, 0]), margin)
+    slides = np.where(mu > 0, np.linalg.norm(u[:, 1:], axis=1), np.inf)
+    margin = np.where(states == SLIP, np.minimum(r[:, 0], slides), margin)
+    if (margin <= 4 * grows * eta).any():
+        return False
+    slip = (states == SLIP) & (mu > 0)
+    reach = np.linalg.norm(r[slip, 1:] - u[slip, 1:], axis=1)
+    curvature = float((8 * grows[slip] ** 2 / reach).max(initial=0.0))
+    return bool(beta * curvature * eta <= SAFE)
