@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contact import Nitsche, Obstacle
-from ..errors import InvalidInput
+from ..errors import InvalidInput, shown
 from ..fem.elasticity import LinearElastic, materials_by_region
 from ..fem.hyperelasticity import CiarletGeymonat, NeoHookean
 from ..fem.mesh import Mesh
@@ -118,6 +118,8 @@ class Contact:
             raise InvalidInput(
                 f"contact on {self.slave!r}: expected either an obstacle or a master surface"
             )
+        if not isinstance(self.method, Nitsche | str):
+            raise InvalidInput(f"method: expected a text, got {shown(self.method)}")
         if self.method == "dual-mortar":
             object.__setattr__(self, "method", "mortar")
         if self.method == "nitsche":
@@ -125,6 +127,11 @@ class Contact:
         if not isinstance(self.method, Nitsche) and self.method not in METHODS:
             raise InvalidInput(
                 f"method: expected one of {', '.join(METHODS)}, got {self.method!r}"
+            )
+        if self.where is not None and not callable(self.where):
+            raise InvalidInput(
+                f"where: expected a function of points (n, dim) that returns (n,) of bool, got "
+                f"{shown(self.where)}"
             )
         if self.master is None and not (
             hasattr(self.obstacle, "gap") and hasattr(self.obstacle, "normals")
