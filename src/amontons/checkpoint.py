@@ -12,7 +12,8 @@ import numpy as np
 from .errors import FileFormatError, InvalidInput
 from .evolution import State, TimeStep
 from .fclib import DAMAGE, write_fclib
-from .files import make_folder, replacing
+from .files import check_is_regular, make_folder, replacing
+from .hdf5 import check_contained
 
 GROUP = "amontons_state"
 ARRAYS = {"displacement": 1, "velocity": 1, "force": 2, "slip": 2}  # name: dimensions
@@ -30,10 +31,12 @@ def save_state(path: str | os.PathLike[str], state: State) -> None:
 def load_state(path: str | os.PathLike[str]) -> State:
     """The state in a file of `save_state`; raises FileFormatError naming file and dataset."""
     path = Path(path)
+    check_is_regular(path)
     if not path.is_file():
         raise FileFormatError(f"{path}: no such file")
     try:
         with h5py.File(path, "r") as file:
+            check_contained(path, file)
             if GROUP not in file:
                 raise FileFormatError(f"{path}: /{GROUP}: missing group")
             group = file[GROUP]

@@ -11,7 +11,7 @@ import amontons
 
 PACKAGE = Path(amontons.__file__).parent
 ORDER = (
-    "errors < clock < warned < files < checked_arrays < cones < linear < blocks < "
+    "errors < clock < warned < files < hdf5 < checked_arrays < cones < linear < blocks < "
     "condensation < global_matrices < judge < judge_sharp < problem < "
     "nitsche_problem < one_sided < one_contact < status < solution < solvers < solve < fem < "
     "contact < model < masonry < granular < hild < vee < evolution < analysis < gallery < "
@@ -23,7 +23,7 @@ ALONE = {  # package: the file or folder that imports it, one for each kind of f
     "rslab": "linear", "pypardiso": "linear",
     "petsc4py": "linear", "mpi4py": "linear", "pymetis": "fem",
     "meshio": "fem vtk",  # reads meshes, writes pictures
-    "h5py": "fclib output checkpoint",  # the exchange format, our results, our states
+    "h5py": "hdf5 fclib output checkpoint",  # checks, the exchange format, results, states
 }  # fmt: skip
 INSIDE = {"analysis": ("multipliers", "solutions", "certificates", "paths")}  # the same, in it
 FILES = sorted(PACKAGE.rglob("*.py"))
