@@ -11,8 +11,8 @@ import amontons
 
 PACKAGE = Path(amontons.__file__).parent
 ORDER = (
-    "errors < clock < warned < files < hdf5 < checked_arrays < cones < linear < blocks < "
-    "condensation < global_matrices < judge < judge_sharp < problem < "
+    "compiled < errors < clock < warned < files < hdf5 < checked_arrays < cones < linear < "
+    "blocks < condensation < global_matrices < judge < judge_sharp < problem < "
     "nitsche_problem < one_sided < one_contact < status < solution < solvers < solve < fem < "
     "contact < model < masonry < granular < hild < vee < evolution < analysis < gallery < "
     "fclib < checkpoint < expressions < case < vtk < plots < output < results < report < api "
@@ -82,6 +82,13 @@ def test_imports_go_downwards_inside_a_folder(folder):
 def test_heavy_packages_are_imported_in_one_place(package):
     users = {home(p) for p in FILES for name in imports(p) if name.split(".")[0] == package}
     assert users <= set(ALONE[package].split())
+
+
+def test_kernels_are_kept_in_our_folder():
+    for path in FILES:
+        if path.name != "compiled.py":
+            text = path.read_text().replace("compiled import njit", "")
+            assert "import njit" not in text, path
 
 
 def test_no_kernel_assumes_that_numbers_are_finite():

@@ -32,10 +32,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from ..blocks import velocity_inplace
+from ..compiled import njit
 from ..judge import natural_error
 from ..problem import Form, FrictionProblem
 from .base import Iterate, Target, check_at_least, check_positive
