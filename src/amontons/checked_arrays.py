@@ -1,16 +1,25 @@
-"""Arrays from outside: checked, copied and locked; every complaint names argument and value."""
+"""Arrays from outside: checked, copied and locked; every complaint names argument and value.
+
+Only arrays of numbers pass: NumPy would also make numbers of texts, dates and truth values, and
+drop the mask of a masked array.  Sparse matrices are checked entry by entry before compiled
+code sees them, which takes their indices on trust.
+"""
 
 from __future__ import annotations
+
+from numbers import Number
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from .errors import InvalidInput
+from .errors import InvalidInput, shown
 
 Array = NDArray[np.float64]
 Matrix = sparse.csr_array | sparse.csc_array | Array
 LARGEST = 1e100  # entry in any unit: squares must stay finite, and 1 / LARGEST positive
+WHOLE = 2.0**53  # up to which floats hold every whole number
+WORDS = {"b": "truth values", "U": "texts", "S": "bytes", "M": "dates", "m": "lengths of time"}
 
 
 def expect_shape(name: str, found: tuple[int, ...], expected: tuple[int, ...]) -> None:
@@ -20,23 +29,95 @@ def expect_shape(name: str, found: tuple[int, ...], expected: tuple[int, ...]) -
 
 
 def real(name: str, values: object) -> Array:
-    """A float copy; rejects texts, ragged lists and complex numbers."""
+    """A float copy; rejects all that are not real numbers, and ragged lists."""
+    if sparse.issparse(values):
+        raise InvalidInput(f"{name}: expected a dense array, got a sparse one")
     try:
-        raw = np.asarray(values)
-        if np.iscomplexobj(raw):
-            raise InvalidInput(f"{name}: expected real numbers, got complex ones")
-        return np.array(raw, dtype=float, order="C")
-    except (TypeError, ValueError) as error:
+        raw = np.asarray(values) if not np.ma.isMaskedArray(values) else _unmasked(name, values)
+        _check_kind(name, raw)
+        with np.errstate(over="ignore"):  # of longer floats; infinity is refused later
+            return np.array(raw, dtype=float, order="C")
+    except (TypeError, ValueError, OverflowError) as error:
         if isinstance(error, InvalidInput):
             raise
         raise InvalidInput(f"{name}: expected an array of numbers ({error})") from error
+
+
+def _unmasked(name: str, values: object) -> NDArray:
+    """The data of a masked array without masked entries."""
+    masked = int(np.ma.count_masked(values))
+    if masked:
+        raise InvalidInput(
+            f"{name}: expected numbers, got a masked array with {masked} masked entries"
+        )
+    return np.ma.getdata(values)
+
+
+def _check_kind(name: str, raw: NDArray) -> None:
+    """Raise InvalidInput for what is no array of real numbers, though NumPy converts it."""
+    kind = raw.dtype.kind
+    if kind == "c":
+        raise InvalidInput(f"{name}: expected real numbers, got complex ones")
+    if kind == "O":
+        for entry in raw.flat:
+            if not isinstance(entry, Number) or isinstance(entry, bool | np.bool_):
+                raise InvalidInput(f"{name}: expected numbers, got {shown(entry)}")
+    elif kind not in "fiu":
+        word = WORDS.get(kind, f"type {raw.dtype}")
+        raise InvalidInput(f"{name}: expected numbers, got {word}")
+
+
+def number(name: str, value: object, *, least: float = -LARGEST) -> float:
+    """One number from `least` on, whose square is a number too."""
+    try:
+        found = real(name, value)
+    except InvalidInput:
+        raise InvalidInput(f"{name}: expected a number, got {shown(value)}") from None
+    if found.ndim:
+        raise InvalidInput(f"{name}: expected a number, got {shown(value)}")
+    if not least <= found <= LARGEST:
+        bound = f" from {least:g} to {LARGEST:g}" if least > -LARGEST else ""
+        raise InvalidInput(f"{name}: expected a finite number{bound}, got {shown(value)}")
+    return float(found)
+
+
+def finite(name: str, values: object, dimensions: int) -> Array:
+    """A read-only copy with so many dimensions, of finite numbers of any size."""
+    array = real(name, values)
+    if array.ndim != dimensions:
+        raise InvalidInput(f"{name}: expected {dimensions} dimensions, got {array.shape}")
+    return _finite(name, array)
+
+
+def integers(name: str, values: object) -> NDArray[np.int64]:
+    """A copy in whole numbers; floats without a fraction pass, a table of a file has them."""
+    if isinstance(values, np.ndarray) and values.dtype.kind == "i":
+        return np.array(values if not np.ma.isMaskedArray(values) else _unmasked(name, values),
+                        dtype=np.int64)  # fmt: skip
+    array = real(name, values)
+    if not (array == np.floor(array)).all() or np.abs(array).max(initial=0.0) > WHOLE:
+        raise InvalidInput(f"{name}: expected whole numbers, got {shown(values)}")
+    return array.astype(np.int64)
+
+
+def columns(name: str, values: object, rows: int) -> Array:
+    """Finite numbers (rows, k); no copy of a float array, which may be as large as a matrix."""
+    array = values if isinstance(values, np.ndarray) and values.dtype == float else None
+    array = real(name, values) if array is None or np.ma.isMaskedArray(array) else array
+    if array.ndim != 2:
+        raise InvalidInput(f"{name}: expected {rows} rows of numbers, got {array.shape}")
+    if len(array) != rows:
+        raise InvalidInput(f"{name}: expected {rows} rows, got {len(array)}")
+    if not np.isfinite(array).all():
+        raise InvalidInput(f"{name}: expected finite numbers, got others")
+    return array
 
 
 def numbers(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
     """A read-only copy of that shape, of finite numbers whose squares are numbers."""
     array = real(name, values)
     expect_shape(name, array.shape, shape)
-    return _numbers(name, array)
+    return squarable(name, array)
 
 
 def contact_rows(name: str, values: ArrayLike, nc: int) -> Array:
@@ -46,15 +127,17 @@ def contact_rows(name: str, values: ArrayLike, nc: int) -> Array:
         array = array.reshape(nc, -1)
     if array.ndim != 2 or array.shape[0] != nc or array.shape[1] not in (2, 3):
         raise InvalidInput(f"{name}: expected shape ({nc}, 2) or ({nc}, 3), got {array.shape}")
-    return _numbers(name, array)
+    return squarable(name, array)
 
 
 def sparse_matrix(name: str, matrix: Matrix) -> sparse.csc_array:
     """A canonical read-only copy: columns sorted, duplicates summed, every entry finite."""
-    if not sparse.issparse(matrix):
+    if sparse.issparse(matrix):
+        matrix = compressed(name, matrix)
+    else:
         matrix = real(name, matrix)
-    elif np.iscomplexobj(matrix.data):
-        raise InvalidInput(f"{name}: expected real numbers, got complex ones")
+        if matrix.ndim != 2:
+            raise InvalidInput(f"{name}: expected a matrix, got shape {matrix.shape}")
     out = sparse.csc_array(matrix, dtype=float, copy=True)
     out.sum_duplicates()
     bad = np.flatnonzero(~np.isfinite(out.data))
@@ -68,6 +151,98 @@ def sparse_matrix(name: str, matrix: Matrix) -> sparse.csc_array:
     return locked(out)
 
 
+def compressed(name: str, matrix: sparse.sparray | sparse.spmatrix) -> Matrix:
+    """A sparse matrix of any format by rows or columns, every index and entry checked.
+
+    The matrix itself where it is stored so: nothing is copied, nothing changed.
+    """
+    if len(matrix.shape) != 2:
+        raise InvalidInput(f"{name}: expected a matrix, got shape {matrix.shape}")
+    if matrix.format == "lil":
+        _check_rows_of_lists(name, matrix)
+    try:
+        if matrix.format not in ("csr", "csc", "bsr"):  # coo checks its indices by itself
+            coo = matrix.tocoo()
+            _check_values(name, coo.data)
+            _check_triplets(name, coo)
+            matrix = coo.tocsr()
+        _check_compressed(name, matrix)
+        return matrix.tocsr() if matrix.format == "bsr" else matrix
+    except (MemoryError, ValueError, TypeError, IndexError) as error:
+        if isinstance(error, InvalidInput):
+            raise
+        raise InvalidInput(f"{name}: not a valid sparse matrix: {error}") from error
+
+
+def _check_rows_of_lists(name: str, matrix: sparse.lil_array) -> None:
+    """Raise InvalidInput where a row of a lil matrix has not one column per value."""
+    if matrix.rows.shape != matrix.data.shape or len(matrix.rows) != matrix.shape[0]:
+        raise InvalidInput(f"{name}: not a valid sparse matrix: lists of other rows")
+    for row, (where, values) in enumerate(zip(matrix.rows, matrix.data, strict=True)):
+        if len(where) != len(values):
+            raise InvalidInput(
+                f"{name}[{row}]: expected as many columns as values, got {len(where)} and "
+                f"{len(values)}"
+            )
+
+
+def _check_triplets(name: str, matrix: sparse.coo_array) -> None:
+    """Raise InvalidInput for a row or column that the matrix has not."""
+    for index, size, word in zip(matrix.coords, matrix.shape, ("row", "column"), strict=True):
+        if index.shape != matrix.data.shape:
+            raise InvalidInput(f"{name}: expected one {word} per value, got {index.shape}")
+        _check_indices(name, index, size, word)
+
+
+def _check_compressed(name: str, matrix: Matrix | sparse.bsr_array) -> None:
+    """Raise InvalidInput for rows, columns or blocks whose indices lead out of the arrays."""
+    by_rows = matrix.format != "csc"
+    _check_values(name, matrix.data)
+    lines, width = matrix.shape if by_rows else matrix.shape[::-1]
+    word = "column" if by_rows else "row"
+    if matrix.format == "bsr":
+        tall, wide = matrix.data.shape[1:] if matrix.data.ndim == 3 else (0, 0)
+        if not (tall and wide) or lines % tall or width % wide:
+            raise InvalidInput(f"{name}: not a valid sparse matrix: blocks that do not fit")
+        lines, width, word = lines // tall, width // wide, "column of blocks"
+    pointers, indices = matrix.indptr, matrix.indices
+    _check_indices(f"{name}: indptr", pointers, np.iinfo(np.int64).max, "start")
+    if pointers.shape != (lines + 1,):
+        raise InvalidInput(
+            f"{name}: indptr: expected {lines + 1} starts, got shape {pointers.shape}"
+        )
+    falls = np.flatnonzero(np.diff(pointers) < 0)
+    if pointers[0] != 0 or falls.size:
+        k = 0 if pointers[0] != 0 else int(falls[0]) + 1
+        raise InvalidInput(
+            f"{name}: indptr[{k}]: expected starts that begin with 0 and never fall, "
+            f"got {pointers[k]}"
+        )
+    used = int(pointers[-1])
+    if min(len(indices), len(matrix.data)) < used:
+        raise InvalidInput(
+            f"{name}: expected {used} indices and values as indptr says, got {len(indices)} "
+            f"and {len(matrix.data)}"
+        )
+    _check_indices(f"{name}: indices", indices[:used], width, word)
+
+
+def _check_values(name: str, values: object) -> None:
+    if not isinstance(values, np.ndarray):
+        raise InvalidInput(f"{name}: expected an array of values, got {shown(values)}")
+    _check_kind(name, values)
+
+
+def _check_indices(name: str, index: object, size: int, word: str) -> None:
+    if not isinstance(index, np.ndarray) or index.ndim != 1 or index.dtype.kind not in "iu":
+        raise InvalidInput(f"{name}: expected a list of whole numbers, got {shown(index)}")
+    if len(index) and (index.min() < 0 or index.max() >= size):
+        bad = np.flatnonzero((index < 0) | (index >= size))[0]
+        raise InvalidInput(
+            f"{name}[{bad}]: expected a {word} from 0 to {size - 1}, got {index[bad]}"
+        )
+
+
 def locked(matrix):
     """The same sparse matrix with read-only arrays, so that sharing it is safe."""
     for array in (matrix.data, matrix.indices, matrix.indptr):
@@ -75,14 +250,19 @@ def locked(matrix):
     return matrix
 
 
-def _numbers(name: str, array: Array) -> Array:
+def squarable(name: str, array: Array) -> Array:
+    """The same array, locked, of finite numbers whose squares are numbers."""
+    _squarable(name, _finite(name, array))
+    return array
+
+
+def _finite(name: str, array: Array) -> Array:
     bad = np.argwhere(~np.isfinite(array))
     if len(bad):
         where = ", ".join(str(k) for k in bad[0])
         raise InvalidInput(
             f"{name}[{where}]: expected a finite number, got {array[tuple(bad[0])]}"
         )
-    _squarable(name, array)
     array.flags.writeable = False
     return array
 

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from .errors import FileFormatError, InvalidInput
 from .evolution import State, TimeStep
 from .fclib import DAMAGE, write_fclib, write_hdf5
-from .files import make_folder
+from .files import check_is_regular, make_folder
+from .hdf5 import check_contained
 
 GROUP = "amontons_state"
 ARRAYS = {"displacement": 1, "velocity": 1, "force": 2, "slip": 2}  # name: dimensions
@@ -84,10 +85,12 @@ def _put_state(file: h5py.File, state: State) -> None:
 
 def _read(path: Path, reader: Callable[[Path, h5py.File], Read]) -> Read:
     """What a reader finds in a file; any damage becomes a FileFormatError."""
+    check_is_regular(path)
     if not path.is_file():
         raise FileFormatError(f"{path}: no such file")
     try:
         with h5py.File(path, "r") as file:
+            check_contained(path, file)
             return reader(path, file)
     except FileFormatError:
         raise

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .checked_arrays import LARGEST, real
 from .errors import InvalidInput
 
 Array = NDArray[np.float64]
@@ -102,14 +103,22 @@ def natural_map(r: Array, u: Array, mu: Array, rho: Array) -> Array:
 
 
 def _coefficient(name: str, value: ArrayLike) -> Array:
-    """A read-only copy, shape (nc,); rejects negative and non-finite values by position."""
-    array = np.array(value, dtype=float, ndmin=1)
+    """A read-only copy, shape (nc,); rejects negative, non-finite and huge values by position.
+
+    The square of a huge one is no number any more.
+    """
+    array = np.atleast_1d(real(name, value))
     if array.ndim != 1:
         raise InvalidInput(f"{name}: expected shape (nc,), got {array.shape}")
     bad = np.flatnonzero(~np.isfinite(array) | (array < 0))
     if bad.size:
         raise InvalidInput(
             f"{name}[{bad[0]}]: expected a finite number >= 0, got {array[bad[0]]!r}"
+        )
+    huge = np.flatnonzero(array > LARGEST)
+    if huge.size:
+        raise InvalidInput(
+            f"{name}[{huge[0]}]: expected at most {LARGEST:g}, got {array[huge[0]]:g}"
         )
     array.flags.writeable = False
     return array

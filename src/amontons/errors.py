@@ -4,9 +4,32 @@ from __future__ import annotations
 
 from typing import Any
 
+LONGEST = 1000  # letters of a message; what a user gave may be longer than any screen
+LONGEST_VALUE = 120  # letters of one value in it
+
 
 class AmontonsError(Exception):
-    """Root of all errors raised on purpose by amontons."""
+    """Root of all errors raised on purpose by amontons; a message has an end, always."""
+
+    def __init__(self, message: object = "") -> None:
+        super().__init__(clipped(str(message), LONGEST))
+
+
+def clipped(text: str, longest: int) -> str:
+    """The text, or its beginning and end with the number of letters left out between them."""
+    if len(text) <= longest:
+        return text
+    tail = longest // 4
+    head = longest - tail - 40
+    return f"{text[:head]} … ({len(text) - head - tail} letters) … {text[len(text) - tail :]}"
+
+
+def shown(value: object) -> str:
+    """A value as messages show it: as Python writes it, with an end."""
+    try:
+        return clipped(repr(value), LONGEST_VALUE)
+    except (ValueError, RecursionError):  # thousands of digits, lists in lists in lists
+        return f"a value of type {type(value).__name__} that is too long to be shown"
 
 
 class InvalidInput(AmontonsError, ValueError):

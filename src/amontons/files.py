@@ -17,7 +17,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from .errors import NotWritten
+from .errors import FileFormatError, NotWritten
 
 STREAMS = ("/dev/", "/proc/")  # /dev/stdout may lead to a plain file that is open elsewhere
 DESCRIPTORS = {"/dev/stdout": 1, "/dev/stderr": 2}  # these keep their place in such a file
@@ -130,6 +130,21 @@ def is_stream(path: Path) -> bool:
     if not path.exists():
         return False
     return not stat.S_ISREG(path.stat().st_mode) or str(path.absolute()).startswith(STREAMS)
+
+
+def check_is_regular(path: Path) -> None:
+    """Raise FileFormatError for a pipe or a device, on which reading may never end.
+
+    What is missing or a folder passes: whoever opens it knows better what to say.
+    """
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError):
+        return
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        raise FileFormatError(
+            f"{path}: not a regular file; save what it gives to a file first"
+        )
 
 
 @contextmanager

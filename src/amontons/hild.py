@@ -15,6 +15,7 @@ balance it.  It acts along x.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -43,11 +44,15 @@ def hild_triangle(
         raise InvalidInput(f"delta: expected a number between 0 and 4/3, got {delta!r}")
     return Model(
         [Body(mesh, LinearElastic(young=1.0, poisson=0.2))],
-        supports=[Fix("BC", lambda x: delta * held_displacement(x))],
+        supports=[Fix("BC", partial(_held, delta))],
         loads=[Traction("CA", (-TRACTION * delta, 0.0))],
         contacts=[Contact("AB", Plane(normal=(0, 1)), mu=mu)],
         name=name,
     )
+
+
+def _held(delta: float, x: Array) -> Array:
+    return delta * held_displacement(x)
 
 
 def triangle_mesh(n: int) -> Mesh:

@@ -41,9 +41,10 @@ from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, uint64
+from numba import uint64
 from numpy.typing import NDArray
 
+from .compiled import njit
 from .cones import Law
 
 Array = NDArray[np.float64]

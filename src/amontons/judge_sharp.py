@@ -14,8 +14,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from .compiled import njit
 from .judge import EPSILON, PENETRATION, contact_residual
 
 SPLIT = 134217729.0  # 2^27 + 1: halves a double into two numbers of 26 bits

@@ -25,7 +25,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from .compiled import njit
 
 OPEN, SLIP, STICK = 0, 1, 2
 NEWTON_STEPS = 12

@@ -24,16 +24,19 @@ from . import judge
 from .blocks import BlockRows, block_part, block_rows, spatial, velocity_inplace
 from .checked_arrays import (
     Matrix,
+    columns,
     contact_rows,
     expect_shape,
+    integers,
     locked,
+    number,
     numbers,
     real,
     sparse_matrix,
 )
 from .clock import NEVER, Deadline
 from .cones import Coulomb, Law, Tresca
-from .errors import InvalidInput, SingularOperator, UnsupportedForm
+from .errors import InvalidInput, SingularOperator, UnsupportedForm, shown
 from .global_matrices import OPERATORS, GlobalMatrices, Shared, made_once
 from .judge import Measure, Weakest
 from .judge_sharp import sharp_error
@@ -118,12 +121,15 @@ class FrictionProblem:
         f = numbers("f", f, (n,))
         w = contact_rows("w", w, nc)
         expect_shape("H", H.shape, (n, nc * w.shape[1]))
-        if near_nullspace is not None and near_nullspace.shape[0] != n:
-            raise InvalidInput(
-                f"near_nullspace: expected {n} rows, got {near_nullspace.shape[0]}"
-            )
+        if near_nullspace is not None:
+            near_nullspace = columns("near_nullspace", near_nullspace, n)
         if guess is not None:
             guess = numbers("guess", guess, (n,))
+        if load_scale is not None:
+            load_scale = number("load_scale", load_scale, least=0.0)
+        if u_scale is not None:
+            u_scale = number("u_scale", u_scale, least=0.0)
+        _check_name(name)
         return cls(law, M=M, H=H, f=f, w=w, near_nullspace=near_nullspace,
                    levels=checked_levels(levels, n), guess=guess, load_scale=load_scale,
                    u_scale=u_scale, name=name)  # fmt: skip
@@ -137,6 +143,7 @@ class FrictionProblem:
         Raises InvalidInput naming the argument and the value.
         """
         law = _law(mu)
+        _check_name(name)
         q = contact_rows("q", q, len(law.coefficient))
         if sparse.issparse(W):
             W = locked(sparse_matrix("W", W).tocsr())
@@ -219,6 +226,13 @@ class FrictionProblem:
         """The Delassus form of some contacts, (k,) in ascending order; `whole` leads back."""
         self._need(Form.DELASSUS)
         assert self.q is not None
+        contacts = integers("contacts", contacts)
+        inside = (contacts >= 0) & (contacts < self.contacts)
+        if contacts.ndim != 1 or not inside.all() or (np.diff(contacts) <= 0).any():
+            raise InvalidInput(
+                f"contacts: expected numbers from 0 to {self.contacts - 1} in ascending order, "
+                f"got {shown(contacts)}"
+            )
         rows = block_part(self.blocks, contacts)
         part = self._from_blocks(rows, self.q[contacts], self.law.at(contacts))
         part._shared["whole"] = ((part.W,), (self, contacts))
@@ -571,6 +585,11 @@ class FrictionProblem:
 def _rows(r: Array) -> Array:
     """r as kernels take it, (nc, 3); the same array where it is so already."""
     return r if r.shape[1] == 3 and r.flags.c_contiguous else spatial(r)
+
+
+def _check_name(name: str) -> None:
+    if not isinstance(name, str):
+        raise InvalidInput(f"name: expected a text, got {shown(name)}")
 
 
 def _law(mu: ArrayLike | Law) -> Law:

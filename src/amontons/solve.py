@@ -12,11 +12,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from .checked_arrays import real
 from .clock import Deadline, TimeLimit, compiling, deadline_of, now
 from .cones import Coulomb
-from .errors import InvalidInput, SingularOperator, TimeUp, UnsupportedForm
+from .errors import InvalidInput, SingularOperator, TimeUp, UnsupportedForm, shown
 from .indefinite import gains_energy, with_obstruction
 from .judge import EPSILON, Measure, Weakest
 from .nitsche_problem import NO_MULTIPLIERS, NitscheProblem
@@ -364,27 +365,32 @@ def _start(
         )
     if isinstance(problem, NitscheProblem):
         return _start_of_nitsche(problem, start.v)
-    r = np.array(start.r, dtype=float)
+    r = real("start: r", start.r)
     if r.shape != (problem.contacts, problem.dimension):
         raise InvalidInput(
             f"start: expected r of shape {(problem.contacts, problem.dimension)}, got {r.shape}"
         )
     if not np.isfinite(r).all():
         raise InvalidInput("start: r holds a number that is not finite")
-    n = problem.unknowns
-    if start.v is not None and problem.form is Form.GLOBAL and start.v.size != n:
-        raise InvalidInput(f"start: expected v of {n} entries, got {start.v.size}")
-    return Iterate(r, start.v, 0)
+    if start.v is None or problem.form is not Form.GLOBAL:
+        return Iterate(r, None, 0)
+    return Iterate(r, _motion(start.v, problem.unknowns), 0)
 
 
 def _start_of_nitsche(problem: NitscheProblem, v: Array | None) -> Iterate:
     """The displacements v (n,) of a start; its reactions may be those of another method."""
-    v = problem.guess if v is None else np.array(v, dtype=float)
-    if v.shape != (problem.unknowns,):
-        raise InvalidInput(f"start: expected v of {problem.unknowns} entries, got {v.shape}")
+    v = problem.guess if v is None else _motion(v, problem.unknowns)
+    return Iterate(problem.reaction(v), v, 0)
+
+
+def _motion(v: ArrayLike, n: int) -> Array:
+    """A copy of v, (n,), of a start."""
+    v = real("start: v", v)
+    if v.shape != (n,):
+        raise InvalidInput(f"start: expected v of {n} entries, got {v.size}")
     if not np.isfinite(v).all():
         raise InvalidInput("start: v holds a number that is not finite")
-    return Iterate(problem.reaction(v), v, 0)
+    return v
 
 
 def _with_motion(problem: FrictionProblem, start: Iterate) -> Iterate:
@@ -397,7 +403,9 @@ def _with_motion(problem: FrictionProblem, start: Iterate) -> Iterate:
 
 def _check_number(name: str, value: object) -> None:
     if not isinstance(value, int | float | np.number) or isinstance(value, bool):
-        raise InvalidInput(f"{name}: expected a number, got {value!r}")
+        raise InvalidInput(f"{name}: expected a number, got {shown(value)}")
+    if isinstance(value, int) and value.bit_length() > 1000:  # more than a float can hold
+        raise InvalidInput(f"{name}: expected a number that floats can hold, got a larger one")
 
 
 def _check_options(

@@ -11,8 +11,8 @@ import amontons
 
 PACKAGE = Path(amontons.__file__).parent
 ORDER = (
-    "errors < clock < dense < warned < files < checked_arrays < cones < linear < blocks < "
-    "condensation < global_matrices < judge < judge_sharp < problem < "
+    "compiled < errors < clock < dense < warned < files < hdf5 < checked_arrays < cones < "
+    "linear < blocks < condensation < global_matrices < judge < judge_sharp < problem < "
     "indefinite < nitsche_problem < one_sided < one_contact < status < settling < solution < "
     "solvers < solve < fem < contact < model < masonry < granular < hild < vee < evolution < "
     "analysis < gallery < fclib < checkpoint < expressions < case < vtk < plots < output < "
@@ -23,7 +23,7 @@ ALONE = {  # package: the file or folder that imports it, one for each kind of f
     "rslab": "linear", "pypardiso": "linear",
     "petsc4py": "linear", "mpi4py": "linear", "pymetis": "fem",
     "meshio": "fem vtk",  # reads meshes, writes pictures
-    "h5py": "fclib output checkpoint",  # the exchange format, our results, our states
+    "h5py": "hdf5 fclib output checkpoint",  # checks, the exchange format, results, states
 }  # fmt: skip
 INSIDE = {"analysis": ("multipliers", "solutions", "certificates", "paths")}  # the same, in it
 FILES = sorted(PACKAGE.rglob("*.py"))
@@ -82,6 +82,13 @@ def test_imports_go_downwards_inside_a_folder(folder):
 def test_heavy_packages_are_imported_in_one_place(package):
     users = {home(p) for p in FILES for name in imports(p) if name.split(".")[0] == package}
     assert users <= set(ALONE[package].split())
+
+
+def test_kernels_are_kept_in_our_folder():
+    for path in FILES:
+        if path.name != "compiled.py":
+            text = path.read_text().replace("compiled import njit", "")
+            assert "import njit" not in text, path
 
 
 def test_no_kernel_assumes_that_numbers_are_finite():

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..checked_arrays import real
 from ..errors import InvalidInput
 
 Array = NDArray[np.float64]
@@ -25,7 +26,7 @@ def performance_profile(times: ArrayLike) -> tuple[Array, Array]:
     >>> tau.tolist(), rho.tolist()
     ([1.0, 2.0, 3.0], [[0.5, 0.5, 1.0], [0.5, 1.0, 1.0]])
     """
-    table = np.array(times, dtype=float)
+    table = real("times", times)
     if table.ndim != 2 or not table.size:
         raise InvalidInput(f"times: expected shape (problems, methods), got {table.shape}")
     if (table <= 0).any():

@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..checked_arrays import LARGEST
+from ..errors import FileFormatError
+from ..files import check_is_regular
 from .tables import Blame, Table
 
 if TYPE_CHECKING:
@@ -61,6 +63,10 @@ def _read_file(table: Table, path: Path) -> Mesh:
     from ..fem import is_cad, read_cad, read_mesh
 
     name = path.parent / table.text("file")
+    try:
+        check_is_regular(name)
+    except FileFormatError as reason:
+        raise table.error("file", str(reason)) from None
     if not name.is_file():
         raise table.error("file", f"no such file: {name}")
     if not is_cad(name):

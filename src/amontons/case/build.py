@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import FileFormatError, InvalidInput
 from ..expressions import nearest
+from ..files import check_is_regular
 from .bodies import read_material, read_materials, read_mesh_table
 from .contacts import read_contact, refuse_repeated
 from .evolution import Evolution, read_evolution, read_wall
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
 EXAMPLE = "example:"  # before the name of a built-in case
 DATA = files("amontons") / "examples_data"
+LARGEST_FILE = 2**24  # bytes of a case file; meshes stand in files of their own
 TOP = ("title", "mesh", "wall", "material", "fix", "traction", "body_force", "contact",
        "solver", "evolution")  # fmt: skip
 
@@ -70,8 +72,14 @@ def example_file(name: str) -> Path:
 
 
 def _load(path: Path) -> dict[str, Any]:
+    check_is_regular(path)
     try:
         with path.open("rb") as file:
+            size = os.fstat(file.fileno()).st_size
+            if size > LARGEST_FILE:
+                raise FileFormatError(
+                    f"{path}: expected a case file of at most {LARGEST_FILE} bytes, got {size}"
+                )
             return tomllib.load(file)
     except FileNotFoundError:
         raise FileFormatError(f"{path}: no such file") from None
@@ -81,6 +89,8 @@ def _load(path: Path) -> dict[str, Any]:
         raise FileFormatError(f"{path}: can not be read: {reason.strerror}") from None
     except UnicodeDecodeError:
         raise FileFormatError(f"{path}: expected UTF-8 text") from None
+    except FileFormatError:
+        raise
     except (tomllib.TOMLDecodeError, RecursionError, ValueError) as reason:
         raise FileFormatError(f"{path}: not valid TOML: {reason}") from None
 

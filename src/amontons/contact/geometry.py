@@ -15,7 +15,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InvalidInput
+from ..checked_arrays import LARGEST, number, real
+from ..errors import InvalidInput, shown
 
 Array = NDArray[np.float64]
 
@@ -82,7 +83,8 @@ class Sphere:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "center", tuple(_vector("center", self.center).tolist()))
-        if not (np.isfinite(self.radius) and self.radius > 0):
+        object.__setattr__(self, "radius", number("radius", self.radius))
+        if not self.radius > 0:
             raise InvalidInput(f"radius: expected a finite length > 0, got {self.radius!r}")
 
     def gap(self, points: Array) -> Array:
@@ -152,7 +154,7 @@ class LevelSet:
     def _second(self, points: Array) -> Array:
         """Second derivatives, (n, dim, dim), symmetric."""
         if self.hessian is not None:
-            second = np.asarray(self.hessian(points), dtype=float)
+            second = real("hessian", self.hessian(points))
             wanted = (*points.shape, points.shape[1])
             if second.shape != wanted:
                 raise InvalidInput(f"hessian: expected shape {wanted}, got {second.shape}")
@@ -166,7 +168,7 @@ class LevelSet:
         return (second + second.swapaxes(1, 2)) / 2
 
     def _values(self, points: Array) -> Array:
-        values = np.asarray(self.function(points), dtype=float)
+        values = real("level set", self.function(points))
         if values.shape != (len(points),):
             raise InvalidInput(
                 f"level set: expected values of shape ({len(points)},) for points of shape "
@@ -176,7 +178,7 @@ class LevelSet:
 
     def _slopes(self, points: Array) -> Array:
         if self.gradient is not None:
-            slopes = np.asarray(self.gradient(points), dtype=float)
+            slopes = real("gradient", self.gradient(points))
             if slopes.shape != points.shape:
                 raise InvalidInput(
                     f"gradient: expected shape {points.shape}, got {slopes.shape}"
@@ -224,9 +226,9 @@ def frames(normals: Array) -> Array:
 
 
 def _vector(name: str, values: Sequence[float]) -> Array:
-    array = np.asarray(values, dtype=float)
-    if array.shape not in ((2,), (3,)) or not np.isfinite(array).all():
-        raise InvalidInput(f"{name}: expected 2 or 3 finite numbers, got {values!r}")
+    array = real(name, values)
+    if array.shape not in ((2,), (3,)) or not (np.abs(array) <= LARGEST).all():
+        raise InvalidInput(f"{name}: expected 2 or 3 finite numbers, got {shown(values)}")
     return array
 
 

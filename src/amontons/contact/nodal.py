@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,11 +64,16 @@ class ContactRows:
 
     def at(self, kept: NDArray[np.bool_]) -> ContactRows:
         """A selection of these contacts."""
-        columns, average = np.repeat(kept, self.points.shape[1]), self.average
+        columns = np.repeat(kept, self.points.shape[1])
+        average = None if self.average is None else partial(_part, self.average, kept)
         return ContactRows(self.nodes[kept], self.points[kept], self.weights[kept],
                            self.gap[kept], self.frames[kept],
-                           sparse.csc_array(self.H[:, columns]),
-                           None if average is None else lambda f: average(f)[kept])  # fmt: skip
+                           sparse.csc_array(self.H[:, columns]), average)  # fmt: skip
+
+
+def _part(average: Callable[[Field], Array], kept: NDArray[np.bool_], field: Field) -> Array:
+    """Averages at a selection of contacts; no closure, so that models can be pickled."""
+    return average(field)[kept]
 
 
 def forces(pairs: Sequence[ContactRows], r: Array) -> Array:

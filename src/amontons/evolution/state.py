@@ -9,8 +9,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checked_arrays import finite, integers, number
 from ..contact import forces
-from ..errors import InvalidInput
+from ..errors import InvalidInput, shown
 from ..model import ContactFields, Fix, Model
 from ..model.doubts import model_warnings
 from ..model.supports import locate, prescribed_values
@@ -25,6 +26,7 @@ from .timed import part_at, steady
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+ARRAYS = {"displacement": 1, "velocity": 1, "force": 2, "slip": 2}  # name: dimensions
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,11 +46,13 @@ class State:
     slip: Array
 
     def __post_init__(self) -> None:
-        for name in ("displacement", "velocity", "force", "slip"):
-            array = np.array(getattr(self, name), dtype=float)
-            if not np.isfinite(array).all():
-                raise InvalidInput(f"state: {name} holds a number that is not finite")
-            array.flags.writeable = False
+        index = integers("state: index", self.index)
+        if index.ndim or index < 0:
+            raise InvalidInput(f"state: index: expected steps done, got {shown(self.index)}")
+        object.__setattr__(self, "index", int(index))
+        object.__setattr__(self, "time", number("state: time", self.time))
+        for name, dimensions in ARRAYS.items():
+            array = finite(f"state: {name}", getattr(self, name), dimensions)
             object.__setattr__(self, name, array)
 
     @property

@@ -11,6 +11,9 @@ A file that is read and written again keeps numbers, storage, texts byte for byt
 types, and the attributes of the groups info, W, M and H that are numbers or texts.  Dropped are
 other attributes and further datasets.
 
+Files that lead elsewhere (links, raw or virtual data sets) or unpack to far more than they
+store are refused before anything is read.
+
 Left out: bilateral constraints (G, b; V, R, s), which raise an error, and the groups `solution`
 and `guesses` of a file, which are not read: in the published files they are all zero.
 """

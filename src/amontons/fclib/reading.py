@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 
 from ..errors import FileFormatError, InvalidInput
+from ..hdf5 import TEXT, check_contained
 from ..problem import Form
 from .matrices import read_matrix
 from .source import DAMAGE, Array, Source, check_is_file
@@ -28,6 +29,7 @@ def read_fclib(path: str | os.PathLike[str]) -> FclibProblem:
     check_is_file(path)
     try:
         with h5py.File(path, "r") as file:
+            check_contained(path, file)
             return _read(Source(path, file))
     except FileFormatError:
         raise
@@ -139,6 +141,8 @@ def _texts(source: Source, root: str) -> dict[str, bytes]:
             raise source.error(where, f"expected a text, got type {node.dtype}")
         value = node[()] if node.shape == () else node[0]
         texts[name] = bytes(value) if isinstance(value, bytes) else str(value).encode()
+        if len(texts[name]) > TEXT:  # of variable length: no longer than the file
+            raise source.error(where, f"expected texts of at most {TEXT} bytes")
     return texts
 
 
@@ -161,7 +165,9 @@ def _attributes(root: h5py.Group) -> dict[str, dict[str, Any]]:
         group = root.get(where)
         if isinstance(group, h5py.Group):
             for key in group.attrs:
-                if group.attrs.get_id(key).dtype.kind in "iufbSO":
+                stored = group.attrs.get_id(key)
+                kind = stored.dtype.kind
+                if kind in "iufbS" or (kind == "O" and stored.shape == ()):  # O: one text
                     value = group.attrs[key]
                     if isinstance(value, str | np.generic) or (
                         isinstance(value, np.ndarray) and value.dtype.kind != "O"

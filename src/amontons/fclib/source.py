@@ -10,16 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileFormatError
+from ..files import check_is_regular
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-DEFLATE_LIMIT = 1032  # bytes that one stored byte can unpack to; more is a damaged header
 # all that h5py raises on damaged files; MemoryError: a shape that no machine holds
 DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, OverflowError)
 
 
 def check_is_file(path: Path) -> None:
     """Raises FileFormatError for what is no HDF5 file, or can not be read."""
+    check_is_regular(path)
     try:
         if path.is_dir():
             raise FileFormatError(f"{path}: expected an FCLib HDF5 file, this is a folder")
@@ -68,8 +69,6 @@ class Source:
             raise self.error(where, f"expected {expected}, got type {node.dtype}")
         if len(node.shape) > 1 and max(node.shape) != node.size:
             raise self.error(where, f"expected one dimension, got shape {node.shape}")
-        if node.size * node.dtype.itemsize > DEFLATE_LIMIT * self.path.stat().st_size:
-            raise self.error(where, f"declares {node.size} values, more than the file can hold")
         return np.asarray(node[()]).reshape(-1)
 
     def integer(self, where: str) -> int:

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..errors import InvalidInput
+from ..checked_arrays import WHOLE, real
+from ..errors import InvalidInput, shown
 from .cells import FACET_KIND
 from .facets import Cells, Facets, sides
 from .mesh import Mesh
@@ -43,7 +44,7 @@ def box(
     """
     lengths, counts, kind = _checked(size, cells, kind)
     dim = len(lengths)
-    start = np.zeros(dim) if origin is None else np.asarray(origin, dtype=float)
+    start = np.zeros(dim) if origin is None else real("origin", origin)
     if start.shape != (dim,) or not np.isfinite(start).all():
         raise InvalidInput(f"origin: expected {dim} finite numbers, got {origin!r}")
     axes = [np.linspace(0, 1, n + 1) for n in counts]
@@ -60,17 +61,23 @@ def box(
 def _checked(
     size: Sequence[float], cells: int | Sequence[int], kind: str | None
 ) -> tuple[Array, tuple[int, ...], str]:
-    lengths = np.asarray(size, dtype=float)
+    lengths = real("size", size)
     if lengths.shape not in ((2,), (3,)) or not (np.isfinite(lengths) & (lengths > 0)).all():
         raise InvalidInput(f"size: expected 2 or 3 lengths > 0, got {size!r}")
     dim = len(lengths)
-    counts = np.broadcast_to(cells, dim) if np.ndim(cells) == 0 else np.asarray(cells)
-    if counts.shape != (dim,) or (counts != np.floor(counts)).any() or (counts < 1).any():
+    counts = real("cells", cells)
+    counts = np.broadcast_to(counts, dim) if counts.ndim == 0 else counts
+    whole = counts.shape == (dim,) and ((counts == np.floor(counts)) & (counts >= 1)).all()
+    if not whole or counts.max() > WHOLE:
         raise InvalidInput(
-            f"cells: expected one whole number >= 1 or {dim} of them, got {cells!r}"
+            f"cells: expected one whole number >= 1 or {dim} of them, got {shown(cells)}"
+        )
+    if np.prod(counts + 1) > np.iinfo(np.int32).max:
+        raise InvalidInput(
+            f"cells: expected at most {np.iinfo(np.int32).max} nodes, got {cells!r}"
         )
     kind = KINDS[dim][0] if kind is None else kind
-    if kind not in KINDS[dim]:
+    if not isinstance(kind, str) or kind not in KINDS[dim]:
         raise InvalidInput(
             f"kind: expected {' or '.join(KINDS[dim])} for {dim} lengths, got {kind!r}"
         )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..checked_arrays import integers
 from ..errors import InvalidInput
 from .cells import CELLS, FIRST, ReferenceCell
 
@@ -43,7 +44,7 @@ def checked_cells(points: Array, kind: str, nodes: ArrayLike, region: str) -> In
         fitting = [c.kind for c in CELLS.values() if c.dim == points.shape[1]]
         raise InvalidInput(f"cells: expected one of {', '.join(fitting)}, got {kind!r}")
     cell = CELLS[kind]
-    table = np.array(nodes, dtype=np.int64)
+    table = integers(f"{kind} cells", nodes)
     if table.ndim != 2 or table.shape[1] != cell.nodes:
         raise InvalidInput(f"{kind} cells: expected shape (k, {cell.nodes}), got {table.shape}")
     if table.min() < 0 or table.max() >= len(points):

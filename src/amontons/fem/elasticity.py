@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..checked_arrays import number
 from ..errors import InvalidInput, MissingDependency
 from .cells import CELLS
 from .check import determinant
@@ -38,10 +39,10 @@ class LinearElastic:
     density: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("young", "poisson"):
-            if not isinstance(getattr(self, name), int | float | np.number):
-                raise InvalidInput(f"{name}: expected a number, got {getattr(self, name)!r}")
-        if not (np.isfinite(self.young) and self.young > 0):
+        number("young", self.young), number("poisson", self.poisson)
+        if self.density is not None:
+            number("density", self.density)
+        if not self.young > 0:
             raise InvalidInput(f"young: expected a finite stress > 0, got {self.young!r}")
         if not -1 < self.poisson < 0.5:
             why = (
@@ -55,7 +56,7 @@ class LinearElastic:
             )
         if self.plane not in ("strain", "stress"):
             raise InvalidInput(f'plane: expected "strain" or "stress", got {self.plane!r}')
-        if self.density is not None and not (np.isfinite(self.density) and self.density > 0):
+        if self.density is not None and not self.density > 0:
             raise InvalidInput(f"density: expected a finite number > 0, got {self.density!r}")
 
     @property

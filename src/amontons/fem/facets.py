@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..checked_arrays import integers
 from ..errors import InvalidInput
 from .cells import CELLS, FACET_KIND, FIRST
 
@@ -100,7 +101,7 @@ def oriented(
 
 
 def _node_table(block: Facets, name: str, points: Array) -> Index:
-    nodes = np.array(block.nodes, dtype=np.int64)
+    nodes = integers(f"surface {name!r}", block.nodes)
     dim = points.shape[1]
     kinds = {size: kind for (d, size), kind in FACET_KIND.items() if d == dim}
     if nodes.ndim != 2 or kinds.get(nodes.shape[1]) != block.kind:

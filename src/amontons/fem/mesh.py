@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -10,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..errors import InvalidInput
+from ..checked_arrays import real, squarable
+from ..errors import InvalidInput, shown
 from ..linear.levels import checked_levels
 from .cells import CELLS
 from .check import check_repeated, checked_cells
@@ -41,14 +43,15 @@ class Mesh:
     levels: tuple[sparse.csr_array, ...] = ()
 
     def __post_init__(self) -> None:
-        points = np.array(self.points, dtype=float)
+        points = real("points", self.points)
         if points.ndim != 2 or points.shape[1] not in (2, 3):
             raise InvalidInput(f"points: expected shape (n, 2) or (n, 3), got {points.shape}")
-        if not np.isfinite(points).all():
-            row = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
-            raise InvalidInput(f"points[{row}]: expected finite numbers, got {points[row]}")
-        points.flags.writeable = False
-        object.__setattr__(self, "points", points)
+        object.__setattr__(self, "points", squarable("points", points))
+        _check_parts("cells", self.cells, Cells)
+        if not isinstance(self.surfaces, Mapping):
+            raise InvalidInput(f"surfaces: expected name -> facets, got {shown(self.surfaces)}")
+        for name, facets in self.surfaces.items():
+            _check_parts(f"surface {name!r}", facets, Facets)
         blocks = tuple(
             Cells(b.kind, checked_cells(points, b.kind, b.nodes, b.region), b.region)
             for b in self.cells
@@ -123,6 +126,16 @@ class Mesh:
     def bounding_box(self) -> tuple[Array, Array]:
         """Smallest and largest coordinates, each (dim,)."""
         return self.points.min(axis=0), self.points.max(axis=0)
+
+
+def _check_parts(name: str, parts: object, kind: type) -> None:
+    """Raise InvalidInput for what is no sequence of blocks with tables of nodes."""
+    if not isinstance(parts, Sequence) or not all(isinstance(b, kind) for b in parts):
+        raise InvalidInput(f"{name}: expected blocks of {kind.__name__}, got {shown(parts)}")
+    for block in parts:
+        table = block.nodes
+        if not isinstance(table, Sequence | np.ndarray) or not getattr(table, "ndim", 1):
+            raise InvalidInput(f"{name}: expected a table of nodes, got {shown(block.nodes)}")
 
 
 def unknown(what: str, name: object, known: object) -> str:

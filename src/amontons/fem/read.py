@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FileFormatError, MissingDependency
+from ..files import check_is_regular
 from . import gmsh
 from .mesh import Mesh
 from .raw import RawBlock, RawMesh, to_mesh
@@ -53,6 +54,7 @@ def file_head(path: Path) -> bytes:
     """The first bytes of a file that exists, can be read and is not empty."""
     if path.is_dir():
         raise FileFormatError(f"{path}: expected a file, this is a folder")
+    check_is_regular(path)
     try:
         with path.open("rb") as file:
             head = file.read(4096)
@@ -72,6 +74,8 @@ def _from_meshio(path: str) -> RawMesh:
         raise MissingDependency(
             f"{path}: this format needs the package meshio: python -m pip install meshio"
         ) from error
+    from ..hdf5 import check_file
+
     said = io.StringIO()
     try:
         with (
@@ -80,8 +84,11 @@ def _from_meshio(path: str) -> RawMesh:
             warnings.catch_warnings(),
         ):
             warnings.simplefilter("ignore")
+            check_file(Path(path))
             found = meshio.read(path)
             return _raw(found)
+    except FileFormatError:
+        raise
     # A broken file makes meshio's forty parsers raise anything, or leave the interpreter.
     except (Exception, SystemExit) as error:
         reason = " ".join(said.getvalue().split()) or str(error) or type(error).__name__

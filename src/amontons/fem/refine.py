@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InvalidInput
+from ..errors import InvalidInput, shown
 from .cells import LINEAR, SECOND
 from .facets import Cells, Facets
 from .mesh import Mesh
@@ -19,6 +19,7 @@ Child = tuple[int, ...]
 _WEDGE = ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5),
           (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5))  # fmt: skip
 _PYRAMID = ((0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 4), (2, 4), (3, 4), (0, 1, 2, 3))
+MOST = 31  # a power of two: cells that node numbers can count
 MIDDLES = {first: PARENTS[second] for first, second in SECOND.items()} | {
     "wedge": _WEDGE, "pyramid": _PYRAMID,
 }  # fmt: skip
@@ -37,8 +38,11 @@ def refined(mesh: Mesh, times: int = 1) -> Mesh:
     >>> refined(box((1, 1), 3)).cell_count
     36
     """
-    if isinstance(times, bool) or not isinstance(times, int | np.integer) or times < 0:
-        raise InvalidInput(f"times: expected a whole number >= 0, got {times!r}")
+    whole = isinstance(times, int | np.integer) and not isinstance(times, bool | np.timedelta64)
+    if not whole or times < 0:
+        raise InvalidInput(f"times: expected a whole number >= 0, got {shown(times)}")
+    if mesh.dim * min(times, MOST) > MOST - np.log2(mesh.cell_count):
+        raise InvalidInput(f"times: expected at most 2^{MOST} cells, got {shown(times)}")
     if times and mesh.order == 2:
         raise InvalidInput("mesh: expected one of first order; refine first, then second_order")
     for _ in range(times):

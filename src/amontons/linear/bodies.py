@@ -82,17 +82,25 @@ class Bodies:
         """A factor of `matrix`, whose bodies these are; raises SingularOperator."""
         solver = solver if solver is not None else Direct()
         solves = [solver.factor(block).solve for block in self.matrices]
+        return BodyFactor(checked(matrix, _BodyByBody(self.members, solves)), solves)
 
-        def solve(b: Array) -> Array:
-            x = np.empty_like(b, dtype=float)
-            for members, one in zip(self.members, solves, strict=True):
-                copies, n = members.shape
-                columns = np.moveaxis(b[members].reshape(copies, n, -1), 0, 1)
-                found = one(columns.reshape(n, -1)).reshape(columns.shape)
-                x[members] = np.moveaxis(found, 1, 0).reshape(copies, n, *b.shape[1:])
-            return x
 
-        return BodyFactor(checked(matrix, solve), solves)
+@dataclass(frozen=True, eq=False)
+class _BodyByBody:
+    """Solves of the whole by those of one body of each kind."""
+
+    members: list[Index]
+    solves: list[Callable[[Array], Array]]
+
+    def __call__(self, b: Array) -> Array:
+        """The solution x, shape of b."""
+        x = np.empty_like(b, dtype=float)
+        for members, one in zip(self.members, self.solves, strict=True):
+            copies, n = members.shape
+            columns = np.moveaxis(b[members].reshape(copies, n, -1), 0, 1)
+            found = one(columns.reshape(n, -1)).reshape(columns.shape)
+            x[members] = np.moveaxis(found, 1, 0).reshape(copies, n, *b.shape[1:])
+        return x
 
 
 @dataclass(frozen=True, eq=False)

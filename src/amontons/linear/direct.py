@@ -3,18 +3,22 @@
 Order by evidence (105 000 unknowns of 3D elasticity, one thread): rslab 9 s, MKL Pardiso 8 s
 and 1 GB to install (extra `mkl`), SuperLU of SciPy only as a last resort.  Every factor is
 tried on a known right-hand side before it is trusted.
+
+The threads of rslab do not survive a fork, and wait for each other forever in the new process:
+there SuperLU takes its place, also in factors that were made before.
 """
 
 from __future__ import annotations
 
 import importlib.util
 import os
+import sys
 import warnings
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from enum import Enum
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -43,6 +47,26 @@ class Backend(Enum):
     def installed(self) -> bool:
         """True when the package can be imported."""
         return importlib.util.find_spec(self.value) is not None
+
+    @property
+    def alive(self) -> bool:
+        """False for rslab in a process that was forked from one that had loaded it."""
+        return self is not Backend.RSLAB or not _Forked.from_rslab
+
+
+class _Forked:
+    """What this process has inherited."""
+
+    from_rslab = False
+
+    @classmethod
+    def mark(cls) -> None:
+        """Note in a forked process whether rslab had been loaded: it may have threads."""
+        cls.from_rslab = cls.from_rslab or "rslab" in sys.modules
+
+
+if hasattr(os, "register_at_fork"):  # not on Windows, which can not fork
+    os.register_at_fork(after_in_child=_Forked.mark)
 
 
 @dataclass(frozen=True)
@@ -75,17 +99,50 @@ class Direct:
             raise SingularOperator(
                 f"matrix: column {empty[0]} is empty, the operator is singular"
             )
+        if self.backend is not None and not self.backend.alive:
+            raise InvalidInput(
+                f"linear solver {self.backend.name}: its threads have not survived the fork of "
+                "this process; use Direct(), or start processes by spawn"
+            )
         chosen = [self.backend] if self.backend else [b for b in Backend if b.installed]
+        chosen = [b for b in chosen if b.alive]
         reasons = []
         for backend in chosen:
             try:
-                solve = _FACTORISE[backend](matrix, self.threads)
+                made = _FACTORISE[backend](matrix, self.threads)
+                solve = _Made(matrix, backend, self.threads, made)
                 return DirectFactor(checked(matrix, solve), backend)
             except (ArithmeticError, RuntimeError, MemoryError, ValueError) as error:
                 reasons.append(f"{backend.value}: {error}")
         raise SingularOperator(
             "matrix: no backend could factorise it (" + "; ".join(reasons) + ")"
         )
+
+
+@dataclass(frozen=True, eq=False)
+class _Made:
+    """Solves with a factor as a package has made it; it stays in the process that made it.
+
+    A copy, and a forked process where the package is not alive, make one of their own.
+    """
+
+    matrix: sparse.csc_array
+    backend: Backend
+    threads: int
+    solve: Solve | None
+
+    def __call__(self, b: Array) -> Array:
+        """The solution x, shape of b."""
+        if self.solve is None or not self.backend.alive:
+            return self._again(b)
+        return self.solve(b)
+
+    @cached_property
+    def _again(self) -> Solve:
+        return Direct(threads=self.threads).factor(self.matrix).apply
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.matrix, self.backend, self.threads, None)
 
 
 @dataclass(frozen=True)
@@ -113,7 +170,7 @@ def checked(matrix: sparse.csc_array, solve: Solve) -> Solve:
     scale = max((np.abs(matrix) @ np.abs(x)).max(initial=0.0), np.finfo(float).tiny)
     found = solve(b)
     if np.isfinite(found).all() and np.abs(matrix @ found - b).max() > REFINE_ABOVE * scale:
-        solve = _refined(matrix, solve)
+        solve = _Refined(matrix, solve)
         found = solve(b)
     residual = np.abs(matrix @ found - b).max() / scale
     if not np.isfinite(found).all() or residual > RESIDUAL_LIMIT:
@@ -124,14 +181,17 @@ def checked(matrix: sparse.csc_array, solve: Solve) -> Solve:
     return solve
 
 
-def _refined(matrix: sparse.csc_array, solve: Solve) -> Solve:
+@dataclass(frozen=True, eq=False)
+class _Refined:
     """`solve` with one step of iterative refinement."""
 
-    def refined(b: Array) -> Array:
-        x = solve(b)
-        return x + solve(b - matrix @ x)
+    matrix: sparse.csc_array
+    solve: Solve
 
-    return refined
+    def __call__(self, b: Array) -> Array:
+        """The solution x, shape of b."""
+        x = self.solve(b)
+        return x + self.solve(b - self.matrix @ x)
 
 
 def _symmetric(matrix: sparse.csc_array) -> bool:

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..checked_arrays import locked
-from ..errors import InvalidInput
+from ..checked_arrays import compressed, locked
+from ..errors import InvalidInput, shown
 
 Levels = tuple[sparse.csr_array, ...]
 Mask = NDArray[np.bool_]
@@ -18,6 +18,8 @@ ONE = 1e-12  # distance from 1 of the entry of a fine node that is a coarse node
 
 def checked_levels(levels: Sequence[sparse.csr_array], size: int) -> Levels:
     """Read-only CSR matrices that fit together, the first with `size` rows."""
+    if not isinstance(levels, Sequence) or isinstance(levels, str):
+        raise InvalidInput(f"levels: expected sparse matrices, got {shown(levels)}")
     out = []
     for k, level in enumerate(levels):
         if not sparse.issparse(level) or level.ndim != 2 or level.shape[0] != size:
@@ -25,14 +27,25 @@ def checked_levels(levels: Sequence[sparse.csr_array], size: int) -> Levels:
             raise InvalidInput(
                 f"levels[{k}]: expected a sparse matrix with {size} rows, got {found}"
             )
+        level = compressed(f"levels[{k}]", level)
+        if not _is_locked(level):
+            level = locked(sparse.csr_array(level, dtype=float, copy=True))
         if level.shape[1] > size or not np.isfinite(level.data).all():
             raise InvalidInput(
                 f"levels[{k}]: expected finite entries and at most {size} columns, got shape "
                 f"{level.shape}"
             )
-        out.append(locked(sparse.csr_array(level)))
+        out.append(level)
         size = level.shape[1]
     return tuple(out)
+
+
+def _is_locked(level: sparse.csr_array) -> bool:
+    """True for what nobody can change, so that it may be shared."""
+    if not isinstance(level, sparse.csr_array) or level.dtype != float:
+        return False
+    arrays = (level.data, level.indices, level.indptr)
+    return not any(array.flags.writeable for array in arrays)
 
 
 def free_levels(

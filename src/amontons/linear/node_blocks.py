@@ -10,9 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, uint64
+from numba import uint64
 from numpy.typing import NDArray
 from scipy import sparse
+
+from ..compiled import njit
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, uint64
+from numba import uint64
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..compiled import njit
 from .node_blocks import NodeBlocks, with_diagonal
 
 Array = NDArray[np.float64]

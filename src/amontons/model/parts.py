@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contact import Nitsche, Obstacle
-from ..errors import InvalidInput
+from ..errors import InvalidInput, shown
 from ..fem.elasticity import LinearElastic, materials_by_region
 from ..fem.hyperelasticity import CiarletGeymonat, NeoHookean
 from ..fem.mesh import Mesh
@@ -128,6 +128,8 @@ class Contact:
             raise InvalidInput(
                 f"contact on {self.slave!r}: expected either an obstacle or a master surface"
             )
+        if not isinstance(self.method, Nitsche | str | None):
+            raise InvalidInput(f"method: expected a text, got {shown(self.method)}")
         if self.method is None:
             object.__setattr__(self, "method", "nodal" if self.master is None else "mortar")
         check_scalar(getattr(self, self.friction), f"{self.friction} on {self.slave!r}")
@@ -138,6 +140,11 @@ class Contact:
         if not isinstance(self.method, Nitsche) and self.method not in METHODS:
             raise InvalidInput(
                 f"method: expected one of {', '.join(METHODS)}, got {self.method!r}"
+            )
+        if self.where is not None and not callable(self.where):
+            raise InvalidInput(
+                f"where: expected a function of points (n, dim) that returns (n,) of bool, got "
+                f"{shown(self.where)}"
             )
         if self.master is None and (isinstance(self.obstacle, type) or not (
             hasattr(self.obstacle, "gap") and hasattr(self.obstacle, "normals")

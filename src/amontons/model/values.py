@@ -7,7 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InvalidInput
+from ..checked_arrays import LARGEST, number, real
+from ..errors import InvalidInput, shown
 from .timing import steady_value
 
 Array = NDArray[np.float64]
@@ -71,7 +72,7 @@ def scalar_at(
     if callable(value):
         # never as many rows as columns: x[0] instead of x[:, 0] must not pass by chance
         padded = np.tile(points, (4, 1))
-        found = np.asarray(value(padded), dtype=float)
+        found = real(what, value(padded))
         if found.ndim == 1 and len(found) == len(padded):
             found = found[:n]
         elif found.ndim:
@@ -81,10 +82,7 @@ def scalar_at(
                 "x[:, 0] is the first coordinate"
             )
     else:
-        try:
-            found = np.asarray(value, dtype=float)
-        except (TypeError, ValueError) as error:
-            raise InvalidInput(f"{what}: expected numbers, got {value!r}") from error
+        found = real(what, value)
     if found.shape not in ((), (n,)):
         raise InvalidInput(
             f"{what}: expected a number or one per {each}, ({n},), got {found.shape}"
@@ -108,8 +106,10 @@ def is_number(value: object) -> bool:
 def _entries(value: object, dim: int, what: str) -> list:
     if is_number(value):
         return [value] * dim
-    if isinstance(value, str) or not hasattr(value, "__len__"):
-        raise InvalidInput(f"{what}: expected {dim} components or a function, got {value!r}")
+    if not isinstance(value, Sequence | np.ndarray) or isinstance(value, str | bytes):
+        raise InvalidInput(
+            f"{what}: expected {dim} components or a function, got {shown(value)}"
+        )
     entries = list(value)  # type: ignore[call-overload]
     if len(entries) != dim:
         raise InvalidInput(f"{what}: expected {dim} components, got {len(entries)}")
@@ -131,10 +131,8 @@ def _number(entry: object, what: str, free: bool) -> float:
         raise InvalidInput(
             f"{what}: expected numbers, got None (only supports leave components free)"
         )
-    try:
-        number = float(entry)  # type: ignore[arg-type]
-    except (TypeError, ValueError) as error:
-        raise InvalidInput(f"{what}: expected a number, got {entry!r}") from error
-    if not np.isfinite(number):
-        raise InvalidInput(f"{what}: expected a finite number, got {number}")
-    return number
+    if type(entry) is not float:  # what most functions return: no need to look closer
+        return number(what, entry)
+    if not abs(entry) <= LARGEST:
+        raise InvalidInput(f"{what}: expected a finite number, got {entry}")
+    return entry

@@ -12,10 +12,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from ..blocks import BlockRows
+from ..compiled import njit
 from ..problem import FrictionProblem
 
 Index = NDArray[np.int32]

@@ -29,9 +29,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numba import njit, uint64
+from numba import uint64
 from numpy.typing import NDArray
 
+from ..compiled import njit
 from ..judge import contact_residual
 from ..linear.grid import GridBlocks
 from ..linear.hierarchy import Nodes

@@ -41,9 +41,9 @@ from enum import Enum
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ..compiled import njit
 from ..cones import Coulomb, Law, Tresca, with_de_saxce
 from ..problem import Form, FrictionProblem
 from .base import Iterate, Target, check_at_least, check_positive

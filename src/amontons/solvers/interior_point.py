@@ -32,11 +32,11 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from ..blocks import velocity_inplace
 from ..clock import NEVER, Deadline
+from ..compiled import njit
 from ..judge import natural_error
 from ..problem import Form, FrictionProblem
 from .base import Iterate, Target, check_at_least, check_positive

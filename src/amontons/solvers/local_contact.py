@@ -16,8 +16,8 @@ import math
 from enum import IntEnum
 
 import numpy as np
-from numba import njit
 
+from ..compiled import njit
 from ..one_contact import solve_contact
 
 STEPS = 20  # Newton steps before the exact solution takes over

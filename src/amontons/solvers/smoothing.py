@@ -30,11 +30,11 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from ..blocks import spatial
 from ..clock import NEVER, Deadline
+from ..compiled import njit
 from ..cones import Tresca
 from ..errors import InvalidInput, UnsupportedForm
 from ..judge import PENETRATION, contact_residual, natural_error

@@ -24,9 +24,10 @@ from enum import Enum
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, uint64
+from numba import uint64
 from numpy.typing import NDArray
 
+from ..compiled import njit
 from ..judge import natural_error
 from ..one_contact import solve_contact, solve_eliminated
 from ..problem import FrictionProblem

@@ -14,9 +14,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, uint64
+from numba import uint64
 from numpy.typing import NDArray
 
+from ..compiled import njit
 from ..linear.grid import GridBlocks
 from ..linear.hierarchy import Hierarchy, inverse_at_rest
 from ..linear.node_blocks import NodeBlocks, block_inverse

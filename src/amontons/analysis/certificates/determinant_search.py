@@ -18,7 +18,8 @@ rounding errors: a pivot is positive, negative, or not known.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from ...compiled import njit
 
 FREE, SLIP_PLUS, SLIP_MINUS, STICK, TANGENT = range(5)
 POSITIVE, NEGATIVE, UNKNOWN, STOPPED = 1, -1, 0, 2

@@ -7,10 +7,10 @@ all A_i where sets share few unknowns.  Extras are eliminated in their own set.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy import linalg, sparse
 
+from ...compiled import njit
 from .multiplier_program import Blocks, Program
 
 Array = NDArray[np.float64]

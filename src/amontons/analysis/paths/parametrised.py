@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...checked_arrays import real
 from ...errors import InvalidInput, NotConverged, SingularOperator
 from ...evolution.system import Motion
 from ...problem import Form, FrictionProblem
@@ -54,6 +55,7 @@ def path_of(
     if base is not None:
         return _between(_discrete(base), _discrete(problem))
     if isinstance(problem, FrictionProblem):
+        _discrete(problem)
         nothing = problem.f if problem.form is Form.GLOBAL else problem.q
         assert nothing is not None
         return _between(problem.with_load(np.zeros_like(nothing)), problem)
@@ -85,7 +87,11 @@ def _between(start: FrictionProblem, end: FrictionProblem) -> FrictionPath:
 
 
 def _discrete(problem: Model | FrictionProblem) -> FrictionProblem:
-    return problem if isinstance(problem, FrictionProblem) else problem.assemble()
+    """The problem, or that of a model; raises InvalidInput where it has no contacts."""
+    discrete = problem if isinstance(problem, FrictionProblem) else problem.assemble()
+    if not discrete.contacts:
+        raise InvalidInput("problem: expected contacts, got none: there is nothing to follow")
+    return discrete
 
 
 def state_of(path: PathProblem, start: object) -> Array:
@@ -93,10 +99,7 @@ def state_of(path: PathProblem, start: object) -> Array:
     if isinstance(path, LoadPath):
         start = getattr(start, "v", start)
     r = getattr(start, "r", start)
-    try:
-        values = np.asarray(r, dtype=float)
-    except (TypeError, ValueError) as reason:
-        raise InvalidInput(f"start: expected a solution or an array, got {start!r}") from reason
+    values = real("start", r)
     if not isinstance(path, FrictionPath):
         return values.ravel()
     wanted = (path.start.contacts, path.start.dimension)

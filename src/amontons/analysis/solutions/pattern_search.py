@@ -15,7 +15,8 @@ room for rounding.  What has no such proof is branched on; patterns that remain 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from ...compiled import njit
 
 FREE, POSITIVE, NEGATIVE, FIXED = 0, 1, 2, 3  # bounds of a variable, closed
 OPEN_OR_CLOSED, CLOSED, OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS = range(7)
