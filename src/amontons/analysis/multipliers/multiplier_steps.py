@@ -21,7 +21,10 @@ ROOM = 0.95  # part of the way to the boundary that a step takes at most
 
 # --------------------------------------------------------------------- the beginning
 def start(program: Program) -> Point:
-    """W = -I with extras so small that all slacks are positive definite, X = lam I + D."""
+    """W = -I with extras so small that all slacks are positive definite, X = lam I + D.
+
+    Raises LinAlgError where there are none, friction being too large for rounding.
+    """
     identity = [-np.tile(_identity(f.size), _unknown_sets(f)) for f in program.families]
     x = np.concatenate([*identity, np.zeros(program.unknowns - program.entries)])
     for f, own, part in zip(
@@ -60,7 +63,7 @@ def _small_extras(family: Family, sets: Array) -> Array:
         if not bad.any():
             return sets[:, family.entries :] * 0.5
         size[bad] /= 4
-    raise ValueError("feasible: with W = -I and small extras not all slacks are positive")
+    raise np.linalg.LinAlgError("with W = -I and small extras not all slacks are positive")
 
 
 # --------------------------------------------------------------------------- one step

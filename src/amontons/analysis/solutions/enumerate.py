@@ -191,7 +191,8 @@ def _doubt(
     """What speaks against a list that has everything that the search left."""
     for solution in solutions:
         share, terms = load_shares(piece.problem, solution.r)
-        if ((share < RESOLVED) & (share > DATA * terms)).any():
+        little, rests = share < RESOLVED, share <= DATA * terms
+        if (little & ~(rests & (solution.sole or solution.freedom > 0))).any():
             return UNRESOLVED
     penetrates = bool((piece.c[0::2][~piece.reacts] < 0).any())
     known = [value for value in degrees if value is not None]
