@@ -38,13 +38,15 @@ def run(
     place = check_folder(f"{opened.name}-results" if folder is None else folder)
     target = opened.target if mu is None else opened.target.with_mu(mu)
     name = ALIASES.get(parameter, parameter)
+    at: Sequence[float] = ()
     limits: dict[str, Any] = {"max_points": max_points, "time_limit": time_limit}
     if every:
         found = api.diagram(target, name, (low, high), **limits)
         branches, complete, reason = list(found), found.complete, found.reason
+        at = found.at
     else:
         branches, complete, reason = [api.follow(target, name, (low, high), **limits)], None, ""
-    text = to_json(record(branches, parameter, (low, high), complete, reason))
+    text = to_json(record(branches, parameter, (low, high), complete, reason, at))
     _write(place, text, branches, opened.title)
     if json_copy is not None:
         deliver_json(text, json_copy)
@@ -56,9 +58,13 @@ def run(
 
 def record(
     branches: Sequence[Branch], parameter: str, interval: tuple[float, float],
-    complete: bool | None, reason: str,
+    complete: bool | None, reason: str, at: Sequence[float] = (),
 ) -> dict[str, Any]:  # fmt: skip
-    """What follow.json holds; points and events name their branch."""
+    """What follow.json holds; points and events name their branch.
+
+    complete: all solutions at the values `at` are on these branches, which says nothing of the
+    values between them.
+    """
     parts = [branch.record() for branch in branches]
 
     def rows(key: str) -> list[dict[str, Any]]:
@@ -68,7 +74,7 @@ def record(
         "schema": SCHEMA, "parameter": parameter, "interval": list(interval),
         "points": rows("points"), "events": rows("events"),
         "branches": [{"stops": part["stops"], "closed": part["closed"]} for part in parts],
-        "complete": complete, "reason": reason, "versions": versions(),
+        "complete": complete, "at": list(at), "reason": reason, "versions": versions(),
     }  # fmt: skip
 
 

@@ -131,7 +131,7 @@ def assess(
     verdict = _every_load(local, deadline.share(BOUNDS))
     if verdict.verdict is Verdict.UNDECIDED:
         verdict = _this_load(local, solution, verdict, deadline)
-    return replace(verdict, seconds=now() - began)
+    return _finished(verdict, began)
 
 
 def quick_verdict(problem: FrictionProblem) -> Uniqueness | None:
@@ -156,7 +156,14 @@ def quick_verdict(problem: FrictionProblem) -> Uniqueness | None:
     verdict = _by_energy(local, deadline)
     if verdict.verdict is Verdict.UNDECIDED and _is_small(local):
         verdict = _by_bounds(verdict, critical_friction(local, time_limit=deadline))
-    return replace(verdict, seconds=now() - began)
+    return _finished(verdict, began)
+
+
+def _finished(verdict: Uniqueness, began: float) -> Uniqueness:
+    """With the time it took; what is proved for every load leaves no other solution at all."""
+    every = verdict.verdict is Verdict.UNIQUE_EVERY_LOAD
+    resolution = 0.0 if every else verdict.resolution
+    return replace(verdict, resolution=resolution, seconds=now() - began)
 
 
 def _is_small(local: FrictionProblem) -> bool:
@@ -332,9 +339,16 @@ def _several(
     alike = alike and all(entry.still for entry in sets)
     if alike and all(same_motion(local, entry.r - s[0].r) for entry in s[1:]):
         reason += SAME_MOTION
-    other = sets[0] if sets else far
+    return _two(verdict, sets[0] if sets else far, reason, found.resolution)
+
+
+def _two(
+    verdict: Uniqueness, other: PieceSolution, reason: str, resolution: float
+) -> Uniqueness:
+    """NOT_UNIQUE, saying how well solutions are known."""
+    reason += f" Each is known to {resolution:.1e} of the largest reaction."
     return replace(verdict, verdict=Verdict.NOT_UNIQUE, other=other, reason=reason,
-                   resolution=found.resolution)  # fmt: skip
+                   resolution=resolution)  # fmt: skip
 
 
 def _alone(verdict: Uniqueness, reason: str, resolution: float) -> Uniqueness:
@@ -368,8 +382,7 @@ def _refuted(
         return replace(verdict, reason=f"{reason} Rounding decides whether it is one.")
     if same_motion(local, other.r - found.r0):
         reason += SAME_MOTION
-    return replace(verdict, verdict=Verdict.NOT_UNIQUE, other=other, reason=reason,
-                   resolution=KNOWN)  # fmt: skip
+    return _two(verdict, other, reason, KNOWN)
 
 
 # ----------------------------------------------------------------------- helpers

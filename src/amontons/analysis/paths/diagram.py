@@ -27,8 +27,9 @@ NEAR = 1e-7  # scaled distance of a solution to a branch that goes through it
 class Diagram:
     """Branches of one problem, each line of the diagram in one of them only.
 
-    complete: all solutions at every value in `at` were found, with proof, and lie on a branch;
-    branches that pass none of these values are not seen.  lost: solutions, as (parameter,
+    complete: all solutions at every value in `at` were found, with proof, and lie on a branch.
+    That is proved of these values, not of the interval: a closed branch, or one that turns back
+    at both ends, that passes none of them is not seen.  lost: solutions, as (parameter,
     state), through which no branch could be followed; sets: points of connected sets of
     solutions at one parameter, which are no curves over it.
     """
@@ -129,7 +130,10 @@ def bifurcation_diagram(
     if sets:
         doubts.append(f"{len(sets)} sets of solutions are no curves")
     values = ", ".join(f"{p:g}" for p in at)
-    reason = "; ".join(doubts) or f"all solutions at {values} are on these branches"
+    reason = "; ".join(doubts) or (
+        f"all solutions at {values} are on these branches; nothing is proved between these "
+        "values, where a closed branch would not be seen"
+    )
     return Diagram(tuple(branches), tuple(at), not doubts, reason, tuple(lost), tuple(sets),
                    now() - began)  # fmt: skip
 
