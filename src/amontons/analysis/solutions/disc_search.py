@@ -21,6 +21,7 @@ from ...errors import TimeUp
 from ...problem import FrictionProblem
 from ..multipliers.scales import RESOLVED, UNRESOLVED, resolves
 from .disc_multipliers import EXACT, BoxProblem, BoxProof, contains
+from .disc_proof import DiscProof, box_of
 from .disc_sets import ON, Law, Region
 from .enumerate import Solutions, missing
 from .existence import exist
@@ -38,36 +39,6 @@ LARGEST = 300  # contacts up to which regions have multipliers: memory
 LOOK = 50.0  # operations of looking at a region per cube of the reactions, at least
 VAGUE = 1e-9  # relative error of a solution that can not be a reference
 STARTS = 300  # of Newton's method before the search
-
-
-@dataclass(frozen=True, eq=False)
-class DiscBox:
-    """A region in which there is no solution but r, (nc, 3), or none at all where r is None.
-
-    r may also be a point where the equations of a pattern hold but a sign of the law does not.
-
-    letters: what every contact may do, . anything, c closed, f free, s stick, l slip with
-    u_T / |u_T| at an angle within arcs[:, 1] of arcs[:, 0], rad.  V (nc, 6, 6), in the units of
-    the problem: with d = (r', u') - (r, u) of any solution r' in the region d V d <= 0 for
-    every contact, and the sum is positive for all d_u = W d_r; without r it is (nc, 7, 7), and
-    d = (r', u', 1).
-    """
-
-    letters: str
-    arcs: Array
-    r: Array | None
-    V: Array
-
-
-@dataclass(frozen=True, eq=False)
-class DiscProof:
-    """Regions that together are everything; anyone can check it with W, q and mu.
-
-    linear: patterns of free and sticking contacts, each a linear system of its own.
-    """
-
-    boxes: tuple[DiscBox, ...]
-    linear: tuple[str, ...]
 
 
 def enumerate_discs(
@@ -187,19 +158,9 @@ class DiscSearch:
     def proof(self) -> DiscProof:
         """What closed the regions, in the units of the problem."""
         return DiscProof(
-            tuple(self._box(proof) for proof in self.proofs),
+            tuple(box_of(self.stack, proof) for proof in self.proofs),
             tuple("".join(region.letter for region in regions) for regions in self.linear),
         )
-
-    def _box(self, proof: BoxProof) -> DiscBox:
-        stack, nc = self.stack, len(proof.regions)
-        unit = np.repeat(np.hstack([stack.to_r, stack.to_u]), 3, axis=1)
-        if proof.r is None:
-            unit = np.hstack([unit, np.ones((nc, 1))])
-        V = proof.V / unit[:, :, None] / unit[:, None, :]
-        arcs = np.array([(region.middle, region.half) for region in proof.regions])
-        letters = "".join(region.letter for region in proof.regions)
-        return DiscBox(letters, arcs, None if proof.r is None else proof.r * stack.to_r, V)
 
     def run(self, most_solutions: int | None = None) -> None:
         """Divide until all regions are closed, the clock runs out, or enough are found."""

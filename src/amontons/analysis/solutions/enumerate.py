@@ -29,7 +29,7 @@ from .piece_solution import DATA, Existence, PieceAnswer, examined
 from .scaled_problem import REACH, SLACK, ScaledProblem, States
 
 if TYPE_CHECKING:
-    from .disc_search import DiscProof
+    from .disc_proof import DiscProof
 
 Array = NDArray[np.float64]
 LETTERS = {search.OPEN_OR_CLOSED: ".", search.CLOSED: "c", search.OPEN: "f",
