@@ -114,7 +114,7 @@ class Deadline:
     def pay(self, operations: float) -> None:
         """Spend what nothing can interrupt; raises TimeUp before where that takes too long."""
         if not self.affords(operations):
-            raise TimeUp(f"the next step takes longer than is left of {self}")
+            raise TimeUp(f"stopped after {self}: the next step takes longer than is left")
         self.spend(operations)
 
     def check(self) -> None:

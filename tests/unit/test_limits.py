@@ -174,7 +174,7 @@ def test_counted_work():
     part.spend(1.5 * clock.RATE)
     assert part.passed and not deadline.passed
     assert deadline.left == 0.5 and not deadline.affords(0.6 * clock.RATE)
-    with pytest.raises(am.TimeUp, match="longer than is left of the work of 2 s"):
+    with pytest.raises(am.TimeUp, match="after the work of 2 s: the next step takes longer"):
         deadline.pay(0.6 * clock.RATE)
     with pytest.raises(am.TimeUp, match="stopped after the work of 2 s"):
         part.check()

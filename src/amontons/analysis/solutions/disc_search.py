@@ -66,7 +66,8 @@ def enumerate_discs(
     search = DiscSearch(stack, finder, deadline)
     search.begin()
     search.run()
-    entries = [replace(entry, distance=search.resolution, at_least=int(exist(local, [entry.r])),
+    entries = [replace(entry, distance=search.resolution,
+                       at_least=int(exist(local, [entry.r], deadline)),
                        sole=search.complete and not (entry.freedom or entry.touching))
                for entry in finder.solutions()]  # fmt: skip
     return Solutions(

@@ -17,6 +17,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ...clock import NEVER, Deadline
 from ...problem import FrictionProblem
 from . import pattern_search as search
 from .multistart import certain_error, described, statuses
@@ -30,14 +31,22 @@ WORDS = 8  # patterns of one solution that are tried
 NEAR = 1e-6  # scaled distance of a solution from the reactions that it belongs to
 SAFE = 0.1  # of beta K eta
 ROUNDING = 1e-14  # of equations, scaled
+WORK = 10.0  # operations of a proof per cube of the reactions
+LITTLE = 5e8  # operations that are always done: some ten milliseconds
 EXACT = 1e-12  # error of solutions that fill a segment
 
 
-def exist(local: FrictionProblem, reactions: Sequence[Array]) -> bool:
+def exist(
+    local: FrictionProblem, reactions: Sequence[Array], deadline: Deadline = NEVER
+) -> bool:
     """True where each of some reactions (nc, d) surely belongs to a solution nearby.
 
-    Also where they all are solutions within rounding, and everything between them.
+    Also where they all are solutions within rounding, and everything between them.  False too
+    where a proof would take longer than there is time; small ones are always looked at.
     """
+    if takes_too_long(local, len(reactions), deadline):
+        return False
+    deadline.spend(_work(local, len(reactions)))
     stack = Stack.of(local)
     pairs = [(reactions[0], r) for r in reactions[1:]]
     if pairs and all(_on_segment(stack, *pair) for pair in pairs):
@@ -46,6 +55,16 @@ def exist(local: FrictionProblem, reactions: Sequence[Array]) -> bool:
         return all(_newton_converges(stack, r / stack.to_r) for r in reactions)
     scaled = ScaledProblem(local)
     return all(_on_its_piece(stack, scaled, r / stack.to_r) for r in reactions)
+
+
+def takes_too_long(local: FrictionProblem, count: int, deadline: Deadline) -> bool:
+    """True where there is no time to prove that so many reactions belong to solutions."""
+    work = _work(local, count)
+    return work > LITTLE and not deadline.affords(work)
+
+
+def _work(local: FrictionProblem, count: int) -> float:
+    return WORK * count * float(local.unknowns) ** 3
 
 
 def _on_segment(stack: Stack, r: Array, other: Array) -> bool:
