@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from . import judge
+from .clock import NEVER, Deadline
 from .cones import Law, augmented_reaction, augmented_reaction_jacobian
 from .errors import SingularOperator, UnsupportedForm
 from .judge import Measure, Weakest
@@ -154,7 +155,7 @@ class NitscheProblem:
         """Itself: M is always stored."""
         return self
 
-    def condensed(self) -> NitscheProblem:
+    def condensed(self, deadline: Deadline = NEVER) -> NitscheProblem:
         """Raises UnsupportedForm: there are no multipliers to condense to."""
         raise UnsupportedForm(NO_MULTIPLIERS)
 

@@ -167,3 +167,25 @@ def test_the_command_line_says_it_too(tmp_path, monkeypatch, verb):
     assert done.exit_code in (1, 2), done.output
     said = " ".join((done.output + done.stderr).split())
     assert "'bracket' gives way by translation along x" in said
+
+
+def test_pictures_of_a_run_that_failed_say_so(tmp_path, monkeypatch):
+    """The first step holds, the second does not."""
+    from amontons.plots import energies, steps
+
+    stamped = []
+    monkeypatch.setattr(steps, "stamp", lambda figure, text: stamped.append(text))
+    monkeypatch.setattr(energies, "stamp", lambda figure, text: stamped.append(text))
+    monkeypatch.chdir(tmp_path)
+    write_gmsh(parts(2), tmp_path / "parts.msh")
+    case = tmp_path / "case.toml"
+    pushed = CASE.replace("value = [0.5, -1.0]", 'value = ["0.4*t", -1.0]')
+    case.write_text(pushed + IN_TIME)
+    done = CliRunner().invoke(main, ["run", str(case), "--pictures"])
+    assert done.exit_code == 1, done.output
+    assert stamped == ["NOT FINISHED (t = 0.5 of 1, the next step did not converge)"] * 2
+    stamped.clear()
+    case.write_text(pushed.replace("0.4*t", "0.1*t") + IN_TIME)
+    done = CliRunner().invoke(main, ["run", str(case), "--pictures", "-o", "good"])
+    assert done.exit_code == 0, done.output
+    assert not any(stamped)

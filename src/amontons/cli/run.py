@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -44,6 +44,16 @@ class _Run:
     stop: Stopping
     frames: list[Frame] = field(default_factory=list)
     doubts: Doubts = field(default_factory=Doubts)
+    failed: bool = False  # the step after the last one did not converge
+
+    def unfinished(self, time: float) -> str:
+        """What its pictures are stamped with where the last step at `time` is not the end."""
+        assert self.case.evolution is not None
+        if self.ended(time):
+            return ""
+        until = f"t = {time:.6g} of {self.case.evolution.until:g}"
+        why = ", the next step did not converge" if self.failed else ""
+        return f"NOT FINISHED ({until}{why})"
 
     def ended(self, time: float) -> bool:
         """True for the time of the last step."""
@@ -175,6 +185,7 @@ def _failed(failure: NotConverged, results: RunFolder, asked: _Run) -> int:
         return _stopped(asked, time)
     sys.stdout.flush()
     click.echo(f"Not converged: {failure}", err=True)
+    asked.failed = True
     return 1
 
 
@@ -208,10 +219,13 @@ def _draw(results: RunFolder, asked: _Run) -> None:
     """Pictures and film of the steps of this call, energies of all steps so far."""
     from ..plots import draw_film, energy_figure, save_figure
 
-    draw_film(asked.case.model, asked.frames, results.folder / PICTURES)
     table = results.table
+    times = table["time"].tolist()
+    note = asked.unfinished(times[-1])
+    frames = [*asked.frames[:-1], replace(asked.frames[-1], stamp=note)]
+    draw_film(asked.case.model, frames, results.folder / PICTURES)
     works = [Energies(*row) for row in table[list(WORKS)].tolist()]
-    save_figure(energy_figure(table["time"].tolist(), works), results.folder / BALANCE)
+    save_figure(energy_figure(times, works, note=note), results.folder / BALANCE)
 
 
 def _show(step: TimeStep, asked: _Run) -> None:
