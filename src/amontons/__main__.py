@@ -1,6 +1,20 @@
-"""`python -m amontons` is the command line."""
+"""`amontons` and `python -m amontons` are the command line."""
 
-from .cli import main
+import sys
+
+from .interrupts import watch
+
+
+def run() -> None:
+    """The command line; Ctrl-C is watched before the first large import."""
+    try:
+        watch()
+        from .cli import main
+
+        main()
+    except KeyboardInterrupt:
+        sys.exit(130)
+
 
 if __name__ == "__main__":
-    main()
+    run()

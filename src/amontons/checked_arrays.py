@@ -250,9 +250,9 @@ def locked(matrix):
     return matrix
 
 
-def squarable(name: str, array: Array) -> Array:
-    """The same array, locked, of finite numbers whose squares are numbers."""
-    _squarable(name, _finite(name, array))
+def squarable(name: str, array: Array, largest: float = LARGEST) -> Array:
+    """The same array, locked, of finite numbers whose squares are numbers, or as `largest`."""
+    _squarable(name, _finite(name, array), largest)
     return array
 
 
@@ -267,11 +267,11 @@ def _finite(name: str, array: Array) -> Array:
     return array
 
 
-def _squarable(name: str, values: Array) -> None:
+def _squarable(name: str, values: Array, largest: float = LARGEST) -> None:
     """Refuse what is so large or small in all entries that its square is no number any more."""
     size = float(np.abs(values).max(initial=0.0))
-    if size > LARGEST or 0 < size < 1 / LARGEST:
+    if size > largest or 0 < size < 1 / largest:
         raise InvalidInput(
             f"{name}: its largest entry is {size:.1e}, which can not be squared; use units in "
-            f"which it lies between {1 / LARGEST:g} and {LARGEST:g}"
+            f"which it lies between {1 / largest:g} and {largest:g}"
         )

@@ -19,6 +19,7 @@ from .clock import Deadline, TimeLimit, compiling, deadline_of, now
 from .cones import Coulomb
 from .errors import InvalidInput, SingularOperator, TimeUp, UnsupportedForm, shown
 from .indefinite import gains_energy, with_obstruction
+from .interrupts import Watching
 from .judge import EPSILON, Measure, Weakest
 from .nitsche_problem import NO_MULTIPLIERS, NitscheProblem
 from .problem import Form, FrictionProblem
@@ -201,14 +202,11 @@ def drive(
         problem = problem.assembled()
     allowed = tolerance**0.5 if contact_tolerance is None else contact_tolerance
     watch = _Watch(problem, tolerance, allowed)
-    outcome, detail = _run(
-        watch,
-        solver,
-        _start(problem, start),
-        Target(tolerance, deadline),
-        max_iterations if max_iterations is not None else np.inf,
-        callback,
-    )
+    begin, limit = _start(problem, start), max_iterations or np.inf
+    with Watching():
+        outcome, detail = _run(
+            watch, solver, begin, Target(tolerance, deadline), limit, callback
+        )
     return _finish(watch, outcome, detail, solver)
 
 

@@ -251,3 +251,23 @@ def test_bad_meshes_are_refused_in_words(name):
     make, message = BAD_MESHES[name]
     with pytest.raises(am.InvalidInput, match=message):
         make()
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("power", [-300, -150, -120, -99, -60, -12, 12, 60, 99, 120, 150, 300])
+def test_lengths_of_any_unit_are_solved_or_refused(dim, power):
+    size = 10.0**power
+    try:
+        body = am.Body(am.box([size] * dim, 2), am.LinearElastic(100.0, 0.3))
+        normal = [0] * (dim - 1) + [1]
+        model = am.Model(
+            [body], [am.Fix("top", [0.0] * (dim - 1) + [-0.01 * size])],
+            [am.Contact("bottom", am.Plane(normal), mu=0.3)],
+        )  # fmt: skip
+        found = am.solve(model)
+    except am.AmontonsError:
+        solved = False
+    else:
+        solved = bool(np.isfinite(found.pressure).all() and found.pressure.max() > 0)
+    assert solved or abs(power) > 20
+    assert not solved or abs(power) < 100

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..checked_arrays import LARGEST
-from ..errors import FileFormatError
+from ..errors import FileFormatError, shown
 from ..files import check_is_regular
 from .tables import Blame, Table
 
@@ -37,9 +38,9 @@ def read_mesh_table(table: Table, path: Path) -> Mesh:
     counts = cells if isinstance(cells, list) else [cells] * len(size)
     if len(counts) != len(size) or not all(type(c) is int and c >= 1 for c in counts):
         raise table.error("cells", f"expected a whole number >= 1, or {len(size)} of them, "
-                          f"got {cells!r}")  # fmt: skip
+                          f"got {shown(cells)}")  # fmt: skip
     if math.prod(c + 1 for c in counts) > MAX_NODES:
-        raise table.error("cells", f"expected at most {MAX_NODES} nodes, got {cells!r}; "
+        raise table.error("cells", f"expected at most {MAX_NODES} nodes, got {shown(cells)}; "
                           "build larger models in Python")  # fmt: skip
     with Blame(table, ""):
         return box(size, counts, table.text("kind") if "kind" in table.data else None)
@@ -67,7 +68,7 @@ def _read_file(table: Table, path: Path) -> Mesh:
         check_is_regular(name)
     except FileFormatError as reason:
         raise table.error("file", str(reason)) from None
-    if not name.is_file():
+    if not os.path.isfile(name):  # also for names that no file can have
         raise table.error("file", f"no such file: {name}")
     if not is_cad(name):
         if "size" in table.data:

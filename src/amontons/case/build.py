@@ -16,7 +16,7 @@ from ..files import check_is_regular
 from .bodies import read_material, read_materials, read_mesh_table
 from .contacts import read_contact, refuse_repeated
 from .evolution import Evolution, read_evolution, read_wall
-from .overrides import apply_overrides
+from .overrides import apply_overrides, check_depth
 from .settings import LIMITS, Settings, make_solver, method_class
 from .tables import Blame, Table
 from .values import on_named, on_surface, vector
@@ -55,7 +55,9 @@ def read_case(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Ca
     text = os.fspath(path)
     is_example = text.startswith(EXAMPLE)
     path = example_file(text.removeprefix(EXAMPLE)) if is_example else Path(path)
-    top = Table(str(path), "", apply_overrides(_load(path), overrides, str(path)))
+    data = _load(path)
+    check_depth(data, str(path))
+    top = Table(str(path), "", apply_overrides(data, overrides, str(path)))
     top.only(*TOP)
     title = top.text("title", path.stem if path.stem != "case" else path.parent.name)
     model = _wall_model(top, title) if "wall" in top.data else _model(top, path, title)

@@ -8,7 +8,10 @@ import tomllib
 from collections.abc import Sequence
 from typing import Any
 
-from ..errors import InvalidInput
+from ..errors import FileFormatError, InvalidInput
+
+DEEPEST = 50  # tables in tables: further down Python itself gives up
+DIGITS = 9  # of an index
 
 
 def split_override(text: str) -> tuple[list[str], Any]:
@@ -20,6 +23,8 @@ def split_override(text: str) -> tuple[list[str], Any]:
     path = [part.strip() for part in re.sub(r"\[(\d+)\]", r".\1", key).split(".")]
     if not sign or not all(path):
         raise InvalidInput(f"--set {text}: expected key=value, such as mesh.cells=32")
+    if len(path) > DEEPEST:
+        raise InvalidInput(f"--set {text}: expected at most {DEEPEST} parts of a key")
     return path, _value(value.strip())
 
 
@@ -29,6 +34,16 @@ def _value(text: str) -> Any:
     except (tomllib.TOMLDecodeError, RecursionError, ValueError):
         return text
     return found["value"] if set(found) == {"value"} else text
+
+
+def check_depth(data: dict[str, Any], file: str) -> None:
+    """Raise FileFormatError for tables and lists in each other that no case can need."""
+    level: list[Any] = [data]
+    for _ in range(DEEPEST):
+        inner = (list(part.values()) if isinstance(part, dict) else part for part in level)
+        level = [x for part in inner for x in part if isinstance(x, dict | list)]
+    if level:
+        raise FileFormatError(f"{file}: expected tables and lists at most {DEEPEST} deep")
 
 
 def apply_overrides(
@@ -53,7 +68,7 @@ def set_value(data: dict[str, Any], path: list[str], value: Any, blame: str) -> 
         if isinstance(node, list) and not part.isdigit() and len(node) == 1:
             node = node[0]
         if isinstance(node, list):
-            if not part.isdigit() or int(part) >= len(node):
+            if not part.isdecimal() or len(part) > DIGITS or int(part) >= len(node):
                 raise InvalidInput(
                     f"{blame}: expected an index from 0 to {len(node) - 1}, got '{part}'"
                 )

@@ -18,7 +18,7 @@ from enum import Enum
 from typing import Any
 
 from .. import linear, solvers
-from ..errors import InvalidInput
+from ..errors import InvalidInput, shown
 from ..expressions import nearest
 from ..solvers import METHODS
 from ..solvers.base import Solver
@@ -166,7 +166,7 @@ def _convert_union(name: str, value: Any, hints: tuple) -> Any:
     if len(reasons) == 1:
         raise reasons[0]
     wanted = " or ".join(_wanted(hint) for hint in hints if hint is not type(None))
-    raise InvalidInput(f"{name}: expected {wanted}, got {value!r}")
+    raise InvalidInput(f"{name}: expected {wanted}, got {shown(value)}")
 
 
 def _wanted(hint: Any) -> str:
@@ -179,13 +179,13 @@ def _wanted(hint: Any) -> str:
 def _word(name: str, value: Any, words: dict[str, Any]) -> Any:
     key = str(value).lower()
     if key not in words:
-        raise InvalidInput(f"{name}: expected {' or '.join(words)}, got {value!r}")
+        raise InvalidInput(f"{name}: expected {' or '.join(words)}, got {shown(value)}")
     return words[key]
 
 
 def _number(name: str, value: Any, kind: type) -> Any:
     wanted = "a whole number" if kind is int else "a number"
-    problem = InvalidInput(f"{name}: expected {wanted}, got {value!r}")
+    problem = InvalidInput(f"{name}: expected {wanted}, got {shown(value)}")
     if isinstance(value, bool) or (kind is int and isinstance(value, float)):
         raise problem
     try:

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..checked_arrays import LARGEST
-from ..errors import FileFormatError, InvalidInput, MissingDependency
+from ..errors import FileFormatError, InvalidInput, MissingDependency, shown
 from ..expressions import nearest
+
+LONGEST_TEXT = 500  # letters of a name or a title; expressions have a limit of their own
 
 
 @dataclass(frozen=True)
@@ -40,8 +42,12 @@ class Table:
     def text(self, key: str, default: str | None = None) -> str:
         """A text, not empty."""
         value = self.need(key, "a text") if default is None else self.data.get(key, default)
+        if isinstance(value, str) and len(value) > LONGEST_TEXT:
+            raise self.error(
+                key, f"expected a text of at most {LONGEST_TEXT} letters, got {len(value)}"
+            )
         if not isinstance(value, str) or not (value.strip() or value == default):
-            raise self.error(key, f"expected a text, got {value!r}")
+            raise self.error(key, f"expected a text, got {shown(value)}")
         return value
 
     def choice(self, key: str, known: Sequence[str], default: str | None = None) -> str:
@@ -62,21 +68,21 @@ class Table:
         if value is None:
             return None
         if not isinstance(value, int) or isinstance(value, bool) or value < minimum:
-            raise self.error(key, f"expected a whole number >= {minimum}, got {value!r}")
+            raise self.error(key, f"expected a whole number >= {minimum}, got {shown(value)}")
         return value
 
     def as_number(self, key: str, value: Any) -> float:
         """A finite number, or a complaint about `key`."""
         if not isinstance(value, int | float) or isinstance(value, bool):
-            raise self.error(key, f"expected a number, got {value!r}")
+            raise self.error(key, f"expected a number, got {shown(value)}")
         try:
             number = float(value)
         except OverflowError:
             number = math.inf
         if not math.isfinite(number):
-            raise self.error(key, f"expected a finite number, got {value!r}")
+            raise self.error(key, f"expected a finite number, got {shown(value)}")
         if abs(number) > LARGEST:
-            raise self.error(key, f"expected a number up to {LARGEST:g}, got {value!r}")
+            raise self.error(key, f"expected a number up to {LARGEST:g}, got {shown(value)}")
         return number
 
     def numbers(self, key: str, counts: Sequence[int]) -> list[float]:
@@ -84,7 +90,7 @@ class Table:
         wanted = f"{' or '.join(map(str, counts))} numbers"
         values = self.need(key, f"a list of {wanted}")
         if not isinstance(values, list) or len(values) not in counts:
-            raise self.error(key, f"expected a list of {wanted}, got {values!r}")
+            raise self.error(key, f"expected a list of {wanted}, got {shown(values)}")
         return [self.as_number(f"{key}[{k}]", value) for k, value in enumerate(values)]
 
     def table(self, key: str) -> Table:
@@ -95,7 +101,7 @@ class Table:
         """A value that must be a table; `expected` says of what."""
         path = ".".join(part for part in (self.where, key) if part)
         if not isinstance(value, dict):
-            raise self.error(key, f"expected {expected}, got {value!r}")
+            raise self.error(key, f"expected {expected}, got {shown(value)}")
         return Table(self.file, path, value)
 
     def tables(self, key: str) -> list[Table]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import AmontonsError, InvalidInput
+from ..errors import AmontonsError, InvalidInput, shown
 from ..expressions import Expression
 from .tables import Blame, Table
 
@@ -35,7 +35,7 @@ def vector(table: Table, key: str, dim: int, *, free: bool = False) -> list:
     if not isinstance(values, list) or len(values) != dim:
         alone = isinstance(values, int | float | str) and values != "free"
         write = f"; write {[*[0] * (dim - 1), values]}" if alone else ""
-        raise table.error(key, f"expected a list of {dim} {words}, got {values!r}{write}")
+        raise table.error(key, f"expected a list of {dim} {words}, got {shown(values)}{write}")
     return [
         None if free and value == "free" else _entry(table, f"{key}[{k}]", value, dim)
         for k, value in enumerate(values)

@@ -77,6 +77,8 @@ def check_writable(
     target: Path | str | None, what: str = "file", suffixes: Sequence[str] = ()
 ) -> None:
     """Raise InvalidInput before the work, not after it, when a file can not be written."""
+    if str(target) == "-" and sys.__stdout__ is None:
+        raise InvalidInput(f"{what}: standard output is closed, expected the name of a file")
     if target is None or str(target) == "-":
         return
     if not str(target):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..checked_arrays import real, squarable
+from ..checked_arrays import LARGEST, real, squarable
 from ..errors import InvalidInput, shown
 from ..linear.levels import checked_levels
 from .cells import CELLS
@@ -46,7 +46,8 @@ class Mesh:
         points = real("points", self.points)
         if points.ndim != 2 or points.shape[1] not in (2, 3):
             raise InvalidInput(f"points: expected shape (n, 2) or (n, 3), got {points.shape}")
-        object.__setattr__(self, "points", squarable("points", points))
+        largest = LARGEST ** (1 / (points.shape[1] - 1))  # areas are squared in 3D
+        object.__setattr__(self, "points", squarable("points", points, largest))
         _check_parts("cells", self.cells, Cells)
         if not isinstance(self.surfaces, Mapping):
             raise InvalidInput(f"surfaces: expected name -> facets, got {shown(self.surfaces)}")

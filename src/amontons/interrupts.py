@@ -1,0 +1,61 @@
+"""Ctrl-C where it does no harm.
+
+Python raises KeyboardInterrupt wherever it happens to be.  In the middle of an import it comes
+out as any other error, in a destructor it is printed and lost, and numba's compiler can crash
+of it.  There the signal is sent again a moment later, until it meets a better place.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from functools import partial
+from types import FrameType
+
+AGAIN = 0.05  # seconds until the signal is sent again
+BUSY = ("importlib", "numba", "llvmlite", "weakref", "_weakrefset")  # packages, and modules
+
+
+def watch() -> None:
+    """Let Ctrl-C wait for a better place from now on, for a program of our own."""
+    if _is_ours():
+        signal.signal(signal.SIGINT, partial(_handle, sys._getframe(1)))
+
+
+class Watching:
+    """The same within a block, unless the program has a handler of its own."""
+
+    def __enter__(self) -> None:
+        self.ours = _is_ours()
+        if self.ours:
+            signal.signal(signal.SIGINT, partial(_handle, sys._getframe(1)))
+
+    def __exit__(self, *error: object) -> None:
+        if self.ours:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def _is_ours() -> bool:
+    """True in the main thread of a program that leaves Ctrl-C to Python."""
+    if threading.current_thread() is not threading.main_thread():
+        return False
+    return signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def _handle(root: FrameType, number: int, frame: FrameType | None) -> None:
+    if not is_busy(frame, root):
+        raise KeyboardInterrupt
+    again = threading.Timer(AGAIN, signal.raise_signal, (number,))
+    again.daemon = True
+    again.start()
+
+
+def is_busy(frame: FrameType | None, root: FrameType | None = None) -> bool:
+    """True where an exception would do harm, see above; what has called `root` is no matter."""
+    while frame is not None and frame is not root:
+        name = frame.f_globals.get("__name__") or ""
+        if name.partition(".")[0] in BUSY or frame.f_code.co_name == "__del__":
+            return True
+        frame = frame.f_back
+    return False
