@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 import os
+import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..files import put
 from .mesh import Mesh
 
 Array = NDArray[np.float64]
-TAIL = 200  # bytes in which a VTU file ends
 CELL_TYPES = {
     "tri": "triangle", "quad": "quad", "tet": "tetra", "hex": "hexahedron", "wedge": "wedge",
     "pyramid": "pyramid", "tri6": "triangle6", "quad9": "quad9", "tet10": "tetra10",
@@ -47,13 +48,18 @@ def write_meshes(
     points = np.zeros((starts[-1], 3))
     points[:, : meshes[0].dim] = np.concatenate([mesh.points for mesh in meshes])
     split = {name: np.split(values, ends) for name, values in cell_data.items()}
-    meshio.Mesh(points, cells, point_data=point_data, cell_data=split).write(path)
-    if path.suffix == ".vtu":
-        _add_fields(path, field_data or {}, remark)
+    whole = meshio.Mesh(points, cells, point_data=point_data, cell_data=split)
+    if path.suffix != ".vtu":
+        whole.write(path)
+        return
+    with tempfile.TemporaryFile() as scratch:  # its writer takes no buffer
+        meshio.vtu.write(os.dup(scratch.fileno()), whole)
+        scratch.seek(0)
+        put(path, _with_fields(scratch.read(), field_data or {}, remark))
 
 
-def _add_fields(path: Path, fields: Mapping[str, float], remark: str) -> None:
-    """Write field data before the end of a VTU file, whose writer knows none."""
+def _with_fields(text: bytes, fields: Mapping[str, float], remark: str) -> bytes:
+    """A VTU file with field data before its end, as its writer knows none."""
     arrays = "".join(
         f'<DataArray type="{"Int32" if isinstance(value, int) else "Float64"}" Name="{name}" '
         f'NumberOfTuples="1" format="ascii">{value!r}</DataArray>\n'
@@ -61,10 +67,5 @@ def _add_fields(path: Path, fields: Mapping[str, float], remark: str) -> None:
         if math.isfinite(value)
     )
     note = f"<!-- {remark.replace('--', '- ')} -->\n" if remark else ""
-    with path.open("r+b") as file:
-        file.seek(-min(TAIL, path.stat().st_size), os.SEEK_END)
-        start = file.tell()
-        head, end, rest = file.read().rpartition(b"</UnstructuredGrid>")
-        file.seek(start + len(head))
-        added = f"<FieldData>\n{arrays}</FieldData>\n{note}"
-        file.write(added.encode() + end + rest)
+    head, end, rest = text.rpartition(b"</UnstructuredGrid>")
+    return head + f"<FieldData>\n{arrays}</FieldData>\n{note}".encode() + end + rest
