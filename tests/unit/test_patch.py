@@ -98,6 +98,12 @@ def test_it_passes_bent_meshes_in_any_direction(cells, kinds, amount, method):
 
 
 @pytest.mark.parametrize("method", ["mortar", "nitsche"])
+def test_it_passes_a_master_of_three_nearly_folded_facets(method):
+    found = errors(((6, 6, 2), (1, 3, 2)), (None, None), method, amount=0.289, seed=96)
+    assert max(found) < EXACT
+
+
+@pytest.mark.parametrize("method", ["mortar", "nitsche"])
 @pytest.mark.parametrize("d", [2, 3])
 def test_it_passes_between_materials_that_agree_along_the_surface(d, method):
     """Without poisson's effect and shear any two do."""

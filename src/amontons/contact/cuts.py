@@ -37,7 +37,7 @@ Mask = NDArray[np.bool_]
 AFFINE = 1e-9  # sides of a parallelogram differ by less, relative to its size
 NEWTON = 30  # steps to the reference point of a quadrilateral
 BENT_POINTS = 5  # points per direction on parts of bent quadrilaterals, before correction
-FINE = ((0.6, 8), (0.45, 12), (0.3, 16), (-np.inf, 24))  # least evenness: points, to 1e-11
+FINE = ((0.6, 8), (0.45, 12), (0.35, 16), (0.25, 24), (-np.inf, 48))  # by evenness, to 1e-11
 AT_ONCE = 400_000  # points of fine rules, for memory
 SEPARATE = 1e-9  # moments that differ by less, relative, are one
 
