@@ -20,6 +20,8 @@ from typing import Any
 
 EXIT = 77  # code of a process that a fault has ended
 OF_PATHS = ("open", "mkdir", "replace", "unlink", "rmdir")
+FLAGS = {"w": os.O_WRONLY | os.O_CREAT | os.O_TRUNC,
+         "wb": os.O_WRONLY | os.O_CREAT | os.O_TRUNC, "r+b": os.O_RDWR}  # fmt: skip
 OF_FILES = ("write", "pwrite", "ftruncate", "fsync", "close")
 
 
@@ -47,22 +49,23 @@ class Faults:
     only: tuple[str, ...] = ()
     room: float = math.inf
     calls: list[str] = field(default_factory=list)
+    written: int = 0  # bytes, also those written over others
     _open: set[int] = field(default_factory=set)
 
     @contextmanager
     def injected(self) -> Iterator[Faults]:
         """The system's calls, watched."""
         before = {name: getattr(os, name) for name in (*OF_PATHS, *OF_FILES)}
-        plain = builtins.open
+        plain = builtins.open  # also io.open, which pathlib calls
         for name in OF_PATHS:
             setattr(os, name, self._watched(name, before[name], self._is_inside))
         for name in OF_FILES:
             setattr(os, name, self._watched(name, before[name], self._open.__contains__))
-        builtins.open = self._opener(plain)
+        builtins.open = io.open = self._opener(plain)
         try:
             yield self
         finally:
-            builtins.open = plain
+            builtins.open = io.open = plain
             for name, call in before.items():
                 setattr(os, name, call)
 
@@ -112,28 +115,28 @@ class Faults:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         part = data[: int(min(size, self.room))]
         self.room -= len(part)
+        self.written += len(part)
         return part
 
     def _opener(self, plain: Callable) -> Callable:
         def opener(file: Any, mode: str = "r", *rest: Any, **named: Any) -> Any:
-            if mode not in ("w", "wb") or not self._is_inside(file):
+            if mode not in FLAGS or not self._is_inside(file):
                 return plain(file, mode, *rest, **named)
-            raw = _Raw(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666))
+            raw = _Raw(os.open(file, FLAGS[mode], 0o666), "r+b" if "+" in mode else "wb")
+            if "+" in mode:
+                return io.BufferedRandom(raw)
             buffered = io.BufferedWriter(raw)
             return buffered if mode == "wb" else io.TextIOWrapper(buffered, encoding="utf-8")
 
         return opener
 
 
-class _Raw(io.RawIOBase):
-    """A file that writes by `os.write`, looked up at every call."""
+class _Raw(io.FileIO):
+    """A file that writes and closes by the calls of `os`, looked up every time."""
 
-    def __init__(self, place: int) -> None:
-        super().__init__()
+    def __init__(self, place: int, mode: str) -> None:
+        super().__init__(place, mode, closefd=False)
         self.place = place
-
-    def writable(self) -> bool:
-        return True
 
     def write(self, data: Any) -> int:
         return os.write(self.place, bytes(data))

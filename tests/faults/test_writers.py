@@ -102,7 +102,7 @@ def files(folder):
 
 
 def tried(write, folder, *, at=0, number=errno.ENOSPC, room=np.inf, old=()):
-    """Write once on a disk that fails; returns whether it did, and the calls it made.
+    """Write once on a disk that fails; returns whether it did, and what was done.
 
     Whatever happens, files are whole or as they were, and nothing else stays.
     """
@@ -129,7 +129,7 @@ def tried(write, folder, *, at=0, number=errno.ENOSPC, room=np.inf, old=()):
     if said and not old and not at:
         for place in folder.rglob("*"):
             assert not place.is_dir() or list(place.iterdir()), f"{place} is empty"
-    return bool(said), faults.calls
+    return bool(said), faults
 
 
 def names(folder):
@@ -139,7 +139,8 @@ def names(folder):
 @pytest.mark.parametrize("name", QUICK)
 @pytest.mark.parametrize("number", ERRORS[:2], ids=errno.errorcode.get)
 def test_every_call_fails_once(writers, name, number, tmp_path):
-    failed, calls = tried(writers[name], tmp_path / "good")
+    failed, good = tried(writers[name], tmp_path / "good")
+    calls = good.calls
     assert not failed
     assert calls.count("fsync") >= 2
     for at in range(1, len(calls) + 1):
@@ -149,8 +150,7 @@ def test_every_call_fails_once(writers, name, number, tmp_path):
 
 @pytest.mark.parametrize("name", QUICK)
 def test_full_disks(writers, name, tmp_path):
-    tried(writers[name], tmp_path / "good")
-    size = sum(path.stat().st_size for path in files(tmp_path / "good"))
+    size = tried(writers[name], tmp_path / "good")[1].written
     for room in (*np.linspace(0, size - 1, 7).astype(int), size):
         for old in ((), names(tmp_path / "good")):
             place = tmp_path / f"{room}-{len(old)}"
@@ -162,8 +162,7 @@ def test_full_disks(writers, name, tmp_path):
 
 @pytest.mark.parametrize("name", ["png", "results", "convert", "run", "film", "bench"])
 def test_a_full_disk_at_some_point(writers, name, tmp_path):
-    tried(writers[name], tmp_path / "good")
-    size = sum(path.stat().st_size for path in files(tmp_path / "good"))
+    size = tried(writers[name], tmp_path / "good")[1].written
     failed, _ = tried(writers[name], tmp_path / "half", room=size // 2)
     assert failed
 
@@ -171,7 +170,7 @@ def test_a_full_disk_at_some_point(writers, name, tmp_path):
 @pytest.mark.slow_faults
 @pytest.mark.parametrize("name", DRAWN)
 def test_every_call_of_a_command_fails_once(writers, name, tmp_path):
-    _, calls = tried(writers[name], tmp_path / "good")
+    calls = tried(writers[name], tmp_path / "good")[1].calls
     for at in range(1, len(calls) + 1):
         number = ERRORS[at % len(ERRORS)]
         old = names(tmp_path / "good") if at % 2 else ()
@@ -181,8 +180,7 @@ def test_every_call_of_a_command_fails_once(writers, name, tmp_path):
 @pytest.mark.slow_faults
 @pytest.mark.parametrize("name", DRAWN)
 def test_full_disks_of_commands(writers, name, tmp_path):
-    tried(writers[name], tmp_path / "good")
-    size = sum(path.stat().st_size for path in files(tmp_path / "good"))
+    size = tried(writers[name], tmp_path / "good")[1].written
     rooms = (*np.linspace(0, size, 25).astype(int), *(4096 * k for k in (1, 2, 3, 5, 8, 13)))
     for k, room in enumerate(rooms):
         tried(writers[name], tmp_path / f"{k}", room=int(room))
@@ -200,7 +198,7 @@ def test_what_is_renamed_is_on_the_disk(writers, tmp_path):
 
 def test_a_run_on_a_full_disk_says_what_is_safe(writers, tmp_path):
     write = writers["moving"]
-    _, calls = tried(write, tmp_path / "good")
+    calls = tried(write, tmp_path / "good")[1].calls
     renames = [k for k, call in enumerate(calls, start=1) if call == "replace"]
     with Faults(tmp_path, at=renames[7]).injected(), pytest.raises(Failed) as reason:
         write(tmp_path)
