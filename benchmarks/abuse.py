@@ -4,8 +4,8 @@
 
 Auto and one other solver in turn solve each; what comes back is checked without the package's
 own judge, in the sum over all contacts and for each contact on its own scale.  As many again
-have every contact in units of its own.  Writes results/abuse.md and abuse.json, and lists every
-finding.
+have every contact in units of its own, and a tenth as many of each kind of broken input and
+machine (`abuse_broken`).  Writes results/abuse.md and abuse.json, and lists every finding.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 
 import numpy as np
+from abuse_broken import Broken, abuse_broken
 from abuse_problems import (
     FAMILIES,
     RESCALED,
@@ -43,11 +44,17 @@ NOTE = """\
 precision); what comes back is checked without the package's own judge. Refused: the method does
 not fit the problem and says so. A finding is an exception, a warning, a number that is not
 finite, an answer called converged that is none or breaks a law, a change with units, order or
-frames, a limit overrun, and a solvable problem that Auto leaves. Converged means an error below
-the tolerance in the sum and below its root at every contact on its own scale.
+frames, a limit overrun, and a solvable problem that Auto leaves. Converged means an error
+below the tolerance in the sum and below its root at every contact on its own scale.
 
 In the second table the units of every contact are apart by up to 1e18 from those of others (W
 becomes S W S): there a solvable problem that Auto leaves is no finding.
+"""
+BROKEN = """\
+Index arrays of sparse matrices that lie, arguments that are no arrays of numbers, FCLib and
+case files with wrong bytes, files that may not grow beyond a size drawn up to 80 kB, processes
+that fork after a solve. A finding is a crash, a hang, an exception that is not ours, a warning,
+a message of more than 2 000 letters, a temporary file that stays.
 """
 MARGIN = 1.0  # seconds that one compiled call may take beyond the limit
 ROUNDING = 1e-10  # relative difference of two evaluations of the same error
@@ -410,7 +417,20 @@ def unsolved(runs: list[Run]) -> str:
     return ", ".join(f"{n} {name.replace('_', ' ')}" for name, n in count.most_common()) or "-"
 
 
-def report(runs: list[Run], rescaled: list[Run], command: str) -> str:
+def table_of_broken(broken: list[Broken]) -> list[str]:
+    """One line per family of broken input."""
+    lines = ["| broken | cases | refused in words | answered | findings |"]
+    lines.append("|---|---|---|---|---|")
+    for each in broken:
+        counts = [each.counts.get(name, 0) for name in ("refused", "answered", "finding")]
+        cells = map(str, (sum(counts), *counts))
+        lines.append(f"| {each.family} | " + " | ".join(cells) + " |")
+    return lines
+
+
+def report(
+    runs: list[Run], rescaled: list[Run], broken: list[Broken], command: str
+) -> str:
     """The page."""
     from machine import describe
 
@@ -420,8 +440,12 @@ def report(runs: list[Run], rescaled: list[Run], command: str) -> str:
     lines += table(runs)
     lines += ["", "## Every contact in units of its own", ""]
     lines += table(rescaled)
+    lines += ["", "## Broken input and broken machines", "", BROKEN]
+    lines += table_of_broken(broken)
     found = [(run, text) for run in runs + rescaled for text in run.findings]
-    lines += ["", f"## Findings: {len(found)}", ""]
+    others = [text for each in broken for text in each.findings]
+    lines += ["", f"## Findings: {len(found) + len(others)}", ""]
+    lines += [f"- {text}" for text in others]
     lines += [f"- {run.number} {run.family}, {run.contacts} contacts in {run.dimension}D, "
               f"{run.solver}: {text}" for run, text in found]  # fmt: skip
     return "\n".join(lines) + "\n"
@@ -449,7 +473,9 @@ def main() -> None:
                 pass
     runs = abuse_all(options.problems, options.seed, limit=options.limit)
     rescaled = abuse_rescaled(options.problems, options.seed, limit=options.limit)
-    page = report(runs, rescaled, f"python benchmarks/abuse.py --problems {options.problems} "
+    broken = abuse_broken(options.problems // 10, options.seed)
+    page = report(runs, rescaled, broken,
+                  f"python benchmarks/abuse.py --problems {options.problems} "
                   f"--seed {options.seed} --limit {options.limit:g}")  # fmt: skip
     options.output.mkdir(parents=True, exist_ok=True)
     (options.output / "abuse.md").write_text(page)
