@@ -38,9 +38,21 @@ def njit(**options: Any) -> Callable[[Function], Function]:
 
     def decorate(function: Function) -> Function:
         with _kept_in(_folder()):
-            return numba.njit(**options)(function)
+            made = numba.njit(**options)(function)
+        made._cache.save_overload = _if_it_can(made._cache.save_overload)
+        return made
 
     return decorate
+
+
+def _if_it_can(save: Function) -> Function:
+    """Keep a result where there is room for it; on a full disk it is compiled again."""
+
+    def kept(*arguments: Any) -> None:
+        with suppress(OSError):
+            save(*arguments)
+
+    return kept
 
 
 @contextmanager
