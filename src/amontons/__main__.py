@@ -1,5 +1,6 @@
 """`amontons` and `python -m amontons` are the command line."""
 
+import signal
 import sys
 
 from .interrupts import watch
@@ -14,6 +15,8 @@ def run() -> None:
         main()
     except KeyboardInterrupt:
         sys.exit(130)
+    finally:  # all is done: what Python still clears away is nothing to interrupt
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 if __name__ == "__main__":

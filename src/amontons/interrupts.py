@@ -7,12 +7,14 @@ of it.  There the signal is sent again a moment later, until it meets a better p
 
 from __future__ import annotations
 
+import _signal  # those of `signal` make enums of all numbers: 10 µs each, in every solve
 import signal
 import sys
 import threading
 from functools import partial
 from types import FrameType
 
+SIGINT = int(signal.SIGINT)
 AGAIN = 0.05  # seconds until the signal is sent again
 BUSY = ("importlib", "numba", "llvmlite", "weakref", "_weakrefset")  # packages, and modules
 
@@ -20,7 +22,7 @@ BUSY = ("importlib", "numba", "llvmlite", "weakref", "_weakrefset")  # packages,
 def watch() -> None:
     """Let Ctrl-C wait for a better place from now on, for a program of our own."""
     if _is_ours():
-        signal.signal(signal.SIGINT, partial(_handle, sys._getframe(1)))
+        _signal.signal(SIGINT, partial(_handle, sys._getframe(1)))
 
 
 class Watching:
@@ -29,18 +31,18 @@ class Watching:
     def __enter__(self) -> None:
         self.ours = _is_ours()
         if self.ours:
-            signal.signal(signal.SIGINT, partial(_handle, sys._getframe(1)))
+            _signal.signal(SIGINT, partial(_handle, sys._getframe(1)))
 
     def __exit__(self, *error: object) -> None:
         if self.ours:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
+            _signal.signal(SIGINT, signal.default_int_handler)
 
 
 def _is_ours() -> bool:
     """True in the main thread of a program that leaves Ctrl-C to Python."""
     if threading.current_thread() is not threading.main_thread():
         return False
-    return signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    return _signal.getsignal(SIGINT) is signal.default_int_handler
 
 
 def _handle(root: FrameType, number: int, frame: FrameType | None) -> None:
