@@ -468,7 +468,13 @@ class FrictionProblem:
         """The contact farthest from its law on its own scale; arguments as in `error`."""
         if self.measure is Measure.EXACT:
             return self.condensed()._weakest_exact(r)
-        if v is None or not (np.isfinite(r).all() and np.isfinite(v).all()):
+        if v is None:
+            try:
+                v = self.velocity(r)[1]
+            except SingularOperator:
+                return Weakest(np.inf, None)
+        assert v is not None
+        if not (np.isfinite(r).all() and np.isfinite(v).all()):
             return Weakest(np.inf, None)
         u, q = self.local_velocity(v), self.open_velocity
         rho = np.where(self.rho > 0, self.rho, np.inf)

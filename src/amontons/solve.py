@@ -133,7 +133,7 @@ class _Watch:
         """The next goal for the error, so that the weakest contact will do too."""
         assert self.weakest is not None
         share = TIGHTER * self.contact_tolerance / self.weakest.error
-        return min(self.error * share, TIGHTER * goal)
+        return max(min(self.error * share, TIGHTER * goal), np.finfo(float).tiny)
 
     def cycled(self, iterate: Iterate, error: float) -> bool:
         """True when this iterate was here before, with other iterates in between."""
