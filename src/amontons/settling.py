@@ -3,8 +3,11 @@
 A method stops within the tolerance of a solution, and may leave some 1e-9 of the load on a
 contact whose motion says that it is open.  Then an area counted where r_N > 0 is not the area
 of the contacts that are closed.  So an open contact carries nothing here, exactly (under
-Tresca's law no r_N), and no shear is above what friction allows.  That changes r within the
-error that was judged; the driver judges it again.
+Tresca's law no r_N, and no shear above its bound).  That changes r within the error that was
+judged; the driver judges it again.
+
+Closed contacts keep what was found: to cut their shear to what friction allows would move, by
+as little, gaps that a linear solve has closed to rounding; steps in time take them for open.
 """
 
 from __future__ import annotations
@@ -85,7 +88,7 @@ def settled(
     """The motion of reactions that keep to the statuses of that motion, and these.
 
     Other reactions may move otherwise, and that may have other statuses; every round opens a
-    contact or takes away what friction does not allow, so that it ends.
+    contact or takes shear from one, so that it ends.
     """
     while True:
         moved = velocity(r)
@@ -118,11 +121,10 @@ def _settle(r, u, rho, coefficient, tresca):
         sliding[i] = slides
         if closed and r[i, 0] > 0.0:
             status[i] = SLIP if slides else STICK
-            bound = mu if tresca else mu * r[i, 0]
-        else:
-            changed = changed or r[i, 0] != 0.0
-            out[i, 0] = 0.0
-            bound = mu if tresca else 0.0
+            continue
+        changed = changed or r[i, 0] != 0.0
+        out[i, 0] = 0.0
+        bound = mu if tresca else 0.0
         if shear > bound * (1.0 + 4.0 * EPSILON):
             changed = True
             for k in range(1, d):
