@@ -353,7 +353,9 @@ def _two(
 
 def _alone(verdict: Uniqueness, reason: str, resolution: float) -> Uniqueness:
     """UNIQUE_THIS_LOAD, saying up to which difference."""
-    reason += f" Any other would differ by less than {resolution:.1e} of the largest reaction."
+    if resolution > 0.0:
+        share = f"{resolution:.1e} of the largest reaction"
+        reason += f" Any other would differ by less than {share}."
     return replace(verdict, verdict=Verdict.UNIQUE_THIS_LOAD, reason=reason,
                    resolution=resolution)  # fmt: skip
 

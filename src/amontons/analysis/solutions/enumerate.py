@@ -123,6 +123,8 @@ class Solutions:
         """The resolution in words, to follow the reason."""
         if not np.isfinite(self.resolution):
             return ""
+        if self.resolution == 0.0 and self.complete:
+            return ", however near"
         differs = "any other differs" if self.complete else "solutions count as one that differ"
         return f"; {differs} by less than {self.resolution:.1e} of the largest reaction"
 
@@ -254,11 +256,11 @@ def _leaves(piece: ScaledProblem, cuts: list[Cut] | None) -> Iterator[tuple[Stat
     leaves, cut = np.empty((2, nodes, nc), dtype=np.int8)
     proofs = np.empty((nodes, m))
     box = piece.box
-    search.start_inplace(D, basic, nonbasic, states, piece.A, piece.c)
+    search.start_inplace(D, basic, nonbasic, states, box.A, box.c)
     done, level = False, 0
     while not done:
         done, level, nodes, count, excluded = search.search_inplace(
-            piece.A, box.spread, piece.c, box.low, box.high, piece.reacts, piece.mu > 0,
+            box.A, box.spread, box.c, box.low, box.high, piece.reacts, piece.mu > 0,
             D, basic, nonbasic, states, turn, level, leaves, cut, proofs,
         )  # fmt: skip
         if cuts is not None:
@@ -337,7 +339,7 @@ def _proof(piece: ScaledProblem, cuts: list[Cut] | None) -> Proof | None:
     """What the search left, in the units of the problem."""
     if cuts is None:
         return None
-    rows = [y / piece.to_u for _, y in cuts]
+    rows = [y / piece.box.to_u for _, y in cuts]
     multipliers = np.array(rows).reshape(-1, piece.contacts, 2)
     return Proof(tuple(_word(states) for states, _ in cuts), multipliers)
 

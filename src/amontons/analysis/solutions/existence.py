@@ -88,7 +88,10 @@ def _on_its_piece(stack: Stack, scaled: ScaledProblem, r: Array) -> bool:
 
 def _newton_converges(stack: Stack, r: Array) -> bool:
     """3D: the condition of Kantorovich, with statuses that do not change in the ball."""
-    r, step = stack.polished(r)
+    start = r
+    r, step = stack.polished(start)
+    if np.abs(r - start).max(initial=0.0) > NEAR * (1 + np.abs(start).max(initial=0.0)):
+        return False
     u, size = stack.velocity(r[None])[0], 1 + float(np.abs(r).max(initial=0.0))
     values = np.linalg.svd(stack.jacobian(r), compute_uv=False)
     if not len(values) or values[-1] == 0:

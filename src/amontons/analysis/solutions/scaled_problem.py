@@ -33,20 +33,25 @@ SYMMETRIC = 1e-12  # of W where only a symmetric one is bounded
 
 @dataclass(frozen=True, eq=False)
 class Box:
-    """Bounds of a, b, u_N, u_T of every contact, low and high (4 nc,).
+    """u = A x + c and bounds of a, b, u_N, u_T of every contact, low and high (4 nc,).
 
-    spread (2 nc,): bound of the error of A x by the rounding of A.  bounded: every solution is
-    in the box; otherwise there may be some with larger reactions.
+    In units of |W_ii| and |q|, not rounded, with which the search needs fewest patterns; so A
+    and c are.  spread (2 nc,): bound of the error of A x by that.  to_u (2 nc,): velocities of
+    the problem per unit.  bounded: every solution is in the box; otherwise there may be some
+    with larger reactions.
     """
 
+    A: Array
+    c: Array
     low: Array
     high: Array
     spread: Array
+    to_u: Array
     bounded: bool
 
 
 class ScaledProblem:
-    """The problem in scaled variables, u = W r + c = A x + c, and the box of all solutions."""
+    """The problem in scaled variables, u = W r + c, and the box of all solutions."""
 
     def __init__(self, problem: FrictionProblem) -> None:
         assert problem.W is not None and problem.q is not None
@@ -56,6 +61,7 @@ class ScaledProblem:
         size, self.reacts = contact_sizes(W, nc)
         root = np.repeat(power_of_two(np.sqrt(size)), 2)
         load = load_size(problem.q / root.reshape(nc, 2), self.mu, self.reacts)
+        self._finer = np.sqrt(size) / root[0::2], float(load or 1.0)
         self.unit = float(power_of_two(load or 1.0))
         self.to_r, self.to_u = self.unit / root, self.unit * root
         self.W = W / root / root[:, None]
@@ -81,9 +87,17 @@ class ScaledProblem:
             bounded = size < REACH
             found = self._wide_box(min(size, REACH))
         low, high = found
-        most = high.reshape(-1, 4)[:, :2].ravel()
-        terms = np.abs(self.W) @ (np.abs(self.generators) @ np.maximum(most, 0.0))
-        return Box(low, high, gamma(2 * self.contacts + 4) * terms, bounded)
+        size, load = self._finer
+        load /= self.unit
+        x = np.repeat(size / load * self.shrink * np.maximum(self.mu, 1.0), 2)
+        u = np.repeat(1 / (load * size), 2)
+        each = np.stack([x.reshape(-1, 2), u.reshape(-1, 2)], axis=1).ravel()
+        room = 8 * EPSILON * (np.abs(low) + np.abs(high)) * each
+        most = np.maximum(high.reshape(-1, 4)[:, :2].ravel(), 0.0)
+        terms = u * (np.abs(self.W) @ (np.abs(self.generators) @ most))
+        A = u[:, None] * (self.W @ self.generators) / x
+        return Box(A, u * self.c, low * each - room, high * each + room,
+                   gamma(2 * self.contacts + 12) * terms, self.to_u / u, bounded)  # fmt: skip
 
     def _ellipsoid(self) -> tuple[Array, Array] | None:
         """The box of r W r + c r <= 0, rounding included; None where W is not surely definite.
