@@ -99,7 +99,7 @@ def page(pairs, options):
         "# This version against the one before", "",
         "Regenerate: `python benchmarks/against_before.py BEFORE/src --runs "
         f"{options.runs}` (before: {options.name}).", "",
-        f"{machine}; one thread. CPU seconds, {options.runs} pairs of processes in turns: "
+        f"{machine}; one thread. CPU seconds, {len(pairs)} pairs of processes in turns: "
         "median (lower and upper quartile) of the ratios. Of all files: the geometric mean in "
         "a pair.",
     ]  # fmt: skip
@@ -169,9 +169,7 @@ def main():
         found = {source: measured(source, options.folder) for source in order}
         pairs.append((found[sources[0]], found[sources[1]]))
         print(f"{k + 1} of {options.runs}", flush=True)
-    text = page(pairs, options)
-    (HERE / "results/against_before.md").write_text(text)
-    print(text)
+        (HERE / "results/against_before.md").write_text(page(pairs, options))
     return None
 
 
