@@ -109,7 +109,8 @@ def all_solutions(
     if found.complete or found.solutions:
         return found
     some = multistart(discrete, starts=FEW, time_limit=None if limit is None else LEAST)
-    return replace(found, solutions=some.solutions)  # the search did not come to any
+    # the search did not come to any
+    return replace(found, solutions=some.solutions, resolution=some.resolution)
 
 
 def multistart(

@@ -8,11 +8,12 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from ...clock import now
+from ...clock import Deadline, now
 from ...errors import InvalidInput, TimeUp
 from ...problem import FrictionProblem
 from ...solution import FrictionSolution
 from ..solutions.enumerate import PieceSolution
+from ..solutions.existence import exist, takes_too_long
 
 Array = NDArray[np.float64]
 SECONDS = 60.0  # whose work a certificate without a time limit may take
@@ -91,3 +92,19 @@ def without_search(local: FrictionProblem) -> tuple[LoadOutcome, str] | None:
 def proved_on(parts: int) -> str:
     """The reason of a certificate that has so many parts."""
     return "multipliers exclude all others" + (f" on {parts} parts" if parts > 1 else "")
+
+
+def refuted(
+    problem: FrictionProblem, r0: Array, other: PieceSolution, deadline: Deadline
+) -> tuple[LoadOutcome, str]:
+    """The answer where another solution was found, and its reason.
+
+    REFUTED only if both are proved to exist (`existence`): a small error alone is none.
+    """
+    if takes_too_long(problem, 2, deadline):
+        reason = f"there was no time to prove that {other.pattern} is another solution"
+        return LoadOutcome.UNDECIDED, reason
+    if not exist(problem, [r0, other.r], deadline):
+        reason = f"rounding of W, q and mu decides whether {other.pattern} is another solution"
+        return LoadOutcome.UNDECIDED, reason
+    return LoadOutcome.REFUTED, f"another solution is {other.pattern}"

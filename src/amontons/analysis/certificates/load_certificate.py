@@ -36,6 +36,7 @@ from .load_answer import (
     LoadOutcome,
     proved_on,
     reactions_of,
+    refuted,
     stopped,
     without_search,
 )
@@ -151,7 +152,9 @@ class _Search:
         return self._answer(LoadOutcome.CERTIFIED, proved_on(len(self.proofs)))
 
     def _refuted(self, other: PieceSolution) -> LoadCertificate:
-        return self._answer(LoadOutcome.REFUTED, f"another solution is {other.pattern}", other)
+        r0 = (self.known.r * self.local.to_r).reshape(-1, 2)
+        outcome, reason = refuted(self.local.problem, r0, other, self.deadline)
+        return self._answer(outcome, reason, other if outcome is LoadOutcome.REFUTED else None)
 
     def _answer(
         self, outcome: LoadOutcome, reason: str, other: PieceSolution | None = None

@@ -26,6 +26,7 @@ from .load_answer import (
     LoadOutcome,
     proved_on,
     reactions_of,
+    refuted,
     stopped,
     without_search,
 )
@@ -96,8 +97,10 @@ class _Certification:
         others = [other for other in finder.found if np.abs(other - finder.found[0]).max() > ON]
         if others:
             other = described(stack, others[0])
-            reason = f"another solution is {other.pattern}"
-            return self._answer(LoadOutcome.REFUTED, reason, other)
+            outcome, reason = refuted(self.local, self.r, other, self.deadline)
+            return self._answer(
+                outcome, reason, other if outcome is LoadOutcome.REFUTED else None
+            )
         if search.complete:
             reason = proved_on(len(search.proofs) + len(search.linear))
             return self._answer(LoadOutcome.CERTIFIED, reason)

@@ -23,7 +23,6 @@ from ...solve import drive
 from ..multipliers.scales import UNRESOLVED, contact_sizes, resolves
 from ..solutions.disc_search import enumerate_discs
 from ..solutions.enumerate import PieceSolution, Solutions, enumerate_solutions
-from ..solutions.existence import exist, takes_too_long
 from .critical_friction import CriticalFriction, Witness, critical_friction
 from .energy_bound import energy_bound
 from .load_answer import LoadCertificate, LoadOutcome
@@ -287,7 +286,7 @@ def _this_load(
         verdict = replace(verdict, certificate=found)
         return _alone(verdict, _sentence(found.reason), found.distance)
     if found.outcome is LoadOutcome.REFUTED:
-        return _refuted(verdict, local, found, deadline)
+        return _refuted(verdict, local, found)
     unsettled = found.reason != UNRESOLVED and not deadline.passed
     if local.dimension == 3 and local.contacts <= REGIONS and unsettled:
         answer = _by_list(
@@ -374,16 +373,12 @@ def same_motion(local: FrictionProblem, dr: Array) -> bool:
 
 
 def _refuted(
-    verdict: Uniqueness, local: FrictionProblem, found: LoadCertificate, deadline: Deadline
+    verdict: Uniqueness, local: FrictionProblem, found: LoadCertificate
 ) -> Uniqueness:
-    """NOT_UNIQUE by a second solution, if both are proved to exist (`existence`)."""
+    """NOT_UNIQUE by a second solution."""
     other = found.other
     assert other is not None
     reason = _sentence(found.reason)
-    if takes_too_long(local, 2, deadline):
-        return replace(verdict, reason=f"{reason} There was no time to prove that it is one.")
-    if not exist(local, [found.r0, other.r], deadline):
-        return replace(verdict, reason=f"{reason} Rounding decides whether it is one.")
     if same_motion(local, other.r - found.r0):
         reason += SAME_MOTION
     return _two(verdict, other, reason, KNOWN)

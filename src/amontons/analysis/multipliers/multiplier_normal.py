@@ -69,8 +69,11 @@ class Normal:
         whole = sparse.coo_array(whole)
         H[whole.row, whole.col] += whole.data
         self.scale = 1 / np.sqrt(np.maximum(np.diagonal(H), np.finfo(float).tiny))
-        H *= self.scale[:, None]
-        H *= self.scale
+        with np.errstate(over="ignore", invalid="ignore"):
+            H *= self.scale[:, None]
+            H *= self.scale
+        if not np.isfinite(H).all():
+            raise np.linalg.LinAlgError("the matrix of the interior-point step is not finite")
         self.factor = _factorised(H)
 
     def __call__(self, right: Array) -> Array:

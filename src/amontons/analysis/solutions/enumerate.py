@@ -12,6 +12,7 @@ A complete list means: every solution of the problem with W, q and mu as given i
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -24,7 +25,7 @@ from ...errors import InvalidInput, TimeUp, UnsupportedForm
 from ...problem import FrictionProblem
 from ..multipliers.scales import RESOLVED, UNRESOLVED, load_shares
 from . import pattern_search as search
-from .local_degree import degree
+from .local_degree import UNKNOWN, Degree, degree
 from .piece_solution import DATA, Existence, PieceAnswer, examined
 from .scaled_problem import REACH, SLACK, ScaledProblem, States
 
@@ -183,7 +184,7 @@ def enumerate_solutions(
     return Solutions(
         solutions, doubt is None, doubt or "every other pattern is excluded", examined,
         now() - began, _proof(piece, cuts),
-        max((s.distance for s in solutions), default=0.0),
+        max((s.distance for s in solutions), default=np.inf if doubt else 0.0),
     )  # fmt: skip
 
 
@@ -284,9 +285,33 @@ def _merged(
             groups.append([item])
         else:
             group.append(item)
+    degrees = _disjoint(piece, groups)
     largest = max((float(np.abs(g[0].r).max(initial=0.0)) for g in groups), default=0.0)
-    for group in groups:
-        yield _entry(piece, group, max(largest, 1.0))
+    for group, known in zip(groups, degrees, strict=True):
+        yield _entry(piece, group, known, max(largest, 1.0)), known.value
+
+
+def _disjoint(piece: ScaledProblem, groups: list[list[PieceAnswer]]) -> list[Degree]:
+    """Degrees of groups, those put together whose pieces are partly the same.
+
+    A solution on a piece that two of them have would count twice.
+    """
+    degrees = [degree(piece, group) for group in groups]
+    while pair := _sharing(degrees):
+        i, j = pair
+        if groups[j][0].existence is Existence.SURE:
+            degrees[max(pair, key=lambda k: len(degrees[k].pieces))] = UNKNOWN
+            continue
+        groups[i] += groups.pop(j)
+        degrees.pop(j)
+        degrees[i] = degree(piece, groups[i])
+    return degrees
+
+
+def _sharing(degrees: Sequence[Degree]) -> tuple[int, int] | None:
+    """Two of them that have a piece in common, in order."""
+    pairs = itertools.combinations(range(len(degrees)), 2)
+    return next((p for p in pairs if degrees[p[0]].pieces & degrees[p[1]].pieces), None)
 
 
 def _rank(answer: PieceAnswer) -> tuple[int, bool, int]:
@@ -313,26 +338,21 @@ def _belongs(piece: ScaledProblem, item: PieceAnswer, group: list[PieceAnswer]) 
 
 
 def _entry(
-    piece: ScaledProblem, group: list[PieceAnswer], largest: float
-) -> tuple[PieceSolution, int | None]:
-    """What a group of answers stands for, and its degree; None of a set, or where not known."""
-    first, known, sole = group[0], None, False
-    if first.existence is Existence.SURE and len(group) == 1:
-        known, sole = first.sign, True
-    elif not first.freedom:
-        known, sole = degree(piece, group)
-    least = max(abs(known or 0), sum(a.exists for a in group), 2 if first.freedom else 0)
+    piece: ScaledProblem, group: list[PieceAnswer], known: Degree, largest: float
+) -> PieceSolution:
+    """What a group of answers stands for."""
+    first, value = group[0], known.value or 0
+    least = max(abs(value), sum(a.exists for a in group), 2 if first.freedom else 0)
     apart = max(float((np.abs(a.r - first.r) + a.off_r).max(initial=0.0))
                 for a in group if not a.freedom or a is first)  # fmt: skip
     reaction = (first.r * piece.to_r).reshape(-1, 2)
     velocity = np.array(piece.problem.velocity(reaction)[0])
     error = piece.problem.error(reaction)
     energy = float(first.r @ piece.W @ first.r) / 2 * piece.unit**2
-    entry = PieceSolution(
+    return PieceSolution(
         _word(first.states), tuple(_word(a.states) for a in group[1:]), reaction, velocity,
-        error, known or 0, energy, first.freedom, sole, least, apart / largest, first.still,
+        error, value, energy, first.freedom, known.sole, least, apart / largest, first.still,
     )  # fmt: skip
-    return entry, known
 
 
 def _proof(piece: ScaledProblem, cuts: list[Cut] | None) -> Proof | None:

@@ -1,11 +1,14 @@
 """How many solutions a border of the law stands for: the local degree of a solution there.
 
 A solution inside a linear piece counts as the sign of its determinant.  One on the border of
-several pieces belongs to all of them: with a small change d of the load each piece P gives a
-change dr of the solution, and has a solution where dr goes into P.  The degree is the sum of
-their signs, and the same for every d.  Where all signs are +1 it is their number: with degree
-one there is exactly one solution, whatever d.  Signs that differ hide two solutions of
-different status, or none, in what rounding leaves open.
+several pieces belongs to all of them.  Contacts that are not on a border keep their status, the
+others have one of those that meet there, and inequalities that are far from zero are left out:
+a piecewise linear map of its own, whose pieces are cones.  Its degree is the sum of the signs
+of all pieces that have a solution, for any load; that of a random one is counted.  Where the
+solutions of all pieces fulfil what was left out, for W, q and mu as uncertain as they are,
+those of the cones are those of the problem.  With degree one and all signs +1 there is then
+exactly one solution, whatever rounding does.  Signs that differ hide two solutions of different
+status, or none, in what rounding leaves open.
 
 All degrees add up to one where W is positive definite, or no reaction in the cone has W r = 0:
 (1 - s) mu and W + s with s from 0 to 1 lead to a monotone problem without friction, whose only
@@ -20,47 +23,72 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import pattern_search as search
-from .piece_solution import DATA, PieceAnswer, PieceSystem
+from .piece_solution import DATA, Existence, PieceAnswer, PieceSystem, located
 from .scaled_problem import ScaledProblem, States
 
 Array = NDArray[np.float64]
+FANS = (  # statuses of a contact that together are a law
+    (search.OPEN,), (search.STICK,), (search.SLIP_PLUS,), (search.SLIP_MINUS,),
+    (search.OPEN, search.SLIP_PLUS), (search.OPEN, search.SLIP_MINUS),
+    (search.STICK, search.SLIP_PLUS), (search.STICK, search.SLIP_MINUS),
+    (search.OPEN, search.STICK, search.SLIP_PLUS, search.SLIP_MINUS),
+)  # fmt: skip
 PIECES = 1024  # that may meet in a solution
 GENERIC = 1e-7  # a change of a slack that is too small to have a sign, relative
 TRIES = 4  # changes of the load
 
 
-def degree(scaled: ScaledProblem, group: Sequence[PieceAnswer]) -> tuple[int | None, bool]:
-    """(local degree, exactly one solution?) of answers that are one solution within rounding.
+@dataclass(frozen=True)
+class Degree:
+    """The local degree, whether exactly one solution is there, and the pieces that meet.
 
-    None where a piece that meets there is nearly singular, or too many meet.
+    value: None for a set, where a piece that meets there is nearly singular, too many meet, or
+    solutions may be so far apart that others would meet.
     """
+
+    value: int | None = None
+    sole: bool = False
+    pieces: frozenset[tuple[int, ...]] = frozenset()
+
+
+UNKNOWN = Degree()
+
+
+def degree(scaled: ScaledProblem, group: Sequence[PieceAnswer]) -> Degree:
+    """That of answers that are one solution within rounding, in 2D."""
     first = group[0]
+    if first.existence is Existence.SURE and len(group) == 1:
+        return Degree(first.sign, True, frozenset([tuple(first.states.tolist())]))
+    if first.freedom:
+        return UNKNOWN
     off_r = np.max([np.abs(g.r - first.r) + g.off_r for g in group], axis=0)
     off_u = np.max([np.abs(g.u - first.u) + g.off_u for g in group], axis=0)
     choices = [_statuses(scaled, first, i, off_r, off_u) for i in range(scaled.contacts)]
     if np.prod([float(len(own)) for own in choices]) > PIECES:
-        return None, False
+        return UNKNOWN
     pieces = []
     for states in itertools.product(*choices):
-        piece = _Cone.of(scaled, np.array(states, dtype=np.int8), first, off_r, off_u)
+        kept = [_kept(own, state) for own, state in zip(choices, states, strict=True)]
+        piece = _Cone.of(scaled, np.array(states, dtype=np.int8), np.concatenate(kept))
         if piece is None:
-            return None, False
+            return UNKNOWN
         pieces.append(piece)
-    met = {tuple(piece.states) for piece in pieces}
-    if any(tuple(g.states) not in met for g in group):
-        return None, False
+    met = frozenset(tuple(piece.states) for piece in pieces)
+    if any(tuple(g.states.tolist()) not in met for g in group):
+        return UNKNOWN
     random = np.random.default_rng(0)
     found = {_count(pieces, random.standard_normal(len(scaled.W))) for _ in range(TRIES)}
     found -= {None}
     if len(found) != 1:
-        return None, False
+        return UNKNOWN
     (value,) = found
-    return value, value == 1 and all(piece.sign == 1 for piece in pieces)
+    return Degree(value, value == 1 and all(piece.sign == 1 for piece in pieces), met)
 
 
 def _statuses(
@@ -84,7 +112,20 @@ def _statuses(
             out.append(search.SLIP_PLUS)
         if abs(at.r[t] + mu * at.r[n]) <= room and at.u[t] >= -off_u[t]:
             out.append(search.SLIP_MINUS)
-    return out
+    return out if mu == 0 or tuple(out) in FANS else list(FANS[-1])
+
+
+def _kept(statuses: Sequence[int], state: int) -> list[bool]:
+    """Which inequalities of a state belong to the law that some statuses make.
+
+    In the order of `ScaledProblem.slack_matrices`.
+    """
+    whole, alone = len(statuses) == len(FANS[-1]), len(statuses) == 1
+    if state in (search.OPEN, search.FRICTIONLESS):
+        return [not alone]
+    if state == search.STICK:
+        return [whole or search.SLIP_PLUS in statuses, whole or search.SLIP_MINUS in statuses]
+    return [whole or search.OPEN in statuses, whole or search.STICK in statuses]
 
 
 class _Cone:
@@ -93,20 +134,23 @@ class _Cone:
     def __init__(self, system: PieceSystem, X: Array, active: NDArray[np.bool_]) -> None:
         self.system, self.X, self.active = system, X, active
         self.states = system.states.tolist()
-        E = (system.scaled.W @ system.R)[system.rows]
-        self.sign = int(np.linalg.slogdet(E)[0]) if len(E) else 1
+        self.sign = system.sign
 
     @classmethod
     def of(
-        cls, scaled: ScaledProblem, states: States, at: PieceAnswer, off_r: Array, off_u: Array
+        cls, scaled: ScaledProblem, states: States, active: NDArray[np.bool_]
     ) -> _Cone | None:
-        """The cone of a pattern at a point, None where its determinant has no sure sign."""
+        """The cone of a pattern with some of its inequalities.
+
+        None where its determinant has no sure sign, or its solution may violate another one.
+        """
         system = PieceSystem.of(scaled, states)
         found = system.inverse(DATA)
         if found is None:
             return None
-        slack = system.P @ at.r + system.Q @ at.u
-        active = slack <= np.abs(system.P) @ off_r + np.abs(system.Q) @ off_u
+        own = located(system, *found, DATA)
+        if (own.slack[~active] <= own.off_slack[~active]).any():
+            return None
         return cls(system, found[0], active)
 
     def enters(self, d: Array) -> bool | None:

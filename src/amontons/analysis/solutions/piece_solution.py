@@ -90,6 +90,12 @@ class PieceSystem:
         """Slacks as functions of y, (s, k)."""
         return self.P @ self.R + self.Q @ (self.scaled.W @ self.R)
 
+    @property
+    def sign(self) -> int:
+        """Of the determinant."""
+        E = (self.scaled.W @ self.R)[self.rows]
+        return int(np.linalg.slogdet(E)[0]) if len(E) else 1
+
     def inverse(self, data: float) -> tuple[Array, float] | None:
         """(X, rho), None where the piece may be singular for data that are off so much."""
         E = (self.scaled.W @ self.R)[self.rows]
@@ -122,8 +128,20 @@ def _exists_as_given(system: PieceSystem) -> bool:
     return found is not None and _judged(system, *found, 0.0).exists
 
 
-def _judged(system: PieceSystem, X: Array, rho: float, data: float) -> PieceAnswer:
-    """The answer about a regular piece."""
+@dataclass(frozen=True, eq=False)
+class Located:
+    """The solution of the equations of a piece, its slacks, and bounds of all errors."""
+
+    r: Array
+    u: Array
+    slack: Array
+    off_r: Array
+    off_u: Array
+    off_slack: Array
+
+
+def located(system: PieceSystem, X: Array, rho: float, data: float) -> Located:
+    """Where the equations of a regular piece hold, for data that are off so much."""
     scaled, R, rows = system.scaled, system.R, system.rows
     y = -(X @ scaled.c[rows])
     for _ in range(2):
@@ -140,17 +158,23 @@ def _judged(system: PieceSystem, X: Array, rho: float, data: float) -> PieceAnsw
     through = np.abs(system.L @ X) + gamma(2 * len(scaled.W) + 4) * (size @ np.abs(X))
     off = through @ error + size.sum(axis=1) * rest + EPSILON * np.abs(slack)
     off += (2 * fine + 3 * data) * (np.abs(system.P) @ y_size + np.abs(system.Q) @ terms)
-    existence = Existence.NEAR
-    if (slack < -off).any():
-        existence = Existence.NONE
-    elif (slack > off).all():
-        existence = Existence.SURE
     off_r = np.abs(R) @ (lead + rest) + (data + 2 * EPSILON) * y_size
     off_u = np.abs(scaled.W @ R) @ (lead + rest) + EPSILON * np.abs(u)
     off_u += (fine + data + gamma(len(y) + 4) * rho) * terms
-    sign = int(np.linalg.slogdet((scaled.W @ R)[rows])[0]) if len(rows) else 1
+    return Located(r, u, slack, off_r, off_u, off)
+
+
+def _judged(system: PieceSystem, X: Array, rho: float, data: float) -> PieceAnswer:
+    """The answer about a regular piece."""
+    at = located(system, X, rho, data)
+    existence = Existence.NEAR
+    if (at.slack < -at.off_slack).any():
+        existence = Existence.NONE
+    elif (at.slack > at.off_slack).all():
+        existence = Existence.SURE
     exists = existence is Existence.SURE
-    return PieceAnswer(system.states, existence, r, u, off_r, off_u, exists, sign)
+    return PieceAnswer(system.states, existence, at.r, at.u, at.off_r, at.off_u, exists,
+                       system.sign)  # fmt: skip
 
 
 def _exact(system: PieceSystem, y: Array) -> tuple[Array, Array, Array]:
