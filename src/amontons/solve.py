@@ -37,6 +37,7 @@ EARLY = 100  # iterates after which a problem that no method is made for is give
 BLUR = 1e-2  # rounding, relative to the tolerance, above which an error is evaluated sharply
 BLURRED = 20  # iterates that would do if rounding could hide no error in them
 TIGHTER = 0.3  # goal of a second start, relative to what would just do
+GAVE_UP = (Outcome.STAGNATED, Outcome.BREAKDOWN, Outcome.CYCLED, Outcome.NON_FINITE)
 TIGHTEST = 1e-300  # smallest goal: contacts far smaller than others need tiny sums
 
 
@@ -237,8 +238,7 @@ def _run(
         outcome, detail = Outcome.TIME_LIMIT, ""
     except KeyboardInterrupt:
         return Outcome.STOPPED, "by the user"
-    gave_up = outcome in (Outcome.STAGNATED, Outcome.BREAKDOWN, Outcome.CYCLED)
-    if watch.weak and gave_up:
+    if watch.weak and outcome in GAVE_UP:
         return Outcome.WEAK_CONTACTS, watch.in_words
     return outcome, "; ".join(text for text in (detail, watch.in_words) if text)
 

@@ -75,7 +75,6 @@ def test_some_signals_while_files_are_written(runs):
     fine(by_signals(runs, signal.SIGTERM, 143, (8, 150)))
 
 
-@pytest.mark.slow_faults
 def test_ctrl_c_at_some_stages(runs):
     fine(by_interrupts(runs, STAGES[::3]))
 

@@ -117,6 +117,7 @@ def _waited(child: int, began: float, command: dict[str, Any]) -> int:
 def _work(command: dict[str, Any], said: str) -> None:
     """Do a command as a process of its own does it, and end."""
     os.setpgid(0, 0)
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in the background
     place = os.open(said, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
     for stream in (1, 2):
         os.dup2(place, stream)

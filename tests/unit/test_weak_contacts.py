@@ -16,7 +16,7 @@ from amontons.judge import Measure
 from amontons.judge_sharp import sharp_error
 from amontons.solution import Outcome
 from amontons.solve import drive
-from amontons.solvers.base import Iterate
+from amontons.solvers.base import Breakdown, Iterate
 
 
 def random_problem(seed, nc=4, d=3):
@@ -99,16 +99,19 @@ class Loose:
 
     form = am.Form.ANY
 
-    def __init__(self, r, v=None):
-        self.iterate = Iterate(np.array(r), v)
+    def __init__(self, r, v=None, last=None):
+        self.iterate, self.last = Iterate(np.array(r), v), last
 
     def iterates(self, problem, start, target):
         yield self.iterate
+        if self.last is not None:
+            raise self.last
 
 
-def test_named_outcome():
+@pytest.mark.parametrize("last", [None, FloatingPointError("overflow"), Breakdown("stuck")])
+def test_named_outcome(last):
     problem = am.FrictionProblem.from_delassus(np.eye(4), [[-1, 0], [1e9, 0]], [0.3, 0.3])
-    found = drive(problem, Loose(np.zeros((2, 2))))
+    found = drive(problem, Loose(np.zeros((2, 2)), last=last))
     assert found.convergence.outcome is Outcome.WEAK_CONTACTS
     assert "contact 0" in found.convergence.detail
     assert found.convergence.error <= 1e-8

@@ -17,7 +17,8 @@ class Stopping:
     """Holds the handlers of both signals while its block runs.
 
     A signal raises KeyboardInterrupt within `breaking`, and only there; elsewhere, and where
-    the exception is lost in a library, `received` remembers it.
+    the exception is lost in a library, `received` remembers it.  A signal that the process was
+    started to ignore, as shells do for commands in the background, is still ignored.
     """
 
     def __init__(self) -> None:
@@ -27,7 +28,8 @@ class Stopping:
 
     def __enter__(self) -> Stopping:
         if threading.current_thread() is threading.main_thread():  # others can not set handlers
-            self._before = {number: signal.signal(number, self._take) for number in SIGNALS}
+            heard = [n for n in SIGNALS if signal.getsignal(n) is not signal.SIG_IGN]
+            self._before = {number: signal.signal(number, self._take) for number in heard}
         return self
 
     def __exit__(self, *_: object) -> None:
