@@ -264,7 +264,7 @@ def test_bad_options_are_named():
     with pytest.raises(InvalidInput, match="smoothing"):
         am.MultigridCycle(smoothing=0)
     with pytest.raises(InvalidInput, match="shape"):
-        am.MultigridCycle(shape="w")
+        am.MultigridCycle(shape="spiral")
 
 
 def test_cycles_say_where_they_do_not_apply():

@@ -24,6 +24,7 @@ from ..cones import Coulomb, Law
 from ..errors import InvalidInput, SingularOperator
 from ..linear import Direct, LinearSolver
 from ..one_sided import HELD, OneSided, one_sided
+from ..options import check_options
 from ..problem import Form, FrictionProblem
 from .active_conditions import (
     Conditions,
@@ -95,6 +96,7 @@ class ActiveSet:
     linear: LinearSolver = field(default_factory=Direct)
 
     def __post_init__(self) -> None:
+        check_options(self)
         for name in ("c_normal", "c_tangential"):
             if getattr(self, name) is not None:
                 check_positive(**{name: getattr(self, name)})
