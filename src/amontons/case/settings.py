@@ -78,7 +78,7 @@ def _made(part: Any, options: dict[str, Any], where: str) -> Any:
     try:
         return part(**values) if part is kind else dataclasses.replace(part, **values)
     except InvalidInput as reason:
-        raise InvalidInput(f"{where}.{reason}") from None
+        raise InvalidInput(f"{where}.{in_words(str(reason))}") from None
 
 
 def _no_such_field(method: str, name: str, names: list[str]) -> str:
