@@ -8,7 +8,7 @@ import os
 import platform
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from .errors import InvalidInput
 from .files import made, put, replacing
-from .solution import FrictionSolution
+from .solution import Convergence, FrictionSolution
 from .solvers import METHODS
 from .warned import ResultWarning
 
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 SCHEMA = "amontons/solution/1"
 LIBRARIES = ("amontons", "numpy", "scipy", "numba", "ngsolve")
+MOST_SETS = 12  # changes of sets that a summary shows; solution.json has all
 FIGURES = (".png", ".svg", ".pdf")
 
 
@@ -156,6 +157,7 @@ def summary(output: Output) -> dict[str, Any]:
         "dimension": problem.dimension,
         "unknowns": problem.unknowns,
         "contacts": contacts,
+        "active_sets": _active_sets(record),
         "resultant": resultant,
         "max_penetration": found.max_penetration,
         "max_cone_violation": found.max_cone_violation,
@@ -164,6 +166,34 @@ def summary(output: Output) -> dict[str, Any]:
         "versions": versions(),
     }
     return finite(data)
+
+
+def _active_sets(record: Convergence) -> dict[str, Any] | None:
+    """What an active set method did step by step; None for other methods.
+
+    normal, tangential: |A_n| and |A_tau|; change: of u; settled: the first iteration with the
+    final sets, kept from then on.
+    """
+    steps = [
+        {"iteration": step.iteration, "error": step.error,
+         "linear_iterations": step.linear_iterations, **asdict(step.sets)}
+        for step in record.history if step.sets is not None
+    ]  # fmt: skip
+    return {"settled": record.sets_settled, "steps": steps} if steps else None
+
+
+def _sets_in_words(record: Convergence) -> str:
+    """A line with the iterations in which the active sets changed, "" without any."""
+    new = [step for step in record.history if step.sets is not None and not step.sets.kept]
+    if not new:
+        return ""
+    shown = [f"{step.iteration}: {step.sets}" for step in new]
+    if len(shown) > MOST_SETS:
+        shown = [*shown[: MOST_SETS - 1], "…", shown[-1]]
+    return (
+        f"active sets open/stick/slip, where they change: {', '.join(shown)} (of "
+        f"{record.iterations} iterations)"
+    )
 
 
 def _method_name(solver: str) -> str:
@@ -211,6 +241,9 @@ def describe(output: Output) -> str:
     lines = [text]
     if output.solution.convergence.stamp:
         lines.append("NOT CONVERGED: what follows is no solution")
+    sets = _sets_in_words(output.solution.convergence)
+    if sets:
+        lines.append(sets)
     if output.fields is not None:
         names = ("x", "y", "z")[: len(output.fields.resultant)]
         total = output.fields.resultant

@@ -17,7 +17,7 @@ from .judge import Measure
 from .nitsche_problem import NitscheProblem
 from .problem import FrictionProblem
 from .settling import Settled
-from .status import ContactStatus, classify, margins
+from .status import ActiveSets, ContactStatus, classify, margins
 from .warned import ResultWarning
 
 Array = NDArray[np.float64]
@@ -61,6 +61,7 @@ class Step:
     error: float
     linear_iterations: int
     seconds: float
+    sets: ActiveSets | None = None  # of an active set method
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +82,12 @@ class Convergence:
     contact_tolerance: float = np.inf
     weakest: int | None = None  # that contact; None where all obey their laws exactly
     compiling: float = 0.0  # seconds of preparing compiled code, which no other time holds
+
+    @property
+    def sets_settled(self) -> int | None:
+        """The first iteration with the final active sets, kept from then on; None without."""
+        last = self.history[-1] if self.history else None
+        return None if last is None or last.sets is None else last.iteration - last.sets.kept
 
     @property
     def by_user(self) -> bool:

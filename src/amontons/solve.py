@@ -31,6 +31,7 @@ from .solvers.base import Breakdown, Iterate, Solver, Target
 Array = NDArray[np.float64]
 Callback = Callable[[Step, Iterate], bool | None]
 MEMORY = 64  # iterates among which a repetition counts as a cycle
+AT_REST = 1e-10  # relative change of r below which an iterate has not moved
 PATIENCE = 500  # iterates without any progress before a solve counts as stagnated
 PROGRESS = 0.99  # the best error must fall at least by this factor within PATIENCE
 EARLY = 100  # iterates after which a problem that no method is made for is given up
@@ -79,7 +80,7 @@ class _Watch:
         self.iterations += iterate.iterations
         self.linear_iterations += iterate.linear_iterations
         seconds = now() - self.started
-        step = Step(self.iterations, error, self.linear_iterations, seconds)
+        step = Step(self.iterations, error, self.linear_iterations, seconds, iterate.sets)
         self.history.append(step)
         if self.best is None or self._better(error, weakest):
             self.best, self.error, self.weakest = iterate, error, weakest
@@ -137,11 +138,16 @@ class _Watch:
         return max(min(self.error * share, TIGHTER * goal), np.finfo(float).tiny)
 
     def cycled(self, iterate: Iterate, error: float) -> bool:
-        """True when this iterate was here before, with other iterates in between."""
+        """True when this iterate was here before, with other iterates in between.
+
+        One that hardly moves does not come back: its method may wait for something else.
+        """
         same = [self._repeats(iterate, error, *old) for old in self.seen]
+        size = np.abs(iterate.r).max(initial=0.0)
+        moved = not self.seen or np.abs(self.seen[-1][1] - iterate.r).max(initial=0.0)
         self.seen.append((error, iterate.r))
         del self.seen[:-MEMORY]
-        return any(same) and not same[-1]
+        return any(same) and not same[-1] and moved > AT_REST * size
 
     @staticmethod
     def _repeats(iterate: Iterate, error: float, old_error: float, old: Array) -> bool:
@@ -254,6 +260,7 @@ def _once(
     """The loop over the iterates of one start.
 
     Returns why it ended; None when the error is below the target, but not that of contacts.
+    A method with a stopping rule of its own (`Iterate.ends`) is not stopped before that holds.
     """
     try:
         each = _operations(watch.problem) if target.deadline.work is not None else 0.0
@@ -261,8 +268,10 @@ def _once(
             target.deadline.spend(iterate.iterations * each)
             step = watch.judge(iterate)
             stop = callback is not None and callback(step, iterate)
-            if watch.converged:
-                return Outcome.CONVERGED, iterate.stage
+            if watch.converged and iterate.ends != "":
+                return Outcome.CONVERGED, iterate.stage or iterate.ends or ""
+            if iterate.ends:
+                return Outcome.STOPPED, f"by its own rule: {iterate.ends}"
             if stop:
                 return Outcome.STOPPED, "by the callback"
             if not np.isfinite(step.error):
@@ -271,7 +280,7 @@ def _once(
                 return Outcome.MAX_ITERATIONS, ""
             if target.deadline.passed:
                 return Outcome.TIME_LIMIT, ""
-            if watch.weak and step.error <= target.tolerance:
+            if watch.weak and step.error <= target.tolerance and iterate.ends is None:
                 return None
             if len(watch.history) == EARLY and gains_energy(watch.problem):
                 return Outcome.BREAKDOWN, "stopped early"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
@@ -11,6 +12,7 @@ from .nitsche_problem import NitscheProblem
 from .problem import FrictionProblem
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 
 class ContactStatus(IntEnum):
@@ -19,6 +21,33 @@ class ContactStatus(IntEnum):
     OPEN = 0
     SLIP = 1
     STICK = 2
+
+
+@dataclass(frozen=True)
+class ActiveSets:
+    """Numbers of contacts in the sets of one step of an active set method.
+
+    open, stick, slip: not in contact; in contact and held; in contact and sliding.  normal,
+    tangential: |A_n| and |A_tau|, where the second counts open contacts that may slide too.
+    kept: steps right before this one with the same sets.  change: of u, relative.
+    """
+
+    open: int
+    stick: int
+    slip: int
+    normal: int
+    tangential: int
+    kept: int
+    change: float
+
+    @classmethod
+    def of(cls, normal: Mask, tangential: Mask, kept: int, change: float) -> ActiveSets:
+        """From which contacts are in A_n and A_tau, (nc,)."""
+        slip, closed, able = (int(m.sum()) for m in (normal & tangential, normal, tangential))
+        return cls(len(normal) - closed, closed - slip, slip, closed, able, kept, change)
+
+    def __str__(self) -> str:
+        return f"{self.open}/{self.stick}/{self.slip}"
 
 
 def classify(

@@ -54,6 +54,33 @@ def test_json(solution, tmp_path):
     assert data["versions"]["amontons"] == am.__version__
 
 
+def test_active_sets_step_by_step(tmp_path):
+    """In solution.json and in the summary; other methods have none."""
+    body = am.Body(am.box((1, 1, 1), cells=4), am.LinearElastic(200, 0.3))
+    model = am.Model(
+        [body], supports=[am.Fix("top", lambda x: (0, 0.1, 0.03 - 0.1 * x[0]))],
+        contacts=[am.Contact("bottom", am.Plane((0, 0, 1)), mu=0.6)],
+    )  # fmt: skip
+    found = am.solve(model, am.ActiveSet(bound="fixed-point", change=1e-9))
+    found.write(tmp_path / "a.json")
+    sets = json.loads((tmp_path / "a.json").read_text())["active_sets"]
+    steps = sets["steps"]
+    assert [step["iteration"] for step in steps] == list(range(1, len(steps) + 1))
+    assert all(step["open"] + step["stick"] + step["slip"] == 25 for step in steps)
+    assert steps[-1]["change"] < 1e-9 <= steps[-2]["change"]
+    last = {key: steps[-1][key] for key in ("open", "stick", "slip")}
+    assert last == found.counts
+    assert sets["settled"] == len(steps) - steps[-1]["kept"]
+    text = output.describe(found.output)
+    first = "{open}/{stick}/{slip}".format(**steps[0])
+    final = "{open}/{stick}/{slip}".format(**steps[-1])
+    assert f"open/stick/slip, where they change: 1: {first}, 2: " in text
+    assert f"{sets['settled']}: {final} (of {len(steps)} iterations)" in text
+    other = output.summary(am.solve(model).output)
+    assert other["active_sets"] is None
+    assert "active sets" not in output.describe(am.solve(model).output)
+
+
 def test_json_has_no_nan():
     found = drive(one_contact_2d(), max_iterations=1)
     broken = replace(found, convergence=replace(found.convergence, error=np.inf))

@@ -11,15 +11,14 @@ from __future__ import annotations
 
 import dataclasses
 import re
-import types
 import typing
 from dataclasses import dataclass, field
-from enum import Enum
 from typing import Any
 
 from .. import linear, solvers
-from ..errors import InvalidInput, shown
+from ..errors import InvalidInput
 from ..expressions import nearest
+from ..options import alternatives, hints_of, is_enum, members_of, usual_part
 from ..solvers import METHODS
 from ..solvers.base import Solver
 
@@ -64,15 +63,14 @@ def make_solver(method: str, options: dict[str, Any]) -> Solver:
 def _made(part: Any, options: dict[str, Any], where: str) -> Any:
     """A dataclass, or a copy of an instance, with some fields set; `where` is its key."""
     kind = part if isinstance(part, type) else type(part)
-    hints = typing.get_type_hints(kind)
-    fields = {f.name: f for f in dataclasses.fields(kind) if f.init}
+    hints = hints_of(kind)
     values = {}
     for name, value in options.items():
         key = f"{where}.{name}"
-        if name not in fields:
-            hint = nearest(name, fields) if fields else ""
+        if name not in hints:
+            hint = nearest(name, hints) if hints else ""
             raise InvalidInput(f"{key}: {_kebab(kind.__name__)} has no such field{hint}")
-        default = _default(fields[name])
+        default = usual_part(kind, name)
         if isinstance(value, dict) and "kind" not in value and default is not None:
             values[name] = _made(default, value, key)
         else:
@@ -80,13 +78,7 @@ def _made(part: Any, options: dict[str, Any], where: str) -> Any:
     try:
         return part(**values) if part is kind else dataclasses.replace(part, **values)
     except InvalidInput as reason:
-        raise InvalidInput(f"{where}.{reason}") from None
-
-
-def _default(field: dataclasses.Field) -> Any:
-    """The part that a field holds when nothing is said, None where it holds a value."""
-    made = field.default_factory
-    return None if made is dataclasses.MISSING else made()
+        raise InvalidInput(f"{where}.{in_words(str(reason))}") from None
 
 
 def _no_such_field(method: str, name: str, names: list[str]) -> str:
@@ -109,29 +101,45 @@ def in_words(text: str) -> str:
 
 
 def _convert(name: str, value: Any, hint: Any) -> Any:
-    """A value of the type that a field is annotated with; `name` is its dotted key."""
-    if isinstance(hint, types.UnionType) or typing.get_origin(hint) is typing.Union:
-        return _convert_union(name, value, typing.get_args(hint))
-    if hint is bool:
-        return _word(name, value, {"true": True, "false": False})
-    if hint in (int, float):
-        return _number(name, value, hint)
-    if isinstance(hint, type) and issubclass(hint, Enum):
-        return _word(name, value, _words(hint))
-    if hint is str and isinstance(value, str):
-        return value
-    if isinstance(value, str | dict):
-        return _component(name, value, hint)
-    raise InvalidInput(f"{name}: can not be set here, use the Python interface")
+    """What a field gets for a text or a table; the field itself checks what remains.
+
+    name: its dotted key.  Texts are read as "none", numbers and truth values where the field
+    takes such; words of enums are left to the field, see `amontons.options`.
+    """
+    hints = alternatives(hint)
+    parts = [one for one in hints if _is_part(one)]
+    if type(None) in hints and value == "none":
+        return None
+    if parts and isinstance(value, str | dict):
+        return _component(name, value, parts[0])
+    if parts or any(typing.get_origin(one) is tuple for one in hints):
+        raise InvalidInput(f"{name}: can not be set here, use the Python interface")
+    return _read(value, hints) if isinstance(value, str) else value
 
 
-def _words(kind: type[Enum]) -> dict[str, Enum]:
-    return {member.name.lower().replace("_", "-"): member for member in kind}
+def _is_part(hint: Any) -> bool:
+    """True for a class or protocol of parts of solvers."""
+    plain = (bool, int, float, str, type(None))
+    return isinstance(hint, type) and hint not in plain and not is_enum(hint)
+
+
+def _read(text: str, hints: tuple[Any, ...]) -> Any:
+    """The number or truth value that a text is, where one of the types takes such."""
+    truth = {"true": True, "false": False}
+    if bool in hints and text.lower() in truth:
+        return truth[text.lower()]
+    for kind in (int, float):
+        if kind in hints:
+            try:
+                return kind(text)
+            except ValueError:
+                continue
+    return text
 
 
 def _component(name: str, value: str | dict[str, Any], protocol: type) -> Any:
     """A part of a solver by its class name in kebab-case, or by a table with that as kind."""
-    wanted = [key for key in vars(protocol) if not key.startswith("_")]
+    wanted = members_of(protocol)
     fitting: dict[str, type] = {
         _kebab(kind.__name__): kind
         for kind in (getattr(home, key) for home in (solvers, linear) for key in home.__all__)
@@ -140,9 +148,9 @@ def _component(name: str, value: str | dict[str, Any], protocol: type) -> Any:
         and all(hasattr(kind, key) for key in wanted)
     }
     options = dict(value) if isinstance(value, dict) else {"kind": value}
-    if "kind" not in options:
+    if "kind" not in options and len(fitting) > 1:
         raise InvalidInput(f"{name}.kind: missing, expected one of {', '.join(fitting)}")
-    chosen = str(options.pop("kind"))
+    chosen = str(options.pop("kind", next(iter(fitting))))
     if chosen not in fitting:
         raise InvalidInput(f"{name}: unknown value '{chosen}'{nearest(chosen, fitting)}")
     return _made(fitting[chosen], options, name)
@@ -150,48 +158,3 @@ def _component(name: str, value: str | dict[str, Any], protocol: type) -> Any:
 
 def _kebab(name: str) -> str:
     return re.sub(r"(?<!^)(?=[A-Z])", "-", name).lower()
-
-
-def _convert_union(name: str, value: Any, hints: tuple) -> Any:
-    if type(None) in hints and (value is None or value == "none"):
-        return None
-    reasons = []
-    for hint in hints:
-        if hint is type(None):
-            continue
-        try:
-            return _convert(name, value, hint)
-        except InvalidInput as reason:
-            reasons.append(reason)
-    if len(reasons) == 1:
-        raise reasons[0]
-    wanted = " or ".join(_wanted(hint) for hint in hints if hint is not type(None))
-    raise InvalidInput(f"{name}: expected {wanted}, got {shown(value)}")
-
-
-def _wanted(hint: Any) -> str:
-    """What a field of that type takes, for messages."""
-    if isinstance(hint, type) and issubclass(hint, Enum):
-        return " or ".join(_words(hint))
-    return {int: "a whole number", float: "a number"}.get(hint, hint.__name__)
-
-
-def _word(name: str, value: Any, words: dict[str, Any]) -> Any:
-    key = str(value).lower()
-    if key not in words:
-        raise InvalidInput(f"{name}: expected {' or '.join(words)}, got {shown(value)}")
-    return words[key]
-
-
-def _number(name: str, value: Any, kind: type) -> Any:
-    wanted = "a whole number" if kind is int else "a number"
-    problem = InvalidInput(f"{name}: expected {wanted}, got {shown(value)}")
-    if isinstance(value, bool) or (kind is int and isinstance(value, float)):
-        raise problem
-    try:
-        number = kind(value)
-    except (TypeError, ValueError, OverflowError):
-        raise problem from None
-    if number != number or number in (float("inf"), -float("inf")):
-        raise problem
-    return number

@@ -27,6 +27,7 @@ from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
 from ..errors import InvalidInput, MissingDependency, SingularOperator
+from ..options import check_options
 from .base import stored
 
 Array = NDArray[np.float64]
@@ -77,6 +78,7 @@ class Direct:
     threads: int = 0  # 0: the backend's own choice (rslab only)
 
     def __post_init__(self) -> None:
+        check_options(self)
         if self.threads < 0:
             raise InvalidInput(f"threads: expected 0 (automatic) or more, got {self.threads}")
         if self.backend is not None and not self.backend.installed:

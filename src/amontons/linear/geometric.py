@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..errors import InvalidInput, SingularOperator
+from ..options import check_options
 from .base import by_columns, check_stopping
 from .grid_matrix import GridMatrix
 from .hierarchy import Hierarchy, Nodes, components
@@ -32,6 +33,7 @@ class GeometricMultigrid:
     max_iterations: int = 200
 
     def __post_init__(self) -> None:
+        check_options(self)
         check_stopping(self.tolerance, self.max_iterations)
         if self.dimension not in (2, 3):
             raise InvalidInput(f"dimension: expected 2 or 3, got {self.dimension}")

@@ -10,6 +10,7 @@ from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
 from ..errors import SingularOperator
+from ..options import check_options
 from .base import Factor, LinearSolver, by_columns, check_stopping, stored
 from .multigrid import AlgebraicMultigrid
 
@@ -25,6 +26,7 @@ class ConjugateGradient:
     max_iterations: int = 500
 
     def __post_init__(self) -> None:
+        check_options(self)
         check_stopping(self.tolerance, self.max_iterations)
 
     def factor(

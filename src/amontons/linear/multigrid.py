@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..errors import InvalidInput
+from ..options import check_options
 from .base import stored
 
 Array = NDArray[np.float64]
@@ -22,6 +23,7 @@ class AlgebraicMultigrid:
     strength: float = 0.0  # smaller connections are ignored when nodes are grouped
 
     def __post_init__(self) -> None:
+        check_options(self)
         if self.block_size < 1:
             raise InvalidInput(f"block_size: expected at least 1, got {self.block_size}")
 

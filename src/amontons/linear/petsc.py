@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..errors import InvalidInput, MissingDependency, SingularOperator
+from ..options import check_options
 from .base import by_columns, check_stopping
 
 Array = NDArray[np.float64]
@@ -29,6 +30,7 @@ class Petsc:
     max_iterations: int = 500
 
     def __post_init__(self) -> None:
+        check_options(self)
         check_stopping(self.tolerance, self.max_iterations)
 
     def factor(

@@ -1,8 +1,8 @@
 """Solvers of the discrete problem, one file per family; a new one is a file and a line here."""
 
-from .active_conditions import Modification
+from .active_conditions import FrictionFunction, Modification
 from .active_multigrid import CycleShape, MultigridCycle
-from .active_set import ActiveSet, ActiveSetIterate, FrictionBound
+from .active_set import ActiveSet, ActiveSetIterate, ChangeNorm, FrictionBound
 from .augmentation import RhoStrategy
 from .base import Breakdown, Iterate, Solver, Target
 from .compressed import CompressedDelassus
@@ -46,11 +46,13 @@ __all__ = [
     "Auto",
     "Batch",
     "Breakdown",
+    "ChangeNorm",
     "ComplementarityFunction",
     "CompressedDelassus",
     "ContactMultigrid",
     "CycleShape",
     "FrictionBound",
+    "FrictionFunction",
     "FullStep",
     "GaussSeidel",
     "GoldsteinPrice",

@@ -18,7 +18,10 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import SingularOperator
+
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 
@@ -28,6 +31,14 @@ class Modification(Enum):
     FIRST = "first"  # (3.11): unsymmetric, positive eigenvalues
     SECOND = "second"  # (3.12): symmetric
     THIRD = "third"  # (3.13): symmetric, positive definite without a factor beta
+    UNMODIFIED = "unmodified"  # (3.5b) as it stands, which may be singular: for comparison
+
+
+class FrictionFunction(Enum):
+    """The function that friction makes zero, with s = lambda + c u; [HSW] section 3."""
+
+    PRODUCT = "product"  # (3.1): max(g, |s|) lambda - g s
+    QUOTIENT = "quotient"  # (3.14): lambda - g s / max(g, |s|), less robust
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,17 +69,38 @@ class Robin:
     beta: Array
 
 
+def robin_of_quotient(lam: Array, u: Array, g: Array, c: Array) -> Robin:
+    """The Newton step on (3.14) of contacts with |s| > g > 0, arrays as in `robin`.
+
+    With e = g / |s| and P = I - s s' / |s|^2 it reads (I - e P) lambda - c e P u = e s.
+    """
+    s = lam + c[:, None] * u
+    size = np.linalg.norm(s, axis=1)
+    ray, e = s / size[:, None], g / size
+    identity = np.eye(lam.shape[1])
+    P = identity - np.einsum("ki,kj->kij", ray, ray)
+    W = np.linalg.inv(identity - e[:, None, None] * P)
+    L = c[:, None, None] * (W - identity)
+    return Robin(L, -g[:, None] * ray, ray, _cosine(lam, s), np.ones(len(g)))
+
+
+def _cosine(lam: Array, s: Array) -> Array:
+    """alpha, (nc,): the cosine between lambda and s, 0 where lambda is."""
+    size = np.linalg.norm(lam, axis=1) * np.linalg.norm(s, axis=1)
+    return (lam * s).sum(axis=1) / np.where(size > 0, size, 1.0)
+
+
 def robin(lam: Array, u: Array, g: Array, c: Array, modification: Modification) -> Robin:
     """Robin conditions (3.10) of contacts with |lambda + c u| > g > 0.
 
-    lam, u: (nc, t), in the paper's signs; g, c: (nc,).
+    lam, u: (nc, t), in the paper's signs; g, c: (nc,).  UNMODIFIED: (3.8), which raises
+    SingularOperator where Id - M of (3.5b) has no inverse.
     """
     s = lam + c[:, None] * u
     size, force = np.linalg.norm(s, axis=1), np.linalg.norm(lam, axis=1)
     e, largest = g / size, np.maximum(g, force)
     delta = np.minimum(force / g, 1.0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        alpha = np.where(force > 0, (lam * s).sum(axis=1) / (force * size), 0.0)
+    alpha = _cosine(lam, s)
     outer = np.einsum("ki,kj->kij", lam, s)
     beta = np.ones(len(g))
     if modification is Modification.FIRST:
@@ -77,10 +109,15 @@ def robin(lam: Array, u: Array, g: Array, c: Array, modification: Modification) 
     elif modification is Modification.SECOND:
         F = 0.5 * (outer + outer.transpose(0, 2, 1)) / (largest * size)[:, None, None]
         beta = 2 / (2 - (alpha - 1) * delta)
+    elif modification is Modification.UNMODIFIED:
+        F = outer / (g * size)[:, None, None]
     else:
         F = np.einsum("ki,kj->kij", lam, lam) / largest[:, None, None] ** 2
     identity = np.eye(lam.shape[1])
-    W = np.linalg.inv(identity - (beta * e)[:, None, None] * (identity - F))
+    try:
+        W = np.linalg.inv(identity - (beta * e)[:, None, None] * (identity - F))
+    except np.linalg.LinAlgError:
+        raise SingularOperator("a Robin condition is singular: modify it") from None
     rhs = -np.einsum("kij,kjl,kl->ki", W, F, e[:, None] * s)
     v = np.einsum("kij,kj->ki", W, s / size[:, None])
     return Robin(c[:, None, None] * (W - identity), rhs, v, alpha, beta)
@@ -88,11 +125,19 @@ def robin(lam: Array, u: Array, g: Array, c: Array, modification: Modification) 
 
 @dataclass(frozen=True, eq=False)
 class Settings:
-    """Parameters c_n, c_tau (nc,), unit of r / u, and the choice of (3.11)-(3.13)."""
+    """Parameters c_n, c_tau (nc,), unit of r / u, and what friction is linearised by."""
 
     c_normal: Array
     c_tangential: Array
     modification: Modification
+    function: FrictionFunction = FrictionFunction.PRODUCT
+
+    def sliding(self, lam: Array, u: Array, g: Array, k: Index) -> Robin:
+        """The conditions of the contacts k; lam, u, g: of all."""
+        c = self.c_tangential[k]
+        if self.function is FrictionFunction.QUOTIENT:
+            return robin_of_quotient(lam[k], u[k], g[k], c)
+        return robin(lam[k], u[k], g[k], c, self.modification)
 
 
 def conditions(r: Array, u: Array, g: Array, first: bool, settings: Settings) -> Conditions:
@@ -109,7 +154,7 @@ def conditions(r: Array, u: Array, g: Array, first: bool, settings: Settings) ->
     G_r, G_u, b = _rows(r.shape, normal, tangential)
     alpha, beta = np.full((2, len(r)), np.nan)
     k = np.flatnonzero(tangential & (g > 0))
-    part = robin(lam[k], slip[k], g[k], settings.c_tangential[k], settings.modification)
+    part = settings.sliding(lam, slip, g, k)
     G_u[k, 1:, 1:], b[k, 1:] = part.L, part.rhs
     alpha[k], beta[k] = part.alpha, part.beta
     return Conditions(G_r, G_u, b, normal, tangential, alpha, beta)
@@ -124,11 +169,13 @@ def newton_conditions(r: Array, u: Array, mu: Array, settings: Settings) -> Cond
     tangential = ~normal | (np.linalg.norm(s, axis=1) >= g)
     G_r, G_u, b = _rows(r.shape, normal, tangential)
     alpha, beta = np.full((2, len(r)), np.nan)
-    k = np.flatnonzero(normal & ~tangential)  # (7.2)
+    k = np.flatnonzero(normal & ~tangential)  # (7.2); with (3.14) u_T = 0
+    if settings.function is FrictionFunction.QUOTIENT:
+        k = k[:0]
     G_r[k, 1:, 0] = (mu[k] / g[k])[:, None] * slip[k]
     b[k, 1:] = slip[k]
     k = np.flatnonzero(normal & tangential & (g > 0))  # (7.3)
-    part = robin(lam[k], slip[k], g[k], settings.c_tangential[k], settings.modification)
+    part = settings.sliding(lam, slip, g, k)
     G_u[k, 1:, 1:] = part.L
     G_r[k, 1:, 0] = mu[k, None] * part.v
     b[k, 1:] = part.rhs + g[k, None] * part.v

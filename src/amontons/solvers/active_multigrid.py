@@ -31,6 +31,7 @@ from ..linear.hierarchy import SMALL, Hierarchy, Nodes, components
 from ..linear.node_blocks import NodeBlocks, block_inverse, residual, sweep
 from ..linear.transfer import Transfer
 from ..one_sided import HELD, OneSided
+from ..options import check_options
 from .active_conditions import Conditions
 from .base import check_at_least
 
@@ -57,9 +58,8 @@ class MultigridCycle:
     smoothing: int = 3  # symmetric block Gauss-Seidel sweeps before and after, each
 
     def __post_init__(self) -> None:
+        check_options(self)
         check_at_least(1, smoothing=self.smoothing)
-        if not isinstance(self.shape, CycleShape):
-            raise InvalidInput(f"shape: expected a CycleShape, got {self.shape!r}")
 
 
 @dataclass(eq=False)

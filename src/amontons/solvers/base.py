@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..clock import NEVER, Deadline
 from ..errors import InvalidInput
 from ..problem import Form, FrictionProblem
+from ..status import ActiveSets
 
 Array = NDArray[np.float64]
 
@@ -25,13 +26,19 @@ class Breakdown(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Iterate:
-    """One state of a solver: reactions r, (nc, d), and v, (n,), if the solver has it."""
+    """One state of a solver: reactions r, (nc, d), and v, (n,), if the solver has it.
+
+    ends: None where the judge alone decides; of a method with a stopping rule of its own, ""
+    while that asks for more, then the reason why it ends here.
+    """
 
     r: Array
     v: Array | None = None
     iterations: int = 1  # how many iterations this state is ahead of the one before
     linear_iterations: int = 0
     stage: str = ""  # which stage of a portfolio made it
+    sets: ActiveSets | None = None  # of a method that decides by sets of contacts
+    ends: str | None = None
 
 
 @dataclass(frozen=True)

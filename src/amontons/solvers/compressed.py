@@ -40,6 +40,7 @@ from ..condensation import SOLVE_COLUMNS
 from ..dense import DENSE_LIMIT
 from ..linear import Direct
 from ..linear.distributed import DistributedMatrix
+from ..options import check_options
 from ..problem import Form, FrictionProblem
 from .base import Breakdown, Iterate, Target, check_at_least, check_positive
 from .portfolio import Portfolio
@@ -61,6 +62,7 @@ class CompressedDelassus:
     seed: int = 0
 
     def __post_init__(self) -> None:
+        check_options(self)
         check_at_least(1, layers=self.layers, rank=self.rank, depth=self.depth)
         check_at_least(self.rank, max_rank=self.max_rank)
         check_positive(inner_reduction=self.inner_reduction)

@@ -38,6 +38,7 @@ from numpy.typing import NDArray
 
 from ..errors import UnsupportedForm
 from ..linear.grid import GridBlocks
+from ..options import check_options
 from ..problem import Form, FrictionProblem
 from .anderson import Anderson
 from .base import Breakdown, Iterate, Patience, Target, check_at_least, check_positive
@@ -72,6 +73,7 @@ class ContactMultigrid:
     report: int = 10  # cycles between iterates that are not yet good enough
 
     def __post_init__(self) -> None:
+        check_options(self)
         check_at_least(0, depth=self.depth)
         check_at_least(
             1, contact_sweeps=self.contact_sweeps, patience=self.patience, report=self.report

@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 from ..blocks import spatial
 from ..cones import Tresca
 from ..errors import InvalidInput, UnsupportedForm
+from ..options import check_options
 from ..problem import Form, FrictionProblem
 from .base import Iterate, Target, check_at_least
 from .local_contact import LocalSolver
@@ -71,6 +72,7 @@ class GaussSeidel:
     order: SweepOrder = SweepOrder.STORED  # of the contacts in a sweep
 
     def __post_init__(self) -> None:
+        check_options(self)
         check_at_least(0, anderson_depth=self.anderson_depth)
         if not 0 < self.relaxation < 2:
             raise InvalidInput(f"relaxation: expected between 0 and 2, got {self.relaxation}")

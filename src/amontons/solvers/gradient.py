@@ -45,6 +45,7 @@ from numpy.typing import NDArray
 
 from ..compiled import njit
 from ..cones import Coulomb, Law, Tresca, with_de_saxce
+from ..options import check_options
 from ..problem import Form, FrictionProblem
 from .base import Iterate, Target, check_at_least, check_positive
 from .gradient_motion import in_identity, in_stiffness
@@ -87,6 +88,7 @@ class AcceleratedGradient:
     batch: int = 1  # iterations between two judgements
 
     def __post_init__(self) -> None:
+        check_options(self)
         check_positive(alpha=self.alpha)
         check_at_least(1, batch=self.batch)
 

@@ -47,6 +47,7 @@ from ..judge import Measure
 from ..linear import Direct
 from ..linear.distributed import DistributedMatrix
 from ..nitsche_problem import NitscheProblem
+from ..options import check_options
 from ..problem import Form, FrictionProblem
 from .base import Breakdown, Iterate, Patience, Solver, Target, check_at_least
 from .compressed import CompressedDelassus
@@ -71,6 +72,7 @@ class Hybrid:
     iterates_of_first: int = 1
 
     def __post_init__(self) -> None:
+        check_options(self)
         check_at_least(1, iterates_of_first=self.iterates_of_first)
 
     def iterates(

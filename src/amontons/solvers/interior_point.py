@@ -38,6 +38,7 @@ from ..blocks import velocity_inplace
 from ..clock import NEVER, Deadline
 from ..compiled import njit
 from ..judge import natural_error
+from ..options import check_options
 from ..problem import Form, FrictionProblem
 from .base import Iterate, Target, check_at_least, check_positive
 from .block_lu import factorise_inplace, solve_inplace
@@ -245,6 +246,7 @@ class InteriorPoint:
     sweeps: int = 200  # after each relaxation; 0: none
 
     def __post_init__(self) -> None:
+        check_options(self)
         check_at_least(1, steps=self.steps)
         check_at_least(0, sweeps=self.sweeps)
         check_positive(shift=self.shift)

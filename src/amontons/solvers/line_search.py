@@ -24,6 +24,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from ..errors import InvalidInput
+from ..options import check_options
 from .base import check_at_least
 
 Merit = Callable[[float], float]
@@ -71,6 +72,7 @@ class Armijo:
     decrease: float = 1e-4  # share of the decrease that Newton's model promises
 
     def __post_init__(self) -> None:
+        check_options(self)
         check_at_least(1, halvings=self.halvings)
         _check_share(decrease=self.decrease)
 
@@ -88,6 +90,7 @@ class NonMonotone:
     decrease: float = 1e-4  # share of the decrease that Newton's model promises
 
     def __post_init__(self) -> None:
+        check_options(self)
         check_at_least(1, memory=self.memory)
         check_at_least(1, halvings=self.halvings)
         _check_share(decrease=self.decrease)
@@ -106,6 +109,7 @@ class GoldsteinPrice:
     most: float = 0.99  # m_2: largest share, above which a step is too short
 
     def __post_init__(self) -> None:
+        check_options(self)
         check_at_least(1, trials=self.trials)
         _check_share(least=self.least, most=self.most)
         if not self.least < self.most:

@@ -37,6 +37,7 @@ from ..dense import dense
 from ..errors import InvalidInput, SingularOperator
 from ..linear import Direct, LinearSolver
 from ..nitsche_problem import NitscheProblem
+from ..options import check_options
 from ..problem import Form, FrictionProblem
 from .augmentation import RhoStrategy, augmentation
 from .base import Breakdown, Iterate, Target, check_positive
@@ -106,6 +107,7 @@ class SemismoothNewton:
     nitsche: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
+        check_options(self)
         check_positive(rho=self.rho)
         if self.rho_strategy.splits and isinstance(self.function, NaturalMap):
             raise InvalidInput(

@@ -27,6 +27,7 @@ from scipy import sparse
 
 from ..errors import InvertedCells, SingularOperator, UnsupportedForm
 from ..linear import Direct, LinearSolver
+from ..options import check_options
 from ..problem import Form, FrictionProblem
 from .base import Breakdown, Iterate, Patience, Target, check_at_least, check_positive
 from .hybrid import Auto
@@ -111,6 +112,7 @@ class NonlinearNewton:
     form: ClassVar[Form] = Form.GLOBAL
 
     def __post_init__(self) -> None:
+        check_options(self)
         check_at_least(0, halvings=self.halvings)
         check_at_least(1, patience=self.patience)
         check_positive(smallest_share=self.smallest_share)

@@ -38,6 +38,7 @@ from ..compiled import njit
 from ..cones import Tresca
 from ..errors import InvalidInput, UnsupportedForm
 from ..judge import PENETRATION, contact_residual, natural_error
+from ..options import check_options
 from ..problem import Form, FrictionProblem
 from .base import Breakdown, Iterate, Target, check_at_least, check_positive
 from .block_lu import Symbolic, factorise_inplace, solve_inplace
@@ -250,6 +251,7 @@ class SmoothingNewton:
     batch: int = 1  # Newton steps between two judgements
 
     def __post_init__(self) -> None:
+        check_options(self)
         check_positive(sigma=self.sigma, shift=self.shift, tracking=self.tracking)
         if not 0 < self.shrink < 1:
             raise InvalidInput(f"shrink: expected between 0 and 1, got {self.shrink}")
@@ -343,6 +345,7 @@ class ProximalPoint:
     sweeps: int = 10
 
     def __post_init__(self) -> None:
+        check_options(self)
         check_positive(alpha=self.alpha, alpha_min=self.alpha_min)
         check_at_least(1, inner_steps=self.inner_steps)
         check_at_least(0, sweeps=self.sweeps)

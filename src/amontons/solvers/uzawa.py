@@ -39,6 +39,7 @@ from ..clock import Deadline
 from ..cones import Coulomb, Law, project_disk, project_disk_jacobian
 from ..errors import InvalidInput, SingularOperator
 from ..linear import Direct, LinearSolver
+from ..options import check_options
 from ..problem import Form, FrictionProblem
 from .augmentation import RhoStrategy, augmentation
 from .base import Breakdown, Iterate, Target, check_at_least, check_positive
@@ -80,6 +81,7 @@ class Uzawa:
     linear: LinearSolver = field(default_factory=Direct)  # global form: M + H B H^T
 
     def __post_init__(self) -> None:
+        check_options(self)
         check_positive(rho=self.rho)
         if not 1 <= self.growth < np.inf:
             raise InvalidInput(f"growth: expected a number >= 1, got {self.growth}")
