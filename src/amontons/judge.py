@@ -1,10 +1,11 @@
 """The one error measure that decides whether a reaction solves a problem.
 
-It is formed from r alone (and v on large global problems), never from a solver's own residual,
+It is formed from r and, where it is given, v, never from a solver's own residual,
 and does not change with units.  With û = u + mu |u_T| n (Coulomb) or u (Tresca):
 
 *exact*:     rho_i = 1 / |W_ii|_2, u = W r + q formed again from r,
-             error = |(r_i - P(r_i - rho_i û_i)) / rho_i| / |q|.
+             error = |(r_i - P(r_i - rho_i û_i)) / rho_i| / |q|; of a v that is given with r
+             also |M v - H r - f| / |load|, what is beyond FLOOR roundings of its terms.
 *residual*:  rho_i = 1 / |H_i^T D^-1 H_i|_2 with D the block diagonal of M, u = H^T v + w,
              error = max(|M v - H r - f| / |load|,
                          |(r_i - P(r_i - rho_i û_i)) / rho_i| / |u_ref|).

@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from . import judge
+from .checked_arrays import expect_shape
 from .clock import NEVER, Deadline
 from .cones import Law, augmented_reaction, augmented_reaction_jacobian
 from .errors import SingularOperator, UnsupportedForm
@@ -179,8 +180,12 @@ class NitscheProblem:
 
     def residual(self, v: Array) -> Array:
         """F(v), (n,), force."""
+        return self.residual_of(self.reaction(v), v)
+
+    def residual_of(self, r: Array, v: Array) -> Array:
+        """The same with r (q, d) in the place of the reactions that v makes."""
         m = self.matrices
-        out = m.M @ v - self.f - m.minus_A @ self.reaction(v).ravel()
+        out = m.M @ v - self.f - m.minus_A @ r.ravel()
         if m.theta.any():
             share = (m.theta * m.weights / m.kappa)[:, None] * self.traction(v)
             out -= m.S @ share.ravel()
@@ -215,11 +220,22 @@ class NitscheProblem:
         v = self.matrices.bonded.solve(self.matrices.H @ overlap.ravel())
         return load + float(np.sqrt(max(v @ (self.matrices.M @ v), 0.0)))
 
-    def error(self, r: Array, v: Array | None = None) -> float:
-        """Unit-free residual of v, (n,); infinite without v.  r is not read: v fixes it."""
+    @np.errstate(over="ignore", invalid="ignore")
+    def error(self, r: Array | None, v: Array | None = None) -> float:
+        """Unit-free residual of v, (n,), and of r, (q, d), where it is not that of v.
+
+        Infinite without v.
+        """
         if v is None or not np.isfinite(v).all():
             return np.inf
-        error = judge.ratio(self.size(self.residual(v)), self.scale)
+        expect_shape("v", np.shape(v), (self.unknowns,))
+        own = self.reaction(v)
+        size = self.size(self.residual_of(own, v))
+        if r is not None and not np.array_equal(r, own):
+            expect_shape("r", np.shape(r), own.shape)
+            other = self.size(self.residual_of(r, v))
+            size = max(size, other) if np.isfinite(other) else np.inf
+        error = judge.ratio(size, self.scale)
         return error if np.isfinite(error) else np.inf
 
     def weakest(self, r: Array, v: Array | None = None) -> Weakest | None:

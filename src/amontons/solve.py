@@ -12,9 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from .checked_arrays import real
 from .clock import Deadline, TimeLimit, compiling, deadline_of, now
 from .cones import Coulomb
 from .errors import InvalidInput, SingularOperator, TimeUp, UnsupportedForm, shown
@@ -27,6 +26,7 @@ from .settling import Motion, Settled, at_rest, motion, settled_state
 from .solution import Convergence, FrictionSolution, Outcome, Step
 from .solvers import Auto
 from .solvers.base import Breakdown, Iterate, Solver, Target
+from .solvers.first_iterate import first_iterate, no_reactions, with_motion
 
 Array = NDArray[np.float64]
 Callback = Callable[[Step, Iterate], bool | None]
@@ -67,8 +67,9 @@ class _Watch:
         error, weakest, told = self.problem.error(iterate.r, iterate.v), None, None
         if error <= self.tolerance and not isinstance(self.problem, NitscheProblem):
             told = settled_state(self.problem, iterate.r, iterate.v)
-            if told[1].r is not iterate.r:
-                iterate = replace(iterate, r=told[1].r)
+            if told[1].r is not iterate.r:  # judged exactly, their motion is found again
+                v = None if self.problem.measure is Measure.EXACT else iterate.v
+                iterate = replace(iterate, r=told[1].r, v=v)
                 error = self.problem.error(iterate.r, iterate.v)
         if error <= self.tolerance:
             weakest = self.problem.weakest(iterate.r, iterate.v)
@@ -185,15 +186,80 @@ def drive(
     the outcome STOPPED with the best iterate.  Raises UnsupportedForm when the solver needs
     the other form.
     """
+    given = _Options(tolerance, contact_tolerance, max_iterations, time_limit, callback)
+    return _drive(problem, solver, given, start, with_motion)
+
+
+def drive_from(
+    start: Iterate,
+    problem: FrictionProblem | NitscheProblem,
+    solver: Solver | None = None,
+    *,
+    tolerance: float = 1e-8,
+    contact_tolerance: float | None = None,
+    max_iterations: int | None = None,
+    time_limit: TimeLimit = None,
+    callback: Callback | None = None,
+) -> FrictionSolution:
+    """Like `drive`, for the question what a solver makes of a start.
+
+    The start is a solution only with the v that it has.  `drive` asks whether the reactions of
+    the start are right, where it can find their motion: no contact force and another v would
+    be the end at once where the bodies move away, and the solver were never asked.
+    """
+    given = _Options(tolerance, contact_tolerance, max_iterations, time_limit, callback)
+    return _drive(problem, solver, given, start, lambda problem, start: start)
+
+
+@dataclass(frozen=True)
+class _Options:
+    """What `drive` takes, checked."""
+
+    tolerance: float
+    contact_tolerance: float | None
+    max_iterations: int | None
+    time_limit: TimeLimit
+    callback: Callback | None
+
+    def __post_init__(self) -> None:
+        if self.callback is not None and not callable(self.callback):
+            raise InvalidInput(f"callback: expected a function, got {self.callback!r}")
+        _check_options(self.tolerance, self.contact_tolerance, self.max_iterations)
+
+    @property
+    def of_contacts(self) -> float:
+        """The contact tolerance that holds."""
+        given = self.contact_tolerance
+        return self.tolerance**0.5 if given is None else given
+
+
+def _drive(
+    problem: FrictionProblem | NitscheProblem,
+    solver: Solver | None,
+    given: _Options,
+    start: Iterate | FrictionSolution | None,
+    first: Callable[[FrictionProblem | NitscheProblem, Iterate], Iterate],
+) -> FrictionSolution:
+    """The solve; `first` makes of the start what is judged before the first iteration."""
     solver = solver if solver is not None else Auto()
+    deadline = deadline_of(given.time_limit)
+    _check_solver(problem, solver)
+    if not getattr(solver, "matrix_free", False):
+        problem = problem.assembled()
+    watch = _Watch(problem, given.tolerance, given.of_contacts)
+    begin, limit = first_iterate(problem, start), given.max_iterations or np.inf
+    target = Target(given.tolerance, deadline)
+    with Watching():
+        outcome, detail = _run(watch, solver, begin, target, limit, given.callback, first)
+    return _finish(watch, outcome, detail, solver)
+
+
+def _check_solver(problem: FrictionProblem | NitscheProblem, solver: Solver) -> None:
+    """Raise InvalidInput for what is no solver, UnsupportedForm for one of another form."""
     if isinstance(solver, type) or not hasattr(solver, "iterates"):
         raise InvalidInput(
             f"solver: expected an instance such as GaussSeidel(), got {solver!r}"
         )
-    if callback is not None and not callable(callback):
-        raise InvalidInput(f"callback: expected a function, got {callback!r}")
-    _check_options(tolerance, contact_tolerance, max_iterations)
-    deadline = deadline_of(time_limit)
     if problem.form is Form.NITSCHE:
         if not getattr(solver, "nitsche", False):
             raise UnsupportedForm(f"{type(solver).__name__}: {NO_MULTIPLIERS}")
@@ -205,16 +271,6 @@ def drive(
             f"{type(solver).__name__} needs the {solver.form.value} form, the problem is "
             f"{problem_form}; use {hint}"
         )
-    if not getattr(solver, "matrix_free", False):
-        problem = problem.assembled()
-    allowed = tolerance**0.5 if contact_tolerance is None else contact_tolerance
-    watch = _Watch(problem, tolerance, allowed)
-    begin, limit = _start(problem, start), max_iterations or np.inf
-    with Watching():
-        outcome, detail = _run(
-            watch, solver, begin, Target(tolerance, deadline), limit, callback
-        )
-    return _finish(watch, outcome, detail, solver)
 
 
 def _run(
@@ -224,11 +280,12 @@ def _run(
     target: Target,
     limit: float,
     callback: Callback | None,
+    first: Callable[[FrictionProblem | NitscheProblem, Iterate], Iterate],
 ) -> tuple[Outcome, str]:
     """Start the solver, and again with a tighter goal while only contacts are not settled."""
     try:
         _prepare(watch.problem, target.deadline)
-        watch.judge(_with_motion(watch.problem, start))
+        watch.judge(first(watch.problem, start))
         if watch.converged:
             return Outcome.CONVERGED, ""
         ended = (Outcome.STAGNATED, "")
@@ -302,7 +359,7 @@ def _once(
 
 def _finish(watch: _Watch, outcome: Outcome, detail: str, solver: Solver) -> FrictionSolution:
     problem = watch.problem
-    best = watch.best if watch.best is not None else Iterate(_zero(problem))
+    best = watch.best if watch.best is not None else Iterate(no_reactions(problem))
     measure = problem.measure if watch.best is not None else Measure.EXACT
     told = None if watch.told is None else watch.told[1]
     if watch.told is not None and problem.form is Form.DELASSUS:
@@ -352,60 +409,6 @@ def _operations(problem: FrictionProblem | NitscheProblem) -> float:
     if problem.form is Form.DELASSUS:
         return 100.0 * problem.blocks.data.size  # type: ignore[union-attr]
     return 1000.0 * problem.unknowns
-
-
-def _zero(problem: FrictionProblem) -> Array:
-    return np.zeros((problem.contacts, problem.dimension))
-
-
-def _start(
-    problem: FrictionProblem | NitscheProblem, start: Iterate | FrictionSolution | None
-) -> Iterate:
-    """The first iterate: zero reactions, or a copy of what the user gives."""
-    if start is None:
-        if isinstance(problem, NitscheProblem):
-            return _start_of_nitsche(problem, None)
-        return Iterate(_zero(problem), None, 0)
-    if not hasattr(start, "r") or not hasattr(start, "v"):
-        raise InvalidInput(
-            f"start: expected a solution or an Iterate, got {type(start).__name__}"
-        )
-    if isinstance(problem, NitscheProblem):
-        return _start_of_nitsche(problem, start.v)
-    r = real("start: r", start.r)
-    if r.shape != (problem.contacts, problem.dimension):
-        raise InvalidInput(
-            f"start: expected r of shape {(problem.contacts, problem.dimension)}, got {r.shape}"
-        )
-    if not np.isfinite(r).all():
-        raise InvalidInput("start: r holds a number that is not finite")
-    if start.v is None or problem.form is not Form.GLOBAL:
-        return Iterate(r, None, 0)
-    return Iterate(r, _motion(start.v, problem.unknowns), 0)
-
-
-def _start_of_nitsche(problem: NitscheProblem, v: Array | None) -> Iterate:
-    """The displacements v (n,) of a start; its reactions may be those of another method."""
-    v = problem.guess if v is None else _motion(v, problem.unknowns)
-    return Iterate(problem.reaction(v), v, 0)
-
-
-def _motion(v: ArrayLike, n: int) -> Array:
-    """A copy of v, (n,), of a start."""
-    v = real("start: v", v)
-    if v.shape != (n,):
-        raise InvalidInput(f"start: expected v of {n} entries, got {v.size}")
-    if not np.isfinite(v).all():
-        raise InvalidInput("start: v holds a number that is not finite")
-    return v
-
-
-def _with_motion(problem: FrictionProblem, start: Iterate) -> Iterate:
-    """The start with some v where finding that of its r would cost a linear solve."""
-    if start.v is not None or problem.measure is Measure.EXACT:
-        return start
-    guess = problem.guess
-    return replace(start, v=guess if guess is not None else np.zeros(problem.unknowns))
 
 
 def _check_number(name: str, value: object) -> None:

@@ -6,10 +6,11 @@ from scipy import sparse
 
 from amontons import judge
 from amontons.cones import Coulomb, Tresca
+from amontons.errors import InvalidInput, UnsupportedForm
 from amontons.judge import Measure, scaled_residual
 from amontons.problem import FrictionProblem
-from amontons.solve import drive
-from amontons.solvers import GaussSeidel
+from amontons.solve import drive, drive_from
+from amontons.solvers import GaussSeidel, Iterate
 
 
 def random_local(seed=0, nc=6, d=3, law=Coulomb):
@@ -134,6 +135,72 @@ def test_residual_and_exact_measures_agree_on_right_and_wrong():
     assert residual.error(wrong) > 1e-3
     assert residual.error(r, 1.1 * v) > 1e-3  # out of balance
     assert residual.error(r, np.full(60, np.nan)) == np.inf
+
+
+def test_each_measure_tests_the_balance_of_the_motion_that_it_is_given():
+    """A v that reactions and loads do not hold is no solution, though r alone would be one."""
+    for problem in residual_pair():
+        r = drive(problem.condensed(), GaussSeidel(), tolerance=1e-13, max_iterations=5000).r
+        v = problem.velocity(r)[1]
+        assert problem.error(r, v) < 1e-11
+        assert problem.certain_error(r, v) < 1e-11
+        for wrong in (0 * v, 1.1 * v, v + 1e-3 * np.eye(60)[7]):
+            off = np.linalg.norm(problem.M @ (wrong - v)) / np.linalg.norm(problem.f)
+            assert problem.error(r, wrong) >= 0.99 * off
+            assert problem.certain_error(r, wrong) >= 0.99 * off
+        assert problem.error(r, np.full(60, np.nan)) == np.inf
+        assert problem.error(r, 1e200 * v) > 1e100
+        with pytest.raises(InvalidInput, match=r"v: expected shape \(60,\), got \(59,\)"):
+            problem.error(r, v[:59])
+
+
+def test_no_contact_force_is_no_solution_while_the_body_is_out_of_balance():
+    """The bodies move away: r = 0 solves, but not with a motion that is another one's."""
+    M, H = sparse.csc_array(np.eye(4)), sparse.csc_array(np.eye(4)[:, :2])
+    problem = FrictionProblem.from_global(M, H, [1.0, 0, 0, 1], [[0.0, 0]], [0.5])
+    assert problem.measure is Measure.EXACT
+    rest = np.zeros((1, 2))
+    assert problem.error(rest) == problem.error(rest, np.array([1.0, 0, 0, 1])) == 0
+    assert problem.error(rest, np.array([1.0, 0, 0, 0])) == pytest.approx(2**-0.5)
+    still = Iterate(rest, np.zeros(4))
+    for run in (drive(problem, start=still), drive_from(still, problem)):
+        assert run.converged
+        assert run.v == pytest.approx([1, 0, 0, 1])
+    errors = [step.error for step in run.convergence.history]
+    assert errors[0] == pytest.approx(1)  # judged with the v of the start
+    assert errors[-1] == 0
+
+
+def test_a_problem_without_v_takes_none():
+    problem, r = random_local()
+    with pytest.raises(UnsupportedForm, match="v: .* local form"):
+        problem.error(r, np.zeros(18))
+
+
+@pytest.mark.parametrize("stiff", [1.0, 1e6, 1e12])
+def test_rounding_of_stiff_bodies_is_no_imbalance(stiff):
+    """M v loses digits beside a small load; the motion that a factor gives is in balance."""
+    rng = np.random.default_rng(3)
+    M = sparse.block_diag([sparse.eye_array(4), stiff * np.array([[2.0, -1], [-1, 2]])])
+    tie = rng.standard_normal((6, 6))
+    turn = np.linalg.qr(tie)[0]
+    M, H = turn @ M.toarray() @ turn.T, rng.standard_normal((6, 2))
+    problem = FrictionProblem.from_global(
+        sparse.csc_array((M + M.T) / 2), sparse.csc_array(H), turn[:, 0], [[-1.0, 0]], [0.5]
+    )
+    r = drive(problem.condensed(), GaussSeidel(), tolerance=1e-12).r
+    assert problem.error(r, problem.velocity(r)[1]) < 1e-11
+    assert problem.error(r, 1.1 * problem.velocity(r)[1]) > 0.05
+
+
+def test_loads_by_gaps_alone_have_a_balance_too():
+    M, H = sparse.csc_array(np.diag([2.0, 2, 1])), sparse.csc_array(np.eye(3)[:, :2])
+    problem = FrictionProblem.from_global(M, H, np.zeros(3), [[-1.0, 0]], [0.5])
+    r = np.array([[2.0, 0]])
+    v = np.array([1.0, 0, 0])
+    assert problem.error(r, v) < 1e-15
+    assert problem.error(r, (1 + 1e-6) * v) == pytest.approx(1e-6, rel=1e-3)
+    assert problem.error(r, v + [0, 0, 1e-6]) == pytest.approx(0.5e-6, rel=1e-3)
 
 
 @pytest.mark.parametrize("force", [1e-9, 1e9])

@@ -100,6 +100,10 @@ def test_the_exact_fields_of_hild_solve_it(n, options):
         assert problem.error(None, v + 0.01 * np.cos(np.arange(v.size))) > 1e-4
         found = am.drive(problem, am.SemismoothNewton(), start=Iterate(None, v))
         assert set(found.pattern) == {letter}
+        r = problem.reaction(v)
+        assert problem.error(r, v) < 1e-12
+        assert problem.error(r + 0.1, v) > 1e-3  # not the reactions of v
+        assert problem.error(r * np.nan, v) == np.inf
     stick = hild_triangle(n, mu=2.9)  # 3 is needed
     below = by_nitsche(stick, **options).discrete_problem()
     assert below.error(None, stick_displacement(points).ravel()[free]) > 1e-3
