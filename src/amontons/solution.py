@@ -61,6 +61,7 @@ class Step:
     error: float
     linear_iterations: int
     seconds: float
+    flops: float | None = None  # floating point operations so far; None: not counted
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +82,7 @@ class Convergence:
     contact_tolerance: float = np.inf
     weakest: int | None = None  # that contact; None where all obey their laws exactly
     compiling: float = 0.0  # seconds of preparing compiled code, which no other time holds
+    flops: float | None = None  # floating point operations, judgements among them; see docs
 
     @property
     def by_user(self) -> bool:
