@@ -17,6 +17,8 @@ from .errors import (
     TimeUp,
     UnsupportedForm,
 )
+from .judge import Criterion
+from .judging import PATIENCE
 from .problem import Form, FrictionProblem
 from .results import ModelSolution
 from .solution import FrictionSolution, Outcome, Step
@@ -43,17 +45,20 @@ def solve(
     problem: FrictionProblem, solver: Solver | None = None, *, tolerance: float = 1e-8,
     contact_tolerance: float | None = None, max_iterations: int | None = None,
     time_limit: TimeLimit = None, start: Start = None, callback: Callback | None = None,
-    check: bool = True,
+    check: bool = True, criterion: Criterion = Criterion.JUDGE,
+    patience: int | None = PATIENCE,
 ) -> FrictionSolution: ...  # fmt: skip
 @overload
 def solve(
     problem: Model, solver: Solver | None = None, *, tolerance: float = 1e-8,
     contact_tolerance: float | None = None, max_iterations: int | None = None,
     time_limit: TimeLimit = None, start: Start = None, callback: Callback | None = None,
-    check: bool = True,
+    check: bool = True, criterion: Criterion = Criterion.JUDGE,
+    patience: int | None = PATIENCE,
 ) -> ModelSolution: ...  # fmt: skip
 def solve(problem, solver=None, *, tolerance=1e-8, contact_tolerance=None, max_iterations=None,
-          time_limit=None, start=None, callback=None, check=True):  # fmt: skip
+          time_limit=None, start=None, callback=None, check=True,
+          criterion=Criterion.JUDGE, patience=PATIENCE):  # fmt: skip
     """Solve a model or a discrete problem until the independent error is below `tolerance`.
 
     contact_tolerance: on the error of every single contact on its own scale (`judge`), by
@@ -61,7 +66,9 @@ def solve(problem, solver=None, *, tolerance=1e-8, contact_tolerance=None, max_i
     seconds, those of compiling not counted.  start: a solution of a neighbouring problem.
     callback(step, iterate) is called after every iterate, True stops; it replaces the progress
     line that a terminal shows.  check: raise NotConverged (Interrupted after Ctrl-C), which
-    carries the best solution, instead of returning it.
+    carries the best solution, instead of returning it.  criterion: what the tolerance is for;
+    Criterion.NATURAL stops by a published error, to compare with papers.  patience: iterates
+    without progress after which a solve counts as stagnated; None to let time decide.
 
     A model is condensed for solvers that need the Delassus form; a FrictionProblem has the form
     its owner chose, and the wrong one raises UnsupportedForm.  A model with hyperelastic laws
@@ -71,7 +78,7 @@ def solve(problem, solver=None, *, tolerance=1e-8, contact_tolerance=None, max_i
     run = drive if isinstance(problem, FrictionProblem) else drive_any_form
     options = {"tolerance": tolerance, "contact_tolerance": contact_tolerance,
                "max_iterations": max_iterations, "time_limit": time_limit,
-               "start": start}  # fmt: skip
+               "start": start, "criterion": criterion, "patience": patience}  # fmt: skip
     result = _solve(problem, solver, run, callback, options)
     if check:
         raise_unless_converged(result)

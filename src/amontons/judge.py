@@ -61,6 +61,18 @@ class Measure(Enum):
     EXACT = "exact"
     RESIDUAL = "residual"
     NITSCHE = "nitsche"
+    NATURAL = "natural"
+
+
+class Criterion(Enum):
+    """What a tolerance is for; the value is its name on the command line.
+
+    JUDGE: the unit-free errors of this module.  NATURAL: |F_nat(r)| / |q| with rho = 1, [ABD]
+    eq. (13), of the problem in its own units: to compare with publications.
+    """
+
+    JUDGE = "judge"
+    NATURAL = "natural"
 
 
 class Weakest(NamedTuple):
@@ -253,7 +265,8 @@ def published_natural_error(r: Array, u: Array, q: Array, law: Law) -> float:
     """|F_nat(r)| / |q| with F_nat = r - P_K(r - û), [ABD] eq. (13) with rho = 1.
 
     The stopping criterion of that comparison; 0 where r = 0 solves a problem with q = 0, else
-    infinite there.  It adds newtons to metres as the FCLib error does, and never decides.
+    infinite there.  It adds newtons to metres as the FCLib error does, and decides only where
+    it is asked to (Criterion.NATURAL).
 
     [ABD] V. Acary, M. Brémond, F. Dubois, CSMA 2017.
     """
@@ -279,6 +292,7 @@ def max_cone_violation(r: Array, law: Law) -> float:
 
 
 __all__ = [
+    "Criterion",
     "Measure",
     "Weakest",
     "contact_residual",

@@ -147,6 +147,7 @@ def summary(output: Output) -> dict[str, Any]:
         "contact_tolerance": record.contact_tolerance,
         "iterations": record.iterations,
         "linear_iterations": record.linear_iterations,
+        "flops": record.flops,
         "seconds": {
             "assemble": output.assemble_seconds,
             "setup": setup,  # factorisation and all else before the first judgement

@@ -62,6 +62,7 @@ class Step:
     linear_iterations: int
     seconds: float
     sets: ActiveSets | None = None  # of an active set method
+    flops: float | None = None  # floating point operations so far; None: not counted
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +83,7 @@ class Convergence:
     contact_tolerance: float = np.inf
     weakest: int | None = None  # that contact; None where all obey their laws exactly
     compiling: float = 0.0  # seconds of preparing compiled code, which no other time holds
+    flops: float | None = None  # floating point operations, judgements among them; see docs
 
     @property
     def sets_settled(self) -> int | None:

@@ -89,3 +89,35 @@ def test_local_newton_needs_coulomb_friction():
     tresca = am.FrictionProblem.from_delassus(problem.W, problem.q, am.Tresca(np.ones(4)))
     with pytest.raises(am.UnsupportedForm, match="NEWTON"):
         drive(tresca, am.GaussSeidel(local=am.LocalSolver.NEWTON))
+
+
+@pytest.mark.parametrize("local", [am.LocalSolver.NEWTON, am.LocalSolver.PROJECTION])
+def test_few_local_steps_and_a_loose_tolerance_reach_the_same_solution(local):
+    problem = random_delassus(3, 12)
+    exact = drive(problem, am.GaussSeidel(), tolerance=1e-10)
+    for options in ({"local_steps": 3}, {"local_tolerance": 1e-2}):
+        found = drive(problem, am.GaussSeidel(local=local, **options), tolerance=1e-10)
+        assert found.converged
+        np.testing.assert_allclose(found.u, exact.u, atol=1e-8)
+
+
+def test_loose_projections_cost_less():
+    problem = random_delassus(3, 12)
+
+    def flops(**options):
+        solver = am.GaussSeidel(local=am.LocalSolver.PROJECTION, **options)
+        return drive(problem, solver, tolerance=1e-8).convergence.flops
+
+    assert flops(local_steps=3) < flops()
+    assert flops(local_tolerance=1e-3) < flops()
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"local_tolerance": 0.0}, {"local_tolerance": 1.5}, {"local_steps": 0}],
+)
+def test_local_options_are_checked(options):
+    with pytest.raises(InvalidInput, match=next(iter(options))):
+        GaussSeidel(local=am.LocalSolver.NEWTON, **options)
+    with pytest.raises(InvalidInput, match="exact solution"):
+        GaussSeidel(**{name: 3 if name == "local_steps" else 0.1 for name in options})

@@ -14,8 +14,8 @@ ORDER = (
     "compiled < interrupts < errors < options < clock < dense < warned < files < hdf5 < "
     "checked_arrays < cones < linear < blocks < condensation < global_matrices < judge < "
     "judge_sharp < problem < indefinite < nitsche_problem < one_sided < one_contact < "
-    "status < settling < solution < solvers < solve < fem < contact < model < masonry < "
-    "granular < hild < vee < evolution < analysis < gallery < fclib < checkpoint < "
+    "status < settling < solution < solvers < judging < solve < fem < contact < model < "
+    "masonry < granular < hild < vee < evolution < analysis < gallery < fclib < checkpoint < "
     "expressions < case < vtk < plots < output < results < report < api < cli"
 ).split(" < ")
 ALONE = {  # package: the file or folder that imports it, one for each kind of file

@@ -17,7 +17,7 @@ from .bodies import read_material, read_materials, read_mesh_table
 from .contacts import read_contact, refuse_repeated
 from .evolution import Evolution, read_evolution, read_wall
 from .overrides import apply_overrides, check_depth
-from .settings import LIMITS, Settings, make_solver, method_class
+from .settings import GENERAL, LIMITS, Settings, make_solver, method_class
 from .tables import Blame, Table
 from .values import on_named, on_surface, vector
 
@@ -46,17 +46,22 @@ class Case:
     tables: dict[str, Any] = field(default_factory=dict)
 
 
-def read_case(path: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Case:
+def read_case(
+    path: str | os.PathLike[str], overrides: Sequence[str] = (), method: str | None = None
+) -> Case:
     """The case in a TOML file; overrides such as "mesh.cells=32" replace single values.
 
-    path: also "example:NAME", a case that comes with amontons.  Raises FileFormatError naming
-    the file, the key, what was found and what was expected.
+    path: also "example:NAME", a case that comes with amontons.  method: solver in place of that
+    of the case, before the overrides; options that the case has for another one go with it.
+    Raises FileFormatError naming the file, the key, what was found and what was expected.
     """
     text = os.fspath(path)
     is_example = text.startswith(EXAMPLE)
     path = example_file(text.removeprefix(EXAMPLE)) if is_example else Path(path)
     data = _load(path)
     check_depth(data, str(path))
+    if method is not None:
+        data = with_method(data, method)
     top = Table(str(path), "", apply_overrides(data, overrides, str(path)))
     top.only(*TOP)
     title = top.text("title", path.stem if path.stem != "case" else path.parent.name)
@@ -153,6 +158,16 @@ def _evolution(top: Table) -> Evolution | None:
 
 
 # ------------------------------------------------------------------------------- solver
+def with_method(data: dict[str, Any], method: str) -> dict[str, Any]:
+    """The data of a case with another solver, without the options of the one it had."""
+    table = data.get("solver", {})
+    if not isinstance(table, dict):
+        return data  # reading it will say so
+    same = table.get("method", "auto") == method
+    kept = {key: value for key, value in table.items() if same or key in GENERAL}
+    return data | {"solver": kept | {"method": method}}
+
+
 def _settings(top: Table) -> Settings:
     table = top.table("solver") if "solver" in top.data else Table(top.file, "solver", {})
     method = table.text("method", "auto")
@@ -166,8 +181,7 @@ def _settings(top: Table) -> Settings:
     seconds = table.number("time_limit") if "time_limit" in table.data else None
     if seconds is not None and not seconds > 0:
         raise table.error("time_limit", f"expected seconds > 0, got {seconds}")
-    used = ("method", "tolerance", "contact_tolerance", "time_limit", *LIMITS)
-    options = {key: value for key, value in table.data.items() if key not in used}
+    options = {key: value for key, value in table.data.items() if key not in GENERAL}
     with Blame(table, "method"):
         method_class(method)
     with Blame(top, ""):  # its messages begin with solver.FIELD

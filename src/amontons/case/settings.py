@@ -25,6 +25,8 @@ from ..solvers.base import Solver
 LIMITS = ("max_iterations", "max_sweeps")  # one limit; the second in Gauss-Seidel's words
 
 NUMBERS = ("tolerance", "contact_tolerance", "time_limit")
+ALIASES = {"none": "full-step"}  # of parts of a solver
+GENERAL = ("method", *NUMBERS, *LIMITS)  # of the driver; all else are options of the solver
 
 
 @dataclass(frozen=True)
@@ -151,6 +153,8 @@ def _component(name: str, value: str | dict[str, Any], protocol: type) -> Any:
     if "kind" not in options and len(fitting) > 1:
         raise InvalidInput(f"{name}.kind: missing, expected one of {', '.join(fitting)}")
     chosen = str(options.pop("kind", next(iter(fitting))))
+    if chosen not in fitting and ALIASES.get(chosen) in fitting:
+        chosen = ALIASES[chosen]
     if chosen not in fitting:
         raise InvalidInput(f"{name}: unknown value '{chosen}'{nearest(chosen, fitting)}")
     return _made(fitting[chosen], options, name)

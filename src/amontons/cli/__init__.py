@@ -44,7 +44,9 @@ Examples:
 """
 )
 @click.argument("source")
-@click.option("--method", metavar="NAME", help="Solver, such as auto or gauss-seidel.")
+@click.option("--method", metavar="NAME",
+              help="Solver, such as auto or gauss-seidel, in place of that of the case and its "
+              "options; --set solver.… then sets options of this one.")  # fmt: skip
 @click.option("--tolerance", type=float, metavar="X", help="Unit-free error to reach. [1e-8]")
 @click.option("--contact-tolerance", type=float, metavar="X",
               help="Error of every contact on its own scale. [root of the tolerance]")
@@ -54,6 +56,12 @@ Examples:
 @click.option("--max-iterations", type=click.IntRange(min=1), metavar="N",
               help="Stop after N iterations.")  # fmt: skip
 @click.option("--time-limit", type=float, metavar="SECONDS", help="Stop after that time.")
+@click.option("--patience", type=click.IntRange(min=0), default=500, show_default=True,
+              metavar="N", help="Stop after N iterates without progress; 0: never."
+              )  # fmt: skip
+@click.option("--criterion", type=click.Choice(["judge", "natural"]), default="judge",
+              show_default=True, help="What the tolerance is for: the unit-free error, or "
+              "|F_nat(r)| / |q| with rho = 1, as papers have it.")  # fmt: skip
 @click.option("-o", "--output", "folder", metavar="DIR",
               help="Folder for the results. [name of the source with -results]")  # fmt: skip
 @click.option("--json", "json_copy", metavar="FILE",
@@ -73,7 +81,14 @@ def solve(**options: object) -> int:
     return run(**options)  # type: ignore[arg-type]
 
 
-@main.command()
+@main.command(
+    epilog="""\b
+Examples:
+  amontons info problem.hdf5
+  amontons info example:wall --set wall.cells=[4,2,2]
+  amontons info case.toml --json - | jq .contacts
+"""
+)
 @click.argument("source")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
               help="Replace a value of the case.")  # fmt: skip
@@ -113,16 +128,30 @@ def convert(**options: object) -> None:
 
 @main.command(
     epilog="""\b
-Example:
+Examples:
   amontons bench *.hdf5 --methods gauss-seidel,auto --tolerances 1e-3,1e-6 --profile p.png
+  amontons bench *.hdf5 --methods semismooth-newton:function=natural-map,line_search=none
+  amontons bench *.hdf5 --methods auto,UPK=gauss-seidel:local=projection,local_steps=3
+  amontons bench *.hdf5 --methods auto --by flops --criterion natural --json race.json
+
+\b
+METHOD:FIELD=VALUE,… sets options of a method, NAME=METHOD:… gives it a name.
 """
 )
 @click.argument("files", nargs=-1, required=True, metavar="FILES…")
-@click.option("--methods", default="auto", show_default=True, metavar="A,B,…", help="Solvers.")
+@click.option("--methods", multiple=True, default=("auto",), metavar="A,B,…",
+              help="Solvers, also with options; may be repeated. [auto]")  # fmt: skip
 @click.option("--tolerances", default="1e-3,1e-6", show_default=True, metavar="X,Y,…",
               help="Errors to reach.")  # fmt: skip
 @click.option("--time-limit", type=float, default=60.0, show_default=True, metavar="SECONDS",
-              help="For each solve; a method that misses it has failed.")  # fmt: skip
+              help="For each solve; a method that misses it has failed, and nothing else ends "
+              "one that makes no progress.")  # fmt: skip
+@click.option("--by", type=click.Choice(["time", "flops"]), default="time", show_default=True,
+              help="What is shown and drawn: seconds or floating point operations."
+              )  # fmt: skip
+@click.option("--criterion", type=click.Choice(["judge", "natural"]), default="judge",
+              show_default=True, help="What the tolerances are for: the unit-free error, or "
+              "|F_nat(r)| / |q| with rho = 1.")  # fmt: skip
 @click.option("--profile", metavar="FILE.png",
               help="Draw Dolan-Moré performance profiles.")  # fmt: skip
 @click.option("--json", "json_copy", metavar="FILE", help="All times as JSON; - prints them.")
@@ -246,7 +275,7 @@ def follow(**options: object) -> int:
 @main.command(
     epilog="""\b
 Examples:
-  amontons run example:wall --set wall.cells=[4,2,2] --pictures
+  amontons run example:wall --set wall.cells=[4,2,2] --set evolution.until=0.1 --pictures
   amontons run wall.toml -o out
   amontons run wall.toml -o out --restart --set evolution.until=2
 

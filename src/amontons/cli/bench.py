@@ -1,4 +1,8 @@
-"""`amontons bench`: times to reach a tolerance, side by side, and performance profiles."""
+"""`amontons bench`: times to reach a tolerance, side by side, and performance profiles.
+
+A race has one limit for all and no other end: no method is given up because it makes no
+progress, so a time without a solution is the time that was really spent.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +17,13 @@ import numpy as np
 
 from .. import api, output
 from ..analysis.profiles import performance_profile
-from ..case import Settings
 from ..clock import compiling, now
 from ..errors import InvalidInput, SingularOperator, UnsupportedForm
+from ..judge import Criterion
 from ..problem import Form, FrictionProblem
 from ..solution import TELLING, Convergence, Outcome
-from .sources import open_source, with_flags
+from .contestants import Contestant, contestants
+from .sources import open_source
 from .terminal import check_writable, deliver_json, show_table
 
 SCHEMA = "amontons/bench/1"
@@ -27,9 +32,19 @@ BUDGET = 2.0  # seconds after which a solve is not repeated again
 
 
 @dataclass(frozen=True)
+class Stop:
+    """How every run ends: seconds for each solve, and what the tolerances are for."""
+
+    seconds: float
+    criterion: Criterion
+
+
+@dataclass(frozen=True)
 class Timing:
     """One method on one file to one tolerance; seconds is infinite when it failed.
 
+    flops: floating point operations to get there, None where the method does not count its own;
+    spent: seconds of the run, whatever its end: at least so many a failure would have taken;
     compiling: seconds of preparing compiled code, once, which no other time holds.
     """
 
@@ -41,36 +56,47 @@ class Timing:
     error: float
     iterations: int
     compiling: float = 0.0
+    flops: float | None = None
+    spent: float = 0.0
+
+    def cost(self, by: str) -> float:
+        """Seconds or operations, infinite when it failed, NaN where they are not counted."""
+        if not math.isfinite(self.seconds):
+            return math.inf
+        flops = math.nan if self.flops is None else self.flops
+        return self.seconds if by == "time" else flops
 
 
 def run(
-    files: Sequence[str], methods: str, tolerances: str, time_limit: float,
-    profile: str | None, json_copy: str | None,
+    files: Sequence[str], methods: Sequence[str], tolerances: str, time_limit: float,
+    profile: str | None, json_copy: str | None, by: str = "time", criterion: str = "judge",
 ) -> None:  # fmt: skip
     """Check all input, solve all, show."""
     check_writable(profile, "--profile", output.FIGURES)
     check_writable(json_copy, "--json")
-    names = _words("methods", methods)
+    racing = contestants(methods)
     goals = [_tolerance(text) for text in _words("tolerances", tolerances)]
+    if not time_limit > 0:
+        raise InvalidInput(f"time-limit: expected seconds > 0, got {time_limit}")
+    stop = Stop(time_limit, Criterion(criterion))
     sources = {file: open_source(file) for file in files}
-    for source in sources.values():
-        for name in names:
-            with_flags(source.settings, name, goals[0], time_limit=time_limit)
     timings = []
     for file, source in sources.items():
         problem = source.discrete()
         for goal in goals:
-            for name in names:
-                timings.append(_time(file, problem, name, goal, time_limit))
-                _progress(f"{source.name}  {name}  {goal:g}")
+            for method in racing:
+                timings.append(_time(file, problem, method, goal, stop))
+                _progress(f"{source.name}  {method.name}  {goal:g}")
     _progress("")
+    names = [method.name for method in racing]
     if json_copy != "-":
-        _show(timings, names, goals)
+        _show(timings, names, goals, by)
     if profile is not None:
-        _draw(timings, names, goals, Path(profile))
+        _draw(timings, names, goals, Path(profile), by)
     if json_copy is not None:
         rows = [asdict(timing) for timing in timings]
-        data = {"schema": SCHEMA, "versions": output.versions(), "results": rows}
+        data = {"schema": SCHEMA, "versions": output.versions(), "time_limit": time_limit,
+                "criterion": criterion, "results": rows}  # fmt: skip
         deliver_json(output.to_json(data), json_copy)
 
 
@@ -106,39 +132,40 @@ def _fresh(problem: FrictionProblem) -> FrictionProblem:
 
 
 def _time(
-    file: str, problem: FrictionProblem, method: str, tolerance: float, limit: float
+    file: str, problem: FrictionProblem, method: Contestant, tolerance: float, stop: Stop
 ) -> Timing:
     """Best time of some runs; the first one warms up, and counts where twice would be long."""
     best, spent, compiled = math.inf, 0.0, compiling()
-    seconds, record = _once(problem, method, tolerance, limit)
+    seconds, record = _once(problem, method, tolerance, stop)
     if isinstance(record, str):
-        return Timing(file, method, tolerance, math.inf, record, math.inf, 0)
+        return Timing(file, method.name, tolerance, math.inf, record, math.inf, 0)
     if seconds > BUDGET:
         best = seconds if record.outcome is Outcome.CONVERGED else math.inf
         spent = seconds
     for _ in range(REPEATS):
         if spent > BUDGET:
             break
-        seconds, record = _once(problem, method, tolerance, limit)
+        seconds, record = _once(problem, method, tolerance, stop)
         assert not isinstance(record, str)
         spent += seconds
         if record.outcome is not Outcome.CONVERGED:
             break
         best = min(best, seconds)
     outcome = record.outcome.name.lower()
-    return Timing(file, method, tolerance, best, outcome, record.error, record.iterations,
-                  compiling() - compiled)  # fmt: skip
+    return Timing(file, method.name, tolerance, best, outcome, record.error, record.iterations,
+                  compiling() - compiled, record.flops, spent=seconds)  # fmt: skip
 
 
 def _once(
-    problem: FrictionProblem, method: str, tolerance: float, limit: float
+    problem: FrictionProblem, method: Contestant, tolerance: float, stop: Stop
 ) -> tuple[float, Convergence | str]:
     """Seconds and record of one solve, or why the method does not fit."""
-    fresh, solver = _fresh(problem), Settings(method).solver()
+    fresh, solver = _fresh(problem), method.settings.solver()
     began = now()
     try:
         found = api.solve_any_form(
-            fresh, solver, tolerance=tolerance, time_limit=limit,
+            fresh, solver, tolerance=tolerance, time_limit=stop.seconds,
+            criterion=stop.criterion, patience=None,
             callback=lambda step, iterate: None,
         )  # fmt: skip
     except (UnsupportedForm, SingularOperator, InvalidInput) as reason:
@@ -149,17 +176,19 @@ def _once(
 
 
 # ------------------------------------------------------------------------------ showing
-def _show(timings: list[Timing], names: list[str], goals: list[float]) -> None:
+def _show(timings: list[Timing], names: list[str], goals: list[float], by: str) -> None:
     """One line per file and tolerance, one column per method."""
     table = {(t.file, t.tolerance, t.method): t for t in timings}
     rows = []
     for file in dict.fromkeys(t.file for t in timings):
         for goal in goals:
             cells = [table[file, goal, name] for name in names]
-            best = min(cell.seconds for cell in cells)
-            rows.append([Path(file).stem, f"{goal:g}", *[_cell(cell, best) for cell in cells]])
+            best = np.nanmin([math.inf, *(cell.cost(by) for cell in cells)])
+            texts = [_cell(cell, by, best) for cell in cells]
+            rows.append([Path(file).stem, f"{goal:g}", *texts])
     compiled = sum(timing.compiling for timing in timings)
-    show_table("Time to solution", ["problem", "tolerance", *names], rows)
+    title = "Time to solution" if by == "time" else "Floating point operations to solution"
+    show_table(title, ["problem", "tolerance", *names], rows)
     solved = [
         f"{name} {sum(math.isfinite(t.seconds) for t in timings if t.method == name)}"
         for name in names
@@ -169,23 +198,43 @@ def _show(timings: list[Timing], names: list[str], goals: list[float]) -> None:
         click.echo(f"compiling, once and not counted: {compiled:.2g} s")
 
 
-def _cell(timing: Timing, best: float) -> str:
+def _cell(timing: Timing, by: str, best: float) -> str:
     if not math.isfinite(timing.seconds):
         failed = timing.outcome.replace("_", " ")
         return f"[red]{failed if len(failed) < 20 else 'does not fit'}[/red]"
-    text = f"{1e3 * timing.seconds:.3g} ms" if timing.seconds < 1 else f"{timing.seconds:.3g} s"
-    return f"[bold]{text}[/bold]" if timing.seconds == best else text
+    cost = timing.cost(by)
+    text = _seconds(cost) if by == "time" else _operations(cost)
+    return f"[bold]{text}[/bold]" if cost == best else text
 
 
-def _draw(timings: list[Timing], names: list[str], goals: list[float], path: Path) -> None:
-    """One panel per tolerance."""
+def _seconds(value: float) -> str:
+    return f"{1e3 * value:.3g} ms" if value < 1 else f"{value:.3g} s"
+
+
+def _operations(value: float) -> str:
+    if math.isnan(value):
+        return "not counted"
+    return f"{value / 1e6:.3g} M" if value < 1e9 else f"{value / 1e9:.3g} G"
+
+
+def _draw(
+    timings: list[Timing], names: list[str], goals: list[float], path: Path, by: str
+) -> None:
+    """One panel per tolerance; methods that do not count operations are not in theirs."""
     from ..plots import profile_figure, save_figure
 
+    shown = [
+        name for name in names
+        if not any(math.isnan(t.cost(by)) for t in timings if t.method == name)
+    ]  # fmt: skip
+    if not shown:
+        raise InvalidInput("--by flops: no method here counts its operations")
     profiles = {}
     for goal in goals:
         columns = [
-            [t.seconds for t in timings if t.method == name and t.tolerance == goal]
-            for name in names
+            [t.cost(by) for t in timings if t.method == name and t.tolerance == goal]
+            for name in shown
         ]
         profiles[goal] = performance_profile(np.array(columns).T)
-    save_figure(profile_figure(profiles, names), path)
+    what = "time" if by == "time" else "operations"
+    save_figure(profile_figure(profiles, shown, what), path)

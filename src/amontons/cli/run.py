@@ -83,7 +83,7 @@ def run(
         _ = read.model.discretisation, read.model.law
     if not quiet:
         say_growth(read)
-    settings = with_flags(read.settings, None, tolerance)
+    settings = with_flags(read.settings, tolerance)
     with Stopping() as stop, ExitStack() as stack:
         asked = _Run(read, settings, every, pictures, quiet, time_limit, deadline, stop)
         for each in {p.resolve(): p for p in (place, exported) if p is not None}.values():

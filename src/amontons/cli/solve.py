@@ -14,6 +14,7 @@ from ..analysis.certificates.uniqueness import Uniqueness, assess, quick_verdict
 from ..case import in_words
 from ..clock import Deadline, TimeLimit, compiling, now
 from ..errors import FileFormatError, InvalidInput, SingularOperator, UnsupportedForm
+from ..judge import Criterion
 from ..nitsche_problem import NO_MULTIPLIERS
 from ..results import ModelSolution
 from ..solution import FrictionSolution, Outcome
@@ -27,16 +28,16 @@ def run(
     source: str, method: str | None, tolerance: float | None, overrides: Sequence[str],
     max_iterations: int | None, time_limit: float | None, folder: str | None,
     json_copy: str | None, quiet: bool, full_verdict: bool,
-    contact_tolerance: float | None = None,
+    contact_tolerance: float | None = None, patience: int = 500, criterion: str = "judge",
 ) -> int:  # fmt: skip
     """Solve and write; returns the exit code."""
-    opened = open_source(source, overrides)
+    opened = open_source(source, overrides, method)
     if opened.in_time:
         raise FileFormatError(
             f"{source}: a case in time, it has [evolution]; use: amontons run {source}"
         )
     settings = with_flags(
-        opened.settings, method, tolerance, max_iterations, time_limit, contact_tolerance
+        opened.settings, tolerance, max_iterations, time_limit, contact_tolerance
     )
     place = check_folder(f"{opened.name}-results" if folder is None else folder)
     check_writable(json_copy, "--json")
@@ -51,6 +52,7 @@ def run(
             opened.target, settings.solver(), tolerance=settings.tolerance,
             contact_tolerance=settings.contact_tolerance,
             max_iterations=settings.max_iterations, time_limit=deadline,
+            patience=patience or None, criterion=Criterion(criterion),
             callback=(lambda step, iterate: None) if silent else None,
         )  # fmt: skip
     except (UnsupportedForm, SingularOperator, InvalidInput) as reason:

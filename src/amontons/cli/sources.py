@@ -99,10 +99,34 @@ def naming_keys(model: Model, file: str) -> Iterator[None]:
         raise type(reason)(f"{file}: {key}: {text}") from reason
 
 
-def open_source(text: str, overrides: Sequence[str] = ()) -> Source:
-    """Read a SOURCE; overrides are those of --set."""
+def open_source(
+    text: str, overrides: Sequence[str] = (), method: str | None = None
+) -> Source:
+    """Read a SOURCE; overrides are those of --set, method that of --method, which comes first.
+
+    Options of another solver that a case has are left out then.
+    """
+    if method is None:
+        return _opened(text, overrides, None)
+    _check_method(method)
+    source = _opened(text, overrides, method)
+    if source.settings.method != method:
+        raise InvalidInput(
+            f"--method {method}: --set solver.method={source.settings.method} says another one"
+        )
+    return source
+
+
+def _check_method(method: str) -> None:
+    try:
+        method_class(method)
+    except InvalidInput as reason:
+        raise InvalidInput(f"--method: {reason}") from None
+
+
+def _opened(text: str, overrides: Sequence[str], method: str | None) -> Source:
     if text.startswith("example:"):
-        return _example(text.removeprefix("example:"), overrides)
+        return _example(text.removeprefix("example:"), overrides, method)
     if not text:
         raise FileFormatError("SOURCE: expected a file or example:NAME, got an empty text")
     path = Path(text)
@@ -110,8 +134,8 @@ def open_source(text: str, overrides: Sequence[str] = ()) -> Source:
         path = path / "solution.h5"
     check_is_plain(path)
     if path.suffix.lower() == ".toml":
-        return _case(path, path.stem, overrides)
-    return _fclib(path, overrides)
+        return _case(path, path.stem, overrides, method)
+    return _fclib(path, overrides, method)
 
 
 def check_is_plain(path: Path) -> None:
@@ -133,8 +157,8 @@ def check_is_plain(path: Path) -> None:
         )
 
 
-def _case(path: Path, name: str, overrides: Sequence[str]) -> Source:
-    case = read_case(path, overrides)
+def _case(path: Path, name: str, overrides: Sequence[str], method: str | None) -> Source:
+    case = read_case(path, overrides, method)
     return Source(
         name,
         case.title,
@@ -157,7 +181,7 @@ def case_file(text: str) -> Path:
     return path
 
 
-def _fclib(path: Path, overrides: Sequence[str]) -> Source:
+def _fclib(path: Path, overrides: Sequence[str], method: str | None) -> Source:
     from ..fclib import read_fclib
 
     try:
@@ -177,7 +201,7 @@ def _fclib(path: Path, overrides: Sequence[str]) -> Source:
         raise FileFormatError(
             f"{path}: the results of a model hold no problem to read; give the case file"
         ) from None
-    settings = override_settings(Settings(), overrides)
+    settings = override_settings(Settings(method or "auto"), overrides)
     return Source(path.stem, path.stem, problem=problem, from_fclib=True, settings=settings,
                   files=(path,))  # fmt: skip
 
@@ -211,17 +235,11 @@ def override_settings(settings: Settings, overrides: Sequence[str]) -> Settings:
 
 
 def with_flags(
-    settings: Settings, method: str | None, tolerance: float | None,
+    settings: Settings, tolerance: float | None,
     max_iterations: int | None = None, time_limit: float | None = None,
     contact_tolerance: float | None = None,
 ) -> Settings:  # fmt: skip
     """Settings with the flags of the command line, which win; the solver is checked here."""
-    if method is not None:
-        try:
-            method_class(method)
-        except InvalidInput as reason:
-            raise InvalidInput(f"--method: {reason}") from None
-        settings = replace(settings, method=method)
     for key, value in (("tolerance", tolerance), ("max_iterations", max_iterations),
                        ("time_limit", time_limit),
                        ("contact_tolerance", contact_tolerance)):  # fmt: skip
@@ -253,13 +271,13 @@ def examples() -> dict[str, str]:
     return dict(sorted(found.items()))
 
 
-def _example(name: str, overrides: Sequence[str]) -> Source:
+def _example(name: str, overrides: Sequence[str], method: str | None) -> Source:
     from ..gallery import GALLERY
 
     if name in GALLERY:
-        settings = override_settings(Settings(), overrides)
+        settings = override_settings(Settings(method or "auto"), overrides)
         return Source(name, name, problem=GALLERY[name](), settings=settings)
     known = examples()
     if name not in known:
         raise InvalidInput(f"example:{name}: no such example{nearest(name, known)}")
-    return _case(Path(str(DATA / f"{name}.toml")), name, overrides)
+    return _case(Path(str(DATA / f"{name}.toml")), name, overrides, method)

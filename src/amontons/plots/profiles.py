@@ -13,8 +13,13 @@ LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000
 DASHES = ("-", "--", "-.", ":")
 
 
-def profile_figure(profiles: dict[float, tuple[Array, Array]], names: list[str]) -> Figure:
-    """Performance profiles, one panel per tolerance: (tau, rho) by tolerance."""
+def profile_figure(
+    profiles: dict[float, tuple[Array, Array]], names: list[str], what: str = "time"
+) -> Figure:
+    """Performance profiles, one panel per tolerance: (tau, rho) by tolerance.
+
+    what: the cost that is compared, for the label of the axis.
+    """
     count = len(profiles)
     figure = Figure(figsize=(4.6 * count + 0.4, 3.8), dpi=150, layout="constrained")
     panels = figure.subplots(1, count, sharey=True, squeeze=False)[0]
@@ -26,7 +31,7 @@ def profile_figure(profiles: dict[float, tuple[Array, Array]], names: list[str])
                       label=name, marker="o", markevery=[0], markersize=4,
                       clip_on=False)  # fmt: skip
         axes.set(xscale="log", xlim=(last**-0.04, last), ylim=(0, 1.03),
-                 xlabel="time / best time", title=f"tolerance {tolerance:g}")  # fmt: skip
+                 xlabel=f"{what} / best {what}", title=f"tolerance {tolerance:g}")  # fmt: skip
         _plain_ticks(axes, last)
         axes.grid(alpha=0.25)
         axes.spines[["top", "right"]].set_visible(False)

@@ -7,12 +7,14 @@ from .augmentation import RhoStrategy
 from .base import Breakdown, Iterate, Solver, Target
 from .compressed import CompressedDelassus
 from .contact_multigrid import ContactMultigrid
+from .fischer_burmeister import FischerBurmeister
 from .functions import AlartCurnier, ComplementarityFunction, JeanMoreau, NaturalMap
 from .gauss_seidel import Batch, GaussSeidel
 from .gradient import AcceleratedGradient, GradientIterate, Metric, Restart
 from .hybrid import Auto, Hybrid
 from .inexact import InexactNewton
 from .interior_point import InteriorPoint
+from .jacobi import Jacobi
 from .line_search import Armijo, FullStep, GoldsteinPrice, LineSearch, NonMonotone
 from .local_contact import LocalSolver
 from .newton import SemismoothNewton
@@ -28,6 +30,7 @@ METHODS: dict[str, type] = {
     "contact-multigrid": ContactMultigrid,
     "gauss-seidel": GaussSeidel,
     "hybrid": Hybrid,
+    "jacobi": Jacobi,
     "interior-point": InteriorPoint,
     "inexact-newton": InexactNewton,
     "proximal-point": ProximalPoint,
@@ -51,6 +54,7 @@ __all__ = [
     "CompressedDelassus",
     "ContactMultigrid",
     "CycleShape",
+    "FischerBurmeister",
     "FrictionBound",
     "FrictionFunction",
     "FullStep",
@@ -62,6 +66,7 @@ __all__ = [
     "InexactNewton",
     "InnerStart",
     "Iterate",
+    "Jacobi",
     "JeanMoreau",
     "LineSearch",
     "LocalSolver",

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..clock import NEVER, Deadline
 from ..errors import InvalidInput
+from ..judge import Criterion, published_natural_error
 from ..problem import Form, FrictionProblem
 from ..status import ActiveSets
 
@@ -39,6 +40,7 @@ class Iterate:
     stage: str = ""  # which stage of a portfolio made it
     sets: ActiveSets | None = None  # of a method that decides by sets of contacts
     ends: str | None = None
+    flops: float | None = None  # floating point operations since the last; None: not counted
 
 
 @dataclass(frozen=True)
@@ -47,11 +49,18 @@ class Target:
 
     tolerance: float
     deadline: Deadline = NEVER  # at which the driver will stop
+    criterion: Criterion = Criterion.JUDGE  # what the tolerance is for
 
     @property
     def seconds_left(self) -> float:
         """Time until the deadline, 0 when it has passed."""
         return self.deadline.left
+
+    def error(self, problem: FrictionProblem, iterate: Iterate) -> float:
+        """The error that the driver will see."""
+        if self.criterion is Criterion.JUDGE:
+            return problem.error(iterate.r, iterate.v)
+        return natural_error_of(problem, iterate.r, iterate.v)
 
 
 @dataclass
@@ -74,6 +83,15 @@ class Patience:
         else:
             self.waited += 1
         return self.waited > self.most
+
+
+def natural_error_of(problem: FrictionProblem, r: Array, v: Array | None = None) -> float:
+    """[ABD] eq. (13) of reactions r, (nc, d), with v, (n,), if it is known."""
+    if v is not None and problem.form is Form.GLOBAL:
+        u = problem.local_velocity(v)
+    else:
+        u = problem.velocity(r)[0]
+    return published_natural_error(r, u, problem.free_velocity, problem.law)
 
 
 class Solver(Protocol):

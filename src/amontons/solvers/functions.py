@@ -7,6 +7,8 @@ shape (nc, d, d).  [ABD] eqs. (8)-(10):
     Jean-Moreau    the same with radius mu r_N^+
     natural map    F = r - P_K(r - rho û)
 
+and `fischer_burmeister` in a module of its own,
+
 with x_N = r_N - rho_N u_N and x_T = r_T - rho_T u_T: rho is (nc,), or (nc, 2) with columns
 rho_N and rho_T.  The natural map takes one rho per contact only: with two, x would have to be
 projected in another norm than Euclid's for F to vanish exactly at a solution.  Under Tresca's
@@ -21,7 +23,7 @@ Jacobians are chosen regular where the law leaves a choice: a contact without fr
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +44,10 @@ Linearised = tuple[Array, Array, Array]
 
 
 class ComplementarityFunction(Protocol):
-    """F and its generalised Jacobian; rho as in the module."""
+    """F and its generalised Jacobian; rho as in the module.
+
+    One that takes only one rho per contact has a class variable one_rho = True.
+    """
 
     def residual(self, r: Array, u: Array, law: Law, rho: Array) -> Array:
         """F, (nc, d), unit of r."""
@@ -85,12 +90,12 @@ def _disk_linearised(  # noqa: PLR0913
     return _disk_function(r, u, rho, radius), A, B
 
 
-def _one_per_contact(rho: Array) -> Array:
-    """Raise InvalidInput unless rho is (nc,)."""
+def one_per_contact(rho: Array) -> Array:
+    """rho; raises InvalidInput unless it is (nc,)."""
     if rho.ndim != 1:
         raise InvalidInput(
-            f"rho: the natural map needs one per contact, shape (nc,), got {rho.shape}; "
-            "use AlartCurnier or JeanMoreau for rho_N and rho_T apart"
+            f"rho: a function of the whole cone needs one per contact, shape (nc,), got "
+            f"{rho.shape}; use AlartCurnier or JeanMoreau for rho_N and rho_T apart"
         )
     return rho
 
@@ -136,13 +141,15 @@ class JeanMoreau:
 class NaturalMap:
     """Projection onto the Coulomb cone after De Saxcé's change of variable."""
 
+    one_rho: ClassVar[bool] = True
+
     def residual(self, r: Array, u: Array, law: Law, rho: Array) -> Array:
         """F, (nc, d), unit of r."""
-        return law.natural_map(r, u, _one_per_contact(rho))
+        return law.natural_map(r, u, one_per_contact(rho))
 
     def linearise(self, r: Array, u: Array, law: Law, rho: Array) -> Linearised:
         """(F, A, B) at (r, u)."""
-        _one_per_contact(rho)
+        one_per_contact(rho)
         if isinstance(law, Tresca):
             return AlartCurnier().linearise(r, u, law, rho)
         d = r.shape[1]

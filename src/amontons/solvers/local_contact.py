@@ -6,6 +6,11 @@ The exact solution (`one_contact`) is faster and safer; these exist for comparis
   eq. (8), without line search; the exact solution takes over where they fail.
 - Projection (NSGS-FP-VI-UPK): r <- P_K(r - rho û), with rho adapted until it is a contraction:
   rho shrinks while rho |û(r) - û(r')| > 0.9 |r - r'| and grows when the ratio is below 0.3.
+  After the last projection the contact is left as it is: a few of them may do, as the sweeps
+  come back to it.
+
+Both end at a relative change, the local tolerance, or after a number of steps, and add the
+floating point operations that they took to `work` (1,).
 
 [ABD] V. Acary, M. Brémond, F. Dubois, CSMA 2017 (see `gauss_seidel`).
 """
@@ -23,6 +28,10 @@ from ..one_contact import solve_contact
 STEPS = 20  # Newton steps before the exact solution takes over
 PROJECTIONS = 100
 CLOSE = 1e-14  # relative change at which an iteration ends
+# Floating point operations, an operation or a root each: tests count them one by one.
+ROW_FLOPS, CRAMER_FLOPS = 113.0, 67.0  # of a Newton step: F, its derivative and size; the step
+VELOCITY_FLOPS, PROJECTION_FLOPS = 27.0, 64.0  # of a projection: before it, each trial of rho
+EXACT_FLOPS = 100.0  # of an exact solution, about: open 0, sticking 21, sliding 150 to 400
 
 
 class LocalSolver(IntEnum):
@@ -74,24 +83,30 @@ def _determinant(J, column, F):
 
 
 @njit(cache=True, error_model="numpy")
-def newton_contact(A, b0, b1, b2, mu, r0, r1, r2):  # noqa: PLR0913
-    """(r_N, r_T1, r_T2) by Newton from (r0, r1, r2); exact where Newton does not converge."""
+def newton_contact(A, b0, b1, b2, mu, r0, r1, r2, close, steps, work):  # noqa: PLR0913
+    """(r_N, r_T1, r_T2) by Newton from (r0, r1, r2); exact where Newton does not converge.
+
+    close: relative residual at which it ends; at most `steps` steps.
+    """
     g1, g2 = r1, r2
     size = max(abs(A[0, 0]), abs(A[1, 1]), abs(A[2, 2]))
     if size > 0.0:
         rho = 1.0 / size
         F, J = np.empty(3), np.empty((3, 3))
-        for _ in range(STEPS):
+        for _ in range(steps):
             _newton_row(A, b0, b1, b2, mu, rho, r0, r1, r2, F, J)
+            work[0] += ROW_FLOPS
             scale = abs(r0) + abs(r1) + abs(r2) + rho * (abs(b0) + abs(b1) + abs(b2))
-            if abs(F[0]) + abs(F[1]) + abs(F[2]) <= CLOSE * scale:
+            if abs(F[0]) + abs(F[1]) + abs(F[2]) <= close * scale:
                 return r0, r1, r2
+            work[0] += CRAMER_FLOPS
             det = _determinant(J, 0, F)
             if not abs(det) > 1e-14:
                 break
             r0 -= _determinant(J, 1, F) / det
             r1 -= _determinant(J, 2, F) / det
             r2 -= _determinant(J, 3, F) / det
+    work[0] += EXACT_FLOPS
     x0, x1, x2, _ = solve_contact(A, b0, b1, b2, mu, False, g1, g2)
     return x0, x1, x2
 
@@ -119,16 +134,21 @@ def _projected(x0, x1, x2, mu):
 
 
 @njit(cache=True, error_model="numpy")
-def projection_contact(A, b0, b1, b2, mu, r0, r1, r2):  # noqa: PLR0913
-    """(r_N, r_T1, r_T2) by projections with an adapted rho from (r0, r1, r2)."""
+def projection_contact(A, b0, b1, b2, mu, r0, r1, r2, close, steps, work):  # noqa: PLR0913
+    """(r_N, r_T1, r_T2) by projections with an adapted rho from (r0, r1, r2).
+
+    close: relative change at which it ends; at most `steps` projections.
+    """
     size = max(abs(A[0, 0]), abs(A[1, 1]), abs(A[2, 2]))
     if size <= 0.0:
         return 0.0, 0.0, 0.0
     rho = 1.0 / size
-    for _ in range(PROJECTIONS):
+    for _ in range(steps):
         u0, u1, u2 = _modified_velocity(A, b0, b1, b2, mu, r0, r1, r2)
         ratio = 0.0
+        work[0] += VELOCITY_FLOPS
         for _ in range(30):
+            work[0] += PROJECTION_FLOPS
             p0, p1, p2 = _projected(r0 - rho * u0, r1 - rho * u1, r2 - rho * u2, mu)
             v0, v1, v2 = _modified_velocity(A, b0, b1, b2, mu, p0, p1, p2)
             moved = math.sqrt((p0 - r0) ** 2 + (p1 - r1) ** 2 + (p2 - r2) ** 2)
@@ -139,7 +159,7 @@ def projection_contact(A, b0, b1, b2, mu, r0, r1, r2):  # noqa: PLR0913
                 break
             rho *= 2.0 / 3.0 * min(1.0, 1.0 / ratio)
         r0, r1, r2 = p0, p1, p2
-        if moved <= CLOSE * (abs(r0) + abs(r1) + abs(r2)):
+        if moved <= close * (abs(r0) + abs(r1) + abs(r2)):
             break
         if ratio < 0.3:
             rho *= 1.5

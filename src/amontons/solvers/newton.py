@@ -23,6 +23,7 @@ SIAM J. Sci. Comput. 17 (1996).
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -43,7 +44,7 @@ from .augmentation import RhoStrategy, augmentation
 from .base import Breakdown, Iterate, Target, check_positive
 from .block_lu import Symbolic, newton_step_inplace
 from .driven import able_directions, driven_directions, sliding_rho
-from .functions import AlartCurnier, ComplementarityFunction, Linearised, NaturalMap, columns
+from .functions import AlartCurnier, ComplementarityFunction, Linearised, columns
 from .line_search import LineSearch, NonMonotone
 from .nitsche_newton import newton_iterates
 
@@ -93,8 +94,8 @@ class SemismoothNewton:
 
     With Nitsche's method only linear and line_search count: function and rho are its own.
 
-    The natural map needs one rho per contact, because the projection onto Coulomb's cone is
-    that of one norm; Alart-Curnier and Jean-Moreau take rho_N and rho_T apart.
+    The natural map and Fischer-Burmeister's function need one rho per contact, because
+    Coulomb's cone is that of one norm; Alart-Curnier and Jean-Moreau take rho_N and rho_T.
     """
 
     form: ClassVar[Form] = Form.ANY
@@ -109,11 +110,11 @@ class SemismoothNewton:
     def __post_init__(self) -> None:
         check_options(self)
         check_positive(rho=self.rho)
-        if self.rho_strategy.splits and isinstance(self.function, NaturalMap):
+        if self.rho_strategy.splits and getattr(self.function, "one_rho", False):
             raise InvalidInput(
-                f"rho_strategy: the natural map projects onto the cone and needs one rho per "
-                f"contact, got {self.rho_strategy.value}; use per-contact or spectral, or the "
-                "function AlartCurnier or JeanMoreau"
+                f"rho_strategy: {_words(self.function)} works on the whole cone and needs one "
+                f"rho per contact, got {self.rho_strategy.value}; use per-contact or spectral, "
+                "or the function AlartCurnier or JeanMoreau"
             )
 
     def iterates(
@@ -158,6 +159,11 @@ class SemismoothNewton:
         if self.linear is not None:
             return Augmented(problem, self.linear)
         return SchurComplement.of(problem)
+
+
+def _words(function: ComplementarityFunction) -> str:
+    """Its name in a message."""
+    return re.sub(r"(?<!^)(?=[A-Z])", " ", type(function).__name__).lower()
 
 
 def _merit(law: _Residual, state: State, step: State, t: float) -> float:
@@ -206,7 +212,7 @@ class _Residual:
         pressed[:, 0] = np.maximum(state.r[:, 0], state.r[:, 0] - normal * state.u[:, 0])
         bound = np.maximum(self.law.bound(pressed), 0.0)
         tangent = sliding_rho(tangent, self.driven, bound, state.u)
-        if isinstance(self.function, NaturalMap):
+        if getattr(self.function, "one_rho", False):
             return tangent
         return np.column_stack([normal, tangent])
 

@@ -31,7 +31,15 @@ from ..compiled import njit
 from ..judge import natural_error
 from ..one_contact import solve_contact, solve_eliminated
 from ..problem import FrictionProblem
-from .local_contact import LocalSolver, newton_contact, projection_contact
+from .local_contact import (
+    CLOSE,
+    EXACT_FLOPS,
+    PROJECTIONS,
+    STEPS,
+    LocalSolver,
+    newton_contact,
+    projection_contact,
+)
 
 Array = NDArray[np.float64]
 EXACT, NEWTON = int(LocalSolver.EXACT), int(LocalSolver.NEWTON)
@@ -40,6 +48,7 @@ SLOWEST = 1e-9  # approach, relative to the fastest, below which contacts count 
 FIRST_JUDGED = 10.0  # change, in goals, at which the judge is asked first: sweeps may be quick
 SAFETY = 0.95  # of the change at which the judge is asked again
 SHIFT = 1e-13  # of the least-squares equations of Anderson acceleration, relative
+BLOCK_FLOPS, CONTACT_FLOPS = 18, 16  # of a sweep: per block of W, per contact besides
 LEAST = 1e-3  # factor by which that change falls at most from one judgement to the next
 
 
@@ -65,6 +74,9 @@ class Sweep(NamedTuple):
     order: Any  # (nc,) contacts in the order of visits
     local: int
     relaxation: float
+    close: float  # relative change at which iterations on one contact end
+    steps: int  # of them at most
+    work: Any  # (1,) floating point operations of iterations on single contacts, added up
 
 
 def sweep_data(
@@ -72,15 +84,31 @@ def sweep_data(
     local: LocalSolver = LocalSolver.EXACT,
     relaxation: float = 1.0,
     order: SweepOrder = SweepOrder.STORED,
+    *,
+    close: float = CLOSE,
+    steps: int | None = None,
 ) -> Sweep:
     """Sweeps of a problem in Delassus form."""
+    if steps is None:
+        steps = PROJECTIONS if local is LocalSolver.PROJECTION else STEPS
     b = problem.blocks
     _, _, _, q, coefficient, tresca, rho = problem.kernel_data
     visits = _by_approach(q) if order is SweepOrder.APPROACH else np.arange(len(q))
     return Sweep(
         b.indptr, b.indices, b.data, q, coefficient, tresca, rho, b.diagonal, b.eliminated,
-        visits, int(local), float(relaxation),
+        visits, int(local), float(relaxation), float(close), int(steps), np.zeros(1),
     )  # fmt: skip
+
+
+def sweep_flops(s: Sweep, sweeps: int, local: float) -> float:
+    """Floating point operations of some sweeps, `local` being what they added to s.work.
+
+    A block of W takes nine products and nine sums; then there are the solution of each contact
+    and what tells its change.
+    """
+    nc = len(s.order)
+    own = CONTACT_FLOPS + (EXACT_FLOPS if s.local == EXACT else 0.0)
+    return sweeps * (BLOCK_FLOPS * (len(s.indices) - nc) + own * nc) + local
 
 
 @njit(cache=True, error_model="numpy")
@@ -122,9 +150,13 @@ def sweep_inplace(s, backward, r):
             else:
                 x0, x1, x2 = solve_eliminated(e, A, b0, b1, b2, c, r1, r2)
         elif s.local == NEWTON:
-            x0, x1, x2 = newton_contact(A, b0, b1, b2, c, r0, r1, r2)
+            x0, x1, x2 = newton_contact(
+                A, b0, b1, b2, c, r0, r1, r2, s.close, s.steps, s.work
+            )
         else:
-            x0, x1, x2 = projection_contact(A, b0, b1, b2, c, r0, r1, r2)
+            x0, x1, x2 = projection_contact(
+                A, b0, b1, b2, c, r0, r1, r2, s.close, s.steps, s.work
+            )
         d0, d1, d2 = x0 - r0, x1 - r1, x2 - r2
         w = s.relaxation if x0 > 0.0 else 1.0  # open at once: else r fades into denormals
         r[i, 0], r[i, 1], r[i, 2] = r0 + w * d0, r1 + w * d1, r2 + w * d2
@@ -298,6 +330,11 @@ class Acceleration:
         self.history = np.empty((2, self.depth + 1, self.r.size))
         self.gram = np.zeros((self.depth + 1, self.depth))
         self.count = np.zeros(2, dtype=np.int64)
+
+    @property
+    def flops(self) -> float:
+        """Floating point operations of a sweep beyond the sweep itself."""
+        return self.r.size * (8.0 + 4.0 * self.depth) + self.depth**3 / 3
 
     def sweep(self, sweeps: int, watch: Array) -> int:
         """Go on for `sweeps` sweeps or until the judge is content; sweeps done."""

@@ -1,0 +1,184 @@
+"""The driver's memory of one solve: it judges every iterate and knows the best one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .clock import compiling, now
+from .cones import Coulomb
+from .judge import EPSILON, Criterion, Measure, Weakest
+from .nitsche_problem import NitscheProblem
+from .problem import Form, FrictionProblem
+from .settling import Motion, Settled, settled_state
+from .solution import Step
+from .solvers.base import Iterate, natural_error_of
+
+Array = NDArray[np.float64]
+MEMORY = 64  # iterates among which a repetition counts as a cycle
+AT_REST = 1e-10  # relative change of r below which an iterate has not moved
+PATIENCE = 500  # iterates without any progress before a solve counts as stagnated
+PROGRESS = 0.99  # the best error must fall at least by this factor within PATIENCE
+BLUR = 1e-2  # rounding, relative to the tolerance, above which an error is evaluated sharply
+BLURRED = 20  # iterates that would do if rounding could hide no error in them
+TIGHTER = 0.3  # goal of a second start, relative to what would just do
+JUDGE_FLOPS = 18, 60  # floating point operations of a judgement per block of W, per contact
+
+
+@dataclass
+class Watch:
+    """The driver's memory of one solve."""
+
+    problem: FrictionProblem | NitscheProblem
+    tolerance: float
+    contact_tolerance: float
+    criterion: Criterion = Criterion.JUDGE
+    patience: int | None = PATIENCE  # None: never stagnated
+    started: float = field(default_factory=now)
+    compiled: float = field(default_factory=compiling)  # until then
+    best: Iterate | None = None
+    told: tuple[Motion, Settled] | None = None  # of the best iterate where it is good enough
+    error: float = np.inf
+    weakest: Weakest | None = None  # contact of the best iterate, once its error will do
+    iterations: int = 0
+    linear_iterations: int = 0
+    flops: float | None = 0.0  # None from the first iterate on that does not count its own
+    history: list[Step] = field(default_factory=list)
+    seen: list[tuple[float, Array]] = field(default_factory=list)
+    blurred: int = 0  # iterates whose error rounding hides
+    mark: tuple[int, float] = (0, np.inf)  # iterate and error of the last real progress
+
+    def judge(self, iterate: Iterate) -> Step:
+        """Judge an iterate and remember it if it is the best."""
+        if self.criterion is Criterion.NATURAL:
+            error = natural_error_of(self.problem, iterate.r, iterate.v)  # type: ignore[arg-type]
+            return self._noted(iterate, error, None, None)
+        error, weakest, told = self.problem.error(iterate.r, iterate.v), None, None
+        if error <= self.tolerance and not isinstance(self.problem, NitscheProblem):
+            told = settled_state(self.problem, iterate.r, iterate.v)
+            if told[1].r is not iterate.r:  # judged exactly, their motion is found again
+                v = None if self.problem.measure is Measure.EXACT else iterate.v
+                iterate = replace(iterate, r=told[1].r, v=v)
+                error = self.problem.error(iterate.r, iterate.v)
+        if error <= self.tolerance:
+            weakest = self.problem.weakest(iterate.r, iterate.v)
+            if weakest is not None and weakest.hidden > BLUR * self.tolerance:
+                error = self.problem.certain_error(iterate.r, iterate.v)
+                if error > self.tolerance:
+                    weakest = None
+                    self.blurred += 1
+        return self._noted(iterate, error, weakest, told)
+
+    def _noted(
+        self, iterate: Iterate, error: float, weakest: Weakest | None,
+        told: tuple[Motion, Settled] | None,
+    ) -> Step:  # fmt: skip
+        """The line of the history about an iterate that has been judged."""
+        self.iterations += iterate.iterations
+        self.linear_iterations += iterate.linear_iterations
+        seconds = now() - self.started
+        self.flops = self._counted(iterate)
+        step = Step(
+            self.iterations, error, self.linear_iterations, seconds, iterate.sets, self.flops
+        )
+        self.history.append(step)
+        if self.best is None or self._better(error, weakest):
+            self.best, self.error, self.weakest = iterate, error, weakest
+            self.told = told
+        if error < PROGRESS * self.mark[1]:
+            self.mark = (len(self.history), error)
+        return step
+
+    def _counted(self, iterate: Iterate) -> float | None:
+        """Floating point operations so far, judgements among them; None if not counted."""
+        if self.flops is None or self.problem.form is not Form.DELASSUS:
+            judged = 0.0
+        else:
+            blocks, (each, own) = self.problem.blocks, JUDGE_FLOPS  # type: ignore[union-attr]
+            judged = each * len(blocks.indices) + own * len(blocks.diagonal)
+        if self.flops is None or (iterate.flops is None and iterate.iterations):
+            return None
+        return self.flops + (iterate.flops or 0.0) + judged
+
+    def _better(self, error: float, weakest: Weakest | None) -> bool:
+        """True for an error below the best; of those that will do, for the better contacts."""
+        if weakest is None or self.weakest is None:
+            return error < self.error
+        return weakest.error < self.weakest.error
+
+    @property
+    def converged(self) -> bool:
+        """True when the best iterate will do in the sum and at every contact."""
+        good = self.error <= self.tolerance
+        return good and (self.weakest is None or self.weakest.error <= self.contact_tolerance)
+
+    @property
+    def weak(self) -> bool:
+        """True when the best iterate will do in the sum alone."""
+        return self.error <= self.tolerance and not self.converged
+
+    @property
+    def in_words(self) -> str:
+        """Why the best iterate will not do though its error is small; "" where it would."""
+        if self.criterion is Criterion.NATURAL:
+            return ""
+        if self.best is not None and not self.converged:
+            hidden = self.problem.rounding(self.best.r)
+            law = self.problem.law
+            mu = law.mu.max(initial=0.0) if isinstance(law, Coulomb) else 0.0
+            if mu * EPSILON > self.tolerance:
+                return (
+                    f"rounding of the slip, times friction of {mu:.0e}, is above the "
+                    "tolerance: hold contacts that can not slip by supports, or take mu below "
+                    "1e7"
+                )
+            if hidden > self.tolerance:
+                return (
+                    f"rounding alone may hide an error of {hidden:.1e}: reactions are huge "
+                    "beside what loads the contacts"
+                )
+        if not self.weak or self.weakest is None:
+            return ""
+        return (
+            f"contact {self.weakest.contact} misses its law by {self.weakest.error:.1e} on its "
+            f"own scale, {self.contact_tolerance:.0e} is allowed"
+        )
+
+    def tighter(self, goal: float) -> float:
+        """The next goal for the error, so that the weakest contact will do too."""
+        if self.criterion is Criterion.NATURAL:
+            return TIGHTER * goal * min(self.tolerance / self.error, 1.0)
+        assert self.weakest is not None
+        share = TIGHTER * self.contact_tolerance / self.weakest.error
+        return max(min(self.error * share, TIGHTER * goal), np.finfo(float).tiny)
+
+    def cycled(self, iterate: Iterate, error: float) -> bool:
+        """True when this iterate was here before, with other iterates in between.
+
+        One that hardly moves does not come back: its method may wait for something else.
+        """
+        same = [self._repeats(iterate, error, *old) for old in self.seen]
+        size = np.abs(iterate.r).max(initial=0.0)
+        moved = not self.seen or np.abs(self.seen[-1][1] - iterate.r).max(initial=0.0)
+        self.seen.append((error, iterate.r))
+        del self.seen[:-MEMORY]
+        return any(same) and not same[-1] and moved > AT_REST * size
+
+    @staticmethod
+    def _repeats(iterate: Iterate, error: float, old_error: float, old: Array) -> bool:
+        if abs(old_error - error) > 1e-12 * error:
+            return False
+        size = np.abs(iterate.r).max(initial=0.0)
+        return bool(np.abs(old - iterate.r).max(initial=0.0) <= 1e-13 * size)
+
+    @property
+    def stagnated(self) -> bool:
+        """True when the best error has not moved for `patience` iterates.
+
+        Or when rounding has hidden that of BLURRED ones: more of them will not be known better.
+        """
+        if self.patience is None:
+            return False
+        return len(self.history) - self.mark[0] > self.patience or self.blurred > BLURRED

@@ -1,0 +1,86 @@
+"""Every example of every --help runs as it is printed, in a folder with the files it names."""
+
+import glob
+import json
+import re
+import shlex
+
+import click
+import pytest
+from click.testing import CliRunner
+
+import amontons as am
+from amontons.case import DATA
+from amontons.cli import main
+from amontons.gallery import box_tower, random_delassus
+
+CASE = """
+title = "press"
+[mesh]
+box = [1, 1]
+cells = 3
+[material.default]
+young = 1.0
+poisson = 0.3
+[[fix]]
+on = "top"
+value = [0.05, -0.1]
+[[contact]]
+slave = "bottom"
+obstacle = { plane = { normal = [0, 1] } }
+friction = { coulomb = 0.5 }
+"""
+GOOD = {"enumerate": (0, 1), "uniqueness": (0, 1)}  # exit codes; 1: undecided
+
+
+def commands():
+    """The group and its commands, by what is typed."""
+    found = {"amontons": main}
+    found |= {f"amontons {name}": command for name, command in main.commands.items()}
+    return found
+
+
+def examples():
+    """(what is typed, command) of all epilogs: lines that begin with the program."""
+    for name, command in commands().items():
+        text = command.epilog or ""
+        for line in text.splitlines():
+            if line.strip().startswith("amontons "):
+                yield pytest.param(re.split(r"\s{2,}", line.strip())[0], id=line.strip()[:60])
+        if name != "amontons" and text:
+            assert "Example" in text, name
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder with a file of every name that the examples use."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "120")
+    (tmp_path / "case.toml").write_text(CASE)
+    am.write_fclib(random_delassus(0, 4), tmp_path / "problem.hdf5")
+    am.write_fclib(box_tower(3), tmp_path / "KaplasTower.hdf5")
+    am.write_fclib(am.read_case(tmp_path / "case.toml").model.assemble(), "global.hdf5")
+    wall = re.sub(r"cells = .*", "cells = [2, 1, 1]", (DATA / "wall.toml").read_text())
+    (tmp_path / "wall.toml").write_text(re.sub(r"until = .*", "until = 0.05", wall))
+    return tmp_path
+
+
+@pytest.mark.parametrize("line", list(examples()))
+def test_example_of_the_help_runs(line, folder):
+    typed, _, reader = line.partition("|")
+    words = [w for word in shlex.split(typed)[1:] for w in sorted(glob.glob(word)) or [word]]
+    if "--restart" in words:  # it goes on with the run of the example before
+        first = words[: words.index("--restart")]
+        assert CliRunner().invoke(main, first).exit_code == 0
+    done = CliRunner().invoke(main, words)
+    assert done.exit_code in GOOD.get(words[0], (0,)), done.output
+    if reader:
+        key = reader.split(".")[-1].strip()
+        assert key in json.loads(done.stdout)
+
+
+def test_every_command_that_takes_options_has_examples():
+    for name, command in commands().items():
+        if isinstance(command, click.Group) or len(command.params) < 2:
+            continue
+        assert "amontons " in (command.epilog or ""), name
