@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from ...errors import InvalidInput, SingularOperator
 from .corrector import Curve, Tolerances
-from .first_order import Tangent, first_order
+from .first_order import first_order
 from .path import Event, PathProblem, Point, is_number, name_of
+from .tangents import Tangent
 from .walk_by_pieces import WalkByPieces
 from .walk_by_switch import WalkBySwitch
 
@@ -55,6 +56,8 @@ class Continuation:
     corrections: int = 5  # [j_max]
     quick: int = 4  # [j_thr] corrections below which the step grows
     border: float = 1e-9  # margin of a piece that counts as zero
+    ahead: float | None = None  # [h_1] of the tangent switch; None: a hundredth of min_step
+    aside: float | None = None  # [h_2] of the tangent switch, the first; None: min_step
     switch: Switch | None = None  # None: by the first-order system where the problem allows it
 
     def __post_init__(self) -> None:
@@ -81,6 +84,8 @@ class Continuation:
             "corrections": (self.corrections >= 1, "at least 1"),
             "quick": (self.quick >= 0, "at least 0"),
             "border": (self.border > 0, "a number > 0"),
+            "ahead": (self.ahead is None or 0 < self.ahead < np.inf, "a number > 0"),
+            "aside": (self.aside is None or 0 < self.aside < np.inf, "a number > 0"),
         }
         for name, (holds, wanted) in checks.items():
             if not holds:
@@ -90,6 +95,16 @@ class Continuation:
     def tolerances(self) -> Tolerances:
         """Those of the corrector."""
         return Tolerances(self.residual, self.change, self.corrections)
+
+    @property
+    def ahead_of_kink(self) -> float:
+        """h_1: [LR] has 1.5 min_step, but does not locate kinks."""
+        return self.min_step / 100 if self.ahead is None else self.ahead
+
+    @property
+    def aside_of_kink(self) -> float:
+        """h_2, the first that is tried."""
+        return self.min_step if self.aside is None else self.aside
 
     def cosine(self, problem: PathProblem) -> float:
         """The smallest cosine between neighbouring tangents: 0.999, or 0.99999 as in [LR].

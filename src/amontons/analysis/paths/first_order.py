@@ -13,7 +13,6 @@ Orientation: along a curve without branch points sign(p') sign(det J_y) does not
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -27,51 +26,14 @@ from .friction_path import FrictionPath
 from .path import PathProblem, corrected, name_of, weight_of
 from .rest import REASON, rates_from_rest, resting
 from .sparse_kernel import sparse_kernel
+from .tangents import INWARD, FirstOrder, Tangent, merged
+from .tangents import inward as inside
 
 Array = NDArray[np.float64]
 SINGULAR = 1e-10  # singular value, relative to the largest, that counts as zero
-INWARD = 1e-9  # rate, of a direction of length 1, below which a condition does not change
-SAME = 1e-7  # distance of two directions of length 1 that count as one
 BORDERS = 4  # near a point up to which all pieces are looked at one by one
 SMALL = (1e-3, 1e-5, 1e-7)  # changes of the parameter that tell where a curve goes
 COMBINATIONS = 20_000  # pieces at a point up to which all are looked at
-
-
-@dataclass(frozen=True, eq=False)
-class Tangent:
-    """A one-sided direction (y', p') of weighted length 1 and the piece into which it leads.
-
-    strict: it leads into the inside of the piece; else touching names the others.
-    """
-
-    direction: Array
-    rate: float
-    piece: Hashable
-    strict: bool = True
-    touching: tuple[Hashable, ...] = ()
-
-    def __neg__(self) -> Tangent:
-        return Tangent(-self.direction, -self.rate, self.piece, self.strict, self.touching)
-
-
-@dataclass(frozen=True, eq=False)
-class FirstOrder:
-    """All one-sided tangents at a point; complete: no piece was left out and none has a set.
-
-    sets: pieces with more than one tangent line: there solutions are not isolated.
-    """
-
-    tangents: tuple[Tangent, ...]
-    sets: tuple[Hashable, ...] = ()
-    complete: bool = True
-    reason: str = ""
-
-    def others(self, direction: Array, rate: float, weight: float) -> list[Tangent]:
-        """The tangents but the one along a direction, by which the point was reached."""
-        return [
-            t for t in self.tangents if _product(t.direction, t.rate, direction, rate, weight)
-            < 1 - SAME
-        ]  # fmt: skip
 
 
 def first_order(
@@ -99,10 +61,10 @@ def first_order(
             continue
         for sign in (1.0, -1.0):
             direction, rate = sign * lines[:-1, 0], sign * float(lines[-1, 0])
-            inward = _inward(problem, piece, y, p, direction, rate, tolerance)
+            inward = inside(problem, piece, y, p, direction, rate, tolerance)
             if inward is not None:
                 found.append(Tangent(direction, rate, name_of(piece), inward))
-    return _first_order(_merged(found, weight), tuple(sets))
+    return _first_order(merged(problem, y, p, found, tolerance), tuple(sets))
 
 
 def _first_order(tangents: tuple[Tangent, ...], sets: tuple[Hashable, ...]) -> FirstOrder:
@@ -131,11 +93,12 @@ def _by_small_steps(
             if lines.shape[1] != 1:
                 continue
             line = lines[:, 0] * (sense if lines[-1, 0] > 0 else -sense)
-            inward = _inward(problem, piece, y, p, line[:-1], float(line[-1]), tolerance)
+            inward = inside(problem, piece, y, p, line[:-1], float(line[-1]), tolerance)
             if inward is not None:
                 found.append(Tangent(line[:-1], float(line[-1]), name_of(piece), inward))
                 break
-    return FirstOrder(_merged(found, weight), (), False, f"{reason}: one way on per sense")
+    tangents = merged(problem, y, p, found, tolerance)
+    return FirstOrder(tangents, (), False, f"{reason}: one way on per sense")
 
 
 def _solution_near(problem: PathProblem, y: Array, p: float) -> Array | None:
@@ -170,46 +133,6 @@ def kernel(J: Any, Jp: Array, weight: float, singular: float = SINGULAR) -> Arra
     return lines
 
 
-def _inward(
-    problem: Any, piece: Hashable, y: Array, p: float, direction: Array, rate: float,
-    tolerance: float,
-) -> bool | None:  # fmt: skip
-    """Whether a direction leads strictly into a piece; None where it leads out of it."""
-    step = 1e-6 * max(1.0, float(np.abs(y).max(initial=0)))
-    here = problem.margins(piece, y, p)
-    there = problem.margins(piece, y + step * direction, p + step * rate)
-    near = np.abs(here) <= tolerance
-    if (here[~near] < 0).any():
-        return None
-    rates = (there[near] - here[near]) / step
-    size = max(1.0, float(np.abs(direction).max(initial=0)))
-    limit = max(INWARD * size, 1e-4 * step)  # curvature of smooth margins
-    if (rates < -limit).any():
-        return None
-    return bool((rates > limit).all())
-
-
-def _product(a: Array, ap: float, b: Array, bp: float, weight: float) -> float:
-    return float(weight * (a @ b) + ap * bp)
-
-
-def _merged(found: list[Tangent], weight: float) -> tuple[Tangent, ...]:
-    """One tangent per direction; pieces that share it are `touching`."""
-    kept: list[Tangent] = []
-    for one in sorted(found, key=lambda t: not t.strict):
-        for k, other in enumerate(kept):
-            near = _product(one.direction, one.rate, other.direction, other.rate, weight)
-            if near > 1 - SAME:
-                touching = (*other.touching, one.piece)
-                kept[k] = Tangent(
-                    other.direction, other.rate, other.piece, other.strict, touching
-                )
-                break
-        else:
-            kept.append(one)
-    return tuple(kept)
-
-
 # ------------------------------------------------------------------ friction in 2D, reduced
 def _friction(path: FrictionPath, y: Array, p: float, tolerance: float) -> FirstOrder:
     """Enumerates the statuses of the contacts at a border only, the others eliminated once."""
@@ -242,7 +165,8 @@ def _friction(path: FrictionPath, y: Array, p: float, tolerance: float) -> First
         whole = basis @ c
         whole /= np.sqrt(weight * whole[:-1] @ whole[:-1] + whole[-1] ** 2)
         tangents.append(Tangent(whole[:-1], float(whole[-1]), name(word), strict))
-    return _first_order(_merged(tangents, weight), tuple(name(w) for w in sets))
+    kept = merged(path, y, p, tangents, tolerance)
+    return _first_order(kept, tuple(name(w) for w in sets))
 
 
 def _combinations(choices: Sequence[str]) -> float:
@@ -259,10 +183,10 @@ def _from_rest(
     for piece, rates, sense in rates_from_rest(path, y, p, choices, rest):
         size = float(np.sqrt(weight * rates @ rates + 1.0))
         direction, rate = rates / size, sense / size
-        inward = _inward(path, piece, y, p, direction, rate, tolerance)
+        inward = inside(path, piece, y, p, direction, rate, tolerance)
         if inward is not None:
             found.append(Tangent(direction, rate, piece, inward))
-    return FirstOrder(_merged(found, weight), (), False, REASON)
+    return FirstOrder(merged(path, y, p, found, tolerance), (), False, REASON)
 
 
 def _others_eliminated(

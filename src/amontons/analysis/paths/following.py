@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from ...clock import NEVER, Deadline, deadline_of, now
 from ...errors import InvalidInput, TimeUp
 from .continuation import Continuation
-from .first_order import Tangent
 from .friction_path import FrictionPath
 from .meeting import PassedEvents, PassedLines
 from .path import (
@@ -29,6 +28,7 @@ from .path import (
     weight_of,
 )
 from .starting import polished
+from .tangents import Tangent
 from .ways import ByEvents, Steps, Stepwise, Way, is_straight
 
 Array = NDArray[np.float64]
@@ -121,7 +121,7 @@ def _both(
         elif one is None:
             halves.append(Half([], [], Stop.NOT_STARTED if tangent else Stop.DEAD_END))
         else:
-            start = Point(p, y, one.direction, one.rate, one.piece)
+            start = Point(p, y, one.direction, one.rate, one.piece, problem=problem)
             steps = way.steps(problem, y, p, one, limits.interval)
             halves.append(_collected(steps, limits, seen.begin(start), start))
             seen.keep(halves[-1].points, halves[-1].events)
@@ -167,7 +167,8 @@ def _collected(
 
 def _start_alone(problem: PathProblem, y: Array, p: float, began: float) -> Branch:
     """The branch of one point where time is up before its tangent is known, which is zero."""
-    start = Point(p, y, np.zeros_like(y), 0.0, name_of(problem.piece(y, p)))
+    piece = name_of(problem.piece(y, p))
+    start = Point(p, y, np.zeros_like(y), 0.0, piece, problem=problem)
     half = Half([start], [_ended(start, Stop.TIME_LIMIT)], Stop.TIME_LIMIT)
     return _branch(problem, half, Half([], [], Stop.TIME_LIMIT), began, False)
 
@@ -194,7 +195,7 @@ def _limited(
 
 def _ended(point: Point, stop: Stop) -> Event:
     return Event(EventKind.END, point.parameter, point.state, point.arclength,
-                 before=point.piece, stop=stop)  # fmt: skip
+                 before=point.piece, stop=stop, problem=point.problem)  # fmt: skip
 
 
 def _branch(
@@ -223,7 +224,8 @@ def _at_start(forth: Half, back: Half, branches: bool) -> list[Event]:
     if not turns and (branches or not changes):
         return []
     kind = EventKind.FOLD if turns else EventKind.STATUS
-    return [Event(kind, one.parameter, one.state, before=other.piece, after=one.piece)]
+    return [Event(kind, one.parameter, one.state, before=other.piece, after=one.piece,
+                  problem=one.problem)]  # fmt: skip
 
 
 def _with_branch_point(
@@ -233,7 +235,7 @@ def _with_branch_point(
     if not tangents:
         return branch
     rows = np.array([np.append(t.direction, t.rate) for t in tangents])
-    event = Event(EventKind.BRANCH, p, y, directions=rows)
+    event = Event(EventKind.BRANCH, p, y, directions=rows, problem=branch.problem)
     events = sorted([*branch.events, event], key=lambda e: e.arclength)
     return replace(branch, events=tuple(events))
 

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from ...errors import SingularOperator
 from .continuation import Continuation
 from .event_tracking import check_straight, leaving, track
-from .first_order import Tangent
 from .friction_path import FrictionPath
 from .meeting import EventsSeen, LinesSeen
 from .path import Branch, Event, PathProblem, Point, weight_of
+from .tangents import Tangent
 
 Array = NDArray[np.float64]
 Steps = Iterator[tuple[Point, Event | None]]
