@@ -2,9 +2,13 @@
 
 from .certificates.critical_friction import CriticalFriction, Witness
 from .certificates.uniqueness import Uniqueness, Verdict
-from .paths.continuation import Continuation
+from .paths.cones import TangentCone
+from .paths.continuation import Continuation, Switch
 from .paths.diagram import Diagram
+from .paths.index_sets import IndexSets
 from .paths.path import Branch, Event, EventKind, PathProblem, Stop
+from .paths.rate_equation import MidpointRule, RateEquation, StepPath, ThetaMethod
+from .paths.tangents import FirstOrder, Tangent
 from .profiles import performance_profile
 from .solutions.enumerate import PieceSolution, Solutions
 
@@ -15,10 +19,19 @@ __all__ = [
     "Diagram",
     "Event",
     "EventKind",
+    "FirstOrder",
+    "IndexSets",
+    "MidpointRule",
     "PathProblem",
     "PieceSolution",
+    "RateEquation",
     "Solutions",
+    "StepPath",
     "Stop",
+    "Switch",
+    "Tangent",
+    "TangentCone",
+    "ThetaMethod",
     "Uniqueness",
     "Verdict",
     "Witness",

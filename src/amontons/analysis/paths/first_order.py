@@ -21,15 +21,17 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from ...errors import NotConverged
+from .cones import TangentCone, edges_and_lines, unit_rows
 from .corrector import determinant_sign
 from .friction_path import FrictionPath
 from .path import PathProblem, corrected, name_of, weight_of
 from .rest import REASON, rates_from_rest, resting
 from .sparse_kernel import sparse_kernel
-from .tangents import INWARD, FirstOrder, Tangent, merged
+from .tangents import INWARD, FirstOrder, Tangent, merged, near_zero
 from .tangents import inward as inside
 
 Array = NDArray[np.float64]
+Sets = list[tuple[tuple[str, ...], tuple[Array, ...]]]
 SINGULAR = 1e-10  # singular value, relative to the largest, that counts as zero
 BORDERS = 4  # near a point up to which all pieces are looked at one by one
 SMALL = (1e-3, 1e-5, 1e-7)  # changes of the parameter that tell where a curve goes
@@ -53,23 +55,51 @@ def first_order(
         pieces = problem.pieces(y, p, tolerance)  # type: ignore[attr-defined]
     weight = weight_of(problem, len(y))
     found: list[Tangent] = []
-    sets: list[Hashable] = []
+    cones: list[TangentCone] = []
     for piece in pieces:
         lines = kernel(*problem.jacobian_of(piece, y, p), weight)  # type: ignore[attr-defined]
         if lines.shape[1] != 1:
-            sets.append(name_of(piece))
+            cone = _cone(problem, piece, y, p, lines, tolerance)
+            cones += [cone] if cone is not None else []
             continue
         for sign in (1.0, -1.0):
             direction, rate = sign * lines[:-1, 0], sign * float(lines[-1, 0])
             inward = inside(problem, piece, y, p, direction, rate, tolerance)
             if inward is not None:
                 found.append(Tangent(direction, rate, name_of(piece), inward))
-    return _first_order(merged(problem, y, p, found, tolerance), tuple(sets))
+    return _first_order(merged(problem, y, p, found, tolerance), cones)
 
 
-def _first_order(tangents: tuple[Tangent, ...], sets: tuple[Hashable, ...]) -> FirstOrder:
-    reason = "solutions near this point are not isolated" if sets else ""
-    return FirstOrder(tangents, sets, not sets, reason)
+def _first_order(tangents: tuple[Tangent, ...], cones: Sequence[TangentCone]) -> FirstOrder:
+    sets = tuple(cone.piece for cone in cones)
+    reason = "" if not sets else (
+        "solutions near this point are not isolated: first-order systems have a set of them on "
+        + ", ".join(map(str, sets))
+    )  # fmt: skip
+    return FirstOrder(tangents, sets, not sets, reason, tuple(cones))
+
+
+def _cone(
+    problem: Any, piece: Hashable, y: Array, p: float, lines: Array, tolerance: float
+) -> TangentCone | None:
+    """The tangents into a piece with several tangent lines (n + 1, k); None if less than two.
+
+    Margins are taken as smooth.
+    """
+    near = near_zero(problem, piece, y, p, tolerance)
+    step = 1e-6 * max(1.0, float(np.abs(y).max(initial=0)))
+    there, behind = (
+        np.array([problem.margins(piece, y + h * line[:-1], p + h * line[-1])[near]
+                  for line in lines.T])
+        for h in (step, -step)
+    )  # fmt: skip
+    conditions = ((there - behind) / (2 * step)).T
+    edges, inside_all = edges_and_lines(conditions)
+    if len(edges) + 2 * len(inside_all) < 2:
+        return None
+    weight = weight_of(problem, len(y))
+    return TangentCone(name_of(piece), unit_rows(edges @ lines.T, weight),
+                       unit_rows(inside_all @ lines.T, weight))  # fmt: skip
 
 
 def _many_meet(problem: Any, y: Array, p: float, tolerance: float) -> bool:
@@ -166,7 +196,11 @@ def _friction(path: FrictionPath, y: Array, p: float, tolerance: float) -> First
         whole /= np.sqrt(weight * whole[:-1] @ whole[:-1] + whole[-1] ** 2)
         tangents.append(Tangent(whole[:-1], float(whole[-1]), name(word), strict))
     kept = merged(path, y, p, tangents, tolerance)
-    return _first_order(kept, tuple(name(w) for w in sets))
+    cones = [
+        TangentCone(name(word), *(unit_rows(rows @ basis.T, weight) for rows in parts))
+        for word, parts in sets
+    ]
+    return _first_order(kept, cones)
 
 
 def _combinations(choices: Sequence[str]) -> float:
@@ -246,12 +280,17 @@ class _LocalPieces:
             self.equations.append({k: _scaled(v) for k, v in equations.items()})
             self.conditions.append({k: _scaled(v) for k, v in conditions.items() if v})
 
-    def search(self) -> tuple[list[tuple[tuple[str, ...], Array, bool]], list[tuple[str, ...]]]:
-        """(pattern, coordinates, strictly inside?) of all tangents; patterns with a set."""
+    def search(self) -> tuple[list[tuple[tuple[str, ...], Array, bool]], Sets]:
+        """(pattern, coordinates, strictly inside?) of all tangents; patterns with a set.
+
+        Of a set, the edges and lines of its cone.
+        """
         words = list(product(*self.choices))
         if not self.choices:
             found = [((), s * np.ones(1), True) for s in (1.0, -1.0)]
-            return (found, []) if self.count == 1 else ([], [()])
+            if self.count == 1:
+                return found, []
+            return [], [((), edges_and_lines(np.zeros((0, self.count))))]
         stacks = np.array([
             np.vstack([rows[letter] for rows, letter in zip(self.equations, word, strict=True)])
             for word in words
@@ -267,8 +306,10 @@ class _LocalPieces:
             ]
             conditions = np.vstack(inside) if inside else np.zeros((0, self.count))
             if rank[k] < self.count - 1:
-                if _holds_more_than_a_line(conditions, right[k, rank[k] :].T):
-                    sets.append(word)
+                lines = right[k, rank[k] :]
+                parts = tuple(rows @ lines for rows in edges_and_lines(conditions @ lines.T))
+                if len(parts[0]) + 2 * len(parts[1]) > 1:
+                    sets.append((word, parts))
                 continue
             c = right[k, -1]
             rates = conditions @ c
@@ -276,22 +317,6 @@ class _LocalPieces:
                 if (s * rates >= -INWARD).all():
                     found.append((word, s * c, bool((s * rates > INWARD).all())))
         return found, sets
-
-
-def _holds_more_than_a_line(conditions: Array, lines: Array) -> bool:
-    """True where some combination of several kernel vectors obeys all conditions."""
-    from scipy.optimize import linprog
-
-    G = conditions @ lines
-    k = lines.shape[1]
-    for axis in range(k):
-        for sign in (1.0, -1.0):
-            cost = np.zeros(k)
-            cost[axis] = -sign
-            answer = linprog(cost, -G, np.full(len(G), INWARD), bounds=[(-1, 1)] * k)
-            if answer.success and -answer.fun > 1e-6:
-                return True
-    return False
 
 
 def _scaled(rows: list[Array]) -> Array:

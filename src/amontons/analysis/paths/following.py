@@ -28,7 +28,7 @@ from .path import (
     weight_of,
 )
 from .starting import polished
-from .tangents import Tangent
+from .tangents import FirstOrder, Tangent
 from .ways import ByEvents, Steps, Stepwise, Way, is_straight
 
 Array = NDArray[np.float64]
@@ -107,13 +107,13 @@ def _both(
     began, problem = now(), timed(problem, limits.deadline)
     seen = way.seen(problem, len(y), known)
     forth, back, extra = tangent, None, False
-    tangents: tuple[Tangent, ...] = ()
+    system = FirstOrder(())
     if tangent is None:
         try:
-            tangents = way.leaving(problem, y, p)
+            system = way.leaving(problem, y, p)
         except TimeUp:
             return _start_alone(problem, y, p, began)
-        forth, back, extra = _both_ways(tangents, weight_of(problem, len(y)))
+        forth, back, extra = _both_ways(system.tangents, weight_of(problem, len(y)))
     halves: list[Half] = []
     for one in (forth, back):
         if halves and halves[0].stop is Stop.CLOSED:
@@ -126,7 +126,7 @@ def _both(
             halves.append(_collected(steps, limits, seen.begin(start), start))
             seen.keep(halves[-1].points, halves[-1].events)
     branch = _branch(problem, halves[0], halves[1], began, extra)
-    return _with_branch_point(branch, y, p, tangents if extra else ())
+    return _with_branch_point(branch, y, p, system if extra or system.sets else FirstOrder(()))
 
 
 def _both_ways(
@@ -229,13 +229,14 @@ def _at_start(forth: Half, back: Half, branches: bool) -> list[Event]:
 
 
 def _with_branch_point(
-    branch: Branch, y: Array, p: float, tangents: Sequence[Tangent]
+    branch: Branch, y: Array, p: float, system: FirstOrder
 ) -> Branch:
     """The branch with an event at its start, from which other branches leave too."""
-    if not tangents:
+    if not system.tangents:
         return branch
-    rows = np.array([np.append(t.direction, t.rate) for t in tangents])
-    event = Event(EventKind.BRANCH, p, y, directions=rows, problem=branch.problem)
+    rows = np.array([np.append(t.direction, t.rate) for t in system.tangents])
+    event = Event(EventKind.BRANCH, p, y, directions=rows, detail=system.reason,
+                  problem=branch.problem)  # fmt: skip
     events = sorted([*branch.events, event], key=lambda e: e.arclength)
     return replace(branch, events=tuple(events))
 

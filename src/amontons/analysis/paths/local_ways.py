@@ -59,6 +59,25 @@ class LocalWays:
                 kept.append(tangent)
         return sure or short
 
+    def all(self) -> list[Tangent]:
+        """All ways from the spot, also back."""
+        kept: list[Tangent] = []
+        for tangent in self._candidates():
+            if self._reach(tangent) is None:
+                continue
+            if not any(self._one(tangent, other) for other in kept):
+                kept.append(tangent)
+        return kept
+
+    def meets_others(self) -> bool:
+        """True where another piece is met around the spot."""
+        s = self.spot
+        probes = self._around(s.y, s.p, ASIDE)
+        for sign in (1.0, -1.0):
+            y, p = s.ahead(sign * ASIDE)
+            probes += [(y, p), *self._around(y, p, ACROSS * ASIDE)]
+        return any(self._piece(*probe) != self.piece for probe in probes)
+
     def _candidates(self) -> list[Tangent]:
         """Directions of the pieces that meet here, as far as probes meet them."""
         s = self.spot

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .cones import TangentCone
 from .path import weight_of
 from .touching import ahead, one_curve, stays_inside
 
@@ -46,13 +47,15 @@ class Tangent:
 class FirstOrder:
     """All one-sided tangents at a point; complete: no piece was left out and none has a set.
 
-    sets: pieces with more than one tangent line: there solutions are not isolated.
+    sets: pieces with more than one tangent line: there solutions are not isolated; cones: all
+    tangents into these.
     """
 
     tangents: tuple[Tangent, ...]
     sets: tuple[Hashable, ...] = ()
     complete: bool = True
     reason: str = ""
+    cones: tuple[TangentCone, ...] = ()
 
     def others(
         self, direction: Array, rate: float, weight: float, piece: Hashable
