@@ -3,10 +3,12 @@
 from .certificates.critical_friction import CriticalFriction, Witness
 from .certificates.uniqueness import Uniqueness, Verdict
 from .paths.cones import TangentCone
+from .paths.contact_rates import ContactRates
 from .paths.continuation import Continuation, Switch
 from .paths.diagram import Diagram
 from .paths.index_sets import IndexSets
 from .paths.path import Branch, Event, EventKind, PathProblem, Stop
+from .paths.rate_claims import Claim
 from .paths.rate_equation import MidpointRule, RateEquation, StepPath, ThetaMethod
 from .paths.tangents import FirstOrder, Tangent
 from .profiles import performance_profile
@@ -14,6 +16,8 @@ from .solutions.enumerate import PieceSolution, Solutions
 
 __all__ = [
     "Branch",
+    "Claim",
+    "ContactRates",
     "Continuation",
     "CriticalFriction",
     "Diagram",

@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Hashable
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .index_sets import IndexSets, told_sets
+from .index_sets import IndexSets, told_rates, told_sets
+
+if TYPE_CHECKING:
+    from .contact_rates import ContactRates
 
 Array = NDArray[np.float64]
 
@@ -75,6 +78,11 @@ class Event:
         """The index sets of the contacts there; None for problems that do not tell."""
         return told_sets(self.problem, self.state, self.parameter)
 
+    @property
+    def rates(self) -> ContactRates | None:
+        """What [LR] (35) says of tangents there; None for problems that do not tell."""
+        return told_rates(self.problem, self.state, self.parameter)
+
     def record(self) -> dict[str, Any]:
         """What the JSON file holds."""
         out: dict[str, Any] = {
@@ -121,6 +129,11 @@ class Point:
     def sets(self) -> IndexSets | None:
         """The index sets of the contacts there; None for problems that do not tell."""
         return told_sets(self.problem, self.state, self.parameter)
+
+    @property
+    def rates(self) -> ContactRates | None:
+        """What [LR] (35) says of tangents there; None for problems that do not tell."""
+        return told_rates(self.problem, self.state, self.parameter)
 
     def reversed(self) -> Point:
         """The same point, to go the other way."""

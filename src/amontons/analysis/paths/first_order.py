@@ -20,11 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from ...errors import NotConverged
+from ...errors import NotConverged, SingularOperator
 from .cones import TangentCone, edges_and_lines, unit_rows
+from .contact_rates import contact_rates
 from .corrector import determinant_sign
 from .friction_path import FrictionPath
 from .path import PathProblem, corrected, name_of, weight_of
+from .rate_claims import Claim
 from .rest import REASON, rates_from_rest, resting
 from .sparse_kernel import sparse_kernel
 from .tangents import INWARD, FirstOrder, Tangent, merged, near_zero
@@ -35,6 +37,7 @@ Sets = list[tuple[tuple[str, ...], tuple[Array, ...]]]
 SINGULAR = 1e-10  # singular value, relative to the largest, that counts as zero
 BORDERS = 4  # near a point up to which all pieces are looked at one by one
 SMALL = (1e-3, 1e-5, 1e-7)  # changes of the parameter that tell where a curve goes
+SEARCHED = 40  # contacts at a border up to which a tree search may come to an end
 COMBINATIONS = 20_000  # pieces at a point up to which all are looked at
 
 
@@ -169,6 +172,10 @@ def _friction(path: FrictionPath, y: Array, p: float, tolerance: float) -> First
     choices = path.choices(y, p, tolerance)
     count = _combinations(choices)
     rest = resting(path, choices)
+    if count > COMBINATIONS and path.start.dimension == 2 and not path.tresca:
+        found = _by_search(path, y, p, tolerance)
+        if found is not None:
+            return found
     turning = path.start.dimension == 3 and not all(path.frictionless[rest])
     if rest and (count > COMBINATIONS or turning):
         count = _combinations([c for i, c in enumerate(choices) if i not in rest])
@@ -201,6 +208,30 @@ def _friction(path: FrictionPath, y: Array, p: float, tolerance: float) -> First
         for word, parts in sets
     ]
     return _first_order(kept, cones)
+
+
+def _by_search(path: FrictionPath, y: Array, p: float, tolerance: float) -> FirstOrder | None:
+    """All tangents by the search of `contact_rates`; None where it comes to no end."""
+    try:
+        rates = contact_rates(path, y, p, tolerance=tolerance)
+    except SingularOperator:
+        return None
+    if rates.pairs + len(rates.zi) > SEARCHED:
+        return None
+    weight, tangents, reasons = weight_of(path, len(y)), [], []
+    for sense in (1.0, -1.0):
+        found, search = rates.tangents(sense)
+        if search.sets or not search.finished:
+            return None
+        reasons += [] if search.complete else [search.reason]
+        for change, piece in found:
+            size = float(np.sqrt(weight * change @ change + 1.0))
+            strict = inside(path, piece, y, p, change / size, sense / size, tolerance)
+            tangents.append(Tangent(change / size, sense / size, piece, bool(strict)))
+    if rates.existence is not Claim.PROVED:
+        reasons.append("tangents along which the parameter stands still were not looked for")
+    kept = merged(path, y, p, tangents, tolerance)
+    return FirstOrder(kept, (), not reasons, "; ".join(dict.fromkeys(reasons)))
 
 
 def _combinations(choices: Sequence[str]) -> float:

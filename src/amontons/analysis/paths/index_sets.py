@@ -84,3 +84,9 @@ def told_sets(problem: Any, y: Array, p: float) -> IndexSets | None:
     """The sets at a point, where the problem tells them."""
     tell = getattr(problem, "index_sets", None)
     return None if tell is None else tell(y, p)
+
+
+def told_rates(problem: Any, y: Array, p: float) -> Any:
+    """The first-order system of contacts at a point, where the problem tells it."""
+    tell = getattr(problem, "contact_rates", None)
+    return None if tell is None else tell(y, p)
