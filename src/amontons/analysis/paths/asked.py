@@ -33,6 +33,9 @@ def on_path(
 ) -> tuple[PathProblem, Array, float]:  # fmt: skip
     """(path, state, parameter): where following begins; raises InvalidInput with the name."""
     interval = limits.interval
+    begun = getattr(problem, "start", None) if start is None and at is None else start
+    if isinstance(begun, np.ndarray) and start is None:
+        at = getattr(problem, "start_at", interval[0])
     p = interval[0] if at is None else checks.checked_value("at", at, interval)
     if not isinstance(problem, PathProblem):
         path = timed(path_of(problem, parameter, interval, base), limits.deadline)
@@ -41,7 +44,6 @@ def on_path(
         return path, y, p
     if base is not None:
         raise InvalidInput("base: expected none, a PathProblem has a parameter of its own")
-    begun = getattr(problem, "start", None) if start is None and at is None else start
     if begun is None or isinstance(begun, FrictionProblem):
         raise InvalidInput("start: a PathProblem needs the unknowns of a solution at `at`")
     y = state_of(problem, begun)

@@ -55,7 +55,8 @@ class PathProblem(Protocol):
 
     And, where it has them, continuation makes use of
     - `weight`, a float: kappa of the weighted norm, by default 1 / n;
-    - `start`, (n,): a solution at the lower end of the interval, where `follow` begins;
+    - `start`, (n,): a solution with which `follow` begins, at the parameter `start_at` or else
+      the lower end of the interval;
     - `describe(y, p)`, a dict of numbers and words: columns of the table of a branch;
     - `solution(y, p)`: what `Branch.solutions` holds instead of y;
     - `index_sets(y, p)`: what `Point.sets` and `Event.sets` are.

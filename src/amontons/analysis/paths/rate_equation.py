@@ -136,8 +136,13 @@ class StepPath:
 
     @property
     def start(self) -> Array:
-        """x_k, which solves (1) at gamma = 0."""
+        """x_k, which solves (1) at gamma = `start_at`."""
         return self.states[1]
+
+    @property
+    def start_at(self) -> float:
+        """Zero."""
+        return 0.0
 
     def branch(
         self, *, back: float = 10.0, ahead: float = 1.0, options: Continuation | None = None,
