@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from .analysis.paths.continuation import Continuation
     from .analysis.paths.diagram import Diagram
     from .analysis.paths.path import Branch, PathProblem
+    from .analysis.paths.tangents import FirstOrder, Tangent
     from .analysis.solutions.enumerate import Solutions
     from .model import Model
 
@@ -169,7 +170,7 @@ def follow(
     problem: FrictionProblem | Model | PathProblem, parameter: str = "load",
     interval: tuple[float, float] = (0.0, 1.0), *, base: FrictionProblem | Model | None = None,
     start: object = None, at: float | None = None, options: Continuation | None = None,
-    **limits: Any,
+    along: Tangent | None = None, **limits: Any,
 ) -> Branch:  # fmt: skip
     """The solution curve over a parameter, both ways from a start, with its folds and events.
 
@@ -178,31 +179,49 @@ def follow(
     `at`, by default the lower end of the interval; without one the curve begins at a solution
     found there.  2D problems with Coulomb friction under a load are tracked exactly, from event
     to event; others are continued step by step, with `options`, which also asks for that.
+    along: one of the tangents of `first_order` at the start, to go that way only.
     limits: max_points (per direction), time_limit (seconds for all), callback(point, event),
     which stops by returning True.
     Each end of the branch has a named reason.
     """
-    from .analysis.paths import checks
+    from .analysis.paths import asked, checks
     from .analysis.paths.following import Limits, follow_path
-    from .analysis.paths.parametrised import first_state, path_of, state_of
-    from .analysis.paths.path import PathProblem, timed
 
     checks.check_options(options)
     bounds = Limits(checks.checked_interval(interval), **checks.checked_limits(limits))
-    at = bounds.interval[0] if at is None else checks.checked_value("at", at, bounds.interval)
-    if isinstance(problem, PathProblem):
-        if start is None:
-            raise InvalidInput("start: a PathProblem needs the unknowns of a solution at `at`")
-        if base is not None:
-            raise InvalidInput("base: expected none, a PathProblem has a parameter of its own")
-        y = state_of(problem, start)
-        checks.check_start(problem, y, at)
-        return follow_path(problem, y, at, bounds, options=options)
-    _check_has_W(_checked(problem), "follow", bounds.deadline)
-    path = timed(path_of(problem, parameter, bounds.interval, _base(base)), bounds.deadline)
-    y = first_state(path, at) if start is None else state_of(path, start)
-    checks.check_size(path, y)
-    return follow_path(path, y, at, bounds, options=options)
+    _check_followed(problem, "follow", bounds.deadline)
+    path, y, p = asked.on_path(problem, parameter, bounds, _base(base), start, at)
+    if along is None:
+        return follow_path(path, y, p, bounds, options=options)
+    return asked.followed_along(path, y, p, bounds, options, along)
+
+
+def first_order(
+    problem: FrictionProblem | Model | PathProblem, parameter: str = "load",
+    interval: tuple[float, float] = (0.0, 1.0), *, base: FrictionProblem | Model | None = None,
+    start: object = None, at: float | None = None, tolerance: float = 1e-9,
+) -> FirstOrder:  # fmt: skip
+    """All one-sided tangents of the solution curves through a solution, as in `follow`.
+
+    They solve the first-order system; directions that lie on a border of their piece are kept
+    where a curve leaves along them.  tolerance: distance to a border that counts as none, in
+    the unknowns of the path.
+    """
+    from .analysis.paths import asked, checks
+    from .analysis.paths.following import Limits
+
+    bounds = Limits(checks.checked_interval(interval))
+    _check_followed(problem, "first_order", bounds.deadline)
+    path, y, p = asked.on_path(problem, parameter, bounds, _base(base), start, at)
+    return asked.tangents_at(path, y, p, tolerance)
+
+
+def _check_followed(problem: Any, verb: str, limit: TimeLimit) -> None:
+    """Raise where a problem is no PathProblem, and has no load and friction to follow."""
+    from .analysis.paths.path import PathProblem
+
+    if not isinstance(problem, PathProblem):
+        _check_has_W(_checked(problem), verb, limit)
 
 
 def diagram(

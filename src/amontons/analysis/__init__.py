@@ -2,23 +2,40 @@
 
 from .certificates.critical_friction import CriticalFriction, Witness
 from .certificates.uniqueness import Uniqueness, Verdict
-from .paths.continuation import Continuation
+from .paths.cones import TangentCone
+from .paths.contact_rates import ContactRates
+from .paths.continuation import Continuation, Switch
 from .paths.diagram import Diagram
+from .paths.index_sets import IndexSets
 from .paths.path import Branch, Event, EventKind, PathProblem, Stop
+from .paths.rate_claims import Claim
+from .paths.rate_equation import MidpointRule, RateEquation, StepPath, ThetaMethod
+from .paths.tangents import FirstOrder, Tangent
 from .profiles import performance_profile
 from .solutions.enumerate import PieceSolution, Solutions
 
 __all__ = [
     "Branch",
+    "Claim",
+    "ContactRates",
     "Continuation",
     "CriticalFriction",
     "Diagram",
     "Event",
     "EventKind",
+    "FirstOrder",
+    "IndexSets",
+    "MidpointRule",
     "PathProblem",
     "PieceSolution",
+    "RateEquation",
     "Solutions",
+    "StepPath",
     "Stop",
+    "Switch",
+    "Tangent",
+    "TangentCone",
+    "ThetaMethod",
     "Uniqueness",
     "Verdict",
     "Witness",

@@ -28,7 +28,7 @@ EXAMPLE = "example:"  # before the name of a built-in case
 DATA = files("amontons") / "examples_data"
 LARGEST_FILE = 2**24  # bytes of a case file; meshes stand in files of their own
 TOP = ("title", "mesh", "wall", "material", "fix", "traction", "body_force", "contact",
-       "solver", "evolution")  # fmt: skip
+       "solver", "continuation", "evolution")  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,8 @@ def read_case(
     top.only(*TOP)
     title = top.text("title", path.stem if path.stem != "case" else path.parent.name)
     model = _wall_model(top, title) if "wall" in top.data else _model(top, path, title)
-    return Case(model, _settings(top), title, path, _evolution(top), top.data)
+    settings = _settings(top)
+    return Case(model, settings, title, path, _evolution(top, settings), top.data)
 
 
 def example_file(name: str) -> Path:
@@ -150,11 +151,11 @@ def _wall_model(top: Table, title: str) -> Model:
         return wall.model(fixes, loads, title)
 
 
-def _evolution(top: Table) -> Evolution | None:
+def _evolution(top: Table, settings: Settings) -> Evolution | None:
     if "evolution" not in top.data:
         return None
     with Blame(top.table("evolution"), ""):
-        return read_evolution(top.table("evolution"))
+        return read_evolution(top.table("evolution"), settings.continuation())
 
 
 # ------------------------------------------------------------------------------- solver
@@ -187,4 +188,8 @@ def _settings(top: Table) -> Settings:
     with Blame(top, ""):  # its messages begin with solver.FIELD
         make_solver(method, options)
     limit = next((value for value in limits if value is not None), None)
-    return Settings(method, tolerance, limit, seconds, options, single)
+    paths = dict(top.table("continuation").data) if "continuation" in top.data else {}
+    settings = Settings(method, tolerance, limit, seconds, options, single, paths)
+    with Blame(top, ""):
+        settings.continuation()
+    return settings

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from .tables import Table
 
 if TYPE_CHECKING:
+    from ..analysis.paths.continuation import Continuation
     from ..evolution import MoreauJean, QuasiStatic
     from ..fem import LinearElastic
     from ..masonry import Wall
@@ -23,8 +24,11 @@ class Evolution:
     until: float
 
 
-def read_evolution(table: Table) -> Evolution:
-    """kind, step, until, and the fields of QuasiStatic or MoreauJean; crossing: a switch."""
+def read_evolution(table: Table, options: Continuation | None = None) -> Evolution:
+    """kind, step, until, and the fields of QuasiStatic or MoreauJean; crossing: a switch.
+
+    options: of the steps along a path that is crossed.
+    """
     from ..evolution import MoreauJean, QuasiStatic
 
     kind = table.choice("kind", KINDS, KINDS[0])
@@ -42,7 +46,8 @@ def read_evolution(table: Table) -> Evolution:
     if "crossing" in values:
         from ..analysis.paths.path_crossing import PathCrossing
 
-        values["crossing"] = PathCrossing() if values["crossing"] else None
+        crossing = PathCrossing() if options is None else PathCrossing(options)
+        values["crossing"] = crossing if values["crossing"] else None
     return Evolution(method(**values), until)  # type: ignore[arg-type]
 
 

@@ -13,7 +13,7 @@ import dataclasses
 import re
 import typing
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import linear, solvers
 from ..errors import InvalidInput
@@ -21,6 +21,9 @@ from ..expressions import nearest
 from ..options import alternatives, hints_of, is_enum, members_of, usual_part
 from ..solvers import METHODS
 from ..solvers.base import Solver
+
+if TYPE_CHECKING:
+    from ..analysis.paths.continuation import Continuation
 
 LIMITS = ("max_iterations", "max_sweeps")  # one limit; the second in Gauss-Seidel's words
 
@@ -39,10 +42,19 @@ class Settings:
     time_limit: float | None = None  # seconds
     options: dict[str, Any] = field(default_factory=dict)
     contact_tolerance: float | None = None  # of every contact; the root of tolerance
+    along_paths: dict[str, Any] = field(default_factory=dict)  # of [continuation]
 
     def solver(self) -> Solver:
         """The solver; raises InvalidInput for an unknown method or field."""
         return make_solver(self.method, self.options)
+
+    def continuation(self) -> Continuation | None:
+        """How curves are followed, where something is said; raises InvalidInput as `solver`."""
+        if not self.along_paths:
+            return None
+        from ..analysis.paths.continuation import Continuation
+
+        return _made(Continuation, self.along_paths, "continuation")
 
 
 def method_class(method: str) -> type:

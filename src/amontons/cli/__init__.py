@@ -235,6 +235,7 @@ Examples:
   amontons follow example:vee                     two folds, three solutions between them
   amontons follow example:vee --all --mu 2
   amontons follow example:hild --parameter friction --from 0.1 --to 5 --all
+  amontons follow example:vee --set continuation.switch=tangent --set continuation.step=1e-3
 
 \b
 Exit codes: 0 every branch has come to its end, 1 one was given up, 2 bad input.
@@ -255,7 +256,11 @@ Exit codes: 0 every branch has come to its end, 1 one was given up, 2 bad input.
               metavar="N", help="Points of a branch in each direction.")  # fmt: skip
 @click.option("--time-limit", type=float, metavar="SECONDS", help="Stop after that time.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
-              help="Replace a value of the case.")  # fmt: skip
+              help="Replace a value of the case; continuation.KEY is a parameter of the "
+                   "algorithm, which then steps along curves also where they are known "
+                   "exactly: step, min_step, max_step, grow, shrink, residual, change, "
+                   "min_cosine, corrections, quick, border, ahead, aside, "
+                   "switch=tangent|first-order.")  # fmt: skip
 @click.option("-o", "--output", "folder", metavar="DIR",
               help="Folder for the results. [name of the source with -results]")  # fmt: skip
 @click.option("--json", "json_copy", metavar="FILE",

@@ -39,7 +39,8 @@ def run(
     target = opened.target if mu is None else opened.target.with_mu(mu)
     name = ALIASES.get(parameter, parameter)
     at: Sequence[float] = ()
-    limits: dict[str, Any] = {"max_points": max_points, "time_limit": time_limit}
+    limits: dict[str, Any] = {"max_points": max_points, "time_limit": time_limit,
+                              "options": opened.settings.continuation()}  # fmt: skip
     if every:
         found = api.diagram(target, name, (low, high), **limits)
         branches, complete, reason = list(found), found.complete, found.reason

@@ -207,13 +207,22 @@ def _fclib(path: Path, overrides: Sequence[str], method: str | None) -> Source:
 
 
 def override_settings(settings: Settings, overrides: Sequence[str]) -> Settings:
-    """Settings changed by `solver.field=value`; `make_solver` checks the fields."""
+    """Settings changed by `solver.field=value`; `make_solver` checks the fields.
+
+    By `continuation.field=value`, too.
+    """
     for text in overrides:
         path, value = split_override(text)
+        if path[0] == "continuation" and len(path) == 2:
+            paths = {**settings.along_paths, path[1]: value}
+            settings = replace(settings, along_paths=paths)
+            settings.continuation()
+            continue
         named = path[1:2] and path[1] in (*LIMITS, *NUMBERS, "method")
         if path[0] != "solver" or len(path) < 2 or (named and len(path) > 2):
             raise InvalidInput(
-                f"--set {text}: expected solver.FIELD=VALUE, as this is not a case file"
+                f"--set {text}: expected solver.FIELD=VALUE or continuation.FIELD=VALUE, as "
+                "this is not a case file"
             )
         key = path[1]
         if key in LIMITS:

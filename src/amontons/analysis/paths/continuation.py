@@ -17,10 +17,12 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InvalidInput, SingularOperator
+from ...errors import InvalidInput
 from .corrector import Curve, Tolerances
-from .first_order import Tangent, first_order
-from .path import Event, PathProblem, Point, is_number, name_of
+from .first_order import first_order
+from .path import Event, PathProblem, Point, is_number
+from .probes import by_probes
+from .tangents import FirstOrder, Tangent
 from .walk_by_pieces import WalkByPieces
 from .walk_by_switch import WalkBySwitch
 
@@ -55,6 +57,8 @@ class Continuation:
     corrections: int = 5  # [j_max]
     quick: int = 4  # [j_thr] corrections below which the step grows
     border: float = 1e-9  # margin of a piece that counts as zero
+    ahead: float | None = None  # [h_1] of the tangent switch; None: a hundredth of min_step
+    aside: float | None = None  # [h_2] of the tangent switch, the first; None: min_step
     switch: Switch | None = None  # None: by the first-order system where the problem allows it
 
     def __post_init__(self) -> None:
@@ -81,6 +85,8 @@ class Continuation:
             "corrections": (self.corrections >= 1, "at least 1"),
             "quick": (self.quick >= 0, "at least 0"),
             "border": (self.border > 0, "a number > 0"),
+            "ahead": (self.ahead is None or 0 < self.ahead < np.inf, "a number > 0"),
+            "aside": (self.aside is None or 0 < self.aside < np.inf, "a number > 0"),
         }
         for name, (holds, wanted) in checks.items():
             if not holds:
@@ -91,6 +97,16 @@ class Continuation:
         """Those of the corrector."""
         return Tolerances(self.residual, self.change, self.corrections)
 
+    @property
+    def ahead_of_kink(self) -> float:
+        """h_1: [LR] has 1.5 min_step, but does not locate kinks."""
+        return self.min_step / 100 if self.ahead is None else self.ahead
+
+    @property
+    def aside_of_kink(self) -> float:
+        """h_2, the first that is tried."""
+        return self.min_step if self.aside is None else self.aside
+
     def cosine(self, problem: PathProblem) -> float:
         """The smallest cosine between neighbouring tangents: 0.999, or 0.99999 as in [LR].
 
@@ -98,27 +114,18 @@ class Continuation:
         """
         if self.min_cosine is not None:
             return self.min_cosine
-        return WITHIN if self._knows_pieces(problem) else ACROSS
+        return WITHIN if self.knows_pieces(problem) else ACROSS
 
-    def start(self, problem: PathProblem, y: Array, p: float) -> tuple[Tangent, ...]:
-        """All one-sided tangents at a solution, as far as the problem tells its pieces.
+    def start(self, problem: PathProblem, y: Array, p: float) -> FirstOrder:
+        """All one-sided tangents at a solution, by probes where the problem tells no pieces.
 
-        Raises SingularOperator where there are several and it does not tell.
+        Raises SingularOperator where there is no unique one on any piece.
         """
-        if self._knows_pieces(problem):
+        if self.knows_pieces(problem):
             found = first_order(problem, y, p, tolerance=self.border)
             if found.tangents:
-                return found.tangents
-        curve = Curve(problem, len(y))
-        try:
-            ty, tp = curve.any_tangent(y, p)
-        except np.linalg.LinAlgError as reason:
-            raise SingularOperator(
-                f"start: the tangent is not unique at {p:g}: curves cross there, or solutions "
-                "are not isolated; start at another point of the curve"
-            ) from reason
-        one = Tangent(ty, tp, name_of(problem.piece(y, p)))
-        return one, -one
+                return found
+        return by_probes(Curve(problem, len(y)), y, p, self)
 
     def walk(
         self, problem: PathProblem, y: Array, p: float, tangent: Tangent,
@@ -132,13 +139,14 @@ class Continuation:
         low, high = interval
         if not low <= p <= high:
             raise InvalidInput(f"start: expected a parameter in {low:g} … {high:g}, got {p:g}")
-        kind = WalkByPieces if self._knows_pieces(problem) else WalkBySwitch
+        kind = WalkByPieces if self.knows_pieces(problem) else WalkBySwitch
         walk = kind(self, problem, y, p, tangent, interval, step or self.step)
         yield walk.here(), None
         while walk.stop is None:
             yield from walk.advance()
 
-    def _knows_pieces(self, problem: PathProblem) -> bool:
+    def knows_pieces(self, problem: PathProblem) -> bool:
+        """True where kinks are passed by the first-order system."""
         known = all(hasattr(problem, name) for name in PIECES)
         if self.switch is Switch.FIRST_ORDER and not known:
             raise InvalidInput(f"switch: the problem has not all of {', '.join(PIECES)}")

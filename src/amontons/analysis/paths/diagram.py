@@ -14,10 +14,10 @@ from ...clock import Deadline, now
 from ...errors import SingularOperator, TimeUp, UnsupportedForm
 from .continuation import Continuation
 from .event_tracking import leaving
-from .first_order import Tangent
 from .following import Limits, follow_path, track_both
 from .friction_path import FrictionPath
 from .path import Branch, EventKind, same, timed
+from .tangents import Tangent
 
 Array = NDArray[np.float64]
 NEAR = 1e-7  # scaled distance of a solution to a branch that goes through it

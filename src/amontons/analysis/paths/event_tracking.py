@@ -23,9 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InvalidInput, SingularOperator, UnsupportedForm
-from .first_order import FirstOrder, Tangent, first_order
+from .first_order import first_order
 from .friction_path import FrictionPath
 from .path import Event, EventKind, Point, Stop, weight_of
+from .tangents import FirstOrder, Tangent
 
 Array = NDArray[np.float64]
 NONE = 1e-13  # rate of a condition, relative to the largest, that counts as zero
@@ -292,7 +293,7 @@ class _Walk:
     def here(self) -> Point:
         """The present point."""
         return Point(self.p, self.y, self.dy / self.speed, self.dp / self.speed, self.pattern,
-                     self.travelled)  # fmt: skip
+                     self.travelled, problem=self.path)  # fmt: skip
 
     def advance(self) -> Event:
         """To the next event, and over it."""
@@ -359,7 +360,7 @@ class _Walk:
         self.u = self.path.W @ y + self.path.free(p)
         system = leaving(self.path, y, p)
         back = (-self.dy / self.speed, -self.dp / self.speed)
-        others = system.others(*back, self.weight)
+        others = system.others(*back, self.weight, before)
         if not system.complete and not others:
             return self._end(Stop.SINGULAR, system.reason)
         if not others:
@@ -374,7 +375,7 @@ class _Walk:
             rows = np.array([np.append(t.direction, t.rate) for t in system.tangents])
             self._note_turn()
             return Event(EventKind.BRANCH, self.p, self.y, self.travelled, before, self.pattern,
-                         directions=rows, detail=detail)  # fmt: skip
+                         directions=rows, detail=detail, problem=self.path)  # fmt: skip
         return self._event(before)
 
     def _orientation(self, pattern: str, rate: float) -> int:
@@ -398,9 +399,10 @@ class _Walk:
 
     def _event(self, before: str) -> Event:
         kind = EventKind.FOLD if self._note_turn() else EventKind.STATUS
-        return Event(kind, self.p, self.y, self.travelled, before, self.pattern)
+        return Event(kind, self.p, self.y, self.travelled, before, self.pattern,
+                     problem=self.path)  # fmt: skip
 
     def _end(self, stop: Stop, detail: str = "") -> Event:
         self.stop = stop
         return Event(EventKind.END, self.p, self.y, self.travelled, self.pattern, stop=stop,
-                     detail=detail)  # fmt: skip
+                     detail=detail, problem=self.path)  # fmt: skip

@@ -13,7 +13,6 @@ Orientation: along a curve without branch points sign(p') sign(det J_y) does not
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -21,57 +20,25 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from ...errors import NotConverged
+from ...errors import NotConverged, SingularOperator
+from .cones import TangentCone, edges_and_lines, unit_rows
+from .contact_rates import contact_rates
 from .corrector import determinant_sign
 from .friction_path import FrictionPath
 from .path import PathProblem, corrected, name_of, weight_of
+from .rate_claims import Claim
 from .rest import REASON, rates_from_rest, resting
 from .sparse_kernel import sparse_kernel
+from .tangents import INWARD, FirstOrder, Tangent, merged, near_zero
+from .tangents import inward as inside
 
 Array = NDArray[np.float64]
+Sets = list[tuple[tuple[str, ...], tuple[Array, ...]]]
 SINGULAR = 1e-10  # singular value, relative to the largest, that counts as zero
-INWARD = 1e-9  # rate, of a direction of length 1, below which a condition does not change
-SAME = 1e-7  # distance of two directions of length 1 that count as one
 BORDERS = 4  # near a point up to which all pieces are looked at one by one
 SMALL = (1e-3, 1e-5, 1e-7)  # changes of the parameter that tell where a curve goes
+SEARCHED = 40  # contacts at a border up to which a tree search may come to an end
 COMBINATIONS = 20_000  # pieces at a point up to which all are looked at
-
-
-@dataclass(frozen=True, eq=False)
-class Tangent:
-    """A one-sided direction (y', p') of weighted length 1 and the piece into which it leads.
-
-    strict: it leads into the inside of the piece; else touching names the others.
-    """
-
-    direction: Array
-    rate: float
-    piece: Hashable
-    strict: bool = True
-    touching: tuple[Hashable, ...] = ()
-
-    def __neg__(self) -> Tangent:
-        return Tangent(-self.direction, -self.rate, self.piece, self.strict, self.touching)
-
-
-@dataclass(frozen=True, eq=False)
-class FirstOrder:
-    """All one-sided tangents at a point; complete: no piece was left out and none has a set.
-
-    sets: pieces with more than one tangent line: there solutions are not isolated.
-    """
-
-    tangents: tuple[Tangent, ...]
-    sets: tuple[Hashable, ...] = ()
-    complete: bool = True
-    reason: str = ""
-
-    def others(self, direction: Array, rate: float, weight: float) -> list[Tangent]:
-        """The tangents but the one along a direction, by which the point was reached."""
-        return [
-            t for t in self.tangents if _product(t.direction, t.rate, direction, rate, weight)
-            < 1 - SAME
-        ]  # fmt: skip
 
 
 def first_order(
@@ -91,23 +58,51 @@ def first_order(
         pieces = problem.pieces(y, p, tolerance)  # type: ignore[attr-defined]
     weight = weight_of(problem, len(y))
     found: list[Tangent] = []
-    sets: list[Hashable] = []
+    cones: list[TangentCone] = []
     for piece in pieces:
         lines = kernel(*problem.jacobian_of(piece, y, p), weight)  # type: ignore[attr-defined]
         if lines.shape[1] != 1:
-            sets.append(name_of(piece))
+            cone = _cone(problem, piece, y, p, lines, tolerance)
+            cones += [cone] if cone is not None else []
             continue
         for sign in (1.0, -1.0):
             direction, rate = sign * lines[:-1, 0], sign * float(lines[-1, 0])
-            inward = _inward(problem, piece, y, p, direction, rate, tolerance)
+            inward = inside(problem, piece, y, p, direction, rate, tolerance)
             if inward is not None:
                 found.append(Tangent(direction, rate, name_of(piece), inward))
-    return _first_order(_merged(found, weight), tuple(sets))
+    return _first_order(merged(problem, y, p, found, tolerance), cones)
 
 
-def _first_order(tangents: tuple[Tangent, ...], sets: tuple[Hashable, ...]) -> FirstOrder:
-    reason = "solutions near this point are not isolated" if sets else ""
-    return FirstOrder(tangents, sets, not sets, reason)
+def _first_order(tangents: tuple[Tangent, ...], cones: Sequence[TangentCone]) -> FirstOrder:
+    sets = tuple(cone.piece for cone in cones)
+    reason = "" if not sets else (
+        "solutions near this point are not isolated: first-order systems have a set of them on "
+        + ", ".join(map(str, sets))
+    )  # fmt: skip
+    return FirstOrder(tangents, sets, not sets, reason, tuple(cones))
+
+
+def _cone(
+    problem: Any, piece: Hashable, y: Array, p: float, lines: Array, tolerance: float
+) -> TangentCone | None:
+    """The tangents into a piece with several tangent lines (n + 1, k); None if less than two.
+
+    Margins are taken as smooth.
+    """
+    near = near_zero(problem, piece, y, p, tolerance)
+    step = 1e-6 * max(1.0, float(np.abs(y).max(initial=0)))
+    there, behind = (
+        np.array([problem.margins(piece, y + h * line[:-1], p + h * line[-1])[near]
+                  for line in lines.T])
+        for h in (step, -step)
+    )  # fmt: skip
+    conditions = ((there - behind) / (2 * step)).T
+    edges, inside_all = edges_and_lines(conditions)
+    if len(edges) + 2 * len(inside_all) < 2:
+        return None
+    weight = weight_of(problem, len(y))
+    return TangentCone(name_of(piece), unit_rows(edges @ lines.T, weight),
+                       unit_rows(inside_all @ lines.T, weight))  # fmt: skip
 
 
 def _many_meet(problem: Any, y: Array, p: float, tolerance: float) -> bool:
@@ -131,11 +126,12 @@ def _by_small_steps(
             if lines.shape[1] != 1:
                 continue
             line = lines[:, 0] * (sense if lines[-1, 0] > 0 else -sense)
-            inward = _inward(problem, piece, y, p, line[:-1], float(line[-1]), tolerance)
+            inward = inside(problem, piece, y, p, line[:-1], float(line[-1]), tolerance)
             if inward is not None:
                 found.append(Tangent(line[:-1], float(line[-1]), name_of(piece), inward))
                 break
-    return FirstOrder(_merged(found, weight), (), False, f"{reason}: one way on per sense")
+    tangents = merged(problem, y, p, found, tolerance)
+    return FirstOrder(tangents, (), False, f"{reason}: one way on per sense")
 
 
 def _solution_near(problem: PathProblem, y: Array, p: float) -> Array | None:
@@ -170,52 +166,16 @@ def kernel(J: Any, Jp: Array, weight: float, singular: float = SINGULAR) -> Arra
     return lines
 
 
-def _inward(
-    problem: Any, piece: Hashable, y: Array, p: float, direction: Array, rate: float,
-    tolerance: float,
-) -> bool | None:  # fmt: skip
-    """Whether a direction leads strictly into a piece; None where it leads out of it."""
-    step = 1e-6 * max(1.0, float(np.abs(y).max(initial=0)))
-    here = problem.margins(piece, y, p)
-    there = problem.margins(piece, y + step * direction, p + step * rate)
-    near = np.abs(here) <= tolerance
-    if (here[~near] < 0).any():
-        return None
-    rates = (there[near] - here[near]) / step
-    size = max(1.0, float(np.abs(direction).max(initial=0)))
-    limit = max(INWARD * size, 1e-4 * step)  # curvature of smooth margins
-    if (rates < -limit).any():
-        return None
-    return bool((rates > limit).all())
-
-
-def _product(a: Array, ap: float, b: Array, bp: float, weight: float) -> float:
-    return float(weight * (a @ b) + ap * bp)
-
-
-def _merged(found: list[Tangent], weight: float) -> tuple[Tangent, ...]:
-    """One tangent per direction; pieces that share it are `touching`."""
-    kept: list[Tangent] = []
-    for one in sorted(found, key=lambda t: not t.strict):
-        for k, other in enumerate(kept):
-            near = _product(one.direction, one.rate, other.direction, other.rate, weight)
-            if near > 1 - SAME:
-                touching = (*other.touching, one.piece)
-                kept[k] = Tangent(
-                    other.direction, other.rate, other.piece, other.strict, touching
-                )
-                break
-        else:
-            kept.append(one)
-    return tuple(kept)
-
-
 # ------------------------------------------------------------------ friction in 2D, reduced
 def _friction(path: FrictionPath, y: Array, p: float, tolerance: float) -> FirstOrder:
     """Enumerates the statuses of the contacts at a border only, the others eliminated once."""
     choices = path.choices(y, p, tolerance)
     count = _combinations(choices)
     rest = resting(path, choices)
+    if count > COMBINATIONS and path.start.dimension == 2 and not path.tresca:
+        found = _by_search(path, y, p, tolerance)
+        if found is not None:
+            return found
     turning = path.start.dimension == 3 and not all(path.frictionless[rest])
     if rest and (count > COMBINATIONS or turning):
         count = _combinations([c for i, c in enumerate(choices) if i not in rest])
@@ -242,7 +202,36 @@ def _friction(path: FrictionPath, y: Array, p: float, tolerance: float) -> First
         whole = basis @ c
         whole /= np.sqrt(weight * whole[:-1] @ whole[:-1] + whole[-1] ** 2)
         tangents.append(Tangent(whole[:-1], float(whole[-1]), name(word), strict))
-    return _first_order(_merged(tangents, weight), tuple(name(w) for w in sets))
+    kept = merged(path, y, p, tangents, tolerance)
+    cones = [
+        TangentCone(name(word), *(unit_rows(rows @ basis.T, weight) for rows in parts))
+        for word, parts in sets
+    ]
+    return _first_order(kept, cones)
+
+
+def _by_search(path: FrictionPath, y: Array, p: float, tolerance: float) -> FirstOrder | None:
+    """All tangents by the search of `contact_rates`; None where it comes to no end."""
+    try:
+        rates = contact_rates(path, y, p, tolerance=tolerance)
+    except SingularOperator:
+        return None
+    if rates.pairs + len(rates.zi) > SEARCHED:
+        return None
+    weight, tangents, reasons = weight_of(path, len(y)), [], []
+    for sense in (1.0, -1.0):
+        found, search = rates.tangents(sense)
+        if search.sets or not search.finished:
+            return None
+        reasons += [] if search.complete else [search.reason]
+        for change, piece in found:
+            size = float(np.sqrt(weight * change @ change + 1.0))
+            strict = inside(path, piece, y, p, change / size, sense / size, tolerance)
+            tangents.append(Tangent(change / size, sense / size, piece, bool(strict)))
+    if rates.existence is not Claim.PROVED:
+        reasons.append("tangents along which the parameter stands still were not looked for")
+    kept = merged(path, y, p, tangents, tolerance)
+    return FirstOrder(kept, (), not reasons, "; ".join(dict.fromkeys(reasons)))
 
 
 def _combinations(choices: Sequence[str]) -> float:
@@ -259,10 +248,10 @@ def _from_rest(
     for piece, rates, sense in rates_from_rest(path, y, p, choices, rest):
         size = float(np.sqrt(weight * rates @ rates + 1.0))
         direction, rate = rates / size, sense / size
-        inward = _inward(path, piece, y, p, direction, rate, tolerance)
+        inward = inside(path, piece, y, p, direction, rate, tolerance)
         if inward is not None:
             found.append(Tangent(direction, rate, piece, inward))
-    return FirstOrder(_merged(found, weight), (), False, REASON)
+    return FirstOrder(merged(path, y, p, found, tolerance), (), False, REASON)
 
 
 def _others_eliminated(
@@ -322,12 +311,17 @@ class _LocalPieces:
             self.equations.append({k: _scaled(v) for k, v in equations.items()})
             self.conditions.append({k: _scaled(v) for k, v in conditions.items() if v})
 
-    def search(self) -> tuple[list[tuple[tuple[str, ...], Array, bool]], list[tuple[str, ...]]]:
-        """(pattern, coordinates, strictly inside?) of all tangents; patterns with a set."""
+    def search(self) -> tuple[list[tuple[tuple[str, ...], Array, bool]], Sets]:
+        """(pattern, coordinates, strictly inside?) of all tangents; patterns with a set.
+
+        Of a set, the edges and lines of its cone.
+        """
         words = list(product(*self.choices))
         if not self.choices:
             found = [((), s * np.ones(1), True) for s in (1.0, -1.0)]
-            return (found, []) if self.count == 1 else ([], [()])
+            if self.count == 1:
+                return found, []
+            return [], [((), edges_and_lines(np.zeros((0, self.count))))]
         stacks = np.array([
             np.vstack([rows[letter] for rows, letter in zip(self.equations, word, strict=True)])
             for word in words
@@ -343,8 +337,10 @@ class _LocalPieces:
             ]
             conditions = np.vstack(inside) if inside else np.zeros((0, self.count))
             if rank[k] < self.count - 1:
-                if _holds_more_than_a_line(conditions, right[k, rank[k] :].T):
-                    sets.append(word)
+                lines = right[k, rank[k] :]
+                parts = tuple(rows @ lines for rows in edges_and_lines(conditions @ lines.T))
+                if len(parts[0]) + 2 * len(parts[1]) > 1:
+                    sets.append((word, parts))
                 continue
             c = right[k, -1]
             rates = conditions @ c
@@ -352,22 +348,6 @@ class _LocalPieces:
                 if (s * rates >= -INWARD).all():
                     found.append((word, s * c, bool((s * rates > INWARD).all())))
         return found, sets
-
-
-def _holds_more_than_a_line(conditions: Array, lines: Array) -> bool:
-    """True where some combination of several kernel vectors obeys all conditions."""
-    from scipy.optimize import linprog
-
-    G = conditions @ lines
-    k = lines.shape[1]
-    for axis in range(k):
-        for sign in (1.0, -1.0):
-            cost = np.zeros(k)
-            cost[axis] = -sign
-            answer = linprog(cost, -G, np.full(len(G), INWARD), bounds=[(-1, 1)] * k)
-            if answer.success and -answer.fun > 1e-6:
-                return True
-    return False
 
 
 def _scaled(rows: list[Array]) -> Array:

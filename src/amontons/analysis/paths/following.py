@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from ...clock import NEVER, Deadline, deadline_of, now
 from ...errors import InvalidInput, TimeUp
 from .continuation import Continuation
-from .first_order import Tangent
 from .friction_path import FrictionPath
 from .meeting import PassedEvents, PassedLines
 from .path import (
@@ -29,6 +28,7 @@ from .path import (
     weight_of,
 )
 from .starting import polished
+from .tangents import FirstOrder, Tangent
 from .ways import ByEvents, Steps, Stepwise, Way, is_straight
 
 Array = NDArray[np.float64]
@@ -107,13 +107,13 @@ def _both(
     began, problem = now(), timed(problem, limits.deadline)
     seen = way.seen(problem, len(y), known)
     forth, back, extra = tangent, None, False
-    tangents: tuple[Tangent, ...] = ()
+    system = FirstOrder(())
     if tangent is None:
         try:
-            tangents = way.leaving(problem, y, p)
+            system = way.leaving(problem, y, p)
         except TimeUp:
             return _start_alone(problem, y, p, began)
-        forth, back, extra = _both_ways(tangents, weight_of(problem, len(y)))
+        forth, back, extra = _both_ways(system.tangents, weight_of(problem, len(y)))
     halves: list[Half] = []
     for one in (forth, back):
         if halves and halves[0].stop is Stop.CLOSED:
@@ -121,12 +121,12 @@ def _both(
         elif one is None:
             halves.append(Half([], [], Stop.NOT_STARTED if tangent else Stop.DEAD_END))
         else:
-            start = Point(p, y, one.direction, one.rate, one.piece)
+            start = Point(p, y, one.direction, one.rate, one.piece, problem=problem)
             steps = way.steps(problem, y, p, one, limits.interval)
             halves.append(_collected(steps, limits, seen.begin(start), start))
             seen.keep(halves[-1].points, halves[-1].events)
     branch = _branch(problem, halves[0], halves[1], began, extra)
-    return _with_branch_point(branch, y, p, tangents if extra else ())
+    return _with_branch_point(branch, y, p, system if extra or system.sets else FirstOrder(()))
 
 
 def _both_ways(
@@ -167,7 +167,8 @@ def _collected(
 
 def _start_alone(problem: PathProblem, y: Array, p: float, began: float) -> Branch:
     """The branch of one point where time is up before its tangent is known, which is zero."""
-    start = Point(p, y, np.zeros_like(y), 0.0, name_of(problem.piece(y, p)))
+    piece = name_of(problem.piece(y, p))
+    start = Point(p, y, np.zeros_like(y), 0.0, piece, problem=problem)
     half = Half([start], [_ended(start, Stop.TIME_LIMIT)], Stop.TIME_LIMIT)
     return _branch(problem, half, Half([], [], Stop.TIME_LIMIT), began, False)
 
@@ -194,7 +195,7 @@ def _limited(
 
 def _ended(point: Point, stop: Stop) -> Event:
     return Event(EventKind.END, point.parameter, point.state, point.arclength,
-                 before=point.piece, stop=stop)  # fmt: skip
+                 before=point.piece, stop=stop, problem=point.problem)  # fmt: skip
 
 
 def _branch(
@@ -223,17 +224,19 @@ def _at_start(forth: Half, back: Half, branches: bool) -> list[Event]:
     if not turns and (branches or not changes):
         return []
     kind = EventKind.FOLD if turns else EventKind.STATUS
-    return [Event(kind, one.parameter, one.state, before=other.piece, after=one.piece)]
+    return [Event(kind, one.parameter, one.state, before=other.piece, after=one.piece,
+                  problem=one.problem)]  # fmt: skip
 
 
 def _with_branch_point(
-    branch: Branch, y: Array, p: float, tangents: Sequence[Tangent]
+    branch: Branch, y: Array, p: float, system: FirstOrder
 ) -> Branch:
     """The branch with an event at its start, from which other branches leave too."""
-    if not tangents:
+    if not system.tangents:
         return branch
-    rows = np.array([np.append(t.direction, t.rate) for t in tangents])
-    event = Event(EventKind.BRANCH, p, y, directions=rows)
+    rows = np.array([np.append(t.direction, t.rate) for t in system.tangents])
+    event = Event(EventKind.BRANCH, p, y, directions=rows, detail=system.reason,
+                  problem=branch.problem)  # fmt: skip
     events = sorted([*branch.events, event], key=lambda e: e.arclength)
     return replace(branch, events=tuple(events))
 

@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,10 +31,15 @@ from ...errors import InvalidInput, UnsupportedForm
 from ...problem import Form, FrictionProblem
 from ...settling import settled
 from ...solution import FrictionSolution
+from .index_sets import IndexSets, index_sets
 from .path import judged
+
+if TYPE_CHECKING:
+    from .contact_rates import ContactRates
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+BORDER = 1e-9  # scaled distance to a border that counts as none
 
 
 @dataclass(frozen=True, eq=False)
@@ -314,6 +319,18 @@ class FrictionPath:
             apart = "".join({"s": "o", "+": "p", "-": "m", "l": "q"}[x] for x in both)
             out.append(apart * ("f" in normal) + closed)
         return out
+
+    def index_sets(self, y: Array, p: float, tolerance: float = BORDER) -> IndexSets:
+        """The sets of [LR] (25)."""
+        _, z_N, z_T = self._trial(y, p)
+        size, bound = np.linalg.norm(z_T, axis=1), self._radius(z_N, p)
+        return index_sets(z_N, size, bound, self.frictionless, tolerance)
+
+    def contact_rates(self, y: Array, p: float) -> ContactRates:
+        """The first-order system as a complementarity problem, [LR] (35)."""
+        from .contact_rates import contact_rates
+
+        return contact_rates(self, y, p)
 
     def pieces(self, y: Array, p: float, tolerance: float) -> list[str]:
         """The patterns of all pieces that meet near a point."""

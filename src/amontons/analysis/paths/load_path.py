@@ -35,9 +35,11 @@ from ...settling import settle
 from ...solution import ContactStatus, FrictionSolution, Outcome
 from ...solve import drive
 from ...solvers.nonlinear_newton import NonlinearNewton
+from .index_sets import IndexSets, index_sets
 from .path import SOLVED, judged
 
 Array = NDArray[np.float64]
+BORDER = 1e-9  # distance to a border, in units of force, that counts as none
 LETTERS = np.array(["f", "s", "+", "-"])  # of OPEN, STICK, SLIP, BACK as in `pattern`
 
 
@@ -157,6 +159,16 @@ class LoadPath:
         """Distances to the borders of a piece: all positive inside of it."""
         point = self.at(p).contact_point(y)
         return point.margins(self._states(piece)).ravel() / self.unit
+
+    def index_sets(self, y: Array, p: float, tolerance: float = BORDER) -> IndexSets:
+        """The sets of [LR] (25), of forces in units of `unit`."""
+        point = self.at(p).contact_point(y)
+        stick = np.full(self.step.contacts, STICK, dtype=np.int8)
+        ahead, behind = point.margins(stick)[:, 1:].T / self.unit
+        without = np.isinf(ahead)  # no friction
+        normal, bound = point.z_normal / self.unit, np.where(without, 0, ahead + behind) / 2
+        along = np.abs(np.where(without, 0, ahead - behind)) / 2
+        return index_sets(normal, along, np.maximum(bound, 0), without, tolerance)
 
     @staticmethod
     def _name(states: NDArray) -> str:

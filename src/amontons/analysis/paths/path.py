@@ -13,10 +13,9 @@ Comput. Methods Appl. Mech. Engrg. 280 (2014).
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
-from enum import Enum
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -26,6 +25,7 @@ from scipy import sparse
 from ...clock import NEVER, Deadline
 from ...judge import Measure
 from ...solution import Convergence, Outcome, Step
+from .events import Event, EventKind, Point, Stop
 
 Array = NDArray[np.float64]
 ROUNDING = 1e-12  # of a parameter, relative to one and itself
@@ -44,13 +44,39 @@ def judged(error: float, measure: Measure, seconds: float) -> Convergence:
 class PathProblem(Protocol):
     """n equations in n unknowns y (n,) and a parameter p: what continuation follows.
 
-    A problem may also have, and continuation then makes use of it,
-    - `weight`, a float: kappa of the weighted norm;
-    - `switches(y, p)`, (k,): functions whose signs tell the piece, so that an event is the zero
-      of one of them;
-    - `pieces(y, p, tolerance)`: the names of all pieces that meet at a point, and
-      `jacobian_of(piece, y, p)`: the first-order system needs both;
-    - `describe(y, p)`, a dict of numbers and words: columns of the table of a branch.
+    These three are all that is required.  Kinks are then located and passed by probes around
+    them.  With these four as well, the first-order system tells all ways on from a kink, and
+    events are zeros of smooth functions:
+    - `residual_of(piece, y, p)`, (n,), and `jacobian_of(piece, y, p)`: a selection function and
+      its derivatives by y and p, also beyond the border of its piece;
+    - `margins(piece, y, p)`, (k,): smooth functions, positive inside of a piece and zero on its
+      border, of the size of the unknowns; infinite where nothing limits it;
+    - `pieces(y, p, tolerance)`: names of all pieces from which a point is no further.
+
+    And, where it has them, continuation makes use of
+    - `weight`, a float: kappa of the weighted norm, by default 1 / n;
+    - `start`, (n,): a solution with which `follow` begins, at the parameter `start_at` or else
+      the lower end of the interval;
+    - `describe(y, p)`, a dict of numbers and words: columns of the table of a branch;
+    - `solution(y, p)`: what `Branch.solutions` holds instead of y;
+    - `index_sets(y, p)`: what `Point.sets` and `Event.sets` are.
+
+    A ball on a spring that meets a wall, y - p + max(0, y - 1) = 0:
+
+    >>> import numpy as np
+    >>> import amontons as am
+    >>> class Wall:
+    ...     def residual(self, y, p):
+    ...         return y - p + np.maximum(0, y - 1)
+    ...     def jacobian(self, y, p):
+    ...         return np.array([[2.0 if y[0] > 1 else 1.0]]), np.array([-1.0])
+    ...     def piece(self, y, p):
+    ...         return "wall" if y[0] > 1 else "free"
+    >>> branch = am.follow(Wall(), start=[0.0], at=0.0, interval=(0.0, 3.0))
+    >>> [(round(e.parameter, 9), e.before, e.after) for e in branch.events[1:-1]]
+    [(1.0, 'free', 'wall')]
+    >>> [y.tolist() for y in branch.at(2.0)]
+    [[1.5]]
     """
 
     def residual(self, y: Array, p: float) -> Array:
@@ -64,104 +90,6 @@ class PathProblem(Protocol):
     def piece(self, y: Array, p: float) -> Hashable | NDArray[Any]:
         """Which selection function is active: anything hashable, or an array of integers."""
         ...
-
-
-class EventKind(Enum):
-    """What happens at a point of a branch; the names in lower case are those in JSON."""
-
-    FOLD = "The parameter turns back."
-    STATUS = "The branch enters another piece."
-    BRANCH = "More than two one-sided branches meet here."
-    END = "The branch stops here, for the reason given."
-
-
-class Stop(Enum):
-    """Why a branch ends; the value is one sentence for the user."""
-
-    INTERVAL = "The end of the interval was reached."
-    CLOSED = "The branch closed: it came back to where it began."
-    JOINED = "The branch ran into one that had been followed before."
-    UNBOUNDED = "The solutions run to infinity at one value of the parameter."
-    DEAD_END = "No other one-sided branch leaves this point."
-    BRANCHES = "Several branches leave this point; they are listed in the event."
-    SINGULAR = "The tangent is not unique here and the first-order system did not help."
-    STEP_TOO_SMALL = (
-        "The corrector fails at the smallest step: allow a smaller one, or looser tolerances."
-    )
-    LOST = "The corrector fails here and no tangent switch leads on."
-    MAX_POINTS = "The number of points allowed is used up; go on from the last one."
-    TIME_LIMIT = "The time allowed is used up; go on from the last point."
-    STOPPED = "Stopped on request; go on from the last point."
-    NOT_STARTED = "This direction was not followed."
-
-    @property
-    def advice(self) -> str:
-        """What it means, and what can be done."""
-        return self.value
-
-
-@dataclass(frozen=True, eq=False)
-class Event:
-    """Something that happens on a branch, at a precisely located point.
-
-    before, after: names of the pieces on the two sides, in the sense of the branch.  smooth:
-    True for a fold inside of a piece.  directions, (k, n + 1), rows (y', p'): all one-sided
-    tangents at a branch point.  stop: for the kind END.
-    """
-
-    kind: EventKind
-    parameter: float
-    state: Array
-    arclength: float = 0.0
-    before: Hashable = None
-    after: Hashable = None
-    smooth: bool = False
-    directions: Array | None = None
-    stop: Stop | None = None
-    detail: str = ""
-
-    def record(self) -> dict[str, Any]:
-        """What the JSON file holds."""
-        out: dict[str, Any] = {
-            "kind": self.kind.name.lower(),
-            "parameter": self.parameter,
-            "arclength": self.arclength,
-        }
-        if self.kind is EventKind.FOLD:
-            out["smooth"] = self.smooth
-        for name in ("before", "after"):
-            value = getattr(self, name)
-            if isinstance(value, str):
-                out[name] = value
-        if self.directions is not None:
-            out["branches"] = len(self.directions)
-        if self.stop is not None:
-            out["stop"] = self.stop.name.lower()
-        if self.detail:
-            out["detail"] = self.detail
-        return out
-
-
-@dataclass(frozen=True, eq=False)
-class Point:
-    """One point of a branch, with all that is needed to go on from there.
-
-    direction, rate: the tangent (y', p') in the sense of travel, of weighted length 1;
-    step: the length of the next step, 0 where there is none.
-    """
-
-    parameter: float
-    state: Array
-    direction: Array
-    rate: float
-    piece: Hashable
-    arclength: float = 0.0
-    step: float = 0.0
-
-    def reversed(self) -> Point:
-        """The same point, to go the other way."""
-        return Point(self.parameter, self.state, -self.direction, -self.rate, self.piece,
-                     -self.arclength, self.step)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -370,8 +298,4 @@ def _back_to(start: Point, last: Point, weight: float) -> list[Point]:
 
 def turned(event: Event) -> Event:
     """The event as seen when the branch is travelled the other way."""
-    values: Mapping[str, Any] = {
-        name: getattr(event, name)
-        for name in ("kind", "parameter", "state", "smooth", "directions", "stop", "detail")
-    }
-    return Event(**values, arclength=-event.arclength, before=event.after, after=event.before)
+    return replace(event, arclength=-event.arclength, before=event.after, after=event.before)

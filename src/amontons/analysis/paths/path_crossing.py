@@ -98,7 +98,7 @@ class PathCrossing:
     ) -> tuple[Array, tuple[float, ...]]:  # fmt: skip
         """(state at share 1, folds on the way) along the path from a solution."""
         way = way_of(path, self.options)
-        onward = [tangent for tangent in way.leaving(path, y, share) if tangent.rate > 0]
+        onward = [t for t in way.leaving(path, y, share).tangents if t.rate > 0]
         if not onward:
             raise Breakdown(f"from {share:.6g} of the load none leads on")
         folds: list[float] = []

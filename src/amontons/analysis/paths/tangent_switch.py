@@ -10,22 +10,27 @@ follow closely or the tangents are nearly parallel; it decides where a determina
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
 from .corrector import Curve, Spot
 
+if TYPE_CHECKING:
+    from .continuation import Continuation
+
 Array = NDArray[np.float64]
-AHEAD = (0.01, 0.1, 1.5, 15.0, 150.0)  # h_1 / h_min; [LR] has 1.5, but does not locate kinks
-REACH = 1e5  # largest h_2 / h_min that is tried
+AHEAD = (1.0, 10.0, 150.0, 1.5e3, 1.5e4)  # times h_1, one after the other
+REACH = 1e5  # times h_2, the largest that is tried
 
 
 def switched_tangent(
-    curve: Curve, spot: Spot, min_step: float, cosine: float
+    curve: Curve, spot: Spot, options: Continuation, cosine: float
 ) -> tuple[Array, float] | None:
     """(y', p') of length 1 that leads away from a kink just ahead, None if none does."""
     for factor in AHEAD:
-        there = spot.ahead(min_step * factor)
+        there = spot.ahead(options.ahead_of_kink * factor)
         line = _line(curve, *there)
         if line is None or _aligned(curve, line, (spot.ty, spot.tp)) >= cosine:
             continue  # still the piece from which the curve comes
@@ -33,37 +38,24 @@ def switched_tangent(
         if sign and spot.sign:
             r = sign * spot.sign
             return r * line[0], r * line[1]
-        found = _sense(curve, spot, line, min_step, cosine)
+        found = _sense(curve, spot, line, options.aside_of_kink, cosine)
         if found is not None:
             return found
     return None
 
 
-def nearest_tangent(curve: Curve, spot: Spot, min_step: float) -> tuple[Array, float] | None:
-    """The tangent just beyond a kink that was passed, in the sense that keeps the orientation.
-
-    The piece that begins there may be shorter than the step that passed it.
-    """
-    there = spot.ahead(min_step * AHEAD[0])
-    line = _line(curve, *there)
-    if line is None:
-        return None
-    sign = curve.orientation(*there, *line) * spot.sign
-    return (sign * line[0], sign * line[1]) if sign else None
-
-
 def _sense(
-    curve: Curve, spot: Spot, line: tuple[Array, float], min_step: float, cosine: float
+    curve: Curve, spot: Spot, line: tuple[Array, float], first: float, cosine: float
 ) -> tuple[Array, float] | None:
     """Step 3: the side on which the line stays the tangent, further and further away."""
     ty, tp = line
-    distance = min_step
-    while distance <= REACH * min_step:
+    distance = first
+    while distance <= REACH * first:
         for r in (1.0, -1.0):
             other = _line(curve, spot.y + r * distance * ty, spot.p + r * distance * tp)
             if other is not None and _aligned(curve, other, line) >= cosine:
                 return r * ty, r * tp
-        distance += min_step * 10 ** np.floor(np.log10(distance / min_step))
+        distance += first * 10 ** np.floor(np.log10(distance / first))
     return None
 
 

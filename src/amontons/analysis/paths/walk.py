@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 
 from .branch_point import branch_point
 from .corrector import Curve, Spot
-from .first_order import Tangent, kernel
+from .first_order import kernel
 from .path import Event, EventKind, PathProblem, Point, Stop
+from .tangents import Tangent
 
 if TYPE_CHECKING:
     from .continuation import Continuation
@@ -52,7 +53,8 @@ class Walk(ABC):
     def here(self) -> Point:
         """The present point."""
         s = self.spot
-        return Point(s.p, s.y, s.ty, s.tp, self.piece, self.travelled, self.step)
+        return Point(s.p, s.y, s.ty, s.tp, self.piece, self.travelled, self.step,
+                     self.problem)  # fmt: skip
 
     def advance(self) -> Found:
         """One accepted step: points and events on the way; a kink at most."""
@@ -63,9 +65,9 @@ class Walk(ABC):
                 spot, count = new
                 if not self._leaves(spot):
                     return self._accept(spot, count, reduced)
-                found = self._over_border(self.step, spot)
-                if found is not None:
-                    return found
+            found = self._over_border(self.step, None if new is None else new[0])
+            if found is not None:
+                return found
             if self.step <= self.options.min_step:
                 return self._stuck()
             self.step = max(self.step * self.options.shrink, self.options.min_step)
@@ -127,7 +129,8 @@ class Walk(ABC):
 
     def _branch_point(self, spot: Spot) -> Found:
         """The point where the bordered determinant changes its sign, and the other line."""
-        point = branch_point(self.curve, self.spot, spot, self.options.tolerances) or spot
+        located = branch_point(self.curve, self.spot, spot, self.options.tolerances)
+        point = located or spot
         lines = kernel(*self.curve.jacobian(point.y, point.p), self.curve.weight, 1e-5)
         rows = [np.append(point.ty, point.tp), -np.append(point.ty, point.tp)]
         for line in lines.T:
@@ -137,9 +140,12 @@ class Walk(ABC):
             if size > 0.5:
                 rows += [rest / size, -rest / size]
                 break
+        if located is None and len(rows) == 2:
+            return []  # a curve on the border of two pieces takes its derivatives in turns
         event = Event(EventKind.BRANCH, point.p, point.y, self.travelled + self.curve.length(
             point.y - self.spot.y, point.p - self.spot.p), self.piece, self.piece,
-            directions=np.array(rows), detail="other lines to first order")  # fmt: skip
+            directions=np.array(rows), detail="other lines to first order",
+            problem=self.problem)  # fmt: skip
         return [(replace(self.here(), parameter=point.p, state=point.y,
                          arclength=event.arclength), event)]  # fmt: skip
 
@@ -200,8 +206,11 @@ class Walk(ABC):
         """True where a point lies outside of the piece."""
 
     @abstractmethod
-    def _over_border(self, step: float, spot: Spot) -> Found | None:
-        """Over the border before the spot a step ahead; None where it can not be located."""
+    def _over_border(self, step: float, spot: Spot | None) -> Found | None:
+        """Over the border before the spot a step ahead; None where it can not be located.
+
+        spot: None where the corrector failed.
+        """
 
     @abstractmethod
     def _stuck(self) -> Found:
@@ -234,9 +243,10 @@ class Walk(ABC):
         return turned
 
     def _event(self, kind: EventKind, before: Any, **more: Any) -> Event:
-        return Event(kind, self.spot.p, self.spot.y, self.travelled, before, self.piece, **more)
+        return Event(kind, self.spot.p, self.spot.y, self.travelled, before, self.piece,
+                     problem=self.problem, **more)  # fmt: skip
 
     def _ended(self, stop: Stop, detail: str = "") -> Event:
         self.stop = stop
         return Event(EventKind.END, self.spot.p, self.spot.y, self.travelled, self.piece,
-                     stop=stop, detail=detail)  # fmt: skip
+                     stop=stop, detail=detail, problem=self.problem)  # fmt: skip

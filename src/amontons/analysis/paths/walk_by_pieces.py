@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from .border import Border
 from .corrector import Curve, Spot, determinant_sign
-from .first_order import Tangent, first_order
+from .first_order import first_order
 from .path import EventKind, Stop
+from .tangents import Tangent
 from .walk import Found, Walk
 
 Array = NDArray[np.float64]
@@ -35,7 +36,9 @@ class WalkByPieces(Walk):
     def _leaves(self, spot: Spot) -> bool:
         return bool((self._margins(spot) < -self.options.border * LOCATED).any())
 
-    def _over_border(self, step: float, spot: Spot) -> Found | None:
+    def _over_border(self, step: float, spot: Spot | None) -> Found | None:
+        if spot is None:
+            return None
         o = self.options
         border = Border(self.problem, self.curve, self.spot, o.tolerances)
         inside = border.located(step, spot, LOCATED * o.border)
@@ -76,7 +79,7 @@ class WalkByPieces(Walk):
         s, before = self.spot, self.piece
         tolerance = max(self.options.border, 1e-10 * float(np.abs(s.y).max(initial=0)))
         system = first_order(self.problem, s.y, s.p, tolerance=tolerance)
-        others = system.others(-s.ty, -s.tp, self.curve.weight)
+        others = system.others(-s.ty, -s.tp, self.curve.weight, before)
         end = self._without_end()
         if end is not None:
             return [(self.here(), end)]
@@ -100,7 +103,7 @@ class WalkByPieces(Walk):
         s = self.spot
         came = self._orientation(self.piece, s.tp)
         return min(others, key=lambda t: (
-            self._orientation(t.piece, t.rate) != came,
+            all(self._orientation(piece, t.rate) != came for piece in t.pieces),
             -self.curve.product(t.direction, t.rate, s.ty, s.tp),
         ))  # fmt: skip
 

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from ...errors import SingularOperator
 from .continuation import Continuation
 from .event_tracking import check_straight, leaving, track
-from .first_order import Tangent
 from .friction_path import FrictionPath
 from .meeting import EventsSeen, LinesSeen
 from .path import Branch, Event, PathProblem, Point, weight_of
+from .tangents import FirstOrder, Tangent
 
 Array = NDArray[np.float64]
 Steps = Iterator[tuple[Point, Event | None]]
@@ -24,7 +24,7 @@ Steps = Iterator[tuple[Point, Event | None]]
 class Way(Protocol):
     """What both offer."""
 
-    def leaving(self, problem: Any, y: Array, p: float) -> tuple[Tangent, ...]:
+    def leaving(self, problem: Any, y: Array, p: float) -> FirstOrder:
         """All one-sided tangents at a solution; SingularOperator with the reason if none."""
         ...
 
@@ -43,7 +43,7 @@ class Way(Protocol):
 class ByEvents:
     """Event tracking, for friction problems whose pieces are straight lines."""
 
-    def leaving(self, problem: FrictionPath, y: Array, p: float) -> tuple[Tangent, ...]:
+    def leaving(self, problem: FrictionPath, y: Array, p: float) -> FirstOrder:
         """See `Way`."""
         system = leaving(problem, y, p)
         if not system.tangents:
@@ -51,7 +51,7 @@ class ByEvents:
                 "start: no solution curve leaves it; the solutions are not isolated there, "
                 f"or do not depend on the parameter ({system.reason or 'first-order system'})"
             )
-        return system.tangents
+        return system
 
     def steps(
         self, problem: FrictionPath, y: Array, p: float, tangent: Tangent,
@@ -72,7 +72,7 @@ class Stepwise:
 
     options: Continuation = Continuation()
 
-    def leaving(self, problem: PathProblem, y: Array, p: float) -> tuple[Tangent, ...]:
+    def leaving(self, problem: PathProblem, y: Array, p: float) -> FirstOrder:
         """See `Way`."""
         return self.options.start(problem, y, p)
 

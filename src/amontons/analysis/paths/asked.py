@@ -1,0 +1,76 @@
+"""What the verbs on solution curves are asked: a path, a solution on it, a direction."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InvalidInput
+from ...problem import FrictionProblem
+from . import checks
+from .continuation import Continuation
+from .corrector import Curve
+from .first_order import first_order
+from .following import Limits, continue_both, track_both
+from .parametrised import first_state, path_of, state_of
+from .path import Branch, PathProblem, timed
+from .probes import by_probes
+from .starting import polished
+from .tangents import FirstOrder, Tangent
+from .ways import is_straight
+
+if TYPE_CHECKING:
+    from ...model import Model
+
+Array = NDArray[np.float64]
+
+
+def on_path(
+    problem: Model | FrictionProblem | PathProblem, parameter: str, limits: Limits,
+    base: Model | FrictionProblem | None, start: object, at: float | None,
+) -> tuple[PathProblem, Array, float]:  # fmt: skip
+    """(path, state, parameter): where following begins; raises InvalidInput with the name."""
+    interval = limits.interval
+    begun = getattr(problem, "start", None) if start is None and at is None else start
+    if isinstance(begun, np.ndarray) and start is None:
+        at = getattr(problem, "start_at", interval[0])
+    p = interval[0] if at is None else checks.checked_value("at", at, interval)
+    if not isinstance(problem, PathProblem):
+        path = timed(path_of(problem, parameter, interval, base), limits.deadline)
+        y = first_state(path, p) if start is None else state_of(path, start)
+        checks.check_size(path, y)
+        return path, y, p
+    if base is not None:
+        raise InvalidInput("base: expected none, a PathProblem has a parameter of its own")
+    if begun is None or isinstance(begun, FrictionProblem):
+        raise InvalidInput("start: a PathProblem needs the unknowns of a solution at `at`")
+    y = state_of(problem, begun)
+    checks.check_start(problem, y, p)
+    return problem, y, p
+
+
+def tangents_at(path: PathProblem, y: Array, p: float, tolerance: float) -> FirstOrder:
+    """All one-sided tangents at a solution, by probes where the problem tells no pieces."""
+    if not tolerance > 0:
+        raise InvalidInput(f"tolerance: expected a number > 0, got {tolerance!r}")
+    y = polished(path, y, p)
+    if Continuation().knows_pieces(path):
+        return first_order(path, y, p, tolerance=tolerance)
+    return by_probes(Curve(path, len(y)), y, p, Continuation())
+
+
+def followed_along(
+    path: PathProblem, y: Array, p: float, limits: Limits, options: Continuation | None,
+    along: Tangent,
+) -> Branch:  # fmt: skip
+    """The branch from a solution along one tangent only."""
+    if not isinstance(along, Tangent) or along.direction.shape != y.shape:
+        raise InvalidInput(
+            f"along: expected one of the tangents of first_order at the start, got {along!r}"
+        )
+    y = polished(path, y, p)
+    if is_straight(path) and options is None:
+        return track_both(path, y, p, limits, tangent=along)  # type: ignore[arg-type]
+    return continue_both(path, y, p, limits, options, tangent=along)
