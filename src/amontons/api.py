@@ -65,8 +65,8 @@ def solve(problem, solver=None, *, tolerance=1e-8, contact_tolerance=None, max_i
 
     A model is condensed for solvers that need the Delassus form; a FrictionProblem has the form
     its owner chose, and the wrong one raises UnsupportedForm.  A model in large deformations
-    (`Model.is_large`) is solved by `NonlinearNewton`; the problem of its solution is the tangent
-    one of the deformed state.
+    (`Model.is_large`) is solved by `NonlinearNewton`; the problem of its solution is the
+    tangent one of the deformed state.
     """
     run = drive if isinstance(problem, FrictionProblem) else drive_any_form
     options = {"tolerance": tolerance, "contact_tolerance": contact_tolerance,

@@ -34,6 +34,7 @@ from ..cones import Law
 from ..contact.current import STICK, ContactPoint, Pieces
 from ..contact.nodal import contact_columns
 from ..errors import InvertedCells
+from ..fem.linear_body import LinearBody
 from ..judge import Measure, Weakest
 from ..problem import Form, FrictionProblem
 from ..solution import FrictionSolution
@@ -233,6 +234,11 @@ class LargeDeformation:
     def known_state(self) -> Array:
         """The state v (n,) at share 0 of the load."""
         return np.zeros(self.unknowns) if self.known is None else self.known[2]
+
+    @property
+    def meets_first(self) -> bool:
+        """True where some body keeps small strains: its cells may be inverted."""
+        return any(isinstance(body, LinearBody) for body in self.parts.bodies)
 
     def at_share(self, share: float) -> LargeDeformation:
         """The problem at a share of the way from the known load to this one."""
