@@ -14,7 +14,7 @@ from typing import Any
 import click
 
 from ..record import check_parts, heading, levels_of, regenerate, stored
-from . import block, examples, tables, vee
+from . import block, convergence, examples, figure2, tables, vee, vee_curves
 
 HERE = Path(__file__).parent
 REFERENCE = json.loads((HERE / "reference.json").read_text())
@@ -27,22 +27,35 @@ def _example(name: str) -> Work:
 
 WORK: dict[str, Work] = {
     **{name: _example(name) for name in examples.EXAMPLES},
+    "figure2": figure2.run,
     "vee": vee.run,
+    "vee-curves": vee_curves.run,
     "friction": vee.run_friction,
+    "friction-curves": vee_curves.run_friction,
     "block": block.run,
+    "block-paper": block.run_theirs,
     "block-friction": block.run_friction,
 }
 PAGES: dict[str, Callable[[Any], list[str]]] = {
     **{
         name: (lambda rows, name=name: tables.example(name, rows)) for name in examples.EXAMPLES
     },
+    "figure2": lambda rows: ["## Null directions (figure 2)", "", *tables.table(rows)],
     "vee": lambda found: tables.vee(found, REFERENCE["vee"]),
+    "vee-curves": lambda found: convergence.page(
+        "figure 9", convergence.vee_rows(found), convergence.vee_claims(found)
+    ),
     "friction": tables.friction,
-    "block": block.page,
+    "friction-curves": vee_curves.page_friction,
+    "block": lambda found: block.page(found, REFERENCE.get("block", {})),
     "block-friction": block.page_friction,
 }
-FIGURES = {"vee": ("9", "10"), "friction": ("11",), "block": ("12", "13"),
-           "block-friction": ("14",)}  # fmt: skip
+FIGURES = {"figure2": ("2",), "vee-curves": ("9", "10"), "friction-curves": ("11",),
+           "block": ("12", "13"), "block-friction": ("14",)}  # fmt: skip
+DRAWN = {  # from all levels that are stored
+    "block": ("figure12.png", block.draw_curves),
+    "block-friction": ("figure14.png", block.draw_friction),
+}
 
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
@@ -56,16 +69,19 @@ FIGURES = {"vee": ("9", "10"), "friction": ("11",), "block": ("12", "13"),
 def main(parts: tuple[str, ...], levels: str, results: Path | None) -> None:
     """Continuation through folds, as in the paper of 2014.
 
-    PART is example1 … example5, vee, friction, block or block-friction; all of them by default.
-    Numbers of other parts stay as they are stored.
+    PART is example1 … example5, figure2, vee, vee-curves, friction, friction-curves, block,
+    block-paper or block-friction; all of them by default.  Numbers of other parts stay as they
+    are stored.
     """
     check_parts(parts, tuple(WORK))
     chosen = levels_of(levels, min(vee.LEVELS), max(vee.LEVELS))
     out = results or HERE / "results"
     chosen_parts = parts or tuple(WORK)
     text = regenerate(out, chosen_parts, lambda p: (p, WORK[p](chosen, out)), page)
-    if "block" in chosen_parts:
-        block.draw_curves(stored(out)["block"], out / "figure12.png")
+    for part, (name, draw) in DRAWN.items():
+        if part in chosen_parts:
+            found = stored(out)
+            draw(_with_theirs(found) if part == "block" else found[part], out / name)
     click.echo(text)
 
 
@@ -74,9 +90,23 @@ def page(record: dict[str, Any]) -> str:
     lines = heading("ligursky2014", record)
     for part, make in PAGES.items():
         if part in record:
-            lines += make(record[part])
+            whole = part == "block" and "block-paper" in record
+            lines += make(_with_theirs(record) if whole else record[part])
             lines += [f"![Figure {name}](figure{name}.png)\n" for name in FIGURES.get(part, ())]
     return "\n".join(lines)
+
+
+def _with_theirs(record: dict[str, Any]) -> dict[str, Any]:
+    """The runs on the block with those by the algorithms of the paper among them."""
+    out = {}
+    for squares in sorted({*record["block"], *record["block-paper"]}, key=int):
+        one = dict(record["block"].get(squares, {}))
+        if squares in record["block-paper"]:
+            theirs = record["block-paper"][squares]
+            one["runs"] = {**one.get("runs", {}), block.THEIRS: theirs}
+            one["curve"] = theirs["curve"]
+        out[squares] = one
+    return out
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Section 3.2.1: the V-shaped body on 2220, 8880 and 35520 triangles, figures 9 to 11."""
+"""Section 3.2.1: the V-shaped body on 2220, 8880 and 35520 triangles; `vee_curves` draws."""
 
 from __future__ import annotations
 
@@ -10,14 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 import amontons as am
 from amontons.analysis.paths.continuation import Switch
 from amontons.evolution.timed import steady
 from amontons.fem.facets import Cells, Facets
-from amontons.files import replacing
-from amontons.plots import solutions_figure
 from amontons.vee import vee
 
 HERE = Path(__file__).parent
@@ -33,7 +30,6 @@ METHODS = {
     "algorithm 1, first-order system": am.Continuation(),
     "algorithms 1 and 2, their settings": am.Continuation(**PAPER, switch=Switch.TANGENT),
 }
-DPI = 150
 
 
 @cache
@@ -90,9 +86,8 @@ def record(branch: am.Branch, cpu: float) -> dict[str, Any]:
 
 
 def run(levels: Sequence[int], out: Path) -> dict[str, Any]:
-    """All methods on the levels, and figures 9 and 10."""
+    """All methods on the levels."""
     found: dict[str, Any] = {}
-    tracked = {}
     for level in levels:
         found[str(LEVELS[level])] = {}
         for name, options in METHODS.items():
@@ -101,68 +96,11 @@ def run(levels: Sequence[int], out: Path) -> dict[str, Any]:
             branch = follow(level, options)
             cpu = time.process_time() - began
             found[str(LEVELS[level])][name] = record(branch, cpu)
-            if options is None:
-                tracked[level] = branch
-    save(figure9(tracked), out / "figure9.png")
-    save(figure10(tracked[coarsest(levels)]), out / "figure10.png")
     return found
 
 
 def run_friction(levels: Sequence[int], out: Path) -> dict[str, Any]:
-    """Figure 11: the curve for several coefficients of friction, on the coarsest level."""
+    """The folds for several coefficients of friction, on the coarsest level."""
     level = coarsest(levels)
     branches = {mu: follow(level, None, mu) for mu in FRICTION}
-    save(figure11(branches), out / "figure11.png")
     return {f"{mu:g}": [e.parameter for e in branch.folds] for mu, branch in branches.items()}
-
-
-# ------------------------------------------------------------------------------ figures
-def figure9(branches: dict[int, am.Branch]) -> Figure:
-    """Displacements and contact stresses of the most left node, one line per mesh."""
-    figure = Figure(figsize=(9.0, 6.4), dpi=DPI, layout="constrained")
-    panels = figure.subplots(2, 2).ravel()
-    for level, branch in branches.items():
-        left = corner(branch)
-        solutions = branch.solutions
-        weight = steady(vee(branch_mesh(branch))).recover(solutions[0]).weights[left]
-        u = np.array([s.u[left] for s in solutions])
-        r = np.array([s.r[left] for s in solutions]) / weight
-        label = f"{LEVELS.get(level, 555 * 4**level)} triangles"
-        for axes, values in zip(panels, (-u[:, 0], u[:, 1], -r[:, 0], r[:, 1]), strict=True):
-            axes.plot(branch.parameter, values, linewidth=1.2, label=label)
-    names = (r"$u_\nu$ (m)", r"$u_\tau$ (m)", r"$T_\nu$ (GN/m$^2$)", r"$T_\tau$ (GN/m$^2$)")
-    for axes, name in zip(panels, names, strict=True):
-        axes.set_xlabel(r"$\gamma$")
-        axes.set_ylabel(name)
-    panels[0].legend(frameon=False)
-    return figure
-
-
-def figure10(branch: am.Branch) -> Figure:
-    """The three deformed bodies at gamma = 0.38."""
-    solutions = [branch.problem.solution(y, GAMMA) for y in branch.at(GAMMA)]
-    names = ["separated", "corner slips left", "corner sticks"]
-    model = steady(vee(branch_mesh(branch)))
-    return solutions_figure(solutions, names, title="gamma = 0.38", model=model)
-
-
-def figure11(branches: dict[float, am.Branch]) -> Figure:
-    """Normal contact stress of the most left node over gamma, one line per friction."""
-    figure = Figure(figsize=(6.4, 4.4), dpi=DPI, layout="constrained")
-    axes = figure.subplots()
-    for mu, branch in branches.items():
-        left = corner(branch)
-        solutions = branch.solutions
-        weight = steady(vee(branch_mesh(branch))).recover(solutions[0]).weights[left]
-        stress = [-s.r[left, 0] / weight for s in solutions]
-        axes.plot(branch.parameter, stress, linewidth=1.2, label=f"F = {mu:g}")
-    axes.set_xlabel(r"$\gamma$")
-    axes.set_ylabel(r"$T_\nu$ (GN/m$^2$)")
-    axes.legend(frameon=False)
-    return figure
-
-
-def save(figure: Figure, path: Path) -> None:
-    """Write a figure whole or not at all."""
-    with replacing(path) as temporary:
-        figure.savefig(temporary, dpi=DPI)

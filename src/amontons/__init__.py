@@ -53,7 +53,7 @@ _HOME = {
     "fem": ("Mesh", "box", "mesh_shape", "read_cad", "read_mesh", "refined"),
     "contact": ("LevelSet", "Nitsche", "Plane", "Sphere"),
     "model": ("Body", "BodyForce", "CiarletGeymonat", "Contact", "ContactFields", "Fix",
-              "LinearElastic", "Model", "NeoHookean", "Traction", "distributed"),
+              "LinearElastic", "Model", "NeoHookean", "Pressure", "Traction", "distributed"),
 }  # fmt: skip
 _MODULE = {name: module for module, names in _HOME.items() for name in names}
 

@@ -72,8 +72,8 @@ def solve(problem, solver=None, *, tolerance=1e-8, contact_tolerance=None, max_i
     without progress after which a solve counts as stagnated; None to let time decide.
 
     A model is condensed for solvers that need the Delassus form; a FrictionProblem has the form
-    its owner chose, and the wrong one raises UnsupportedForm.  A model with hyperelastic laws
-    is solved at finite strains by `NonlinearNewton`; the problem of its solution is the
+    its owner chose, and the wrong one raises UnsupportedForm.  A model in large deformations
+    (`Model.is_large`) is solved by `NonlinearNewton`; the problem of its solution is the
     tangent one of the deformed state.
     """
     run = drive if isinstance(problem, FrictionProblem) else drive_any_form
@@ -361,7 +361,7 @@ def _with_record(found: FrictionSolution, **changes: Any) -> FrictionSolution:
 def _solve_large(
     model: Model, solver: Solver | None, callback: Callback | None, options: dict[str, Any]
 ) -> ModelSolution:
-    """The same of a model with hyperelastic laws: one nonlinear problem."""
+    """The same of a model in large deformations: one nonlinear problem."""
     from .model.large_deformation import large_deformation
     from .solvers.nonlinear_newton import nonlinear_solver
 

@@ -341,3 +341,44 @@ def test_the_tangent_problem_towards_a_load_is_linear_elasticity_at_rest():
     linear = am.solve(models[1], tolerance=1e-11).r
     assert np.abs(linear).max() > 0.01
     np.testing.assert_allclose(found, linear, atol=1e-9)
+
+
+@pytest.mark.parametrize("law", [NEO, am.LinearElastic(1.0, 0.3)], ids=["neo", "linear"])
+def test_steps_from_an_initial_displacement(law):
+    """A block that is turned before the start: the turn is no part of the first step."""
+    angle = 0.05
+    c, s = np.cos(angle) - 1, np.sin(angle)
+
+    def turned(x):
+        return c * (x[0] - 0.5) - s * (x[1] - 1), s * (x[0] - 0.5) + c * (x[1] - 1)
+
+    def top(x, t):
+        return c * (x[0] - 0.5), s * (x[0] - 0.5) - t
+
+    contact = am.Contact("bottom", am.Plane((0, 1), (0, -0.05)), mu=0.4,
+                         configuration="current")  # fmt: skip
+    mesh = am.box((1, 1), cells=4)
+    model = am.Model([am.Body(mesh, law)], [am.Fix("top", top)], [contact])
+    start = am.at_rest(model, displacement=turned)
+    where = np.array([turned(x) for x in mesh.points])
+    assert np.abs(start.displacement.reshape(-1, 2) - where).max() < 1e-15
+    step = am.QuasiStatic(0.05)
+    first, last = am.evolve(model, step, until=0.1, start=start)
+    assert first.energies.supports > 0
+    *_, plain = am.evolve(model, step, until=0.1)
+    if law is NEO:
+        assert plain.energies.elastic == pytest.approx(last.energies.elastic, rel=0.1)
+    if law is NEO:  # a turn without contact leaves nothing
+        still = am.Model([am.Body(mesh, law)], [am.Fix("top", lambda x, t: top(x, 0.0))],
+                         [am.Contact("bottom", am.Plane((0, 1), (0, -1)), mu=0.4)])  # fmt: skip
+        (only,) = am.evolve(still, step, until=0.05, start=start)
+        assert np.abs(only.state.displacement - start.displacement).max() < 1e-12
+        assert only.energies.turnover < 1e-15
+    two = am.Model([am.Body(mesh, NEO, name="a"), am.Body(mesh, NEO, name="b")],
+                   contacts=[am.Contact("a.bottom", am.Plane((0, 1)), mu=0),
+                             am.Contact("b.bottom", am.Plane((0, 1)), mu=0)])  # fmt: skip
+    both = am.at_rest(two, displacement=[(0, 1), turned]).displacement.reshape(2, -1, 2)
+    assert (both[0] == [0, 1]).all()
+    assert np.abs(both[1] - where).max() < 1e-15
+    with pytest.raises(am.InvalidInput, match="displacement"):
+        am.at_rest(model, displacement=3.0)

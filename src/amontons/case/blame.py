@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from ..model import Body, Contact, Model
 
 
+KINDS = {"Traction": "traction", "Pressure": "pressure", "BodyForce": "body_force"}
+
+
 def key_of(model: Model, error: AmontonsError, *, wall: bool = False) -> str:
     """Path such as "fix[1].value" or "contact[0].friction", found by trying part after part.
 
@@ -26,9 +29,9 @@ def key_of(model: Model, error: AmontonsError, *, wall: bool = False) -> str:
         supports = tuple(model.supports[: k + 1])
         if _fails(lambda s=supports: prescribed_values(bodies, s, offsets)):
             return f"fix[{k}].value"
-    counts = {"traction": 0, "body_force": 0}
+    counts = dict.fromkeys(KINDS.values(), 0)
     for load in model.loads:
-        kind = "traction" if hasattr(load, "on") else "body_force"
+        kind = KINDS[type(load).__name__]
         if _fails(lambda one=load: external_load(bodies, (one,), offsets)):
             region = getattr(load, "region", None) is not None and "region" in str(error)
             return f"{kind}[{counts[kind]}].{'region' if region else 'value'}"

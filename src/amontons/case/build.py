@@ -19,7 +19,7 @@ from .evolution import Evolution, read_evolution, read_wall
 from .overrides import apply_overrides, check_depth
 from .settings import GENERAL, LIMITS, Settings, make_solver, method_class
 from .tables import Blame, Table
-from .values import on_named, on_surface, vector
+from .values import configuration, on_named, on_surface, pressure_on, vector
 
 if TYPE_CHECKING:
     from ..model import Model
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 EXAMPLE = "example:"  # before the name of a built-in case
 DATA = files("amontons") / "examples_data"
 LARGEST_FILE = 2**24  # bytes of a case file; meshes stand in files of their own
-TOP = ("title", "mesh", "wall", "material", "fix", "traction", "body_force", "contact",
-       "solver", "continuation", "evolution")  # fmt: skip
+TOP = ("title", "mesh", "wall", "material", "fix", "traction", "pressure", "body_force",
+       "contact", "solver", "continuation", "evolution")  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,11 +113,15 @@ def _model(top: Table, path: Path, title: str) -> Model:
         raise top.error("mesh.order", f"expected 1 or 2, got {order}")
     material = read_materials(top.table("material"), mesh)
     fixes = [on_surface(Fix, table, mesh, free=True) for table in top.tables("fix")]
-    loads: list = [on_surface(Traction, table, mesh) for table in top.tables("traction")]
+    loads: list = [
+        on_surface(Traction, table, mesh, "configuration") for table in top.tables("traction")
+    ]
+    loads += [pressure_on(table, mesh) for table in top.tables("pressure")]
     for table in top.tables("body_force"):
-        table.only("value", "region")
+        table.only("value", "region", "configuration")
         region = table.text("region") if "region" in table.data else None
-        loads.append(BodyForce(vector(table, "value", mesh.dim), region=region))
+        value = vector(table, "value", mesh.dim)
+        loads.append(BodyForce(value, region=region, **configuration(table)))
     if "contact" not in top.data:
         raise top.error("contact", "missing, expected at least one table [[contact]]")
     contacts = [read_contact(table, mesh) for table in top.tables("contact")]
@@ -135,6 +139,8 @@ def _wall_model(top: Table, title: str) -> Model:
     for key in ("mesh", "contact"):
         if key in top.data:
             raise top.error(key, "not with [wall], which makes its meshes and contacts")
+    if "pressure" in top.data:
+        raise top.error("pressure", "not with [wall], whose surfaces are flat: give a traction")
     table = top.table("material")
     table.only("default", "plate")
     table.need("default", "a table")

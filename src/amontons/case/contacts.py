@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..expressions import Expression
 from .tables import Blame, Table
-from .values import scalar
+from .values import configuration, scalar
 
 if TYPE_CHECKING:
     from ..contact import Nitsche, Obstacle
@@ -20,7 +20,7 @@ def read_contact(table: Table, mesh: Mesh) -> Contact:
     """The contact of a table [[contact]]."""
     from ..model import Contact
 
-    table.only("slave", "obstacle", "master", "friction", "method")
+    table.only("slave", "obstacle", "master", "friction", "method", "configuration")
     method = _contact_method(table)
     slave = table.text("slave")
     for key in ("slave", "master"):
@@ -41,9 +41,11 @@ def read_contact(table: Table, mesh: Mesh) -> Contact:
     with Blame(table, ""):
         if "master" in table.data:
             master = table.text("master")
-            return Contact(slave, master=master, mu=mu, tresca=tresca, method=method)
+            return Contact(slave, master=master, mu=mu, tresca=tresca, method=method,
+                           **configuration(table))  # fmt: skip
         obstacle = _obstacle(table.table("obstacle"), mesh.dim)
-        return Contact(slave, obstacle, mu=mu, tresca=tresca, method=method)
+        return Contact(slave, obstacle, mu=mu, tresca=tresca, method=method,
+                       **configuration(table))  # fmt: skip
 
 
 def _steady(table: Table, key: str) -> float | Expression:

@@ -14,18 +14,40 @@ if TYPE_CHECKING:
     from ..fem import Mesh
 
 
-def on_surface(kind: type, table: Table, mesh: Mesh, *, free: bool = False) -> Any:
-    """A support or load of a table, on a surface that the mesh has."""
-    part = on_named(kind, table, mesh.dim, free=free)
+def on_surface(
+    kind: type, table: Table, mesh: Mesh, *more: str, free: bool = False
+) -> Any:  # fmt: skip
+    """A support or load of a table, on a surface that the mesh has; more: its other keys."""
+    part = on_named(kind, table, mesh.dim, *more, free=free)
     with Blame(table, "on"):
         mesh.surface(part.on)
     return part
 
 
-def on_named(kind: type, table: Table, dim: int, *, free: bool = False) -> Any:
+def on_named(kind: type, table: Table, dim: int, *more: str, free: bool = False) -> Any:
     """The same where the names of surfaces are not known yet."""
+    table.only("on", "value", *more)
+    value = vector(table, "value", dim, free=free)
+    return kind(table.text("on"), value, **configuration(table))
+
+
+def configuration(table: Table) -> dict[str, str]:
+    """The key configuration, where it is given."""
+    if "configuration" not in table.data:
+        return {}
+    return {"configuration": table.choice("configuration", ("reference", "current"))}
+
+
+def pressure_on(table: Table, mesh: Mesh) -> Any:
+    """The pressure of a table [[pressure]]."""
+    from ..model import Pressure
+
     table.only("on", "value")
-    return kind(table.text("on"), vector(table, "value", dim, free=free))
+    name = table.text("on")
+    with Blame(table, "on"):
+        mesh.surface(name)
+    value = _entry(table, "value", table.need("value", "a number or an expression"), mesh.dim)
+    return Pressure(name, value)
 
 
 def vector(table: Table, key: str, dim: int, *, free: bool = False) -> list:

@@ -33,8 +33,10 @@ has turned round, or contact has opened, within the step), contact is booked by 
 
 is what the straight line misses of the path: zero without friction or slip while contacts stay
 closed; else of second order in the step, but for what a jump sets free.  Negative says that
-the loads did more work than their means tell: take smaller steps.  At finite strains (3) has
-the mean of the inner forces, and the rest of the gain, of third order, is part of `numerical`.
+the loads did more work than their means tell: take smaller steps.  In large deformations (3)
+has the mean of the inner forces, and the rest of the gain, of third order, is part of
+`numerical`; so is what loads that follow the body do beyond the mean of their ends, which the
+work of the loads contains.
 
 All balances hold up to the residual of the contact solve, which `defect` holds.
 """
@@ -103,13 +105,14 @@ class Forces:
 
 
 def slow_energies(  # noqa: PLR0913
-    before: Forces, after: Forces, dq: Array, fixed: Index, friction: float, path: float = 0.0
+    before: Forces, after: Forces, dq: Array, fixed: Index, friction: float,
+    path: float = 0.0, bend: float = 0.0,
 ) -> Energies:  # fmt: skip
     """The balance (3) to (5) of a quasi-static step that moves the dofs by dq (dofs,).
 
     The load before is the one that the state balances, whatever was said of that time: a load
     that is there at once grows along the step.  fixed: prescribed dofs; friction: r1_T . du_T;
-    path: `path_work` at finite strains.
+    path: `path_work` of large deformations; bend: work of loads beyond that of their mean.
     """
     balanced = before.inner - before.pushed
     load = balanced.copy()
@@ -117,12 +120,12 @@ def slow_energies(  # noqa: PLR0913
     held = np.zeros_like(dq)
     held[fixed] = (balanced - load + after.inner - after.load - after.pushed)[fixed]
     gain = after.elastic - before.elastic
-    works = {"loads": 0.5 * (load + after.load) @ dq, "supports": 0.5 * held @ dq}
+    works = {"loads": 0.5 * (load + after.load) @ dq + bend, "supports": 0.5 * held @ dq}
     mean = 0.5 * (before.pushed + after.pushed) @ dq
     size = abs(gain) + sum(map(abs, works.values()))
     contact = friction if mean > TOLERATED * size else max(friction, mean)
     return Energies(elastic=after.elastic, gain=gain, contact=float(contact),
-                    numerical=float(path + contact - mean),
+                    numerical=float(path + bend + contact - mean),
                     **{name: float(work) for name, work in works.items()})  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Quasi-static steps at finite strains: friction on the motion since the last step.
+"""Quasi-static steps of large deformations: friction on the motion since the last step.
 
 Every step begins from the last state and goes to its load in load steps where it must.
 """
@@ -15,6 +15,7 @@ from ..contact import frames
 from ..model import Model
 from ..model.diagnosis import with_diagnosis
 from ..model.large_deformation import large_step
+from ..model.nodal_forces import NodalForces
 from ..model.nonlinear_parts import nonlinear_parts
 from ..solution import FrictionSolution
 from .energy import Energies, Forces, path_work, slow_energies
@@ -27,7 +28,7 @@ Array = NDArray[np.float64]
 
 
 class LargeSlowModel:
-    """A model with hyperelastic laws and without inertia; `advance` makes one step."""
+    """A model in large deformations and without inertia; `advance` makes one step."""
 
     def __init__(self, model: Model, crossing: Crossing | None = None) -> None:
         self.motion, self.crossing = Motion(model), crossing
@@ -36,7 +37,7 @@ class LargeSlowModel:
         """The state before the first step: undeformed, also where supports hold the body."""
         return undeformed(state, self.motion)
 
-    def _known(self, state: State) -> tuple[Array, Array, Array]:
+    def _known(self, state: State) -> tuple[NodalForces | Array, Array, Array]:
         """Load, prescribed values (dofs,) and free displacements (n,) of the last state."""
         free = state.displacement[self.motion.parts.free]
         if state.is_unloaded:
@@ -82,22 +83,38 @@ class LargeSlowModel:
         """The same record; one that failed says which bodies give way."""
         return with_diagnosis(solution, self.motion.body)
 
-    def _energies(self, state: State, q1: Array, load: Array, r: Array, u: Array) -> Energies:
+    def _energies(
+        self, state: State, q1: Array, load: NodalForces, r: Array, u: Array
+    ) -> Energies:
         """The balance of `slow_energies`; r, u (nc, d): reactions, [gap, slip] of the step."""
-        before = self._forces(state.displacement, self.motion.load_of(state), state.force)
-        after, dq = self._forces(q1, load, r), q1 - state.displacement
+        q0, load_0 = state.displacement, self.motion.load_of(state)
+        before, after = self._forces(q0, load_0, state.force), self._forces(q1, load, r)
         friction = float((r[:, 1:] * u[:, 1:]).sum())
-        path = path_work(before, after, dq)
-        return slow_energies(before, after, dq, self.motion.parts.fixed, friction, path)
+        path = path_work(before, after, q1 - q0)
+        bend = self._bend(q0, q1, load_0, load)
+        return slow_energies(before, after, q1 - q0, self.motion.parts.fixed, friction, path,
+                             bend)  # fmt: skip
 
-    def _forces(self, q: Array, load: Array, r: Array) -> Forces:
+    def _bend(self, q0: Array, q1: Array, before: NodalForces, after: NodalForces) -> float:
+        """Work of loads that follow the body beyond that of the mean of their ends.
+
+        By Simpson's rule, exact for pressures that grow along with a motion on a straight line.
+        """
+        if not (before.following or after.following):
+            return 0.0
+        shape = nonlinear_parts(self.motion.body).X.shape
+        ends = (before.at(q0.reshape(shape)) + after.at(q1.reshape(shape))) / 2
+        middle = (0.5 * (before + after)).at(((q0 + q1) / 2).reshape(shape))
+        return float((middle - ends) @ (q1 - q0)) * 2 / 3
+
+    def _forces(self, q: Array, load: NodalForces, r: Array) -> Forces:
         """All forces at displacements q (dofs,); r (nc, d): in the frames there."""
         parts = nonlinear_parts(self.motion.body)
         axes = frames(parts.contact.normals(parts.points + q[parts.at]))
         pushed = np.zeros_like(q)
         pushed[parts.at] = np.einsum("pkc,pk->pc", axes, r)
         moved = q.reshape(parts.X.shape)
-        return Forces(parts.forces(moved), load, pushed, parts.energy(moved))
+        return Forces(parts.forces(moved), load.at(moved), pushed, parts.energy(moved))
 
 
 def at_contacts(model: Model, displacement: Array) -> Array:

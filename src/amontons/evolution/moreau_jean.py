@@ -91,7 +91,8 @@ class MoreauJean:
         """The matrices of all steps; tolerance of their solves."""
         if model.is_large:
             raise UnsupportedForm(
-                "model: dynamics are those of small strains; use QuasiStatic or LinearElastic"
+                "model: dynamics are those of small strains with contact in the reference "
+                "configuration; use QuasiStatic, or LinearElastic without configuration="
             )
         if model.contacts[0].nitsche is not None:
             raise UnsupportedForm(f"model: {NO_MULTIPLIERS}")

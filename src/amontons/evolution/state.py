@@ -181,26 +181,33 @@ def at_rest(
     *,
     time: float = 0.0,
     velocity: VectorValue | Sequence[VectorValue] = 0.0,
+    displacement: VectorValue | Sequence[VectorValue] = 0.0,
 ) -> State:
-    """The undeformed model at a time, moving with a velocity.
+    """The model at a time without contact forces: undeformed, or displaced; with a velocity.
 
-    velocity: a value per component, a function of x, or a list of one of these per body.  Fixed
-    dofs start with their prescribed displacement and without velocity; quasi-static steps begin
-    without displacements.
+    velocity, displacement: a value per component, a function of x, or a list of one of these
+    per body.  Fixed dofs start with their prescribed displacement and without velocity;
+    quasi-static steps of a model that is displaced nowhere else begin without that either.
     """
     parts = steady(model).discretisation
-    q, v = np.zeros(parts.dofs), np.zeros(parts.dofs)
-    per_body = _one_each(velocity, len(model.bodies))
-    for body, value, a, b in zip(
-        model.bodies, per_body, parts.offsets[:-1], parts.offsets[1:], strict=True
-    ):
-        check_vector(value, "velocity")
-        v[a:b] = vector_at(value, body.mesh.points, "velocity").ravel()
+    q, v = (
+        _at_nodes(model, value, name)
+        for value, name in ((displacement, "displacement"), (velocity, "velocity"))
+    )
     v[parts.fixed] = 0.0
     supports: tuple[Fix, ...] = tuple(part_at(s, time) for s in model.supports)  # type: ignore[misc]
     q[parts.fixed] = prescribed_values(model.bodies, supports, parts.offsets)[parts.fixed]
     u = parts.local(q)
     return State(0, time, q, v, np.zeros_like(u), u[:, 1:])
+
+
+def _at_nodes(model: Model, value: object, name: str) -> Array:
+    """Values of all bodies at their nodes, (dofs,)."""
+    out = []
+    for body, own in zip(model.bodies, _one_each(value, len(model.bodies)), strict=True):
+        check_vector(own, name)
+        out.append(vector_at(own, body.mesh.points, name).ravel())
+    return np.concatenate(out)
 
 
 def undeformed(state: State, motion: Motion) -> State:
@@ -215,10 +222,10 @@ def undeformed(state: State, motion: Motion) -> State:
     return replace(state, displacement=zero(state.displacement), slip=zero(state.slip))
 
 
-def _one_each(velocity: object, bodies: int) -> list:
-    """A velocity for every body; a list of vectors or functions is one per body."""
-    if isinstance(velocity, list | tuple):
-        several = all(isinstance(v, list | tuple) or callable(v) for v in velocity)
-        if several and len(velocity) == bodies:
-            return list(velocity)
-    return [velocity] * bodies
+def _one_each(value: object, bodies: int) -> list:
+    """A value for every body; a list of vectors or functions is one per body."""
+    if isinstance(value, list | tuple):
+        several = all(isinstance(v, list | tuple) or callable(v) for v in value)
+        if several and len(value) == bodies:
+            return list(value)
+    return [value] * bodies

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,8 @@ from ..errors import InvalidInput
 from ..fem.mass import lumped, mass
 from ..model import Fix, Model
 from ..model.assembly import Discretisation
+from ..model.nodal_forces import nodal_forces, sampled
+from ..model.parts import Load
 from ..model.supports import external_load, locate, prescribed_values
 from .timed import depends_on_time, is_timed, part_at, steady
 
@@ -34,7 +36,7 @@ class Motion:
     """
 
     model: Model
-    _loads: dict[float, Array] = field(default_factory=dict, init=False, repr=False)
+    _loads: dict[float, Any] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def body(self) -> Model:
@@ -51,31 +53,36 @@ class Motion:
         """True when a load or a support depends on time."""
         return depends_on_time(self.model)
 
+    def _of(self, loads: tuple[Load, ...]) -> Any:
+        """Nodal forces of some loads: (dofs,), in large deformations as `NodalForces`."""
+        if self.model.is_large:
+            return nodal_forces(self.body, loads)
+        return external_load(self.model.bodies, loads, self.parts.offsets)
+
     @cached_property
-    def _steady_load(self) -> Array:
-        steady = tuple(p for p in self.model.loads if not is_timed(p.value))
-        return external_load(self.model.bodies, steady, self.parts.offsets)
+    def _steady_load(self) -> Any:
+        return self._of(tuple(p for p in self.model.loads if not is_timed(p.value)))
 
     @cached_property
     def _supports_move(self) -> bool:
         return any(is_timed(support.value) for support in self.model.supports)
 
-    def load(self, t: float) -> Array:
-        """Nodal forces at time t, (dofs,)."""
+    def load(self, t: float) -> Any:
+        """Nodal forces at time t: (dofs,), in large deformations as `NodalForces`."""
         moving = tuple(part_at(p, t) for p in self.model.loads if is_timed(p.value))
         if not moving:
             return self._steady_load
         if t not in self._loads:
-            forces = external_load(self.model.bodies, moving, self.parts.offsets)  # type: ignore[arg-type]
+            forces = self._of(moving)  # type: ignore[arg-type]
             for old in list(self._loads)[:-1]:
                 del self._loads[old]
             self._loads[t] = self._steady_load + forces
         return self._loads[t]
 
-    def load_of(self, state: State) -> Array:
-        """Nodal forces (dofs,) that are said to act at the time of a quasi-static state."""
+    def load_of(self, state: State) -> Any:
+        """Nodal forces, as `load`, that are said to act at the time of a quasi-static state."""
         if state.is_unloaded:
-            return np.zeros(self.parts.dofs)
+            return 0.0 * self.load(state.time)
         return (1.0 if self.is_timed else state.time) * self.load(state.time)
 
     def prescribed(self, t: float) -> Array:
@@ -85,8 +92,8 @@ class Motion:
         """
         return self._checked(self._displaced(t), t)
 
-    def applied(self, t: float) -> tuple[Array, Array]:
-        """(nodal forces, prescribed displacement) at time t, (dofs,) each.
+    def applied(self, t: float) -> tuple[Any, Array]:
+        """(nodal forces as `load`, prescribed displacement (dofs,)) at time t.
 
         Where nothing depends on time all grow with it as load factor.  Raises as `prescribed`.
         """
@@ -99,7 +106,7 @@ class Motion:
 
     def straight(
         self, interval: tuple[float, float], otherwise: str
-    ) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    ) -> tuple[tuple[Any, Array], tuple[Any, Array]]:
         """What is applied at both ends of an interval of time.
 
         Raises InvalidInput, which says what to do `otherwise`, unless it changes along a
@@ -109,7 +116,8 @@ class Motion:
         first, last = self.applied(a), self.applied(b)
         for share in INSIDE if self.is_timed else ():
             now = self.applied(a + share * (b - a))
-            for start, end, value in zip(first, last, now, strict=True):
+            for three in zip(first, last, now, strict=True):
+                start, end, value = (sampled(given, self._points) for given in three)
                 size = max(float(np.abs(x).max(initial=0)) for x in (start, end, value))
                 line = (1 - share) * start + share * end
                 if np.abs(line - value).max(initial=0) > BENT * size:
@@ -118,6 +126,11 @@ class Motion:
                         f"{b:g}; {otherwise}"
                     )
         return first, last
+
+    @cached_property
+    def _points(self) -> Array:
+        """Reference positions of all nodes, (nodes, d)."""
+        return np.concatenate([body.mesh.points for body in self.model.bodies])
 
     @cached_property
     def _steady_displacement(self) -> Array:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..model import BodyForce, Fix, Model, Traction
+from ..model import BodyForce, Fix, Model, Pressure
+from ..model.parts import Load
 from ..model.timing import at_time, is_timed
 
-Part = Fix | Traction | BodyForce
+Part = Fix | Load
 
 __all__ = ["at_time", "depends_on_time", "growth_in_words", "is_timed", "part_at", "steady"]
 
@@ -65,4 +66,5 @@ def _is_something(value: object) -> bool:
 def _name(part: Part) -> str:
     if isinstance(part, BodyForce):
         return "body force" if part.region is None else f"body force in {part.region!r}"
-    return f"{'fix' if isinstance(part, Fix) else 'traction'} on {part.on!r}"
+    words = {Fix: "fix", Pressure: "pressure"}
+    return f"{words.get(type(part), 'traction')} on {part.on!r}"

@@ -164,7 +164,7 @@ class HyperelasticBody:
                     f"material of region {region!r}: expected NeoHookean or CiarletGeymonat "
                     f"as in the other regions, got {law!r}"
                 )
-        self.pointers, self.columns, places = _pattern(mesh)
+        self.pointers, self.columns, places = node_pattern(mesh)
         self.blocks = [
             _block(mesh, cells, laws[cells.region].coefficients, place)  # type: ignore[attr-defined]
             for cells, place in zip(mesh.cells, places, strict=True)
@@ -224,7 +224,7 @@ def _check(least: float) -> None:
         raise InvertedCells(f"cells are inverted: the least det F is {least:.3g}")
 
 
-def _pattern(mesh: Mesh) -> tuple[NDArray[np.int32], NDArray[np.int32], list[Index]]:
+def node_pattern(mesh: Mesh) -> tuple[NDArray[np.int32], NDArray[np.int32], list[Index]]:
     """Row pointers, columns, and per block of cells the place of every pair of nodes."""
     n = len(mesh.points)
     keys = [cells.nodes[:, :, None] * n + cells.nodes[:, None, :] for cells in mesh.cells]

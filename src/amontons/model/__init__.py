@@ -4,8 +4,9 @@ from ..fem.elasticity import LinearElastic
 from ..fem.hyperelasticity import CiarletGeymonat, NeoHookean
 from .fields import ContactFields
 from .model import Model
-from .parts import Body, BodyForce, Contact, Fix, Traction
+from .parts import Body, BodyForce, Contact, Fix, Pressure, Traction
 from .processes import distributed
 
 __all__ = ["Body", "BodyForce", "CiarletGeymonat", "Contact", "ContactFields", "Fix",
-           "LinearElastic", "Model", "NeoHookean", "Traction", "distributed"]  # fmt: skip
+           "LinearElastic", "Model", "NeoHookean", "Pressure", "Traction",
+           "distributed"]  # fmt: skip

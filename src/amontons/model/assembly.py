@@ -16,7 +16,7 @@ from ..linear.distributed import DistributedMatrix
 from ..linear.grid_matrix import GridMatrix
 from ..linear.levels import Levels, continued, free_levels
 from .held import check_outside
-from .parts import Body, BodyForce, Contact, Fix, Traction
+from .parts import Body, Contact, Fix, Load
 from .placing import Placed, place
 from .rigid import Piece, near_nullspace, pieces
 from .supports import Prescribed, external_load, locate
@@ -101,7 +101,7 @@ class Discretisation:
 def discretise(
     bodies: tuple[Body, ...],
     supports: tuple[Fix, ...],
-    loads: tuple[Traction | BodyForce, ...],
+    loads: tuple[Load, ...],
     contacts: tuple[Contact, ...],
     K: DistributedMatrix | None = None,
 ) -> Discretisation:

@@ -1,10 +1,10 @@
-"""Bodies at finite strains against obstacles: the discrete nonlinear problem.
+"""Bodies in large deformations against obstacles: the discrete nonlinear problem.
 
-With f_int the nodal forces of the hyperelastic bodies at displacements v, and f the loads, the
-force that a contact has to supply is lambda = f_int - f at its node.  The displacements v of
-the free dofs are all the unknowns of
+With f_int the nodal forces of the bodies, hyperelastic or linear, at displacements v, and f the
+loads, which may follow the body, the force that a contact has to supply is lambda = f_int - f
+at its node.  The displacements v of the free dofs are all the unknowns of
 
-    F(v) = f_int(v) - f           on free dofs that are no contact,                         (1)
+    F(v) = f_int(v) - f(v)        on free dofs that are no contact,                         (1)
          = law(lambda(v), X + v)  at contacts, (2) of `contact.current`,
 
 which is continuous and piecewise smooth; all its entries are forces.  Friction speaks of the
@@ -12,8 +12,7 @@ motion since `before`, the displacements at the end of the last step: [LR] secti
 `linearised` is the tangent problem at a state, as a `FrictionProblem`: it has the same
 reactions, gaps and slips there, so that statuses, files and pictures need nothing else.
 
-Left out: master surfaces, loads that follow the body, friction on components of a contact's
-motion that supports hold.
+Left out: master surfaces, friction on components of a contact's motion that supports hold.
 
 [LR] T. Ligurský, Y. Renard, "A continuation problem for computing solutions of discretised
 evolution problems with application to plane quasi-static contact problems with friction",
@@ -35,10 +34,11 @@ from ..cones import Law
 from ..contact.current import STICK, ContactPoint, Pieces
 from ..contact.nodal import contact_columns
 from ..errors import InvertedCells
+from ..fem.linear_body import LinearBody
 from ..judge import Measure, Weakest
 from ..problem import Form, FrictionProblem
 from ..solution import FrictionSolution
-from .assembly import external_load
+from .nodal_forces import NodalForces, nodal_forces
 from .nonlinear_parts import NonlinearParts, nonlinear_parts
 
 if TYPE_CHECKING:
@@ -50,21 +50,25 @@ TOUCHING = 1e-9  # gaps up to this part of the size count as closed where nothin
 
 @dataclass(frozen=True, eq=False)
 class LargeDeformation:
-    """One static problem, or one step, at finite strains.
+    """One static problem, or one step, of large deformations.
 
-    load, prescribed (dofs,): nodal forces, and values on the fixed dofs, zero on the free ones;
+    load, prescribed (dofs,): nodal forces, also as an array of dead ones, and values on the
+    fixed dofs, zero on the free ones;
     before (nc, d): displacements of the contacts since which friction counts; drift (nc, d):
     motion added to that since then; known: load, prescribed values (dofs,) and state v (n,)
     from which load steps may begin, by default the undeformed state.
     """
 
     parts: NonlinearParts
-    load: Array
+    load: NodalForces
     prescribed: Array
     before: Array
     drift: Array
-    known: tuple[Array, Array, Array] | None = None
+    known: tuple[NodalForces | Array, Array, Array] | None = None
     name: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "load", NodalForces.of(self.load))
 
     # ---------------------------------------------------------------- sizes
     form = Form.GLOBAL
@@ -112,10 +116,22 @@ class LargeDeformation:
         x, motion = self._moved(u)
         return self.parts.contact.at(rest[self.parts.at], motion, x)
 
+    def _needed(self, u: Array) -> Array:
+        """f_int - f (dofs,) at displacements u (nodes, d)."""
+        return self.parts.forces(u) - self.load.at(u)
+
+    def _needed_slopes(self, u: Array) -> tuple[Array, Array]:
+        """The same with its derivative in node blocks (m, d, d)."""
+        inner, blocks = self.parts.tangent(u)
+        load, slopes = self.load.slopes(u)
+        for nodes, part in slopes:
+            self.parts.subtract_inplace(blocks, nodes, part)
+        return inner - load, blocks
+
     def contact_point(self, v: Array) -> ContactPoint:
         """The contact law at a state."""
         u = self.displacement(v)
-        return self._point(u, self.parts.forces(u) - self.load)
+        return self._point(u, self._needed(u))
 
     def residual(self, v: Array, pieces: Pieces | None = None) -> Array:
         """F(v), (n,), unit of force, or the selection function of given pieces.
@@ -123,7 +139,7 @@ class LargeDeformation:
         Raises InvertedCells where it is not defined.
         """
         u = self.displacement(v)
-        rest = self.parts.forces(u) - self.load
+        rest = self._needed(u)
         rest[self.parts.at] = self._point(u, rest).residual(pieces)
         return rest[self.parts.free]
 
@@ -134,11 +150,9 @@ class LargeDeformation:
     def linearisation(self, v: Array, pieces: Pieces | None = None) -> Linearisation:
         """F and its derivatives at a state."""
         u = self.displacement(v)
-        forces, blocks = self.parts.tangent(u)
-        point = self._point(u, forces - self.load)
-        return Linearisation(
-            self, forces - self.load, blocks, point, *point.derivatives(pieces)
-        )
+        rest, blocks = self._needed_slopes(u)
+        point = self._point(u, rest)
+        return Linearisation(self, u, rest, blocks, point, *point.derivatives(pieces))
 
     def pieces(self, v: Array) -> Pieces:
         """The active piece of the law at every contact, see `ContactPoint.pieces`."""
@@ -160,7 +174,7 @@ class LargeDeformation:
     def _local(self, v: Array) -> tuple[Array, Array, Array, Array]:
         """r, u, frames of `CurrentContact.local`, and f_int - f (dofs,)."""
         u = self.displacement(v)
-        rest = self.parts.forces(u) - self.load
+        rest = self._needed(u)
         x, motion = self._moved(u)
         return *self.parts.contact.local(rest[self.parts.at], motion, x), rest
 
@@ -181,16 +195,16 @@ class LargeDeformation:
             _, u, axes, rest = self._local(v)
         except InvertedCells:
             return np.inf
-        load, length = self._sizes(r, u, rest)
+        load, length = self._sizes(v, r, u, rest)
         rest[self.parts.at] -= np.einsum("pkc,pk->pc", axes, r)
         balance = float(np.linalg.norm(rest[self.parts.free]))
         law = judge.scaled_residual(r, u, self.law, self.rho)
         return max(balance / load, law / length)
 
-    def _sizes(self, r: Array, u: Array, rest: Array) -> tuple[float, float]:
+    def _sizes(self, v: Array, r: Array, u: Array, rest: Array) -> tuple[float, float]:
         """Sizes of the forces and of u, at least what rounding can resolve."""
         held = rest.copy()
-        held[self.parts.free] = self.load[self.parts.free]
+        held[self.parts.free] = self.load.at(self.displacement(v))[self.parts.free]
         load = np.hypot(np.linalg.norm(held), np.linalg.norm(rest[self.parts.at]))
         length = np.hypot(np.linalg.norm(u), np.linalg.norm(r / self.rho[:, None]))
         least = self.parts.resolved
@@ -221,12 +235,19 @@ class LargeDeformation:
         """The state v (n,) at share 0 of the load."""
         return np.zeros(self.unknowns) if self.known is None else self.known[2]
 
+    @property
+    def meets_first(self) -> bool:
+        """True where some body keeps small strains: its cells may be inverted."""
+        return any(isinstance(body, LinearBody) for body in self.parts.bodies)
+
     def at_share(self, share: float) -> LargeDeformation:
         """The problem at a share of the way from the known load to this one."""
-        load, prescribed = (0.0, 0.0) if self.known is None else self.known[:2]
+        if self.known is None:
+            return replace(self, load=share * self.load, prescribed=share * self.prescribed)
+        load, prescribed, _ = self.known
         return replace(
             self,
-            load=load + share * (self.load - load),
+            load=self.load * share + (1 - share) * NodalForces.of(load),
             prescribed=prescribed + share * (self.prescribed - prescribed),
         )
 
@@ -242,8 +263,8 @@ class LargeDeformation:
         tangent = now.linearised(v)
         moved = then.prescribed - now.prescribed
         displaced = now.displacement(v)
-        _, blocks = self.parts.tangent(displaced)
-        force = then.load - now.load - self.parts.matrix(blocks) @ moved
+        _, blocks = now._needed_slopes(displaced)
+        force = (then.load - now.load).at(displaced) - self.parts.matrix(blocks) @ moved
         normals = self.parts.contact.normals(now._moved(displaced)[0])
         w = np.array(tangent.w)
         w[:, 0] += (normals * moved[self.parts.at]).sum(axis=1)
@@ -272,14 +293,14 @@ class LargeDeformation:
         """The tangent problem at v: same reactions, gaps and slips there, frames of there."""
         parts = self.parts
         moved = self.displacement(v)
-        _, blocks = parts.tangent(moved)
+        _, blocks = self._needed_slopes(moved)
         r, u, axes, rest = self._local(v)
         bend = parts.contact.normal_slopes(self._moved(moved)[0])
         blocks[parts.diagonal] -= _turned(axes, r, bend)
         nodes = parts.at[:, 0] // self.dimension
         H = sparse.csc_array(contact_columns(nodes, axes, parts.X.size).tocsr()[parts.free])
         M = parts.on_free(blocks)
-        load, length = self._sizes(r, u, rest)
+        load, length = self._sizes(v, r, u, rest)
         w = u - (H.T @ v).reshape(u.shape)
         return FrictionProblem.from_global(
             M, H, M @ v - rest[parts.free], w, self.law, load_scale=load, u_scale=length,
@@ -291,11 +312,12 @@ class LargeDeformation:
 class Linearisation:
     """F and its derivatives at one state.
 
-    rest (dofs,): f_int - f; blocks: its derivative; by_force, by_x, by_motion (nc, d, d): those
-    of the contact law.
+    u (nodes, d): displacements; rest (dofs,): f_int - f; blocks: its derivative; by_force,
+    by_x, by_motion (nc, d, d): those of the contact law.
     """
 
     problem: LargeDeformation
+    u: Array
     rest: Array
     blocks: Array
     point: ContactPoint
@@ -321,10 +343,12 @@ class Linearisation:
         blocks[parts.diagonal] += self.by_x + self.by_motion
         return parts.on_free(blocks)
 
-    def shifted(self, load: Array, prescribed: Array, drift: Array | None = None) -> Array:
+    def shifted(
+        self, load: NodalForces | Array, prescribed: Array, drift: Array | None = None
+    ) -> Array:
         """First-order change of F, (n,), with changes of load, prescribed (dofs,) and drift."""
         parts = self.problem.parts
-        change = parts.matrix(self.blocks) @ prescribed - load
+        change = parts.matrix(self.blocks) @ prescribed - NodalForces.of(load).at(self.u)
         at = np.einsum("pij,pj->pi", self.by_force, change[parts.at])
         if drift is not None:
             at += np.einsum("pij,pj->pi", self.by_motion, drift)
@@ -343,21 +367,20 @@ def _turned(axes: Array, r: Array, bend: Array) -> Array:
 
 
 def large_deformation(model: Model) -> LargeDeformation:
-    """The static problem of a model with hyperelastic laws, at its load factor.
+    """The static problem of a model in large deformations, at its load factor.
 
     Friction speaks of the motion from the undeformed state.
     """
     nonlinear_parts(model)  # says what is not supported
     linear = model.discretisation
-    load = external_load(model.bodies, model.loads, linear.offsets)
-    factor = model.load_factor
+    load, factor = nodal_forces(model, model.loads), model.load_factor
     model.check_outside(factor * linear.prescribed)
     return large_step(model, factor * load, factor * linear.prescribed)
 
 
 def large_step(
-    model: Model, load: Array, prescribed: Array, before: Array | None = None,
-    known: tuple[Array, Array, Array] | None = None,
+    model: Model, load: NodalForces | Array, prescribed: Array, before: Array | None = None,
+    known: tuple[NodalForces | Array, Array, Array] | None = None,
 ) -> LargeDeformation:  # fmt: skip
     """One step under nodal forces and prescribed values (dofs,), since displacements `before`.
 
@@ -366,5 +389,5 @@ def large_step(
     parts = nonlinear_parts(model)
     model.check_held()
     before = np.zeros(parts.at.shape) if before is None else before
-    return LargeDeformation(parts, load, prescribed, before, np.zeros_like(before), known,
-                            model.name)  # fmt: skip
+    return LargeDeformation(parts, NodalForces.of(load), prescribed, before,
+                            np.zeros_like(before), known, model.name)  # fmt: skip

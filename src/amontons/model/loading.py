@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 def no_load(model: Model, fields: ContactFields) -> list[ResultWarning]:
     """A warning where nothing moves, and no value given to a load or support can.
 
-    Tractions, body forces, supports that move and overlaps (gap < 0) are loads.  Values
-    that depend on time may be loads at another time, and are not judged.
+    Tractions, pressures, body forces, supports that move and overlaps (gap < 0) are loads.
+    Values that depend on time may be loads at another time, and are not judged.
     """
     if fields.force.any() or any(moved.any() for moved in fields.displacement):
         return []
@@ -27,8 +27,8 @@ def no_load(model: Model, fields: ContactFields) -> list[ResultWarning]:
         return []
     return [
         _warning(
-            "it has no traction, body force, support that moves, or overlap; add a Traction or "
-            "BodyForce, or a Fix whose value is not 0"
+            "it has no traction, pressure, body force, support that moves, or overlap; add a "
+            "Traction, Pressure or BodyForce, or a Fix whose value is not 0"
         )
     ]
 

@@ -27,7 +27,8 @@ from .held import check_outside
 from .large_deformation import LargeDeformation, large_deformation
 from .large_fields import recover_large
 from .nitsche import nitsche_matrices, nitsche_problem
-from .parts import Body, BodyForce, Contact, Fix, Traction
+from .nodal_forces import follows
+from .parts import CURRENT, REFERENCE, Body, BodyForce, Contact, Fix, Load, Pressure
 from .rigid import Piece, check_held, loose_modes
 from .values import ScalarValue, is_number, scalar_at
 
@@ -36,23 +37,24 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """Elastic bodies in frictional contact with obstacles and each other, small strains.
+    """Elastic bodies in frictional contact with obstacles and each other.
 
-    Gaps and normals are taken once in the reference configuration.  load_factor multiplies the
-    loads and the prescribed displacements, not the gaps.
+    Gaps and normals are taken once in the reference configuration, unless the contacts or
+    hyperelastic laws say otherwise: then where the nodes are, see `is_large`.  load_factor
+    multiplies the loads and the prescribed displacements, not the gaps.
     """
 
     bodies: Sequence[Body]
     supports: Sequence[Fix] = ()
     contacts: Sequence[Contact] = ()
-    loads: Sequence[Traction | BodyForce] = ()
+    loads: Sequence[Load] = ()
     load_factor: float = 1.0
     name: str = ""
     _shared: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
         for name, kind in (("bodies", Body), ("supports", Fix), ("contacts", Contact),
-                           ("loads", Traction | BodyForce)):  # fmt: skip
+                           ("loads", Load)):  # fmt: skip
             object.__setattr__(self, name, _tuple_of(name, getattr(self, name), kind))
         if not self.bodies:
             raise InvalidInput("bodies: expected at least one, got none")
@@ -68,6 +70,7 @@ class Model:
             raise InvalidInput(
                 "contacts: expected Nitsche's method in all of them or in none, got both"
             )
+        self._check_configurations()
         if not (is_number(self.load_factor) and np.isfinite(self.load_factor)):
             raise InvalidInput(
                 f"load_factor: expected a finite number, got {self.load_factor!r}"
@@ -86,8 +89,38 @@ class Model:
 
     @property
     def is_large(self) -> bool:
-        """True with hyperelastic laws: finite strains, contact in the current configuration."""
+        """True where contact is found in the current configuration, and loads may follow.
+
+        So it is with hyperelastic laws, whose strains are finite, and where contacts ask for
+        it; linear elastic bodies keep their small strains.
+        """
+        return self._is_hyperelastic or any(c.configuration == CURRENT for c in self.contacts)
+
+    @property
+    def _is_hyperelastic(self) -> bool:
         return any(is_hyperelastic(body.material) for body in self.bodies)
+
+    def _check_configurations(self) -> None:
+        """Contacts of one configuration, one that the bodies can have, and loads that fit."""
+        for contact in self.contacts if self.is_large else ():
+            if contact.configuration == REFERENCE and self._is_hyperelastic:
+                raise InvalidInput(
+                    f"contact on {contact.slave!r}: hyperelastic laws have contact in the "
+                    "current configuration; leave configuration out"
+                )
+            if contact.configuration != CURRENT and not self._is_hyperelastic:
+                raise InvalidInput(
+                    "contacts: expected one configuration for all of them, got both "
+                    "'reference' and 'current'"
+                )
+        for load in self.loads:
+            if follows(load) and not (self.is_large or isinstance(load, Pressure)):
+                is_body = isinstance(load, BodyForce)
+                what = "body force" if is_body else f"traction on {load.on!r}"
+                raise InvalidInput(
+                    f"{what}: configuration 'current' needs large deformations: hyperelastic "
+                    "laws, or contacts with configuration='current'"
+                )
 
     @property
     def discretisation(self) -> Discretisation:
@@ -114,7 +147,7 @@ class Model:
     def discrete_problem(self) -> FrictionProblem | NitscheProblem | LargeDeformation:
         """What `solve` solves: as `assemble`, with Nitsche's method a NitscheProblem.
 
-        With hyperelastic laws a LargeDeformation.
+        With contact in the current configuration a LargeDeformation.
         """
         return large_deformation(self) if self.is_large else self._problem
 
@@ -122,8 +155,9 @@ class Model:
     def _problem(self) -> FrictionProblem | NitscheProblem:
         if self.is_large:
             raise UnsupportedForm(
-                "model: hyperelastic laws have no one linear problem; use solve(model), whose "
-                "solution.problem is the tangent one, or LinearElastic"
+                "model: hyperelastic laws and contact in the current configuration have no one "
+                "linear problem; use solve(model), whose solution.problem is the tangent one, "
+                "or LinearElastic and contact in the reference configuration"
             )
         parts = self.discretisation
         w = self.load_factor * parts.carried
@@ -205,8 +239,8 @@ class Model:
     def imbalance(self, load: Array | None = None) -> str:
         """Which bodies contact alone holds, and whether it can, in words; "" if supports do.
 
-        load (n,): forces on the free dofs, by default those of the model.  At finite strains,
-        where normals change, nothing is proved.
+        load (n,): forces on the free dofs, by default those of the model.  In large
+        deformations, where normals change, nothing is proved.
         """
         parts = self.discretisation
         given = self.load_factor * parts.load if load is None else load
@@ -274,7 +308,7 @@ def _mean_bound(contact: Contact, rows: ContactRows) -> Array:
     return np.maximum(rows.mean(lambda x: scalar_at(given, x, what)), 0.0)
 
 
-def _surfaces(*parts: Fix | Traction | BodyForce | Contact) -> list[str]:
+def _surfaces(*parts: Fix | Load | Contact) -> list[str]:
     """Names of all surfaces that parts of a model refer to."""
     names: list[str] = []
     for part in parts:
@@ -308,7 +342,7 @@ def _bonded(parts: Discretisation, f: Array, w: Array) -> tuple[Array, float]:
 
 
 def _tuple_of(name: str, values: object, kind: object) -> tuple:
-    wanted = getattr(kind, "__name__", "Traction or BodyForce")
+    wanted = getattr(kind, "__name__", "Traction, Pressure or BodyForce")
     if isinstance(values, kind):  # type: ignore[arg-type]
         raise InvalidInput(f"{name}: expected a list of {wanted}, got one alone; write [it]")
     try:

@@ -1,4 +1,4 @@
-"""What a model at finite strains computes with: bodies, contacts, the pattern of the tangent.
+"""What large deformations compute with: bodies, contacts, the pattern of the tangent.
 
 The tangent of the whole model is a list of node blocks, body after body; its free rows and
 columns always have the same pattern, so that they are one `take` away.
@@ -18,6 +18,8 @@ from scipy import sparse
 from ..contact.current import CurrentContact
 from ..errors import UnsupportedForm
 from ..fem.hyperelasticity import HyperelasticBody, is_hyperelastic
+from ..fem.linear_body import LinearBody
+from .parts import CURRENT
 
 if TYPE_CHECKING:
     from .model import Model
@@ -38,7 +40,7 @@ class NonlinearParts:
     of the free dofs its place in the list of blocks.
     """
 
-    bodies: tuple[HyperelasticBody, ...]
+    bodies: tuple[HyperelasticBody | LinearBody, ...]
     X: Array
     ends: Index
     free: Index
@@ -86,6 +88,18 @@ class NonlinearParts:
         parts = zip(self.bodies, np.split(u, self.ends), strict=True)
         return sum(body.energy(part) for body, part in parts)
 
+    @cached_property
+    def _order(self) -> Index:
+        """One ascending number per node block."""
+        rows = np.repeat(np.arange(len(self.X)), np.diff(self.pointers))
+        return rows * len(self.X) + self.columns
+
+    def subtract_inplace(self, blocks: Array, nodes: Index, slopes: Array) -> None:
+        """Take derivatives (k, a, a, d, d), at all pairs of nodes (k, a), from node blocks."""
+        pairs = nodes[:, :, None] * len(self.X) + nodes[:, None, :]
+        places = np.searchsorted(self._order, pairs.ravel())
+        np.subtract.at(blocks, places, slopes.reshape(-1, *blocks.shape[1:]))
+
     def matrix(self, blocks: Array) -> sparse.bsr_array:
         """Node blocks as a matrix (dofs, dofs)."""
         return _matrix(blocks, self.columns, self.pointers)
@@ -94,11 +108,6 @@ class NonlinearParts:
         """Node blocks as the matrix (n, n) of the free dofs."""
         t = self.taken
         return sparse.csc_array((blocks.ravel()[t.data], t.indices, t.indptr), shape=t.shape)
-
-
-def is_large(model: Model) -> bool:
-    """True with hyperelastic laws: finite strains, contact in the current configuration."""
-    return any(is_hyperelastic(body.material) for body in model.bodies)
 
 
 def nonlinear_parts(model: Model) -> NonlinearParts:
@@ -115,7 +124,12 @@ def nonlinear_parts(model: Model) -> NonlinearParts:
 def _nonlinear_parts(model: Model) -> NonlinearParts:
     _check_supported(model)
     linear = model.discretisation  # of the tangent at rest: same dofs, contacts and checks
-    bodies = tuple(HyperelasticBody(body.mesh, body.material) for body in model.bodies)  # type: ignore[arg-type]
+    bodies = tuple(
+        (HyperelasticBody if is_hyperelastic(body.material) else LinearBody)(
+            body.mesh, body.material  # type: ignore[arg-type]
+        )
+        for body in model.bodies
+    )
     X = np.concatenate([body.mesh.points for body in model.bodies])
     d = X.shape[1]
     nodes = np.concatenate([p.rows.nodes + linear.offsets[p.body] // d for p in linear.placed])
@@ -144,12 +158,13 @@ def _nonlinear_parts(model: Model) -> NonlinearParts:
 
 
 def _check_supported(model: Model) -> None:
+    asked = all(contact.configuration == CURRENT for contact in model.contacts)
     for body in model.bodies:
-        laws = body.material.values() if hasattr(body.material, "values") else [body.material]
-        if not all(is_hyperelastic(law) for law in laws):
+        if not (asked or is_hyperelastic(body.material)):
             raise UnsupportedForm(
                 f"body {body.name!r}: others have hyperelastic laws and this one is linear "
-                "elastic; give all of them NeoHookean or CiarletGeymonat"
+                "elastic; give all of them NeoHookean or CiarletGeymonat, or say that it keeps "
+                "small strains by configuration='current' of the contacts"
             )
     for contact in model.contacts:
         if contact.obstacle is None or contact.method != "nodal":

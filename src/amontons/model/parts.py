@@ -1,6 +1,8 @@
 """What a model is made of: bodies, supports, loads, contacts.
 
 Surfaces are named as in the mesh; "body.surface" where several bodies know the same name.
+
+[LR] T. Ligurský, Y. Renard, CMAME 280 (2014), eq. (20), (22).
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checked_arrays import number
 from ..contact import Nitsche, Obstacle
 from ..errors import InvalidInput, shown
 from ..fem.elasticity import LinearElastic, materials_by_region
@@ -22,13 +25,14 @@ from .values import ScalarValue, VectorValue, check_scalar, check_vector
 Array = NDArray[np.float64]
 Material = LinearElastic | NeoHookean | CiarletGeymonat
 METHODS = ("nodal", "mortar", "nitsche")  # "dual-mortar" is another name of the second
+REFERENCE, CURRENT = CONFIGURATIONS = ("reference", "current")
 
 
 @dataclass(frozen=True, eq=False)
 class Body:
     """A mesh and its material: LinearElastic, NeoHookean or CiarletGeymonat, or one per region.
 
-    The last two mean large deformations, of the whole model.
+    The last two mean finite strains, of all bodies of the model.
 
     order: 1 or 2, degree of the displacement.  With 2 the mesh becomes one of second order, see
     `second_order`: its points are then all nodes.
@@ -72,24 +76,63 @@ class Fix:
 
 @dataclass(frozen=True, eq=False)
 class Traction:
-    """Force per area on a surface (per length in 2D): components or functions of x (dim,)."""
+    """Force per area on a surface (per length in 2D): components or functions of x (dim,).
+
+    configuration: "reference", per area of the undeformed surface and at x there, or "current",
+    per area of the deformed one and at x where its points are now: [LR] h^phi.
+    """
 
     on: str
     value: VectorValue
+    configuration: str = REFERENCE
 
     def __post_init__(self) -> None:
         check_vector(self.value, f"traction on {self.on!r}")
+        check_configuration(self.configuration)
+
+
+@dataclass(frozen=True, eq=False)
+class Pressure:
+    """Force per area against the outward normal of a surface: a number or function of x (dim,).
+
+    > 0 pushes into the body.  In large deformations it follows the body: per area, along the
+    normal and at x of the deformed surface.  In small strains all three are undeformed.
+    """
+
+    on: str
+    value: float | Callable[..., float]
+
+    def __post_init__(self) -> None:
+        if not callable(self.value):
+            object.__setattr__(self, "value", number(f"pressure on {self.on!r}", self.value))
 
 
 @dataclass(frozen=True, eq=False)
 class BodyForce:
-    """Force per volume in all bodies, or in the named region: components or functions of x."""
+    """Force per volume in all bodies, or in the named region: components or functions of x.
+
+    configuration: "reference", per undeformed volume and at x there, or "current", per deformed
+    volume and at x where its points are now: [LR] f^phi.
+    """
 
     value: VectorValue
     region: str | None = None
+    configuration: str = REFERENCE
 
     def __post_init__(self) -> None:
         check_vector(self.value, "body force")
+        check_configuration(self.configuration)
+
+
+Load = Traction | Pressure | BodyForce
+
+
+def check_configuration(value: object) -> None:
+    """Raise InvalidInput unless it is "reference" or "current"."""
+    if value not in CONFIGURATIONS:
+        raise InvalidInput(
+            f"configuration: expected one of {', '.join(CONFIGURATIONS)}, got {shown(value)}"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +152,8 @@ class Contact:
     The bound of a contact is a force, the area of the node times the value at the node; with
     mortar times the mean of the function with the dual function of the node, if that is > 0.
     where: a function of points (n, dim) -> (n,) bool that tells which slave nodes take part.
+    configuration: where gap and normal are taken, "reference" or "current", where the nodes are
+    now (nodal, obstacles only); by default "current" with hyperelastic laws.
     """
 
     slave: str
@@ -118,8 +163,11 @@ class Contact:
     master: str | None = None
     method: str | Nitsche | None = None
     where: Callable[[Array], NDArray[np.bool_]] | None = None
+    configuration: str | None = None
 
     def __post_init__(self) -> None:
+        if self.configuration is not None:
+            check_configuration(self.configuration)
         if (self.mu is None) == (self.tresca is None):
             raise InvalidInput(
                 f"contact on {self.slave!r}: expected either mu or tresca (mu=0: no friction)"

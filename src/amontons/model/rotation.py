@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..fem.hyperelasticity import is_hyperelastic
 from ..warned import ResultWarning
 from .fields import ContactFields
 from .rigid import Piece
@@ -73,9 +74,17 @@ def angles(gradients: Array) -> Array:
     return np.degrees(np.arctan2(np.linalg.norm(axis, axis=1), trace - 1))
 
 
+def _finite_strains(model: Model) -> list[int]:
+    """The pieces whose law can turn."""
+    starts = np.cumsum([body.mesh.points.size for body in model.bodies])
+    pieces = model.discretisation.parts
+    of = [int(np.searchsorted(starts, piece.dofs[0], side="right")) for piece in pieces]
+    return [k for k, body in enumerate(of) if is_hyperelastic(model.bodies[body].material)]
+
+
 def large_rotation(model: Model, fields: ContactFields) -> list[ResultWarning]:
     """A warning where a body of small strains turns by more than LIMIT."""
-    if model.is_large:
+    if all(is_hyperelastic(body.material) for body in model.bodies):
         return []
     displacement = np.concatenate(fields.displacement)
     if not np.isfinite(displacement).all():
@@ -85,6 +94,7 @@ def large_rotation(model: Model, fields: ContactFields) -> list[ResultWarning]:
         model._shared["rotation"] = _Fit.of(model.discretisation.parts, points)
     fit: _Fit = model._shared["rotation"]
     turned = angles(fit.gradients(displacement))
+    turned[_finite_strains(model)] = 0.0
     far = np.flatnonzero(turned > LIMIT)
     if not far.size:
         return []
@@ -92,10 +102,11 @@ def large_rotation(model: Model, fields: ContactFields) -> list[ResultWarning]:
     others = f", and {far.size - 1} more by over {LIMIT:g}" if far.size > 1 else ""
     angle = min(float(turned[worst]), 89.9)
     stretch = 100 * (1 / np.cos(np.radians(angle)) - 1)
+    keep = "" if model.is_large else ", and keep loads and gaps where they were"
     return [ResultWarning(
         "large-rotation",
         f"body {fit.names[worst]!r} turns by {turned[worst]:.1f} degrees{others}: small "
-        f"strains stretch what turns, here by {stretch:.2g} %, and keep loads and gaps where "
-        "they were; give the bodies a hyperelastic law such as NeoHookean (solve, quasi-static "
+        f"strains stretch what turns, here by {stretch:.2g} %{keep}; "
+        "give the bodies a hyperelastic law such as NeoHookean (solve, quasi-static "
         f"steps), or trust the motion only up to some {LIMIT:g} degrees",
     )]  # fmt: skip

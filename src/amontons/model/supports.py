@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from ..errors import InvalidInput
 from ..fem.elasticity import body_load
-from ..fem.mesh import unknown
+from ..fem.mesh import Mesh, unknown
+from ..fem.moved_loads import pressure_forces
 from ..fem.surfaces import surface_load
-from .parts import Body, BodyForce, Fix, Traction
+from .parts import Body, BodyForce, Fix, Load, Pressure, Traction
 from .timing import lasting
-from .values import vector_at
+from .values import component_at, vector_at
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -101,24 +102,39 @@ def _check_agreement(old: Array, new: Array, points: Array, on: str) -> None:
 
 
 def external_load(
-    bodies: tuple[Body, ...], loads: tuple[Traction | BodyForce, ...], offsets: Index
+    bodies: tuple[Body, ...], loads: tuple[Load, ...], offsets: Index
 ) -> Array:
-    """Nodal forces of tractions and body forces, (dofs,)."""
+    """Nodal forces of loads on the undeformed bodies, (dofs,)."""
     out = np.zeros(int(offsets[-1]))
     for load in loads:
-        if isinstance(load, Traction):
-            k, surface = locate(bodies, load.on)
-            mesh = bodies[k].mesh
-            facets, nodes = mesh.surface(surface), mesh.surface_nodes(surface)
-            traction = np.zeros_like(mesh.points)
-            traction[nodes] = vector_at(
-                load.value, mesh.points[nodes], f"traction on {load.on!r}"
-            )
-            out[offsets[k] : offsets[k + 1]] += surface_load(
-                mesh.points, facets, traction
-            ).ravel()
-        else:
+        if isinstance(load, BodyForce):
             _add_body_force(out, bodies, load, offsets)
+            continue
+        k, surface = locate(bodies, load.on)
+        forces = _pressed if isinstance(load, Pressure) else _drawn
+        out[offsets[k] : offsets[k + 1]] += forces(bodies[k].mesh, surface, load).ravel()
+    return out
+
+
+def _drawn(mesh: Mesh, surface: str, load: Traction) -> Array:
+    """Nodal forces (n, dim) of a traction."""
+    facets, nodes = mesh.surface(surface), mesh.surface_nodes(surface)
+    traction = np.zeros_like(mesh.points)
+    traction[nodes] = vector_at(load.value, mesh.points[nodes], f"traction on {load.on!r}")
+    return surface_load(mesh.points, facets, traction)
+
+
+def _pressed(mesh: Mesh, surface: str, load: Pressure) -> Array:
+    """Nodal forces (n, dim) of a pressure."""
+    out, nodes = np.zeros_like(mesh.points), mesh.surface_nodes(surface)
+    density = np.zeros(len(out))
+    density[nodes] = component_at(
+        load.value, mesh.points[nodes], f"pressure on {load.on!r}"
+    )  # fmt: skip
+    for facets in mesh.surface(surface):
+        x = mesh.points[facets.nodes]
+        forces, _ = pressure_forces(facets.kind, x, density[facets.nodes], np.zeros_like(x))
+        np.add.at(out, facets.nodes, forces)
     return out
 
 

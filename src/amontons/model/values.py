@@ -51,14 +51,19 @@ def vector_at(value: VectorValue, points: Array, what: str, *, free: bool = Fals
     if callable(value):
         rows = [_row(value(x), dim, what, free) for x in points]
         return np.array(rows, dtype=float).reshape(len(points), dim)
-    entries = _entries(value, dim, what)
-    columns = [
-        [_number(entry(x), what, free) for x in points]
-        if callable(entry)
-        else np.full(len(points), _number(entry, what, free))
-        for entry in entries
-    ]
+    columns = [_column(entry, points, what, free) for entry in _entries(value, dim, what)]
     return np.array(columns, dtype=float).T.reshape(len(points), dim)
+
+
+def component_at(value: Component, points: Array, what: str) -> Array:
+    """A number, or a function of one point x (dim,), at points (n, dim): (n,)."""
+    return np.array(_column(steady_value(value), points, what, False), dtype=float)
+
+
+def _column(entry: Component, points: Array, what: str, free: bool) -> Array | list[float]:
+    if callable(entry):
+        return [_number(entry(x), what, free) for x in points]
+    return np.full(len(points), _number(entry, what, free))
 
 
 def scalar_at(

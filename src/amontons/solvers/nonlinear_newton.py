@@ -8,7 +8,8 @@ steps from a state that is known, each begun by a tangent predictor,
 
 which also moves the prescribed displacements: cells would be inverted by moving these alone.
 Where Newton's method fails from there, it starts from the solution of the tangent problem with
-contact: many contacts that close at once find their statuses together.
+contact: many contacts that close at once find their statuses together.  Bodies whose cells can
+be inverted begin with it, as nothing else keeps them from passing through their obstacles.
 
 Line search: halving until |F| falls below the largest of the last few values; states with
 inverted cells are never accepted.
@@ -86,6 +87,11 @@ class NonlinearProblem(Protocol):
         ...
 
     @property
+    def meets_first(self) -> bool:
+        """True where load steps begin with the tangent problem with contact."""
+        ...
+
+    @property
     def known_state(self) -> Array:
         """The state at share 0."""
         ...
@@ -142,7 +148,8 @@ class NonlinearNewton:
                     f"no equilibrium found beyond {share:.4g} of the load: {reason}{hint}"
                 )
             goal = min(1.0, share + step)
-            for predict in (self._predict, self._predict_contact):
+            both = (self._predict, self._predict_contact)
+            for predict in both[::-1] if problem.meets_first else both:
                 try:
                     first = predict(problem, share, goal, v, target)
                     if goal == 1.0:

@@ -31,6 +31,7 @@ from ...errors import InvertedCells, NotConverged, UnsupportedForm
 from ...evolution.system import Motion
 from ...model import Model
 from ...model.large_deformation import LargeDeformation, large_step
+from ...model.nodal_forces import NodalForces
 from ...settling import settle
 from ...solution import ContactStatus, FrictionSolution, Outcome
 from ...solve import drive
@@ -47,12 +48,13 @@ LETTERS = np.array(["f", "s", "+", "-"])  # of OPEN, STICK, SLIP, BACK as in `pa
 class LoadPath:
     """A PathProblem in the displacements y (n,) of the free dofs and the share p of the load.
 
-    step: the problem at p = 1; load, prescribed (dofs,): those at p = 0; drift (nc, d): V.
+    step: the problem at p = 1; load, prescribed (dofs,): those at p = 0, loads that follow the
+    body as `NodalForces`; drift (nc, d): V.
     Residuals and margins are forces divided by `unit`, so that rounding is far below one.
     """
 
     step: LargeDeformation
-    load: Array
+    load: NodalForces | Array
     prescribed: Array
     drift: Array | None = None
     deadline: Deadline = NEVER  # of those who follow it, see `timed`
@@ -221,7 +223,7 @@ class LoadPath:
 
 
 def load_path(model: Model, interval: tuple[float, float]) -> LoadPath:
-    """A model with hyperelastic laws over its load.
+    """A model in large deformations over its load.
 
     Loads and supports that depend on the time t are taken at t, and have to be straight lines
     in it; where none does, all of them grow with the parameter as load factor.  Friction speaks

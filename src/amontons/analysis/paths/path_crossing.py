@@ -85,7 +85,7 @@ class PathCrossing:
 
         Raises Breakdown with the reason where the path does not lead there.
         """
-        nothing = (np.zeros_like(problem.load), np.zeros_like(problem.prescribed))
+        nothing = (0.0 * problem.load, np.zeros_like(problem.prescribed))
         load, prescribed = nothing if problem.known is None else problem.known[:2]
         path = LoadPath(problem, load, prescribed)
         limit = NEVER.within(target.seconds_left)
