@@ -397,7 +397,7 @@ def drive_any_form(
     found = drive(condensed, solver, **options)
     u, v = problem.velocity(found.r)
     record = found.convergence
-    history = tuple(replace(step, seconds=step.seconds + spent) for step in record.history)
+    history = tuple(step._replace(seconds=step.seconds + spent) for step in record.history)
     record = replace(record, seconds=record.seconds + spent, history=history,
                      compiling=record.compiling + compiled)  # fmt: skip
     return replace(found, problem=problem, u=u, v=v, convergence=record)

@@ -40,7 +40,7 @@ class Watching:
 
 def _is_ours() -> bool:
     """True in the main thread of a program that leaves Ctrl-C to Python."""
-    if threading.current_thread() is not threading.main_thread():
+    if threading.get_ident() != threading.main_thread().ident:
         return False
     return _signal.getsignal(SIGINT) is signal.default_int_handler
 

@@ -172,41 +172,6 @@ def hidden_square(r0, r1, r2, rho, coefficient, tresca):  # noqa: PLR0913
     return size
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
-def weakest_contact(indptr, indices, data, q, coefficient, tresca, rho, r, floor):
-    """(largest contactwise error, its contact or -1, `rounding_error`), as `natural_error`.
-
-    floor (nc,): unit of u, added to the scale of each contact.
-    """
-    worst, contact, hidden = 0.0, -1, 0.0
-    for i in range(len(coefficient)):
-        u0, u1, u2 = q[i, 0], q[i, 1], q[i, 2]
-        scale = floor[i] + math.sqrt(u0 * u0 + u1 * u1 + u2 * u2)
-        for k in range(uint64(indptr[i]), uint64(indptr[i + 1])):
-            j = uint64(indices[k])
-            r0, r1, r2 = r[j, 0], r[j, 1], r[j, 2]
-            d0 = data[k, 0, 0] * r0 + data[k, 0, 1] * r1 + data[k, 0, 2] * r2
-            d1 = data[k, 1, 0] * r0 + data[k, 1, 1] * r1 + data[k, 1, 2] * r2
-            d2 = data[k, 2, 0] * r0 + data[k, 2, 1] * r1 + data[k, 2, 2] * r2
-            u0, u1, u2 = u0 + d0, u1 + d1, u2 + d2
-            scale += math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
-        if rho[i] > 0.0:
-            e0, e1, e2 = contact_residual(
-                r[i, 0], r[i, 1], r[i, 2], u0, u1, u2, rho[i], coefficient[i], tresca
-            )
-            size = max(math.sqrt(e0 * e0 + e1 * e1 + e2 * e2), -PENETRATION * u0)
-            hidden += hidden_square(r[i, 0], r[i, 1], r[i, 2], rho[i], coefficient[i], tresca)
-        elif r[i, 0] != 0.0 or r[i, 1] != 0.0 or r[i, 2] != 0.0:
-            size = math.inf
-        else:
-            size = max(-u0, 0.0)
-        if not size <= worst * scale:  # also where it is not a number
-            worst, contact = (size / scale if scale > 0.0 else math.inf), i
-    if worst != worst or hidden != hidden:
-        worst = hidden = math.inf
-    return worst, contact, EPSILON * math.sqrt(hidden)
-
-
 @njit(cache=True, error_model="numpy")
 def rounding_error(coefficient, tresca, rho, r):
     """What rounding may hide in the velocities that reactions make, unit of u.
@@ -223,7 +188,7 @@ def rounding_error(coefficient, tresca, rho, r):
 
 
 def weakest_of(r: Array, u: Array, law: Law, rho: Array, scale: Array) -> Weakest:
-    """NumPy form of `weakest_contact` with u and the scales (nc,) given."""
+    """NumPy form of the contactwise error with u and the scales (nc,) given."""
     if len(r) == 0:
         return Weakest(0.0, None)
     size = residual_sizes(r, u, law, rho)
@@ -305,6 +270,5 @@ __all__ = [
     "residual_sizes",
     "rounding_error",
     "scaled_residual",
-    "weakest_contact",
     "weakest_of",
 ]

@@ -11,8 +11,8 @@ from .clock import compiling, now
 from .cones import Coulomb
 from .judge import EPSILON, Criterion, Measure, Weakest
 from .nitsche_problem import NitscheProblem
-from .problem import Form, FrictionProblem
-from .settling import Motion, Settled, settled_state
+from .problem import FrictionProblem
+from .settling import Motion, Settled, settled_exactly, settled_state
 from .solution import Step
 from .solvers.base import Iterate, natural_error_of
 
@@ -24,7 +24,6 @@ PROGRESS = 0.99  # the best error must fall at least by this factor within PATIE
 BLUR = 1e-2  # rounding, relative to the tolerance, above which an error is evaluated sharply
 BLURRED = 20  # iterates that would do if rounding could hide no error in them
 TIGHTER = 0.3  # goal of a second start, relative to what would just do
-JUDGE_FLOPS = 18, 60  # floating point operations of a judgement per block of W, per contact
 
 
 @dataclass
@@ -56,20 +55,40 @@ class Watch:
             error = natural_error_of(self.problem, iterate.r, iterate.v)  # type: ignore[arg-type]
             return self._noted(iterate, error, None, None)
         error, weakest, told = self.problem.error(iterate.r, iterate.v), None, None
-        if error <= self.tolerance and not isinstance(self.problem, NitscheProblem):
-            told = settled_state(self.problem, iterate.r, iterate.v)
-            if told[1].r is not iterate.r:  # judged exactly, their motion is found again
-                v = None if self.problem.measure is Measure.EXACT else iterate.v
-                iterate = replace(iterate, r=told[1].r, v=v)
-                error = self.problem.error(iterate.r, iterate.v)
         if error <= self.tolerance:
-            weakest = self.problem.weakest(iterate.r, iterate.v)
-            if weakest is not None and weakest.hidden > BLUR * self.tolerance:
-                error = self.problem.certain_error(iterate.r, iterate.v)
-                if error > self.tolerance:
-                    weakest = None
-                    self.blurred += 1
+            iterate, error, weakest, told = self._settled(iterate, error)
+        if weakest is not None and weakest.hidden > BLUR * self.tolerance:
+            error = self.problem.certain_error(iterate.r, iterate.v)
+            if error > self.tolerance:
+                weakest = None
+                self.blurred += 1
         return self._noted(iterate, error, weakest, told)
+
+    def _settled(
+        self, iterate: Iterate, error: float
+    ) -> tuple[Iterate, float, Weakest | None, tuple[Motion, Settled] | None]:
+        """An iterate whose error will do, with reactions that keep to their statuses."""
+        problem = self.problem
+        if isinstance(problem, NitscheProblem):
+            return iterate, error, problem.weakest(iterate.r, iterate.v), None
+        if problem.measure is Measure.EXACT and problem.condensed().q_norm > 0:
+            u, told, own, weakest = settled_exactly(problem.condensed(), iterate.r)
+            if told.changed:  # its motion is found again
+                iterate, error = replace(iterate, r=told.r, v=None), own
+            return (
+                iterate,
+                error,
+                weakest if error <= self.tolerance else None,
+                ((u, None), told),
+            )
+        motion, told = settled_state(problem, iterate.r, iterate.v)
+        if told.r is not iterate.r:
+            v = None if problem.measure is Measure.EXACT else iterate.v
+            iterate = replace(iterate, r=told.r, v=v)
+            error = problem.error(iterate.r, iterate.v)
+        if error > self.tolerance:
+            return iterate, error, None, (motion, told)
+        return iterate, error, problem.weakest(iterate.r, iterate.v), (motion, told)
 
     def _noted(
         self, iterate: Iterate, error: float, weakest: Weakest | None,
@@ -93,14 +112,9 @@ class Watch:
 
     def _counted(self, iterate: Iterate) -> float | None:
         """Floating point operations so far, judgements among them; None if not counted."""
-        if self.flops is None or self.problem.form is not Form.DELASSUS:
-            judged = 0.0
-        else:
-            blocks, (each, own) = self.problem.blocks, JUDGE_FLOPS  # type: ignore[union-attr]
-            judged = each * len(blocks.indices) + own * len(blocks.diagonal)
         if self.flops is None or (iterate.flops is None and iterate.iterations):
             return None
-        return self.flops + (iterate.flops or 0.0) + judged
+        return self.flops + (iterate.flops or 0.0) + self.problem.judge_flops
 
     def _better(self, error: float, weakest: Weakest | None) -> bool:
         """True for an error below the best; of those that will do, for the better contacts."""

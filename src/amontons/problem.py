@@ -39,6 +39,7 @@ from .cones import Coulomb, Law, Tresca
 from .errors import InvalidInput, SingularOperator, UnsupportedForm, shown
 from .global_matrices import OPERATORS, GlobalMatrices, Shared, made_once
 from .judge import Measure, Weakest
+from .judge_contacts import assess
 from .judge_sharp import sharp_error
 from .linear import Factor
 from .linear.bodies import Bodies
@@ -48,6 +49,7 @@ from .linear.hierarchy import Hierarchy
 from .linear.levels import Levels, checked_levels
 
 Array = NDArray[np.float64]
+JUDGE_FLOPS = 18, 60  # floating point operations of a judgement per block of W, per contact
 ESTIMATED = 9_000  # unknowns of a mesh above which the size of u is taken from a coarse level
 
 
@@ -294,6 +296,14 @@ class FrictionProblem:
         return b.indptr, b.indices, b.data, q, self.law.coefficient, tresca, rho
 
     @cached_property
+    def judge_flops(self) -> float:
+        """Floating point operations of one judgement, 0 where they are not counted."""
+        if self.form is Form.GLOBAL:
+            return 0.0
+        each, own = JUDGE_FLOPS
+        return float(each * len(self.blocks.indices) + own * self.contacts)
+
+    @cached_property
     def q_norm(self) -> float:
         """Euclidean norm of q (Delassus form only)."""
         self._need(Form.DELASSUS)
@@ -436,9 +446,11 @@ class FrictionProblem:
         finite, and without v when M is singular.  Raises UnsupportedForm for a v in the
         Delassus form, which has none, InvalidInput for one of another size.
         """
-        self._check_motion(v)
+        if v is not None:
+            self._check_motion(v)
         if self.measure is Measure.EXACT:
-            return max(self.condensed().exact_error(r), self.imbalance(r, v))
+            error = self.condensed().exact_error(r)
+            return error if v is None else max(error, self.imbalance(r, v))
         if v is None:
             try:
                 v = self.velocity(r)[1]
@@ -489,9 +501,7 @@ class FrictionProblem:
         """|M| and |H|, entry by entry."""
         return self._kept("sizes", (self.M, self.H), lambda: (abs(self.M), abs(self.H)))
 
-    def _check_motion(self, v: Array | None) -> None:
-        if v is None:
-            return
+    def _check_motion(self, v: Array) -> None:
         if self.form is Form.DELASSUS:
             raise UnsupportedForm(
                 "v: expected None, the problem is in its local form, which has reactions only"
@@ -522,13 +532,15 @@ class FrictionProblem:
         return found._replace(hidden=self.rounding(r))
 
     def _weakest_exact(self, r: Array) -> Weakest:
-        data = self.kernel_data
-        error, contact, hidden = judge.weakest_contact(*data, _rows(r), self._floor)
+        rows, nc = _rows(r), self.contacts
+        unused = (*np.empty((2, nc, 3)), *np.empty((2, nc), np.int8))
+        _, error, contact, hidden, _ = assess(*self.kernel_data, rows, self.floor, *unused)
         hidden = judge.ratio(hidden, self.q_norm)
         return Weakest(error, contact if contact >= 0 else None, hidden)
 
     @cached_property
-    def _floor(self) -> Array:
+    def floor(self) -> Array:
+        """What is added to the scale of each contact, (nc,), unit of u: `blur`, or zeros."""
         return self.blur if self.blur is not None else np.zeros(self.contacts)
 
     def exact_error(self, r: Array) -> float:

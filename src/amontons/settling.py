@@ -13,26 +13,24 @@ as little, gaps that a linear solve has closed to rounding; steps in time take t
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .blocks import spatial
 from .compiled import njit
 from .cones import Law, Tresca
 from .errors import SingularOperator
-from .judge import Measure
+from .judge import Measure, Weakest, ratio
+from .judge_contacts import assess, settled_contact
 from .problem import FrictionProblem
-from .status import ContactStatus
 
 Array = NDArray[np.float64]
 Motion = tuple[Array, Array | None]  # u (nc, d), and v (n,) where there is one
-EPSILON = float(np.finfo(float).eps)
-OPEN, SLIP, STICK = (int(status) for status in ContactStatus)
 
 
-@dataclass(frozen=True, eq=False)
-class Settled:
+class Settled(NamedTuple):
     """Reactions r (nc, d) that keep to their status, (nc,), and what `classify` says besides.
 
     changed: False where r is what was given, and then it is the same array.
@@ -49,11 +47,13 @@ def settle(law: Law, rho: Array, r: Array, u: Array) -> Settled:
 
     rho (nc,): unit of r / u, 0 where a contact can not react.
     """
-    out, status, sliding, changed = _settle(
-        np.ascontiguousarray(r), np.ascontiguousarray(u), rho, law.coefficient,
-        isinstance(law, Tresca),
-    )  # fmt: skip
-    return Settled(out if changed else r, status, sliding, changed)
+    status, sliding = np.empty((2, len(r)), np.int8)
+    rows, kept = spatial(r), np.empty((len(r), 3))
+    changed = _settle(
+        rows, spatial(u), rho, law.coefficient, isinstance(law, Tresca), kept, status, sliding
+    )
+    out = np.ascontiguousarray(kept[:, : r.shape[1]]) if changed else r
+    return Settled(out, status, sliding.view(np.bool_), changed)
 
 
 def motion(problem: FrictionProblem, r: Array, v: Array | None = None) -> Motion:
@@ -82,6 +82,27 @@ def settled_state(
     return settled(problem.law, form.rho, r, lambda r: motion(form, r, kept))
 
 
+def settled_exactly(
+    problem: FrictionProblem, r: Array
+) -> tuple[Array, Settled, float, Weakest]:
+    """(u, `settled`, exact error, weakest contact) in the Delassus form; q is not zero."""
+    (nc, d), data, found = r.shape, problem.kernel_data, r
+    while True:
+        rows = found if d == 3 and found.flags.c_contiguous else spatial(found)
+        u, kept = np.empty((2, nc, 3))
+        status, sliding = np.empty((2, nc), np.int8)
+        error, worst, contact, hidden, changed = assess(
+            *data, rows, problem.floor, u, kept, status, sliding
+        )
+        if not changed:
+            break
+        found = np.ascontiguousarray(kept[:, :d])
+    size = problem.q_norm
+    weakest = Weakest(worst, contact if contact >= 0 else None, ratio(hidden, size))
+    told = Settled(found, status, sliding.view(np.bool_), found is not r)
+    return u[:, :d], told, ratio(error, size), weakest
+
+
 def settled(
     law: Law, rho: Array, r: Array, velocity: Callable[[Array], Motion]
 ) -> tuple[Motion, Settled]:
@@ -99,37 +120,21 @@ def settled(
 
 
 @njit(cache=True, error_model="numpy")
-def _settle(r, u, rho, coefficient, tresca):
-    nc, d = r.shape
-    out, changed = r.copy(), False
-    status, sliding = np.zeros(nc, np.int8), np.zeros(nc, np.bool_)
-    for i in range(nc):
-        slip2 = x2 = r2 = 0.0
-        for k in range(1, d):
-            slip2 += u[i, k] * u[i, k]
-            x = r[i, k] - rho[i] * u[i, k]
-            x2 += x * x
-            r2 += r[i, k] * r[i, k]
-        x, shear, mu = np.sqrt(x2), np.sqrt(r2), coefficient[i]
-        if tresca:
-            closed = r[i, 0] - rho[i] * u[i, 0] > 0.0
-            slides = x > mu
-        else:
-            normal = r[i, 0] - rho[i] * (u[i, 0] + mu * np.sqrt(slip2))
-            closed = mu * x > -normal
-            slides = closed and not (x <= mu * normal and mu > 0.0)
-        sliding[i] = slides
-        if closed and r[i, 0] > 0.0:
-            status[i] = SLIP if slides else STICK
-            continue
-        changed = changed or r[i, 0] != 0.0
-        out[i, 0] = 0.0
-        bound = mu if tresca else 0.0
-        if shear > bound * (1.0 + 4.0 * EPSILON):
-            changed = True
-            for k in range(1, d):
-                out[i, k] *= bound / shear
-    return out, status, sliding, changed
+def _settle(r, u, rho, coefficient, tresca, kept, status, sliding):  # noqa: PLR0913
+    """Fill kept (nc, 3), status and sliding (nc,); True where kept is not r."""
+    changed = False
+    for i in range(len(r)):
+        state, slides, normal, shear = settled_contact(
+            r[i, 0], r[i, 1], r[i, 2], u[i, 0], u[i, 1], u[i, 2], rho[i], coefficient[i], tresca
+        )
+        status[i], sliding[i] = state, slides
+        for k in range(3):
+            kept[i, k] = (shear if k else normal) * r[i, k]
+            changed = changed or kept[i, k] != r[i, k]
+    return changed
 
 
-__all__ = ["Motion", "Settled", "at_rest", "motion", "settle", "settled", "settled_state"]
+__all__ = [
+    "Motion", "Settled", "at_rest", "motion", "settle", "settled", "settled_exactly",
+    "settled_state",
+]  # fmt: skip

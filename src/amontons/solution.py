@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,8 +54,7 @@ class Outcome(Enum):
         return self.value
 
 
-@dataclass(frozen=True)
-class Step:
+class Step(NamedTuple):
     """One line of the history: what the driver saw after an iterate."""
 
     iteration: int

@@ -9,7 +9,8 @@ WEAK_CONTACTS.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,9 +87,8 @@ def drive_from(
     return _drive(problem, solver, given, start, lambda problem, start: start)
 
 
-@dataclass(frozen=True)
-class _Options:
-    """What `drive` takes, checked."""
+class _Options(NamedTuple):
+    """What `drive` takes."""
 
     tolerance: float
     contact_tolerance: float | None
@@ -98,7 +98,8 @@ class _Options:
     criterion: Criterion = Criterion.JUDGE
     patience: int | None = PATIENCE
 
-    def __post_init__(self) -> None:
+    def check(self) -> None:
+        """Raise InvalidInput for what is no option."""
         if self.callback is not None and not callable(self.callback):
             raise InvalidInput(f"callback: expected a function, got {self.callback!r}")
         _check_options(self.tolerance, self.contact_tolerance, self.max_iterations)
@@ -119,6 +120,7 @@ def _drive(
 ) -> FrictionSolution:
     """The solve; `first` makes of the start what is judged before the first iteration."""
     solver = solver if solver is not None else Auto()
+    given.check()
     deadline = deadline_of(given.time_limit)
     _check_stop(problem, given.criterion, given.patience)
     _check_solver(problem, solver)
@@ -179,6 +181,8 @@ def _run(
         outcome, detail = Outcome.TIME_LIMIT, ""
     except KeyboardInterrupt:
         return Outcome.STOPPED, "by the user"
+    if outcome is Outcome.CONVERGED:
+        return outcome, detail
     if watch.weak and outcome in GAVE_UP:
         return Outcome.WEAK_CONTACTS, watch.in_words
     return outcome, "; ".join(text for text in (detail, watch.in_words) if text)

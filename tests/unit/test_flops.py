@@ -7,7 +7,7 @@ import pytest
 
 import amontons as am
 from amontons.gallery import random_delassus
-from amontons.judging import JUDGE_FLOPS
+from amontons.problem import JUDGE_FLOPS
 from amontons.solvers import local_contact, sweeps
 from amontons.solvers.base import Iterate, Target
 

@@ -13,10 +13,11 @@ PACKAGE = Path(amontons.__file__).parent
 ORDER = (
     "compiled < interrupts < errors < options < clock < dense < warned < files < hdf5 < "
     "checked_arrays < cones < linear < blocks < condensation < global_matrices < judge < "
-    "judge_sharp < problem < indefinite < nitsche_problem < one_sided < one_contact < "
-    "status < settling < solution < solvers < judging < solve < fem < contact < model < "
-    "masonry < granular < hild < vee < evolution < analysis < gallery < fclib < checkpoint < "
-    "expressions < case < vtk < plots < output < results < report < api < cli"
+    "judge_contacts < judge_sharp < problem < indefinite < nitsche_problem < one_sided < "
+    "one_contact < status < settling < solution < solvers < judging < solve < fem < "
+    "contact < model < masonry < granular < hild < vee < evolution < analysis < gallery < "
+    "fclib < checkpoint < expressions < case < vtk < plots < output < results < report < "
+    "api < cli"
 ).split(" < ")
 ALONE = {  # package: the file or folder that imports it, one for each kind of file
     "ngsolve": "fem", "netgen": "fem", "pyamg": "linear", "matplotlib": "plots", "click": "cli",

@@ -69,7 +69,7 @@ def with_motion(problem: FrictionProblem, start: Iterate) -> Iterate:
     Without one where it costs little, and the v of a neighbouring solution says nothing.
     """
     if problem.measure is Measure.EXACT:
-        return replace(start, v=None)
+        return start if start.v is None else replace(start, v=None)
     if start.v is not None:
         return start
     guess = problem.guess
