@@ -49,11 +49,12 @@ _HOME = {
                  "Diagram", "Event", "EventKind", "FirstOrder", "IndexSets", "MidpointRule",
                  "PathProblem", "PieceSolution", "RateEquation", "Solutions", "StepPath",
                  "Stop", "Switch", "Tangent", "TangentCone", "ThetaMethod", "Uniqueness",
-                 "Verdict", "Witness", "performance_profile"),
+                 "Verdict", "Witness", "graded", "performance_profile"),
     "fem": ("Mesh", "box", "mesh_shape", "read_cad", "read_mesh", "refined"),
     "contact": ("LevelSet", "Nitsche", "Plane", "Sphere"),
     "model": ("Body", "BodyForce", "CiarletGeymonat", "Contact", "ContactFields", "Fix",
-              "LinearElastic", "Model", "NeoHookean", "Pressure", "Traction", "distributed"),
+              "LinearElastic", "Model", "NeoHookean", "Pressure", "Rigid", "Traction",
+              "distributed"),
 }  # fmt: skip
 _MODULE = {name: module for module, names in _HOME.items() for name in names}
 

@@ -2,6 +2,7 @@
 
 from .certificates.critical_friction import CriticalFriction, Witness
 from .certificates.uniqueness import Uniqueness, Verdict
+from .grading import graded
 from .paths.cones import TangentCone
 from .paths.contact_rates import ContactRates
 from .paths.continuation import Continuation, Switch
@@ -39,5 +40,6 @@ __all__ = [
     "Uniqueness",
     "Verdict",
     "Witness",
+    "graded",
     "performance_profile",
 ]

@@ -195,8 +195,11 @@ def at_rest(
         for value, name in ((displacement, "displacement"), (velocity, "velocity"))
     )
     v[parts.fixed] = 0.0
+    if parts.rigid is not None:
+        v = parts.rigid.nearest(v, np.zeros_like(v))
     supports: tuple[Fix, ...] = tuple(part_at(s, time) for s in model.supports)  # type: ignore[misc]
     q[parts.fixed] = prescribed_values(model.bodies, supports, parts.offsets)[parts.fixed]
+    q = parts.completed(q)
     u = parts.local(q)
     return State(0, time, q, v, np.zeros_like(u), u[:, 1:])
 
