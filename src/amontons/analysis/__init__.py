@@ -1,6 +1,7 @@
 """Questions about problems and solvers; sees discrete problems only."""
 
 from .certificates.critical_friction import CriticalFriction, Witness
+from .certificates.opening import Existence, Opening
 from .certificates.uniqueness import Uniqueness, Verdict
 from .grading import graded
 from .paths.cones import TangentCone
@@ -24,9 +25,11 @@ __all__ = [
     "Diagram",
     "Event",
     "EventKind",
+    "Existence",
     "FirstOrder",
     "IndexSets",
     "MidpointRule",
+    "Opening",
     "PathProblem",
     "PieceSolution",
     "RateEquation",
