@@ -122,6 +122,19 @@ def test_what_rigid_bodies_can_not_do_is_said():
         am.solve(am.Model([body, soft], [am.Fix("soft.top", 0)], [contact]))
 
 
+def test_nitsche_and_current_contact_refuse_rigid_bodies():
+    lid = am.Body(am.box((2.0, 1.0), (2, 1)), am.Rigid())
+    stone = am.Body(am.box((2.0, 1.0), (4, 2), origin=(0, -1)), STONE)
+    fix = am.Fix("body 2.bottom", 0)
+    for slave, master in (("body 2.top", "body 1.bottom"), ("body 1.bottom", "body 2.top")):
+        contact = am.Contact(slave, master=master, mu=0.5, method="nitsche")
+        with pytest.raises(am.UnsupportedForm, match=r"Nitsche.*nodal"):
+            am.Model([lid, stone], [fix], [contact]).discrete_problem()
+    floor = am.Contact("bottom", am.Plane((0, 1)), mu=0.5, configuration="current")
+    with pytest.raises(am.UnsupportedForm, match="'body' is rigid"):
+        am.solve(am.Model([block(2)], [], [floor], [am.Traction("top", (0, -1.0))]))
+
+
 def test_a_rigid_body_that_nothing_holds_is_named():
     body = am.Body(am.box((2.0, 1.0), 2), am.Rigid())
     contact = am.Contact("bottom", am.Plane((0, 1)), mu=0.0)

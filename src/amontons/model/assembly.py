@@ -26,6 +26,7 @@ from .supports import Prescribed, external_load, locate
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 ROUNDING = 1e-14  # of the displacements, up to which their difference is none
+SAME_PLACE = 1e-12  # of the largest displacement: what rounding moves of a rigid body
 GRID_FROM = 50_000  # dofs of a box of equal cells from which its stiffness is not stored
 
 
@@ -140,6 +141,14 @@ class Discretisation:
         out = prescribed.copy()
         out[self.free] = v
         return out
+
+    def moved(self, displacement: Array) -> bool:
+        """Whether any dof has gone where supports alone do not bring it, (dofs,)."""
+        if self.rigid is None:
+            return bool(displacement[self.free].any())
+        held = self.rigid.completed(np.where(self.is_fixed, displacement, 0.0))
+        size = np.abs(displacement).max(initial=0.0)
+        return bool(np.abs(displacement - held).max(initial=0.0) > SAME_PLACE * size)
 
     def completed(self, prescribed: Array) -> Array:
         """Prescribed values (dofs,), continued over rigid bodies."""

@@ -203,6 +203,11 @@ class Model:
         parts, law = self.discretisation, self.law
         loose = self._loose_but_held(parts, law)
         if self.contacts[0].nitsche is not None:
+            if parts.rigid is not None:
+                raise UnsupportedForm(
+                    "model: Nitsche's method takes the place of reactions by stresses, and a "
+                    "rigid body has none; use nodal or mortar contact"
+                )
             if "nitsche" not in self._shared:
                 self._shared["nitsche"] = nitsche_matrices(parts, not loose)
             matrices = self._shared["nitsche"]
