@@ -145,13 +145,23 @@ def _unfit(problem: FrictionProblem) -> str:
     try:
         if negative_direction(problem) is not None:
             return f"{name} is indefinite, and the theorem needs a positive definite M"
-        if problem.form is Form.GLOBAL and problem.loose_modes.shape[1]:
-            raise SingularOperator("loose")
+        if problem.form is Form.GLOBAL:
+            _check_definite(problem)
     except SingularOperator:
         return "contact alone holds a body, so M is not positive definite and the load counts"
     except InvalidInput as error:
         return str(error)
     return ""
+
+
+def _check_definite(problem: FrictionProblem) -> None:
+    """Raise SingularOperator where M, in which nothing negative was found, is singular."""
+    if problem.small_blocks is not None:  # they have inverses
+        return
+    if problem.loose_modes.shape[1]:
+        raise SingularOperator("loose")
+    if problem.near_nullspace is None:  # nobody says which motions could be loose
+        problem.factor()
 
 
 @dataclass(frozen=True, eq=False)
@@ -275,7 +285,8 @@ def _stuck(system: _System, program: _Program, x: Array) -> Opening | None:
 class _Program:
     """The program in its own units.
 
-    A: H with rows and contacts of unit size, a row for w; rows (n,): scales of v;
+    A: the rows of H with entries, rows and contacts of unit size, and a row for w; rows (n,):
+    scales of v, zero where H has none;
     stretch (m,): scales of x; places (m,): of x in r (flat); pull: scale of w, 0 without.
     """
 
@@ -306,12 +317,13 @@ class _Program:
         stretch = 1 / size[contact]
         H = sparse.csr_array(H @ sparse.diags_array(stretch))
         rows = np.sqrt(np.asarray(H.multiply(H).sum(axis=1)).ravel())
-        rows = 1 / np.where(rows > 0, rows, 1.0)
-        H = sparse.csr_array(sparse.diags_array(rows) @ H)
+        live = np.flatnonzero(rows)
+        rows = np.divide(1.0, rows, out=np.zeros_like(rows), where=rows > 0)
+        H = sparse.csr_array(sparse.diags_array(rows[live]) @ H[live])
         w = w * stretch
         pull = 1 / np.abs(w).max() if w.any() else 0.0
         A = sparse.vstack([H, sparse.csr_array(pull * w[None])])
-        last = np.zeros((len(rows) + 1, 1))
+        last = np.zeros((len(live) + 1, 1))
         last[-1] = 1.0
         A = sparse.csr_array(sparse.hstack([A, sparse.csr_array(last)]))
         place = np.full(nc * d, -1)
@@ -323,7 +335,9 @@ class _Program:
 
     def motion(self, z: Array) -> tuple[Array, float]:
         """(v, factor on w) of z: H^T v + factor w opens what z opens."""
-        return self.rows * z[:-1], self.pull * max(float(z[-1]), 0.0)
+        v = np.zeros(len(self.rows))
+        v[self.rows > 0] = self.rows[self.rows > 0] * z[:-1]
+        return v, self.pull * max(float(z[-1]), 0.0)
 
     def reactions(self, x: Array, system: _System) -> list[Array]:
         """r (nc, d) of x, as it is and with what is felt of it taken away; largest 1."""
