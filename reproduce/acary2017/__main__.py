@@ -117,8 +117,8 @@ def _do(
         if "wall" in parts:
             report.measure(out, "wall", paths, names, limit, machine, LONGER)
         if "siconos" in parts and shutil.which(siconos):
-            later = paths[4 * len(main_series.steps) :][: len(main_series.steps)] or paths[:1]
-            report.ratio_of_siconos(out, later, siconos, 4 * limit, machine)
+            some = paths[:: -(-len(paths) // 5)]  # five of them, easy and hard ones
+            report.ratio_of_siconos(out, some, siconos, 4 * limit, machine)
     if fine is not None and {"problems", "fine", "step"} & set(parts):
         paths = wall.write_problems(fine, problems, click.echo)
         if "fine" in parts:

@@ -17,7 +17,7 @@ from amontons.plots import SI, Frame, draw_film, energy_figure, series_figure
 from . import profiles, step, tables
 from .methods import HYBRID, LONGER, PRINTED
 from .race import NOBODY, load, race, store
-from .wall import CASE, Series
+from .wall import CASE, Series, newton_iterations, write_problems
 
 FINE_METHODS = (
     "NSN-AC",
@@ -71,7 +71,7 @@ def against_siconos(
     out: Path, series: Series, fine: Series | None, problems: Path, python: str, cap: float,
     machine: dict[str, str], methods: Sequence[str] | None,
 ) -> None:  # fmt: skip
-    """The last problem of the smallest and of the middle step of each wall, against Siconos.
+    """The easiest and the hardest problem of each wall, against Siconos.
 
     methods: those of ours to measure again, None for all and every solver of Siconos.
     """
@@ -80,8 +80,8 @@ def against_siconos(
     for chosen in (series, fine):
         if chosen is None:
             continue
-        for size in dict.fromkeys((chosen.steps[0], chosen.steps[len(chosen.steps) // 2])):
-            path = problems / chosen.names(size)[-1]
+        paths = sorted(write_problems(chosen, problems, click.echo), key=newton_iterations)
+        for path in dict.fromkeys((paths[0], paths[-1])):
             click.echo(f"{path.stem} against Siconos")
             record["walls"][path.stem] = step.compare(
                 path, python, cap, click.echo, methods, stored.get(path.stem)
@@ -101,7 +101,7 @@ def ratio_of_siconos(
 
 def pictures(out: Path, folder: Path, *, quick: bool) -> None:
     """Frames into the working folder; a series, the film and the energies into `out`."""
-    small = ["wall.cells=[2,1,1]", "wall.rows=3", "evolution.until=0.1"] if quick else []
+    small = ["wall.cells=[2,1,1]", "evolution.until=0.2"] if quick else []
     case = read_case(CASE, small)
     assert case.evolution is not None
     frames, times, energies = [], [], []

@@ -1,15 +1,19 @@
-"""The problems of the wall: time steps of its compression and shear, as FCLib files.
+"""The problems of the wall: steps of one run of its compression and shear, as FCLib files.
 
-The paper gives neither the size of the blocks nor the time step, and the step decides how hard
-a problem is (`README.md`).  So a series has the same instants for several step sizes: "graded
-difficulty" as in the paper, with a grade that everyone can repeat.
+As in the paper: one series of time steps, from which problems of graded difficulty for the
+non-smooth Newton method are chosen.  Difficulty is the number of iterations of NSN-AC with full
+steps from r = 0, counted on some steps of the run; it stands in the name of a file behind step
+and contacts, as in the collection LowWall_FEM.  What the paper leaves open is in `README.md`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,88 +22,136 @@ from amontons.case import read_case
 from amontons.files import replacing
 
 CASE = Path(__file__).resolve().parents[2] / "examples" / "wall" / "wall.toml"
-COMPRESSED = 0.05  # s, when the compression is complete and the shear starts
-SMALL_STEP = 2e-3  # s, up to which Auto from the last step's reactions beats Newton
-NEWTON_STEPS = 12  # from the last step's reactions, before Auto takes over
-TOLERANCE = 1e-6  # of the steps between the chosen ones
+COUNTED_TO = 1e-6  # error at which the iterations of Newton are counted
+MOST = 100  # iterations after which a step counts as too hard for it
+NEWTON = am.SemismoothNewton(am.AlartCurnier(), line_search=am.FullStep())
+STATUSES = ("open", "slip", "stick")
 
 
 @dataclass(frozen=True)
 class Series:
-    """Walls of one mesh: cells of a block, step sizes in s, instants in s."""
+    """Steps of one run: cells of a block, steps to count iterations on, how many to choose."""
 
     name: str
     cells: tuple[int, int, int]
-    steps: tuple[float, ...]
-    instants: tuple[float, ...]
-    rows: int = 5
-
-    def indices(self, step: float) -> list[int]:
-        """The steps, counted from 1, that end nearest to the instants."""
-        return sorted({max(1, round(instant / step)) for instant in self.instants})
-
-    def names(self, step: float) -> list[str]:
-        """File names of the problems of one step size."""
-        return [f"{self.name}-{1e3 * step:g}ms-{k:04d}.hdf5" for k in self.indices(step)]
+    counted: tuple[int, ...]
+    chosen: int
 
     @property
-    def problems(self) -> list[str]:
-        """All file names: every step size at the first instant, then at the second, ..."""
-        return [
-            name for names in zip(*map(self.names, self.steps), strict=True) for name in names
-        ]
+    def steps(self) -> int:
+        """Steps of the run."""
+        return self.counted[-1]
 
 
-def evenly(compressed: int, sheared: int, end: float) -> tuple[float, ...]:
-    """Instants, s: some while the wall is compressed, the others evenly until `end`."""
-    first = COMPRESSED * np.arange(1, compressed + 1) / (compressed + 0.5)
-    later = np.linspace(COMPRESSED, end, sheared + 1)[1:]
-    return tuple(np.concatenate([first, later]).tolist())
-
-
-PAPER = Series("wall", (8, 4, 4), (1e-3, 2e-3, 5e-3, 1e-2, 2e-2), evenly(2, 8, 0.5))
-FINE = Series("fine", (16, 7, 7), (5e-3,), (0.03, 0.1))
-QUICK = Series("quick", (2, 1, 1), (5e-3,), (0.04, 0.1, 0.15), rows=3)
+# the wall cracks within the first steps of shear, later ones differ less
+PAPER = Series("wall", (8, 4, 4), (*range(1, 41), *range(50, 501, 10)), 50)
+FINE = Series("fine", (16, 6, 6), (10, 12), 2)  # 2037 contacts
+QUICK = Series("quick", (2, 1, 1), (2, 4, 6, 9, 11, 12, 14), 3)
 
 
 def write_problems(
     series: Series, folder: Path, report: Callable[[str], None] = print
 ) -> list[Path]:
-    """The files of a series; those that are there are kept.
+    """The chosen problems of a series, in the order of their steps; kept if they are there.
 
     Beside each file lies its warm start, FILE.npz: impulses r (nc, 3) of the step before at the
-    contacts of this one.
+    contacts of this one.  `series_file` holds what was counted.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    for step in series.steps:
-        if not all((folder / name).is_file() for name in series.names(step)):
-            _follow(series, step, folder, report)
-    return [folder / name for name in series.problems]
+    known = series_file(series, folder)
+    if known.is_file():
+        paths = [folder / name for name in json.loads(known.read_text())["chosen"]]
+        if all(path.is_file() and path.with_suffix(".npz").is_file() for path in paths):
+            return paths
+    rows = _follow(series, folder, report)
+    newton = [math.nan if row["newton"] is None else row["newton"] for row in rows]
+    indices = am.graded(newton, series.chosen)
+    names = [rows[k]["file"] for k in indices]
+    for row in rows:
+        if row["file"] not in names:
+            for suffix in (".hdf5", ".npz"):
+                (folder / row["file"]).with_suffix(suffix).unlink(missing_ok=True)
+    record = {"series": series.name, "cells": series.cells, "steps": series.steps,
+              "tolerance": COUNTED_TO, "counted": rows, "chosen": names}  # fmt: skip
+    with replacing(known) as temporary:
+        temporary.write_text(json.dumps(record, indent=1) + "\n")
+    return [folder / name for name in names]
 
 
-def _follow(series: Series, step: float, folder: Path, report: Callable[[str], None]) -> None:
-    """Run one step size until its last instant and write the chosen steps."""
-    last = series.indices(step)[-1]
-    names = dict(zip(series.indices(step), series.names(step), strict=True))
-    case = read_case(CASE, [f"wall.cells={list(series.cells)}", f"wall.rows={series.rows}",
-                            f"evolution.step={step}"])  # fmt: skip
+def series_file(series: Series, folder: Path) -> Path:
+    """The record of a series: steps with their statuses and iterations, names of the chosen."""
+    return folder / f"{series.name}-series.json"
+
+
+def newton_iterations(path: Path) -> int:
+    """The iterations of Newton in the name of a problem."""
+    return int(path.stem.rpartition("-")[2])
+
+
+def _follow(
+    series: Series, folder: Path, report: Callable[[str], None]
+) -> list[dict[str, Any]]:  # fmt: skip
+    """Make the run; a row and a file for each counted step."""
+    case = read_case(CASE, [f"wall.cells={list(series.cells)}"])
     assert case.evolution is not None
-    newton = am.Hybrid(
-        first=am.SemismoothNewton(), iterates_of_first=NEWTON_STEPS, main=am.Auto()
-    )
-    solver = None if step <= SMALL_STEP else newton
-    before = None
-    for done in am.evolve(case.model, case.evolution.method, until=last * step,
-                          solver=solver, tolerance=TOLERANCE):  # fmt: skip
-        k = done.state.index
-        if k in names:
-            path = folder / names[k]
-            am.write_fclib(
-                done.problem, path, title=f"wall, step {step:g} s, t = {done.time:g}"
-            )
+    method = case.evolution.method
+    rows, before = [], None
+    for done in am.evolve(case.model, method, until=series.steps * method.step,
+                          tolerance=case.settings.tolerance):  # fmt: skip
+        if done.state.index in series.counted:
+            rows.append(row := _row(series, done))
+            path = folder / row["file"]
+            title = f"wall, step {done.state.index}, t = {done.time:g} s"
+            am.write_fclib(done.problem, path, title=title)
             force = np.zeros_like(done.state.force) if before is None else before
             with replacing(path.with_suffix(".npz")) as temporary:
                 with temporary.open("wb") as file:
-                    np.savez(file, r=step * force[done.active])
-            report(f"{path.name}: {done.problem.contacts} contacts")
+                    np.savez(file, r=method.step * force[done.active])
+            report(f"{path.name}: " + ", ".join(f"{row[name]} {name}" for name in STATUSES))
         before = done.state.force
+    return rows
+
+
+def _row(series: Series, done: am.TimeStep) -> dict[str, Any]:
+    """A step in numbers; newton: None where full steps do not converge."""
+    found = am.drive(done.problem.condensed(), NEWTON, tolerance=COUNTED_TO,
+                     max_iterations=MOST)  # fmt: skip
+    newton = found.convergence.iterations if found.converged else None
+    contacts = done.problem.contacts
+    name = f"{series.name}-{done.state.index:04d}-{contacts}-{newton or 0:02d}.hdf5"
+    status = np.bincount(done.solution.status, minlength=3)
+    counts = {name: int(status[k]) for k, name in enumerate(STATUSES)}
+    return {"step": done.state.index, "time": done.time, "contacts": contacts, **counts,
+            "newton": newton, "unknowns": done.problem.unknowns, "file": name}  # fmt: skip
+
+
+def section(record: dict[str, Any]) -> str:
+    """Markdown: what was counted on a series, and what was chosen of it beside the paper."""
+    rows = [row for row in record["counted"] if row["file"] in record["chosen"]]
+    newton = sorted(row["newton"] for row in rows)
+    contacts = [row["contacts"] for row in rows]
+    hard = sum(row["newton"] is None for row in record["counted"])
+    return "\n".join([
+        "| | LowWall_FEM | here |",
+        "|---|---|---|",
+        f"| unknowns | 7212 | {rows[0]['unknowns']} |",
+        f"| problems | 50 of steps 1 to 498 | {len(rows)} of steps {rows[0]['step']} to "
+        f"{rows[-1]['step']} |",
+        f"| contacts in a problem | 624 to 688 | {min(contacts)} to {max(contacts)} |",
+        f"| iterations of Newton | 14 to 56, median 31 | {newton[0]} to {newton[-1]}, median "
+        f"{np.median(newton):g} |",
+        f"| hardest over easiest | 4 | {newton[-1] / newton[0]:.3g} |",
+        "",
+        f"Counted on {len(record['counted'])} of {record['steps']} steps, to an error of "
+        f"{record['tolerance']:g} from r = 0; on {hard} of them full steps did not converge "
+        f"within {MOST} iterations. " + _spread(rows),
+    ])  # fmt: skip
+
+
+def _spread(rows: Sequence[dict[str, Any]]) -> str:
+    """A sentence about the statuses of the chosen problems."""
+    ranges = ", ".join(
+        f"{min(row[name] for row in rows)} to {max(row[name] for row in rows)} {name}"
+        for name in STATUSES
+    )
+    return f"In the chosen problems {ranges}."

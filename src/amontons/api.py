@@ -27,6 +27,7 @@ from .solvers.base import Iterate, Solver
 
 if TYPE_CHECKING:
     from .analysis.certificates.critical_friction import CriticalFriction
+    from .analysis.certificates.opening import Opening
     from .analysis.certificates.uniqueness import Uniqueness
     from .analysis.paths.continuation import Continuation
     from .analysis.paths.diagram import Diagram
@@ -295,6 +296,19 @@ def uniqueness(
     if "there is no solution" in balance:
         reason += f" {balance[0].upper()}{balance[1:]}."
     return replace(verdict, reason=reason)
+
+
+def existence(
+    problem: FrictionProblem | Model, *, time_limit: TimeLimit = None
+) -> Opening:
+    """Whether a problem has a solution for every load: a motion that opens all contacts.
+
+    Else reactions that hold each other, on which it depends; or undecided, with the reason.
+    time_limit: seconds, by default the work of about 20 s, counted in operations.
+    """
+    from .analysis.certificates.opening import opening
+
+    return opening(_discrete(problem), time_limit=_begun(time_limit))
 
 
 def critical_friction(

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from .blocks import spatial
 from .fem import cell_stress, von_mises
 from .fem.hyperelasticity import cauchy_stress, is_hyperelastic
+from .fem.rigid import Rigid
 from .fem.write import write_meshes
 from .solution import FrictionSolution
 
 if TYPE_CHECKING:
-    from .model import ContactFields, Model
+    from .model import Body, ContactFields, Model
 
 Array = NDArray[np.float64]
 OFF = -1  # CSTATUS of nodes that are no contact; the other contact fields are zero there
@@ -39,12 +40,7 @@ def write_model(
     """
     pairs = list(zip(model.bodies, fields.displacement, strict=True))
     starts = np.cumsum([0, *(len(body.mesh.points) for body, _ in pairs)])
-    stress = [
-        (cauchy_stress if is_hyperelastic(body.material) else cell_stress)(
-            body.mesh, body.material, moved
-        )
-        for body, moved in pairs
-    ]
+    stress = [_stress(body, moved) for body, moved in pairs]
     owner = [np.full(body.mesh.cell_count, k) for k, (body, _) in enumerate(pairs)]
     displacement = spatial(np.concatenate(fields.displacement))
     record = getattr(solution, "solution", solution).convergence  # of a step in time, too
@@ -59,6 +55,14 @@ def write_model(
         {"CONVERGED": converged, "ERROR": float(record.error)},
         record.stamp,
     )  # fmt: skip
+
+
+def _stress(body: Body, moved: Array) -> Array:
+    """Stress (cells, 3, 3) at displacements (nodes, d); 0 in a rigid body, nobody knows it."""
+    if isinstance(body.material, Rigid):
+        return np.zeros((body.mesh.cell_count, 3, 3))
+    large = is_hyperelastic(body.material)
+    return (cauchy_stress if large else cell_stress)(body.mesh, body.material, moved)
 
 
 def _contact_fields(

@@ -48,22 +48,46 @@ def made_up(**seconds):
 
 
 def test_problems_are_those_of_the_chosen_instants_with_a_warm_start(problems):
-    assert [path.name for path in problems] == [
-        "quick-5ms-0008.hdf5", "quick-5ms-0020.hdf5", "quick-5ms-0030.hdf5",
-    ]  # fmt: skip
+    assert [path.name[:10] for path in problems] == ["quick-0002", "quick-0012", "quick-0014"]
     for path in problems:
         problem = am.read_fclib(path)
         r = np.load(path.with_suffix(".npz"))["r"]
         assert r.shape == (problem.contacts, 3)
         cold = problem.condensed().error(np.zeros_like(r))
-        assert problem.condensed().error(r) < 0.2 * cold
+        assert problem.condensed().error(r) < 0.6 * cold
 
 
-def test_the_series_of_the_paper_has_fifty_problems():
-    names = wall.PAPER.problems
-    assert len(set(names)) == 50
-    assert names[:2] == ["wall-1ms-0020.hdf5", "wall-2ms-0010.hdf5"]
-    assert names[-1] == "wall-20ms-0025.hdf5"
+def test_names_tell_step_contacts_and_iterations_of_newton(problems):
+    found = [wall.newton_iterations(path) for path in problems]
+    assert max(found) >= 3 * min(found)
+    for path in problems:
+        problem = am.read_fclib(path)
+        _, _, contacts, newton = path.stem.split("-")
+        assert int(contacts) == problem.contacts
+        run = am.drive(problem.condensed(), wall.NEWTON, tolerance=wall.COUNTED_TO)
+        assert run.convergence.iterations == int(newton)
+
+
+def test_the_series_of_the_paper_is_one_run_of_five_hundred_steps():
+    assert wall.PAPER.steps == 500
+    assert wall.PAPER.chosen == 50
+
+
+def test_the_wall_of_the_paper_has_its_unknowns():
+    case = wall.read_case(wall.CASE)
+    bodies = {body.name: body for body in case.model.bodies}
+    supports = (bodies.pop("base"), bodies.pop("plate"))
+    assert sum(len(body.mesh.points) for body in bodies.values()) == 2400
+    assert all(isinstance(body.material, am.Rigid) for body in supports)
+    assert case.model.discretisation.unknowns == 7212
+
+
+def test_what_was_counted_stands_beside_the_paper(problems):
+    record = json.loads(wall.series_file(wall.QUICK, problems[0].parent).read_text())
+    text = wall.section(record)
+    assert "| unknowns | 7212 | 408 |" in text
+    assert "on 0 of them" in text
+    assert record["chosen"] == [path.name for path in problems]
 
 
 def test_problems_that_are_there_are_kept(problems):

@@ -15,7 +15,7 @@ from amontons.cli.locking import locked
 from amontons.clock import Deadline
 
 WALL = Path(__file__).resolve().parents[2] / "examples" / "wall" / "wall.toml"
-SMALL = ["--set", "wall.cells=[2,1,1]", "--set", "wall.rows=3"]
+SMALL = ["--set", "wall.cells=[2,1,1]", "--set", "evolution.step=1e-3"]
 BLOCK = """
 [mesh]
 box = [2, 1]
@@ -48,12 +48,15 @@ def table(folder):
 
 def test_the_wall_of_a_case_is_that_of_the_script():
     model = read_case(WALL).model
-    assert len(model.bodies) == 13
-    stone = model.bodies[0].material
-    wall = am.Wall(5, 2, (0.4, 0.2, 0.2), (8, 4, 4), stone, plate=0.05)
+    assert len(model.bodies) == 14
+    stone, steel = model.bodies[1].material, am.Rigid(7800)
+    wall = am.Wall(3, 3, (0.4, 0.2, 0.2), (8, 4, 4), stone, plate=0.05, base=0.05,
+                   plate_material=steel, bond=am.Bond.ALTERNATING)  # fmt: skip
     assert [c.slave for c in model.contacts] == [c.slave for c in wall.contacts]
-    assert model.bodies[-1].material.young == 2.1e11
-    assert model.bodies[0].material.density == 2000
+    assert model.bodies[-1].material == model.bodies[0].material == steel
+    assert stone.density == 2000
+    rigid = read_case(WALL, ["wall.rigid=true"]).model
+    assert rigid.bodies[5].material == am.Rigid(2000)
 
 
 def test_a_run_restarts_where_it_stopped(tmp_path):
@@ -128,7 +131,10 @@ def test_broken_cases_are_refused(old, new, words, tmp_path):
         ("wall.size=[1]", ["wall.size"]),
         ("wall.brick=1", ["wall.brick", "unknown key"]),
         ("mesh.cells=2", ["mesh", "not with"]),
-        ("fix.on=lid", ["lid"]),
+        ("fix[1].on=lid", ["lid"]),
+        ("wall.rigid=1", ["wall.rigid", "true or false"]),
+        ("wall.base=-1", ["base", "-1"]),
+        ("material.plate.young=1", ["material.plate", "young"]),
         ("evolution.lumped=1", ["lumped", "true or false"]),
         ("material.glass.young=1", ["glass", "unknown key"]),
     ],

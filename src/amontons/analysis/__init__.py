@@ -1,7 +1,9 @@
 """Questions about problems and solvers; sees discrete problems only."""
 
 from .certificates.critical_friction import CriticalFriction, Witness
+from .certificates.opening import Existence, Opening
 from .certificates.uniqueness import Uniqueness, Verdict
+from .grading import graded
 from .paths.cones import TangentCone
 from .paths.contact_rates import ContactRates
 from .paths.continuation import Continuation, Switch
@@ -23,9 +25,11 @@ __all__ = [
     "Diagram",
     "Event",
     "EventKind",
+    "Existence",
     "FirstOrder",
     "IndexSets",
     "MidpointRule",
+    "Opening",
     "PathProblem",
     "PieceSolution",
     "RateEquation",
@@ -39,5 +43,6 @@ __all__ = [
     "Uniqueness",
     "Verdict",
     "Witness",
+    "graded",
     "performance_profile",
 ]

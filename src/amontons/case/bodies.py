@@ -14,10 +14,13 @@ from .tables import Blame, Table
 
 if TYPE_CHECKING:
     from ..fem import Mesh
+    from ..fem.rigid import Rigid
     from ..model.parts import Material
 
-LAWS = {  # of materials, with their own keys
-    "linear-elastic": ("plane", "density"), "neo-hookean": (), "ciarlet-geymonat": ("a",),
+LAWS = {  # of materials, with their keys
+    "linear-elastic": ("young", "poisson", "plane", "density"),
+    "neo-hookean": ("young", "poisson"), "ciarlet-geymonat": ("young", "poisson", "a"),
+    "rigid": ("density",),
 }  # fmt: skip
 MAX_NODES = 5_000_000  # of a box: a typing error must not fill the memory
 
@@ -97,13 +100,16 @@ def read_materials(table: Table, mesh: Mesh) -> Material | dict[str, Material]:
     return found
 
 
-def read_material(table: Table) -> Material:
+def read_material(table: Table) -> Material | Rigid:
     """The law of one table."""
-    from ..model import CiarletGeymonat, LinearElastic, NeoHookean
+    from ..model import CiarletGeymonat, LinearElastic, NeoHookean, Rigid
 
     law = table.choice("law", tuple(LAWS), "linear-elastic")
-    table.only("law", "young", "poisson", *LAWS[law])
+    table.only("law", *LAWS[law])
     density = table.number("density") if "density" in table.data else None
+    if law == "rigid":
+        with Blame(table, ""):
+            return Rigid(density)
     young, poisson = table.number("young"), table.number("poisson")
     with Blame(table, ""):
         if law == "neo-hookean":

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from ..analysis.paths.continuation import Continuation
     from ..evolution import MoreauJean, QuasiStatic
     from ..fem import LinearElastic
+    from ..fem.rigid import Rigid
     from ..masonry import Wall
 
 KINDS = ("dynamic", "quasi-static")
@@ -52,19 +53,21 @@ def read_evolution(table: Table, options: Continuation | None = None) -> Evoluti
 
 
 def _value(table: Table, key: str, is_switch: bool) -> float | bool:
-    if not is_switch:
-        return table.number(key)
+    return _switch(table, key) if is_switch else table.number(key)
+
+
+def _switch(table: Table, key: str) -> bool:
     if not isinstance(table.data[key], bool):
         raise table.error(key, f"expected true or false, got {table.data[key]!r}")
     return table.data[key]
 
 
-def read_wall(table: Table, materials: dict[str, LinearElastic]) -> Wall:
-    """The wall of a table [wall]; materials: default and, for the plate, plate."""
+def read_wall(table: Table, materials: dict[str, LinearElastic | Rigid]) -> Wall:
+    """The wall of a table [wall]; materials: default and, for plate and base, plate."""
     from ..masonry import Bond, Wall
 
     table.only("rows", "blocks", "size", "cells", "bond", "friction", "support_friction",
-               "plate")  # fmt: skip
+               "plate", "base", "rigid")  # fmt: skip
     words = {bond.name.lower(): bond for bond in Bond}
     counts = table.need("cells", "whole numbers, one per direction")
     if not isinstance(counts, list) or not all(type(c) is int and c >= 1 for c in counts):
@@ -76,6 +79,7 @@ def read_wall(table: Table, materials: dict[str, LinearElastic]) -> Wall:
         bond=words[table.choice("bond", tuple(words), "running")],
         mu=table.number("friction"), mu_support=table.number("support_friction"),
         plate=table.number("plate", 0.0), plate_material=materials.get("plate"),
+        base=table.number("base", 0.0), rigid="rigid" in table.data and _switch(table, "rigid"),
     )  # fmt: skip
 
 

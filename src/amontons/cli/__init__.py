@@ -92,9 +92,15 @@ Examples:
 @click.argument("source")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
               help="Replace a value of the case.")  # fmt: skip
-@click.option("--json", "json_copy", metavar="FILE", help="The same as JSON; - prints it.")
+@click.option("--time-limit", type=float, metavar="SECONDS",
+              help="For ranks and existence. [the work of 20 s]")  # fmt: skip
+@click.option("--json", "json_copy", metavar="FILE",
+              help="The same as JSON, with certificates; - prints it.")  # fmt: skip
 def info(**options: object) -> None:
     """Say what a problem is: sizes, rank, density, friction, scales, methods that fit.
+
+    It tells the rank of H (or W) with the degree of hyperstaticity, and whether solutions exist
+    whatever the load, by a motion that opens all contacts or reactions that hold each other.
 
     SOURCE is a TOML case file, an FCLib HDF5 file, or example:NAME.
     """

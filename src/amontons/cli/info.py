@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..analysis.certificates.opening import opening
+from ..clock import Deadline, check_seconds, deadline_of
 from ..cones import Tresca
 from ..dense import dense
-from ..errors import InvalidInput, SingularOperator
+from ..errors import InvalidInput, SingularOperator, TimeUp
 from ..indefinite import negative_direction
+from ..linear.rank import matrix_rank, semidefinite_rank
 from ..nitsche_problem import NitscheProblem
 from ..output import to_json
 from ..problem import Form, FrictionProblem
@@ -23,14 +26,25 @@ if TYPE_CHECKING:
     from ..model.large_deformation import LargeDeformation
 
 RANK_LIMIT = 2000  # rows of W up to which its singular values are computed
+SECONDS = 20.0  # whose work ranks and existence may take without a time limit
+RANKS = 0.5  # part of it that the ranks may take
 
 
-def run(source: str, overrides: Sequence[str], json_copy: str | None) -> None:
+def run(
+    source: str, overrides: Sequence[str], json_copy: str | None,
+    time_limit: float | None = None,
+) -> None:  # fmt: skip
     """Print the table, or the JSON."""
     check_writable(json_copy, "--json")
+    if time_limit is not None:
+        check_seconds(time_limit)
     opened = open_source(source, overrides)
-    facts = describe(opened.solvable())
-    facts = {"name": opened.name, **facts}
+    problem = opened.solvable()
+    facts = {"name": opened.name, **describe(problem)}
+    if isinstance(problem, FrictionProblem) and problem.contacts:
+        deadline = deadline_of(time_limit, SECONDS)
+        facts |= _ranks(problem.assembled(), deadline.share(RANKS))
+        facts["existence"] = _existence(problem.assembled(), deadline)
     if json_copy != "-":
         show_table(opened.title, ["", ""], [[k, _text(v)] for k, v in facts.items()], "left")
     if json_copy is not None:
@@ -60,6 +74,38 @@ def describe(problem: FrictionProblem | NitscheProblem | LargeDeformation) -> di
     facts["scales (a guess)"] = _scales(problem)
     facts["methods that fit"] = fitting_methods(problem)
     return facts
+
+
+def _ranks(problem: FrictionProblem, deadline: Deadline) -> dict[str, Any]:
+    """Rank of H, or of a W that is too large for singular values, and hyperstaticity.
+
+    The degree of hyperstaticity is the number of independent reactions r with H r = 0, which
+    hold each other: d nc - rank.
+    """
+    name = "H" if problem.form is Form.GLOBAL else "W"
+    matrix = problem.H if problem.form is Form.GLOBAL else problem.W
+    assert matrix is not None
+    columns = matrix.shape[1]
+    try:
+        rank = (matrix_rank if name == "H" else semidefinite_rank)(matrix, deadline)
+    except (TimeUp, InvalidInput) as error:
+        return {f"rank of {name}": f"not computed: {error}"}
+    found: dict[str, Any] = {}
+    if name == "H" or columns > RANK_LIMIT:
+        found[f"rank of {name}"] = str(rank)
+    return found | {"degree of hyperstaticity": columns - rank.value}
+
+
+def _existence(problem: FrictionProblem, deadline: Deadline) -> dict[str, Any]:
+    """The verdict of `opening`; v and r are its certificates."""
+    found = opening(problem, time_limit=deadline)
+    facts = {"verdict": found.verdict.value, "meaning": found.verdict.meaning,
+             "reason": found.reason, "margin": found.margin, "residual": found.residual,
+             "work": found.work}  # fmt: skip
+    return facts | {
+        name: None if value is None else value.tolist()
+        for name, value in (("v", found.v), ("r", found.r))
+    }
 
 
 def _describe_nitsche(problem: NitscheProblem) -> dict[str, Any]:
@@ -160,6 +206,8 @@ def fitting_methods(problem: FrictionProblem) -> list[str]:
 
 
 def _text(value: Any) -> str:
+    if isinstance(value, dict):
+        return f"{value['verdict'].replace('_', ' ')}: {value['meaning']} {value['reason']}"
     if isinstance(value, float):
         return f"{value:.3g}"
     if isinstance(value, list):

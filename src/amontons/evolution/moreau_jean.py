@@ -7,6 +7,9 @@ With v_theta = theta v1 + (1 - theta) v0, q1 = q0 + h v_theta, and impulses r of
 
 A contact takes part when its gap, predicted as gap + prediction h u_N, is not positive; then
 the law holds between r and u1 + e (u_N of before, 0), e being the restitution ([J], [AB] 10.1).
+With `reach` those that are open by less take part too, and their law is that of the gap at the
+end, q1: they close without penetration.  In long steps, in which a contact that has opened a
+little would else go through, that keeps a wall of many joints together.
 
 That law alone can create energy, of the order of the step size, where a closed contact is about
 to open or a sliding one turns round: the law speaks of u1, the work of an impulse is that on
@@ -74,6 +77,7 @@ class MoreauJean:
     theta: float = 0.5  # 1/2: no numerical damping; 1: implicit Euler
     restitution: float = 0.0  # of contacts: normal velocity after over before an impact
     prediction: float = 0.5  # part of a step by which gaps are predicted
+    reach: float = 0.0  # length: predicted gaps up to which open contacts take part
     mass_damping: float = 0.0  # Rayleigh, per time
     stiffness_damping: float = 0.0  # Rayleigh, time
     lumped: bool = False  # mass at the nodes instead of the consistent matrix
@@ -84,8 +88,14 @@ class MoreauJean:
         _expect("theta", self.theta, 0.5 <= self.theta <= 1, "from 1/2 to 1")
         _expect("restitution", self.restitution, 0 <= self.restitution <= 1, "from 0 to 1")
         _expect("prediction", self.prediction, 0 <= self.prediction <= 1, "from 0 to 1")
-        for name in ("mass_damping", "stiffness_damping"):
+        for name in ("reach", "mass_damping", "stiffness_damping"):
             _expect(name, getattr(self, name), getattr(self, name) >= 0, ">= 0")
+
+        if self.reach > 0 and self.restitution > 0:
+            raise InvalidInput(
+                "reach: expected 0 with restitution, which speaks of velocities, got "
+                f"{self.reach!r}"
+            )
 
     def prepare(self, model: Model, tolerance: float) -> MovingModel:
         """The matrices of all steps; tolerance of their solves."""
@@ -115,9 +125,9 @@ class MovingModel:
             1 / (model.dimension - 1)
         )
         nc, d = parts.carried.shape
-        M_free = self.M_hat[parts.free][:, parts.free]
+        M_free = parts.reduced(self.M_hat)
         self.base = FrictionProblem.from_global(
-            M_free, parts.H, np.zeros(len(parts.free)), np.zeros((nc, d)), self.motion.body.law,
+            M_free, parts.H, np.zeros(parts.unknowns), np.zeros((nc, d)), self.motion.body.law,
             near_nullspace=parts.near_nullspace, levels=parts.levels, name=model.name,
         )  # fmt: skip
         self._last_part: tuple[Index, FrictionProblem] | None = None
@@ -136,22 +146,23 @@ class MovingModel:
         v0, q0 = state.velocity, state.displacement
         u0 = self._local(v0)
         gap = parts.gap + self._local(q0)[:, 0]
-        active = np.flatnonzero(gap + method.prediction * h * u0[:, 0] <= self.closed)
-        v1 = np.zeros(parts.dofs)
+        near = self.closed + method.reach
+        active = np.flatnonzero(gap + method.prediction * h * u0[:, 0] <= near)
         before, after = self.motion.prescribed(state.time), self.motion.prescribed(time)
-        v1[parts.fixed] = ((after - before) / h)[parts.fixed]
+        held = (after - before) / h
         force = theta * self.motion.load(time) + (1 - theta) * self.motion.load(state.time)
         known = self.M @ v0 + h * (
             force - (1 - theta) * (self.C @ v0) - self.K @ (q0 + h * theta * (1 - theta) * v0)
         )
-        f = (known - self.M_hat @ v1)[parts.free]
-        carried = self._local(v1)[active]  # by the supports
+        f = parts.gathered(known - self.M_hat @ held)
+        f = parts.with_driven(f, self.base.M, held)
+        carried = self._local(held)[active]  # by the supports
         start = Iterate(h * state.force[active])
         local = self._local_problem if self._condenses else None
-        shifts = _Shifts.of(u0[active], method)
+        shifts = _Shifts.of(u0[active], gap[active], method)
         while True:
             solution = solve(self._problem(active, f, carried + shifts.values), start, local)
-            v1[parts.free] = _velocity(solution)
+            v1 = parts.spread(_velocity(solution), held)
             q1 = q0 + h * (theta * v1 + (1 - theta) * v0)
             impulse = np.zeros_like(parts.carried)
             impulse[active] = solution.r
@@ -220,10 +231,10 @@ class MovingModel:
         dv, dq = v1 - state.velocity, q1 - state.displacement
         pushed = parts.whole_H @ impulse.ravel()
         q_theta = state.displacement + theta * dq
-        # what the supports must do for the balance of momentum on the fixed dofs
+        # what supports, and the stiffness of rigid bodies, do for the balance of momentum
         held = np.zeros_like(dq)
         rest = M @ dv + C @ dq + h * (K @ q_theta - force) - pushed
-        held[parts.fixed] = rest[parts.fixed]
+        held[parts.held] = rest[parts.held]
         kinetic, elastic = 0.5 * v1 @ (M @ v1), 0.5 * q1 @ (K @ q1)
         v0, q0 = state.velocity, state.displacement
         work = float(pushed @ dq) / h
@@ -241,21 +252,24 @@ class MovingModel:
 class _Shifts:
     """What is added to u1 in the law of the active contacts, (k, d).
 
-    before (k, d): u0; theta; restitution: that of contacts with the law on u1; on_mean (k,):
-    those with the law on u_theta; tries: how often restitution was made smaller.
+    before (k, d): u0; opening (k,): gap over h, of open contacts; theta; restitution: that of
+    contacts with the law on u1; on_mean (k,): those with the law on u_theta; tries: how often
+    restitution was made smaller.
     """
 
     before: Array
+    opening: Array
     theta: float
     restitution: float
     on_mean: Mask
     tries: int = 0
 
     @classmethod
-    def of(cls, before: Array, method: MoreauJean) -> _Shifts:
-        """Those of a step that begins with u0 (k, d)."""
+    def of(cls, before: Array, gap: Array, method: MoreauJean) -> _Shifts:
+        """Those of a step that begins with u0 (k, d) and gaps (k,)."""
         none = np.zeros(len(before), dtype=bool)
-        return cls(before, method.theta, method.restitution, none)
+        opening = np.maximum(gap, 0) / method.step if method.reach else np.zeros(len(gap))
+        return cls(before, opening, method.theta, method.restitution, none)
 
     @property
     def values(self) -> Array:
@@ -263,7 +277,11 @@ class _Shifts:
         out = np.zeros_like(self.before)
         out[:, 0] = self.restitution * self.before[:, 0]
         mean = (1 - self.theta) / self.theta * self.before
-        return np.where(self.on_mean[:, None], mean, out)
+        out = np.where(self.on_mean[:, None], mean, out)
+        # gap at the end >= 0: u1 >= -(gap + (1 - theta) h u0) / (theta h)
+        is_open = self.opening > 0
+        out[is_open, 0] = (self.opening / self.theta + mean[:, 0])[is_open]
+        return out
 
     def changed(self, r: Array, after: Array, excess: float) -> _Shifts | None:
         """Laws that create less than r and u1 = after, (k, d), did by `excess`; None: no other.

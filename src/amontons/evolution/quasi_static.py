@@ -95,8 +95,7 @@ class SlowModel:
         )
         solution = carried_on(solution, state.force)
         assert solution.v is not None
-        q1 = prescribed.copy()
-        q1[parts.free] = solution.v
+        q1 = parts.spread(solution.v, prescribed)
         dq = q1 - state.displacement
         u = parts.local(q1)
         energies = self._energies(state, q1, load, solution.r)
@@ -115,6 +114,7 @@ class SlowModel:
         parts, q = self.motion.parts, state.displacement
         held = np.zeros_like(q)
         held[parts.fixed] = q[parts.fixed]
+        held = parts.completed(held)
         load = parts.K @ q - parts.whole_H @ state.force.ravel()
         motion = (parts.whole_H.T @ state.velocity).reshape(parts.carried.shape)
         drift = (time - state.time) * motion[:, 1:]
@@ -132,7 +132,7 @@ class SlowModel:
         )
         after = self._forces(q1, load, parts.whole_H @ r.ravel())
         friction = float((r[:, 1:] * parts.local(dq)[:, 1:]).sum())
-        return slow_energies(before, after, dq, parts.fixed, friction)
+        return slow_energies(before, after, dq, parts.held, friction)
 
     def _forces(self, q: Array, load: Array, pushed: Array) -> Forces:
         inner = self.motion.parts.K @ q

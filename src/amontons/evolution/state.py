@@ -195,8 +195,12 @@ def at_rest(
         for value, name in ((displacement, "displacement"), (velocity, "velocity"))
     )
     v[parts.fixed] = 0.0
+    if parts.rigid is not None:
+        v = parts.rigid.nearest(v, np.zeros_like(v))
     supports: tuple[Fix, ...] = tuple(part_at(s, time) for s in model.supports)  # type: ignore[misc]
     q[parts.fixed] = prescribed_values(model.bodies, supports, parts.offsets)[parts.fixed]
+    if parts.rigid is not None:
+        q = parts.rigid.nearest(q, np.where(parts.is_fixed, q, 0.0))
     u = parts.local(q)
     return State(0, time, q, v, np.zeros_like(u), u[:, 1:])
 
@@ -215,7 +219,7 @@ def undeformed(state: State, motion: Motion) -> State:
 
     Quasi-static steps begin there: what supports prescribe at first is part of the first step.
     """
-    moved = state.displacement[motion.parts.free].any() or state.velocity.any()
+    moved = motion.parts.moved(state.displacement) or state.velocity.any()
     if state.index or moved or state.force.any():
         return state
     zero = np.zeros_like

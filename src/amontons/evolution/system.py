@@ -86,7 +86,7 @@ class Motion:
         return (1.0 if self.is_timed else state.time) * self.load(state.time)
 
     def prescribed(self, t: float) -> Array:
-        """Prescribed displacement at time t, (dofs,), zero on the free dofs.
+        """Prescribed displacement at time t, (dofs,), zero on the free dofs of elastic bodies.
 
         Raises InvalidInput where it pushes a node that supports hold into what it meets.
         """
@@ -146,7 +146,7 @@ class Motion:
         changed = np.flatnonzero(np.isnan(values) == self.parts.is_fixed)
         if changed.size:
             raise InvalidInput(self._comes_or_goes(int(changed[0]), t))
-        return np.where(self.parts.is_fixed, values, 0.0)
+        return self.parts.completed(np.where(self.parts.is_fixed, values, 0.0))
 
     def _comes_or_goes(self, dof: int, t: float) -> str:
         """What to say of a dof that is free at t and was held at time 0, or the other way."""

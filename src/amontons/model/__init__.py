@@ -2,11 +2,12 @@
 
 from ..fem.elasticity import LinearElastic
 from ..fem.hyperelasticity import CiarletGeymonat, NeoHookean
+from ..fem.rigid import Rigid
 from .fields import ContactFields
 from .model import Model
 from .parts import Body, BodyForce, Contact, Fix, Pressure, Traction
 from .processes import distributed
 
 __all__ = ["Body", "BodyForce", "CiarletGeymonat", "Contact", "ContactFields", "Fix",
-           "LinearElastic", "Model", "NeoHookean", "Pressure", "Traction",
+           "LinearElastic", "Model", "NeoHookean", "Pressure", "Rigid", "Traction",
            "distributed"]  # fmt: skip

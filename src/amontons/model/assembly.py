@@ -12,6 +12,7 @@ from scipy import sparse
 from ..errors import InvalidInput
 from ..fem.box import box
 from ..fem.elasticity import LinearElastic, stiffness
+from ..fem.rigid import Rigid
 from ..linear.distributed import DistributedMatrix
 from ..linear.grid_matrix import GridMatrix
 from ..linear.levels import Levels, continued, free_levels
@@ -19,11 +20,13 @@ from .held import check_outside
 from .parts import Body, Contact, Fix, Load
 from .placing import Placed, place
 from .rigid import Piece, near_nullspace, pieces
+from .rigid_bodies import RigidBodies
 from .supports import Prescribed, external_load, locate
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 ROUNDING = 1e-14  # of the displacements, up to which their difference is none
+SAME_PLACE = 1e-12  # of the largest displacement: what rounding moves of a rigid body
 GRID_FROM = 50_000  # dofs of a box of equal cells from which its stiffness is not stored
 
 
@@ -31,9 +34,10 @@ GRID_FROM = 50_000  # dofs of a box of equal cells from which its stiffness is n
 class Discretisation:
     """All arrays of a model at load factor 1, whatever the friction.
 
-    K (dofs, dofs): stiffness of the whole model, an operator for one large box; free (n,),
-    fixed: its dofs; prescribed (dofs,), load (n,): force on the free dofs with the prescribed
-    values lifted in; gap (nc,); carried (nc, d): part of the local displacement that the
+    K (dofs, dofs): stiffness of the whole model, an operator for one large box; free, fixed:
+    its dofs; prescribed (dofs,), load (n,): force on the unknowns with the prescribed values
+    lifted in; rigid: the bodies that do not deform, None without, when the unknowns (n,) are
+    the free dofs; gap (nc,); carried (nc, d): part of the local displacement that the
     supports prescribe; levels: prolongations of the free dofs from coarser meshes, finest first
     (none where K is an operator, which has its own); nodal_levels: of the nodes, body by body.
     """
@@ -53,10 +57,11 @@ class Discretisation:
     whole_H: sparse.csc_array
     levels: Levels = ()
     nodal_levels: tuple[Levels, ...] = ()
+    rigid: RigidBodies | None = None
 
     def continued(self, prescribed: Array) -> Array | None:
         """Prescribed values (dofs,) continued into the bodies, (n,); None without levels."""
-        if not any(self.nodal_levels):
+        if not any(self.nodal_levels) or self.rigid is not None:
             return None
         counts = np.diff(self.offsets) // self.placed[0].rows.points.shape[1]
         return continued(
@@ -93,9 +98,61 @@ class Discretisation:
         return sparse.csr_array(self.K.tocsc()) if isinstance(self.K, GridMatrix) else self.K
 
     @property
-    def near_nullspace(self) -> Array:
-        """Rigid modes on the free dofs, (n, k)."""
+    def near_nullspace(self) -> Array | None:
+        """Rigid modes on the free dofs, (n, k); None with rigid bodies."""
+        if self.rigid is not None:
+            return None
         return near_nullspace(self.parts, self.free, self.dofs)
+
+    # ------------------------------------------------------------------ unknowns
+    @property
+    def unknowns(self) -> int:
+        """Of the discrete problem: free dofs, and the motions of rigid bodies."""
+        return len(self.free) if self.rigid is None else len(self.rigid.driven)
+
+    @cached_property
+    def held(self) -> Index:
+        """Dofs with forces of supports, or those that keep a body rigid, which do no work."""
+        if self.rigid is None:
+            return self.fixed
+        return np.union1d(self.fixed, self.rigid.dofs)
+
+    def gathered(self, force: Array) -> Array:
+        """Forces on the unknowns (n, ...) of nodal forces (dofs, ...), none on driven ones."""
+        return force[self.free] if self.rigid is None else self.rigid.spread.T @ force
+
+    def reduced(self, whole: sparse.csr_array) -> sparse.csc_array:
+        """A matrix (dofs, dofs) in the unknowns, (n, n)."""
+        if self.rigid is not None:
+            return self.rigid.matrix(whole)
+        return sparse.csc_array(whole[self.free][:, self.free])
+
+    def with_driven(self, force: Array, M: sparse.csc_array, prescribed: Array) -> Array:
+        """Forces (n,) with those that give driven unknowns of M their prescribed values."""
+        if self.rigid is None:
+            return force
+        values = self.rigid.driven_values(prescribed)
+        return np.where(self.rigid.driven, M.diagonal() * values, force)
+
+    def spread(self, v: Array, prescribed: Array) -> Array:
+        """Values of all dofs (dofs,) of unknowns v (n,), and what is prescribed, completed."""
+        if self.rigid is not None:
+            return prescribed + self.rigid.spread @ v
+        out = prescribed.copy()
+        out[self.free] = v
+        return out
+
+    def moved(self, displacement: Array) -> bool:
+        """Whether any dof has gone where supports alone do not bring it, (dofs,)."""
+        if self.rigid is None:
+            return bool(displacement[self.free].any())
+        held = self.rigid.completed(np.where(self.is_fixed, displacement, 0.0))
+        size = np.abs(displacement).max(initial=0.0)
+        return bool(np.abs(displacement - held).max(initial=0.0) > SAME_PLACE * size)
+
+    def completed(self, prescribed: Array) -> Array:
+        """Prescribed values (dofs,), continued over rigid bodies."""
+        return prescribed if self.rigid is None else self.rigid.completed(prescribed)
 
 
 def discretise(
@@ -109,12 +166,16 @@ def discretise(
     offsets = np.cumsum([0, *(body.mesh.points.size for body in bodies)])
     given = Prescribed.of(bodies, supports, offsets)
     is_fixed = given.is_fixed
-    free, fixed = np.flatnonzero(~is_fixed), np.flatnonzero(is_fixed)
-    if not free.size:
+    rigid = RigidBodies.of(bodies, offsets, is_fixed)
+    fixed = np.flatnonzero(is_fixed)
+    free = np.flatnonzero(~is_fixed) if rigid is None else rigid.free
+    if not (free.size if rigid is None else (~rigid.driven).any()):
         raise InvalidInput("supports: every degree of freedom is fixed, nothing left to solve")
     if K is None:
         K = _stiffness(bodies)
     prescribed = np.where(is_fixed, given.values, 0.0)
+    if rigid is not None:
+        prescribed = rigid.completed(prescribed)
     placed = tuple(place(bodies, contact, given, offsets) for contact in contacts)
     _check_once(bodies, contacts, placed)
     whole_H = sparse.hstack([p.H for p in placed], format="csc")
@@ -126,11 +187,16 @@ def discretise(
         )
     load = external_load(bodies, loads, offsets)
     d = bodies[0].mesh.dim
+    if rigid is not None:
+        M, H = rigid.matrix(K), sparse.csc_array(rigid.spread.T @ whole_H)
+        force = rigid.spread.T @ (load - K @ prescribed)
+        load = np.where(rigid.driven, M.diagonal() * rigid.driven_values(prescribed), force)
+    else:
+        M = sparse.csc_array(K[free][:, free]) if sparse.issparse(K) else K.on(free)
+        H = sparse.csc_array(whole_H.tocsr()[free])
+        load = (load - K @ prescribed)[free]
     return Discretisation(
-        offsets, K, free, fixed, prescribed,
-        M=sparse.csc_array(K[free][:, free]) if sparse.issparse(K) else K.on(free),
-        H=sparse.csc_array(whole_H.tocsr()[free]),
-        load=(load - K @ prescribed)[free],
+        offsets, K, free, fixed, prescribed, M=M, H=H, load=load,
         gap=np.concatenate([p.rows.gap for p in placed]),
         carried=_local(whole_H, abs(whole_H), prescribed, d),
         placed=placed,
@@ -141,11 +207,12 @@ def discretise(
         ],
         whole_H=whole_H,
         levels=()
-        if not sparse.issparse(K)  # operators have their own, or none
+        if not sparse.issparse(K) or rigid is not None  # operators have their own, or none
         else free_levels(
             [b.mesh.levels for b in bodies], [len(b.mesh.points) for b in bodies], d, is_fixed
         ),
         nodal_levels=tuple(body.mesh.levels for body in bodies),
+        rigid=rigid,
     )  # fmt: skip
 
 
@@ -166,8 +233,15 @@ def _stiffness(bodies: tuple[Body, ...]) -> sparse.csr_array | GridMatrix:
     grid = _grid(bodies)
     if grid is not None:
         return grid
-    parts = [stiffness(body.mesh, body.material).tocsr() for body in bodies]
+    parts = [_stiffness_of(body) for body in bodies]
     return parts[0] if len(parts) == 1 else sparse.block_diag(parts, format="csr")
+
+
+def _stiffness_of(body: Body) -> sparse.csr_array:
+    """Of one body; a rigid one resists by its unknowns, not by stiffness."""
+    if isinstance(body.material, Rigid):
+        return sparse.csr_array((body.mesh.points.size,) * 2)
+    return stiffness(body.mesh, body.material).tocsr()
 
 
 def _grid(bodies: tuple[Body, ...]) -> GridMatrix | None:

@@ -40,10 +40,11 @@ def imbalance(
     if not loose:
         return ""
     motion, of = rigid_motions(loose, parts.dofs)
-    size = float(np.abs(load) @ np.abs(motion[parts.free]).max(axis=1))
+    moved = parts.gathered(motion)
+    size = float(np.abs(load) @ np.abs(moved).max(axis=1))
     found = None
     if size > 0 and len(law.coefficient) <= MOST:
-        found = _escape(parts.whole_H.T @ motion, load @ motion[parts.free] / size, law, size)
+        found = _escape(parts.whole_H.T @ motion, load @ moved / size, law, size)
     if found is None:
         return f"contact and friction alone hold {in_words(loose)}: perhaps they do not suffice"
     texts = [

@@ -83,8 +83,7 @@ def recover_fields(
 def _by_body(
     bodies: tuple[Body, ...], parts: Discretisation, v: Array, factor: float
 ) -> tuple[Array, ...]:
-    whole = factor * parts.prescribed
-    whole[parts.free] = v
+    whole = parts.spread(v, factor * parts.prescribed)
     pairs = zip(parts.offsets[:-1], parts.offsets[1:], strict=True)
     return tuple(
         whole[a:b].reshape(body.mesh.points.shape)

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ..fem.cells import CELLS
 from ..fem.elasticity import LinearElastic, materials_by_region
 from ..fem.mesh import Mesh
+from ..fem.rigid import Rigid
 from ..fem.surfaces import facet_areas
 from ..warned import ResultWarning
 from .fields import ContactFields
@@ -40,7 +41,7 @@ def volumetric_locking(model: Model, fields: ContactFields) -> list[ResultWarnin
     """A warning for each region that is much too stiff, with the estimated factor."""
     out = []
     for body in model.bodies:
-        if body.mesh.order > 1:
+        if body.mesh.order > 1 or isinstance(body.material, Rigid):
             continue
         for region, law in materials_by_region(body.mesh, body.material).items():  # type: ignore[arg-type]
             if not _nearly_incompressible(law, model.dimension):

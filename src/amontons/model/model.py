@@ -189,7 +189,9 @@ class Model:
         w = parts.local(prescribed)
         w[:, 0] += parts.gap
         w[:, 1:] -= before
-        return self._discrete((load - parts.K @ prescribed)[parts.free], w, prescribed)
+        f = parts.gathered(load - parts.K @ prescribed)
+        f = parts.with_driven(f, parts.M, prescribed) if parts.rigid is not None else f
+        return self._discrete(f, w, prescribed)
 
     def _discrete(
         self, f: Array, w: Array, prescribed: Array
@@ -201,6 +203,11 @@ class Model:
         parts, law = self.discretisation, self.law
         loose = self._loose_but_held(parts, law)
         if self.contacts[0].nitsche is not None:
+            if parts.rigid is not None:
+                raise UnsupportedForm(
+                    "model: Nitsche's method takes the place of reactions by stresses, and a "
+                    "rigid body has none; use nodal or mortar contact"
+                )
             if "nitsche" not in self._shared:
                 self._shared["nitsche"] = nitsche_matrices(parts, not loose)
             matrices = self._shared["nitsche"]
@@ -334,7 +341,10 @@ def _bonded(parts: Discretisation, f: Array, w: Array) -> tuple[Array, float]:
     They replace those without contact, which do not exist where contact alone holds a body.
     """
     H, M = parts.H, parts.M
-    stiffness = sparse.diags_array(abs(H).T @ M.diagonal())
+    near = abs(H).T @ M.diagonal()
+    if parts.rigid is not None:  # between rigid bodies, which have none
+        near[near == 0] = near.max(initial=0.0) or 1.0
+    stiffness = sparse.diags_array(near)
     stored = M.tocsc() if isinstance(M, GridMatrix) else M
     bonded = sparse.csc_array(stored + H @ stiffness @ H.T)
     v = Direct().factor(bonded).solve(f - H @ (stiffness @ w.ravel()))

@@ -19,6 +19,7 @@ from ..contact.current import CurrentContact
 from ..errors import UnsupportedForm
 from ..fem.hyperelasticity import HyperelasticBody, is_hyperelastic
 from ..fem.linear_body import LinearBody
+from ..fem.rigid import Rigid
 from .parts import CURRENT
 
 if TYPE_CHECKING:
@@ -160,6 +161,11 @@ def _nonlinear_parts(model: Model) -> NonlinearParts:
 def _check_supported(model: Model) -> None:
     asked = all(contact.configuration == CURRENT for contact in model.contacts)
     for body in model.bodies:
+        if isinstance(body.material, Rigid):
+            raise UnsupportedForm(
+                f"body {body.name!r} is rigid, and contact in the current configuration needs "
+                "bodies that deform"
+            )
         if not (asked or is_hyperelastic(body.material)):
             raise UnsupportedForm(
                 f"body {body.name!r}: others have hyperelastic laws and this one is linear "

@@ -20,6 +20,7 @@ from ..fem.elasticity import LinearElastic, materials_by_region
 from ..fem.hyperelasticity import CiarletGeymonat, NeoHookean
 from ..fem.mesh import Mesh
 from ..fem.order import second_order
+from ..fem.rigid import Rigid
 from .values import ScalarValue, VectorValue, check_scalar, check_vector
 
 Array = NDArray[np.float64]
@@ -32,31 +33,39 @@ REFERENCE, CURRENT = CONFIGURATIONS = ("reference", "current")
 class Body:
     """A mesh and its material: LinearElastic, NeoHookean or CiarletGeymonat, or one per region.
 
-    The last two mean finite strains, of all bodies of the model.
+    The last two mean finite strains, of all bodies of the model.  Rigid, of the whole body: it
+    moves without deforming, and its mesh only says where it is touched, held and loaded.
 
     order: 1 or 2, degree of the displacement.  With 2 the mesh becomes one of second order, see
     `second_order`: its points are then all nodes.
     """
 
     mesh: Mesh
-    material: Material | Mapping[str, Material]
+    material: Material | Rigid | Mapping[str, Material]
     name: str = ""
     order: int = 1
 
     def __post_init__(self) -> None:
         if not isinstance(self.mesh, Mesh):
             raise InvalidInput(f"mesh: expected a Mesh (see box, read_mesh), got {self.mesh!r}")
-        if not isinstance(self.material, Material | Mapping):
+        if not isinstance(self.material, Material | Rigid | Mapping):
             raise InvalidInput(
-                "material: expected LinearElastic, NeoHookean or CiarletGeymonat, or a dict "
-                f"region -> one of them, got {self.material!r}"
+                "material: expected LinearElastic, NeoHookean, CiarletGeymonat or Rigid, or a "
+                f"dict region -> one of the first three, got {self.material!r}"
             )
         if self.order not in (1, 2):
             raise InvalidInput(f"order: expected 1 or 2, got {self.order!r}")
         if self.order == 2:
             object.__setattr__(self, "mesh", second_order(self.mesh))
         object.__setattr__(self, "order", self.mesh.order)
-        materials_by_region(self.mesh, self.material)
+        laws = materials_by_region(self.mesh, self.material)
+        if isinstance(self.material, Mapping):
+            for region, law in laws.items():
+                if not isinstance(law, Material):
+                    raise InvalidInput(
+                        f"material of region {region!r}: expected LinearElastic, NeoHookean or "
+                        f"CiarletGeymonat, got {law!r}"
+                    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,8 +25,9 @@ from ..contact import (
 )
 from ..contact.segments import Surface
 from ..errors import InvalidInput, UnsupportedForm
-from ..fem.elasticity import LinearElastic
+from ..fem.elasticity import LinearElastic, materials_by_region
 from ..fem.mesh import Mesh
+from ..fem.rigid import Rigid
 from ..fem.surfaces import facet_normals
 from .held import HeldNodes
 from .parts import Body, Contact
@@ -176,9 +177,10 @@ def _met_by_nitsche(
     """The same for the Gauss points of Nitsche's method."""
     k, surface = locate(bodies, contact.slave)
     body, first, size = bodies[k], int(offsets[k]), int(offsets[-1])
-    if not isinstance(body.material, LinearElastic) and not all(
-        isinstance(law, LinearElastic) for law in dict(body.material).values()
-    ):
+    laws = [body.material] if isinstance(body.material, Rigid) else (
+        materials_by_region(body.mesh, body.material).values()
+    )
+    if not all(isinstance(law, LinearElastic) for law in laws):
         raise UnsupportedForm(
             f"contact on {contact.slave!r}: Nitsche's method takes the stress from "
             'LinearElastic; use method="nodal"'

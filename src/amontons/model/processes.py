@@ -20,6 +20,7 @@ from scipy import sparse
 from ..errors import UnsupportedForm
 from ..fem.elasticity import stiffness
 from ..fem.partition import extract, partition
+from ..fem.rigid import Rigid
 from ..linear.distributed import DistributedMatrix, Share
 from ..linear.petsc import Petsc, mpi, petsc
 from .assembly import Discretisation, discretise
@@ -44,6 +45,8 @@ def distributed(
     InvalidInput for more processes than cells, UnsupportedForm when contact alone holds a
     body, and on the first process what `work` raises.
     """
+    if any(isinstance(body.material, Rigid) for body in model.bodies):
+        raise UnsupportedForm("model: several processes need bodies that deform, none is Rigid")
     petsc()
     comm = mpi().COMM_WORLD if comm is None else comm
     share = _share(model.bodies, comm)
