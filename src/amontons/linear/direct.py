@@ -51,8 +51,9 @@ class Backend(Enum):
 
     @property
     def installed(self) -> bool:
-        """True when the package can be imported."""
-        return importlib.util.find_spec(self.value) is not None
+        """True when there is such a package, and not just a folder of that name."""
+        found = importlib.util.find_spec(self.value)
+        return found is not None and found.origin is not None
 
     @property
     def alive(self) -> bool:
