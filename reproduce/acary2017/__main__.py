@@ -17,15 +17,16 @@ from amontons.errors import AmontonsError
 from benchmarks.machine import describe
 
 from . import report, wall
-from .methods import FCLIB, FINE, LOCAL, NAMES, WALL
+from .methods import FCLIB, FINE, NAMES, VARIANTS, WALL
 
-PARTS = ("problems", "wall", "local", "fine", "fclib", "siconos", "step", "pictures", "report")
+PARTS = ("problems", "wall", "variants", "fine", "fclib", "siconos", "step", "pictures",
+         "report")  # fmt: skip
 HERE = Path(__file__).parent
 EPILOG = f"""\b
 Parts, in their order (--only A,B takes some of them):
   problems  simulate the walls and write their problems into the working folder
   wall      the methods of the paper and ours on the 50 problems of the wall
-  local     Gauss-Seidel with more and less accurate contacts, and Jacobi, on 5 of them
+  variants  line search, other functions, more accurate contacts, Jacobi, on 5 of them
   fine      some methods on 2 problems of a finer wall
   fclib     the methods on the FCLib files
   siconos   the methods of the paper in Siconos on 5 problems
@@ -75,9 +76,9 @@ def _words(text: str | None, known: Sequence[str], option: str) -> list[str]:
 @click.option(
     "--methods", metavar="A,B", help="Methods to run; the others keep their stored runs."
 )
-@click.option("--limit", type=float, default=10.0, show_default=True, metavar="SECONDS",
-              help="Of processor time for one solve of the wall, the same for all methods; a "
-              "fifth of it for an FCLib file, four times as much on the finer wall."
+@click.option("--limit", type=float, default=5.0, show_default=True, metavar="SECONDS",
+              help="Of processor time for one solve of the wall, the same for all methods; "
+              "half of it for an FCLib file, eight times as much on the finer wall."
               )  # fmt: skip
 @click.option("--shared", type=click.Path(path_type=Path), metavar="DIR",
               help="Folder with data/fclib. [$AMONTONS_SHARED or ../shared]")  # fmt: skip
@@ -113,26 +114,26 @@ def _do(
     main_series, fine = (wall.QUICK, None) if quick else (wall.PAPER, wall.FINE)
     problems = folder / "problems"
     machine = describe()
-    if {"problems", "wall", "local", "siconos"} & set(parts):
+    if {"problems", "wall", "variants", "siconos"} & set(parts):
         paths = wall.write_problems(main_series, problems, click.echo)
         if "wall" in parts:
             chosen = [name for name in names if name in WALL]
             report.measure(out, "wall", paths, chosen, limit, machine)
-        if "local" in parts:
-            chosen = [name for name in names if name in LOCAL]
-            report.measure(out, "local", report.some(paths), chosen, limit, machine)
+        if "variants" in parts:
+            chosen = [name for name in names if name in VARIANTS]
+            report.measure(out, "variants", report.some(paths), chosen, limit, machine)
         if "siconos" in parts and shutil.which(siconos):
             report.within_siconos(out, paths, siconos, limit, machine)
     if fine is not None and {"problems", "fine", "step"} & set(parts):
         paths = wall.write_problems(fine, problems, click.echo)
         if "fine" in parts:
             chosen = [name for name in names if name in FINE]
-            report.measure(out, "fine", paths, chosen, 4 * limit, machine)
+            report.measure(out, "fine", paths, chosen, 8 * limit, machine)
     if "fclib" in parts and not quick:
         paths = sorted(data.glob("*.hdf5"), key=lambda path: path.stat().st_size)
         if paths:
             chosen = [name for name in names if name in FCLIB]
-            report.measure(out, "fclib", paths, chosen, limit / 5, machine)
+            report.measure(out, "fclib", paths, chosen, limit / 2, machine)
         else:
             click.echo(f"fclib: no files in {data}; name its folder with --shared")
     if "step" in parts:

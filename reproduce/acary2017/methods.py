@@ -64,7 +64,8 @@ PRINTED = tuple(method.name for method in METHODS if method.printed)
 NEWTON = ("NSN-AC", "NSN-JM", "NSN-NM")
 SWEEPING = ("NSGS-AC", "NSGS-FP-VI-UPK")
 HYBRID = "NSN-AC-HYBRID"
-WALL = (*PRINTED, "NSN-AC line search", "NSN-FB", "NSN-AC inexact", "Auto", "Auto global")
+WALL = (*PRINTED, "NSN-AC inexact", "Auto")
 FINE = ("NSN-AC", "NSGS-AC", HYBRID, "NSN-AC global", "NSN-AC inexact", "Auto", "Auto global")
 FCLIB = (*PRINTED, "NSN-AC line search", "NSN-FB", "Jacobi", "Auto")
-LOCAL = (*SWEEPING, "NSGS-FP-VI-UPK 100", "Jacobi")  # on a few problems
+VARIANTS = ("NSN-AC", "NSN-AC line search", "NSN-FB", "NSN-AC global", "Auto global",
+            *SWEEPING, "NSGS-FP-VI-UPK 100", "Jacobi")  # fmt: skip  # on a few problems

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .methods import METHODS, NAMES, SWEEPING
+from .methods import METHODS, NAMES
 from .race import CLOCK, PAPER, TOLERANCES, Cost, Runs, iterations, key
 from .ratios import cost_text, count, each_step, median_cost, number, ratio, said, solved
 
@@ -71,13 +71,14 @@ def difficulty(stem: str) -> int:
     return int(text) if text.isdigit() else 0
 
 
-def local_table(runs: Runs) -> str:
-    """Markdown: what the accuracy of the solution of one contact does to Gauss-Seidel."""
-    names = (*SWEEPING, "NSGS-FP-VI-UPK 100", "Jacobi")
+def variants_table(runs: Runs) -> str:
+    """Solved, median iterations, operations and seconds, by method and tolerance."""
     rows = ["| method | " + " | ".join(
-        f"to {said(t)}: solved, sweeps, operations, time" for t in COMPARED) + " |",
+        f"to {said(t)}: solved, iterations, operations, time" for t in COMPARED) + " |",
         "|---|" + "---|" * len(COMPARED)]  # fmt: skip
-    for name in names:
+    for name in NAMES:
+        if not any(name in entry["methods"] for entry in runs.values()):
+            continue
         cells = [
             f"{solved(runs, name, t)}, {count(float(np.median(iterations(runs, name, t))))}, "
             f"{cost_text(median_cost(runs, name, t, Cost('flops', 'judge')), PAPER)}, "
