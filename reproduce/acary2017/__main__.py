@@ -36,10 +36,11 @@ Parts, in their order (--only A,B takes some of them):
 
 \b
 Examples:
-  python -m reproduce.acary2017 --quick              a tiny wall, two minutes
-  python -m reproduce.acary2017                      all of it, most of an hour on one core
-  python -m reproduce.acary2017 --only wall,fclib --methods "Auto,Auto global"
-                                                     measure two columns again
+  python -m reproduce.acary2017 --quick              a tiny wall, some minutes
+  python -m reproduce.acary2017                      all of it, some two hours on one core
+  python -m reproduce.acary2017 --missing            go on where it was stopped
+  python -m reproduce.acary2017 --only wall,fclib --methods Auto
+                                                     measure one column again
   python -m reproduce.acary2017 --only step --methods "Auto,Auto global"
                                                      the same against the quickest of Siconos
   python -m reproduce.acary2017 --only report        tables and figures only
@@ -76,17 +77,19 @@ def _words(text: str | None, known: Sequence[str], option: str) -> list[str]:
 @click.option(
     "--methods", metavar="A,B", help="Methods to run; the others keep their stored runs."
 )
-@click.option("--limit", type=float, default=5.0, show_default=True, metavar="SECONDS",
+@click.option("--limit", type=float, default=20.0, show_default=True, metavar="SECONDS",
               help="Of processor time for one solve of the wall, the same for all methods; "
-              "half of it for an FCLib file, eight times as much on the finer wall."
+              "a tenth of it for an FCLib file, twice as much on the finer wall."
               )  # fmt: skip
+@click.option("--missing", is_flag=True,
+              help="Measure only what is not stored yet with this limit.")  # fmt: skip
 @click.option("--shared", type=click.Path(path_type=Path), metavar="DIR",
               help="Folder with data/fclib. [$AMONTONS_SHARED or ../shared]")  # fmt: skip
 @click.option("--siconos", default="/usr/bin/python3", show_default=True, metavar="PYTHON",
               help="Python that has Siconos; else no parts siconos and step.")  # fmt: skip
 def main(
     quick: bool, folder: Path, results: Path | None, only: str | None, methods: str | None,
-    limit: float, shared: Path | None, siconos: str,
+    limit: float, missing: bool, shared: Path | None, siconos: str,
 ) -> None:  # fmt: skip
     """Newton against Gauss-Seidel on a wall of elastic blocks, as in the paper of CSMA 2017.
 
@@ -101,14 +104,14 @@ def main(
     out = results or (place / "results" if quick else HERE / "results")
     data = (shared or Path(os.environ.get("AMONTONS_SHARED", "../shared"))) / "data" / "fclib"
     try:
-        _do(parts, names, limit, quick, place, out, data, siconos)
+        _do(parts, names, limit, quick, place, out, data, siconos, missing)
     except AmontonsError as reason:
         raise click.ClickException(str(reason)) from reason
 
 
 def _do(
     parts: list[str], names: list[str], limit: float, quick: bool, folder: Path, out: Path,
-    data: Path, siconos: str,
+    data: Path, siconos: str, missing: bool,
 ) -> None:  # fmt: skip
     """The parts in their order; each stores what it found before the next one starts."""
     main_series, fine = (wall.QUICK, None) if quick else (wall.PAPER, wall.FINE)
@@ -118,22 +121,22 @@ def _do(
         paths = wall.write_problems(main_series, problems, click.echo)
         if "wall" in parts:
             chosen = [name for name in names if name in WALL]
-            report.measure(out, "wall", paths, chosen, limit, machine)
+            report.measure(out, "wall", paths, chosen, limit, machine, missing)
         if "variants" in parts:
             chosen = [name for name in names if name in VARIANTS]
-            report.measure(out, "variants", report.some(paths), chosen, limit, machine)
+            report.measure(out, "variants", report.some(paths), chosen, limit, machine, missing)
         if "siconos" in parts and shutil.which(siconos):
             report.within_siconos(out, paths, siconos, limit, machine)
     if fine is not None and {"problems", "fine", "step"} & set(parts):
         paths = wall.write_problems(fine, problems, click.echo)
         if "fine" in parts:
             chosen = [name for name in names if name in FINE]
-            report.measure(out, "fine", paths, chosen, 8 * limit, machine)
+            report.measure(out, "fine", paths, chosen, 2 * limit, machine, missing)
     if "fclib" in parts and not quick:
         paths = sorted(data.glob("*.hdf5"), key=lambda path: path.stat().st_size)
         if paths:
             chosen = [name for name in names if name in FCLIB]
-            report.measure(out, "fclib", paths, chosen, limit / 2, machine)
+            report.measure(out, "fclib", paths, chosen, limit / 10, machine, missing)
         else:
             click.echo(f"fclib: no files in {data}; name its folder with --shared")
     if "step" in parts:

@@ -42,20 +42,25 @@ def some(paths: Sequence[Path]) -> list[Path]:
 
 def measure(
     out: Path, name: str, paths: Sequence[Path], methods: Sequence[str], limit: float,
-    machine: dict[str, str],
+    machine: dict[str, str], missing: bool = False,
 ) -> None:  # fmt: skip
     """Run the methods on the files and store after every file; other columns stay.
 
-    limit: processor seconds for a solve, the same for all.
+    limit: processor seconds for a solve, the same for all.  missing: what is stored with this
+    limit stays, too, so that a measurement goes on where it was stopped.
     """
     target = out / f"{name}.json"
     record = load(target)
     record |= {"limit": limit, "machine": machine}
     record["runs"] = {stem: run for stem, run in record["runs"].items()
                       if stem in {path.stem for path in paths}}  # fmt: skip
-    for path in paths if methods else ():
-        race([path], methods, limit, record["runs"], click.echo)
-        store(target, record)
+    for path in paths:
+        known = record["runs"].get(path.stem, {"methods": {}})["methods"]
+        stays = [name for name, run in known.items() if missing and run["limit"] == limit]
+        asked = [name for name in methods if name not in stays]
+        if asked:
+            race([path], asked, limit, record["runs"], click.echo)
+            store(target, record)
 
 
 def against_siconos(

@@ -2,6 +2,7 @@
 
 import json
 import math
+import shlex
 import sys
 from pathlib import Path
 
@@ -259,6 +260,36 @@ def test_command_measures_writes_and_refreshes_single_columns(tmp_path):
     assert (place / "profiles-wall.png").read_bytes().startswith(b"\x89PNG")
     found = json.loads((place / "results.json").read_text())["wall"]["ratios"]
     assert found["seconds, judge"]["1e-06"]["value"] > 1
+
+
+def test_examples_of_the_help_are_commands(monkeypatch):
+    asked = []
+    monkeypatch.setattr("reproduce.acary2017.__main__._do", lambda *given: asked.append(given))
+    lines = [line.strip() for line in main.epilog.splitlines() if "python -m" in line]
+    for line in lines:
+        words = shlex.split(line.partition("   ")[0])[3:]
+        done = CliRunner().invoke(main, words)
+        assert done.exit_code == 0, done.output
+    assert len(asked) == len(lines) >= 5
+
+
+def test_a_measurement_goes_on_where_it_was_stopped(problems, tmp_path, monkeypatch):
+    asked = []
+
+    def race_of(paths, methods, limit, runs, report):
+        asked.append((paths[0].stem, tuple(methods)))
+        entry = runs.setdefault(paths[0].stem, {"methods": {}})
+        entry["methods"] |= {name: {"limit": limit} for name in methods}
+
+    monkeypatch.setattr(report, "race", race_of)
+    first, second = problems[:2]
+    report.measure(tmp_path, "wall", [first], ["NSN-AC"], 2.0, {})
+    asked.clear()
+    report.measure(tmp_path, "wall", [first, second], ["NSN-AC", "Auto"], 2.0, {}, True)
+    assert asked == [(first.stem, ("Auto",)), (second.stem, ("NSN-AC", "Auto"))]
+    asked.clear()
+    report.measure(tmp_path, "wall", [first], ["NSN-AC"], 3.0, {}, True)  # another limit
+    assert asked == [(first.stem, ("NSN-AC",))]
 
 
 def test_unknown_parts_and_methods_are_refused():
