@@ -17,27 +17,30 @@ from amontons.errors import AmontonsError
 from benchmarks.machine import describe
 
 from . import report, wall
-from .methods import LONGER, NAMES
+from .methods import FCLIB, FINE, NAMES, VARIANTS, WALL
 
-PARTS = ("problems", "wall", "fine", "fclib", "siconos", "step", "pictures", "report")
+PARTS = ("problems", "wall", "variants", "fine", "fclib", "siconos", "step", "pictures",
+         "report")  # fmt: skip
 HERE = Path(__file__).parent
 EPILOG = f"""\b
 Parts, in their order (--only A,B takes some of them):
   problems  simulate the walls and write their problems into the working folder
-  wall      every method on the 50 problems of the wall
-  fine      some methods on 2 problems of a finer wall (1930 of 2032 contacts are closed)
-  fclib     every method on the FCLib files
-  siconos   NSGS and NSN_AC of Siconos on the problems of one instant
+  wall      the methods of the paper and ours on the 50 problems of the wall
+  variants  line search, other functions, more accurate contacts, Jacobi, on 5 of them
+  fine      some methods on 2 problems of a finer wall
+  fclib     the methods on the FCLib files
+  siconos   the methods of the paper in Siconos on 5 problems
   step      one warm-started time step against every solver of Siconos
   pictures  the cracking joints, a film of them, the energy balance
   report    tables and figures from the stored runs; always done at the end
 
 \b
 Examples:
-  python -m reproduce.acary2017 --quick              a tiny wall, two minutes
-  python -m reproduce.acary2017                      all of it, most of an hour on one core
-  python -m reproduce.acary2017 --only wall,fclib --methods "Auto,Auto global"
-                                                     measure two columns again
+  python -m reproduce.acary2017 --quick              a tiny wall, some minutes
+  python -m reproduce.acary2017                      all of it, some two hours on one core
+  python -m reproduce.acary2017 --missing            go on where it was stopped
+  python -m reproduce.acary2017 --only wall,fclib --methods Auto
+                                                     measure one column again
   python -m reproduce.acary2017 --only step --methods "Auto,Auto global"
                                                      the same against the quickest of Siconos
   python -m reproduce.acary2017 --only report        tables and figures only
@@ -74,17 +77,19 @@ def _words(text: str | None, known: Sequence[str], option: str) -> list[str]:
 @click.option(
     "--methods", metavar="A,B", help="Methods to run; the others keep their stored runs."
 )
-@click.option("--limit", type=float, default=6.0, show_default=True, metavar="SECONDS",
-              help="Of processor time for one solve of the wall, four times as much for "
-              "NSGS-AC; a third of it for an FCLib file, eight times as much on the finer "
-              "wall.")  # fmt: skip
+@click.option("--limit", type=float, default=20.0, show_default=True, metavar="SECONDS",
+              help="Of processor time for one solve of the wall, the same for all methods; "
+              "a tenth of it for an FCLib file, twice as much on the finer wall."
+              )  # fmt: skip
+@click.option("--missing", is_flag=True,
+              help="Measure only what is not stored yet with this limit.")  # fmt: skip
 @click.option("--shared", type=click.Path(path_type=Path), metavar="DIR",
               help="Folder with data/fclib. [$AMONTONS_SHARED or ../shared]")  # fmt: skip
 @click.option("--siconos", default="/usr/bin/python3", show_default=True, metavar="PYTHON",
               help="Python that has Siconos; else no parts siconos and step.")  # fmt: skip
 def main(
     quick: bool, folder: Path, results: Path | None, only: str | None, methods: str | None,
-    limit: float, shared: Path | None, siconos: str,
+    limit: float, missing: bool, shared: Path | None, siconos: str,
 ) -> None:  # fmt: skip
     """Newton against Gauss-Seidel on a wall of elastic blocks, as in the paper of CSMA 2017.
 
@@ -99,35 +104,39 @@ def main(
     out = results or (place / "results" if quick else HERE / "results")
     data = (shared or Path(os.environ.get("AMONTONS_SHARED", "../shared"))) / "data" / "fclib"
     try:
-        _do(parts, names, limit, quick, place, out, data, siconos)
+        _do(parts, names, limit, quick, place, out, data, siconos, missing)
     except AmontonsError as reason:
         raise click.ClickException(str(reason)) from reason
 
 
 def _do(
     parts: list[str], names: list[str], limit: float, quick: bool, folder: Path, out: Path,
-    data: Path, siconos: str,
+    data: Path, siconos: str, missing: bool,
 ) -> None:  # fmt: skip
     """The parts in their order; each stores what it found before the next one starts."""
     main_series, fine = (wall.QUICK, None) if quick else (wall.PAPER, wall.FINE)
     problems = folder / "problems"
     machine = describe()
-    if {"problems", "wall", "siconos"} & set(parts):
+    if {"problems", "wall", "variants", "siconos"} & set(parts):
         paths = wall.write_problems(main_series, problems, click.echo)
         if "wall" in parts:
-            report.measure(out, "wall", paths, names, limit, machine, LONGER)
+            chosen = [name for name in names if name in WALL]
+            report.measure(out, "wall", paths, chosen, limit, machine, missing)
+        if "variants" in parts:
+            chosen = [name for name in names if name in VARIANTS]
+            report.measure(out, "variants", report.some(paths), chosen, limit, machine, missing)
         if "siconos" in parts and shutil.which(siconos):
-            some = paths[:: -(-len(paths) // 5)]  # five of them, easy and hard ones
-            report.ratio_of_siconos(out, some, siconos, 4 * limit, machine)
+            report.within_siconos(out, paths, siconos, limit, machine)
     if fine is not None and {"problems", "fine", "step"} & set(parts):
         paths = wall.write_problems(fine, problems, click.echo)
         if "fine" in parts:
-            chosen = [name for name in names if name in report.FINE_METHODS]
-            report.measure(out, "fine", paths, chosen, 8 * limit, machine)
+            chosen = [name for name in names if name in FINE]
+            report.measure(out, "fine", paths, chosen, 2 * limit, machine, missing)
     if "fclib" in parts and not quick:
         paths = sorted(data.glob("*.hdf5"), key=lambda path: path.stat().st_size)
         if paths:
-            report.measure(out, "fclib", paths, names, limit / 3, machine)
+            chosen = [name for name in names if name in FCLIB]
+            report.measure(out, "fclib", paths, chosen, limit / 10, machine, missing)
         else:
             click.echo(f"fclib: no files in {data}; name its folder with --shared")
     if "step" in parts:

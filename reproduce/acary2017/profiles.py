@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -9,14 +10,28 @@ from amontons.analysis import performance_profile
 from amontons.files import replacing
 from amontons.plots import profile_figure
 
-from .race import Runs, seconds
-from .tables import PROFILED
+from .race import CLOCK, TOLERANCES, Cost, Runs, costs_to
 
 
-def draw(runs: Runs, names: Sequence[str], path: Path) -> None:
-    """Profiles of the named methods, one panel for each tolerance."""
-    present = [n for n in names if all(n in entry["methods"] for entry in runs.values())]
-    profiles = {t: performance_profile(seconds(runs, present, t)) for t in PROFILED}
+def draw(
+    runs: Runs, names: Sequence[str], path: Path, cost: Cost = CLOCK,
+    tolerances: Sequence[float] = TOLERANCES,
+) -> None:  # fmt: skip
+    """Profiles of the named methods, one panel for each tolerance.
+
+    A method that does not count operations is not in a figure of them.
+    """
+    present = [n for n in names if all(_counted(entry, n, cost) for entry in runs.values())]
+    if not present:
+        return
+    profiles = {t: performance_profile(costs_to(runs, present, t, cost)) for t in tolerances}
+    what = "time" if cost.by == "seconds" else "operations"
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as temporary:
-        profile_figure(profiles, present).savefig(temporary)
+        profile_figure(profiles, present, what).savefig(temporary)
+
+
+def _counted(entry: dict, name: str, cost: Cost) -> bool:
+    """True where a method was run, and tells this cost."""
+    run = entry["methods"].get(name)
+    return run is not None and not math.isnan(cost.spent(run))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -14,57 +14,53 @@ from amontons.case import read_case
 from amontons.files import replacing
 from amontons.plots import SI, Frame, draw_film, energy_figure, series_figure
 
-from . import profiles, step, tables
-from .methods import HYBRID, LONGER, PRINTED
-from .race import NOBODY, load, race, store
+from . import claims, peers, profiles, step, tables
+from .methods import HYBRID, NEWTON, PRINTED
+from .race import CLOCK, PAPER, load, race, store
+from .ratios import number
 from .wall import CASE, Series, newton_iterations, write_problems
 
-FINE_METHODS = (
-    "NSN-AC",
-    "NSGS-AC",
-    HYBRID,
-    "NSN-AC global",
-    "NSN-AC inexact",
-    "Auto",
-    "Auto global",
-)
-OURS = (
-    "NSN-AC",
-    HYBRID,
-    "NSGS-AC",
-    "NSN-AC inexact",
-    "NSN-AC global",
-    "Auto",
-    "Auto global",
-)
+OURS = ("NSN-AC", HYBRID, "NSGS-AC", "NSN-AC inexact", "Auto")
 SETS = {
     "wall": "the wall",
     "fine": "the finer wall",
     "fclib": "the FCLib files",
 }
-COLD = (1e-4, 1e-6)  # tolerances at which Siconos runs from r = 0
 PROFILES = ("wall", "fclib")
+SOME = 5  # problems for Siconos and for the accuracy of one contact, from easy to hard
 PICTURE_EVERY = 25  # steps between two pictures
 SHOWN = 4  # pictures of the series
 COMMAND = "python -m reproduce.acary2017"
 
 
+def some(paths: Sequence[Path]) -> list[Path]:
+    """A few of the problems, evenly from the easiest to the hardest."""
+    order = sorted(paths, key=newton_iterations)
+    places = np.linspace(0, len(order) - 1, min(SOME, len(order))).round().astype(int)
+    return [order[k] for k in places]
+
+
 def measure(
     out: Path, name: str, paths: Sequence[Path], methods: Sequence[str], limit: float,
-    machine: dict[str, str], longer: Mapping[str, float] = NOBODY,
+    machine: dict[str, str], missing: bool = False,
 ) -> None:  # fmt: skip
     """Run the methods on the files and store after every file; other columns stay.
 
-    limit: seconds for a solve; longer: factors on it by method.
+    limit: processor seconds for a solve, the same for all.  missing: what is stored with this
+    limit stays, too, so that a measurement goes on where it was stopped.
     """
     target = out / f"{name}.json"
     record = load(target)
     record |= {"limit": limit, "machine": machine}
     record["runs"] = {stem: run for stem, run in record["runs"].items()
                       if stem in {path.stem for path in paths}}  # fmt: skip
-    for path in paths if methods else ():
-        race([path], methods, limit, record["runs"], click.echo, longer)
-        store(target, record)
+    for path in paths:
+        known = record["runs"].get(path.stem, {"methods": {}})["methods"]
+        stays = [name for name, run in known.items() if missing and run["limit"] == limit]
+        asked = [name for name in methods if name not in stays]
+        if asked:
+            race([path], asked, limit, record["runs"], click.echo)
+            store(target, record)
 
 
 def against_siconos(
@@ -89,13 +85,13 @@ def against_siconos(
             store(out / "step.json", record)
 
 
-def ratio_of_siconos(
-    out: Path, paths: Sequence[Path], python: str, cap: float, machine: dict[str, str]
+def within_siconos(
+    out: Path, paths: Sequence[Path], python: str, limit: float, machine: dict[str, str]
 ) -> None:
-    """NSGS and NSN_AC of Siconos from r = 0 on some problems of the wall."""
-    record = {"machine": machine, "cap": cap, "runs": {}}
-    for path in paths:
-        record["runs"][path.stem] = step.cold(path, python, cap, COLD, click.echo)
+    """The methods of the paper in Siconos from r = 0 on some problems of the wall."""
+    record: dict = {"machine": machine, "limit": limit, "runs": {}}
+    for path in some(paths):
+        peers.race([path], python, limit, record["runs"], click.echo)
         store(out / "siconos.json", record)
 
 
@@ -128,26 +124,23 @@ def write(out: Path, *, quick: bool) -> None:
     """results.md and results.json with the figures, from what is stored."""
     stored = {name: load(out / f"{name}.json") for name in SETS}
     stored = {name: record for name, record in stored.items() if record["runs"]}
+    siconos = load(out / "siconos.json")
     out.mkdir(parents=True, exist_ok=True)
-    page, data = [_head(stored, quick=quick)], {}
+    page, data = [], {}
     for name, record in stored.items():
-        runs = record["runs"]
         part, data[name] = _part(name, record, out)
         page.append(part)
-        if name == "wall" and all(set(PRINTED) <= set(r["methods"]) for r in runs.values()):
-            found = tables.claims(runs, record["limit"])
-            if "fclib" in stored:
-                found.append(tables.most_robust(stored["fclib"]["runs"], SETS["fclib"]))
-            data["claims"] = [vars(claim) for claim in found]
-            page.insert(1, f"## The paper's claims\n\n{tables.claims_table(found)}")
-            if (out / "siconos.json").is_file():
-                theirs = json.loads((out / "siconos.json").read_text())
-                page[1] += f"\n\n{WITHIN.format(medians=step.cold_medians(theirs))}"
-    if (out / "siconos.json").is_file():
-        record = json.loads((out / "siconos.json").read_text())
-        page.append(f"## The same ratio within Siconos\n\n{COLD_TEXT}\n\n"
-                    + step.cold_table(record)
-                    + f"\n\nMedians: {step.cold_medians(record)}.")  # fmt: skip
+    said, data["claims"] = _claims(stored, siconos)
+    page = [_head(stored, said, quick=quick), *said[1:], *page]
+    variants = load(out / "variants.json")
+    if variants["runs"]:
+        page.append(VARIANTS.format(problems=len(variants["runs"]), limit=variants["limit"],
+                                    table=tables.variants_table(variants["runs"])))  # fmt: skip
+    if siconos["runs"]:
+        page.append(SICONOS.format(
+            table=peers.table(siconos["runs"]), steps=peers.steps_table(siconos["runs"]),
+            problems=len(siconos["runs"]["siconos"]), limit=siconos["limit"],
+        ))  # fmt: skip
     if (out / "step.json").is_file():
         record = json.loads((out / "step.json").read_text())
         page.append(f"## One time step against Siconos\n\n{STEP_TEXT}\n\n"
@@ -159,57 +152,110 @@ def write(out: Path, *, quick: bool) -> None:
     store(out / "results.json", data)
 
 
-def _head(stored: dict, *, quick: bool) -> str:
+def _claims(stored: dict, siconos: dict) -> tuple[list[str], list[dict]]:
+    """The line in counts and the table of claims; the same for the JSON."""
+    runs = stored.get("wall", {}).get("runs", {})
+    if not runs or not all(set(PRINTED) <= set(r["methods"]) for r in runs.values()):
+        return [""], []
+    ours, seconds = claims.claims(runs, PAPER), claims.claims(runs, CLOCK)
+    theirs: list[claims.Claim | None] = [None] * len(ours)
+    if siconos["runs"]:
+        theirs = list(claims.claims(siconos["runs"]["siconos"], peers.COST))
+    if "fclib" in stored:
+        ours.append(claims.most_robust(stored["fclib"]["runs"], SETS["fclib"]))
+        seconds, theirs = [*seconds, None], [*theirs, None]
+    verdicts = [claims.verdict(c, other) for c, other in zip(ours, theirs, strict=True)]
+    told = [
+        {**vars(c), "verdict": v, "siconos": vars(other) if other else None}
+        for c, v, other in zip(ours, verdicts, theirs, strict=True)
+    ]
+    table = claims.table(ours, seconds, theirs)
+    return [claims.opening(verdicts), f"## The paper's claims\n\n{CLAIMS}\n\n{table}"], told
+
+
+def _head(stored: dict, said: list[str], *, quick: bool) -> str:
     where = next(iter(stored.values()), {}).get("machine", {})
     described = "; ".join(f"{k} {v}" for k, v in where.items())
     limits = ", ".join(f"{r['limit']:g} s for {SETS[n]}" for n, r in stored.items())
-    limits += "".join(
-        f"; {name} has {k:g} times as long on the wall" for name, k in LONGER.items()
-    )
     return HEAD.format(command=COMMAND + (" --quick" if quick else ""), machine=described,
-                       limits=limits, methods=tables.legend())  # fmt: skip
+                       limits=limits, methods=tables.legend(), opening=said[0])  # fmt: skip
 
 
 def _part(name: str, record: dict, out: Path) -> tuple[str, dict]:
-    """One set of problems: profiles, table of methods; for the wall the table of steps."""
-    runs, limit = record["runs"], record["limit"]
-    lines = [f"## On {SETS[name]}: {len(runs)} problems", tables.methods_table(runs)]
+    """One set of problems: profiles, table of methods; for the walls by difficulty."""
+    runs = record["runs"]
+    lines = [f"## On {SETS[name]}: {len(runs)} problems",
+             "Processor seconds, by our judge:", tables.methods_table(runs),
+             "Floating point operations, by the paper's (13):",
+             tables.methods_table(runs, PAPER)]  # fmt: skip
     if name in PROFILES:
-        profiles.draw(runs, PRINTED, out / f"profiles-{name}.png")
-        profiles.draw(runs, OURS, out / f"profiles-{name}-ours.png")
-        lines += [f"![The methods of the paper](profiles-{name}.png)",
-                  f"![Ours beside them](profiles-{name}-ours.png)"]  # fmt: skip
-    data = {"costs": {}, "ratios": {}}
+        lines += _figures(name, runs, out)
+    data: dict = {}
     if all({"NSGS-AC", "NSN-AC"} <= set(r["methods"]) for r in runs.values()):
-        data = tables.record_of(runs, limit)
+        data = tables.record_of(runs)
         if name != "fclib":
-            lines += [f"### By time step\n\n{tables.steps_table(runs, limit)}"]
+            lines += [f"### By difficulty\n\n{tables.grades_table(runs)}"]
         lines += [tables.measures_text(runs)]
     formed = [r["condensing"] for r in runs.values() if "condensing" in r]
     if formed:
-        lines.append(f"Forming W, not counted above: median {tables.middle(formed):.2g} s.")
-    return "\n\n".join(lines), data
+        middle = number(float(np.median(formed)))
+        lines.append(f"Forming W, not counted above: median {middle} s.")
+    return "\n\n".join(line for line in lines if line), data
+
+
+def _figures(name: str, runs: dict, out: Path) -> list[str]:
+    """Profiles as in figure 3 with its zoom, by seconds, and of ours."""
+    newton = (*NEWTON, HYBRID)
+    drawn = {
+        "": ("Operations, the methods of the paper", PRINTED, PAPER),
+        "-zoom": ("Operations, the Newton methods among themselves", newton, PAPER),
+        "-seconds": ("Seconds, the methods of the paper", PRINTED, CLOCK),
+        "-ours": ("Seconds, ours beside them", OURS, CLOCK),
+    }
+    lines = []
+    for suffix, (title, names, cost) in drawn.items():
+        path = out / f"profiles-{name}{suffix}.png"
+        profiles.draw(runs, names, path, cost)
+        lines.append(f"![{title}]({path.name})")
+    return lines
 
 
 HEAD = """# The wall of acary2017: measured
 
+{opening}
+
 Regenerate: `{command}`.  {machine}; one thread.
 
-Times are processor seconds of one thread from the problem as read (with W for the Delassus
-form) to an iterate that our judge accepts, from r = 0, limits {limits};
-a method that misses the limit has not solved the problem.  A ratio is the median over the
-problems of the ratio of two times; where one of the two methods failed it counts with the
-limit, and `≥` or `≤` says so.
+Costs are those from the problem as read (with W for the Delassus form), from r = 0: processor
+seconds of one thread until our judge accepts an iterate, and floating point operations, as
+the solvers count them (judgements included), until the paper's (13) holds.  Limits: {limits},
+the same for every method, and nothing else ends a run that makes no progress.  A ratio is the
+median over the problems of the ratio of two costs; where one of the two methods failed its run
+counts with what it really took, and `≥` or `≤` says so.
 
 {methods}"""
+CLAIMS = """The verdict is that of operations to (13), the paper's own measure.  *Differs by the
+paper's fault*: the same methods in Siconos, by whose authors the paper is, differ on these
+problems too; *by ours*: they do not, or were not asked."""
+VARIANTS = """## Variants
+
+{problems} problems of the wall from the easiest to the hardest, by our judge, {limit:g} s for a
+solve: other functions and a line search for Newton, and how accurately one contact is solved.
+
+{table}"""
 STEP_TEXT = """Warm start from the impulses of the step before, tolerance 1e-6 by our judge,
 processor seconds of one thread.  *Given W*: the solver alone.  *Given M and H*: from the file
-to the answer; solvers of the Delassus form are charged the time that we need to form W.  A
-problem has the contacts that are closed or about to close, of 685 and 2032."""
-COLD_TEXT = """NSGS and NSN_AC of Siconos at one instant of the wall from r = 0, given W, judged
-by us: what the ratio is where neither method is ours."""
-WITHIN = """Within Siconos, by whose authors the paper is, NSN_AC is ahead of NSGS by
-{medians} on problems of the same wall: see below."""
+to the answer; solvers of the Delassus form are charged the time that we need to form W."""
+SICONOS = """## Within Siconos
+
+{problems} problems of the wall from the easiest to the hardest, from r = 0, given W, judged by
+(13), {limit:g} s for a call.  A call of Siconos includes its own judging.
+
+{table}
+
+What a Newton step takes, given W, ours (NSN-AC) and theirs (NLS_AC, with MUMPS) in one run:
+
+{steps}"""
 PICTURES = """## The cracking joints
 
 ![Status of the joints](cracking.png)

@@ -5,7 +5,10 @@
 PROBLEM.npz holds mu (nc,), the warm start r0, u0 (nc 3,) and, for a SOLVER of the Delassus form
 (NSGS, NSN_AC, ...), W in csr and q; for one of the global form (GLOBAL_NSN_AC, ...) M and H in
 csc, f, w and v0.  For every tolerance one line of JSON: the tolerance asked, info, processor
-seconds of the driver call (best of several where it is short), and r.
+seconds of the driver call (best of several where it is short), iterations, and r.
+
+NLS_AC, NLS_JM and NLS_NM are Newton's methods without line search; NLS_HYBRID is NLS_AC after
+100 iterations of NSGS, whose time it counts.
 """
 
 import json
@@ -18,6 +21,8 @@ import scipy.sparse as sp
 import siconos.numerics as sn
 
 MAX_ITERATIONS = 100_000
+HYBRID_SWEEPS = 100
+NLS = {"NLS_AC": "NSN_AC", "NLS_JM": "NSN_AC", "NLS_NM": "NSN_NM", "NLS_HYBRID": "NSN_AC"}
 REPEATED = 0.5  # seconds below which a call is repeated
 
 
@@ -34,19 +39,27 @@ def columns(data, name, shape):
 
 def options(name, tolerance):
     """SolverOptions of a name; NSGS_UPK is NSGS with projections for one contact."""
-    base = "NSGS" if name == "NSGS_UPK" else name
+    base = "NSGS" if name == "NSGS_UPK" else NLS.get(name, name)
     family = base.replace("GLOBAL_", "GLOBAL_FRICTION_3D_", 1)
     family = family if base.startswith("GLOBAL_") else f"FRICTION_3D_{base}"
     so = sn.SolverOptions(getattr(sn, f"SICONOS_{family}"))
     if name == "NSGS_UPK":
         inner = sn.SICONOS_FRICTION_3D_ONECONTACT_ProjectionOnConeWithLocalIteration
         sn.solver_options_update_internal(so, 0, inner)
+    if name in NLS:
+        so.iparam[sn.SICONOS_FRICTION_3D_NSN_LINESEARCH] = (
+            sn.SICONOS_FRICTION_3D_NSN_LINESEARCH_NO
+        )
+    if name == "NLS_JM":
+        so.iparam[sn.SICONOS_FRICTION_3D_NSN_FORMULATION] = (
+            sn.SICONOS_FRICTION_3D_NSN_FORMULATION_JEANMOREAU_STD
+        )
     so.dparam[0] = tolerance
     so.iparam[0] = MAX_ITERATIONS
     return so
 
 
-def local_problem(data, size):
+def local_problem(data, size, hybrid=False):
     """FrictionContactProblem with W in blocks, and what runs it."""
     failed, matrix = sn.SBM_from_csparse(3, columns(data, "W", (size, size)))
     if failed:
@@ -57,9 +70,13 @@ def local_problem(data, size):
 
     def run(so):
         r, u = data["r0"].copy(), data["u0"].copy()
-        began = time.process_time()
+        began, before = time.process_time(), 0
+        if hybrid:
+            first = options("NSGS", 1e-300)
+            first.iparam[0] = before = HYBRID_SWEEPS
+            sn.fc3d_driver(problem, r, u, first)
         info = sn.fc3d_driver(problem, r, u, so)
-        return time.process_time() - began, info, r
+        return time.process_time() - began, info, r, before + int(so.iparam[1])
 
     return run
 
@@ -77,7 +94,7 @@ def global_problem(data, size):
         r, u, v = data["r0"].copy(), data["u0"].copy(), data["v0"].copy()
         began = time.process_time()
         info = sn.gfc3d_driver(problem, r, u, v, so)
-        return time.process_time() - began, info, r
+        return time.process_time() - began, info, r, int(so.iparam[1])
 
     return run
 
@@ -90,15 +107,18 @@ def main():
     sn.numerics_set_verbose(0)
     data = dict(np.load(path))
     size = data["r0"].size
-    make = global_problem if name.startswith("GLOBAL_") else local_problem
-    run = make(data, size)
+    if name.startswith("GLOBAL_"):
+        run = global_problem(data, size)
+    else:
+        run = local_problem(data, size, name == "NLS_HYBRID")
     print(json.dumps({"ready": True}), file=out, flush=True)
     for text in tolerances:
-        seconds, info, r = run(options(name, float(text)))
+        seconds, info, r, iterations = run(options(name, float(text)))
         for _ in range(2 if seconds < REPEATED else 0):
             seconds = min(seconds, run(options(name, float(text)))[0])
         r = [float(x) if np.isfinite(x) else 0.0 for x in r]
-        line = {"asked": float(text), "info": int(info), "seconds": seconds, "r": r}
+        line = {"asked": float(text), "info": int(info), "seconds": seconds,
+                "iterations": iterations, "r": r}  # fmt: skip
         print(json.dumps(line), file=out, flush=True)
 
 

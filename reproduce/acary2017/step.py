@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import select
 import subprocess
 import tempfile
@@ -27,13 +28,12 @@ import amontons as am
 from amontons.solve import drive
 from amontons.solvers.base import Iterate
 
-from .race import _fresh, key
-from .tables import said
+from .race import fresh
 
 TOLERANCE = 1e-6
 RETIGHTEN = (1.0, 1e-2, 1e-4)
-FINELY = (1.0, 0.5, 0.2, 0.05, 1e-2)  # where a tighter run may take seconds more
 LONG = 5.0  # seconds above which our own solve is not repeated
+POLL, PATIENT = 0.2, 30.0  # seconds between two looks; the wall's clock beside the processor's
 START_UP = 60.0  # seconds for a worker to read its problem
 LOCAL = ("NSGS", "NSGS_UPK", "NSGSV", "NSN_AC", "NSN_AC_TEST", "NSN_FB", "NSN_NM", "ADMM",
          "PROX", "TFP", "DSFP", "VI_FPP", "VI_EG", "FPP", "EG", "HP", "SOCLCP", "ACLMFP",
@@ -42,7 +42,6 @@ GLOBAL = ("GLOBAL_NSN_AC", "GLOBAL_NSN_AC_WR", "GLOBAL_NSGS", "GLOBAL_NSGS_WR",
           "GLOBAL_NSGSV_WR", "GLOBAL_ADMM", "GLOBAL_ADMM_WR", "GLOBAL_IPM", "GLOBAL_PROX_WR",
           "GLOBAL_TFP_WR", "GLOBAL_DSFP_WR", "GLOBAL_ACLMFP", "GLOBAL_VI_FPP",
           "GLOBAL_VI_EG")  # fmt: skip
-RIVALS = ("NSGS", "NSN_AC")
 QUICKEST = 5  # solvers of Siconos of each form that run again when ours do
 OURS = {
     "Auto": am.Auto(),
@@ -85,74 +84,13 @@ def compare(
     theirs = dict(kept.get("siconos", {}))
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "problem.npz"
-        _write(file, problem, condensed, r)
+        write_problem(file, problem, condensed, r)
         for name in _quickest(theirs) if theirs else (*LOCAL, *GLOBAL):
-            theirs[name] = best = _worker(condensed, python, file, name, cap)
+            theirs[name] = best = worker(condensed, python, file, name, cap)
             report(f"  Siconos {name}: {_said(best)}")
     sizes = {"contacts": problem.contacts, "unknowns": problem.unknowns}
     return sizes | {"condensing": condensing, "ours": parts[0], "ours_global": parts[1],
                     "siconos": theirs}  # fmt: skip
-
-
-def cold(
-    path: Path, python: str, cap: float, tolerances: Sequence[float],
-    report: Callable[[str], None] = print,
-) -> dict[str, dict[str, dict[str, Any]]]:  # fmt: skip
-    """NSGS and NSN_AC of Siconos from r = 0: rows of `compare` by solver and tolerance."""
-    problem = am.read_fclib(path)
-    condensed = problem.condensed()
-    found: dict[str, dict[str, dict[str, Any]]] = {}
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "problem.npz"
-        _write(file, problem, condensed, np.zeros((problem.contacts, 3)))
-        for name in RIVALS:
-            found[name] = rows = {
-                key(t): _worker(condensed, python, file, name, cap, t, FINELY)
-                for t in tolerances
-            }
-            said = ", ".join(f"{t} {_said(row)}" for t, row in rows.items())
-            report(f"{path.stem}: Siconos {name}: {said}")
-    return found
-
-
-def cold_table(record: dict[str, Any]) -> str:
-    """Markdown: how far NSN_AC is ahead of NSGS, both of Siconos."""
-    names = list(next(iter(record["runs"].values()))["NSGS"])
-    columns = " | ".join(f"NSGS, NSN_AC, ratio at {said(float(t))}" for t in names)
-    rows = [f"| problem | {columns} |", "|---|" + "---|" * len(names)]
-    for stem, found in record["runs"].items():
-        cells = [_cold_cell(found, t, record["cap"]) for t in names]
-        rows.append(f"| {stem} | {' | '.join(cells)} |")
-    return "\n".join(rows)
-
-
-def cold_medians(record: dict[str, Any]) -> str:
-    """The medians of the table in a sentence."""
-    parts = []
-    for t in next(iter(record["runs"].values()))["NSGS"]:
-        found = sorted(x for run in record["runs"].values()
-                       if (x := _cold_ratio(run, t, record["cap"])) is not None)  # fmt: skip
-        if found:
-            value, bound = found[len(found) // 2]
-            parts.append(f"{'≥ ' if bound else ''}{value:.2g} times at {said(float(t))}")
-    return ", ".join(parts)
-
-
-def _cold_ratio(
-    found: dict[str, dict[str, dict[str, Any]]], tolerance: str, cap: float
-) -> tuple[float, bool] | None:
-    """NSGS / NSN_AC and whether it is a lower bound; None where NSN_AC failed."""
-    slow, fast = (found[who][tolerance]["seconds"] for who in RIVALS)
-    return ((slow or cap) / fast, slow is None) if fast else None
-
-
-def _cold_cell(found: dict[str, dict[str, dict[str, Any]]], tolerance: str, cap: float) -> str:
-    ratio = _cold_ratio(found, tolerance, cap)
-    if ratio is None:
-        return "-"
-    slow, fast = (found[who][tolerance]["seconds"] for who in RIVALS)
-    sign = "≥ " if ratio[1] else ""
-    return f"{sign}{_cell(slow or cap)}, {_cell(fast)}, {sign}{ratio[0]:.2g}"
 
 
 def _column(form: str, who: str) -> str:
@@ -172,9 +110,9 @@ def _ours(problem: am.FrictionProblem, solver: Any, r: np.ndarray) -> dict[str, 
     """Best time of three warm runs, judged as theirs: by the exact measure."""
     best = math.inf
     for k in range(4):
-        fresh = _fresh(problem)
+        again = fresh(problem)
         began = time.process_time()
-        found = drive(fresh, solver, tolerance=TOLERANCE, start=Iterate(r), time_limit=60)
+        found = drive(again, solver, tolerance=TOLERANCE, start=Iterate(r), time_limit=60)
         seconds = time.process_time() - began
         best = min(best, seconds) if k else best  # the first may compile
         if k and seconds > LONG:
@@ -187,7 +125,7 @@ def _ours(problem: am.FrictionProblem, solver: Any, r: np.ndarray) -> dict[str, 
     }
 
 
-def _write(
+def write_problem(
     path: Path, problem: am.FrictionProblem, condensed: am.FrictionProblem, r: np.ndarray
 ) -> None:
     """The problem in both forms with its warm start, for the workers."""
@@ -202,28 +140,33 @@ def _write(
     np.savez(path, **arrays)
 
 
-def _worker(
+def worker(
     condensed: am.FrictionProblem, python: str, file: Path, solver: str, cap: float,
     tolerance: float = TOLERANCE, retighten: Sequence[float] = RETIGHTEN,
+    measure: Callable[[np.ndarray], float] | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """The best run of one solver that passes our judge, or why there is none."""
+    """The best run of one solver that passes our judge, or why there is none.
+
+    cap: processor seconds of a call; measure: of reactions (nc, 3) in place of the judge.  Of a
+    run that fails "spent" is what it really took.
+    """
+    measure = measure or condensed.exact_error
     asked = ",".join(f"{tolerance * k:g}" for k in retighten)
     script = str(Path(__file__).parent / "siconos_worker.py")
     process = subprocess.Popen([python, script, str(file), solver, asked],
                                stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
                                text=True)  # fmt: skip
-    runs, why = [], "ended without an answer"
+    runs, why, spent = [], "ended without an answer", 0.0
     for k in range(len(retighten) + 1):
-        ready, _, _ = select.select([process.stdout], [], [], cap if k else START_UP)
-        line = process.stdout.readline() if ready else ""
+        line, spent = _line(process, cap if k else START_UP)
         if not line:
-            why = f"over {cap:g} s" if not ready else why
+            why = f"over {cap:g} s" if spent >= cap and k else why
             break
         found = json.loads(line)
         if k == 0:
             continue
         r = np.array(found.pop("r")).reshape(-1, 3)
-        runs.append({**found, "error": condensed.exact_error(r)})
+        runs.append({**found, "error": measure(r)})
         if runs[-1]["error"] <= tolerance or found["seconds"] > cap:
             break  # a tighter one takes no less
     process.kill()
@@ -236,8 +179,30 @@ def _worker(
             "seconds": None,
             "error": min(x["error"] for x in runs),
             "why": "misses the tolerance",
+            "spent": max(x["seconds"] for x in runs),
         }
-    return {"seconds": None, "why": why}
+    return {"seconds": None, "why": why, "spent": spent}
+
+
+def _line(process: subprocess.Popen, cap: float) -> tuple[str, float]:
+    """The next line, "" at the end or after so many processor seconds; and those it took."""
+    began, waited = _processor(process.pid), time.monotonic()
+    while True:
+        ready, _, _ = select.select([process.stdout], [], [], POLL)
+        spent = _processor(process.pid) - began
+        if ready:
+            return process.stdout.readline(), spent
+        if spent >= cap or time.monotonic() - waited > PATIENT * cap:
+            return "", spent
+
+
+def _processor(pid: int) -> float:
+    """Processor seconds of a process so far, 0 where the system does not tell."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def _said(row: dict[str, Any]) -> str:

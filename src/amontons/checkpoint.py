@@ -5,7 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterator
+import re
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -145,19 +146,40 @@ def _digest(checkpoint: Checkpoint, case: str) -> bytes:
 
 
 def export_fclib(
-    steps: Iterator[TimeStep], folder: str | os.PathLike[str], name: str = "step"
-) -> Iterator[TimeStep]:
+    steps: Iterator[TimeStep], folder: str | os.PathLike[str], name: str = "step",
+    chosen: Sequence[range] | None = None,
+) -> Iterator[TimeStep]:  # fmt: skip
     """The same steps, the problem of each written to FOLDER/NAME-00001.hdf5 and so on.
 
-    The reactions of the step go along as the file's solution.  A step without contacts has no
-    problem and no file.
+    chosen: the steps, counted from 1, that are written; all without.  The reactions of the step
+    go along as the file's solution.  A step without contacts has no problem and no file.
     """
     folder = Path(folder)
     make_folder(folder)
     for step in steps:
-        if step.problem.contacts:
+        wanted = chosen is None or any(step.state.index in part for part in chosen)
+        if wanted and step.problem.contacts:
             write_fclib(
                 step.problem, folder / f"{name}-{step.state.index:05d}.hdf5",
                 solution=step.solution, title=f"{step.problem.name or name}, t = {step.time:g}",
             )  # fmt: skip
         yield step
+
+
+def steps_of(text: str) -> list[range]:
+    """The steps of "1-40,50-500:10,777": single ones, from-to, from-to:every; from 1 on.
+
+    >>> [list(part) for part in steps_of("1-3,10-30:10,77")]
+    [[1, 2, 3], [10, 20, 30], [77]]
+    """
+    found = []
+    for word in text.split(","):
+        match = re.fullmatch(r"\s*(\d{1,9})(?:-(\d{1,9})(?::(\d{1,9}))?)?\s*", word)
+        first, last, every = (int(n or 0) for n in match.groups()) if match else (0, 0, 0)
+        last, every = last or first, every or (1 if match and match[3] is None else 0)
+        if not 1 <= first <= last or every < 1:
+            raise InvalidInput(
+                f"steps: expected 7, 1-40 or 50-500:10, with commas between them, got {word!r}"
+            )
+        found.append(range(first, last + 1, every))
+    return found

@@ -46,6 +46,7 @@ class Watch:
     flops: float | None = 0.0  # None from the first iterate on that does not count its own
     history: list[Step] = field(default_factory=list)
     seen: list[tuple[float, Array]] = field(default_factory=list)
+    content: int = 0  # iterates in a row that the judge would take, but not the criterion
     blurred: int = 0  # iterates whose error rounding hides
     mark: tuple[int, float] = (0, np.inf)  # iterate and error of the last real progress
 

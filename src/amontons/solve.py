@@ -31,6 +31,7 @@ from .solvers.first_iterate import first_iterate, no_reactions, with_motion
 
 Array = NDArray[np.float64]
 Callback = Callable[[Step, Iterate], bool | None]
+CONTENT = 5  # iterates with which a solver is content before its goal is tightened
 EARLY = 100  # iterates after which a problem that no method is made for is given up
 GAVE_UP = (Outcome.STAGNATED, Outcome.BREAKDOWN, Outcome.CYCLED, Outcome.NON_FINITE)
 TIGHTEST = 1e-300  # smallest goal: contacts far smaller than others need tiny sums
@@ -173,6 +174,7 @@ def _run(
             if watch.weak or ended is None:
                 goal = watch.tighter(target.tolerance)
                 start, target = watch.best or start, replace(target, tolerance=goal)
+                watch.content = 0
             ended = _once(watch, solver, start, target, limit, callback)
             if ended is not None:
                 break
@@ -229,6 +231,8 @@ def _once(
                 return Outcome.CYCLED, ""
             if watch.stagnated:
                 return Outcome.STAGNATED, ""
+        if watch.content:
+            return None
         return Outcome.STAGNATED, "the method has nothing left to try"
     except Breakdown as reason:
         late = target.deadline.passed
@@ -242,10 +246,15 @@ def _once(
 
 
 def _content_too_early(watch: Watch, iterate: Iterate, target: Target) -> bool:
-    """True where a solver is content by the judge's error, but the criterion is another one."""
+    """True where a solver is content by the judge's error, but the criterion is another one.
+
+    Some iterates of it may come first: Newton is there with one more, and keeps its history.
+    """
     if watch.criterion is Criterion.JUDGE:
         return False
-    return watch.problem.error(iterate.r, iterate.v) <= target.tolerance
+    content = watch.problem.error(iterate.r, iterate.v) <= target.tolerance
+    watch.content = watch.content + 1 if content else 0
+    return watch.content > CONTENT
 
 
 def _finish(watch: Watch, outcome: Outcome, detail: str, solver: Solver) -> FrictionSolution:

@@ -2,6 +2,7 @@
 
 import json
 import math
+import shlex
 import sys
 from pathlib import Path
 
@@ -14,12 +15,24 @@ from amontons.analysis import performance_profile
 from amontons.evolution import Energies
 from amontons.plots import SI, Frame, draw_film, energy_figure, series_figure
 
+SPENT = 7.0  # seconds of a made-up run that failed
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))  # the reproductions are not installed
 
-from reproduce.acary2017 import race, report, step, tables, wall  # noqa: E402
+from reproduce.acary2017 import (  # noqa: E402
+    claims,
+    peers,
+    race,
+    ratios,
+    report,
+    step,
+    tables,
+    wall,
+)
 from reproduce.acary2017.__main__ import main  # noqa: E402
-from reproduce.acary2017.methods import METHODS, NAMES, PRINTED  # noqa: E402
+from reproduce.acary2017.methods import METHODS, NAMES, PRINTED, SWEEPING  # noqa: E402
+
+FEW = tuple(name for name in NAMES if name not in ("Jacobi", "NSGS-FP-VI-UPK 100"))  # slow
 
 
 @pytest.fixture(scope="module")
@@ -29,21 +42,23 @@ def problems(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def runs(problems):
-    return race.race(problems[1:], NAMES, 20.0, {}, lambda text: None)
+    return race.race(problems[1:], FEW, 20.0, {}, lambda text: None)
 
 
 def made_up(**seconds):
-    """Runs with the given times to every tolerance, one list for each method."""
+    """Runs with the given costs to every tolerance, one list for each method; None: failed."""
     count = len(next(iter(seconds.values())))
     out = {}
     for k in range(count):
         methods = {}
         for name, times in seconds.items():
             t = times[k]
-            met = {race.key(x): [t, 10] for x in race.TOLERANCES} if t else {}
-            methods[name.replace("_", "-")] = {"met": met, "outcome": "", "error": 1.0,
-                                               "error_13": 1.0}  # fmt: skip
-        out[f"wall-1ms-{k:04d}"] = {"contacts": 100, "density": 0.3, "methods": methods}
+            met = {race.key(x): [t, 10, 1e6 * t] for x in race.TOLERANCES} if t else {}
+            methods[name.replace("_", "-")] = {
+                "met": dict.fromkeys(race.CRITERIA, met), "outcome": "", "error": 1.0,
+                "error_13": 1.0, "seconds": t or SPENT, "flops": 1e6 * (t or SPENT),
+            }  # fmt: skip
+        out[f"wall-{k:04d}-100-{4 + k}"] = {"contacts": 100, "density": 0.3, "methods": methods}
     return out
 
 
@@ -100,8 +115,41 @@ def test_all_methods_solve_the_tiny_wall(runs):
     for entry in runs.values():
         for name, run in entry["methods"].items():
             assert run["outcome"] == "converged", name
-            times = [run["met"][race.key(t)] for t in race.TOLERANCES]
-            assert times == sorted(times)
+            for criterion in race.CRITERIA:
+                costs = [run["met"][criterion][race.key(t)] for t in race.TOLERANCES]
+                assert [c[0] for c in costs] == sorted(c[0] for c in costs)
+                assert [c[1] for c in costs] == sorted(c[1] for c in costs)
+
+
+def test_the_methods_of_the_paper_count_their_operations(runs):
+    for entry in runs.values():
+        for name in PRINTED:
+            met = entry["methods"][name]["met"]["13"]
+            flops = [met[race.key(t)][2] for t in race.TOLERANCES]
+            assert flops == sorted(flops)
+            assert flops[0] > 1e4
+
+
+def test_equation_13_beside_the_clock_is_the_published_one(problems):
+    problem = am.read_fclib(problems[1]).condensed()
+    method = next(m for m in METHODS if m.name == "NSN-AC")
+    run = race.one_run(problem, method, 20.0, problem)
+    found = am.drive(problem, method.solver, tolerance=race.GOAL, patience=None,
+                     max_iterations=run["iterations"])  # fmt: skip
+    assert found.natural_error == pytest.approx(run["error_13"], rel=1e-6, abs=1e-12)
+
+
+def test_no_run_is_ended_because_it_makes_no_progress(problems, monkeypatch):
+    asked = {}
+
+    def drive(problem, solver, **options):
+        asked.update(options)
+        return am.drive(problem, solver, **options)
+
+    monkeypatch.setattr(race, "drive", drive)
+    problem = am.read_fclib(problems[0]).condensed()
+    race.one_run(problem, METHODS[0], 20.0, problem)
+    assert asked["patience"] is None
 
 
 def test_all_methods_find_the_same_velocities(problems):
@@ -118,26 +166,28 @@ def test_all_methods_find_the_same_velocities(problems):
 
 
 def test_profiles_are_shares(runs):
-    for tolerance in tables.PROFILED:
-        tau, rho = performance_profile(race.seconds(runs, PRINTED, tolerance))
-        assert tau[0] == 1
-        assert (rho >= 0).all() and (rho <= 1).all()
-        assert (np.diff(rho, axis=1) >= 0).all()
-        np.testing.assert_array_equal(rho[:, -1], 1)  # all are solved
+    for tolerance in race.TOLERANCES:
+        for cost in (race.PAPER, race.CLOCK):
+            tau, rho = performance_profile(race.costs_to(runs, PRINTED, tolerance, cost))
+            assert tau[0] == 1
+            assert (rho >= 0).all() and (rho <= 1).all()
+            assert (np.diff(rho, axis=1) >= 0).all()
+            np.testing.assert_array_equal(rho[:, -1], 1)  # all are solved
 
 
-def test_ratio_is_the_median_and_knows_bounds():
+def test_ratio_is_the_median_and_bounds_rest_on_what_was_run():
     done = made_up(NSGS_AC=[4.0, 6.0, 8.0], NSN_AC=[1.0, 1.0, 1.0])
-    assert str(tables.ratio(done, "NSGS-AC", "NSN-AC", 1e-6, 10.0)) == "6"
-    slow = made_up(NSGS_AC=[4.0, None, None], NSN_AC=[1.0, 1.0, 0.5])
-    assert str(tables.ratio(slow, "NSGS-AC", "NSN-AC", 1e-6, 10.0)) == "≥ 10"
+    for cost in (race.PAPER, race.CLOCK):
+        assert str(ratios.ratio(done, "NSGS-AC", "NSN-AC", 1e-6, cost)) == "6"
+        slow = made_up(NSGS_AC=[4.0, None, None], NSN_AC=[1.0, 1.0, 0.5])
+        assert str(ratios.ratio(slow, "NSGS-AC", "NSN-AC", 1e-6, cost)) == "≥ 7"
     for entry in slow.values():
-        entry["methods"]["NSGS-AC"]["limit"] = 30.0
-    assert str(tables.ratio(slow, "NSGS-AC", "NSN-AC", 1e-6, 10.0)) == "≥ 30"
-    broken = made_up(NSGS_AC=[4.0, 4.0, 4.0], NSN_AC=[None, None, 1.0])
-    assert str(tables.ratio(broken, "NSGS-AC", "NSN-AC", 1e-6, 10.0)) == "≤ 0.4"
+        entry["methods"]["NSGS-AC"]["limit"] = 30.0  # allowed, but not run
+    assert str(ratios.ratio(slow, "NSGS-AC", "NSN-AC", 1e-6)) == "≥ 7"
+    broken = made_up(NSGS_AC=[3.5, 3.5, 3.5], NSN_AC=[None, None, 1.0])
+    assert str(ratios.ratio(broken, "NSGS-AC", "NSN-AC", 1e-6)) == "≤ 0.5"
     nobody = made_up(NSGS_AC=[None], NSN_AC=[None])
-    assert str(tables.ratio(nobody, "NSGS-AC", "NSN-AC", 1e-6, 10.0)) == "-"
+    assert str(ratios.ratio(nobody, "NSGS-AC", "NSN-AC", 1e-6)) == "-"
 
 
 def test_claims_follow_the_numbers():
@@ -146,29 +196,48 @@ def test_claims_follow_the_numbers():
         NSGS_AC=[50.0, 60.0], NSGS_FP_VI_UPK=[40.0, 40.0], NSN_NM=[2.0, 2.0], **newton
     )
     near = made_up(NSGS_AC=[1.5, 1.6], NSGS_FP_VI_UPK=[3.0, 3.0], NSN_NM=[0.5, 0.5], **newton)
-    agreed = [claim.agrees for claim in tables.claims(far, 100.0)]
+    agreed = [claim.agrees for claim in claims.claims(far)]
     assert agreed == [False, True, True, True, True, True, True, True]
-    differs = [claim.agrees for claim in tables.claims(near, 100.0)]
+    differs = [claim.agrees for claim in claims.claims(near)]
     assert differs == [True, True, False, False, False, False, False, False]
-    text = tables.claims_table(tables.claims(near, 100.0))
-    assert "a step costs as much as" in text
-    assert text.count("\n") == 9
     few = made_up(**{name.replace("-", "_"): [1.0, None] for name in PRINTED})
-    assert tables.most_robust(few, "two").agrees
-    few["wall-1ms-0000"]["methods"]["NSN-AC-HYBRID"]["met"] = {}
-    assert not tables.most_robust(few, "two").agrees
+    assert claims.most_robust(few, "two").agrees
+    few["wall-0000-100-4"]["methods"]["NSN-AC-HYBRID"]["met"] = {}
+    assert not claims.most_robust(few, "two").agrees
 
 
-def test_tables_have_a_row_for_every_method_and_step(runs):
-    page = tables.methods_table(runs)
-    rows = [row.split(" | ") for row in page.splitlines()]
-    assert {len(row) for row in rows if len(row) > 1} == {6}
-    assert [row[0].removeprefix("| ") for row in rows[2:]] == list(NAMES)
-    assert rows[2][1].startswith("2, ")
-    assert "| 5 ms | 2 |" in tables.steps_table(runs, 20.0)
-    c = tables.costs(runs, 1e-6)
+def test_the_first_line_counts_verdicts():
+    yes, no = (claims.Claim("text", "1", "2", agrees, "why") for agrees in (True, False))
+    verdicts = [
+        claims.verdict(ours, theirs)
+        for ours, theirs in ((yes, None), (yes, no), (no, no), (no, yes), (no, None))
+    ]
+    assert claims.opening(verdicts) == (
+        "**Of the 5 claims: agrees 2 / differs by the paper's fault 1 / differs by ours 2.**"
+    )
+    page = claims.table([yes, no], [yes, None], [None, no])
+    assert page.count("\n") == 3
+    assert "differs, by Siconos too: why; Siconos: why" in page
+
+
+def test_tables_have_a_row_for_every_method_and_grade(runs):
+    for cost in (race.CLOCK, race.PAPER):
+        page = tables.methods_table(runs, cost)
+        rows = [row.split(" | ") for row in page.splitlines()]
+        assert {len(row) for row in rows if len(row) > 1} == {6}
+        assert [row[0].removeprefix("| ") for row in rows[2:]] == list(FEW)
+        assert rows[2][1].startswith("2, ")
+    assert tables.grades_table(runs).count("\n") == 1 + len(tables.by_grade(runs))
+    c = ratios.each_step(runs, 1e-6)
     assert c["sweeps"] > 20 * c["newton_steps"]
-    assert c["dense_lu_operations"] > c["sweep_operations"]
+    assert c["newton_operations"] > c["sweep_operations"]
+
+
+def test_problems_are_grouped_by_difficulty():
+    done = made_up(NSGS_AC=[1.0] * 7)
+    assert {n: len(g) for n, g in tables.by_grade(done).items()} == {
+        "4 to 6": 3, "7 to 8": 2, "9 to 10": 2,
+    }  # fmt: skip
 
 
 def test_command_measures_writes_and_refreshes_single_columns(tmp_path):
@@ -189,9 +258,38 @@ def test_command_measures_writes_and_refreshes_single_columns(tmp_path):
     page = (place / "results.md").read_text()
     assert "python -m reproduce.acary2017 --quick" in page
     assert (place / "profiles-wall.png").read_bytes().startswith(b"\x89PNG")
-    assert (
-        json.loads((place / "results.json").read_text())["wall"]["ratios"]["1e-06"]["value"] > 1
-    )
+    found = json.loads((place / "results.json").read_text())["wall"]["ratios"]
+    assert found["seconds, judge"]["1e-06"]["value"] > 1
+
+
+def test_examples_of_the_help_are_commands(monkeypatch):
+    asked = []
+    monkeypatch.setattr("reproduce.acary2017.__main__._do", lambda *given: asked.append(given))
+    lines = [line.strip() for line in main.epilog.splitlines() if "python -m" in line]
+    for line in lines:
+        words = shlex.split(line.partition("   ")[0])[3:]
+        done = CliRunner().invoke(main, words)
+        assert done.exit_code == 0, done.output
+    assert len(asked) == len(lines) >= 5
+
+
+def test_a_measurement_goes_on_where_it_was_stopped(problems, tmp_path, monkeypatch):
+    asked = []
+
+    def race_of(paths, methods, limit, runs, report):
+        asked.append((paths[0].stem, tuple(methods)))
+        entry = runs.setdefault(paths[0].stem, {"methods": {}})
+        entry["methods"] |= {name: {"limit": limit} for name in methods}
+
+    monkeypatch.setattr(report, "race", race_of)
+    first, second = problems[:2]
+    report.measure(tmp_path, "wall", [first], ["NSN-AC"], 2.0, {})
+    asked.clear()
+    report.measure(tmp_path, "wall", [first, second], ["NSN-AC", "Auto"], 2.0, {}, True)
+    assert asked == [(first.stem, ("Auto",)), (second.stem, ("NSN-AC", "Auto"))]
+    asked.clear()
+    report.measure(tmp_path, "wall", [first], ["NSN-AC"], 3.0, {}, True)  # another limit
+    assert asked == [(first.stem, ("NSN-AC",))]
 
 
 def test_unknown_parts_and_methods_are_refused():
@@ -220,14 +318,24 @@ def test_table_against_siconos_names_the_best():
     assert "is GLOBAL_ADMM, 400 ms; Auto takes 200 ms, 0.5 of it" in page
 
 
-def test_ratio_within_siconos_is_a_bound_where_gauss_seidel_did_not_end():
-    record = {"cap": 24.0, "runs": {"wall-5ms-0055": {
-        "NSGS": {"0.0001": {"seconds": 3.0}, "1e-06": {"seconds": None}},
-        "NSN_AC": {"0.0001": {"seconds": 1.0}, "1e-06": {"seconds": 2.0}},
-    }}}  # fmt: skip
-    page = step.cold_table(record)
-    assert "| wall-5ms-0055 | 3 s, 1 s, 3 | ≥ 24 s, 2 s, ≥ 12 |" in page
-    assert step.cold_medians(record) == "3 times at 1e-4, ≥ 12 times at 1e-6"
+def test_runs_of_siconos_look_like_ours_and_end_at_the_first_miss(problems, monkeypatch):
+    def worker(condensed, python, file, solver, cap, tolerance, *more):
+        if solver == "NSGS" and tolerance < 1e-3:
+            return {"seconds": None, "why": "over 5 s", "spent": 5.1}
+        return {"seconds": 0.5, "iterations": 7, "error": tolerance}
+
+    monkeypatch.setattr(peers, "worker", worker)
+    found = peers.race(problems[:1], "", 5.0, {}, lambda text: None)
+    (entry,) = found["siconos"].values()
+    slow = entry["methods"]["NSGS-AC"]
+    assert set(slow["met"]["13"]) == {race.key(1e-2), race.key(1e-3)}
+    assert slow["seconds"] == 5.1
+    assert str(ratios.ratio(found["siconos"], *SWEEPING[:1], "NSN-AC", 1e-6, peers.COST)) == (
+        "≥ 10"
+    )
+    assert len(claims.claims(found["siconos"], peers.COST)) == 8
+    assert "| NSGS-AC (NSGS) | 1, 500 ms | 1, 500 ms | 0, - | 0, - |" in peers.table(found)
+    assert "| 71.4 ms |" in peers.steps_table(found)
 
 
 def test_one_column_against_siconos_runs_again_beside_the_quickest_only(problems, monkeypatch):
@@ -237,7 +345,7 @@ def test_one_column_against_siconos_runs_again_beside_the_quickest_only(problems
         asked.append(solver)
         return {"seconds": 2.0, "error": 1e-8}
 
-    monkeypatch.setattr(step, "_worker", worker)
+    monkeypatch.setattr(step, "worker", worker)
     stored = {
         "ours": {"NSN-AC line search": {"seconds": 7.0}},
         "ours_global": {},
@@ -279,10 +387,10 @@ def test_contact_of_the_tiny_wall_never_creates_energy_and_pictures_say_so(tmp_p
 
 
 def test_reference_holds_the_numbers_of_the_paper():
-    assert tables.REFERENCE["newton_over_gauss_seidel"] == {
+    assert claims.REFERENCE["newton_over_gauss_seidel"] == {
         "0.001": 4,
         "0.0001": 20,
         "1e-06": 40,
     }
-    assert math.isclose(tables.REFERENCE["wall"]["rows_of_H"] / 3, 688)
+    assert math.isclose(claims.REFERENCE["wall"]["rows_of_H"] / 3, 688)
     assert set(report.SETS) >= {"wall", "fclib"}

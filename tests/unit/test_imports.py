@@ -21,7 +21,7 @@ ORDER = (
 ).split(" < ")
 ALONE = {  # package: the file or folder that imports it, one for each kind of file
     "ngsolve": "fem", "netgen": "fem", "pyamg": "linear", "matplotlib": "plots", "click": "cli",
-    "rslab": "linear", "pypardiso": "linear",
+    "rslab": "linear", "pypardiso": "linear", "mumps": "linear",
     "petsc4py": "linear", "mpi4py": "linear", "pymetis": "fem",
     "meshio": "fem vtk",  # reads meshes, writes pictures
     "h5py": "hdf5 fclib output checkpoint",  # checks, the exchange format, results, states

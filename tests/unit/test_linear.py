@@ -5,7 +5,7 @@ import pytest
 from scipy import sparse
 
 from amontons.errors import InvalidInput, MissingDependency, SingularOperator
-from amontons.linear import AlgebraicMultigrid, ConjugateGradient, Direct
+from amontons.linear import AlgebraicMultigrid, ConjugateGradient, Direct, direct
 from amontons.linear.direct import Backend
 from amontons.linear.small_blocks import LARGEST_BLOCK, block_diagonal_inverse
 
@@ -78,6 +78,41 @@ def test_a_missing_backend_says_what_to_install(monkeypatch):
     monkeypatch.setattr(Backend, "installed", property(lambda self: False))
     with pytest.raises(MissingDependency, match="pypardiso"):
         Direct(Backend.PARDISO)
+
+
+def test_a_package_that_does_not_load_is_passed_over(monkeypatch):
+    """A wheel for another NumPy: it is found, and raises ImportError."""
+
+    def broken(matrix, threads):
+        raise ImportError("numpy.core.multiarray failed to import")
+
+    monkeypatch.setattr(Backend, "installed", property(lambda self: True))
+    for backend in (Backend.MUMPS, Backend.RSLAB, Backend.PARDISO):
+        monkeypatch.setitem(direct._FACTORISE, backend, broken)
+    A = sparse.csc_array([[2.0, 1.0], [0.0, 3.0]])
+    found = Direct().factor(A)
+    assert found.backend is Backend.SUPERLU
+    np.testing.assert_allclose(A @ found.solve(np.ones(2)), 1)
+
+
+def test_mumps_comes_first_where_a_matrix_is_not_symmetric(monkeypatch):
+    monkeypatch.setattr(Backend, "installed", property(lambda self: True))
+    symmetric = sparse.csc_array([[2.0, 1.0], [1.0, 3.0]])
+    other = sparse.csc_array([[2.0, 1.0], [0.0, 3.0]])
+    assert direct._by_merit(other)[0] is Backend.MUMPS
+    assert direct._by_merit(symmetric)[0] is Backend.RSLAB
+    monkeypatch.setattr(Backend, "installed", property(lambda self: False))
+    with pytest.raises(MissingDependency, match=r"amontons\[mumps\]"):
+        Direct(Backend.MUMPS)
+
+
+@pytest.mark.parametrize("backend", [b for b in Backend if b.installed])
+def test_factors_tell_their_operations(backend):
+    n = 60
+    A = sparse.csc_array(np.random.default_rng(0).standard_normal((n, n)) + n * np.eye(n))
+    found = Direct(backend).factor(A)
+    dense = 2 / 3 * n**3
+    assert found.flops is None or 0.5 * dense < found.flops < 2 * dense
 
 
 def test_direct_leaves_its_argument_alone():

@@ -84,6 +84,33 @@ def test_a_run_restarts_where_it_stopped(tmp_path):
     assert [row["elastic"] for row in table(half)] == [row["elastic"] for row in rows]
 
 
+def test_export_takes_the_steps_that_are_asked_for(tmp_path):
+    case = tmp_path / "case.toml"
+    case.write_text(BLOCK)
+    out, problems = tmp_path / "out", tmp_path / "problems"
+    asked = ("-o", out, "--export-fclib", problems, "--export-steps")
+    assert run(case, *asked, "1,3-9:2", "--quiet").exit_code == 0
+    made = [int(row["index"]) for row in table(out)]
+    wanted = [k for k in (1, 3, 5, 7, 9) if k in made]
+    assert [p.name for p in sorted(problems.iterdir())] == [
+        f"case-{k:05d}.hdf5" for k in wanted
+    ]
+
+
+@pytest.mark.parametrize("text", ["", "0", "3-1", "1-5:0", "a", "1,,2", "1-", "-3", "1:2"])
+def test_steps_to_export_are_checked(tmp_path, text):
+    case = tmp_path / "case.toml"
+    case.write_text(BLOCK)
+    done = run(case, "-o", tmp_path / "out", "--export-fclib", tmp_path / "x",
+               "--export-steps", text)  # fmt: skip
+    assert done.exit_code == 2
+    assert "--export-steps: expected" in done.output
+    assert not (tmp_path / "out").exists()
+    alone = run(case, "--export-steps", "1")
+    assert alone.exit_code == 2
+    assert "needs --export-fclib" in alone.output
+
+
 def test_quasi_static_cases_run(tmp_path):
     case = tmp_path / "case.toml"
     case.write_text(BLOCK)

@@ -288,6 +288,7 @@ def follow(**options: object) -> int:
 Examples:
   amontons run example:wall --set wall.cells=[4,2,2] --set evolution.until=0.1 --pictures
   amontons run wall.toml -o out
+  amontons run wall.toml -o out --export-fclib problems --export-steps 1-4,10-50:10
   amontons run wall.toml -o out --restart --set evolution.until=2
 
 \b
@@ -306,7 +307,10 @@ has been made is saved, go on with --restart.
 @click.option("-o", "--output", "folder", metavar="DIR",
               help="Folder for the results. [name of the case with -results]")  # fmt: skip
 @click.option("--export-fclib", "export", metavar="DIR",
-              help="Write the discrete problem of every step as an FCLib file.")  # fmt: skip
+              help="Write the discrete problems of the steps as FCLib files.")  # fmt: skip
+@click.option("--export-steps", metavar="LIST",
+              help="Which steps: 7, 1-40 or 50-500:10, with commas between. [all]"
+              )  # fmt: skip
 @click.option("--every", type=click.IntRange(min=1), default=10, show_default=True, metavar="N",
               help="Write a VTK file, and the state, every N steps.")  # fmt: skip
 @click.option("--pictures", is_flag=True,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..case import Case, Settings, identity, read_case
-from ..checkpoint import export_fclib
+from ..checkpoint import export_fclib, steps_of
 from ..clock import Deadline, now
 from ..errors import FileFormatError, InvalidInput, NotConverged, NotWritten
 from ..evolution import Energies, TimeStep, at_rest, evolve
@@ -64,11 +64,12 @@ class _Run:
 def run(
     case: str, overrides: Sequence[str], tolerance: float | None, time_limit: float | None,
     folder: str | None, export: str | None, every: int, pictures: bool, restart: bool,
-    quiet: bool,
+    quiet: bool, export_steps: str | None = None,
 ) -> int:  # fmt: skip
     """Step and write; returns the exit code."""
     if time_limit is not None and not time_limit > 0:
         raise InvalidInput(f"--time-limit: expected seconds > 0, got {time_limit}")
+    chosen = _chosen(export, export_steps)
     deadline = Deadline.after(time_limit)
     path = case_file(case)
     read = read_case(path, overrides)
@@ -97,8 +98,21 @@ def run(
             click.echo(f"{stop.word}.", err=True)
             return stop.code
         with _saying_what_is_safe(results):
-            steps = steps if exported is None else export_fclib(steps, exported, path.stem)
+            if exported is not None:
+                steps = export_fclib(steps, exported, path.stem, chosen)
             return _follow(steps, results, asked)
+
+
+def _chosen(export: str | None, steps: str | None) -> list[range] | None:
+    """The steps of --export-steps, None for all."""
+    if steps is None:
+        return None
+    if export is None:
+        raise InvalidInput("--export-steps: needs --export-fclib DIR")
+    try:
+        return steps_of(steps)
+    except InvalidInput as reason:
+        raise InvalidInput(f"--export-{reason}") from None
 
 
 def _prepared(

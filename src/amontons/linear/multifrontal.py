@@ -5,8 +5,8 @@ with all joints of the two blocks that it parts.  A general sparse LU finds such
 each analysis, which takes it as long as the factor; here the analysis is done once on the
 groups (a hundred instead of thousands), and a factor is a few dense operations per group.
 
-Pivots are taken within a group only, in single precision: a preconditioner, not a solver to the
-last digit.
+Pivots are taken within a group only: in single precision a preconditioner; in double one whose
+solutions want a check, and refinement, against the matrix.
 
 [DR] I. Duff, J. Reid, "The multifrontal solution of unsymmetric sets of linear equations",
 SIAM J. Sci. Stat. Comput. 5 (1984).
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from ..errors import SingularOperator
 
-Array = NDArray[np.float32]
+Array = NDArray[np.floating]
 Index = NDArray[np.int64]
 
 
@@ -98,15 +98,16 @@ class Fronts:
         for g in self.order:
             border, k = self.borders[g], int(self.sizes[g])
             whole = np.concatenate([self.rows[g], self.border_rows[g]])
-            front = np.zeros((len(whole), len(whole)), dtype=np.float32)
             rows, columns = block(g, border)
+            front = np.zeros((len(whole), len(whole)), dtype=rows.dtype)
             front[:k], front[k:, :k] = rows, columns
             ends = np.cumsum([k, *self.sizes[border]])
             place = dict(zip([g, *border], ends - self.sizes[[g, *border]], strict=True))
             for child, rest in waiting[g]:
                 rows_of = (place[h] + np.arange(self.sizes[h]) for h in self.borders[child])
                 at = np.concatenate(list(rows_of))
-                _add(front, rest, at)
+                if at.size:
+                    _add(front, rest, at)
             waiting[g] = []
             try:
                 inverse = np.linalg.inv(front[:k, :k])
@@ -145,7 +146,7 @@ class FrontLU:
 
     def solve(self, b: Array) -> Array:
         """The solution x of A x = b, both (n,), in the order of the groups."""
-        f, x = self.fronts, b.astype(np.float32)
+        f, x = self.fronts, b.astype(self.pivots[0].dtype)
         for g in f.order:
             own = self.pivots[g] @ x[f.rows[g]]
             x[f.rows[g]] = own

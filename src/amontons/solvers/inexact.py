@@ -85,10 +85,13 @@ class _Preconditioned:
         F[self.contacts, :d] = linearised[0]
         A[self.contacts, :d, :d], B[self.contacts, :d, :d] = linearised[1], linearised[2]
         tolerance = float(np.clip(forcing, TIGHTEST, LOOSEST))
+        before = self.joints.flops
         dr, count = self.joints.solve(A, B, -F, tolerance)
         dr = dr[self.contacts, :d]
         assert self.problem.W is not None
-        return State(dr, (self.problem.W @ dr.ravel()).reshape(dr.shape)), count
+        du = (self.problem.W @ dr.ravel()).reshape(dr.shape)
+        flops = self.joints.flops - before + 2.0 * self.problem.blocks.data.size
+        return State(dr, du, flops=flops), count
 
 
 @dataclass(eq=False)

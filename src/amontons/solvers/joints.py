@@ -1,8 +1,9 @@
 """The Newton equation (A + B W) dr = b on deformable bodies, joint by joint.
 
 W of several deformable bodies is full within a body and empty between bodies that do not touch.
-Contacts with the same neighbours (those of a joint between two bodies) form a group, and W, in
-single precision, is a strip of dense blocks per group.  On it work
+Contacts with the same neighbours (those of a joint between two bodies) form a group, and W is a
+strip of dense blocks per group: in single precision for approximate solves, in double for exact
+factors of the rows of some contacts (`Joints.exact`, `SomeJoints`).  On the first work
 
     GMRES        the product with A + B W, bound by memory: strips in single precision
     `Fronts`     a block LU of some earlier A + B W as preconditioner
@@ -41,17 +42,17 @@ FLOP, ENTRY = 0.04, 0.25
 class Joints:
     """W in strips by groups, and the preconditioner kept between solves.
 
-    contacts: (nc,) in the order of the groups; strips (3 k, 3 m) in single precision with their
-    column groups.
+    contacts: (nc,) in the order of the groups; strips (3 k, 3 m) with their column groups.
     """
 
     nc: int
     contacts: Index
     columns: list[list[int]]  # groups that a group is coupled with, itself among them
-    strips: list[Single]
+    strips: list[Single] | list[Array]
     fronts: Fronts
     kept: FrontLU | None = None
     spent: float = 0.0  # on GMRES since the last factor, nanoseconds
+    flops: float = 0.0  # floating point operations of all solves so far
     unknowns: Index = field(init=False)
 
     def __post_init__(self) -> None:
@@ -66,10 +67,15 @@ class Joints:
     @classmethod
     def of(cls, problem: FrictionProblem) -> Joints | None:
         """The joints of a problem in Delassus form; None where groups are too small."""
-        return problem.kept("joints", lambda: cls._make(problem.blocks))
+        return problem.kept("joints", lambda: cls._make(problem.blocks, np.float32))
 
     @classmethod
-    def _make(cls, blocks: BlockRows) -> Joints | None:
+    def exact(cls, problem: FrictionProblem) -> Joints | None:
+        """The same with W in double precision."""
+        return problem.kept("exact joints", lambda: cls._make(problem.blocks, np.float64))
+
+    @classmethod
+    def _make(cls, blocks: BlockRows, precision: type) -> Joints | None:
         if len(blocks.diagonal) < FEW:
             return None
         group = _groups(blocks)
@@ -89,7 +95,7 @@ class Joints:
             offset = np.zeros(count, dtype=np.int64)
             offset[groups] = np.concatenate([[0], np.cumsum(sizes[groups])[:-1]])
             at = offset[group[near]] + inside[near]
-            strip = np.zeros((len(members), int(sizes[groups].sum()), 3, 3), dtype=np.float32)
+            strip = np.zeros((len(members), int(sizes[groups].sum()), 3, 3), dtype=precision)
             for k, i in enumerate(members):
                 strip[k, at] = blocks.data[blocks.indptr[i] : blocks.indptr[i + 1]]
             strips.append(
@@ -98,6 +104,10 @@ class Joints:
             columns.append(groups.tolist())
         near_sets = [set(c) - {g} for g, c in enumerate(columns)]
         return cls(len(group), contacts, columns, strips, Fronts.of(3 * sizes, near_sets))
+
+    def some(self, contacts: Index, A: Array, B: Array) -> SomeJoints:
+        """A + B W of some contacts, in any order, with their A and B (k, 3, 3)."""
+        return SomeJoints(self, contacts, A, B)
 
     # ------------------------------------------------------------------ solves
     def solve(self, A: Array, B: Array, b: Array, tolerance: float) -> tuple[Array, int]:
@@ -141,6 +151,7 @@ class Joints:
             matrix, b, rtol=max(tolerance, SINGLE), atol=0.0, restart=limit, maxiter=1
         )
         self.spent += count * self.product_cost
+        self.flops += count * 2 * self._entries + 2.0 * count**2 * b.size
         return kept.solve(y), count, not failed
 
     def _in_order(self, size: float, x: Single, shape: tuple[int, ...]) -> Array:
@@ -157,6 +168,7 @@ class Joints:
     def renew(self, law: _Scaled) -> None:
         """Factorise A + B W of now."""
         self.kept, self.spent = self.fronts.factor(law.front), 0.0
+        self.flops += self.fronts.flops + 5.0 * sum(strip.size for strip in self.strips)
 
     @property
     def factor_cost(self) -> float:
@@ -166,7 +178,66 @@ class Joints:
     @property
     def product_cost(self) -> float:
         """Nanoseconds of an iteration of GMRES."""
-        return ENTRY * (self.fronts.entries + sum(strip.size for strip in self.strips))
+        return ENTRY * self._entries
+
+    @property
+    def _entries(self) -> float:
+        """Numbers that an iteration of GMRES reads: the factor and W."""
+        return self.fronts.entries + sum(strip.size for strip in self.strips)
+
+
+class SomeJoints:
+    """A + B W of some contacts, factorised joint by joint in the precision of the strips."""
+
+    def __init__(self, joints: Joints, contacts: Index, A: Array, B: Array) -> None:
+        self.joints = joints
+        place = np.full(joints.nc, -1, dtype=np.int64)
+        place[contacts] = np.arange(len(contacts))
+        ends = np.cumsum(joints.fronts.sizes // 3)
+        groups = np.split(place[joints.contacts], ends[:-1])
+        self.order = np.concatenate([group[group >= 0] for group in groups])
+        live = [np.flatnonzero(group >= 0) for group in groups]
+        self.live = [(3 * k[:, None] + np.arange(3)).ravel() for k in live]
+        sizes = np.array([len(rows) for rows in self.live])
+        self.fronts = Fronts(sizes, joints.fronts.order, joints.fronts.borders)
+        self.rows = [
+            self._rows(g, A[group[group >= 0]], B[group[group >= 0]])
+            for g, group in enumerate(groups)
+        ]
+
+    def _rows(self, g: int, A: Array, B: Array) -> dict[int, Array]:
+        """The rows of a group in A + B W, by the groups of their columns."""
+        j = self.joints
+        width = j.strips[g].shape[1]
+        strip = j.strips[g][self.live[g]].reshape(len(B), 3, width)
+        full = np.matmul(B, strip).reshape(3 * len(B), width)
+        out = {h: full[:, j.places[g][h] + self.live[h]] for h in j.columns[g]}
+        own, k = out[g].reshape(len(B), 3, len(B), 3), np.arange(len(B))
+        own[k, :, k, :] += A
+        return out
+
+    def factor(self) -> FrontLU:
+        """Raises SingularOperator when a joint has no inverse."""
+        return self.fronts.factor(self._front)
+
+    def _front(self, g: int, border: Sequence[int]) -> tuple[Array, Array]:
+        """Rows and columns of the front of a group."""
+        size = self.fronts.sizes
+        none = np.empty((0, size[g]))
+        rows = [self.rows[g].get(h, np.zeros((size[g], size[h]))) for h in [g, *border]]
+        below = [self.rows[h].get(g, np.zeros((size[h], size[g]))) for h in border]
+        return np.concatenate(rows, axis=1), np.concatenate([none, *below])
+
+    def solve(self, factor: FrontLU, b: Array) -> Array:
+        """The solution x of (A + B W) x = b, both (k, 3), in the order of the contacts."""
+        out = np.empty_like(b)
+        out[self.order] = factor.solve(b[self.order].ravel()).reshape(b.shape)
+        return out
+
+    @property
+    def flops(self) -> float:
+        """Floating point operations of forming the rows: five per entry."""
+        return 5.0 * sum(part.size for rows in self.rows for part in rows.values())
 
 
 def _groups(blocks: BlockRows) -> Index:

@@ -93,11 +93,12 @@ def newton_contact(A, b0, b1, b2, mu, r0, r1, r2, close, steps, work):  # noqa: 
     if size > 0.0:
         rho = 1.0 / size
         F, J = np.empty(3), np.empty((3, 3))
-        for _ in range(steps):
+        for k in range(steps):
             _newton_row(A, b0, b1, b2, mu, rho, r0, r1, r2, F, J)
             work[0] += ROW_FLOPS
             scale = abs(r0) + abs(r1) + abs(r2) + rho * (abs(b0) + abs(b1) + abs(b2))
-            if abs(F[0]) + abs(F[1]) + abs(F[2]) <= close * scale:
+            enough = close if k > 0 else CLOSE  # a step at least: sweeps shall not stand still
+            if abs(F[0]) + abs(F[1]) + abs(F[2]) <= enough * scale:
                 return r0, r1, r2
             work[0] += CRAMER_FLOPS
             det = _determinant(J, 0, F)

@@ -27,14 +27,13 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from ..dense import dense
 from ..errors import InvalidInput, SingularOperator
 from ..linear import Direct, LinearSolver
 from ..nitsche_problem import NitscheProblem
@@ -42,46 +41,15 @@ from ..options import check_options
 from ..problem import Form, FrictionProblem
 from .augmentation import RhoStrategy, augmentation
 from .base import Breakdown, Iterate, Target, check_positive
-from .block_lu import Symbolic, newton_step_inplace
 from .driven import able_directions, driven_directions, sliding_rho
 from .functions import AlartCurnier, ComplementarityFunction, Linearised, columns
 from .line_search import LineSearch, NonMonotone
+from .newton_steps import Condensed, Linearisation, State, block_diagonal
 from .nitsche_newton import newton_iterates
 
 Array = NDArray[np.float64]
-DENSE_UNKNOWNS = (
-    1200  # reactions up to which a dense factor of A + B W is quicker than a sparse
-)
-BLOCK_CONTACTS = 1000  # above, minimum degree itself would take long
-BLOCK_WORK, BLOCK_SHARE = 4e6, 0.25  # products of blocks: number, part of those of a full W
-TRUSTED = 1e-6  # residual of a step, relative to F, up to which an LU in blocks is believed
+FUNCTION_FLOPS, LINEARISE_FLOPS = 60.0, 200.0  # of F, and of F, A, B, per contact, about
 FORCING = (1e-10, 0.1)  # smallest and largest relative tolerance of GMRES
-
-
-@dataclass(frozen=True, eq=False)
-class State:
-    """Reactions r and velocities u, (nc, d), with v, (n,), in the global form."""
-
-    r: Array
-    u: Array
-    v: Array | None = None
-
-    def moved(self, t: float, step: State) -> State:
-        """This state plus t times a step."""
-        v = None if self.v is None or step.v is None else self.v + t * step.v
-        return State(self.r + t * step.r, self.u + t * step.u, v)
-
-
-class Linearisation(Protocol):
-    """The Newton equation of one problem; W is hidden in it."""
-
-    def state(self, start: Iterate) -> State:
-        """The first state."""
-        ...
-
-    def step(self, state: State, linearised: Linearised, forcing: float) -> tuple[State, int]:
-        """The Newton step of a state, and the linear iterations it took."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -131,14 +99,15 @@ class SemismoothNewton:
         state = replace(state, r=law.admissible(state.r))
         values: list[float] = []
         while True:
-            state, count = self._next(law, system, state, values)
-            yield Iterate(state.r, state.v, linear_iterations=count)
+            state, count, flops = self._next(law, system, state, values)
+            yield Iterate(state.r, state.v, linear_iterations=count, flops=flops)
 
     @np.errstate(over="ignore", invalid="ignore")  # steps without a line search may run away
     def _next(
         self, law: _Residual, system: Linearisation, state: State, values: list[float]
-    ) -> tuple[State, int]:
-        """The state after one step, and its linear iterations; appends to the merit values."""
+    ) -> tuple[State, int, float | None]:
+        """The state after one step, its linear iterations and operations; appends to values."""
+        law.evaluations = 0
         linearised = law.linearise(state)
         values.append(law.size(linearised[0]))
         forcing = FORCING[1]
@@ -151,7 +120,10 @@ class SemismoothNewton:
         if not np.isfinite(step.r).all():
             raise Breakdown("the Newton step is not finite")
         merit = partial(_merit, law, state, step)
-        return state.moved(self.line_search.length(merit, values), step), count
+        state = state.moved(self.line_search.length(merit, values), step)
+        each = LINEARISE_FLOPS + FUNCTION_FLOPS * law.evaluations
+        flops = None if step.flops is None else step.flops + each * len(state.r)
+        return state, count, flops
 
     def _linearise(self, problem: FrictionProblem) -> Linearisation:
         if problem.form is Form.DELASSUS:
@@ -184,7 +156,7 @@ class _Residual:
         self.function, self.law, self.rho = function, problem.law, rho
         driven = driven_directions(problem)
         self.able, self.driven = able_directions(problem) | driven, driven.any(axis=1)
-        self.now = rho
+        self.now, self.evaluations = rho, 0
         self.rows = columns(rho, problem.dimension)
         self.blocked = (~self.able)[:, :, None] * np.eye(problem.dimension)
 
@@ -194,6 +166,7 @@ class _Residual:
 
     def evaluate(self, state: State) -> Array:
         """F, (nc, d), unit of r."""
+        self.evaluations += 1
         return self.admissible(self.function.residual(state.r, state.u, self.law, self.now))
 
     def linearise(self, state: State) -> Linearised:
@@ -219,86 +192,6 @@ class _Residual:
     def size(self, F: Array) -> float:
         """|F / rho|, unit of u."""
         return float(np.linalg.norm(F / self.rows))
-
-
-def block_diagonal(blocks: Array) -> sparse.csr_array:
-    """Sparse matrix with the given (nc, d, d) blocks on its diagonal."""
-    nc, d, _ = blocks.shape
-    index = np.arange(nc + 1)
-    return sparse.csr_array(
-        sparse.bsr_array((blocks, index[:-1], index), shape=(nc * d, nc * d))
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class Condensed:
-    """Newton equation of the Delassus form."""
-
-    problem: FrictionProblem
-
-    def state(self, start: Iterate) -> State:
-        """r of the start and its velocity."""
-        return State(start.r, self.problem.velocity(start.r)[0])
-
-    def step(self, state: State, linearised: Linearised, forcing: float) -> tuple[State, int]:
-        """A factor in blocks where that is least work, a dense one for a full W, or sparse."""
-        F, A, B = linearised
-        W = self.problem.W
-        assert W is not None
-        dr = self._by_blocks(F, A, B) if self.in_blocks(self.problem) else None
-        if dr is None:
-            large = sparse.issparse(W) and F.size > DENSE_UNKNOWNS
-            dr = _sparse_step(A, B, W, F) if large else _dense_step(A, B, W, F)
-        return State(dr.reshape(F.shape), (W @ dr.ravel()).reshape(F.shape)), 0
-
-    @staticmethod
-    def in_blocks(problem: FrictionProblem, most: float = BLOCK_WORK) -> bool:
-        """Whether an LU in blocks of contacts is less work than a dense one and than `most`."""
-        nc = problem.contacts
-        if nc > BLOCK_CONTACTS or nc < 2:
-            return False
-        work = Symbolic.of(problem).products
-        return work <= min(most, BLOCK_SHARE * nc**3)
-
-    def _by_blocks(self, F: Array, A: Array, B: Array) -> Array | None:
-        """dr (nc, d) by block LU; None where its pivots, taken in order, are too small."""
-        nc, d = F.shape
-        rows, own, law = np.zeros((nc, 3)), np.tile(np.eye(3), (nc, 1, 1)), np.zeros((nc, 3, 3))
-        rows[:, :d], own[:, :d, :d], law[:, :d, :d] = F, A, B
-        dr = np.empty((nc, 3))
-        blocks = self.problem.blocks
-        with np.errstate(all="ignore"):
-            residual = newton_step_inplace(
-                blocks.indptr, blocks.indices, blocks.data, own, law, rows,
-                *Symbolic.of(self.problem).arrays, dr,
-            )  # fmt: skip
-        good = residual <= TRUSTED and np.isfinite(dr).all()
-        return np.ascontiguousarray(dr[:, :d]) if good else None
-
-
-def _sparse_step(A: Array, B: Array, W: sparse.csr_array, F: Array) -> Array:
-    """Solution of (A + B W) dr = -F by a sparse factor."""
-    matrix = block_diagonal(A) + block_diagonal(B) @ W
-    return Direct().factor(sparse.csc_array(matrix)).solve(-F.ravel())
-
-
-def _dense_step(A: Array, B: Array, W, F: Array) -> Array:
-    """Solution of (A + B W) dr = -F; least squares when the matrix is singular."""
-    nc, d = F.shape
-    full = dense(W)
-    matrix = (B @ full.reshape(nc, d, nc * d)).reshape(nc * d, nc * d)
-    own = matrix.reshape(nc, d, nc, d)
-    own[np.arange(nc), :, np.arange(nc), :] += A
-    scale = np.abs(matrix).max(axis=1, keepdims=True)
-    scale[scale == 0] = 1.0  # a row of zeros is for least squares
-    matrix, b = matrix / scale, -F.ravel() / scale[:, 0]
-    try:
-        dr = np.linalg.solve(matrix, b)
-        if np.abs(matrix @ dr - b).max() <= 1e-6 * np.abs(b).max():
-            return dr
-    except np.linalg.LinAlgError:
-        pass
-    return np.linalg.lstsq(matrix, b, rcond=1e-12)[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -334,9 +227,11 @@ class Augmented:
         coupling = block_diagonal(B) @ p.H.T
         matrix = sparse.block_array([[p.M, -p.H], [coupling, block_diagonal(A)]], format="csc")
         balance = p.f + p.H @ state.r.ravel() - p.M @ state.v
-        solution = self.linear.factor(matrix).solve(np.concatenate([balance, -F.ravel()]))
+        factor = self.linear.factor(matrix)
+        solution = factor.solve(np.concatenate([balance, -F.ravel()]))
         dv, dr = solution[: p.unknowns], solution[p.unknowns :]
-        return State(dr.reshape(F.shape), (p.H.T @ dv).reshape(F.shape), dv), 0
+        flops = getattr(factor, "flops", None)
+        return State(dr.reshape(F.shape), (p.H.T @ dv).reshape(F.shape), dv, flops), 0
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,125 @@
+"""The methods of the paper within Siconos, by whose authors it is, on some of its problems.
+
+From r = 0, given W, one call of Siconos for each tolerance of (13).  Siconos stops on its own
+error, so it is asked again, more finely, until (13) holds; the quickest such call counts.  What
+is stored looks like our own runs, so the same claims are drawn from it.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import amontons as am
+from amontons.judge import published_natural_error
+
+from .methods import HYBRID, METHODS
+from .race import TOLERANCES, Cost, Runs, best_run, key
+from .ratios import cost_text, number, solved
+from .step import worker, write_problem
+
+SOLVERS = {
+    "NSN-AC": "NLS_AC",
+    "NSN-JM": "NLS_JM",
+    "NSN-NM": "NLS_NM",
+    HYBRID: "NLS_HYBRID",
+    "NSGS-AC": "NSGS",
+    "NSGS-FP-VI-UPK": "NSGS_UPK",
+    "NSN-FB": "NSN_FB",
+}
+FINELY = (1.0, 0.3, 0.1, 1e-2)  # of the tolerance, asked of Siconos
+COST = Cost("seconds", "13")
+BESIDE = ("NSN-AC", "NSN-FB")  # ours, measured in the same run
+
+
+def race(
+    paths: Sequence[Path], python: str, limit: float, runs: dict[str, Runs],
+    report: Callable[[str], None] = print,
+) -> dict[str, Runs]:  # fmt: skip
+    """"siconos" and "ours" by problem; limit: processor seconds for a call."""
+    for path in paths:
+        problem = am.read_fclib(path)
+        condensed = problem.condensed()
+        theirs = {}
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "problem.npz"
+            write_problem(file, problem, condensed, np.zeros((problem.contacts, 3)))
+            for name, solver in SOLVERS.items():
+                theirs[name] = _run(condensed, python, file, solver, limit)
+        ours = {m.name: best_run(condensed, m, limit) for m in METHODS if m.name in BESIDE}
+        sizes = {"contacts": problem.contacts, "density": condensed.blocks.density}
+        runs.setdefault("siconos", {})[path.stem] = sizes | {"methods": theirs}
+        runs.setdefault("ours", {})[path.stem] = sizes | {"methods": ours}
+        report(f"{path.stem}: Siconos " + ", ".join(
+            f"{name} {cost_text(COST.met(run, TOLERANCES[-1]))}" for name, run in theirs.items()
+        ))  # fmt: skip
+    return runs
+
+
+def _run(
+    condensed: am.FrictionProblem, python: str, file: Path, solver: str, limit: float
+) -> dict[str, Any]:
+    """A run as `race.one_run` has it; tolerances beyond one that was missed are missed."""
+
+    def measure(r: np.ndarray) -> float:
+        u = condensed.velocity(r)[0]
+        return published_natural_error(r, u, condensed.free_velocity, condensed.law)
+
+    met: dict[str, list[float | None]] = {}
+    row: dict[str, Any] = {}
+    for tolerance in TOLERANCES:
+        row = worker(condensed, python, file, solver, limit, tolerance, FINELY, measure)
+        if row["seconds"] is None:
+            break
+        met[key(tolerance)] = [row["seconds"], row["iterations"], None]
+    missed = row["seconds"] is None
+    return {
+        "outcome": row["why"] if missed else "converged",
+        "error": row.get("error", np.inf),
+        "seconds": row["spent"] if missed else row["seconds"],
+        "flops": None,
+        "limit": limit,
+        "met": {"13": met},
+    }
+
+
+def table(runs: dict[str, Runs]) -> str:
+    """Markdown: solved and median seconds of Siconos by method and tolerance of (13)."""
+    theirs = runs["siconos"]
+    head = [f"to {t:g}: solved, median" for t in TOLERANCES]
+    rows = ["| Siconos | " + " | ".join(head) + " |", "|---|" + "---|" * len(head)]
+    for name, solver in SOLVERS.items():
+        cells = []
+        for t in TOLERANCES:
+            costs = [COST.met(entry["methods"][name], t) for entry in theirs.values()]
+            middle = cost_text(float(np.median(costs)))
+            cells.append(f"{solved(theirs, name, t, COST)}, {middle}")
+        rows.append(f"| {name} ({solver}) | {' | '.join(cells)} |")
+    return "\n".join(rows)
+
+
+def steps_table(runs: dict[str, Runs]) -> str:
+    """Markdown: what a Newton step takes, ours and theirs in one run, and their number."""
+    rows = [
+        "| problem | contacts | a step, ours | Siconos | ratio | steps, ours | Siconos |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for stem, entry in runs["siconos"].items():
+        found = [
+            _each(each["methods"]["NSN-AC"]) for each in (runs["ours"][stem], entry)
+        ]
+        (mine, k), (theirs, n) = found
+        cells = [str(entry["contacts"]), cost_text(mine), cost_text(theirs),
+                 number(mine / theirs), f"{k:g}", f"{n:g}"]  # fmt: skip
+        rows.append(f"| {stem} | {' | '.join(cells)} |")
+    return "\n".join(rows)
+
+
+def _each(run: dict[str, Any]) -> tuple[float, float]:
+    """Seconds of a step and their number, to the tightest tolerance that was met."""
+    found = [value for value in run["met"]["13"].values() if value[1]]
+    return (found[-1][0] / found[-1][1], found[-1][1]) if found else (np.nan, np.nan)
