@@ -170,9 +170,15 @@ def strategies(levels: list[int]) -> dict[str, dict[str, Run]]:
 
 
 def table51(levels: list[int]) -> dict[str, dict[str, Run]]:
-    """Algorithm 2 with m = k_f = 1 for Coulomb friction, tolerance 1e-10."""
+    """Algorithm 2 with m = k_f = 1 for Coulomb friction, tolerance 1e-10.
+
+    There is nothing below level 0 to start from.
+    """
     return {
-        name: {str(k): run(coulomb(k), fixed_point(**given), 1e-10) for k in levels}
+        name: {
+            str(k): run(coulomb(k), fixed_point(**(given if k else INEXACT)), 1e-10)
+            for k in levels
+        }
         for name, given in (("zero", INEXACT), ("nested", NESTED))
     }
 

@@ -221,7 +221,8 @@ def _over_plane(
     title = "$\\lambda_n$"
     if bounded:
         limit = solution.problem.law.bound(solution.r) / weights
-        axes.scatter(x, y, limit, s=4, color=SLIP, depthshade=False)
+        size = 4 if len(x) < 1500 else 1
+        axes.scatter(x, y, limit, s=size, color=SLIP, depthshade=False)
         title = "surface: $|\\lambda_\\tau|$; dots: friction bound $F \\lambda_n$"
     axes.set(xlabel="x", ylabel="y", zlabel=unit, title=title)
     axes.view_init(28, -125)

@@ -164,7 +164,7 @@ def parameters(runs: Mapping) -> list[str]:
     level = runs["level"]
     told = [
         f"{name}: {run['K']}, {run['cycles']}" if run["finished"]
-        else f"{name}: none in {run['steps']}"
+        else f"{name}: none, the same again after {run['steps']}"
         for name, run in runs.items() if name != "level"
     ]  # fmt: skip
     return [

@@ -185,7 +185,7 @@ def _quotient(record: Record) -> tuple[bool, str]:
 def _inexact_sets(record: Record) -> tuple[bool, str]:
     runs = record["table4.2"]
     off = [abs(run["K"] - runs["inexact"][k]["K"]) for k, run in runs["exact"].items()]
-    return max(off) <= 1, f"at most {max(off)} apart"
+    return max(off) <= 1, f"at most {max(off)} apart" if max(off) else "in the same step"
 
 
 def _nested_cycles(record: Record) -> tuple[bool, str]:
@@ -206,7 +206,7 @@ def _any_c(record: Record) -> tuple[bool, str]:
 def _small_c(record: Record) -> tuple[bool, str]:
     p = record["parameters"]
     told = f"level {p['level']}: c_n = 0.01 " + (
-        "ends" if p["c_n = 0.01"]["finished"] else f"not in {p['c_n = 0.01']['steps']} steps"
+        "ends" if p["c_n = 0.01"]["finished"] else "runs in circles"
     )
     small = p["c_tau = 0.01"]
     return not p["c_n = 0.01"]["finished"], (
