@@ -169,6 +169,7 @@ def _table51(levels: list[int], out: Path) -> dict:
         fields = cube.model(int(level)).recover(run.solution)
         record["zero"][level] |= {
             "counts": run.solution.counts, "resultant": [float(x) for x in fields.resultant],
+            "corner": cube.corner_traction(int(level), run.solution),
         }  # fmt: skip
     last = levels[-1]
     solution, points = runs["zero"][str(last)].solution, cube.contact_points(last)

@@ -73,6 +73,13 @@ def node(level: int) -> int:
     return int(np.argmin(np.linalg.norm(contact_points(level) - NODE, axis=1)))
 
 
+def corner_traction(level: int, solution: am.FrictionSolution) -> float:
+    """|lambda| at the node (1, 1, 0), where section 5.1 sees a singularity."""
+    k = int(np.argmin(np.linalg.norm(contact_points(level) - (1, 1, 0), axis=1)))
+    (placed,) = model(level).discretisation.placed
+    return float(np.linalg.norm(solution.r[k]) / placed.rows.weights[k])
+
+
 def table41(levels: list[int]) -> dict[str, Run]:
     """Exact Algorithm 1 from zero with (3.11), tolerance 1e-9."""
     return {str(k): run(tresca(k), fixed_point(), 1e-9) for k in levels}
@@ -143,7 +150,7 @@ def parameters(level: int) -> dict[str, Run]:
     tractions = 100 * 4.0**-level  # c = 100 for tractions is c D_p for forces
     options = {
         "c_tau = 0.01": {"c_tangential": 0.01}, "c_n = 0.01": {"c_normal": 0.01},
-        "c_n = 1": {"c_normal": 1.0}, "c_n = 10000": {"c_normal": 1e4},
+        "c_n = 1": {"c_normal": 1.0}, "c_n = 100": {}, "c_n = 10000": {"c_normal": 1e4},
         "c = 100 D_p": {"c_normal": tractions, "c_tangential": tractions},
         "c from the stiffness": {"c_normal": None, "c_tangential": None},
     }  # fmt: skip

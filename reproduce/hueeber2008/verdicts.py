@@ -214,6 +214,13 @@ def _small_c(record: Record) -> tuple[bool, str]:
     )
 
 
+def _scaling(record: Record) -> tuple[bool, str]:
+    p = record["parameters"]
+    forces, tractions = p["c_n = 100"]["cycles"], p["c = 100 D_p"]["cycles"]
+    told = f"{forces} cycles with c = 100 for forces, {tractions} with it for tractions"
+    return forces < tractions, f"level {p['level']}: {told}"
+
+
 def _superlinear(record: Record) -> tuple[bool, str]:
     worst = 0.0
     for run in record["figure4.3"].values():
@@ -257,6 +264,13 @@ def _nested_sets(record: Record) -> tuple[bool, str]:
         for k, run in record["table5.1"]["zero"].items() if k != "0"
     ]  # fmt: skip
     return all(a < b for a, b in both), ", ".join(f"{a} for {b}" for a, b in both)
+
+
+def _singular(record: Record) -> tuple[bool, str]:
+    sizes = [run["corner"] for run in record["table5.1"]["zero"].values()][1:]
+    told = ", ".join(f"{x:.0f}" for x in sizes)
+    grows = all(b > 1.1 * a for a, b in zip(sizes, sizes[1:], strict=False))
+    return grows, f"|lambda| there on level 1, 2, …: {told}"
 
 
 def _costly(record: Record) -> tuple[bool, str]:
@@ -316,6 +330,8 @@ def _newton_ends(record: Record) -> tuple[bool, str]:
 CLAIMS = (
     Claim("2.2", "the discrete Tresca bound is the integral of g times phi_p",
           ("table4.1", "readings"), _nodal),
+    Claim("2.2", "multipliers times D_p give better rates of the inexact method",
+          ("parameters",), _scaling),
     Claim("3.2", "the scaling of the Robin condition is essential", ("section3",), _unmodified,
           "ours"),
     Claim("3.4", "(3.1) is more robust than (3.14)", ("section3",), _quotient, "ours"),
@@ -341,6 +357,8 @@ CLAIMS = (
     Claim("5.1", "K_l and k_max almost independent of the level", ("table5.1",), _any_level,
           "ours"),
     Claim("5.1", "nested finds the sets earlier", ("table5.1",), _nested_sets, "ours"),
+    Claim("5.1", "the solution has a singularity at (1, 1, 0)", ("table5.1",), _singular,
+          "ours"),
     Claim("6", "fewer nodes stick with smaller F", ("table6.1",), _sticking, "ours"),
     Claim("6", "the same behaviour as for the cube", ("table6.1",), _like_the_cube, "ours"),
     Claim("7", "full Newton needs half of the steps: ring", ("ring",), _half("ring"), "ours"),

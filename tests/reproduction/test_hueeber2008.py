@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))  # the reproductions are not installed
 
 from reproduce.hueeber2008 import figures, meshes, shell, tables, verdicts  # noqa: E402
-from reproduce.hueeber2008.__main__ import CUBE, REFERENCE, main  # noqa: E402
+from reproduce.hueeber2008.__main__ import CUBE, FIGURES, REFERENCE, main, page  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -159,6 +159,49 @@ def test_the_shell():
     assert newton.finished and fixed.finished and newton.steps < fixed.steps
     r = newton.iterates[-1].r
     np.testing.assert_allclose(fixed.iterates[-1].r, r, atol=1e-7 * np.abs(r).max())
+
+
+STORED = json.loads((ROOT / "reproduce/hueeber2008/results/results.json").read_text())
+PAGE = (ROOT / "reproduce/hueeber2008/results/results.md").read_text()
+README = " ".join((ROOT / "reproduce/hueeber2008/README.md").read_text().split())
+
+
+def test_the_stored_page_is_that_of_the_stored_numbers():
+    assert PAGE == page(STORED)
+    assert "differs by ours 0:" in PAGE.splitlines()[2]
+    for name in FIGURES:
+        assert (ROOT / f"reproduce/hueeber2008/results/figure{name}.png").exists()
+
+
+def test_the_readme_says_what_the_page_says():
+    cycles = [STORED["table4.2"][n]["5"]["cycles"] for n in ("exact", "inexact", "nested")]
+    assert "multigrid steps {}, {} and {} on level 5".format(*cycles) in README
+    newton = [run["steps"] for run in STORED["newton"].values()]
+    fixed = [run["steps"] for k, run in STORED["table5.1"]["zero"].items() if k != "5"]
+    assert (
+        f"{min(newton)} to {max(newton)} steps on the cube where the fixed point takes "
+        f"{min(fixed)} to {max(fixed)}"
+    ) in README
+    nested = [
+        run["K"] for rows in STORED["table6.1"]["nested"].values()
+        for level, run in rows.items() if level != "0"
+    ]  # fmt: skip
+    assert f"nested K_l is {min(nested)} to {max(nested)} where" in README
+    far = {
+        (mu, level) for k, (mu, rows) in enumerate(STORED["table6.1"]["zero"].items())
+        for level, run in rows.items()
+        if abs(run["K"] - REFERENCE["table6.1"]["zero"][level][k]) > 2
+    }  # fmt: skip
+    assert far == {("0.2", "1"), ("0.2", "2")}  # "but for F = 0.2 on levels 1 and 2"
+    ring = [STORED["ring"][name]["steps"] for name in ("newton", "fixed-point")]
+    gain = verdicts.rate(STORED["ring"])
+    text = "full Newton {} steps, fixed point {}, which gains a factor {:.2f}"
+    assert text.format(*ring, gain) in README
+    shell_steps = [
+        "{} for {}".format(*(both[name]["steps"] for name in ("newton", "fixed-point")))
+        for both in STORED["figure7.3"].values()
+    ]
+    assert f"full Newton {', '.join(shell_steps)} steps" in README
 
 
 @pytest.mark.parametrize("words", [["table9"], ["--levels", "x"], ["--levels", "9"]])
