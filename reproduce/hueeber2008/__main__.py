@@ -16,15 +16,17 @@ import numpy as np
 import amontons as am
 
 from ..record import check_parts, heading, levels_of, regenerate
-from . import bodies, cube, figures, tables
+from . import bodies, cube, deformed, figures, sketches, tables, verdicts
 from .runs import Run
 
 HERE = Path(__file__).parent
-CUBE = ("table4.1", "table4.2", "table4.3", "figure4.3", "table5.1", "newton")
-PARTS = (*CUBE, "table6.1", "section6", "section7")
+CUBE = ("table4.1", "readings", "section3", "table4.2", "table4.3", "parameters", "figure4.3",
+        "table5.1", "strategies", "newton")  # fmt: skip
+PARTS = (*CUBE, "table6.1", "section6", "ring", "figure7.3")
 FIGURES = (
-    "4.1", "4.2", "4.3", "5.1a", "5.1b", "5.2", "5.3", "6.1", "6.2", "6.3-0.2", "6.3-0.4",
-    "6.3-0.6", "6.4", "6.5", "6.6a", "6.6b", "7.1", "7.2a", "7.2b", "7.3",
+    "4.1a", "4.1", "4.2", "4.3", "5.1a", "5.1b", "5.2", "5.3", "6.1a", "6.1", "6.2", "6.2b",
+    "6.3-0.2", "6.3-0.4", "6.3-0.6", "6.4", "6.5", "6.6a", "6.6b", "6.6c", "7.1a", "7.1",
+    "7.2a", "7.2b", "7.3",
 )  # fmt: skip
 REFERENCE = json.loads((HERE / "reference.json").read_text())
 RESULTANTS = HERE.parents[1] / "tests/data/cube.json"
@@ -40,9 +42,10 @@ RESULTANTS = HERE.parents[1] / "tests/data/cube.json"
 def main(parts: tuple[str, ...], levels: str, results: Path | None) -> None:
     """Active sets and multigrid for contact with friction, as in the paper of 2008.
 
-    PART is one of table4.1, table4.2, table4.3, figure4.3, table5.1, newton (the cube),
-    table6.1, section6 (the shell, up to level 3), section7 (ring and tool, coarse up to level
-    2); all of them by default.  Numbers of other parts stay as they are stored.
+    PART is one of table4.1, readings, section3, table4.2, table4.3, parameters, figure4.3,
+    table5.1, strategies, newton (the cube), table6.1, section6, figure7.3 (the shell, up to
+    level 3), ring (ring and tool, coarse up to level 2); all of them by default.  Numbers of
+    other parts stay as they are stored.
     """
     check_parts(parts, PARTS)
     chosen = levels_of(levels, 0, 5)
@@ -52,27 +55,44 @@ def main(parts: tuple[str, ...], levels: str, results: Path | None) -> None:
 
 
 def page(record: dict) -> str:
-    """All tables of what is stored."""
-    lines = heading("hueeber2008", record)
-    makers: dict[str, Callable] = {
-        "table4.1": tables.table41, "table4.2": tables.table42, "table4.3": tables.table43,
-        "table5.1": tables.table51,
-    }  # fmt: skip
-    for part, make in makers.items():
-        if part in record:
+    """All tables of what is stored, after a line of counts."""
+    found = verdicts.verdicts(record, REFERENCE)
+    title, *head = heading("hueeber2008", record)
+    lines = [title, "", verdicts.counts_line(found), *head, *verdicts.summary(found)]
+    for part, make in TABLES.items():
+        if part in record and part in REFERENCE:
             lines += make(record[part], REFERENCE[part])
-    if "table5.1" in record:
-        lines += note("table5.1")
-        known = json.loads(RESULTANTS.read_text()) if RESULTANTS.exists() else {}
-        lines += tables.resultants(record["table5.1"]["zero"], known)
-    if {"newton", "table5.1"} <= record.keys():
-        lines += tables.newton(record["newton"], record["table5.1"]["zero"])
-    if "table6.1" in record:
-        lines += [*tables.table61(record["table6.1"], REFERENCE["table6.1"]), *note("table6.1")]
-    if "section7" in record:
-        lines += [*tables.section7(record["section7"]), *note("section7")]
+        elif part in record:
+            lines += make(record[part])
+        if part in record:
+            lines += [*_beside(part, record), *note(part)]
+    if {"ring", "figure7.3"} <= record.keys():
+        both = {"ring": record["ring"], **record["figure7.3"]}
+        lines += [*tables.section7(both), *note("section7")]
     lines += [f"![Figure {name}](figure{name}.png)\n" for name in FIGURES]
     return "\n".join(lines)
+
+
+def _beside(part: str, record: dict) -> list[str]:
+    """What a table has below it from other parts."""
+    if part == "table4.1" and "readings" in record:
+        return tables.sentence41(record[part], record["readings"])
+    if part == "table4.3" and "parameters" in record:
+        return tables.parameters(record["parameters"])
+    if part == "table5.1":
+        known = json.loads(RESULTANTS.read_text()) if RESULTANTS.exists() else {}
+        lines = [*note("norm"), *tables.resultants(record[part]["zero"], known)]
+        if "newton" in record:
+            lines += tables.newton(record["newton"], record[part]["zero"])
+        return lines
+    return []
+
+
+TABLES: dict[str, Callable] = {
+    "table4.1": tables.table41, "section3": tables.section3, "table4.2": tables.table42,
+    "table4.3": tables.table43, "figure4.3": tables.figure43, "table5.1": tables.table51,
+    "strategies": tables.strategies, "table6.1": tables.table61,
+}  # fmt: skip
 
 
 def note(part: str) -> list[str]:
@@ -92,11 +112,25 @@ def _table41(levels: list[int], out: Path) -> dict:
     runs = cube.table41(levels)
     last = levels[-1]
     _cube_figures(runs[str(last)].solution, last, out / "figure4.2.png", out / "figure4.1.png")
+    sketches.cube(out / "figure4.1a.png")
     return _records(runs)
 
 
+def _readings(levels: list[int], out: Path) -> dict:
+    return {name: _records(runs) for name, runs in cube.readings(levels).items()}
+
+
+def _parameters(levels: list[int], out: Path) -> dict:
+    level = min(3, levels[-1])
+    return {"level": level} | _records(cube.parameters(level))
+
+
+def _strategies(levels: list[int], out: Path) -> dict:
+    return {name: _records(runs) for name, runs in cube.strategies(levels).items()}
+
+
 def _cube_figures(
-    solution: am.FrictionSolution, level: int, contact: Path, deformed: Path
+    solution: am.FrictionSolution, level: int, contact: Path, picture: Path
 ) -> None:
     """Status of the nodes and the deformed cube, both on the face z = 0."""
     points = cube.contact_points(level)[:, :2]
@@ -104,7 +138,7 @@ def _cube_figures(
         cube.model(level), solution, points, np.eye(3)[:2], 1.5 * 2.0**-level, contact,
         ((0.55, 1.02), (0.55, 1.02)),
     )  # fmt: skip
-    figures.deformed(cube.model(level), solution, deformed)
+    deformed.deformed(cube.model(level), solution, picture)
 
 
 def _table42(levels: list[int], out: Path) -> dict:
@@ -118,7 +152,14 @@ def _table43(levels: list[int], out: Path) -> dict:
 def _figure43(levels: list[int], out: Path) -> dict:
     runs = cube.figure43(levels[-1])
     figures.modifications(runs, levels[-1], out / "figure4.3.png")
-    return _records(runs)
+    node = cube.node(levels[-1])
+    return {
+        name: run.record() | {
+            "alpha": [float(it.alpha[node]) for it in run.iterates],
+            "beta": [float(it.beta[node]) for it in run.iterates],
+        }
+        for name, run in runs.items()
+    }  # fmt: skip
 
 
 def _table51(levels: list[int], out: Path) -> dict:
@@ -128,6 +169,7 @@ def _table51(levels: list[int], out: Path) -> dict:
         fields = cube.model(int(level)).recover(run.solution)
         record["zero"][level] |= {
             "counts": run.solution.counts, "resultant": [float(x) for x in fields.resultant],
+            "corner": cube.corner_traction(int(level), run.solution),
         }  # fmt: skip
     last = levels[-1]
     solution, points = runs["zero"][str(last)].solution, cube.contact_points(last)
@@ -142,9 +184,11 @@ def _newton(levels: list[int], out: Path) -> dict:
 
 
 WORK: dict[str, Callable[[list[int], Path], dict]] = {
-    "table4.1": _table41, "table4.2": _table42, "table4.3": _table43, "figure4.3": _figure43,
-    "table5.1": _table51, "newton": _newton, "table6.1": bodies.table61,
-    "section6": bodies.section6, "section7": bodies.section7,
+    "table4.1": _table41, "readings": _readings, "table4.2": _table42, "table4.3": _table43,
+    "section3": lambda levels, out: cube.robust(levels), "parameters": _parameters,
+    "figure4.3": _figure43, "table5.1": _table51, "strategies": _strategies, "newton": _newton,
+    "table6.1": bodies.table61, "section6": bodies.section6, "ring": bodies.ring_and_tool,
+    "figure7.3": bodies.figure73,
 }  # fmt: skip
 
 if __name__ == "__main__":

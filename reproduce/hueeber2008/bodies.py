@@ -8,7 +8,8 @@ import numpy as np
 
 import amontons as am
 
-from . import figures, ring, shell
+from . import figures, ring, shell, sketches
+from .deformed import deformed
 from .runs import INEXACT, Run, fixed_point, run
 
 FINEST = 3  # level of the shell in the paper
@@ -32,10 +33,11 @@ def table61(levels: list[int], out: Path) -> dict:
     radius = np.linalg.norm(placed.rows.points[:, :2], axis=1)
     weighted = {mu: (solution, placed.rows.weights) for mu, solution in found.items()}
     figures.radial(weighted, radius, out / "figure6.4.png")
+    sketches.shell(out / "figure6.1a.png")
     return {
         name: {mu: records(by_level) for mu, by_level in group.items()}
         for name, group in runs.items()
-    }
+    } | {"nodes": {str(k): shell.nodes(k) for k in chosen}}
 
 
 def section6(levels: list[int], out: Path) -> dict:
@@ -47,30 +49,41 @@ def section6(levels: list[int], out: Path) -> dict:
                     start=shell.first_guess(shell.model(k, 0.5)))
         for k in chosen
     }  # fmt: skip
-    solution = pressed[str(last)].solution
+    solution, model = pressed[str(last)].solution, shell.model(last, 0.5)
     figures.sets({k: pressed[k] for k in pressed if k != "0"} or pressed, out / "figure6.5.png")
-    figures.deformed(shell.model(last, 0.5), solution, out / "figure6.1.png", cut=True)
+    deformed(model, solution, out / "figure6.1.png", cut=True)
     _contacts(last, 0.5, solution, out / "figure6.2.png")
+    (rows,) = (placed.rows for placed in model.discretisation.placed)
+    figures.tractions(solution, rows.points, rows.weights, out / "figure6.2b.png", normal=True)
     pulled_model = shell.model(last, 0.7, traction=True)
     pulled = run(pulled_model.assemble(), fixed_point(**INEXACT), 1e-9,
                  start=shell.first_guess(pulled_model))  # fmt: skip
-    figures.deformed(pulled_model, pulled.solution, out / "figure6.6a.png", cut=True)
+    deformed(pulled_model, pulled.solution, out / "figure6.6a.png", cut=True)
     _contacts(last, 0.7, pulled.solution, out / "figure6.6b.png", traction=True)
+    figures.tractions(
+        pulled.solution, rows.points, rows.weights, out / "figure6.6c.png", normal=False
+    )
     return {"pressed": records(pressed), "pulled": records({str(last): pulled})}
 
 
-def section7(levels: list[int], out: Path) -> dict:
-    """Full Newton against the fixed point: ring and tool (figures 7.1, 7.2), shell (7.3)."""
+def ring_and_tool(levels: list[int], out: Path) -> dict:
+    """Section 7: full Newton against the fixed point, figures 7.1 and 7.2; coarse up to 2."""
     fine = max(levels) > 2
     found = ring.newton(fine)
     model, solution = ring.model(fine), found["newton"].solution
     figures.newton({"ring and tool, F = 0.7": found}, out / "figure7.2b.png")
-    figures.deformed(model, solution, out / "figure7.1.png", view=(18, -70), cut=True)
+    deformed(model, solution, out / "figure7.1.png", view=(18, -70), cut=True)
+    sketches.ring(out / "figure7.1a.png")
     _unrolled(model, solution, out / "figure7.2a.png")
-    level = min(max(levels), 2)
+    return records(found)
+
+
+def figure73(levels: list[int], out: Path) -> dict:
+    """Section 7 on the shell, on the finest level: figure 7.3."""
+    level = min(max(levels), FINEST)
     compared = {f"shell, F = {mu}": shell.newton(level, mu) for mu in (0.2, 0.4, 0.6)}
     figures.newton(compared, out / "figure7.3.png")
-    return {"ring": records(found)} | {name: records(runs) for name, runs in compared.items()}
+    return {name: records(runs) for name, runs in compared.items()}
 
 
 def _contacts(

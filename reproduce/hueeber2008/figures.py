@@ -9,10 +9,8 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 import amontons as am
-from amontons.fem import Cells, cell_stress, von_mises
 
 from . import cube
 from .runs import Run
@@ -84,96 +82,15 @@ def status(
 def _kinds(solution: am.FrictionSolution, closed: np.ndarray) -> list:
     """(name, which, colour) of the kinds of nodes."""
     sliding = solution.sliding
-    if not isinstance(solution.problem.law, am.Tresca):
+    tresca = isinstance(solution.problem.law, am.Tresca)
+    if not tresca:
         sliding = sliding & closed  # an open node has nothing to slide against
     return [
-        ("open, slides", ~closed & sliding, "#c9b458"), ("open", ~closed & ~sliding, OPEN),
+        ("open, slides", ~closed & sliding, "#c9b458"),
+        ("open, sticks" if tresca else "open", ~closed & ~sliding, OPEN),
         ("closed, slides", closed & sliding, SLIP),
         ("closed, sticks", closed & ~sliding, STICK),
     ]  # fmt: skip
-
-
-def deformed(
-    model: am.Model, solution: am.FrictionSolution, path: Path,
-    view: tuple[float, float] = (22, -60), *, cut: bool = False,
-) -> None:  # fmt: skip
-    """Surfaces of the deformed bodies coloured by von Mises stress: figures 4.1, 5.1, 6.1, 7.1.
-
-    cut: only what lies behind the plane y = 0, and the section in that plane beside it.
-    """
-    fields = model.recover(solution)
-    faces, values, sections = [], [], []
-    for body, moved in zip(model.bodies, fields.displacement, strict=True):
-        mesh, stress = body.mesh, _nodal_stress(body, moved)
-        (block,) = mesh.cells
-        centre = mesh.points[block.nodes].mean(axis=1)
-        kept = centre[:, 1] > 0 if cut else np.ones(len(centre), dtype=bool)
-        used, local = np.unique(block.nodes[kept], return_inverse=True)
-        part = am.Mesh(mesh.points[used], (Cells("hex", local.reshape(-1, 8)),))
-        (facets,) = part.boundary
-        nodes = used[facets.nodes]
-        faces.append((mesh.points + moved)[nodes])
-        values.append(stress[nodes].mean(axis=1))
-        flat = (np.abs(mesh.points[nodes][:, :, 1]) < 1e-9).all(axis=1)
-        sections.append(((mesh.points + moved)[:, [0, 2]], nodes[flat], values[-1][flat]))
-    every = np.concatenate(values)
-    colours = plt.Normalize(0, np.quantile(every, 0.98))  # corners would take all colours
-    figure = plt.figure(figsize=(13.5, 4.8) if cut else (7, 5.4))
-    axes = figure.add_subplot(1, 2 if cut else 1, 1, projection="3d")
-    _surfaces(axes, np.concatenate(faces), colours(every), view)
-    frames = [axes]
-    if cut:
-        axes.set_zlabel("")  # where that of the section is
-        figure.subplots_adjust(wspace=0.3)
-        frames.append(figure.add_subplot(1, 2, 2))
-        for section in sections:
-            _section(frames[1], *section, colours)
-    figure.colorbar(plt.cm.ScalarMappable(colours, "viridis"), ax=frames, shrink=0.7, pad=0.06,
-                    extend="max", label="von Mises stress")  # fmt: skip
-    figure.savefig(path, dpi=DPI, bbox_inches="tight")
-    plt.close(figure)
-
-
-def _nodal_stress(body: am.Body, moved: np.ndarray) -> np.ndarray:
-    """Von Mises stress at the nodes, (n,): means of the cells around."""
-    (block,) = body.mesh.cells
-    stress = von_mises(cell_stress(body.mesh, body.material, moved))
-    total = np.zeros(len(body.mesh.points))
-    np.add.at(total, block.nodes, stress[:, None])
-    return total / np.bincount(block.nodes.ravel(), minlength=len(total))
-
-
-def _surfaces(axes, faces: np.ndarray, share: np.ndarray, view: tuple[float, float]) -> None:
-    """Faces (k, 4, 3) in space."""
-    axes.add_collection3d(
-        Poly3DCollection(faces, facecolors=plt.cm.viridis(share), edgecolors="0.75",
-                         linewidths=0.15)
-    )  # fmt: skip
-    low, high = faces.min(axis=(0, 1)), faces.max(axis=(0, 1))
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]),
-             xlabel="x", ylabel="y", zlabel="z")  # fmt: skip
-    axes.set_box_aspect(high - low)
-    for axis, span in zip((axes.xaxis, axes.yaxis, axes.zaxis), high - low, strict=True):
-        axis.set_major_locator(plt.MaxNLocator(max(2, int(5 * span / (high - low).max()))))
-    axes.view_init(*view)
-
-
-def _section(axes, points: np.ndarray, nodes: np.ndarray, values: np.ndarray, colours) -> None:
-    """Facets nodes (k, 4) of a body in the plane y = 0 with its outline; of tubes one side."""
-    x = points[nodes][:, :, 0]
-    if np.abs(x).min() > 0.1 * np.abs(x).max():
-        right = x.mean(axis=1) > 0
-        nodes, values = nodes[right], values[right]
-    shown = {"facecolors": plt.cm.viridis(colours(values)), "edgecolors": "0.75"}
-    axes.add_collection(
-        matplotlib.collections.PolyCollection(points[nodes], linewidths=0.3, **shown)
-    )
-    sides = np.stack([nodes, np.roll(nodes, -1, axis=1)], axis=2).reshape(-1, 2)
-    sides, times = np.unique(np.sort(sides, axis=1), axis=0, return_counts=True)
-    outline = points[sides[times == 1]]
-    axes.add_collection(matplotlib.collections.LineCollection(outline, colors="k", lw=1.2))
-    axes.autoscale()
-    axes.set(aspect="equal", xlabel="x", ylabel="z", title="section y = 0")
 
 
 def radial(solutions: dict, radius: np.ndarray, path: Path) -> None:
@@ -247,7 +164,7 @@ def sets(runs: dict[str, Run], path: Path) -> None:
 def modifications(runs: dict[str, Run], level: int, path: Path) -> None:
     """Error of lambda, alpha and beta at one node: figure 4.3."""
     figure, (left, middle, right) = plt.subplots(1, 3, figsize=(13, 3.8))
-    node = int(np.argmin(np.linalg.norm(cube.contact_points(level) - cube.NODE, axis=1)))
+    node = cube.node(level)
     best = min(runs.values(), key=lambda run: run.changes[-1]).iterates[-1].r
     for (name, run), style in zip(runs.items(), STYLES, strict=True):
         error = [np.linalg.norm(it.r - best) for it in run.iterates]
@@ -268,16 +185,44 @@ def modifications(runs: dict[str, Run], level: int, path: Path) -> None:
 def bound(solution: am.FrictionSolution, points: np.ndarray, path: Path) -> None:
     """Friction bound and shear force at all nodes: figure 5.1, right."""
     figure = plt.figure(figsize=(7, 5.4))
-    axes = figure.add_subplot(projection="3d")
-    shear = np.linalg.norm(solution.r[:, 1:], axis=1)
-    limit = solution.problem.law.bound(solution.r)
-    n = int(np.sqrt(len(points)))
-    order = np.lexsort((points[:, 0], points[:, 1]))
-    x, y, z = (a[order].reshape(n, n) for a in (points[:, 0], points[:, 1], shear))
-    axes.plot_surface(x, y, z, cmap="viridis", alpha=0.75, linewidth=0)
-    axes.scatter(*points[:, :2].T, limit, s=4, color=SLIP, label="bound $F \\lambda_n$")
-    axes.set(xlabel="x", ylabel="y", zlabel="force at a node")
-    axes.set_title("surface: $|\\lambda_\\tau|$; dots: friction bound")
-    axes.view_init(28, -125)
+    _over_plane(figure.add_subplot(projection="3d"), points, solution, np.ones(len(points)),
+                "force at a node", bounded=True)  # fmt: skip
     figure.savefig(path, dpi=DPI, bbox_inches="tight")
     plt.close(figure)
+
+
+def tractions(
+    solution: am.FrictionSolution, points: np.ndarray, weights: np.ndarray, path: Path, *,
+    normal: bool,
+) -> None:  # fmt: skip
+    """lambda_n, if asked for, and |lambda_tau| with the bound: figures 6.2 and 6.6, right.
+
+    points (nc, 3), weights (nc,): D_p, by which a force becomes a traction.
+    """
+    figure = plt.figure(figsize=(13, 5.2) if normal else (7, 5.4))
+    if normal:
+        left = figure.add_subplot(1, 2, 1, projection="3d")
+        _over_plane(left, points, solution, weights, "traction", bounded=False)
+    axes = figure.add_subplot(1, 1 + normal, 1 + normal, projection="3d")
+    _over_plane(axes, points, solution, weights, "traction", bounded=True)
+    figure.savefig(path, dpi=DPI, bbox_inches="tight")
+    plt.close(figure)
+
+
+def _over_plane(
+    axes, points: np.ndarray, solution: am.FrictionSolution, weights: np.ndarray, unit: str, *,
+    bounded: bool,
+) -> None:  # fmt: skip
+    """lambda_n over (x, y), or with `bounded` |lambda_tau| with dots at the friction bound."""
+    shear = np.linalg.norm(solution.r[:, 1:], axis=1) / weights
+    value = shear if bounded else solution.r[:, 0] / weights
+    x, y = points[:, 0], points[:, 1]
+    axes.plot_trisurf(x, y, value, cmap="viridis", alpha=0.75, linewidth=0)
+    title = "$\\lambda_n$"
+    if bounded:
+        limit = solution.problem.law.bound(solution.r) / weights
+        size = 4 if len(x) < 1500 else 1
+        axes.scatter(x, y, limit, s=size, color=SLIP, depthshade=False)
+        title = "surface: $|\\lambda_\\tau|$; dots: friction bound $F \\lambda_n$"
+    axes.set(xlabel="x", ylabel="y", zlabel=unit, title=title)
+    axes.view_init(28, -125)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-import numpy as np
+from dataclasses import dataclass, replace
 
 import amontons as am
 
@@ -52,35 +50,23 @@ def run(
     problem: am.FrictionProblem, solver: am.ActiveSet, change: float, *,
     start: object = None, limit: int = 120,
 ) -> Run:  # fmt: skip
-    """Steps until |u^k - u^k-1| / |u^k| is below `change`, at most `limit`."""
+    """Steps until k > k_f and |u^k - u^kc| / |u^k| is below `change`, at most `limit`."""
     seen: list = []
-    errors: list[float] = []
-    changes: list[float] = []
-    v = None if start is None else start.v
-    last = problem.H.T @ (np.zeros(problem.unknowns) if v is None else v)
 
-    def note(step, iterate) -> bool:
-        nonlocal last
-        now = problem.H.T @ iterate.v
-        size = max(float(np.linalg.norm(now)), np.finfo(float).tiny)
-        changes.append(float(np.linalg.norm(now - last)) / size)
-        last = now
-        seen.append(iterate)
-        errors.append(step.error)
-        return len(seen) > 1 and changes[-1] < change  # k > k_f: not in the first step
+    def note(step, iterate) -> None:
+        seen.append((step, iterate))
 
     solution = am.drive(
-        problem, solver, tolerance=NEVER, max_iterations=limit, start=start, callback=note
-    )
-    sets = [np.concatenate([it.normal, it.tangential]) for it in seen]
-    settled = len(sets)
-    while settled > 1 and np.array_equal(sets[settled - 2], sets[-1]):
-        settled -= 1
+        problem, replace(solver, change=change), tolerance=NEVER, max_iterations=limit,
+        start=start, callback=note,
+    )  # fmt: skip
+    steps, iterates = zip(*seen, strict=True)
+    sets = [step.sets for step in steps]
     return Run(
-        solution, [int(it.normal.sum()) for it in seen],
-        [int(it.tangential.sum()) for it in seen], settled,
-        sum(it.linear_iterations for it in seen), changes, errors,
-        bool(seen) and changes[-1] < change, seen,
+        solution, [s.normal for s in sets], [s.tangential for s in sets],
+        solution.convergence.sets_settled, sum(it.linear_iterations for it in iterates),
+        [s.change for s in sets], [step.error for step in steps], bool(iterates[-1].ends),
+        list(iterates),
     )  # fmt: skip
 
 

@@ -1,6 +1,7 @@
 """The contract of a solver: a frozen dataclass whose one method yields iterates.
 
-A solver never stops itself and never judges itself; the driver in `solve.py` does both.
+A solver never stops itself and never judges itself; the driver in `solve.py` does both.  What a
+published stopping rule asks for it tells in `Iterate.ends`.
 """
 
 from __future__ import annotations
