@@ -14,7 +14,7 @@ from typing import Any
 import click
 
 from ..record import check_parts, heading, levels_of, regenerate, stored
-from . import block, convergence, examples, figure2, tables, vee, vee_curves
+from . import block, claims, convergence, examples, figure2, tables, vee, vee_curves
 
 HERE = Path(__file__).parent
 REFERENCE = json.loads((HERE / "reference.json").read_text())
@@ -88,11 +88,14 @@ def main(parts: tuple[str, ...], levels: str, results: Path | None) -> None:
 def page(record: dict[str, Any]) -> str:
     """All tables of what is stored."""
     lines = heading("ligursky2014", record)
+    held = claims.collected(record)
+    lines[2:2] = [claims.line(held), ""]
     for part, make in PAGES.items():
         if part in record:
             whole = part == "block" and "block-paper" in record
             lines += make(_with_theirs(record) if whole else record[part])
             lines += [f"![Figure {name}](figure{name}.png)\n" for name in FIGURES.get(part, ())]
+    lines += ["## All statements", "", *tables.table(held)]
     return "\n".join(lines)
 
 

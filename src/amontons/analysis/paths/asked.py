@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -57,8 +58,10 @@ def tangents_at(path: PathProblem, y: Array, p: float, tolerance: float) -> Firs
         raise InvalidInput(f"tolerance: expected a number > 0, got {tolerance!r}")
     y = polished(path, y, p)
     if Continuation().knows_pieces(path):
-        return first_order(path, y, p, tolerance=tolerance)
-    return by_probes(Curve(path, len(y)), y, p, Continuation())
+        found = first_order(path, y, p, tolerance=tolerance)
+    else:
+        found = by_probes(Curve(path, len(y)), y, p, Continuation())
+    return replace(found, problem=path)
 
 
 def followed_along(

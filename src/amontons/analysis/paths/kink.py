@@ -25,11 +25,11 @@ from .path import name_of
 
 Array = NDArray[np.float64]
 CLOSED = 1e-14  # length of an interval that is not divided any more, or that of rounding
-SURE = 1e-2  # by which a zero of (1) may be off, in the square of the interval
+SURE = 1e-3  # by which a zero of (1) may be off, in the square of the interval
 BASELINE = 1e-5  # distance of two points from which the curve's bend is measured
 LARGE = 1e-3  # of the largest row, of one that counts
 BEHIND = 1e-9  # distance from a kink at which its next piece has begun
-PATIENCE = 3  # steps from one halving to the next
+PATIENCE = 5  # steps from one halving to the next
 ROUNDS = 120
 
 
