@@ -14,13 +14,12 @@ from . import checks
 from .continuation import Continuation
 from .corrector import Curve
 from .first_order import first_order
-from .following import Limits, continue_both, track_both
+from .following import Limits, continue_both, follow_along
 from .parametrised import first_state, path_of, state_of
 from .path import Branch, PathProblem, timed
 from .probes import by_probes
 from .starting import polished
 from .tangents import FirstOrder, Tangent
-from .ways import is_straight
 
 if TYPE_CHECKING:
     from ...model import Model
@@ -74,6 +73,6 @@ def followed_along(
             f"along: expected one of the tangents of first_order at the start, got {along!r}"
         )
     y = polished(path, y, p)
-    if is_straight(path) and options is None:
-        return track_both(path, y, p, limits, tangent=along)  # type: ignore[arg-type]
+    if options is None:
+        return follow_along(path, y, p, limits, along)
     return continue_both(path, y, p, limits, options, tangent=along)
