@@ -10,19 +10,33 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from . import convergence
+
 Row = dict[str, Any]
 AGREES, PAPER, OURS = "agrees", "paper", "ours"
-NEAR = 1e-9  # distance of folds and solutions to other programs that is none
 THEIRS = "algorithms 1 and 2, their settings"
 
 
-def of_example(name: str) -> Callable[[list[Row]], list[Row]]:
-    """One row per row of an example's table."""
-    title = name.replace("example", "example ")
+def of_rows(where: str) -> Callable[[list[Row]], list[Row]]:
+    """One row per row of a table that says what agrees, and whose fault the rest is."""
     return lambda rows: [
-        {"where": title, "claim": f"{next(iter(row.values()))}: {row['paper']}",
-         "verdict": AGREES if row["agrees"] else OURS}
+        {"where": where, "claim": ": ".join(dict.fromkeys(
+            [str(next(iter(row.values()))), row["paper"]])),
+         "verdict": AGREES if row["agrees"] else PAPER if row.get("fault") else OURS}
         for row in rows
+    ]  # fmt: skip
+
+
+def of_meshes(where: str, held: Callable[[Any], list[Row]]) -> Callable[[Any], list[Row]]:
+    """The sentences on curves from mesh to mesh.
+
+    What does not hold on all meshes is the paper's: the curves are those of other programs,
+    too, and what they tend to is a matter of three meshes.
+    """
+    return lambda found: [
+        {"where": where, "claim": row["claim"],
+         "verdict": AGREES if row["verdict"] == "holds" else PAPER}
+        for row in held(found)
     ]  # fmt: skip
 
 
@@ -46,22 +60,66 @@ def of_vee(found: dict[str, Any]) -> list[Row]:
     return rows
 
 
-def of_friction(found: dict[str, list[float]]) -> list[Row]:
-    """Figure 11 prints curves, and no values of friction in what the text has."""
-    counts = [len(folds) for folds in found.values()]
-    grows = counts == sorted(counts) and set(counts) == {0, 2}
+def of_friction(figure: str) -> Callable[[dict[str, Any]], list[Row]]:
+    """Figures 11 and 14 show curves for values of friction that the text does not have."""
+
+    def rows(found: dict[str, Any]) -> list[Row]:
+        folds = [x["folds"] if isinstance(x, dict) else x for x in found.values()]
+        counts = [len(x) for x in folds]
+        grows = counts == sorted(counts) and set(counts) == {0, 2}
+        return [
+            {"where": figure, "claim": "no folds for small friction, two for large",
+             "verdict": AGREES if grows else OURS},
+            {"where": figure, "claim": "one curve per coefficient (values not in the text)",
+             "verdict": PAPER},
+        ]  # fmt: skip
+
+    return lambda found: rows(_first_mesh(found))
+
+
+def _first_mesh(found: dict[str, Any]) -> dict[str, Any]:
+    """The values of friction of the first mesh, where there are several."""
+    first = next(iter(found.values()))
+    return found if isinstance(first, list) or "folds" in first else first
+
+
+def of_block(found: dict[str, Any]) -> list[Row]:
+    """The three solutions of figure 13, on every mesh."""
+    rows = []
+    for squares, run in found.items():
+        known = next(iter(run["runs"].values())) if "runs" in run else run
+        states = [one["corner"] for one in known["at 0.495"]]
+        rows.append({
+            "where": f"figure 13, {squares} squares",
+            "claim": "three solutions at 0.495: separated, right slip, stick",
+            "verdict": AGREES if states == ["f", "-", "s"] else OURS,
+        })  # fmt: skip
+    return rows
+
+
+def of_block_by_theirs(found: dict[str, Any]) -> list[Row]:
+    """The block by the paper's algorithms and settings."""
     return [
-        {"where": "figure 11", "claim": "no folds for small friction, two for large",
-         "verdict": AGREES if grows else OURS},
-        {"where": "figure 11", "claim": "curves for six coefficients, whose values are missing",
-         "verdict": PAPER},
+        {"where": f"section 3.2.2, {squares} squares",
+         "claim": "algorithms 1 and 2 follow the whole curve, over two folds",
+         "verdict": AGREES if len(run["folds"]) == 2 and set(run["stops"]) == {"interval"}
+         else OURS}
+        for squares, run in found.items()
     ]  # fmt: skip
 
 
 SOURCES: dict[str, Callable[[Any], list[Row]]] = {
-    **{f"example{k}": of_example(f"example{k}") for k in range(1, 6)},
+    **{f"example{k}": of_rows(f"example {k}") for k in range(1, 6)},
+    "first-order": of_rows("section 3.1.1"),
     "vee": of_vee,
-    "friction": of_friction,
+    "vee-curves": of_meshes("figure 9", convergence.vee_claims),
+    "friction": of_friction("figure 11"),
+    "stress": of_rows("section 3.2.2, stress"),
+    "block": lambda found: [
+        *of_block(found), *of_meshes("figure 12", convergence.block_claims)(found)
+    ],
+    "block-paper": of_block_by_theirs,
+    "block-friction": of_friction("figure 14"),
 }
 
 
