@@ -20,6 +20,7 @@ from ...clock import NEVER, Deadline
 from ...errors import InvalidInput
 from ...evolution.passage import Arrival
 from ...model.large_deformation import LargeDeformation
+from ...options import check_options
 from ...problem import FrictionProblem
 from ...solvers.base import Breakdown, Target
 from .continuation import Continuation
@@ -54,6 +55,7 @@ class PathCrossing:
     ahead: float = 0.0
 
     def __post_init__(self) -> None:
+        check_options(self)
         if self.max_points < 2:
             raise InvalidInput(f"max_points: expected at least 2, got {self.max_points}")
         if not 0 < self.back < np.inf:
