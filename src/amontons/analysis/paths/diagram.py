@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from ...clock import Deadline, now
 from ...errors import SingularOperator, TimeUp, UnsupportedForm
 from .continuation import Continuation
-from .event_tracking import leaving
 from .following import Limits, follow_path, track_both
 from .friction_path import FrictionPath
 from .path import Branch, EventKind, same, timed
+from .straight import leaving
 from .tangents import Tangent
 
 Array = NDArray[np.float64]

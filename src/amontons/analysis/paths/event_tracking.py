@@ -22,15 +22,14 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InvalidInput, SingularOperator, UnsupportedForm
-from .first_order import first_order
+from ...errors import InvalidInput, SingularOperator
 from .friction_path import FrictionPath
 from .path import Event, EventKind, Point, Stop, weight_of
-from .tangents import FirstOrder, Tangent
+from .straight import TIE, check_straight, leaving
+from .tangents import Tangent
 
 Array = NDArray[np.float64]
 NONE = 1e-13  # rate of a condition, relative to the largest, that counts as zero
-TIE = 1e-10  # scaled condition that counts as zero at an event
 EXACT = 1e-11  # rest of the equations above which the inverse is made anew
 RENEWAL = 100  # events after which it is made anew in any case
 SIGN = {"+": 1.0, "-": -1.0}
@@ -222,21 +221,6 @@ class Line:
         self.inverse[beside] += change * self.inverse[normal]
         self.driver[normal] -= change * self.driver[beside]
         self.sign[i] = -self.sign[i]
-
-
-def leaving(path: FrictionPath, y: Array, p: float) -> FirstOrder:
-    """All one-sided branches at a solution, one without a border having two."""
-    check_straight(path)
-    return first_order(path, y, p, tolerance=TIE * max(1.0, float(np.abs(y).max(initial=0))))
-
-
-def check_straight(path: FrictionPath) -> None:
-    """Raise UnsupportedForm where the pieces are not straight lines."""
-    if not path.straight or path.tresca:
-        raise UnsupportedForm(
-            "event tracking: expected a 2D problem with Coulomb friction and a load parameter, "
-            "whose pieces are straight lines; use method='general'"
-        )
 
 
 def track(

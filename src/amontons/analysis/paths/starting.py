@@ -7,9 +7,10 @@ from numpy.typing import NDArray
 
 from ...errors import InvalidInput, SingularOperator
 from ...problem import FrictionProblem
-from .event_tracking import leaving, track
+from .event_tracking import track
 from .friction_path import FrictionPath
 from .path import PathProblem, Stop, corrected, timed
+from .straight import leaving
 
 Array = NDArray[np.float64]
 ON_CURVE = 1e-9  # scaled residual of a state that counts as a solution

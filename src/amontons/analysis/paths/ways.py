@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from ...errors import SingularOperator
 from .continuation import Continuation
-from .event_tracking import check_straight, leaving, track
+from .event_tracking import track
 from .friction_path import FrictionPath
 from .meeting import EventsSeen, LinesSeen
 from .path import Branch, Event, PathProblem, Point, weight_of
+from .straight import check_straight, leaving
 from .tangents import FirstOrder, Tangent
 
 Array = NDArray[np.float64]
