@@ -14,7 +14,7 @@ from typing import Any
 import click
 
 from ..record import check_parts, heading, levels_of, regenerate, stored
-from . import block, convergence, examples, figure2, tables, vee, vee_curves
+from . import block, convergence, disc, examples, figure2, tables, vee, vee_curves
 
 HERE = Path(__file__).parent
 REFERENCE = json.loads((HERE / "reference.json").read_text())
@@ -27,6 +27,7 @@ def _example(name: str) -> Work:
 
 WORK: dict[str, Work] = {
     **{name: _example(name) for name in examples.EXAMPLES},
+    "example5-model": disc.run,
     "figure2": figure2.run,
     "vee": vee.run,
     "vee-curves": vee_curves.run,
@@ -40,6 +41,7 @@ PAGES: dict[str, Callable[[Any], list[str]]] = {
     **{
         name: (lambda rows, name=name: tables.example(name, rows)) for name in examples.EXAMPLES
     },
+    "example5-model": lambda rows: ["## Example 5 as a model", "", *tables.table(rows)],
     "figure2": lambda rows: ["## Null directions (figure 2)", "", *tables.table(rows)],
     "vee": lambda found: tables.vee(found, REFERENCE["vee"]),
     "vee-curves": lambda found: convergence.page(
@@ -69,9 +71,9 @@ DRAWN = {  # from all levels that are stored
 def main(parts: tuple[str, ...], levels: str, results: Path | None) -> None:
     """Continuation through folds, as in the paper of 2014.
 
-    PART is example1 … example5, figure2, vee, vee-curves, friction, friction-curves, block,
-    block-paper or block-friction; all of them by default.  Numbers of other parts stay as they
-    are stored.
+    PART is example1 … example5, example5-model, figure2, vee, vee-curves, friction,
+    friction-curves, block, block-paper or block-friction; all of them by default.  Numbers of
+    other parts stay as they are stored.
     """
     check_parts(parts, tuple(WORK))
     chosen = levels_of(levels, min(vee.LEVELS), max(vee.LEVELS))
