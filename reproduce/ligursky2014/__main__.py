@@ -14,7 +14,7 @@ from typing import Any
 import click
 
 from ..record import check_parts, heading, levels_of, regenerate, stored
-from . import block, convergence, disc, examples, figure2, tables, vee, vee_curves
+from . import block, convergence, disc, examples, figure2, tables, time_steps, vee, vee_curves
 
 HERE = Path(__file__).parent
 REFERENCE = json.loads((HERE / "reference.json").read_text())
@@ -36,6 +36,7 @@ WORK: dict[str, Work] = {
     "block": block.run,
     "block-paper": block.run_theirs,
     "block-friction": block.run_friction,
+    "time-steps": time_steps.run,
 }
 PAGES: dict[str, Callable[[Any], list[str]]] = {
     **{
@@ -51,6 +52,7 @@ PAGES: dict[str, Callable[[Any], list[str]]] = {
     "friction-curves": vee_curves.page_friction,
     "block": lambda found: block.page(found, REFERENCE.get("block", {})),
     "block-friction": block.page_friction,
+    "time-steps": time_steps.page,
 }
 FIGURES = {"figure2": ("2",), "vee-curves": ("9", "10"), "friction-curves": ("11",),
            "block": ("12", "13"), "block-friction": ("14",)}  # fmt: skip
@@ -72,8 +74,8 @@ def main(parts: tuple[str, ...], levels: str, results: Path | None) -> None:
     """Continuation through folds, as in the paper of 2014.
 
     PART is example1 … example5, example5-model, figure2, vee, vee-curves, friction,
-    friction-curves, block, block-paper or block-friction; all of them by default.  Numbers of
-    other parts stay as they are stored.
+    friction-curves, block, block-paper, block-friction or time-steps; all of them by default.
+    Numbers of other parts stay as they are stored.
     """
     check_parts(parts, tuple(WORK))
     chosen = levels_of(levels, min(vee.LEVELS), max(vee.LEVELS))

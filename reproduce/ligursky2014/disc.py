@@ -91,3 +91,13 @@ def run(levels: Sequence[int], out: Path) -> list[dict[str, Any]]:
             "solutions at 0.47": len(branch.at(0.47)),
         })  # fmt: skip
     return rows
+
+
+def statements(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """What the paper says of both radii."""
+    return [
+        {"where": f"example 5 as a model, r = {row['r']:g}",
+         "claim": "a fold where slip begins" if row["r"] == min(RADII) else "no fold",
+         "verdict": "agrees" if row["off"] <= 1e-10 else "ours"}
+        for row in rows
+    ]  # fmt: skip
