@@ -17,7 +17,6 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 import amontons as am
-from amontons.analysis.paths.continuation import Switch
 from amontons.files import replacing
 
 from . import convergence
@@ -152,7 +151,7 @@ def run(levels: Sequence[int], out: Path) -> Iterator[dict[str, Any]]:
 
 def run_theirs(levels: Sequence[int], out: Path) -> Iterator[dict[str, Any]]:
     """The block on each level by the algorithms and settings of the paper."""
-    options = am.Continuation(**PAPER, switch=Switch.TANGENT)
+    options = am.Continuation(**PAPER, switch=am.Switch.TANGENT)
     for level in chosen(levels):
         branch, cpu = timed(LEVELS[level], options)
         yield {str(2 * LEVELS[level] ** 2): record(branch, cpu) | {"curve": curve(branch)}}
