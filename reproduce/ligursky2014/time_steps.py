@@ -21,8 +21,8 @@ FIRST = 0.05  # of the block: with it its corner touches
 
 
 def run(levels: Sequence[int], out: Path) -> dict[str, Any]:
-    """The V-shaped body on the coarsest mesh; the block's first step."""
-    return {"vee": [vee_row(min(levels), step) for step in STEPS],
+    """The V-shaped body on the coarsest of its meshes; the block's first step."""
+    return {"vee": [vee_row(vee.coarsest(levels), step) for step in STEPS],
             "block": [block_row(True), block_row(False)]}  # fmt: skip
 
 
