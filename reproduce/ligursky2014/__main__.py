@@ -82,9 +82,9 @@ def main(parts: tuple[str, ...], levels: str, results: Path | None) -> None:
     out = results or HERE / "results"
     chosen_parts = parts or tuple(WORK)
     text = regenerate(out, chosen_parts, lambda p: (p, WORK[p](chosen, out)), page)
+    found = stored(out)
     for part, (name, draw) in DRAWN.items():
-        if part in chosen_parts:
-            found = stored(out)
+        if part in found and any(one.startswith(part) for one in chosen_parts):
             draw(_with_theirs(found) if part == "block" else found[part], out / name)
     click.echo(text)
 
@@ -94,19 +94,18 @@ def page(record: dict[str, Any]) -> str:
     lines = heading("ligursky2014", record)
     for part, make in PAGES.items():
         if part in record:
-            whole = part == "block" and "block-paper" in record
-            lines += make(_with_theirs(record) if whole else record[part])
+            lines += make(_with_theirs(record) if part == "block" else record[part])
             lines += [f"![Figure {name}](figure{name}.png)\n" for name in FIGURES.get(part, ())]
     return "\n".join(lines)
 
 
 def _with_theirs(record: dict[str, Any]) -> dict[str, Any]:
     """The runs on the block with those by the algorithms of the paper among them."""
-    out = {}
-    for squares in sorted({*record["block"], *record["block-paper"]}, key=int):
-        one = dict(record["block"].get(squares, {}))
-        if squares in record["block-paper"]:
-            theirs = record["block-paper"][squares]
+    out, by_theirs = {}, record.get("block-paper", {})
+    for squares, found in record["block"].items():
+        one = dict(found)
+        if squares in by_theirs:
+            theirs = by_theirs[squares]
             one["runs"] = {**one.get("runs", {}), block.THEIRS: theirs}
             one["curve"] = theirs["curve"]
         out[squares] = one
