@@ -14,7 +14,20 @@ from typing import Any
 import click
 
 from ..record import check_parts, heading, levels_of, regenerate, stored
-from . import block, convergence, disc, examples, figure2, tables, time_steps, vee, vee_curves
+from . import (
+    block,
+    claims,
+    convergence,
+    disc,
+    examples,
+    figure2,
+    rates,
+    stress,
+    tables,
+    time_steps,
+    vee,
+    vee_curves,
+)
 
 HERE = Path(__file__).parent
 REFERENCE = json.loads((HERE / "reference.json").read_text())
@@ -33,6 +46,8 @@ WORK: dict[str, Work] = {
     "vee-curves": vee_curves.run,
     "friction": vee.run_friction,
     "friction-curves": vee_curves.run_friction,
+    "first-order": lambda levels, out: rates.rows(),
+    "stress": lambda levels, out: stress.rows(),
     "block": block.run,
     "block-paper": block.run_theirs,
     "block-friction": block.run_friction,
@@ -50,6 +65,9 @@ PAGES: dict[str, Callable[[Any], list[str]]] = {
     ),
     "friction": tables.friction,
     "friction-curves": vee_curves.page_friction,
+    "first-order": lambda rows: ["## First-order systems (section 3.1.1)", "",
+                                 *tables.table(rows)],
+    "stress": lambda rows: ["## Stress of the block (section 3.2.2)", "", *tables.table(rows)],
     "block": lambda found: block.page(found, REFERENCE.get("block", {})),
     "block-friction": block.page_friction,
     "time-steps": time_steps.page,
@@ -73,9 +91,9 @@ DRAWN = {  # from all levels that are stored
 def main(parts: tuple[str, ...], levels: str, results: Path | None) -> None:
     """Continuation through folds, as in the paper of 2014.
 
-    PART is example1 … example5, example5-model, figure2, vee, vee-curves, friction,
-    friction-curves, block, block-paper, block-friction or time-steps; all of them by default.
-    Numbers of other parts stay as they are stored.
+    PART is example1 … example5, example5-model, figure2, first-order, vee, vee-curves,
+    friction, friction-curves, stress, block, block-paper, block-friction or time-steps; all of
+    them by default.  Numbers of other parts stay as they are stored.
     """
     check_parts(parts, tuple(WORK))
     chosen = levels_of(levels, min(vee.LEVELS), max(vee.LEVELS))
@@ -92,10 +110,13 @@ def main(parts: tuple[str, ...], levels: str, results: Path | None) -> None:
 def page(record: dict[str, Any]) -> str:
     """All tables of what is stored."""
     lines = heading("ligursky2014", record)
+    held = claims.collected(record)
+    lines[2:2] = [claims.line(held), ""]
     for part, make in PAGES.items():
         if part in record:
             lines += make(_with_theirs(record) if part == "block" else record[part])
             lines += [f"![Figure {name}](figure{name}.png)\n" for name in FIGURES.get(part, ())]
+    lines += ["## All statements", "", *tables.table(held)]
     return "\n".join(lines)
 
 

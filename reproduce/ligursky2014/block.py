@@ -306,41 +306,6 @@ def page(found: dict[str, Any], known: dict[str, Any]) -> list[str]:
     ]  # fmt: skip
 
 
-def statements(found: dict[str, Any]) -> list[dict[str, Any]]:
-    """What the paper says of the block: figures 12 and 13, and that its algorithms pass."""
-    rows = convergence.statements("figure 12", convergence.block_claims(found))
-    for squares in sorted(found, key=int):
-        runs = found[squares]["runs"]
-        corners = [one["corner"] for one in next(iter(runs.values()))["at 0.495"]]
-        rows.append({
-            "where": f"figure 13, {squares} squares",
-            "claim": "three solutions at 0.495: separated, right slip, stick",
-            "verdict": "agrees" if corners == ["f", "-", "s"] else "ours",
-        })
-        if THEIRS in runs:
-            one = runs[THEIRS]
-            whole = len(one["folds"]) == 2 and set(one["ends"]) == {"interval"}
-            rows.append({
-                "where": f"section 3.2.2, {squares} squares",
-                "claim": "algorithms 1 and 2 follow the whole curve, over two folds",
-                "verdict": "agrees" if whole else "ours",
-            })
-    return rows
-
-
-def statements_on_friction(found: dict[str, Any]) -> list[dict[str, Any]]:
-    """Figure 14, whose values of friction are missing in what the text has."""
-    rows = []
-    for squares in sorted(found, key=int):
-        counts = [len(row["folds"]) for row in found[squares].values()]
-        forms = counts == sorted(counts) and set(counts) == {0, 2}
-        rows.append({"where": f"figure 14, {squares} squares",
-                     "claim": "two folds form as friction grows",
-                     "verdict": "agrees" if forms else "ours"})  # fmt: skip
-    missing = "curves for several coefficients, whose values are missing"
-    return [*rows, {"where": "figure 14", "claim": missing, "verdict": "paper"}]
-
-
 def page_friction(found: dict[str, Any]) -> list[str]:
     """Folds for several coefficients."""
     rows = [

@@ -184,18 +184,6 @@ def _solutions(one: dict[str, Any]) -> int:
     return sum(row["gamma"] == 0.38 for row in one["rows"])
 
 
-def statements(where: str, claims: list[Row]) -> list[Row]:
-    """The same as statements of the paper: what does not hold on its meshes is its own.
-
-    The values that tell are those of other programs too, see `reference.json`.
-    """
-    return [
-        {"where": where, "claim": row["claim"],
-         "verdict": "agrees" if row["verdict"] == "holds" else "paper"}
-        for row in claims
-    ]  # fmt: skip
-
-
 def page(title: str, rows: list[Row], claims: list[Row]) -> list[str]:
     """The two tables, where there are three meshes."""
     if not rows:

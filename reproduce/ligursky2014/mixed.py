@@ -35,6 +35,10 @@ class FullProblem:
         r = y[self.n :]
         return u.reshape(-1, 2), r.reshape(-1, 2), (r - u).reshape(-1, 2)
 
+    def local(self, y: Array, p: float) -> tuple[Array, Array]:
+        """Displacements and forces of the contacts, (nc, 2) each."""
+        return self._contact(y, p)[:2]
+
     def piece(self, y: Array, p: float) -> NDArray[np.int64]:
         """One number per contact."""
         _, _, z = self._contact(y, p)

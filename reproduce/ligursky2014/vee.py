@@ -12,10 +12,9 @@ from typing import Any
 import numpy as np
 
 import amontons as am
-from amontons.analysis.paths.continuation import Switch
-from amontons.evolution.timed import steady
-from amontons.fem.facets import Cells, Facets
 from amontons.vee import vee
+
+from .mixed import full_problem
 
 HERE = Path(__file__).parent
 LEVELS = {0: 555, 1: 2220, 2: 8880, 3: 35520}
@@ -28,8 +27,10 @@ PAPER = {  # section 3.2.1
 METHODS = {
     "event tracking": None,
     "algorithm 1, first-order system": am.Continuation(),
-    "algorithms 1 and 2, their settings": am.Continuation(**PAPER, switch=Switch.TANGENT),
+    "algorithms 1 and 2, their settings": am.Continuation(**PAPER, switch=am.Switch.TANGENT),
 }
+FULL = "algorithms 1 and 2, H in full"  # as a user writes it, on the coarsest mesh only
+LARGEST = 555  # triangles of that
 
 
 @cache
@@ -37,9 +38,9 @@ def mesh(level: int) -> am.Mesh:
     """The paper's mesh: that of 555 triangles, refined."""
     data = json.loads((HERE / "mesh.json").read_text())
     surfaces = {
-        name: (Facets("line", np.array(data[name])),) for name in ("clamped", "contact")
+        name: (am.Facets("line", np.array(data[name])),) for name in ("clamped", "contact")
     }
-    cells = (Cells("tri", np.array(data["triangles"])),)
+    cells = (am.Cells("tri", np.array(data["triangles"])),)
     return am.refined(am.Mesh(np.array(data["points"]), cells, surfaces), level)
 
 
@@ -55,7 +56,7 @@ def coarsest(levels: Sequence[int]) -> int:
 
 def corner(branch: am.Branch) -> int:
     """The contact at the most left node."""
-    body = steady(vee(branch_mesh(branch)))
+    body = vee(branch_mesh(branch))
     return int(
         np.argmin(body.recover(branch.problem.solution(branch[0].state, 0.0)).points[:, 0])
     )
@@ -78,6 +79,11 @@ def record(branch: am.Branch, cpu: float) -> dict[str, Any]:
             "u_n": -float(solution.u[left, 0]), "u_t": float(solution.u[left, 1]),
             "lam_n": -float(solution.r[left, 0]), "lam_t": float(solution.r[left, 1]),
         })  # fmt: skip
+    return record_of(branch, cpu, rows)
+
+
+def record_of(branch: am.Branch, cpu: float, rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """What is stored of a curve."""
     return {
         "folds": [e.parameter for e in branch.folds], "points": len(branch),
         "status changes": sum(e.kind is am.EventKind.STATUS for e in branch.events),
@@ -96,6 +102,10 @@ def run(levels: Sequence[int], out: Path) -> dict[str, Any]:
             branch = follow(level, options)
             cpu = time.process_time() - began
             found[str(LEVELS[level])][name] = record(branch, cpu)
+            if options is None:
+                tracked = branch
+        if LEVELS[level] <= LARGEST:
+            found[str(LEVELS[level])][FULL] = in_full(tracked)
     return found
 
 
@@ -104,3 +114,25 @@ def run_friction(levels: Sequence[int], out: Path) -> dict[str, Any]:
     level = coarsest(levels)
     branches = {mu: follow(level, None, mu) for mu in FRICTION}
     return {f"{mu:g}": [e.parameter for e in branch.folds] for mu, branch in branches.items()}
+
+
+def in_full(branch: am.Branch) -> dict[str, Any]:
+    """The same of the function H in displacements and forces, which names its pieces only."""
+    problem, start = full_problem(branch)
+    began = time.process_time()
+    found = am.follow(problem, start=start, at=0.0)
+    cpu = time.process_time() - began
+    rows = [
+        path_state(problem, y, GAMMA, corner(branch)) | {"error": 0.0} for y in found.at(GAMMA)
+    ]
+    return record_of(found, cpu, rows) | {"unknowns": len(start)}
+
+
+def path_state(problem: Any, y: np.ndarray, p: float, left: int) -> dict[str, Any]:
+    """Status, displacement and force of a contact of the problem in full."""
+    u, r = problem.local(y, p)
+    return {
+        "status": "fs+-"[problem.piece(y, p)[left]],
+        "u_n": -float(u[left, 0]), "u_t": float(u[left, 1]),
+        "lam_n": -float(r[left, 0]), "lam_t": float(r[left, 1]),
+    }  # fmt: skip

@@ -50,7 +50,7 @@ _HOME = {
                  "PathProblem", "PieceSolution", "RateEquation", "Solutions", "StepPath",
                  "Stop", "Switch", "Tangent", "TangentCone", "ThetaMethod", "Uniqueness",
                  "Verdict", "Witness", "performance_profile"),
-    "fem": ("Mesh", "box", "mesh_shape", "read_cad", "read_mesh", "refined"),
+    "fem": ("Cells", "Facets", "Mesh", "box", "mesh_shape", "read_cad", "read_mesh", "refined"),
     "contact": ("LevelSet", "Nitsche", "Plane", "Sphere"),
     "model": ("Body", "BodyForce", "CiarletGeymonat", "Contact", "ContactFields", "Fix",
               "LinearElastic", "Model", "NeoHookean", "Pressure", "Traction", "distributed"),

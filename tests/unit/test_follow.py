@@ -1,6 +1,8 @@
 """The verbs follow and diagram, and the command line."""
 
 import json
+from dataclasses import fields
+from importlib import resources
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from click.testing import CliRunner
 import amontons as am
 from amontons.analysis.solutions.enumerate import enumerate_solutions
 from amontons.cli import main
+from amontons.cli.sources import open_source
 from amontons.errors import InvalidInput, UnsupportedForm
 from amontons.gallery import one_contact_2d
 from amontons.hild import hild_triangle
@@ -248,3 +251,97 @@ def test_a_change_of_status_at_the_start_is_an_event():
         assert {event.before, event.after} == {"f", "s"}
     ends = am.follow(closed, base=open_, interval=(0.5, 1), start=np.zeros((1, 2)), at=0.5)
     assert not [e for e in ends.events if e.kind is am.EventKind.STATUS]
+
+
+def test_parameters_of_the_algorithm_from_case_file_and_command_line(tmp_path):
+    case, data = tmp_path / "vee.toml", resources.files("amontons") / "examples_data"
+    text = (data / "vee.toml").read_text()
+    (tmp_path / "vee.msh").write_bytes((data / "vee.msh").read_bytes())
+    case.write_text(text + "\n[continuation]\nmax_step = 0.05\nswitch = \"tangent\"\n")
+    counts = []
+    for more in ([], ["--set", "continuation.max_step=0.02"]):
+        done = CliRunner().invoke(main, [
+            "follow", str(case), "--set", "mesh.refine=0", "--json", "-", "-o",
+            str(tmp_path / "out"), *more,
+        ])  # fmt: skip
+        assert done.exit_code == 0, done.output
+        found = json.loads(done.output)
+        folds = [e["parameter"] for e in found["events"] if e["kind"] == "fold"]
+        assert folds == pytest.approx([0.4356565442, 0.3207653196], abs=1e-9)
+        steps = np.diff([point["arclength"] for point in found["points"]])
+        counts.append(steps.max())
+    assert counts[0] > 0.045
+    assert counts[1] < 0.0201
+
+
+@pytest.mark.parametrize("name", [f.name for f in fields(am.Continuation)])
+def test_every_parameter_of_the_algorithm_has_a_key(name):
+    value = {"switch": "tangent", "max_step": 0.2, "grow": 2, "shrink": 0.4, "quick": 3,
+             "corrections": 6, "min_cosine": 0.99, "min_step": 1e-6}  # fmt: skip
+    value = value.get(name, 1e-3)
+    source = open_source("example:hild", [f"continuation.{name}={value}"])
+    options = source.settings.continuation()
+    assert getattr(options, name) == (am.Switch.TANGENT if name == "switch" else value)
+
+
+@pytest.mark.parametrize(("override", "message"), [
+    ("continuation.swich=tangent", "no such field; did you mean 'switch'"),
+    ("continuation.switch=other", "expected first-order or tangent"),
+    ("continuation.step=-1", "expected 0 < min_step"),
+    ("continuation.ahead=0", "ahead: expected a number > 0"),
+])  # fmt: skip
+@pytest.mark.parametrize("source", ["example:vee", "example:hild"])
+def test_wrong_parameters_of_the_algorithm_are_named(source, override, message):
+    with pytest.raises(am.AmontonsError, match=message):
+        open_source(source, [override])
+
+
+def test_events_and_points_tell_their_index_sets(tmp_path):
+    branch = am.follow(vee(0))
+    for event in branch.events[1:-1]:
+        assert len(event.sets.undecided) == 1  # one contact changes its status at a time
+        (contact,) = event.sets.undecided
+        assert event.before[contact] != event.after[contact]
+    record = branch.record()["events"][1]
+    assert set(record["sets"]) == {f.name for f in fields(am.IndexSets)}
+    middle = branch[len(branch) // 2]
+    sizes = [len(getattr(middle.sets, name)) for name in ("free", "closed", "grazing")]
+    assert sum(sizes) == branch.problem.start.contacts
+    assert "slip" in str(middle.sets)
+
+
+def test_tangents_are_public_and_can_be_followed():
+    a, b = 2.0, 1.0
+    M, H = np.array([[a, -b], [-b, a]]), np.diag([-1.0, 1.0])
+    ends = [am.FrictionProblem.from_global(M, H, load, [[0.0, 0.0]], [a / b])
+            for load in ((1.0, 0.0), (1.0, -1.0))]  # fmt: skip
+    given = {"base": ends[0], "start": [[1.0, 2.0]], "at": 2.0, "interval": (0, 4)}
+    system = am.first_order(ends[1], **given)
+    assert {t.piece for t in system.tangents} == {"s", "+"}
+    for tangent in system.tangents:
+        branch = am.follow(ends[1], **given, along=tangent)
+        assert branch.stops[0] is am.Stop.NOT_STARTED
+        assert branch[0].piece == tangent.piece
+    with pytest.raises(InvalidInput, match="along"):
+        am.follow(ends[1], **given, along=system)
+    with pytest.raises(InvalidInput, match="tolerance"):
+        am.first_order(ends[1], **given, tolerance=0)
+
+
+def test_tangents_of_problems_that_only_name_the_active_piece():
+    class Kink:
+        def residual(self, y, p):
+            return y - 2 * np.maximum(p, 0) + np.minimum(p, 0)
+
+        def jacobian(self, y, p):
+            return np.eye(1), np.array([-2.0 if p > 0 else 1.0])
+
+        def piece(self, y, p):
+            return p > 0
+
+    system = am.first_order(Kink(), start=[0.0], at=0.0, interval=(-1, 1))
+    slopes = sorted((np.sign(t.rate), float(t.direction[0] / t.rate)) for t in system.tangents)
+    np.testing.assert_allclose(slopes, [(-1, -1), (1, 2)], atol=1e-9)
+    assert not system.complete
+    inside = am.first_order(Kink(), start=[1.0], at=0.5, interval=(-1, 1))
+    assert len(inside.tangents) == 2

@@ -168,3 +168,28 @@ def test_run_tells_the_jump(tmp_path):
     )
     assert wrong.exit_code == 2
     assert "evolution.crossing" in wrong.output and "true or false" in wrong.output
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_all_solutions_of_a_step_that_its_path_reaches(side):
+    """At q_N = 0.2 the contact of the first test sticks, slips and is open."""
+    before, step = (one_contact(q, -1.0, side=side) for q in (0.1, 0.2))
+    r = -np.linalg.solve(before.W, np.ravel(before.q)).reshape(1, 2)
+    alone = am.PathCrossing().between(before, step, r)
+    assert alone.branch is None
+    found = am.PathCrossing(ahead=2).between(before, step, r)
+    np.testing.assert_allclose(found.r, alone.r, atol=1e-14)
+    assert found.folds == alone.folds == ()
+    solutions = [found.branch.problem.solution(y, 1.0) for y in found.branch.at(1.0)]
+    assert [s.pattern for s in solutions] == ["s", "+" if side == 1 else "-", "f"]
+    assert len(am.all_solutions(step)) == 3
+    with pytest.raises(am.InvalidInput, match="ahead"):
+        am.PathCrossing(ahead=-1)
+
+
+def test_the_passage_of_a_step_has_all_its_solutions():
+    crossing = am.PathCrossing(ahead=5)
+    for step in am.evolve(arm(), am.QuasiStatic(0.1, crossing=crossing), until=1.5):
+        assert step.passage.branch is not None
+    several = step.passage.branch.at(1.0)
+    assert len(several) == len(am.all_solutions(step.solution.problem)) == 3

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,7 @@ class Arrival:
     r: Array
     v: Array | None
     folds: tuple[float, ...]
+    branch: Any = None  # the whole path, a Branch, where it was asked for
 
 
 class Crossing(Protocol):
@@ -63,12 +64,15 @@ class Passage:
     """The path of one step.
 
     folds: times at which it turned; arrived: False where the path does not lead to the step,
-    whose solution then comes from a solver alone, and may be another one.
+    whose solution then comes from a solver alone, and may be another one.  branch: the whole
+    path where the crossing was to go on beyond the step: `branch.at(1)` are all solutions of
+    the step on it.
     """
 
     folds: tuple[float, ...]
     arrived: bool
     reason: str = ""
+    branch: Any = None
 
     @property
     def jumped(self) -> bool:
@@ -117,4 +121,4 @@ def _passed(
         return Iterate(r), Passage((), False, str(reason))
     before, after = times
     folds = tuple(before + share * (after - before) for share in found.folds)
-    return Iterate(found.r, found.v), Passage(folds, True)
+    return Iterate(found.r, found.v), Passage(folds, True, branch=found.branch)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,13 +14,12 @@ from . import checks
 from .continuation import Continuation
 from .corrector import Curve
 from .first_order import first_order
-from .following import Limits, continue_both, track_both
+from .following import Limits, continue_both, follow_along
 from .parametrised import first_state, path_of, state_of
 from .path import Branch, PathProblem, timed
 from .probes import by_probes
 from .starting import polished
 from .tangents import FirstOrder, Tangent
-from .ways import is_straight
 
 if TYPE_CHECKING:
     from ...model import Model
@@ -57,8 +57,10 @@ def tangents_at(path: PathProblem, y: Array, p: float, tolerance: float) -> Firs
         raise InvalidInput(f"tolerance: expected a number > 0, got {tolerance!r}")
     y = polished(path, y, p)
     if Continuation().knows_pieces(path):
-        return first_order(path, y, p, tolerance=tolerance)
-    return by_probes(Curve(path, len(y)), y, p, Continuation())
+        found = first_order(path, y, p, tolerance=tolerance)
+    else:
+        found = by_probes(Curve(path, len(y)), y, p, Continuation())
+    return replace(found, problem=path)
 
 
 def followed_along(
@@ -71,6 +73,6 @@ def followed_along(
             f"along: expected one of the tangents of first_order at the start, got {along!r}"
         )
     y = polished(path, y, p)
-    if is_straight(path) and options is None:
-        return track_both(path, y, p, limits, tangent=along)  # type: ignore[arg-type]
+    if options is None:
+        return follow_along(path, y, p, limits, along)
     return continue_both(path, y, p, limits, options, tangent=along)

@@ -11,16 +11,17 @@ else by the simple tangent switch (`walk_by_pieces`, `walk_by_switch`; `walk` fo
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InvalidInput
+from ...options import check_options
 from .corrector import Curve, Tolerances
 from .first_order import first_order
-from .path import Event, PathProblem, Point, is_number
+from .path import Event, PathProblem, Point
 from .probes import by_probes
 from .tangents import FirstOrder, Tangent
 from .walk_by_pieces import WalkByPieces
@@ -62,15 +63,7 @@ class Continuation:
     switch: Switch | None = None  # None: by the first-order system where the problem allows it
 
     def __post_init__(self) -> None:
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if value is None and item.default is None:
-                continue
-            if item.name == "switch":
-                if not isinstance(value, Switch):
-                    raise InvalidInput(f"switch: expected a Switch, got {value!r}")
-            elif not is_number(value):
-                raise InvalidInput(f"{item.name}: expected a number, got {value!r}")
+        check_options(self)
         self._check_ranges()
 
     def _check_ranges(self) -> None:

@@ -241,6 +241,16 @@ def _with_branch_point(
     return replace(branch, events=tuple(events))
 
 
+def follow_along(
+    problem: PathProblem, y: Array, p: float, limits: Limits, tangent: Tangent,
+    options: Continuation | None = None,
+) -> Branch:  # fmt: skip
+    """The branch from an exact solution along one tangent, as far as `follow_path` does."""
+    if is_straight(problem):
+        return track_both(problem, y, p, limits, tangent=tangent)  # type: ignore[arg-type]
+    return continue_both(problem, y, p, limits, options, tangent=tangent)
+
+
 def follow_path(
     problem: PathProblem, y: Array, p: float, limits: Limits, *,
     method: Method | None = None, options: Continuation | None = None,

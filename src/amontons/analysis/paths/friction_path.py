@@ -107,6 +107,10 @@ class FrictionPath:
         record = judged(error, problem.measure, now() - began)
         return FrictionSolution(problem, told.r, np.array(u), v, record, settled=told)
 
+    def reaction_rates(self, direction: Array) -> Array:
+        """r', (nc, d), of a direction y' (m,)."""
+        return (direction * self.to_r).reshape(self.start.contacts, -1)
+
     def state(self, r: Array) -> Array:
         """The unknowns y (m,) of reactions r, (nc, d)."""
         return np.asarray(r, dtype=float).ravel() / self.to_r

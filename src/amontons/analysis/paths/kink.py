@@ -25,11 +25,12 @@ from .path import name_of
 
 Array = NDArray[np.float64]
 CLOSED = 1e-14  # length of an interval that is not divided any more, or that of rounding
-SURE = 1e-2  # by which a zero of (1) may be off, in the square of the interval
+SURE = 1e-3  # by which a zero of (1) may be off, in the square of the interval
 BASELINE = 1e-5  # distance of two points from which the curve's bend is measured
 LARGE = 1e-3  # of the largest row, of one that counts
 BEHIND = 1e-9  # distance from a kink at which its next piece has begun
-PATIENCE = 3  # steps from one halving to the next
+PATIENCE = 5  # steps from one halving to the next
+WIDER = 4.0  # growth of an interval whose end was predicted too early
 ROUNDS = 120
 
 
@@ -58,7 +59,7 @@ class KinkSearch:
         """
         low, high, start = 0.0, step, self.base
         near = 0  # 1: just before a zero of (1), 2: just after it
-        zero = spread = 0.0
+        zero, spread, guessed = 0.0, 0.0, True  # guessed: high is beyond by prediction only
         for count in range(ROUNDS):
             if high - low <= CLOSED:
                 break
@@ -70,14 +71,22 @@ class KinkSearch:
                 if found is not None:
                     spread = max(SURE * (high - low) ** 2, CLOSED / 4)
                     zero, s, near = found, max(found - spread, (low + found) / 2), 1
-            spot = self._on_piece(s)
+            predicted = self._is_own(*self._predicted(s))
+            spot = self._on_piece(s) if predicted else None
             if spot is None:
-                high, near = s, 0
+                high, near, guessed = s, 0, not predicted
             else:
                 low, near = s, 2 if near == 1 else 0
                 self._move(spot, s)
+                high = self._revised(low, high, step) if guessed else high
         ends = self._ends()
         return None if self.base is start and not ends else (self.base, ends)
+
+    def _revised(self, low: float, high: float, step: float) -> float:
+        """A bound that is beyond the border as predicted from nearby, too."""
+        while high < step and self._is_own(*self._predicted(high)):
+            high = min(step, low + WIDER * (high - low))
+        return high
 
     def _ends(self) -> bool:
         """True where another piece is active just ahead."""
@@ -92,10 +101,8 @@ class KinkSearch:
         return y + h * h / 2 * self.bend[:-1], p + h * h / 2 * float(self.bend[-1])
 
     def _on_piece(self, s: float) -> Spot | None:
-        """The point of the curve at s; None where that is not on the piece."""
+        """The point of the curve at s, predicted there; None where it is not on the piece."""
         y, p = self._predicted(s)
-        if not self._is_own(y, p):
-            return None
         b = self.base
         found = self.curve.correct(y, p, b.ty, b.tp, self.tolerances)
         if found is None:

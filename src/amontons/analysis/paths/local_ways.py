@@ -21,6 +21,7 @@ from .tangents import SAME, Tangent, product
 Array = NDArray[np.float64]
 SURE = (1e-4, 1e-5)  # distances at which a false direction has no solution
 SHORT = (1e-6, 1e-7, 1e-8)  # where the next kink, or a fold, is nearer
+BEGIN = 1e-7  # where every direction has a solution
 TOLD = (1e-3, 1e-4, 1e-5)  # where curves with one tangent are held against each other
 ASIDE = 1e-7  # distance of probes around the point
 ALONG = 1e-6  # of probes along a direction
@@ -125,7 +126,8 @@ class LocalWays:
                 continue
             spot = self._solution(t, h)
             if spot is not None and self._piece(spot.y, spot.p) == t.piece:
-                return self._surely(t, h)
+                begins = self._solution(t, BEGIN) is not None  # not behind the next kink
+                return self._surely(t, h) if begins else None
         return None
 
     def _surely(self, t: Tangent, h: float) -> float:

@@ -11,6 +11,7 @@ jump says where, and not how, it lands.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,13 +20,16 @@ from ...clock import NEVER, Deadline
 from ...errors import InvalidInput
 from ...evolution.passage import Arrival
 from ...model.large_deformation import LargeDeformation
+from ...options import check_options
 from ...problem import FrictionProblem
 from ...solvers.base import Breakdown, Target
 from .continuation import Continuation
+from .following import Limits, follow_along
 from .friction_path import FrictionPath
 from .load_path import LoadPath
-from .path import EventKind
+from .path import Branch, EventKind
 from .starting import polished
+from .tangents import Tangent
 from .ways import way_of
 
 Array = NDArray[np.float64]
@@ -40,18 +44,24 @@ class PathCrossing:
     motion; as `NonlinearNewton(crossing=...)` where load steps end.
 
     options: those of steps along paths that are not straight; max_points of a path; back: how
-    far it may lead back, in steps: small steps meet the second fold of a jump far behind.
+    far it may lead back, in steps: small steps meet the second fold of a jump far behind;
+    ahead: how far beyond the step, in steps, it is followed for all solutions of the step that
+    it reaches: then `Arrival.branch` and `Passage.branch` are that path, `branch.at(1)` these.
     """
 
     options: Continuation = Continuation()
     max_points: int = 2000
     back: float = 1000.0
+    ahead: float = 0.0
 
     def __post_init__(self) -> None:
+        check_options(self)
         if self.max_points < 2:
             raise InvalidInput(f"max_points: expected at least 2, got {self.max_points}")
         if not 0 < self.back < np.inf:
             raise InvalidInput(f"back: expected a number of steps > 0, got {self.back}")
+        if not 0 <= self.ahead < np.inf:
+            raise InvalidInput(f"ahead: expected a number of steps >= 0, got {self.ahead}")
 
     def between(
         self, before: FrictionProblem, step: FrictionProblem, r: Array,
@@ -62,9 +72,9 @@ class PathCrossing:
         Raises Breakdown with the reason where the path does not lead there.
         """
         path = FrictionPath(before, step)
-        y, folds = self._arrived(path, _start(path, path.state(r)), 0.0, deadline)
+        y, folds, branch = self._reached(path, _start(path, path.state(r)), deadline)
         found = (y * path.to_r).reshape(r.shape)
-        return Arrival(found, step.velocity(found)[1], folds)
+        return Arrival(found, step.velocity(found)[1], folds, branch)
 
     def along(
         self, step: LargeDeformation, drift: Array, deadline: Deadline = NEVER
@@ -75,8 +85,8 @@ class PathCrossing:
         """
         load, prescribed, v = step.known  # type: ignore[misc]
         path = LoadPath(step, load, prescribed, drift)
-        y, folds = self._arrived(path, _start(path, v), 0.0, deadline)
-        return Arrival(step.reactions(y), y, folds)
+        y, folds, branch = self._reached(path, _start(path, v), deadline)
+        return Arrival(step.reactions(y), y, folds, branch)
 
     def across(
         self, problem: LargeDeformation, share: float, v: Array, target: Target
@@ -92,17 +102,42 @@ class PathCrossing:
         y, folds = self._arrived(path, *_on_path(path, v, share), limit)
         return y, _told(folds)
 
+    def _reached(
+        self, path: FrictionPath | LoadPath, y: Array, deadline: Deadline
+    ) -> tuple[Array, tuple[float, ...], Branch | None]:
+        """(state where the path first arrives, folds on the way, the path beyond or None)."""
+        if self.ahead == 0:
+            return *self._arrived(path, y, 0.0, deadline), None
+        left = deadline.left if np.isfinite(deadline.moment) else None
+        limits = Limits((-self.back, 1.0 + self.ahead), self.max_points, left)
+        onward = self._onward(path, y, 0.0)
+        branch = follow_along(path, y, 0.0, limits, onward, self.options)
+        found = branch.at(1.0)
+        if not found:
+            reason = branch.stops[1].advice
+            raise Breakdown(f"the path of the load does not lead to its end: {reason}")
+        first = next(
+            a for a, b in pairwise(branch) if (a.parameter - 1) * (b.parameter - 1) <= 0
+        )
+        folds = (e.parameter for e in branch.folds if e.arclength <= first.arclength)
+        return found[0], tuple(folds), branch
+
+    def _onward(self, path: FrictionPath | LoadPath, y: Array, share: float) -> Tangent:
+        """The tangent along which the load grows; raises Breakdown where there is none."""
+        system = way_of(path, self.options).leaving(path, y, share)
+        onward = [t for t in system.tangents if t.rate > 0]
+        if not onward:
+            raise Breakdown(f"from {share:.6g} of the load none leads on")
+        return onward[0]
+
     def _arrived(
         self, path: FrictionPath | LoadPath, y: Array, share: float,
         deadline: Deadline,
     ) -> tuple[Array, tuple[float, ...]]:  # fmt: skip
         """(state at share 1, folds on the way) along the path from a solution."""
-        way = way_of(path, self.options)
-        onward = [t for t in way.leaving(path, y, share).tangents if t.rate > 0]
-        if not onward:
-            raise Breakdown(f"from {share:.6g} of the load none leads on")
+        way, onward = way_of(path, self.options), self._onward(path, y, share)
         folds: list[float] = []
-        walk = way.steps(path, y, share, onward[0], (-self.back, 1.0))
+        walk = way.steps(path, y, share, onward, (-self.back, 1.0))
         for count, (point, event) in enumerate(walk):
             if event is not None and event.kind is EventKind.FOLD:
                 folds.append(event.parameter)

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -48,7 +48,7 @@ class FirstOrder:
     """All one-sided tangents at a point; complete: no piece was left out and none has a set.
 
     sets: pieces with more than one tangent line: there solutions are not isolated; cones: all
-    tangents into these.
+    tangents into these.  problem: the path whose unknowns the directions are in.
     """
 
     tangents: tuple[Tangent, ...]
@@ -56,6 +56,7 @@ class FirstOrder:
     complete: bool = True
     reason: str = ""
     cones: tuple[TangentCone, ...] = ()
+    problem: Any = field(default=None, repr=False)
 
     def others(
         self, direction: Array, rate: float, weight: float, piece: Hashable
