@@ -18,11 +18,13 @@ from . import (
     block,
     claims,
     convergence,
+    disc,
     examples,
     figure2,
     rates,
     stress,
     tables,
+    time_steps,
     vee,
     vee_curves,
 )
@@ -38,6 +40,7 @@ def _example(name: str) -> Work:
 
 WORK: dict[str, Work] = {
     **{name: _example(name) for name in examples.EXAMPLES},
+    "example5-model": disc.run,
     "figure2": figure2.run,
     "vee": vee.run,
     "vee-curves": vee_curves.run,
@@ -48,11 +51,13 @@ WORK: dict[str, Work] = {
     "block": block.run,
     "block-paper": block.run_theirs,
     "block-friction": block.run_friction,
+    "time-steps": time_steps.run,
 }
 PAGES: dict[str, Callable[[Any], list[str]]] = {
     **{
         name: (lambda rows, name=name: tables.example(name, rows)) for name in examples.EXAMPLES
     },
+    "example5-model": lambda rows: ["## Example 5 as a model", "", *tables.table(rows)],
     "figure2": lambda rows: ["## Null directions (figure 2)", "", *tables.table(rows)],
     "vee": lambda found: tables.vee(found, REFERENCE["vee"]),
     "vee-curves": lambda found: convergence.page(
@@ -65,6 +70,7 @@ PAGES: dict[str, Callable[[Any], list[str]]] = {
     "stress": lambda rows: ["## Stress of the block (section 3.2.2)", "", *tables.table(rows)],
     "block": lambda found: block.page(found, REFERENCE.get("block", {})),
     "block-friction": block.page_friction,
+    "time-steps": time_steps.page,
 }
 FIGURES = {"figure2": ("2",), "vee-curves": ("9", "10"), "friction-curves": ("11",),
            "block": ("12", "13"), "block-friction": ("14",)}  # fmt: skip
@@ -85,18 +91,18 @@ DRAWN = {  # from all levels that are stored
 def main(parts: tuple[str, ...], levels: str, results: Path | None) -> None:
     """Continuation through folds, as in the paper of 2014.
 
-    PART is example1 … example5, figure2, first-order, vee, vee-curves, friction,
-    friction-curves, stress, block, block-paper or block-friction; all of them by default.
-    Numbers of other parts stay as they are stored.
+    PART is example1 … example5, example5-model, figure2, first-order, vee, vee-curves,
+    friction, friction-curves, stress, block, block-paper, block-friction or time-steps; all of
+    them by default.  Numbers of other parts stay as they are stored.
     """
     check_parts(parts, tuple(WORK))
     chosen = levels_of(levels, min(vee.LEVELS), max(vee.LEVELS))
     out = results or HERE / "results"
     chosen_parts = parts or tuple(WORK)
     text = regenerate(out, chosen_parts, lambda p: (p, WORK[p](chosen, out)), page)
+    found = stored(out)
     for part, (name, draw) in DRAWN.items():
-        if part in chosen_parts:
-            found = stored(out)
+        if part in found and any(one.startswith(part) for one in chosen_parts):
             draw(_with_theirs(found) if part == "block" else found[part], out / name)
     click.echo(text)
 
@@ -108,8 +114,7 @@ def page(record: dict[str, Any]) -> str:
     lines[2:2] = [claims.line(held), ""]
     for part, make in PAGES.items():
         if part in record:
-            whole = part == "block" and "block-paper" in record
-            lines += make(_with_theirs(record) if whole else record[part])
+            lines += make(_with_theirs(record) if part == "block" else record[part])
             lines += [f"![Figure {name}](figure{name}.png)\n" for name in FIGURES.get(part, ())]
     lines += ["## All statements", "", *tables.table(held)]
     return "\n".join(lines)
@@ -117,11 +122,11 @@ def page(record: dict[str, Any]) -> str:
 
 def _with_theirs(record: dict[str, Any]) -> dict[str, Any]:
     """The runs on the block with those by the algorithms of the paper among them."""
-    out = {}
-    for squares in sorted({*record["block"], *record["block-paper"]}, key=int):
-        one = dict(record["block"].get(squares, {}))
-        if squares in record["block-paper"]:
-            theirs = record["block-paper"][squares]
+    out, by_theirs = {}, record.get("block-paper", {})
+    for squares, found in record["block"].items():
+        one = dict(found)
+        if squares in by_theirs:
+            theirs = by_theirs[squares]
             one["runs"] = {**one.get("runs", {}), block.THEIRS: theirs}
             one["curve"] = theirs["curve"]
         out[squares] = one

@@ -62,7 +62,7 @@ def _columns(rows: Sequence[dict[str, float]]) -> dict[str, list[float]]:
     return {key: [row[key] for row in rows] for key in rows[0]}
 
 
-def thinned(curve: dict[str, list[float]], most: float = 2e-4) -> dict[str, list[float]]:
+def thinned(curve: dict[str, list[float]], most: float = 3e-5) -> dict[str, list[float]]:
     """As few of its points as keep every chord within `most` of the range of each quantity."""
     keys = list(curve)
     points = np.array([curve[key] for key in keys]).T

@@ -85,8 +85,8 @@ def run_friction(levels: Sequence[int], out: Path) -> dict[str, Any]:
         for mu in vee.FRICTION:
             branch = vee.follow(level, None, mu)
             left, weight = corner_rows(level, branch)
-            stress = [at_corner(branch, x.state, x.parameter, left, weight)["T_nu"]
-                      for x in branch]  # fmt: skip
+            forces = (branch.states * branch.problem.to_r).reshape(len(branch), -1, 2)
+            stress = (-forces[:, left, 0] / weight).tolist()
             rows[f"{mu:g}"] = {"folds": [fold.parameter for fold in branch.folds],
                                "gamma": branch.parameter.tolist(), "T_nu": stress}  # fmt: skip
     draw_friction(found, out / "figure11.png")
