@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -9,14 +10,16 @@ from numpy.typing import NDArray
 
 from .clock import compiling, now
 from .cones import Coulomb
-from .judge import EPSILON, Criterion, Measure, Weakest
+from .judge import EPSILON, Criterion, Weakest
 from .nitsche_problem import NitscheProblem
 from .problem import Form, FrictionProblem
 from .settling import Motion, Settled, settled_state
 from .solution import Step
 from .solvers.base import Iterate, natural_error_of
+from .solvers.first_iterate import own_motion
 
 Array = NDArray[np.float64]
+Taken = Callable[[FrictionProblem | NitscheProblem, Iterate], Iterate]
 MEMORY = 64  # iterates among which a repetition counts as a cycle
 AT_REST = 1e-10  # relative change of r below which an iterate has not moved
 PATIENCE = 500  # iterates without any progress before a solve counts as stagnated
@@ -36,6 +39,7 @@ class Watch:
     contact_tolerance: float
     criterion: Criterion = Criterion.JUDGE
     patience: int | None = PATIENCE  # None: never stagnated
+    taken: Taken = own_motion  # what of an iterate is judged
     started: float = field(default_factory=now)
     compiled: float = field(default_factory=compiling)  # until then
     best: Iterate | None = None
@@ -52,15 +56,15 @@ class Watch:
 
     def judge(self, iterate: Iterate) -> Step:
         """Judge an iterate and remember it if it is the best."""
+        iterate = self.taken(self.problem, iterate)
         if self.criterion is Criterion.NATURAL:
             error = natural_error_of(self.problem, iterate.r, iterate.v)  # type: ignore[arg-type]
             return self._noted(iterate, error, None, None)
         error, weakest, told = self.problem.error(iterate.r, iterate.v), None, None
         if error <= self.tolerance and not isinstance(self.problem, NitscheProblem):
             told = settled_state(self.problem, iterate.r, iterate.v)
-            if told[1].r is not iterate.r:  # judged exactly, their motion is found again
-                v = None if self.problem.measure is Measure.EXACT else iterate.v
-                iterate = replace(iterate, r=told[1].r, v=v)
+            if told[1].r is not iterate.r:
+                iterate = replace(own_motion(self.problem, iterate), r=told[1].r)
                 error = self.problem.error(iterate.r, iterate.v)
         if error <= self.tolerance:
             weakest = self.problem.weakest(iterate.r, iterate.v)

@@ -1,5 +1,8 @@
 """Questions about problems and solvers; sees discrete problems only."""
 
+from .basin_methods import BasinMethod, Ended, RunLimits
+from .basin_solutions import KnownSolution
+from .basins import BasinRun, Basins
 from .certificates.critical_friction import CriticalFriction, Witness
 from .certificates.uniqueness import Uniqueness, Verdict
 from .paths.cones import TangentCone
@@ -15,20 +18,26 @@ from .profiles import performance_profile
 from .solutions.enumerate import PieceSolution, Solutions
 
 __all__ = [
+    "BasinMethod",
+    "BasinRun",
+    "Basins",
     "Branch",
     "Claim",
     "ContactRates",
     "Continuation",
     "CriticalFriction",
     "Diagram",
+    "Ended",
     "Event",
     "EventKind",
     "FirstOrder",
     "IndexSets",
+    "KnownSolution",
     "MidpointRule",
     "PathProblem",
     "PieceSolution",
     "RateEquation",
+    "RunLimits",
     "Solutions",
     "StepPath",
     "Stop",
