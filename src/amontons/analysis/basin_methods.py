@@ -41,9 +41,9 @@ class RunLimits:
 class Ended:
     """How a run ended.
 
-    r (nc, d) and v (n,): its state, in the contacts and displacements of the problem that is
-    studied; one of them may be None.  converged: by a judge, the balance of r and v included.
-    outcome: in words.  by_user: Ctrl-C ended it.
+    r (nc, d) and v (n,): its solution, or its last state where it found none, in the contacts
+    and displacements of the problem that is studied; one may be None.  converged: by a judge,
+    the balance of r and v included.  outcome: in words.  by_user: Ctrl-C ended it.
     """
 
     r: Array | None
@@ -110,11 +110,14 @@ class BasinMethod:
         own = self.problem if self.problem is not None else problem
         if isinstance(own, FrictionProblem) and self.solver.form is Form.DELASSUS:
             own = own.condensed(limits.deadline)
+        last: list[Iterate] = []
         found = drive_from(
             self._start(own, start), own, self.solver, tolerance=limits.tolerance,
             max_iterations=limits.max_iterations, time_limit=limits.deadline,
+            callback=lambda step, iterate: last.__setitem__(slice(None), [iterate]),
         )  # fmt: skip
-        return self._ended(problem, own, found)
+        state = found if found.converged or not last else last[0]
+        return self._ended(problem, own, found, state)
 
     def _start(self, own: FrictionProblem | NitscheProblem, start: Iterate) -> Iterate:
         """The start in the problem in which the method runs."""
@@ -128,16 +131,16 @@ class BasinMethod:
 
     def _ended(
         self, problem: FrictionProblem, own: FrictionProblem | NitscheProblem,
-        found: FrictionSolution,
+        found: FrictionSolution, state: FrictionSolution | Iterate,
     ) -> Ended:  # fmt: skip
-        r: Array | None = found.r
+        r: Array | None = state.r
         if self.reactions is not None:
-            r = (real("reactions", self.reactions) @ found.r.ravel()).reshape(
+            r = (real("reactions", self.reactions) @ state.r.ravel()).reshape(
                 problem.contacts, problem.dimension
             )
         elif own.contacts != problem.contacts or own.form is Form.NITSCHE:
             r = None
-        v = found.v if problem.form is Form.GLOBAL else None
+        v = state.v if problem.form is Form.GLOBAL else None
         record = found.convergence
         return Ended(
             r, v, record.outcome is Outcome.CONVERGED, record.error, record.iterations,

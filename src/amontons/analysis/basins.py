@@ -19,7 +19,7 @@ import numpy as np
 
 from ..clock import Deadline, now
 from ..errors import InvalidInput, NotConverged, SingularOperator, UnsupportedForm
-from .basin_methods import RunLimits, Runs, methods_of
+from .basin_methods import Ended, RunLimits, Runs, methods_of
 from .basin_solutions import FAILED, OTHER, Atlas, KnownSolution
 from .basin_starts import (
     Drawing,
@@ -39,7 +39,9 @@ class BasinRun:
     """One run: indices of its method and start, and what it found.
 
     found: the name of a solution, "other" for a state that the judge takes and that is none of
-    the known, or "failed".  distance: to the nearest known solution, relative as `within`.
+    the known, or "failed".  distance: of its last state to the nearest known solution, by the
+    motion alone, relative as `within`; nearest: the name of that one.  A run can fail at no
+    distance: its motion is that of a solution, and its reactions do not hold it.
     """
 
     method: int
@@ -50,12 +52,14 @@ class BasinRun:
     iterations: int
     seconds: float
     distance: float
+    nearest: str = ""
 
 
 @dataclass(frozen=True, eq=False)
 class Basins:
     """What `basins` found; complete: the solutions are all that there are, with proof.
 
+    scale: energy, unit of sqrt(r u), that distances are relative to.
     missing: runs that were not made, the time being over or the user having stopped; reason
     and ended say why the list is complete or not, and why runs are missing.
     """
@@ -70,6 +74,7 @@ class Basins:
     within: float
     seed: int
     seconds: float
+    scale: float = 1.0
     missing: int = 0
     ended: str = ""
     name: str = ""
@@ -119,8 +124,8 @@ class Basins:
         """What JSON files hold, schema amontons/basins/1, but for versions and title."""
         return {
             "schema": SCHEMA, "name": self.name, "tolerance": self.tolerance,
-            "within": self.within, "seed": self.seed, "complete": self.complete,
-            "reason": self.reason,
+            "within": self.within, "scale": self.scale, "seed": self.seed,
+            "complete": self.complete, "reason": self.reason,
             "solutions": [
                 {"name": s.name, "pattern": s.pattern, "source": s.source, "error": s.error,
                  "energy": s.energy, "freedom": s.freedom, "r": s.r.tolist(),
@@ -214,7 +219,7 @@ def study(
     return Basins(
         tuple(atlas.known), tuple(variants), tuple(chosen), tuple(runs), atlas.complete,
         atlas.reason, options.tolerance, options.within, options.seed, now() - began,
-        every - len(runs), ended, problem.name,
+        atlas.scale, every - len(runs), ended, problem.name,
     )  # fmt: skip
 
 
@@ -244,26 +249,28 @@ def _one(
         return None, True
     if ended.outcome == "time_limit" and deadline.passed:
         return None, False
-    name, far = FAILED, float(np.inf)
+    far, nearest = _nearest(atlas, ended)
+    name = FAILED
     if ended.converged:
         within = method.within or options.within
         name, far = atlas.tell(
             ended.r, ended.v, ended.pattern, within, deadline, options.tolerance
         )
-    elif ended.v is not None or ended.r is not None:
-        far = _nearest(atlas, ended)
     return BasinRun(m, s, name, ended.outcome, ended.error, ended.iterations, now() - began,
-                    far), False  # fmt: skip
+                    far, nearest), False  # fmt: skip
 
 
-def _nearest(atlas: Atlas, ended: Any) -> float:
-    """Distance of a state that is no solution to the nearest; infinite where it overflowed."""
-    for part in (ended.r, ended.v):
-        if part is not None and not np.isfinite(part).all():
-            return float(np.inf)
+def _nearest(atlas: Atlas, ended: Ended) -> tuple[float, str]:
+    """Distance and name of the nearest solution; infinite where there is none."""
+    states = [part for part in (ended.r, ended.v) if part is not None]
+    if not states or not all(np.isfinite(part).all() for part in states):
+        return np.inf, ""
     with np.errstate(over="ignore", invalid="ignore"):
-        far = float(atlas.distances(ended.r, ended.v).min(initial=np.inf))
-    return far if np.isfinite(far) else float(np.inf)
+        far = atlas.distances(ended.r, ended.v)
+    if not len(far) or not np.isfinite(far).all():
+        return np.inf, ""
+    k = int(np.argmin(far))
+    return float(far[k]), atlas.known[k].name
 
 
 def _plain(parameters: Any) -> dict[str, Any]:
