@@ -7,6 +7,7 @@ import os
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import json
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from types import ModuleType
@@ -50,14 +51,14 @@ def main(
     check_parts(parts, PARTS)
     out = results or HERE / "results"
 
-    def named(part: str) -> tuple[str, list | dict]:
+    def named(part: str) -> tuple[str, list | dict | Iterator[dict]]:
         other = "counts" in PAPER.get(part, {}) and int(contacts) != PAPER[part]["n_c"]
         return f"{part}@{contacts}" if other else part, work(part, draws, int(contacts), out)
 
     regenerate(out, parts or PARTS, named, page)
 
 
-def work(part: str, draws: int, contacts: int, out: Path) -> list | dict:
+def work(part: str, draws: int, contacts: int, out: Path) -> list | dict | Iterator[dict]:
     """The numbers of a part."""
     if part == "enumeration":
         return solutions.enumeration()
@@ -71,8 +72,16 @@ def work(part: str, draws: int, contacts: int, out: Path) -> list | dict:
     module = ALGORITHMS[table["algorithm"]]
     if "cells" in table:
         return [[asdict(cell) for cell in row] for row in module.cells(table)]
-    table = {**table, "n_c": contacts}
-    return {"draws": draws, "counts": module.counts(table, draws, SEED)}
+    return one_by_one(module, {**table, "n_c": contacts}, draws)
+
+
+def one_by_one(module: ModuleType, table: dict, draws: int) -> Iterator[dict]:
+    """The counts of a table, given away again after each value of its parameter."""
+    counts: dict[str, list[int]] = {}
+    for value in table["values"]:
+        found = module.counts({**table, "values": [value]}, draws, SEED)
+        counts = {kind: counts.get(kind, []) + found[kind] for kind in found}
+        yield {"draws": draws, "counts": counts}
 
 
 def page(record: dict) -> str:

@@ -13,49 +13,71 @@ W G, q.  On more elements states change within an element, and the equation need
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import amontons as am
-from amontons.cones import Coulomb, augmented_reaction, augmented_reaction_jacobian
-from amontons.solvers import Iterate
+from amontons.analysis import Ended, RunLimits
+from amontons.cones import augmented_reaction, augmented_reaction_jacobian
 
-from .triangle import Cell, Triangle, tally
+from .triangle import SAME, Cell, Triangle, tally, triangle_of
 
+Array = NDArray[np.float64]
 POINTS = 8  # on an edge, as in `nitsche`
 LIMIT = 200  # Newton steps: it ends within ten or not at all
-TOLERANCE = 1e-10  # of the judge; rounding leaves 1e-11 at eta = 1e-7
+TOLERANCE = 1e-10  # of the judge, or of the last step at points; rounding leaves 1e-11
+JUDGED = 1e-8  # residual at points, relative to the forces
+LEAST = 1e-3  # size of forces and tractions that are next to none
+NEAR_SLIP = 0.5  # energy norm in which slip at points is that of the nodes
 
 
-def cells(table: Mapping) -> list[list[Cell]]:
+def cells(
+    table: Mapping, tolerance: float = TOLERANCE, near: float = SAME
+) -> list[list[Cell]]:
     """A table over eta and lambda^0; the last two columns are the exact stick and slip."""
-    triangle = Triangle(table["n_c"], table["mu"])
+    triangle = triangle_of(table["n_c"], table["mu"])
     starts = [np.array([column[::-1]]) for column in table["columns"]]  # printed (T, N)
     starts[-2:] = [exact(triangle, "stick"), exact(triangle, "slip")]
-    return [[run(triangle, eta, start) for start in starts] for eta in table["values"]]
+    methods = [nodal(triangle, eta) for eta in table["values"]]
+    return _study(triangle, methods, starts, tolerance=tolerance, within=near)
 
 
-def exact(triangle: Triangle, name: str) -> np.ndarray:
+def _study(
+    triangle: Triangle, methods: Sequence[Any], starts: Sequence[Array], **options: float
+) -> list[list[Cell]]:
+    """From lambda, rows (N, T), which are forces G lambda."""
+    forces = [am.Iterate(triangle.mass @ start) for start in starts]
+    return triangle.study(methods, forces, max_iterations=LIMIT, **options)
+
+
+def exact(triangle: Triangle, name: str) -> Array:
     """lambda (n_c, 2), rows (N, T), of the solution of that name; at mu = 3 slip is stick."""
     v = triangle.exact[name if name in triangle.exact else "stick"]
     return np.linalg.solve(triangle.mass, triangle.forces(v))
 
 
-def run(triangle: Triangle, eta: float, start: np.ndarray) -> Cell:
-    """Newton's method from lambda = start, rows (N, T)."""
-    method = am.SemismoothNewton(
+def nodal(triangle: Triangle, eta: float) -> am.BasinMethod:
+    """Newton's method with the law at the nodes, in tractions."""
+    solver = am.SemismoothNewton(
         line_search=am.FullStep(), rho=eta, rho_strategy=am.RhoStrategy.CONSTANT
     )
-    found = am.drive(
-        triangle.integral, method, tolerance=TOLERANCE, max_iterations=LIMIT,
-        start=Iterate(start),
+    return am.BasinMethod(
+        solver, "alart-curnier", {"eta": eta}, problem=triangle.integral,
+        reactions=np.kron(triangle.mass, np.eye(2)),
     )  # fmt: skip
-    v = triangle.problem.velocity(triangle.mass @ found.r)[1]
-    return triangle.cell(v, converged=found.converged, iterations=found.convergence.iterations)
 
 
-def at_points(triangle: Triangle) -> tuple[np.ndarray, np.ndarray]:
+def run(triangle: Triangle, eta: float, start: Array) -> Cell:
+    """Newton's method from lambda = start, rows (N, T)."""
+    return _study(triangle, [nodal(triangle, eta)], [start], tolerance=TOLERANCE)[0][0]
+
+
+def at_points(triangle: Triangle) -> tuple[Array, Array]:
     """Shape functions of the contacts, (q, n_c), and weights (q,) at all Gauss points of AB."""
     s, weights = np.polynomial.legendre.leggauss(POINTS)
     s, weights = (s + 1) / 2, weights / 2
@@ -69,32 +91,86 @@ def at_points(triangle: Triangle) -> tuple[np.ndarray, np.ndarray]:
     return shapes.reshape(-1, triangle.n_c), np.outer(np.diff(ends), weights).ravel()
 
 
-def run_at_points(triangle: Triangle, eta: float, start: np.ndarray) -> Cell:
-    """Newton's method with the law at Gauss points, from lambda = start, rows (N, T)."""
-    shapes, weights = at_points(triangle)
-    law = Coulomb(np.full(len(weights), triangle.mu))
-    N = np.kron(shapes, np.eye(2))
-    weighted = N.T * np.repeat(weights, 2)
-    G = weighted @ N
-    compliance = triangle.local.W @ G
-    inside = (N @ (np.eye(len(G)) - eta * compliance)).reshape(-1, 2, len(G))  # dx / dlambda
-    unknown, count, done = start.ravel(), 0, False
-    while count < LIMIT and not done:
-        u = compliance @ unknown + triangle.local.q.ravel()
-        x = (N @ (unknown - eta * u)).reshape(-1, 2)
+@dataclass(frozen=True, eq=False)
+class AtPoints:
+    """Newton's method with the law at Gauss points, as `am.basins` takes it.
+
+    within: relative, how near a solution is told by: slip there is not that of the nodes.
+    """
+
+    triangle: Triangle
+    eta: float
+    within: float | None = None
+    method = "alart-curnier, integral"
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """eta."""
+        return {"eta": self.eta}
+
+    @property
+    def label(self) -> str:
+        """For tables."""
+        return f"{self.method} eta={self.eta:g}"
+
+    def run(
+        self, problem: am.FrictionProblem, start: am.Iterate, limits: RunLimits
+    ) -> Ended:
+        """Steps from lambda of the forces of a start until both step and residual are small."""
+        G = np.kron(self.triangle.mass, np.eye(2))
+        unknown, count, done = np.linalg.solve(G, start.r.ravel()), 0, False
+        while True:
+            residual, matrix = self._linearised(unknown)
+            size = max(float(np.linalg.norm(G @ unknown)), LEAST)
+            error = float(np.linalg.norm(residual)) / size
+            if done or count >= LIMIT or limits.deadline.passed or not np.isfinite(error):
+                break
+            step = np.linalg.solve(matrix, -residual)
+            unknown, count = unknown + step, count + 1
+            done = np.linalg.norm(step) <= limits.tolerance * max(
+                float(np.linalg.norm(unknown)), LEAST
+            )
+        converged = done and error <= JUDGED
+        outcome = "converged" if converged else "max_iterations"
+        if not converged and limits.deadline.passed:
+            outcome = "time_limit"
+        return Ended((G @ unknown).reshape(-1, 2), None, converged, error, count, outcome)
+
+    def _linearised(self, unknown: Array) -> tuple[Array, Array]:
+        """The equation at lambda, (2 n_c,), and one element of its generalised Jacobian."""
+        spread, weighted, law = _points(self.triangle)
+        compliance, q = self.triangle.integral.W, self.triangle.local.q.ravel()
+        x = (spread @ (unknown - self.eta * (compliance @ unknown + q))).reshape(-1, 2)
+        G = weighted @ spread
+        inside = spread - self.eta * (spread @ compliance)  # dx / dlambda
+        slope = np.einsum(
+            "qij,qjk->qik", augmented_reaction_jacobian(x, law),
+            inside.reshape(-1, 2, len(unknown)),
+        )  # fmt: skip
         residual = G @ unknown - weighted @ augmented_reaction(x, law).ravel()
-        slope = np.einsum("qij,qjk->qik", augmented_reaction_jacobian(x, law), inside)
-        step = np.linalg.solve(G - weighted @ slope.reshape(N.shape), -residual)
-        unknown, count = unknown + step, count + 1
-        done = np.linalg.norm(step) <= TOLERANCE * max(np.linalg.norm(unknown), 1e-3)
-    v = triangle.problem.velocity((G @ unknown).reshape(-1, 2))[1]
-    return triangle.cell(v, converged=bool(done), iterations=count)
+        return residual, G - weighted @ slope.reshape(spread.shape)
+
+
+@lru_cache(maxsize=8)
+def _points(triangle: Triangle) -> tuple[Array, Array, am.Coulomb]:
+    """Values at the points from nodal ones, (2 q, 2 n_c); integrals of them; the law there."""
+    shapes, weights = at_points(triangle)
+    spread = np.kron(shapes, np.eye(2))
+    law = am.Coulomb(np.full(len(weights), triangle.mu))
+    return spread, spread.T * np.repeat(weights, 2), law
+
+
+def run_at_points(triangle: Triangle, eta: float, start: Array) -> Cell:
+    """Newton's method with the law at Gauss points, from lambda = start, rows (N, T)."""
+    within = None if triangle.n_c == 1 else NEAR_SLIP / triangle.size
+    method = AtPoints(triangle, eta, within)
+    return _study(triangle, [method], [start], tolerance=TOLERANCE)[0][0]
 
 
 def counts(table: Mapping, draws: int, seed: int) -> dict[str, list[int]]:
     """A table over eta: how many random lambda^0, uniform in [-0.5, 0.5], led to what."""
-    triangle = Triangle(table["n_c"], table["mu"])
+    triangle = triangle_of(table["n_c"], table["mu"])
     starts = np.random.default_rng(seed).uniform(-0.5, 0.5, (draws, table["n_c"], 2))
-    return tally(
-        [run_at_points(triangle, eta, start) for start in starts] for eta in table["values"]
-    )
+    within = NEAR_SLIP / triangle.size
+    methods = [AtPoints(triangle, eta, within) for eta in table["values"]]
+    return tally(_study(triangle, methods, list(starts), tolerance=TOLERANCE))

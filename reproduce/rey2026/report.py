@@ -59,7 +59,8 @@ def count_table(name: str, ours: Mapping, paper: Mapping) -> list[str]:
              "|---" * (1 + len(paper["values"])) + "|"]  # fmt: skip
     for kind in kinds:
         printed = paper["counts"].get(kind, [0] * len(paper["values"]))
-        pairs = [f"{a} ({b})" for a, b in zip(counts[kind], printed, strict=True)]
+        known = [*counts[kind], *["–"] * (len(printed) - len(counts[kind]))]
+        pairs = [f"{a} ({b})" for a, b in zip(known, printed, strict=True)]
         lines.append(f"| {kind} | " + " | ".join(pairs) + " |")
     return [*lines, ""]
 

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,19 +28,24 @@ from amontons.hild import (
 Array = NDArray[np.float64]
 MESHES = Path(__file__).with_name("meshes.json")
 LISTED = 25  # contact nodes up to which all solutions are listed in seconds at mu = 3.5
+STARTS = 60  # of Newton's method for the slip solution of finer meshes, without proof
 SAME = 1e-8  # energy norm of the error that names a solution; the paper says 1e-10
+TOLERANCE = 1e-8  # of the judge
+STRICT = 1e-10  # of the judge, and of the error that names a solution, as in the paper
 
 
 @dataclass(frozen=True)
 class Cell:
     """One computation of a table: free, stick, slip, other or fail, and what is known of it.
 
-    error: energy norm of the difference to the nearest exact solution.
+    error: energy norm of the difference to the nearest exact solution.  unheld: of a failure
+    that has the displacements of a solution and forces that do not hold it, its name.
     """
 
     kind: str
     error: float
     iterations: int = 0
+    unheld: str = ""
 
 
 KINDS = ("free", "stick", "slip", "other", "fail")
@@ -58,6 +64,10 @@ def mesh(n_c: int) -> am.Mesh:
     points = np.array(stored["points"])
     points[np.abs(points[:, 1]) < 1e-8, 1] = 0.0
     return mesh_of_triangle(points, stored["triangles"])
+
+
+def _some_solutions(problem: am.FrictionProblem) -> Any:
+    return am.multistart(problem, starts=STARTS)
 
 
 @dataclass(frozen=True)
@@ -88,17 +98,23 @@ class Triangle:
 
     @cached_property
     def exact(self) -> dict[str, Array]:
-        """Displacements (n,) by name: free, stick and, where all can be listed, slip."""
+        """Displacements (n,) by name: free, stick and, above mu = 3, slip."""
         points = mesh(self.n_c).points
         known = {
             "free": self.unknowns(free_displacement(points)),
             "stick": self.unknowns(stick_displacement(points)),
         }
-        if self.mu > 3 and self.n_c <= LISTED:
-            for found in am.all_solutions(self.local).solutions:
+        if self.mu > 3:
+            search = am.all_solutions if self.n_c <= LISTED else _some_solutions
+            for found in search(self.local).solutions:
                 if set(found.pattern) & {"+", "-"}:
                     known["slip"] = self.problem.velocity(found.r)[1]
         return known
+
+    @cached_property
+    def named(self) -> dict[str, am.Iterate]:
+        """The solutions by which runs are told; at mu = 3 on its rim stick is the slip too."""
+        return {name: am.Iterate(self.forces(v), v) for name, v in self.exact.items()}
 
     def forces(self, v: Array) -> Array:
         """Contact forces (n_c, 2), rows (N, T), that hold a displacement (n,)."""
@@ -139,21 +155,38 @@ class Triangle:
             self.local.W @ spread, self.local.q, np.full(self.n_c, self.mu)
         )
 
+    @cached_property
+    def size(self) -> float:
+        """Energy norm of the largest difference between free and another solution."""
+        return max(self.energy(v - self.exact["free"]) for v in self.exact.values())
+
     def energy(self, v: Array) -> float:
         """Energy norm sqrt(v K v) of a displacement (n,)."""
         return float(np.sqrt(max(v @ (self.problem.M @ v), 0.0)))
 
-    def cell(
-        self, v: Array, *, converged: bool, within: float = SAME, iterations: int = 0
-    ) -> Cell:
-        """What a displacement (n,) at the end of a computation is.
+    def study(
+        self, methods: Sequence[Any], starts: Sequence[am.Iterate], *, within: float = SAME,
+        tolerance: float = TOLERANCE, max_iterations: int | None = None,
+    ) -> list[list[Cell]]:  # fmt: skip
+        """What each method makes of each start, by `am.basins`: a row of cells per method.
 
-        The exact solution within the energy norm `within`; else, where slip is not among the
-        exact ones (n_c > LISTED), a converged one is slip.
+        within: energy norm, of the error that names a solution.
         """
-        errors = {name: self.energy(v - u) for name, u in self.exact.items()}
-        name = min(errors, key=errors.__getitem__)
-        if errors[name] <= within:
-            return Cell(name, errors[name], iterations)
-        other = "slip" if self.n_c > LISTED else "other"
-        return Cell(other if converged else "fail", errors[name], iterations)
+        at = {f"start {k}": start for k, start in enumerate(starts)}
+        found = am.basins(
+            self.problem, methods, starts=at, solutions=self.named, within=within / self.size,
+            tolerance=tolerance, max_iterations=max_iterations,
+        )  # fmt: skip
+        rows: list[list[Cell]] = [[] for _ in methods]
+        for run in found.runs:
+            kind = "fail" if run.found == "failed" else run.found.split(" ")[0]
+            far = run.distance * found.scale
+            unheld = run.nearest if kind == "fail" and far <= within else ""
+            rows[run.method].append(Cell(kind, far, run.iterations, unheld))
+        return rows
+
+
+@lru_cache(maxsize=8)
+def triangle_of(n_c: int, mu: float) -> Triangle:
+    """The problem, made once with all that is prepared of it."""
+    return Triangle(n_c, mu)

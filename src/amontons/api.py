@@ -26,6 +26,7 @@ from .solve import Callback, drive
 from .solvers.base import Iterate, Solver
 
 if TYPE_CHECKING:
+    from .analysis.basins import Basins
     from .analysis.certificates.critical_friction import CriticalFriction
     from .analysis.certificates.opening import Opening
     from .analysis.certificates.uniqueness import Uniqueness
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
 
 FEW = 10  # starts of Newton's method where a search ends without any solution
 LEAST = 1.0  # seconds for them beyond a time limit
+SEARCH, WORK = 0.5, 60.0  # share of a limit, or seconds of work, for the search in `basins`
 HUGE = 1e12  # friction above which rounding hides what the law says
 Start = Iterate | FrictionSolution | ModelSolution | None
 
@@ -138,6 +140,49 @@ def multistart(
     discrete = _discrete(problem)
     _check_has_W(problem, "multistart", limit)
     return search(discrete, starts=starts, seed=seed, time_limit=limit)
+
+
+def basins(
+    problem: FrictionProblem | Model, methods: Any = ("auto",), parameters: Any = None,
+    starts: Any = None, *, solutions: Any = None, draws: int = 10, seed: int = 0,
+    tolerance: float = 1e-8, within: float = 1e-4, max_iterations: int | None = None,
+    run_limit: float | None = None, reaction_size: float | None = None,
+    displacement_size: float | None = None, time_limit: TimeLimit = None,
+    callback: Callable[[int, int], None] | None = None,
+) -> Basins:  # fmt: skip
+    """Which solution each method finds, with each value of its parameters, from each start.
+
+    methods: names such as "uzawa", solvers, or `BasinMethod`s; a mapping gives them names.
+    parameters: values by field, {"rho": [1, 10]} or {"uzawa.rho": …}; all combinations are run.
+    starts: names of `analysis.basin_starts` ("cone", "cone:20", …) or a mapping, also of other
+    names to an Iterate or several; draws: random starts of each kind; reaction_size,
+    displacement_size: how large, by default as in the solutions.  solutions: those that runs
+    are told by, {"free": …} with anything that has r, or what `all_solutions` gave; by default
+    they are searched for, with up to half the time_limit, and without proof those that runs
+    find are added.  within: how near they are told by, in energy norm, relative to the largest.
+    run_limit: seconds of one run, more is a failure; time_limit: seconds of everything, runs
+    that do not fit are left out and said to be missing.  A run counts as a solution only when
+    the judge agrees to `tolerance`, the balance of its r and v included.  callback(done, all)
+    is called after each run.
+    """
+    from .analysis.basin_solutions import Atlas, given_solutions
+    from .analysis.basins import StudyOptions, check_callback, study
+
+    options = StudyOptions(draws, seed, tolerance, within, max_iterations, run_limit,
+                           reaction_size, displacement_size)  # fmt: skip
+    check_callback(callback)
+    deadline = deadline_of(time_limit)
+    discrete = _discrete(problem)
+    _check_has_W(problem, "basins", _begun(time_limit))
+    atlas = Atlas(discrete, within)
+    if solutions is not None:
+        given_solutions(atlas, solutions)
+    elif isinstance(discrete.law, Tresca):
+        atlas.reason = "given bounds of friction (Tresca): nobody has searched for all"
+    else:
+        limit = deadline.share(SEARCH) if time_limit is not None else deadline_of(None, WORK)
+        given_solutions(atlas, all_solutions(discrete, time_limit=limit))
+    return study(atlas, methods, parameters, starts, options, deadline, callback)
 
 
 def _begun(time_limit: TimeLimit) -> TimeLimit:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,8 +16,10 @@ from .problem import FrictionProblem
 from .settling import Motion, Settled, settled_exactly, settled_state
 from .solution import Step
 from .solvers.base import Iterate, natural_error_of
+from .solvers.first_iterate import own_motion
 
 Array = NDArray[np.float64]
+Taken = Callable[[FrictionProblem | NitscheProblem, Iterate], Iterate]
 MEMORY = 64  # iterates among which a repetition counts as a cycle
 AT_REST = 1e-10  # relative change of r below which an iterate has not moved
 PATIENCE = 500  # iterates without any progress before a solve counts as stagnated
@@ -35,6 +38,7 @@ class Watch:
     contact_tolerance: float
     criterion: Criterion = Criterion.JUDGE
     patience: int | None = PATIENCE  # None: never stagnated
+    taken: Taken = own_motion  # what of an iterate is judged
     started: float = field(default_factory=now)
     compiled: float = field(default_factory=compiling)  # until then
     best: Iterate | None = None
@@ -52,6 +56,7 @@ class Watch:
 
     def judge(self, iterate: Iterate) -> Step:
         """Judge an iterate and remember it if it is the best."""
+        iterate = self.taken(self.problem, iterate)
         if self.criterion is Criterion.NATURAL:
             error = natural_error_of(self.problem, iterate.r, iterate.v)  # type: ignore[arg-type]
             return self._noted(iterate, error, None, None)
@@ -84,8 +89,7 @@ class Watch:
             )
         motion, told = settled_state(problem, iterate.r, iterate.v)
         if told.r is not iterate.r:
-            v = None if problem.measure is Measure.EXACT else iterate.v
-            iterate = replace(iterate, r=told.r, v=v)
+            iterate = replace(own_motion(problem, iterate), r=told.r)
             error = problem.error(iterate.r, iterate.v)
         if error > self.tolerance:
             return iterate, error, None, (motion, told)

@@ -34,11 +34,11 @@ from scipy import sparse
 from . import judge
 from .checked_arrays import expect_shape
 from .clock import NEVER, Deadline
-from .cones import Law, augmented_reaction, augmented_reaction_jacobian
+from .cones import Law, Tresca, augmented_reaction, augmented_reaction_jacobian
 from .errors import SingularOperator, UnsupportedForm
 from .judge import Measure, Weakest
 from .linear import Direct, Factor, LinearSolver
-from .problem import Form
+from .problem import Form, FrictionProblem
 
 Array = NDArray[np.float64]
 EPSILON = judge.EPSILON
@@ -151,6 +151,24 @@ class NitscheProblem:
     def with_law(self, law: Law) -> NitscheProblem:
         """The same problem under another law."""
         return replace(self, law=law)
+
+    def with_multipliers(self) -> FrictionProblem:
+        """The same law at the same points with reactions as unknowns: an augmented Lagrangian.
+
+        Its r (q, d) are tractions times sqrt(omega), its u displacements times sqrt(omega), so
+        that one rho, stress per length, is the same at all points.  More points than the trace
+        of v has freedom make W singular: for `Uzawa`, which never forms it.
+        """
+        m, d = self.matrices, self.dimension
+        root = np.sqrt(m.weights)
+        H = sparse.csc_array(m.H @ sparse.diags_array(np.repeat(root, d)))
+        coefficient = self.law.coefficient
+        if isinstance(self.law, Tresca):  # a force becomes force / sqrt(omega), and root is > 0
+            coefficient = coefficient / root
+        law = type(self.law)(coefficient)
+        return FrictionProblem.from_global(
+            m.M, H, self.f, root[:, None] * self.w, law, name=self.name
+        )
 
     def assembled(self) -> NitscheProblem:
         """Itself: M is always stored."""

@@ -20,14 +20,20 @@ from .errors import InvalidInput, SingularOperator, TimeUp, UnsupportedForm, sho
 from .indefinite import gains_energy, with_obstruction
 from .interrupts import Watching
 from .judge import Criterion, Measure
-from .judging import BLUR, PATIENCE, Watch
+from .judging import BLUR, PATIENCE, Taken, Watch
 from .nitsche_problem import NO_MULTIPLIERS, NitscheProblem
 from .problem import Form, FrictionProblem
 from .settling import at_rest, motion
 from .solution import Convergence, FrictionSolution, Outcome, Step
 from .solvers import Auto
 from .solvers.base import Breakdown, Iterate, Solver, Target
-from .solvers.first_iterate import first_iterate, no_reactions, with_motion
+from .solvers.first_iterate import (
+    as_it_is,
+    first_iterate,
+    no_reactions,
+    own_motion,
+    with_motion,
+)
 
 Array = NDArray[np.float64]
 Callback = Callable[[Step, Iterate], bool | None]
@@ -55,6 +61,8 @@ def drive(
     tolerance: on the unit-free error of `judge`; contact_tolerance: on the contactwise one, by
     default the square root of the tolerance, infinite to ask for the first alone.  time_limit
     in seconds, those of compiling not counted, or a Deadline.
+    Where the exact measure judges, the answer is r with its motion, and the v of iterates is
+    not read; `drive_from` reads it.
     callback(step, iterate) is called after every iterate; returning True stops.  criterion:
     what the tolerance is for, the unit-free judge or a published error.  patience: iterates
     without progress after which a solve counts as stagnated; None to let time decide, as in a
@@ -64,7 +72,7 @@ def drive(
     given = _Options(
         tolerance, contact_tolerance, max_iterations, time_limit, callback, criterion, patience
     )
-    return _drive(problem, solver, given, start, with_motion)
+    return _drive(problem, solver, given, start, own_motion)
 
 
 def drive_from(
@@ -80,12 +88,12 @@ def drive_from(
 ) -> FrictionSolution:
     """Like `drive`, for the question what a solver makes of a start.
 
-    The start is a solution only with the v that it has.  `drive` asks whether the reactions of
-    the start are right, where it can find their motion: no contact force and another v would
-    be the end at once where the bodies move away, and the solver were never asked.
+    The start and the iterates are solutions only with the v that they have.  To `drive` it is
+    enough that reactions are right, where it can find their motion: no contact force would be
+    the end wherever the bodies can move away, also where the solver goes somewhere else.
     """
     given = _Options(tolerance, contact_tolerance, max_iterations, time_limit, callback)
-    return _drive(problem, solver, given, start, lambda problem, start: start)
+    return _drive(problem, solver, given, start, as_it_is)
 
 
 class _Options(NamedTuple):
@@ -117,9 +125,9 @@ def _drive(
     solver: Solver | None,
     given: _Options,
     start: Iterate | FrictionSolution | None,
-    first: Callable[[FrictionProblem | NitscheProblem, Iterate], Iterate],
+    taken: Taken,
 ) -> FrictionSolution:
-    """The solve; `first` makes of the start what is judged before the first iteration."""
+    """The solve; `taken` makes of an iterate what is judged of it."""
     solver = solver if solver is not None else Auto()
     given.check()
     deadline = deadline_of(given.time_limit)
@@ -127,11 +135,13 @@ def _drive(
     _check_solver(problem, solver)
     if not getattr(solver, "matrix_free", False):
         problem = problem.assembled()
-    watch = Watch(problem, given.tolerance, given.of_contacts, given.criterion, given.patience)
+    watch = Watch(
+        problem, given.tolerance, given.of_contacts, given.criterion, given.patience, taken
+    )
     begin, limit = first_iterate(problem, start), given.max_iterations or np.inf
     target = Target(given.tolerance, deadline, given.criterion)
     with Watching():
-        outcome, detail = _run(watch, solver, begin, target, limit, given.callback, first)
+        outcome, detail = _run(watch, solver, begin, target, limit, given.callback)
     return _finish(watch, outcome, detail, solver)
 
 
@@ -161,12 +171,11 @@ def _run(
     target: Target,
     limit: float,
     callback: Callback | None,
-    first: Callable[[FrictionProblem | NitscheProblem, Iterate], Iterate],
 ) -> tuple[Outcome, str]:
     """Start the solver, and again with a tighter goal while only contacts are not settled."""
     try:
         _prepare(watch.problem, target.deadline)
-        watch.judge(first(watch.problem, start))
+        watch.judge(with_motion(watch.problem, start))
         if watch.converged:
             return Outcome.CONVERGED, ""
         ended: tuple[Outcome, str] | None = (Outcome.STAGNATED, "")

@@ -1,5 +1,8 @@
 """Questions about problems and solvers; sees discrete problems only."""
 
+from .basin_methods import BasinMethod, Ended, RunLimits
+from .basin_solutions import KnownSolution
+from .basins import BasinRun, Basins
 from .certificates.critical_friction import CriticalFriction, Witness
 from .certificates.opening import Existence, Opening
 from .certificates.uniqueness import Uniqueness, Verdict
@@ -17,22 +20,28 @@ from .profiles import performance_profile
 from .solutions.enumerate import PieceSolution, Solutions
 
 __all__ = [
+    "BasinMethod",
+    "BasinRun",
+    "Basins",
     "Branch",
     "Claim",
     "ContactRates",
     "Continuation",
     "CriticalFriction",
     "Diagram",
+    "Ended",
     "Event",
     "EventKind",
     "Existence",
     "FirstOrder",
     "IndexSets",
+    "KnownSolution",
     "MidpointRule",
     "Opening",
     "PathProblem",
     "PieceSolution",
     "RateEquation",
+    "RunLimits",
     "Solutions",
     "StepPath",
     "Stop",

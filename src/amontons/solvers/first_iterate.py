@@ -63,14 +63,22 @@ def _motion(v: ArrayLike, n: int) -> Array:
     return v
 
 
-def with_motion(problem: FrictionProblem, start: Iterate) -> Iterate:
-    """The start with some v where finding that of its r would cost a linear solve.
-
-    Without one where it costs little, and the v of a neighbouring solution says nothing.
-    """
-    if problem.measure is Measure.EXACT:
-        return start if start.v is None else replace(start, v=None)
-    if start.v is not None:
+def with_motion(problem: FrictionProblem | NitscheProblem, start: Iterate) -> Iterate:
+    """The start with some v where finding that of its r would cost a linear solve."""
+    if start.v is not None or problem.measure is Measure.EXACT:
         return start
+    assert isinstance(problem, FrictionProblem)
     guess = problem.guess
     return replace(start, v=guess if guess is not None else np.zeros(problem.unknowns))
+
+
+def own_motion(problem: FrictionProblem | NitscheProblem, iterate: Iterate) -> Iterate:
+    """The iterate without its v where the motion of its r costs little: that one is taken."""
+    if iterate.v is None or problem.measure is not Measure.EXACT:
+        return iterate
+    return replace(iterate, v=None)
+
+
+def as_it_is(problem: FrictionProblem | NitscheProblem, iterate: Iterate) -> Iterate:
+    """The iterate with the v that it has."""
+    return iterate

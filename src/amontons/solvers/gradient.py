@@ -115,7 +115,8 @@ class AcceleratedGradient:
                 u = motion.u(x)
                 theta = 1 / math.sqrt(1 + motion.omega * beta)
                 ahead, alpha, beta = u + theta * (u - u_last), alpha / theta, theta * beta
-                if restart and _climbs(motion.response(load), law, r - r_last):
+                dr = r - r_last  # r at rest: short steps would keep v from following it
+                if restart and (not dr.any() or _climbs(motion.response(load), law, dr)):
                     ahead, alpha, beta = u, weight, first
             change = motion.size(x - x_last)
             yield GradientIterate(r, motion.v(x), self.batch, change=change)
