@@ -67,8 +67,7 @@ def with_motion(problem: FrictionProblem | NitscheProblem, start: Iterate) -> It
     """The start with some v where finding that of its r would cost a linear solve."""
     if start.v is not None or problem.measure is Measure.EXACT:
         return start
-    assert isinstance(problem, FrictionProblem)
-    guess = problem.guess
+    guess = problem.guess  # also of the problems of large deformations
     return replace(start, v=guess if guess is not None else np.zeros(problem.unknowns))
 
 
