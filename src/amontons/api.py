@@ -221,10 +221,11 @@ def follow(
     """The solution curve over a parameter, both ways from a start, with its folds and events.
 
     parameter: "load" or "friction", see `path_of`; a PathProblem has its own.  base, for
-    "load": the problem at 0, `problem` being that at 1.  start: a solution at the parameter
-    `at`, by default the lower end of the interval; without one the curve begins at a solution
-    found there.  2D problems with Coulomb friction under a load are tracked exactly, from event
-    to event; others are continued step by step, with `options`, which also asks for that.
+    "load": the problem at 0, `problem` being that at 1.  start: a point or an event of a
+    branch, or a solution at the parameter `at`, by default the lower end of the interval;
+    without one the curve begins at a solution found there.  2D problems with Coulomb friction
+    under a load are tracked exactly, from event to event; others are continued step by step,
+    with `options`, which also asks for that.
     along: one of the tangents of `first_order` at the start, to go that way only.
     limits: max_points (per direction), time_limit (seconds for all), callback(point, event),
     which stops by returning True.
