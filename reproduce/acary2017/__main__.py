@@ -119,6 +119,7 @@ def _do(
     machine = describe()
     if {"problems", "wall", "variants", "siconos"} & set(parts):
         paths = wall.write_problems(main_series, problems, click.echo)
+        report.keep_series(out, main_series, problems)
         if "wall" in parts:
             chosen = [name for name in names if name in WALL]
             report.measure(out, "wall", paths, chosen, limit, machine, missing)

@@ -18,7 +18,8 @@ from . import claims, peers, profiles, step, tables
 from .methods import HYBRID, NEWTON, PRINTED
 from .race import CLOCK, PAPER, load, race, store
 from .ratios import number
-from .wall import CASE, Series, newton_iterations, write_problems
+from .wall import CASE, Series, newton_iterations, section, series_file, write_problems
+from .wall import PAPER as PAPER_SERIES
 
 OURS = ("NSN-AC", HYBRID, "NSGS-AC", "NSN-AC inexact", "Auto")
 SETS = {
@@ -85,6 +86,11 @@ def against_siconos(
             store(out / "step.json", record)
 
 
+def keep_series(out: Path, series: Series, problems: Path) -> None:
+    """Copy the record of how the problems were chosen to the results."""
+    store(out / "series.json", json.loads(series_file(series, problems).read_text()))
+
+
 def within_siconos(
     out: Path, paths: Sequence[Path], python: str, limit: float, machine: dict[str, str]
 ) -> None:
@@ -131,7 +137,7 @@ def write(out: Path, *, quick: bool) -> None:
         part, data[name] = _part(name, record, out)
         page.append(part)
     said, data["claims"] = _claims(stored, siconos)
-    page = [_head(stored, said, quick=quick), *said[1:], *page]
+    page = [_head(stored, said, quick=quick), *said[1:], *_problems(stored, out, quick=quick), *page]
     variants = load(out / "variants.json")
     if variants["runs"]:
         page.append(VARIANTS.format(problems=len(variants["runs"]), limit=variants["limit"],
@@ -150,6 +156,21 @@ def write(out: Path, *, quick: bool) -> None:
     with replacing(out / "results.md") as temporary:
         temporary.write_text("\n\n".join(page) + "\n", encoding="utf-8")
     store(out / "results.json", data)
+
+
+def _problems(stored: dict, out: Path, *, quick: bool) -> list[str]:
+    """How the problems were chosen, and how many of them are measured."""
+    lines = []
+    if (out / "series.json").is_file():
+        lines.append(section(json.loads((out / "series.json").read_text())))
+    done = len(stored.get("wall", {}).get("runs", {}))
+    if done < PAPER_SERIES.chosen and not quick:
+        lines.append(
+            f"Measured on {done} of the {PAPER_SERIES.chosen} problems so far: "
+            + ", ".join(stored.get("wall", {}).get("runs", {}))
+            + f" (step, contacts, iterations of Newton); `{COMMAND} --missing` goes on."
+        )
+    return ["\n\n".join(["## The problems", *lines])] if lines else []
 
 
 def _claims(stored: dict, siconos: dict) -> tuple[list[str], list[dict]]:
