@@ -14,7 +14,7 @@ from amontons.case import read_case
 from amontons.files import replacing
 from amontons.plots import SI, Frame, draw_film, energy_figure, series_figure
 
-from . import claims, peers, profiles, step, tables
+from . import claims, peers, profiles, rigid, step, tables
 from .methods import HYBRID, NEWTON, PRINTED
 from .race import CLOCK, PAPER, load, race, store
 from .ratios import number
@@ -137,7 +137,8 @@ def write(out: Path, *, quick: bool) -> None:
         part, data[name] = _part(name, record, out)
         page.append(part)
     said, data["claims"] = _claims(stored, siconos)
-    page = [_head(stored, said, quick=quick), *said[1:], *_problems(stored, out, quick=quick), *page]
+    problems = _problems(stored, out, quick=quick)
+    page = [_head(stored, said, quick=quick), *said[1:], *problems, *page]
     variants = load(out / "variants.json")
     if variants["runs"]:
         page.append(VARIANTS.format(problems=len(variants["runs"]), limit=variants["limit"],
@@ -147,6 +148,9 @@ def write(out: Path, *, quick: bool) -> None:
             table=peers.table(siconos["runs"]), steps=peers.steps_table(siconos["runs"]),
             problems=len(siconos["runs"]["siconos"]), limit=siconos["limit"],
         ))  # fmt: skip
+    if (out / "rigid.json").is_file():
+        record = json.loads((out / "rigid.json").read_text())
+        page.append(f"## Rigid against elastic blocks\n\n{rigid.section(record, out)}")
     if (out / "step.json").is_file():
         record = json.loads((out / "step.json").read_text())
         page.append(f"## One time step against Siconos\n\n{STEP_TEXT}\n\n"
