@@ -16,11 +16,11 @@ import click
 from amontons.errors import AmontonsError
 from benchmarks.machine import describe
 
-from . import report, wall
+from . import report, rigid, wall
 from .methods import FCLIB, FINE, NAMES, VARIANTS, WALL
 
-PARTS = ("problems", "wall", "variants", "fine", "fclib", "siconos", "step", "pictures",
-         "report")  # fmt: skip
+PARTS = ("problems", "wall", "variants", "fine", "fclib", "siconos", "rigid", "step",
+         "pictures", "report")  # fmt: skip
 HERE = Path(__file__).parent
 EPILOG = f"""\b
 Parts, in their order (--only A,B takes some of them):
@@ -30,6 +30,7 @@ Parts, in their order (--only A,B takes some of them):
   fine      some methods on 2 problems of a finer wall
   fclib     the methods on the FCLib files
   siconos   the methods of the paper in Siconos on 5 problems
+  rigid     the wall of rigid and of elastic blocks: rank of H, and the order of Newton
   step      one warm-started time step against every solver of Siconos
   pictures  the cracking joints, a film of them, the energy balance
   report    tables and figures from the stored runs; always done at the end
@@ -119,6 +120,7 @@ def _do(
     machine = describe()
     if {"problems", "wall", "variants", "siconos"} & set(parts):
         paths = wall.write_problems(main_series, problems, click.echo)
+        report.keep_series(out, main_series, problems)
         if "wall" in parts:
             chosen = [name for name in names if name in WALL]
             report.measure(out, "wall", paths, chosen, limit, machine, missing)
@@ -139,6 +141,8 @@ def _do(
             report.measure(out, "fclib", paths, chosen, limit / 10, machine, missing)
         else:
             click.echo(f"fclib: no files in {data}; name its folder with --shared")
+    if "rigid" in parts:
+        rigid.measure(out, machine, rigid.QUICK if quick else rigid.KINDS, click.echo)
     if "step" in parts:
         if shutil.which(siconos):
             again = None if set(names) == set(NAMES) else names

@@ -73,9 +73,12 @@ def _factor(runs: Runs, newton: str, tolerance: float, cost: Cost) -> Claim:
     found = ratio(runs, "NSGS-AC", newton, tolerance, cost)
     drawn = profile_ratio(runs, "NSGS-AC", newton, tolerance, 0.5, cost)
     read = "" if math.isnan(drawn) else f"; from the profiles at one half: {number(drawn)}"
+    why = _why(runs, tolerance)
+    if found.at_least and found.value < wanted:
+        why = f"a bound only, as NSGS-AC does not end within the limit; {why}"
     return Claim(
         f"at {said(tolerance)} {newton} is ahead of NSGS-AC", f"{wanted} times",
-        f"{found} times{read}", found.value >= wanted, _why(runs, tolerance),
+        f"{found} times{read}", found.value >= wanted, why,
     )  # fmt: skip
 
 
@@ -108,14 +111,15 @@ def _hybrid(runs: Runs, cost: Cost) -> Claim:
 
 
 def _upk(runs: Runs, cost: Cost) -> Claim:
-    found = ratio(runs, "NSGS-AC", "NSGS-FP-VI-UPK", 1e-6, cost)
+    found, looser = (ratio(runs, *SWEEPING, t, cost) for t in (1e-6, 1e-4))
     sweeps = [np.array(iterations(runs, n, 1e-4, cost.criterion)) for n in SWEEPING]
     both = np.isfinite(sweeps[0]) & np.isfinite(sweeps[1])
     same = float(np.median(sweeps[1][both] / sweeps[0][both])) if both.any() else math.nan
+    nobody = "" if found.problems else "none of them ends within the limit; "
     return Claim(
         "at 1e-6 NSGS-FP-VI-UPK is ahead of NSGS-AC", "yes",
-        f"NSGS-AC / NSGS-FP-VI-UPK {found}", found.value > 1,
-        f"NSGS-FP-VI-UPK makes {number(same)} times the sweeps of NSGS-AC to 1e-4",
+        f"NSGS-AC / NSGS-FP-VI-UPK {found}; at 1e-4 {looser}", found.value > 1,
+        f"{nobody}NSGS-FP-VI-UPK makes {number(same)} times the sweeps of NSGS-AC to 1e-4",
     )  # fmt: skip
 
 

@@ -14,11 +14,12 @@ from amontons.case import read_case
 from amontons.files import replacing
 from amontons.plots import SI, Frame, draw_film, energy_figure, series_figure
 
-from . import claims, peers, profiles, step, tables
+from . import claims, peers, profiles, rigid, step, tables
 from .methods import HYBRID, NEWTON, PRINTED
 from .race import CLOCK, PAPER, load, race, store
 from .ratios import number
-from .wall import CASE, Series, newton_iterations, write_problems
+from .wall import CASE, Series, newton_iterations, section, series_file, write_problems
+from .wall import PAPER as PAPER_SERIES
 
 OURS = ("NSN-AC", HYBRID, "NSGS-AC", "NSN-AC inexact", "Auto")
 SETS = {
@@ -85,6 +86,11 @@ def against_siconos(
             store(out / "step.json", record)
 
 
+def keep_series(out: Path, series: Series, problems: Path) -> None:
+    """Copy the record of how the problems were chosen to the results."""
+    store(out / "series.json", json.loads(series_file(series, problems).read_text()))
+
+
 def within_siconos(
     out: Path, paths: Sequence[Path], python: str, limit: float, machine: dict[str, str]
 ) -> None:
@@ -131,7 +137,8 @@ def write(out: Path, *, quick: bool) -> None:
         part, data[name] = _part(name, record, out)
         page.append(part)
     said, data["claims"] = _claims(stored, siconos)
-    page = [_head(stored, said, quick=quick), *said[1:], *page]
+    problems = _problems(stored, out, quick=quick)
+    page = [_head(stored, said, quick=quick), *said[1:], *problems, *page]
     variants = load(out / "variants.json")
     if variants["runs"]:
         page.append(VARIANTS.format(problems=len(variants["runs"]), limit=variants["limit"],
@@ -141,6 +148,9 @@ def write(out: Path, *, quick: bool) -> None:
             table=peers.table(siconos["runs"]), steps=peers.steps_table(siconos["runs"]),
             problems=len(siconos["runs"]["siconos"]), limit=siconos["limit"],
         ))  # fmt: skip
+    if (out / "rigid.json").is_file():
+        record = json.loads((out / "rigid.json").read_text())
+        page.append(f"## Rigid against elastic blocks\n\n{rigid.section(record, out)}")
     if (out / "step.json").is_file():
         record = json.loads((out / "step.json").read_text())
         page.append(f"## One time step against Siconos\n\n{STEP_TEXT}\n\n"
@@ -150,6 +160,21 @@ def write(out: Path, *, quick: bool) -> None:
     with replacing(out / "results.md") as temporary:
         temporary.write_text("\n\n".join(page) + "\n", encoding="utf-8")
     store(out / "results.json", data)
+
+
+def _problems(stored: dict, out: Path, *, quick: bool) -> list[str]:
+    """How the problems were chosen, and how many of them are measured."""
+    lines = []
+    if (out / "series.json").is_file():
+        lines.append(section(json.loads((out / "series.json").read_text())))
+    done = len(stored.get("wall", {}).get("runs", {}))
+    if done < PAPER_SERIES.chosen and not quick:
+        lines.append(
+            f"Measured on {done} of the {PAPER_SERIES.chosen} problems so far: "
+            + ", ".join(stored.get("wall", {}).get("runs", {}))
+            + f" (step, contacts, iterations of Newton); `{COMMAND} --missing` goes on."
+        )
+    return ["\n\n".join(["## The problems", *lines])] if lines else []
 
 
 def _claims(stored: dict, siconos: dict) -> tuple[list[str], list[dict]]:
@@ -162,7 +187,7 @@ def _claims(stored: dict, siconos: dict) -> tuple[list[str], list[dict]]:
     if siconos["runs"]:
         theirs = list(claims.claims(siconos["runs"]["siconos"], peers.COST))
     if "fclib" in stored:
-        ours.append(claims.most_robust(stored["fclib"]["runs"], SETS["fclib"]))
+        ours = [*ours, claims.most_robust(stored["fclib"]["runs"], SETS["fclib"])]
         seconds, theirs = [*seconds, None], [*theirs, None]
     verdicts = [claims.verdict(c, other) for c, other in zip(ours, theirs, strict=True)]
     told = [
@@ -186,8 +211,10 @@ def _part(name: str, record: dict, out: Path) -> tuple[str, dict]:
     runs = record["runs"]
     lines = [f"## On {SETS[name]}: {len(runs)} problems",
              "Processor seconds, by our judge:", tables.methods_table(runs),
-             "Floating point operations, by the paper's (13):",
-             tables.methods_table(runs, PAPER)]  # fmt: skip
+             _early(runs)]  # fmt: skip
+    if any(run["flops"] for entry in runs.values() for run in entry["methods"].values()):
+        lines += ["Floating point operations, by the paper's (13):",
+                  tables.methods_table(runs, PAPER)]  # fmt: skip
     if name in PROFILES:
         lines += _figures(name, runs, out)
     data: dict = {}
@@ -203,20 +230,32 @@ def _part(name: str, record: dict, out: Path) -> tuple[str, dict]:
     return "\n\n".join(line for line in lines if line), data
 
 
+def _early(runs: dict) -> str:
+    """What is to be said of runs of an earlier measurement, which a rule has ended."""
+    ends = [run["outcome"] for entry in runs.values() for run in entry["methods"].values()]
+    early = ends.count("stagnated")
+    if not early:
+        return ""
+    return (
+        f"Measured while a rule of stagnation still ended runs, {early} of {len(ends)} here: "
+        "what is solved is at least what stands in the table."
+    )
+
+
 def _figures(name: str, runs: dict, out: Path) -> list[str]:
     """Profiles as in figure 3 with its zoom, by seconds, and of ours."""
     newton = (*NEWTON, HYBRID)
     drawn = {
-        "": ("Operations, the methods of the paper", PRINTED, PAPER),
+        "-operations": ("Operations, the methods of the paper", PRINTED, PAPER),
         "-zoom": ("Operations, the Newton methods among themselves", newton, PAPER),
-        "-seconds": ("Seconds, the methods of the paper", PRINTED, CLOCK),
+        "": ("Seconds, the methods of the paper", PRINTED, CLOCK),
         "-ours": ("Seconds, ours beside them", OURS, CLOCK),
     }
     lines = []
     for suffix, (title, names, cost) in drawn.items():
         path = out / f"profiles-{name}{suffix}.png"
-        profiles.draw(runs, names, path, cost)
-        lines.append(f"![{title}]({path.name})")
+        if profiles.draw(runs, names, path, cost):
+            lines.append(f"![{title}]({path.name})")
     return lines
 
 

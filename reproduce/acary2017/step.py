@@ -150,27 +150,10 @@ def worker(
     cap: processor seconds of a call; measure: of reactions (nc, 3) in place of the judge.  Of a
     run that fails "spent" is what it really took.
     """
-    measure = measure or condensed.exact_error
-    asked = ",".join(f"{tolerance * k:g}" for k in retighten)
-    script = str(Path(__file__).parent / "siconos_worker.py")
-    process = subprocess.Popen([python, script, str(file), solver, asked],
-                               stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-                               text=True)  # fmt: skip
-    runs, why, spent = [], "ended without an answer", 0.0
-    for k in range(len(retighten) + 1):
-        line, spent = _line(process, cap if k else START_UP)
-        if not line:
-            why = f"over {cap:g} s" if spent >= cap and k else why
-            break
-        found = json.loads(line)
-        if k == 0:
-            continue
-        r = np.array(found.pop("r")).reshape(-1, 3)
-        runs.append({**found, "error": measure(r)})
-        if runs[-1]["error"] <= tolerance or found["seconds"] > cap:
-            break  # a tighter one takes no less
-    process.kill()
-    process.wait()
+    runs, why, spent = calls(
+        python, file, solver, cap, [tolerance * k for k in retighten],
+        measure or condensed.exact_error, tolerance,
+    )  # fmt: skip
     passing = [x for x in runs if x["error"] <= tolerance]
     if passing:
         return min(passing, key=lambda x: x["seconds"])
@@ -182,6 +165,38 @@ def worker(
             "spent": max(x["seconds"] for x in runs),
         }
     return {"seconds": None, "why": why, "spent": spent}
+
+
+def calls(
+    python: str, file: Path, solver: str, cap: float, asked: Sequence[float],
+    measure: Callable[[np.ndarray], float], enough: float,
+) -> tuple[list[dict[str, Any]], str, float]:  # fmt: skip
+    """Calls of one solver with one tolerance after another, in one process.
+
+    Ends where the error is small enough or a call takes longer than cap; returns what the calls
+    gave with their "error", why they ended, and the processor seconds of the last one.
+    """
+    script = str(Path(__file__).parent / "siconos_worker.py")
+    texts = ",".join(f"{tolerance:g}" for tolerance in asked)
+    process = subprocess.Popen([python, script, str(file), solver, texts],
+                               stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+                               text=True)  # fmt: skip
+    runs, why, spent = [], "ended without an answer", 0.0
+    for k in range(len(asked) + 1):
+        line, spent = _line(process, cap if k else START_UP)
+        if not line:
+            why = f"over {cap:g} s" if spent >= cap and k else why
+            break
+        found = json.loads(line)
+        if k == 0:
+            continue
+        r = np.array(found.pop("r")).reshape(-1, 3)
+        runs.append({**found, "error": measure(r)})
+        if runs[-1]["error"] <= enough or found["seconds"] > cap:
+            break  # a tighter one takes no less
+    process.kill()
+    process.wait()
+    return runs, why, spent
 
 
 def _line(process: subprocess.Popen, cap: float) -> tuple[str, float]:

@@ -319,12 +319,13 @@ def test_table_against_siconos_names_the_best():
 
 
 def test_runs_of_siconos_look_like_ours_and_end_at_the_first_miss(problems, monkeypatch):
-    def worker(condensed, python, file, solver, cap, tolerance, *more):
-        if solver == "NSGS" and tolerance < 1e-3:
-            return {"seconds": None, "why": "over 5 s", "spent": 5.1}
-        return {"seconds": 0.5, "iterations": 7, "error": tolerance}
+    def calls(python, file, solver, cap, asked, measure, enough):
+        if solver == "NSGS":
+            rows = [{"seconds": 0.5, "iterations": 7, "error": x} for x in (1e-2, 1e-3)]
+            return rows, "over 5 s", 5.1
+        return [{"seconds": 0.5, "iterations": 7, "error": 1e-7}], "", 0.5
 
-    monkeypatch.setattr(peers, "worker", worker)
+    monkeypatch.setattr(peers, "calls", calls)
     found = peers.race(problems[:1], "", 5.0, {}, lambda text: None)
     (entry,) = found["siconos"].values()
     slow = entry["methods"]["NSGS-AC"]
