@@ -40,7 +40,6 @@ Examples:
   amontons solve example:cube --set mesh.cells=8 -o out
   amontons solve case.toml --method semismooth-newton --set solver.line_search=armijo
   amontons solve problem.hdf5 --method gauss-seidel --set solver.batch=adaptive
-  amontons solve problem.hdf5 --start problem-results -o again
   amontons solve problem.hdf5 --quiet --json - | jq .error
 """
 )
