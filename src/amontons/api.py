@@ -153,6 +153,7 @@ def basins(
     """Which solution each method finds, with each value of its parameters, from each start.
 
     methods: names such as "uzawa", solvers, or `BasinMethod`s; a mapping gives them names.
+    Of a model also "nitsche": its contact by Nitsche's method, with the fields of `Nitsche`.
     parameters: values by field, {"rho": [1, 10]} or {"uzawa.rho": …}; all combinations are run.
     starts: names of `analysis.basin_starts` ("cone", "cone:20", …) or a mapping, also of other
     names to an Iterate or several; draws: random starts of each kind; reaction_size,
@@ -165,6 +166,7 @@ def basins(
     the judge agrees to `tolerance`, the balance of its r and v included.  callback(done, all)
     is called after each run.
     """
+    from .analysis.basin_nitsche import by_nitsche
     from .analysis.basin_solutions import Atlas, given_solutions
     from .analysis.basins import StudyOptions, check_callback, study
 
@@ -182,7 +184,8 @@ def basins(
     else:
         limit = deadline.share(SEARCH) if time_limit is not None else deadline_of(None, WORK)
         given_solutions(atlas, all_solutions(discrete, time_limit=limit))
-    return study(atlas, methods, parameters, starts, options, deadline, callback)
+    makers = {} if isinstance(problem, FrictionProblem) else {"nitsche": by_nitsche(problem)}
+    return study(atlas, methods, parameters, starts, options, deadline, callback, makers)
 
 
 def _begun(time_limit: TimeLimit) -> TimeLimit:
