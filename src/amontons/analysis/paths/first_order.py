@@ -220,7 +220,7 @@ def _by_search(path: FrictionPath, y: Array, p: float, tolerance: float) -> Firs
         return None
     weight, tangents, reasons = weight_of(path, len(y)), [], []
     for sense in (1.0, -1.0):
-        found, search = rates.tangents(sense)
+        found, search = rates.tangents(sense, path.deadline)
         if search.sets or not search.finished:
             return None
         reasons += [] if search.complete else [search.reason]
