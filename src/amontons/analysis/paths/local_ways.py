@@ -170,16 +170,19 @@ class LocalWays:
         along = self._cosine(a, b)
         if along < ALIKE:
             return False
-        compared = False
-        for h in TOLD:
-            x, z = self._solution(a, h), self._solution(b, h)
-            if x is None or z is None:
-                continue
-            compared = True
-            y, p = x.y - z.y, x.p - z.p
-            shift = self.curve.product(y, p, z.ty, z.tp)
-            across = self.curve.length(y - shift * z.ty, p - shift * z.tp)
-            size = max(1.0, float(np.abs(x.y).max(initial=0)))
-            if across > APART * size + SHIFTED * abs(shift):
-                return False
-        return compared or along >= 1 - SAME
+        for distances in (TOLD, (BEGIN,)):  # the latter where solutions do not go far
+            told = [self._coincide(a, b, h) for h in distances]
+            if any(one is not None for one in told):
+                return all(one is not False for one in told)
+        return along >= 1 - SAME
+
+    def _coincide(self, a: Tangent, b: Tangent, h: float) -> bool | None:
+        """Whether the solutions at a distance lie on one curve; None where one is missing."""
+        x, z = self._solution(a, h), self._solution(b, h)
+        if x is None or z is None:
+            return None
+        y, p = x.y - z.y, x.p - z.p
+        shift = self.curve.product(y, p, z.ty, z.tp)
+        across = self.curve.length(y - shift * z.ty, p - shift * z.tp)
+        size = max(1.0, float(np.abs(x.y).max(initial=0)))
+        return across <= APART * size + SHIFTED * abs(shift)
