@@ -95,10 +95,10 @@ class ContactRates:
         return rate_solutions(self.D, sense * self.b, self.pairs, self.mu, nodes, deadline)
 
     def tangents(
-        self, sense: float, deadline: Deadline = NEVER
+        self, sense: float, deadline: Deadline = NEVER, *, nodes: int = 200_000
     ) -> tuple[list[tuple[Array, str]], RateSolutions]:
         """Rates r' (2 nc,) for p' = sense with the piece into which they lead; the search."""
-        found = self.solutions(sense, deadline=deadline)
+        found = self.solutions(sense, nodes=nodes, deadline=deadline)
         out = [
             (self.force @ x + sense * self.offset, self.piece(word))
             for x, word in zip(found.solutions, found.patterns, strict=True)

@@ -60,26 +60,29 @@ class LocalWays:
     def found(self) -> list[Tangent]:
         """All ways but the one that led here; those that are sure where there are any."""
         back = Tangent(-self.spot.ty, -self.spot.tp, self.piece)
-        return self._distinct(
+        ahead = (
             t for t in self._candidates()
-            if not (t.piece == self.piece and self._cosine(t, back) >= 1 - SAME)
-            and not self._one(t, back)
+            if t.piece != self.piece or self._cosine(t, back) < 1 - SAME
         )  # fmt: skip
+        return self._distinct(ahead, back)
 
     def all(self) -> list[Tangent]:
         """All ways from the spot, also back."""
         return self._distinct(self._candidates())
 
-    def _distinct(self, candidates: Iterable[Tangent]) -> list[Tangent]:
+    def _distinct(
+        self, candidates: Iterable[Tangent], back: Tangent | None = None
+    ) -> list[Tangent]:
         """One tangent per curve, of those that lead into their piece; the sure ones if any.
 
         Where a piece is short the one behind it has a solution nearby, too, on the same curve:
-        the tangent with the least distance to its solution is that of the curve.
+        the tangent with the least distance to its solution is that of the curve.  back: one
+        whose curve is left out.
         """
         kept: list[Way] = []
         for tangent in candidates:
             way = self._way(tangent)
-            if way is None:
+            if way is None or (back is not None and self._one(tangent, back)):
                 continue
             same = [k for k, other in enumerate(kept) if self._one(tangent, other.tangent)]
             if not same:
@@ -167,16 +170,19 @@ class LocalWays:
         along = self._cosine(a, b)
         if along < ALIKE:
             return False
-        compared = False
-        for h in TOLD:
-            x, z = self._solution(a, h), self._solution(b, h)
-            if x is None or z is None:
-                continue
-            compared = True
-            y, p = x.y - z.y, x.p - z.p
-            shift = self.curve.product(y, p, z.ty, z.tp)
-            across = self.curve.length(y - shift * z.ty, p - shift * z.tp)
-            size = max(1.0, float(np.abs(x.y).max(initial=0)))
-            if across > APART * size + SHIFTED * abs(shift):
-                return False
-        return compared or along >= 1 - SAME
+        for distances in (TOLD, (BEGIN,)):  # the latter where solutions do not go far
+            told = [self._coincide(a, b, h) for h in distances]
+            if any(one is not None for one in told):
+                return all(one is not False for one in told)
+        return along >= 1 - SAME
+
+    def _coincide(self, a: Tangent, b: Tangent, h: float) -> bool | None:
+        """Whether the solutions at a distance lie on one curve; None where one is missing."""
+        x, z = self._solution(a, h), self._solution(b, h)
+        if x is None or z is None:
+            return None
+        y, p = x.y - z.y, x.p - z.p
+        shift = self.curve.product(y, p, z.ty, z.tp)
+        across = self.curve.length(y - shift * z.ty, p - shift * z.tp)
+        size = max(1.0, float(np.abs(x.y).max(initial=0)))
+        return across <= APART * size + SHIFTED * abs(shift)
