@@ -27,11 +27,11 @@ from kills import CASE, SLOW, Runs, at_every_call, at_random  # noqa: E402
 from worker import Worker  # noqa: E402
 
 WALL = (HERE.parent / "examples" / "wall" / "wall.toml").read_text()
-SMALL = ("wall.cells=[2,1,1]", "wall.rows=3", "evolution.until=0.02")
+SMALL = ("wall.cells=[2,1,1]", "evolution.step=1e-3", "evolution.until=0.02")
 CASES = {  # text, settings, steps from picture to picture, part of the kills
     "block, dynamic, 12 steps": (CASE, (), 2, 1.0),
     "block, quasi-static, 12 steps": (SLOW, (), 2, 0.3),
-    "wall of 8 bodies, dynamic, 20 steps": (WALL, SMALL, 5, 0.2),
+    "wall of 14 bodies, dynamic, 20 steps": (WALL, SMALL, 5, 0.2),
 }
 SEED = 2026
 

@@ -203,10 +203,9 @@ def _said(record: dict[str, Any]) -> str:
             for who in METHODS
         )
         lost = [row["rows"] - row["rank"] for row in rows]
-        parts.append(
-            f"Of {len(rows)} {kind} problems ({min(lost)} to {max(lost)} rows of Hᵀ depend on "
-            f"others) solve: {counts}."
-        )
+        many = "no" if not max(lost, default=0) else f"{min(lost)} to {max(lost)}"
+        parts.append(f"Of {len(rows)} {kind} problems, with {many} columns of H that depend "
+                     f"on others, solve: {counts}.")  # fmt: skip
     return " ".join(parts)
 
 

@@ -43,7 +43,7 @@ def test_built_in_example(name, tmp_path):
 
 
 def test_built_in_wall_runs_in_time(tmp_path):
-    smaller = ["--set", "wall.cells=[2,1,1]", "--set", "evolution.until=0.02"]
+    smaller = ["--set", "wall.cells=[2,1,1]", "--set", "evolution.until=0.2"]
     arguments = ["run", "example:wall", "-o", str(tmp_path / "out"), "--pictures", *smaller]
     result = CliRunner().invoke(main, arguments)
     assert result.exit_code == 0, result.output
