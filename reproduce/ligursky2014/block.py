@@ -247,8 +247,9 @@ def folds_table(found: dict[str, Any], known: dict[str, Any]) -> list[str]:
             row = {"squares": squares, "method": name}
             row |= {f"fold {k + 1}": f"{fold:.10f}" for k, fold in enumerate(one["folds"])}
             if squares in known:
-                row |= {"off reference": fold_error(one, known[squares]),
-                        "solutions off": solution_error(one, known[squares])}  # fmt: skip
+                if "folds" in known[squares]:
+                    row["folds off"] = fold_error(one, known[squares])
+                row["solutions off"] = solution_error(one, known[squares])
             rows.append(row | {"points": one["points"], "ends": ", ".join(one["ends"]),
                                "CPU s": f"{one['cpu']:.1f}"})  # fmt: skip
     return table(rows)
@@ -271,7 +272,8 @@ def solution_error(run_: dict[str, Any], known: dict[str, Any]) -> float:
     if [row["pattern"] for row in ours] != [row["pattern"] for row in theirs]:
         return float("inf")
     pairs = [*zip(ours, theirs, strict=True),
-             *zip(run_["along"], known["along"], strict=True)]  # fmt: skip
+             *zip(run_["along"] if "along" in known else (), known.get("along", ()),
+                  strict=True)]  # fmt: skip
     return max(abs(a[key] - b[key]) for a, b in pairs for key in NODE)
 
 
@@ -299,7 +301,7 @@ def page(found: dict[str, Any], known: dict[str, Any]) -> list[str]:
         "The reference is GetFEM's element on the same squares with statuses solved for "
         "directly (`reference.json`); solutions off: largest difference at the node (10, 0), "
         "mm and N/mm2, in the three solutions at 0.495, whose statuses are the same at every "
-        "contact, and at five other loads.", "",
+        "contact, and on 800 squares at five other loads.", "",
         "The solutions at gamma = 0.495; residual in N, lengths in mm, products in N mm:", "",
         *table(checks), "The node at (10, 0) there (mm, N/mm2), signs of the paper:", "",
         *table(nodes), "and where the load has one solution:", "", *table(along),

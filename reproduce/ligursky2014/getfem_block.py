@@ -1,8 +1,10 @@
 """The block by GetFEM: reference values for `reference.json`, from another program.
 
-    python3 reproduce/ligursky2014/getfem_block.py 20 40
+    python3 reproduce/ligursky2014/getfem_block.py 20 40=PATTERN,PATTERN,...
 
-with a Python that has GetFEM (5.4; Debian's python3-getfem) and SciPy; cells along the width.
+with a Python that has GetFEM (5.4; Debian's python3-getfem) and SciPy; cells along the width,
+alone for the whole curve, with statuses for the solutions at 0.495 that have them (all
+conditions of the contacts are checked).  The whole curve on 40 takes a quarter of an hour.
 Nothing of amontons is used.  Forces and tangents of the body are GetFEM's (its law
 "Ciarlet Geymonat", bilinear squares, 2 x 2 Gauss points).  The rest is written here: for given
 statuses of the contact nodes the problem is smooth, its curve is followed by arclength, the
@@ -311,7 +313,28 @@ def record(cells):
     return {"folds": curve.folds, "at 0.495": curve.solutions, "along": curve.along}
 
 
+def with_statuses(cells, patterns):
+    """The solutions at 0.495 that have given statuses; raises where a condition fails."""
+    curve = Curve(Block(cells))
+    begin, rows = np.r_[curve.y, 0.0], []
+    last = np.r_[np.zeros(len(curve.y)), 1.0]
+    for pattern in patterns:
+        curve.statuses = list(pattern)
+        z = curve.solved(begin, lambda z, u, f, K: (z[-1] - GAMMA, last), 1e-12)
+        u, forces, _ = curve.check(z)
+        rows.append({"corner": pattern[-1], "pattern": pattern,
+                     **curve.block.node(u, forces)})  # fmt: skip
+    return {"at 0.495": rows}
+
+
+def asked(argument):
+    """(squares, record) of one argument."""
+    cells, _, patterns = argument.partition("=")
+    found = with_statuses(int(cells), patterns.split(",")) if patterns else record(int(cells))
+    return str(2 * int(cells) ** 2), found
+
+
 if __name__ == "__main__":
     gf.util_trace_level(0)
-    found = {str(2 * int(cells) ** 2): record(int(cells)) for cells in sys.argv[1:]}
+    found = dict(asked(argument) for argument in sys.argv[1:])
     print(json.dumps(found, indent=1, default=float))

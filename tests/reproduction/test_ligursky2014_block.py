@@ -28,14 +28,15 @@ STORED = json.loads((ROOT / "reproduce/ligursky2014/results/results.json").read_
 def test_stored_block_meets_the_reference():
     """The committed page beside GetFEM: folds, statuses of every contact, the node (10, 0)."""
     known_meshes = [name for name in REFERENCE["block"] if name.isdigit()]
-    assert "800" in known_meshes
+    assert {"800", "3200"} <= set(known_meshes)
     for squares in known_meshes:
         known, runs = REFERENCE["block"][squares], dict(STORED["block"][squares]["runs"])
         if squares in STORED["block-paper"]:
             runs[block.THEIRS] = STORED["block-paper"][squares]
         for name, run in runs.items():
-            assert block.fold_error(run, known) < 1e-9, name
             assert block.solution_error(run, known) < 1e-8, name
+            if "folds" in known:
+                assert block.fold_error(run, known) < 1e-9, name
 
 
 def test_stored_block_on_all_meshes():
