@@ -170,7 +170,7 @@ def _problems(stored: dict, out: Path, *, quick: bool) -> list[str]:
     done = len(stored.get("wall", {}).get("runs", {}))
     if done < PAPER_SERIES.chosen and not quick:
         lines.append(
-            f"Measured on {done} of the {PAPER_SERIES.chosen} problems so far: "
+            f"Measured on {done} problems so far, of {PAPER_SERIES.chosen} in all: "
             + ", ".join(stored.get("wall", {}).get("runs", {}))
             + f" (step, contacts, iterations of Newton); `{COMMAND} --missing` goes on."
         )
