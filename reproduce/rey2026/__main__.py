@@ -15,7 +15,7 @@ from types import ModuleType
 import click
 
 from ..record import check_parts, heading, regenerate
-from . import alart_curnier, nitsche, primal_dual, report, solutions, uzawa
+from . import alart_curnier, extra, nitsche, primal_dual, report, solutions, uzawa, verdict
 
 HERE = Path(__file__).parent
 PAPER: dict[str, dict] = json.loads((HERE / "paper.json").read_text())
@@ -28,7 +28,8 @@ ALGORITHMS: dict[str, ModuleType] = {
     "uzawa": uzawa,
 }
 TABLES = [name for name, table in PAPER.items() if table.get("algorithm") in ALGORITHMS]
-PARTS = (*TABLES, "enumeration", "figure1", "refinement", "mu_crit")
+EXTRA = ("example", "kept", "symmetric", "integral", "strict", "readings", "meshes")
+PARTS = (*TABLES, "enumeration", "figure1", "refinement", "mu_crit", *EXTRA)
 SEED = 2026
 
 
@@ -68,11 +69,30 @@ def work(part: str, draws: int, contacts: int, out: Path) -> list | dict | Itera
         return solutions.refinement()
     if part == "mu_crit":
         return solutions.critical()
+    if part in EXTRA:
+        return beside(part, draws)
     table = PAPER[part]
     module = ALGORITHMS[table["algorithm"]]
     if "cells" in table:
         return [[asdict(cell) for cell in row] for row in module.cells(table)]
     return one_by_one(module, {**table, "n_c": contacts}, draws)
+
+
+def beside(part: str, draws: int) -> list | dict | Iterator[dict]:
+    """The numbers of a part that is no table of the paper."""
+    if part == "example":
+        return extra.example()
+    if part == "kept":
+        return extra.kept()
+    if part == "symmetric":
+        return extra.symmetric(PAPER)
+    if part == "integral":
+        return extra.integral(PAPER)
+    if part == "strict":
+        return extra.strict(PAPER)
+    if part == "readings":
+        return extra.readings(PAPER, draws, SEED)
+    return extra.meshes(draws, SEED)
 
 
 def one_by_one(module: ModuleType, table: dict, draws: int) -> Iterator[dict]:
@@ -86,7 +106,8 @@ def one_by_one(module: ModuleType, table: dict, draws: int) -> Iterator[dict]:
 
 def page(record: dict) -> str:
     """All tables of what is stored."""
-    lines = heading("rey2026", record)
+    title, *rest = heading("rey2026", record)
+    lines = [title, "", *verdict.line(record, PAPER, report.agrees), *rest[1:]]
     lines += report.summary(record, PAPER)
     for name, table in PAPER.items():
         if name in record and "algorithm" in table:
@@ -102,7 +123,27 @@ def page(record: dict) -> str:
             lines += make(record[part])
     if "mu_crit" in record:
         lines += report.critical(record["mu_crit"], PAPER["mu_crit"])
-    return "\n".join(lines)
+    return "\n".join([*lines, *_beside(record)])
+
+
+def _beside(record: dict) -> list[str]:
+    """What is no table of the paper."""
+    titles = {"integral": "Uzawa with integral contact terms",
+              "symmetric": "Nitsche's symmetric variant (θ = 1)",
+              "strict": "One element with 1e-10 for the judge and for naming"}  # fmt: skip
+    lines: list[str] = []
+    if "example" in record:
+        lines += report.example(record["example"])
+    if "kept" in record:
+        lines += report.kept(record["kept"])
+    for part, title in titles.items():
+        if part in record:
+            lines += report.other(title, record[part], PAPER)
+    if "readings" in record:
+        lines += report.readings(record["readings"], PAPER)
+    if "meshes" in record:
+        lines += report.meshes(record["meshes"], extra.ALPHAS)
+    return lines
 
 
 if __name__ == "__main__":

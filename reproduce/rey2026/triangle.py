@@ -31,6 +31,7 @@ LISTED = 25  # contact nodes up to which all solutions are listed in seconds at 
 STARTS = 60  # of Newton's method for the slip solution of finer meshes, without proof
 SAME = 1e-8  # energy norm of the error that names a solution; the paper says 1e-10
 TOLERANCE = 1e-8  # of the judge
+NEAR_KEPT = 1e-4  # energy norm, of a state that was kept
 STRICT = 1e-10  # of the judge, and of the error that names a solution, as in the paper
 
 

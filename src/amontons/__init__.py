@@ -38,7 +38,7 @@ _HOME = {
     "granular": ("SpherePacking",),
     "evolution": ("MoreauJean", "Passage", "QuasiStatic", "State", "TimeStep", "at_rest",
                   "evolve"),
-    "checkpoint": ("export_fclib", "load_state", "save_state"),
+    "checkpoint": ("export_fclib", "load_start", "load_state", "save_state"),
     "case": ("read_case",),
     "results": ("ModelSolution",),
     "warned": ("ResultWarning",),

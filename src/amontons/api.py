@@ -153,6 +153,7 @@ def basins(
     """Which solution each method finds, with each value of its parameters, from each start.
 
     methods: names such as "uzawa", solvers, or `BasinMethod`s; a mapping gives them names.
+    Of a model also "nitsche": its contact by Nitsche's method, with the fields of `Nitsche`.
     parameters: values by field, {"rho": [1, 10]} or {"uzawa.rho": …}; all combinations are run.
     starts: names of `analysis.basin_starts` ("cone", "cone:20", …) or a mapping, also of other
     names to an Iterate or several; draws: random starts of each kind; reaction_size,
@@ -165,6 +166,7 @@ def basins(
     the judge agrees to `tolerance`, the balance of its r and v included.  callback(done, all)
     is called after each run.
     """
+    from .analysis.basin_nitsche import by_nitsche
     from .analysis.basin_solutions import Atlas, given_solutions
     from .analysis.basins import StudyOptions, check_callback, study
 
@@ -182,7 +184,8 @@ def basins(
     else:
         limit = deadline.share(SEARCH) if time_limit is not None else deadline_of(None, WORK)
         given_solutions(atlas, all_solutions(discrete, time_limit=limit))
-    return study(atlas, methods, parameters, starts, options, deadline, callback)
+    makers = {} if isinstance(problem, FrictionProblem) else {"nitsche": by_nitsche(problem)}
+    return study(atlas, methods, parameters, starts, options, deadline, callback, makers)
 
 
 def _begun(time_limit: TimeLimit) -> TimeLimit:
@@ -221,10 +224,11 @@ def follow(
     """The solution curve over a parameter, both ways from a start, with its folds and events.
 
     parameter: "load" or "friction", see `path_of`; a PathProblem has its own.  base, for
-    "load": the problem at 0, `problem` being that at 1.  start: a solution at the parameter
-    `at`, by default the lower end of the interval; without one the curve begins at a solution
-    found there.  2D problems with Coulomb friction under a load are tracked exactly, from event
-    to event; others are continued step by step, with `options`, which also asks for that.
+    "load": the problem at 0, `problem` being that at 1.  start: a point or an event of a
+    branch, or a solution at the parameter `at`, by default the lower end of the interval;
+    without one the curve begins at a solution found there.  2D problems with Coulomb friction
+    under a load are tracked exactly, from event to event; others are continued step by step,
+    with `options`, which also asks for that.
     along: one of the tangents of `first_order` at the start, to go that way only.
     limits: max_points (per direction), time_limit (seconds for all), callback(point, event),
     which stops by returning True.

@@ -15,11 +15,13 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from .checked_arrays import real
 from .errors import FileFormatError, InvalidInput
 from .evolution import State, TimeStep
 from .fclib import DAMAGE, write_fclib, write_hdf5
 from .files import check_is_regular, make_folder
 from .hdf5 import check_contained
+from .solvers import Iterate
 
 GROUP = "amontons_state"
 ARRAYS = {"displacement": 1, "velocity": 1, "force": 2, "slip": 2}  # name: dimensions
@@ -55,6 +57,64 @@ def load_state(path: str | os.PathLike[str]) -> State:
     return _read(Path(path), _state)
 
 
+def load_start(path: str | os.PathLike[str]) -> Iterate:
+    """A start from a file: reactions r, and displacements or velocities v if there are any.
+
+    An HDF5 file with the data sets r (nc, d) and maybe v (n,), such as our solution.h5, or the
+    folder that holds it; or JSON, {"r": [[…], …], "v": […]}.  Raises FileFormatError naming
+    the file for anything else, and for numbers that are not finite.
+    """
+    path = Path(path)
+    if path.is_dir() and (path / "solution.h5").is_file():
+        path = path / "solution.h5"
+    if path.suffix.lower() != ".json":
+        return _read(path, _start_in_hdf5, "a solution")
+    check_is_regular(path)
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise FileFormatError(f"{path}: no such file") from None
+    except (OSError, ValueError, RecursionError) as reason:
+        raise FileFormatError(f"{path}: expected JSON, got: {reason}") from None
+    return _start_of(path, data)
+
+
+def _start_in_hdf5(path: Path, file: h5py.File) -> Iterate:
+    found = {
+        name: file[name][()] for name in ("r", "v") if isinstance(file.get(name), h5py.Dataset)
+    }
+    return _start_of(path, found)
+
+
+def _start_of(path: Path, data: Any) -> Iterate:
+    """The start in the data of a file."""
+    if not isinstance(data, dict) or "r" not in data:
+        words = "reactions r, a row per contact, and maybe v"
+        if isinstance(data, dict) and "schema" in data:
+            hint = "; solution.h5 of the same folder holds them" if "outcome" in data else ""
+            hint = '; save one entry of "solutions"' if "solutions" in data else hint
+            raise FileFormatError(
+                f"{path}: expected {words}, got a record {data['schema']}{hint}"
+            )
+        raise FileFormatError(f"{path}: expected {words}, found no r")
+    try:
+        r, v = real("r", data["r"]), data.get("v")
+        v = None if v is None else real("v", v)
+    except InvalidInput as reason:
+        raise FileFormatError(f"{path}: {reason}") from None
+    for name, values, dimensions in (("r", r, 2), ("v", v, 1)):
+        if values is None:
+            continue
+        if values.ndim != dimensions:
+            words = "a row per contact" if name == "r" else "a list of numbers"
+            raise FileFormatError(
+                f"{path}: {name}: expected {words}, got shape {values.shape}"
+            )
+        if not np.isfinite(values).all():
+            raise FileFormatError(f"{path}: {name}: holds a number that is not finite")
+    return Iterate(r, v)
+
+
 def save_checkpoint(path: str | os.PathLike[str], checkpoint: Checkpoint) -> None:
     """Write a checkpoint; nothing on failure."""
     case = json.dumps(checkpoint.case, sort_keys=True)
@@ -84,7 +144,9 @@ def _put_state(file: h5py.File, state: State) -> None:
         group[name] = getattr(state, name)
 
 
-def _read(path: Path, reader: Callable[[Path, h5py.File], Read]) -> Read:
+def _read(
+    path: Path, reader: Callable[[Path, h5py.File], Read], what: str = "a saved state"
+) -> Read:
     """What a reader finds in a file; any damage becomes a FileFormatError."""
     check_is_regular(path)
     if not path.is_file():
@@ -99,7 +161,7 @@ def _read(path: Path, reader: Callable[[Path, h5py.File], Read]) -> Read:
         raise FileFormatError(f"{path}: {reason}") from reason
     except DAMAGE as reason:
         raise FileFormatError(
-            f"{path}: expected a saved state (HDF5), got: {str(reason).splitlines()[0]}"
+            f"{path}: expected {what} (HDF5), got: {str(reason).splitlines()[0]}"
         ) from reason
 
 

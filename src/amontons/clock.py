@@ -19,6 +19,7 @@ from numbers import Real
 from numba.core import event
 
 from .errors import InvalidInput, TimeUp
+from .interrupts import hold, release
 
 
 class _Compiling(threading.local, event.Listener):
@@ -27,11 +28,13 @@ class _Compiling(threading.local, event.Listener):
     depth: int = 0
     since: float = 0.0
     total: float = 0.0
+    held: bool = False
 
     def on_start(self, event: event.Event) -> None:
         """Note when the outermost preparation begins."""
         if self.depth == 0:
             self.since = time.perf_counter()
+            self.held = hold()  # the compiler may crash of Ctrl-C
         self.depth += 1
 
     def on_end(self, event: event.Event) -> None:
@@ -39,6 +42,8 @@ class _Compiling(threading.local, event.Listener):
         self.depth -= 1
         if self.depth == 0:
             self.total += time.perf_counter() - self.since
+            if self.held:
+                release()
 
 
 _compiling = _Compiling()

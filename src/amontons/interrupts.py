@@ -26,16 +26,46 @@ def watch() -> None:
 
 
 class Watching:
-    """The same within a block, unless the program has a handler of its own."""
+    """The same within a block, unless the program has a handler of its own.
 
-    def __enter__(self) -> None:
+    later: only from `begin` on, for what is mostly over before a signal could come; setting a
+    handler takes as long as some solves.
+    """
+
+    def __init__(self, *, later: bool = False) -> None:
+        self.ours, self.later = False, later
+
+    def __enter__(self) -> Watching:
+        if not self.later:
+            self._begin(sys._getframe(1))
+        return self
+
+    def begin(self) -> None:
+        """Watch from now on."""
+        if not self.ours:
+            self._begin(sys._getframe(1))
+
+    def _begin(self, root: FrameType) -> None:
         self.ours = _is_ours()
         if self.ours:
-            _signal.signal(SIGINT, partial(_handle, sys._getframe(1)))
+            _signal.signal(SIGINT, partial(_handle, root))
 
     def __exit__(self, *error: object) -> None:
         if self.ours:
             _signal.signal(SIGINT, signal.default_int_handler)
+
+
+def hold() -> bool:
+    """Let Ctrl-C wait until `release`; False where it is nothing to us or already watched."""
+    ours = _is_ours()
+    if ours:
+        _signal.signal(SIGINT, _again)
+    return ours
+
+
+def release() -> None:
+    """Ctrl-C as Python has it, after `hold`."""
+    _signal.signal(SIGINT, signal.default_int_handler)
 
 
 def _is_ours() -> bool:
@@ -48,6 +78,11 @@ def _is_ours() -> bool:
 def _handle(root: FrameType, number: int, frame: FrameType | None) -> None:
     if not is_busy(frame, root):
         raise KeyboardInterrupt
+    _again(number, frame)
+
+
+def _again(number: int, frame: FrameType | None) -> None:
+    """Send the signal once more in a moment."""
     again = threading.Timer(AGAIN, signal.raise_signal, (number,))
     again.daemon = True
     again.start()

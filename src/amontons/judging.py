@@ -119,7 +119,9 @@ class Watch:
         """Floating point operations so far, judgements among them; None if not counted."""
         if self.flops is None or (iterate.flops is None and iterate.iterations):
             return None
-        return self.flops + (iterate.flops or 0.0) + self.problem.judge_flops
+        p = self.problem
+        judged = p.judge_flops if isinstance(p, FrictionProblem) else 0.0
+        return self.flops + (iterate.flops or 0.0) + judged
 
     def _better(self, error: float, weakest: Weakest | None) -> bool:
         """True for an error below the best; of those that will do, for the better contacts."""

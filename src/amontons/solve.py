@@ -38,6 +38,7 @@ from .solvers.first_iterate import (
 Array = NDArray[np.float64]
 Callback = Callable[[Step, Iterate], bool | None]
 CONTENT = 5  # iterates with which a solver is content before its goal is tightened
+QUICK = 300  # contacts up to which one iterate is no time to press Ctrl-C
 EARLY = 100  # iterates after which a problem that no method is made for is given up
 GAVE_UP = (Outcome.STAGNATED, Outcome.BREAKDOWN, Outcome.CYCLED, Outcome.NON_FINITE)
 TIGHTEST = 1e-300  # smallest goal: contacts far smaller than others need tiny sums
@@ -140,8 +141,8 @@ def _drive(
     )
     begin, limit = first_iterate(problem, start), given.max_iterations or np.inf
     target = Target(given.tolerance, deadline, given.criterion)
-    with Watching():
-        outcome, detail = _run(watch, solver, begin, target, limit, given.callback)
+    with Watching(later=problem.contacts <= QUICK) as watching:
+        outcome, detail = _run(watching, watch, solver, begin, target, limit, given.callback)
     return _finish(watch, outcome, detail, solver)
 
 
@@ -165,6 +166,7 @@ def _check_solver(problem: FrictionProblem | NitscheProblem, solver: Solver) -> 
 
 
 def _run(
+    watching: Watching,
     watch: Watch,
     solver: Solver,
     start: Iterate,
@@ -184,7 +186,7 @@ def _run(
                 goal = watch.tighter(target.tolerance)
                 start, target = watch.best or start, replace(target, tolerance=goal)
                 watch.content = 0
-            ended = _once(watch, solver, start, target, limit, callback)
+            ended = _once(watching, watch, solver, start, target, limit, callback)
             if ended is not None:
                 break
         outcome, detail = ended or (Outcome.STAGNATED, "")
@@ -200,6 +202,7 @@ def _run(
 
 
 def _once(
+    watching: Watching,
     watch: Watch,
     solver: Solver,
     start: Iterate,
@@ -217,6 +220,8 @@ def _once(
         for iterate in solver.iterates(watch.problem, start, target):
             target.deadline.spend(iterate.iterations * each)
             step = watch.judge(iterate)
+            if not watch.converged:
+                watching.begin()
             stop = callback is not None and callback(step, iterate)
             if watch.converged and iterate.ends != "":
                 return Outcome.CONVERGED, iterate.stage or iterate.ends or ""

@@ -170,3 +170,23 @@ def test_what_a_shell_ignores_stays_ignored():
         assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+def test_the_compiler_is_not_interrupted():
+    """Outside of a solve too: its end is waited for, then Ctrl-C comes as ever."""
+    from numba.core import event
+
+    ended = []
+
+    def compiled():
+        with event.trigger_event("numba:compiler_lock"):
+            signal.raise_signal(signal.SIGINT)
+            time.sleep(0.01)
+            ended.append("compiling")
+        time.sleep(1)
+        ended.append("all")
+
+    with pytest.raises(KeyboardInterrupt):
+        compiled()
+    assert ended == ["compiling"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

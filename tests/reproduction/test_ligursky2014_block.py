@@ -27,12 +27,12 @@ STORED = json.loads((ROOT / "reproduce/ligursky2014/results/results.json").read_
 
 def test_stored_block_meets_the_reference():
     """The committed page beside GetFEM: folds, statuses of every contact, the node (10, 0)."""
-    assert set(REFERENCE["block"]) >= {"800", "3200"}
-    for squares, known in REFERENCE["block"].items():
-        if not squares.isdigit():
-            continue
-        runs = dict(STORED["block"][squares]["runs"])
-        runs[block.THEIRS] = STORED["block-paper"][squares]
+    known_meshes = [name for name in REFERENCE["block"] if name.isdigit()]
+    assert "800" in known_meshes
+    for squares in known_meshes:
+        known, runs = REFERENCE["block"][squares], dict(STORED["block"][squares]["runs"])
+        if squares in STORED["block-paper"]:
+            runs[block.THEIRS] = STORED["block-paper"][squares]
         for name, run in runs.items():
             assert block.fold_error(run, known) < 1e-9, name
             assert block.solution_error(run, known) < 1e-8, name

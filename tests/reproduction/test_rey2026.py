@@ -1,6 +1,7 @@
 """`python -m reproduce.rey2026`: printed cells of every algorithm, solutions and thresholds."""
 
 import json
+import re
 import sys
 from dataclasses import asdict
 from pathlib import Path
@@ -9,12 +10,22 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import amontons as am
+
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))  # the reproductions are not installed
 
-from reproduce.rey2026 import alart_curnier, primal_dual, report, solutions, uzawa  # noqa: E402
+from reproduce.rey2026 import (  # noqa: E402
+    alart_curnier,
+    extra,
+    primal_dual,
+    report,
+    solutions,
+    uzawa,
+    verdict,
+)
 from reproduce.rey2026.__main__ import ALGORITHMS, PAPER, PARTS, main  # noqa: E402
-from reproduce.rey2026.triangle import Triangle  # noqa: E402
+from reproduce.rey2026.triangle import Triangle, triangle_of  # noqa: E402
 
 
 def some(table, rows):
@@ -85,6 +96,40 @@ def test_random_starts_are_counted(tmp_path):
     found = json.loads((tmp_path / "results.json").read_text())["alart_multidof"]
     assert found["draws"] == 2
     assert np.sum(list(found["counts"].values()), axis=0).tolist() == [2] * 6
+
+
+def test_no_run_out_of_balance_is_a_solution():
+    """Draw 80 at eta = 100 ends at r = 0 with a body on its way: slip it is not, at mu = 3."""
+    triangle = triangle_of(50, 3.0)
+    random = np.random.default_rng(2026)
+    for _ in range(81):
+        r = random.uniform([0, -0.5], 0.5, (50, 2))
+        v = random.uniform(-0.5, 0.5, triangle.problem.unknowns)
+    method = uzawa.method(triangle, 100.0)
+    start = am.Iterate(r, v)
+    cell = triangle.study([method], [start], within=1e-4, max_iterations=20_000)[0][0]
+    assert cell.kind in ("free", "fail")
+
+
+def test_the_page_opens_with_counts_of_verdicts():
+    page = (ROOT / "reproduce" / "rey2026" / "results" / "results.md").read_text()
+    first = page.splitlines()[2]
+    assert re.fullmatch(
+        r"\*\*agrees \d+ / differs by the paper's fault \d+ / differs by ours \d+\*\*", first
+    )
+    record = json.loads(
+        (ROOT / "reproduce" / "rey2026" / "results" / "results.json").read_text()
+    )
+    cells = verdict.of_cells(record, PAPER, report.agrees)
+    assert len(cells) == 852
+    assert f"- 852 cells: {verdict.in_words(cells)}" in page
+
+
+def test_the_example_of_section_5_2():
+    found = extra.example()
+    assert found["free"] == pytest.approx(-3 / np.hypot(3, 6.6), abs=1e-5)
+    assert found["held"] == pytest.approx(6.6 / np.hypot(3, 6.6))
+    assert found["mu"] == pytest.approx(2.2)
 
 
 def test_three_solutions_above_mu_3_and_the_printed_thresholds(tmp_path):

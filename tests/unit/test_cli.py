@@ -338,3 +338,55 @@ def test_enumerate_says_what_it_can_not_do():
     assert tower.exit_code == 1
     assert "there may be others" in tower.stdout
     assert "--mu" in run("enumerate", "example:hild", "--mu", "-1").stderr
+
+
+def test_basins_says_who_finds_what(folder):
+    arguments = ("basins", "random.hdf5", "--methods", "gauss-seidel", "--starts", "cone:3")
+    short = ("--time-limit", "20", "--quiet")
+    result = run(*arguments, *short, "--json", "b.json", "--picture", "b.png")
+    assert result.exit_code == 0, result.output
+    data = json.loads((folder / "b.json").read_text())
+    assert data["schema"] == "amontons/basins/1"
+    assert sum(data["counts"]["gauss-seidel"].values()) == 3
+    assert (folder / "b.png").stat().st_size > 5000
+    for words, extra in (
+        ("such as uzawa.rho=1,10,100", ("--parameter", "rho")),
+        ("no such field", ("--parameter", "uzawa.rho=1")),
+        ("expected kinds among", ("--starts", "cones")),
+        ("unknown method", ("--methods", "newton")),
+        ("tolerance", ("--tolerance", "7")),
+    ):
+        refused = run(*arguments, *short, *extra)
+        assert refused.exit_code == 2, extra
+        assert words in refused.stderr
+
+
+def test_solve_starts_from_a_file(folder):
+    assert run("solve", "tower.hdf5", "--quiet", "-o", "first").exit_code == 0
+    for start in ("first", "first/solution.h5"):
+        data = json.loads(run("solve", "tower.hdf5", "--start", start, "--json", "-").stdout)
+        assert data["iterations"] == 0
+    text = json.dumps({"r": np.zeros((8, 3)).tolist(), "v": None})
+    (folder / "start.json").write_text(text)
+    assert run("solve", "tower.hdf5", "--start", "start.json").exit_code == 0
+    broken = {
+        "list.json": ("[1]", "found no r"),
+        "rows.json": ('{"r": [[1, 2], [3]]}', "r: expected an array of numbers"),
+        "few.json": ('{"r": [[1, 2, 3]]}', "expected r of shape (8, 3), got (1, 3)"),
+        "nan.json": ('{"r": [[NaN, 2, 3]]}', "not finite"),
+        "text.json": ('{"r": "abc"}', "r: expected"),
+        "half.json": ('{"r": [[', "expected JSON"),
+        "flat.json": ('{"r": [1, 2]}', "a row per contact"),
+        "no.h5": ("no HDF5", "expected a solution (HDF5)"),
+    }
+    for name, (content, words) in broken.items():
+        (folder / name).write_text(content)
+        refused = run("solve", "tower.hdf5", "--start", name, "-o", "none")
+        assert refused.exit_code == 2, name
+        assert f"--start {name}: " in refused.stderr
+        assert words in refused.stderr, refused.stderr
+    for name, words in (("first/solution.json", "solution.h5"), ("gone.json", "no such file"),
+                        ("tower.hdf5", "found no r")):  # fmt: skip
+        refused = run("solve", "tower.hdf5", "--start", name)
+        assert refused.exit_code == 2
+        assert words in refused.stderr, refused.stderr

@@ -345,3 +345,30 @@ def test_tangents_of_problems_that_only_name_the_active_piece():
     assert not system.complete
     inside = am.first_order(Kink(), start=[1.0], at=0.5, interval=(-1, 1))
     assert len(inside.tangents) == 2
+
+
+def test_a_curve_goes_on_from_its_points_and_events():
+    branch = am.follow(vee(0))
+    fold = branch.folds[0]
+    for problem in (vee(0), branch.problem):
+        system = am.first_order(problem, start=fold)
+        assert {t.piece for t in system.tangents} == {fold.before, fold.after}
+        ends = [am.follow(problem, start=fold, along=t)[-1].parameter for t in system.tangents]
+        assert sorted(ends) == [0, 1]
+    point = branch[5]
+    system = am.first_order(branch.problem, start=point.state, at=point.parameter)
+    assert point.piece in {t.piece for t in system.tangents}
+    assert am.follow(branch.problem, interval=(0.0, 0.2))[-1].parameter == 0.2
+    with pytest.raises(InvalidInput, match="start: expected 20 unknowns, got 19"):
+        am.follow(branch.problem, start=point.state[:-1], at=point.parameter)
+
+
+def test_sets_of_solutions_are_told_by_the_event():
+    M, H = np.array([[2.0, -1], [-1, 2]]), np.diag([-1.0, 1.0])
+    ends = [am.FrictionProblem.from_global(M, H, load, [[0.0, 0.0]], [2.0])
+            for load in ((0.0, 0.0), (1.0, -2.0))]  # fmt: skip
+    branch = am.follow(ends[1], base=ends[0], start=[[0.0, 0.0]], at=0.0)
+    (event,) = [e for e in branch.events if e.kind is am.EventKind.BRANCH]
+    assert "a set of them on +" in event.detail
+    (cone,) = am.first_order(ends[1], base=ends[0], start=event).cones
+    assert len(cone.edges) == 2

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -112,22 +112,25 @@ class BasinMethod:
             own = own.condensed(limits.deadline)
         last: list[Iterate] = []
         found = drive_from(
-            self._start(own, start), own, self.solver, tolerance=limits.tolerance,
+            self._start(problem, own, start), own, self.solver, tolerance=limits.tolerance,
             max_iterations=limits.max_iterations, time_limit=limits.deadline,
             callback=lambda step, iterate: last.__setitem__(slice(None), [iterate]),
         )  # fmt: skip
         state = found if found.converged or not last else last[0]
         return self._ended(problem, own, found, state)
 
-    def _start(self, own: FrictionProblem | NitscheProblem, start: Iterate) -> Iterate:
+    def _start(
+        self, problem: FrictionProblem, own: FrictionProblem | NitscheProblem, start: Iterate
+    ) -> Iterate:
         """The start in the problem in which the method runs."""
-        r = start.r
+        r, v = start.r, start.v
         if self.reactions is not None:
             back = np.linalg.lstsq(real("reactions", self.reactions), r.ravel(), rcond=None)[0]
             r = back.reshape(own.contacts, -1)
         elif r.shape != (own.contacts, own.dimension):
             r = np.zeros((own.contacts, own.dimension))  # other points: only v leads there
-        return Iterate(r, start.v if own.form is not Form.DELASSUS else None)
+            v = problem.velocity(start.r)[1] if v is None else v
+        return Iterate(r, v if own.form is not Form.DELASSUS else None)
 
     def _ended(
         self, problem: FrictionProblem, own: FrictionProblem | NitscheProblem,
@@ -154,12 +157,25 @@ def name_of(solver: Solver) -> str:
     return next((name for name, known in METHODS.items() if known is kind), kind.__name__)
 
 
-def methods_of(methods: Any, parameters: Mapping[str, Any] | None) -> list[Runs]:
+@dataclass(frozen=True)
+class Maker:
+    """How methods of a name are made: fields, and a function of values for some of them."""
+
+    fields: Sequence[str]
+    make: Callable[[dict[str, Any]], Runs]
+
+
+def methods_of(
+    methods: Any, parameters: Mapping[str, Any] | None,
+    makers: Mapping[str, Maker] | None = None,
+) -> list[Runs]:
     """All variants: each method with all combinations of the values of its parameters.
 
     methods: names, solvers, or what has `run`; one, several, or a mapping of labels to them.
-    parameters: values by field, for all methods that have it, or by "method.field".
+    parameters: values by field, for all methods that have it, or by "method.field".  makers:
+    of names that are no solvers.
     """
+    makers = makers or {}
     named = _named(methods)
     grid = _checked_grid(parameters or {})
     used: set[str] = set()
@@ -168,18 +184,17 @@ def methods_of(methods: Any, parameters: Mapping[str, Any] | None) -> list[Runs]
         if hasattr(method, "run"):
             found.append(method)
             continue
-        solver = method if not isinstance(method, str) else _by_name(method)
-        label = name or name_of(solver)
-        fields = _fields(solver)
-        known = [key for key in grid if _key(key, label) in fields]
+        maker = _maker(name, method, makers)
+        label = name or (method if isinstance(method, str) else name_of(method))
+        known = [key for key in grid if _key(key, label) in maker.fields]
         used.update(known)
         keys = {_key(key, label): key for key in sorted(known, key=lambda key: "." in key)}
         axes = [[(part, value) for value in grid[key]] for part, key in keys.items()]
         for values in itertools.product(*axes):
-            found.append(BasinMethod(_with(solver, dict(values)), label, dict(values)))
+            found.append(maker.make(dict(values)))
             if len(found) > MOST:
                 raise InvalidInput(f"parameters: expected at most {MOST} variants, got more")
-    _check_used(grid, used, [method for _, method in named])
+    _check_used(grid, used, list(dict.fromkeys(method.method for method in found)))
     _check_labels(found)
     return found
 
@@ -195,7 +210,9 @@ def _named(methods: Any) -> list[tuple[str, Any]]:
     for name, method in pairs:
         if not isinstance(name, str):
             raise InvalidInput(f"methods: expected a name, got {shown(name)}")
-        known = isinstance(method, str) or hasattr(method, "iterates") or hasattr(method, "run")
+        known = isinstance(method, str | Maker) or any(
+            hasattr(method, name) for name in ("iterates", "run")
+        )
         if isinstance(method, type) or not known:
             raise InvalidInput(
                 "methods: expected names of solvers, or solvers such as Uzawa(), got "
@@ -206,13 +223,24 @@ def _named(methods: Any) -> list[tuple[str, Any]]:
     return pairs
 
 
-def _by_name(name: str) -> Solver:
-    if name not in METHODS:
-        raise InvalidInput(f"methods: expected one of {', '.join(METHODS)}, got {name!r}")
-    return METHODS[name]()
+def _maker(name: str, method: Any, makers: Mapping[str, Maker]) -> Maker:
+    """That of a solver, or of a name."""
+    if isinstance(method, Maker):
+        return method
+    if isinstance(method, str) and method in makers:
+        return makers[method]
+    if isinstance(method, str) and method not in METHODS:
+        known = ", ".join((*METHODS, *makers))
+        raise InvalidInput(f"methods: expected one of {known}, got {method!r}")
+    solver = METHODS[method]() if isinstance(method, str) else method
+    label = name or name_of(solver)
+    return Maker(
+        fields_of(solver), lambda values: BasinMethod(_with(solver, values), label, values)
+    )
 
 
-def _fields(solver: Solver) -> list[str]:
+def fields_of(solver: Any) -> list[str]:
+    """Names of the fields of a solver, or of its class."""
     if not dataclasses.is_dataclass(solver):
         return []
     return [f.name for f in dataclasses.fields(solver) if f.init]
@@ -251,11 +279,10 @@ def _key(key: str, label: str) -> str:
     return name if not dot or owner == label else ""
 
 
-def _check_used(grid: Mapping[str, Any], used: set[str], methods: list[Any]) -> None:
+def _check_used(grid: Mapping[str, Any], used: set[str], methods: Sequence[str]) -> None:
     for key in grid:
         if key not in used:
-            names = ", ".join(m if isinstance(m, str) else type(m).__name__ for m in methods)
-            raise InvalidInput(f"parameters: {key}: no such field of {names}")
+            raise InvalidInput(f"parameters: {key}: no such field of {', '.join(methods)}")
 
 
 def _check_labels(methods: Sequence[Runs]) -> None:

@@ -11,7 +11,7 @@ no solution, whatever it looks like.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +19,7 @@ import numpy as np
 
 from ..clock import Deadline, now
 from ..errors import InvalidInput, NotConverged, SingularOperator, UnsupportedForm
-from .basin_methods import Ended, RunLimits, Runs, methods_of
+from .basin_methods import Ended, Maker, RunLimits, Runs, methods_of
 from .basin_solutions import FAILED, OTHER, Atlas, KnownSolution
 from .basin_starts import (
     Drawing,
@@ -190,10 +190,11 @@ class StudyOptions:
 def study(
     atlas: Atlas, methods: Any, parameters: Any, starts: Starts | None, options: StudyOptions,
     deadline: Deadline, callback: Callable[[int, int], None] | None = None,
+    makers: Mapping[str, Maker] | None = None,
 ) -> Basins:  # fmt: skip
     """All runs, method by method; callback(done, all) after each."""
     began, problem = now(), atlas.problem
-    variants = methods_of(methods, parameters)
+    variants = methods_of(methods, parameters, makers)
     chosen = drawn(starts, options.draws, _drawing(atlas, options))
     runs: list[BasinRun] = []
     ended = ""

@@ -59,6 +59,8 @@ Examples:
 @click.option("--patience", type=click.IntRange(min=0), default=500, show_default=True,
               metavar="N", help="Stop after N iterates without progress; 0: never."
               )  # fmt: skip
+@click.option("--start", metavar="FILE", help="Start from the r, and v, of a solution.h5, its "
+              "folder, or JSON {\"r\": [[…], …], \"v\": […]}.")  # fmt: skip
 @click.option("--criterion", type=click.Choice(["judge", "natural"]), default="judge",
               show_default=True, help="What the tolerance is for: the unit-free error, or "
               "|F_nat(r)| / |q| with rho = 1, as papers have it.")  # fmt: skip
@@ -203,6 +205,62 @@ def enumerate_solutions(**options: object) -> int:
     from .enumerate import run as run_enumerate
 
     return run_enumerate(**options)  # type: ignore[arg-type]
+
+
+@main.command(
+    epilog="""\b
+Examples:
+  amontons basins example:hild --mu 3.5 --methods uzawa,semismooth-newton
+  amontons basins example:brake --methods uzawa --parameter rho=0.1,1,10 --picture brake.png
+  amontons basins example:hild --methods nitsche --parameter kappa=10,100 --starts everywhere
+  amontons basins problem.hdf5 --methods gauss-seidel --starts zero,cone:100 --json b.json
+
+\b
+Starts: zero, open, cone, reactions, displacements, everywhere, both, perturbed, exact,
+exact-reactions, exact-displacements; each with a number of draws, as in cone:100.
+Exit codes: 0 all runs are made, 1 the time was over before, 2 bad input, 130 interrupted.
+"""
+)
+@click.argument("source")
+@click.option("--methods", multiple=True, default=("auto",), show_default=True,
+              metavar="A,B,…", help="Solvers, as in `bench`; nitsche for a case.")  # fmt: skip
+@click.option("--parameter", "parameters", multiple=True, metavar="[METHOD.]FIELD=X,Y,…",
+              help="Values of a field of the solvers; may be repeated, all combinations are "
+              "run.")  # fmt: skip
+@click.option("--starts", metavar="KIND[:N],…",
+              help="From where. [zero,cone,displacements,perturbed,exact]")  # fmt: skip
+@click.option("--draws", type=click.IntRange(min=1), default=10, show_default=True, metavar="N",
+              help="Random starts of each kind.")  # fmt: skip
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, metavar="N",
+              help="Of the random choice.")  # fmt: skip
+@click.option("--mu", type=float, metavar="X", help="Friction coefficient of all contacts.")
+@click.option("--tolerance", type=float, default=1e-8, show_default=True, metavar="X",
+              help="Unit-free error of a run that counts.")  # fmt: skip
+@click.option("--within", type=float, default=1e-4, show_default=True, metavar="X",
+              help="Relative distance in energy up to which a run is at a solution."
+              )  # fmt: skip
+@click.option("--max-iterations", type=click.IntRange(min=1), metavar="N",
+              help="Of each run.")  # fmt: skip
+@click.option("--run-limit", type=float, metavar="SECONDS",
+              help="Time of each run; one that takes longer has failed.")  # fmt: skip
+@click.option("--time-limit", type=float, metavar="SECONDS",
+              help="Of everything; what is not run by then is left out.")  # fmt: skip
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
+              help="Replace a value of the case.")  # fmt: skip
+@click.option("--json", "json_copy", metavar="FILE",
+              help="Solutions, runs and counts as JSON; - prints them.")  # fmt: skip
+@click.option("--picture", metavar="FILE",
+              help="Draw what was found: .png, .svg or .pdf.")  # fmt: skip
+@click.option("--quiet", is_flag=True, help="No progress, no tables.")
+def basins(**options: object) -> int:
+    """Find out which solution each method finds, from many starts, over its parameters.
+
+    SOURCE is a TOML case file, an FCLib HDF5 file, or example:NAME.  The solutions are listed
+    first, as by `enumerate`; a run counts when the judge takes its reactions and its motion.
+    """
+    from .basins import run as run_basins
+
+    return run_basins(**options)  # type: ignore[arg-type]
 
 
 @main.command(

@@ -6,18 +6,23 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import click
 
 from .. import api, output
 from ..analysis.certificates.uniqueness import Uniqueness, assess, quick_verdict
 from ..case import in_words
+from ..checkpoint import load_start
 from ..clock import Deadline, TimeLimit, compiling, now
 from ..errors import FileFormatError, InvalidInput, SingularOperator, UnsupportedForm
 from ..judge import Criterion
 from ..nitsche_problem import NO_MULTIPLIERS
+from ..problem import Form
 from ..results import ModelSolution
 from ..solution import FrictionSolution, Outcome
+from ..solvers import Iterate
+from ..solvers.first_iterate import first_iterate
 from .group import INTERRUPTED
 from .sources import Source, open_source, with_flags
 from .terminal import check_folder, check_writable, say_when
@@ -29,6 +34,7 @@ def run(
     max_iterations: int | None, time_limit: float | None, folder: str | None,
     json_copy: str | None, quiet: bool, full_verdict: bool,
     contact_tolerance: float | None = None, patience: int = 500, criterion: str = "judge",
+    start: str | None = None,
 ) -> int:  # fmt: skip
     """Solve and write; returns the exit code."""
     opened = open_source(source, overrides, method)
@@ -43,7 +49,7 @@ def run(
     check_writable(json_copy, "--json")
     began, compiled = now(), compiling()
     deadline = Deadline.after(settings.time_limit)
-    opened.solvable()
+    begin = _start(start, opened.solvable())
     assembled = now() - began if opened.model is not None else 0.0
     compiled = compiling() - compiled
     silent = quiet or json_copy == "-"
@@ -53,7 +59,7 @@ def run(
             contact_tolerance=settings.contact_tolerance,
             max_iterations=settings.max_iterations, time_limit=deadline,
             patience=patience or None, criterion=Criterion(criterion),
-            callback=(lambda step, iterate: None) if silent else None,
+            callback=(lambda step, iterate: None) if silent else None, start=begin,
         )  # fmt: skip
     except (UnsupportedForm, SingularOperator, InvalidInput) as reason:
         text = f"{source}: --method {settings.method}: {in_words(str(reason))}"
@@ -70,6 +76,20 @@ def run(
     elif not quiet:
         _report(result, verdict, full_verdict, place)
     return _finish(found)
+
+
+def _start(file: str | None, problem: Any) -> Iterate | None:
+    """The start in the file of --start, fit for the problem."""
+    if file is None:
+        return None
+    try:
+        found = load_start(file)
+        if problem.form is Form.NITSCHE and found.v is None:
+            raise InvalidInput("no v, and the method starts from displacements")
+        return first_iterate(problem, found)
+    except (FileFormatError, InvalidInput) as reason:
+        text = str(reason).removeprefix(f"{file}: ")
+        raise type(reason)(f"--start {file}: {text}") from None
 
 
 def _output(

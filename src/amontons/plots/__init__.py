@@ -1,5 +1,6 @@
 """Figures: of one solution, of several, of convergence, of steps in time, of many methods."""
 
+from .basins import basins_figure
 from .branch import branch_figure, draw_branch
 from .convergence import convergence_figure
 from .energies import energy_figure
@@ -16,6 +17,7 @@ __all__ = [
     "SI",
     "Frame",
     "Units",
+    "basins_figure",
     "branch_figure",
     "convergence_figure",
     "draw_branch",

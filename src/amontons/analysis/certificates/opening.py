@@ -56,7 +56,7 @@ SECONDS = 20.0  # whose work a verdict without a time limit may take
 RESIDUAL = 1e-7  # of H r and w . r relative to their terms, that counts as zero
 SYMMETRIC = 1e-4  # asymmetry of M or W, relative, up to which the theorem is used
 ROUNDING = 4 * np.finfo(float).eps  # per term of a sum
-DOUBLINGS = 60  # of a direction that opens all contacts, until w does not matter
+GROWTH = tuple(8.0**k for k in range(20))  # of a direction, until w does not matter
 NEARLY = 1e-4  # residual from which reactions are polished
 POLISHING = 300  # iterations of that
 
@@ -255,8 +255,8 @@ def _searched(system: _System, deadline: Deadline) -> Opening:
 def _open(system: _System, program: _Program, z: Array) -> Opening | None:
     """(1) with the motion of the program, if that is proved."""
     v, pull = program.motion(z)
-    for k in range(DOUBLINGS if pull <= 0 else 1):
-        motion = system.motion(v * 2.0**k if pull <= 0 else v / pull)
+    for factor in GROWTH if pull <= 0 else (1 / pull,):
+        motion = system.motion(factor * v)
         if not np.isfinite(motion).all():
             return None
         margin = system.margin(motion)

@@ -36,6 +36,7 @@ Solve = Callable[[Array], Array]
 BOUNDARY = 0.99  # part of the way to the boundary of the cones that a step goes
 STEPS = 80
 SHORT = 1e-6  # length of a step that gets nowhere
+FULL = 0.2  # share of entries from which A is stored in full
 DENSE = 1500  # unknowns z up to which the matrix is stored in full
 
 
@@ -157,22 +158,24 @@ class _Scaling:
 
 
 def iterates(
-    A: sparse.csr_array, cones: Cones, e: Array, deadline: Deadline
+    matrix: sparse.csr_array, cones: Cones, e: Array, deadline: Deadline
 ) -> Iterator[tuple[Array, Array, float]]:
     """(x, z, lam) of the program, better and better; ends where steps get nowhere.
 
     e (m,): positive along the axes of some cones, else zero.  Raises TimeUp.
     """
-    n, m = A.shape
+    n, m = matrix.shape
+    is_full = matrix.nnz > FULL * n * m and n <= DENSE
+    A = matrix.toarray() if is_full else matrix
     unit = cones.identity(m)
     x = unit / float(e @ unit)
     y, z, lam = unit.copy(), np.zeros(n), 0.0
     for _ in range(STEPS):
-        deadline.pay(_cost(A))
+        deadline.pay(_cost(matrix, is_full))
         F = _Scaling.of(cones, x, y)
         lamda = F.apply(x)
         inverse = F.inverse_square(m)
-        factor = _factor(sparse.csr_array(A @ inverse @ A.T))
+        factor = _factor(A @ (inverse @ A.T))
         if factor is None:
             return
         right = inverse @ e
@@ -202,13 +205,14 @@ def iterates(
         yield x, z, lam
 
 
-def _factor(N: sparse.csr_array) -> Solve | None:
+def _factor(N: sparse.csr_array | Array) -> Solve | None:
     """A solver for I + N, N positive semidefinite; None where rounding has made it singular."""
     n = N.shape[0]
     matrix = N + sparse.eye_array(n)
     try:
         if n <= DENSE:
-            factor = cho_factor(matrix.toarray(), check_finite=False)
+            full = matrix.toarray() if sparse.issparse(matrix) else np.asarray(matrix)
+            factor = cho_factor(full, check_finite=False)
             return lambda right: cho_solve(factor, right, check_finite=False)
         return splu(sparse.csc_array(matrix), permc_spec="MMD_AT_PLUS_A",
                     diag_pivot_thresh=0.0, options={"SymmetricMode": True}).solve  # fmt: skip
@@ -216,8 +220,9 @@ def _factor(N: sparse.csr_array) -> Solve | None:
         return None
 
 
-def _cost(A: sparse.csr_array) -> float:
+def _cost(A: sparse.csr_array, is_full: bool) -> float:
     """Operations of a step, roughly."""
-    n = A.shape[0]
+    n, m = A.shape
     dense = float(n) ** 3 / 3
-    return 40.0 * A.nnz + (dense if n <= DENSE else min(dense, 30.0 * float(n) ** 2))
+    product = 2.0 * n * n * m if is_full else 40.0 * A.nnz
+    return product + (dense if n <= DENSE else min(dense, 30.0 * float(n) ** 2))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ...checked_arrays import real
 from ...errors import InvalidInput
 from ...problem import FrictionProblem
 from . import checks
@@ -15,8 +16,10 @@ from .continuation import Continuation
 from .corrector import Curve
 from .first_order import first_order
 from .following import Limits, continue_both, follow_along
+from .friction_path import FrictionPath
+from .load_path import LoadPath
 from .parametrised import first_state, path_of, state_of
-from .path import Branch, PathProblem, timed
+from .path import Branch, Event, PathProblem, Point, timed
 from .probes import by_probes
 from .starting import polished
 from .tangents import FirstOrder, Tangent
@@ -31,24 +34,42 @@ def on_path(
     problem: Model | FrictionProblem | PathProblem, parameter: str, limits: Limits,
     base: Model | FrictionProblem | None, start: object, at: float | None,
 ) -> tuple[PathProblem, Array, float]:  # fmt: skip
-    """(path, state, parameter): where following begins; raises InvalidInput with the name."""
+    """(path, state, parameter): where following begins; raises InvalidInput with the name.
+
+    start: also a point or an event of a branch, which has its parameter.
+    """
     interval = limits.interval
-    begun = getattr(problem, "start", None) if start is None and at is None else start
-    if isinstance(begun, np.ndarray) and start is None:
-        at = getattr(problem, "start_at", interval[0])
+    if isinstance(start, Point | Event):
+        at, start = start.parameter if at is None else at, start.state
+        known = True
+    else:
+        known = isinstance(problem, PathProblem) and np.ndim(start) == 1
+    if start is None and at is None and isinstance(getattr(problem, "start", None), np.ndarray):
+        at, start = getattr(problem, "start_at", interval[0]), problem.start  # type: ignore
     p = interval[0] if at is None else checks.checked_value("at", at, interval)
     if not isinstance(problem, PathProblem):
         path = timed(path_of(problem, parameter, interval, base), limits.deadline)
-        y = first_state(path, p) if start is None else state_of(path, start)
-        checks.check_size(path, y)
-        return path, y, p
-    if base is not None:
+    elif base is not None:
         raise InvalidInput("base: expected none, a PathProblem has a parameter of its own")
-    if begun is None or isinstance(begun, FrictionProblem):
+    else:
+        path = problem
+    own = isinstance(path, FrictionPath | LoadPath)
+    if start is None and not own:
         raise InvalidInput("start: a PathProblem needs the unknowns of a solution at `at`")
-    y = state_of(problem, begun)
-    checks.check_start(problem, y, p)
-    return problem, y, p
+    if start is None:
+        y = first_state(path, p)
+    else:
+        y = real("start", start).ravel() if known else state_of(path, start)
+    if isinstance(path, FrictionPath) and len(y) != path.start.contacts * path.start.dimension:
+        raise InvalidInput(
+            f"start: expected {path.start.contacts * path.start.dimension} unknowns, "
+            f"got {len(y)}"
+        )
+    if isinstance(path, LoadPath):
+        checks.check_size(path, y)
+    else:
+        checks.check_start(path, y, p)
+    return path, y, p
 
 
 def tangents_at(path: PathProblem, y: Array, p: float, tolerance: float) -> FirstOrder:

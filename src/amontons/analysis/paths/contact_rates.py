@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ...clock import NEVER, Deadline
 from ...errors import InvalidInput, SingularOperator, UnsupportedForm
 from .index_sets import IndexSets
 from .rate_claims import Claim, all_pieces_regular, is_P_matrix, strictly_copositive
@@ -87,13 +88,17 @@ class ContactRates:
             return Claim.PROVED  # their determinants are the minors of proposition 8
         return all_pieces_regular(self.D, self.b, self.pairs, self.mu)
 
-    def solutions(self, sense: float, *, nodes: int = 200_000) -> RateSolutions:
+    def solutions(
+        self, sense: float, *, nodes: int = 200_000, deadline: Deadline = NEVER
+    ) -> RateSolutions:
         """All x for p' = sense, by a tree search that cuts what linear bounds exclude."""
-        return rate_solutions(self.D, sense * self.b, self.pairs, self.mu, nodes)
+        return rate_solutions(self.D, sense * self.b, self.pairs, self.mu, nodes, deadline)
 
-    def tangents(self, sense: float) -> tuple[list[tuple[Array, str]], RateSolutions]:
+    def tangents(
+        self, sense: float, deadline: Deadline = NEVER, *, nodes: int = 200_000
+    ) -> tuple[list[tuple[Array, str]], RateSolutions]:
         """Rates r' (2 nc,) for p' = sense with the piece into which they lead; the search."""
-        found = self.solutions(sense)
+        found = self.solutions(sense, nodes=nodes, deadline=deadline)
         out = [
             (self.force @ x + sense * self.offset, self.piece(word))
             for x, word in zip(found.solutions, found.patterns, strict=True)

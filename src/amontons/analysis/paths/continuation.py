@@ -107,7 +107,8 @@ class Continuation:
         """
         if self.min_cosine is not None:
             return self.min_cosine
-        return WITHIN if self.knows_pieces(problem) else ACROSS
+        smooth = getattr(problem, "smooth", False)
+        return WITHIN if smooth or self.knows_pieces(problem) else ACROSS
 
     def start(self, problem: PathProblem, y: Array, p: float) -> FirstOrder:
         """All one-sided tangents at a solution, by probes where the problem tells no pieces.

@@ -37,6 +37,7 @@ Sets = list[tuple[tuple[str, ...], tuple[Array, ...]]]
 SINGULAR = 1e-10  # singular value, relative to the largest, that counts as zero
 BORDERS = 4  # near a point up to which all pieces are looked at one by one
 SMALL = (1e-3, 1e-5, 1e-7)  # changes of the parameter that tell where a curve goes
+NODES = 50_000  # patterns that such a search looks at
 SEARCHED = 40  # contacts at a border up to which a tree search may come to an end
 COMBINATIONS = 20_000  # pieces at a point up to which all are looked at
 
@@ -220,7 +221,7 @@ def _by_search(path: FrictionPath, y: Array, p: float, tolerance: float) -> Firs
         return None
     weight, tangents, reasons = weight_of(path, len(y)), [], []
     for sense in (1.0, -1.0):
-        found, search = rates.tangents(sense)
+        found, search = rates.tangents(sense, path.deadline, nodes=NODES)
         if search.sets or not search.finished:
             return None
         reasons += [] if search.complete else [search.reason]

@@ -9,7 +9,8 @@ along it, at distances at which one that only seems to be there would show ([LR]
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,18 @@ ALONG = 1e-6  # of probes along a direction
 ACROSS = 1e-3  # of probes beside a direction, in that along it
 PIECES = 8  # that are looked at
 NEAR = 0.1  # distance of a solution to its prediction, in that to the point
+ALIKE = 0.9  # cosine of directions that may belong to one curve
+SHIFTED = 1e-2  # distance across a curve, in that along it, which a bend may make
 APART = 1e-10  # distance of two solutions of size one that are not the same
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """A direction; sure: its solutions go far; off: distance of the nearest to its tangent."""
+
+    tangent: Tangent
+    sure: bool
+    off: float
 
 
 class LocalWays:
@@ -41,34 +53,44 @@ class LocalWays:
         self.curve, self.spot, self.piece = curve, spot, piece
         self.ahead, self.tolerances = ahead, tolerances
         self.weight = curve.weight
+        self.known: dict[tuple[int, float], tuple[Tangent, Spot | None]] = {}
         across = np.random.default_rng(0).standard_normal(len(spot.y) + 1)
         self.across = across / curve.length(across[:-1], float(across[-1]))
 
     def found(self) -> list[Tangent]:
         """All ways but the one that led here; those that are sure where there are any."""
         back = Tangent(-self.spot.ty, -self.spot.tp, self.piece)
-        sure: list[Tangent] = []
-        short: list[Tangent] = []
-        for tangent in self._candidates():
-            if tangent.piece == self.piece and self._points(tangent, back):
-                continue
-            distance = self._reach(tangent)
-            if distance is None or self._one(tangent, back):
-                continue
-            kept = sure if distance in SURE else short
-            if not any(self._one(tangent, other) for other in kept):
-                kept.append(tangent)
-        return sure or short
+        ahead = (
+            t for t in self._candidates()
+            if t.piece != self.piece or self._cosine(t, back) < 1 - SAME
+        )  # fmt: skip
+        return self._distinct(ahead, back)
 
     def all(self) -> list[Tangent]:
         """All ways from the spot, also back."""
-        kept: list[Tangent] = []
-        for tangent in self._candidates():
-            if self._reach(tangent) is None:
+        return self._distinct(self._candidates())
+
+    def _distinct(
+        self, candidates: Iterable[Tangent], back: Tangent | None = None
+    ) -> list[Tangent]:
+        """One tangent per curve, of those that lead into their piece; the sure ones if any.
+
+        Where a piece is short the one behind it has a solution nearby, too, on the same curve:
+        the tangent with the least distance to its solution is that of the curve.  back: one
+        whose curve is left out.
+        """
+        kept: list[Way] = []
+        for tangent in candidates:
+            way = self._way(tangent)
+            if way is None or (back is not None and self._one(tangent, back)):
                 continue
-            if not any(self._one(tangent, other) for other in kept):
-                kept.append(tangent)
-        return kept
+            same = [k for k, other in enumerate(kept) if self._one(tangent, other.tangent)]
+            if not same:
+                kept.append(way)
+            elif way.off < kept[same[0]].off:
+                kept[same[0]] = replace(way, sure=way.sure or kept[same[0]].sure)
+        sure = [way.tangent for way in kept if way.sure]
+        return sure or [way.tangent for way in kept]
 
     def meets_others(self) -> bool:
         """True where another piece is met around the spot."""
@@ -112,13 +134,8 @@ class LocalWays:
         except np.linalg.LinAlgError:
             return None
 
-    def _points(self, a: Tangent, b: Tangent) -> bool:
-        """True for the same direction."""
-        along = product(a.direction, a.rate, b.direction, b.rate, self.weight)
-        return along >= 1 - SAME
-
-    def _reach(self, t: Tangent) -> float | None:
-        """The largest distance at which a direction has a solution in its piece."""
+    def _way(self, t: Tangent) -> Way | None:
+        """A direction with a solution in its piece; None where there is none."""
         for h in (*SURE, *SHORT):
             ahead = self.spot.y + h * t.direction, self.spot.p + h * t.rate
             beside = (ahead, *self._around(*ahead, ACROSS * h))
@@ -126,35 +143,46 @@ class LocalWays:
                 continue
             spot = self._solution(t, h)
             if spot is not None and self._piece(spot.y, spot.p) == t.piece:
-                begins = self._solution(t, BEGIN) is not None  # not behind the next kink
-                return self._surely(t, h) if begins else None
+                begin = self._solution(t, BEGIN)
+                if begin is None:
+                    return None
+                sure = h in SURE or any(self._solution(t, far) is not None for far in SURE)
+                y, p = self.spot.y + BEGIN * t.direction, self.spot.p + BEGIN * t.rate
+                return Way(t, sure, self.curve.length(begin.y - y, begin.p - p))
         return None
 
-    def _surely(self, t: Tangent, h: float) -> float:
-        """A distance of SURE where solutions go on that far, on whatever piece."""
-        if h in SURE or all(self._solution(t, far) is None for far in SURE):
-            return h
-        return SURE[-1]
-
     def _solution(self, t: Tangent, h: float) -> Spot | None:
-        y, p = self.spot.y + h * t.direction, self.spot.p + h * t.rate
-        found = self.curve.correct(y, p, t.direction, t.rate, self.tolerances)
-        if found is None:
-            return None
-        spot = found[0]
-        return spot if self.curve.length(spot.y - y, spot.p - p) <= NEAR * h else None
+        key = id(t), h
+        if key not in self.known:
+            y, p = self.spot.y + h * t.direction, self.spot.p + h * t.rate
+            found = self.curve.correct(y, p, t.direction, t.rate, self.tolerances)
+            near = found is not None and (
+                self.curve.length(found[0].y - y, found[0].p - p) <= NEAR * h
+            )
+            self.known[key] = t, found[0] if found is not None and near else None
+        return self.known[key][1]
+
+    def _cosine(self, a: Tangent, b: Tangent) -> float:
+        return product(a.direction, a.rate, b.direction, b.rate, self.weight)
 
     def _one(self, a: Tangent, b: Tangent) -> bool:
         """True where two directions lead along the same curve."""
-        along = product(a.direction, a.rate, b.direction, b.rate, self.weight)
-        if along < 1 - SAME:
+        along = self._cosine(a, b)
+        if along < ALIKE:
             return False
-        angle = np.sqrt(2 * max(1 - along, 0.0))
-        for h in TOLD:
-            x, z = self._solution(a, h), self._solution(b, h)
-            if x is None or z is None:
-                continue
-            size = max(1.0, float(np.abs(x.y).max(initial=0)))
-            if self.curve.length(x.y - z.y, x.p - z.p) > APART * size + angle * h:
-                return False
-        return True
+        for distances in (TOLD, (BEGIN,)):  # the latter where solutions do not go far
+            told = [self._coincide(a, b, h) for h in distances]
+            if any(one is not None for one in told):
+                return all(one is not False for one in told)
+        return along >= 1 - SAME
+
+    def _coincide(self, a: Tangent, b: Tangent, h: float) -> bool | None:
+        """Whether the solutions at a distance lie on one curve; None where one is missing."""
+        x, z = self._solution(a, h), self._solution(b, h)
+        if x is None or z is None:
+            return None
+        y, p = x.y - z.y, x.p - z.p
+        shift = self.curve.product(y, p, z.ty, z.tp)
+        across = self.curve.length(y - shift * z.ty, p - shift * z.tp)
+        size = max(1.0, float(np.abs(x.y).max(initial=0)))
+        return across <= APART * size + SHIFTED * abs(shift)

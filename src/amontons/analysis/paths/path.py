@@ -55,6 +55,7 @@ class PathProblem(Protocol):
 
     And, where it has them, continuation makes use of
     - `weight`, a float: kappa of the weighted norm, by default 1 / n;
+    - `smooth`: True where there is one selection function, which allows for longer steps;
     - `start`, (n,): a solution with which `follow` begins, at the parameter `start_at` or else
       the lower end of the interval;
     - `describe(y, p)`, a dict of numbers and words: columns of the table of a branch;

@@ -172,6 +172,11 @@ class StepPath:
         """Of the parameter."""
         return "gamma"
 
+    @property
+    def smooth(self) -> bool:
+        """True where neither G nor F names pieces."""
+        return self.equation.G_piece is None and self.equation.F_piece is None
+
     @cached_property
     def _last_rate(self) -> Array:
         return (self.states[1] - self.states[0]) / (self.times[1] - self.times[0])

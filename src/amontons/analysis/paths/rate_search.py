@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...clock import NEVER, Deadline
 from ..solutions import pattern_search as search
 
 Array = NDArray[np.float64]
@@ -22,7 +23,8 @@ REACH = 1e6  # bound of x where none is known, in the size of c and D
 SLACK = 1e-9  # violation of a condition that counts as none
 SAME = 1e-8  # distance of two solutions that count as one
 SINGULAR = 1e-11  # of a system, relative
-BATCH = 2000  # nodes between two looks
+BATCH = 2000  # nodes between two looks, up to 20 contacts
+NODE = 10.0  # operations of a node per square of the rates
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +48,10 @@ class RateSolutions:
         return len(self.solutions)
 
 
-def rate_solutions(D: Array, b: Array, pairs: int, mu: Array, nodes: int) -> RateSolutions:
-    """All x with D x = y + b and the conditions of [LR] (35)."""
+def rate_solutions(
+    D: Array, b: Array, pairs: int, mu: Array, nodes: int, deadline: Deadline = NEVER
+) -> RateSolutions:
+    """All x with D x = y + b and the conditions of [LR] (35), as far as time allows."""
     size = float(np.abs(b).max(initial=0.0))
     if not len(D) or size <= SLACK**2:
         nothing = np.zeros(len(D))
@@ -65,7 +69,8 @@ def rate_solutions(D: Array, b: Array, pairs: int, mu: Array, nodes: int) -> Rat
                 sets.append(tree.word(states))
             elif x is not None and all(np.abs(x - z).max() > SAME for z, _ in found):
                 found.append((x, tree.word(states)))
-        if examined >= nodes and not done:
+        deadline.spend(NODE * more * len(tree.rhs) ** 2)
+        if not done and (examined >= nodes or deadline.passed):
             break
     reason = "every other pattern is excluded"
     if not done:
@@ -141,8 +146,9 @@ class _Tree:
         basic, nonbasic = np.empty((2, levels, m), dtype=np.int64)
         states = np.empty((levels, n), dtype=np.int8)
         turn = np.zeros((levels, 3), dtype=np.int64)
-        leaves, cut = np.empty((2, BATCH, n), dtype=np.int8)
-        proofs, spread = np.empty((BATCH, m)), np.zeros(m)
+        batch = max(20, BATCH * 20**2 // max(20, n) ** 2)
+        leaves, cut = np.empty((2, batch, n), dtype=np.int8)
+        proofs, spread = np.empty((batch, m)), np.zeros(m)
         reacts = np.ones(n, dtype=bool)
         search.start_inplace(D, basic, nonbasic, states, self.A, self.rhs)
         done, level = False, 0
