@@ -40,6 +40,7 @@ class Claim:
     found: str
     agrees: bool
     reason: str = ""
+    undecided: bool = False  # runs ended at the limit before they could tell
 
 
 def claims(runs: Runs, cost: Cost = PAPER) -> list[Claim]:
@@ -74,11 +75,12 @@ def _factor(runs: Runs, newton: str, tolerance: float, cost: Cost) -> Claim:
     drawn = profile_ratio(runs, "NSGS-AC", newton, tolerance, 0.5, cost)
     read = "" if math.isnan(drawn) else f"; from the profiles at one half: {number(drawn)}"
     why = _why(runs, tolerance)
-    if found.at_least and found.value < wanted:
+    early = found.at_least and found.value < wanted
+    if early:
         why = f"a bound only, as NSGS-AC does not end within the limit; {why}"
     return Claim(
         f"at {said(tolerance)} {newton} is ahead of NSGS-AC", f"{wanted} times",
-        f"{found} times{read}", found.value >= wanted, why,
+        f"{found} times{read}", found.value >= wanted, why, early,
     )  # fmt: skip
 
 
@@ -120,6 +122,7 @@ def _upk(runs: Runs, cost: Cost) -> Claim:
         "at 1e-6 NSGS-FP-VI-UPK is ahead of NSGS-AC", "yes",
         f"NSGS-AC / NSGS-FP-VI-UPK {found}; at 1e-4 {looser}", found.value > 1,
         f"{nobody}NSGS-FP-VI-UPK makes {number(same)} times the sweeps of NSGS-AC to 1e-4",
+        not found.problems,
     )  # fmt: skip
 
 
@@ -155,18 +158,23 @@ def _why(runs: Runs, tolerance: float) -> str:
 
 # ------------------------------------------------------------------------------- verdicts
 def verdict(ours: Claim, theirs: Claim | None) -> str:
-    """AGREES, PAPERS where Siconos differs as well on the same problems, else OURS."""
+    """AGREES, PAPERS where Siconos differs as well on the same problems, else OURS.
+
+    What was not run for long enough is ours, whatever Siconos says.
+    """
     if ours.agrees:
         return AGREES
-    return PAPERS if theirs is not None and not theirs.agrees else OURS
+    differs = theirs is not None and not theirs.agrees and not theirs.undecided
+    return PAPERS if differs and not ours.undecided else OURS
 
 
-def opening(verdicts: Sequence[str]) -> str:
-    """The first line of the page, in counts."""
+def opening(verdicts: Sequence[str], undecided: int = 0) -> str:
+    """The first line of the page, in counts; undecided: those that our limit leaves open."""
     counts = Counter(verdicts)
+    left = f" ({undecided} of them undecided within our limit)" if undecided else ""
     return (
         f"**Of the {len(verdicts)} claims: agrees {counts[AGREES]} / differs by the paper's "
-        f"fault {counts[PAPERS]} / differs by ours {counts[OURS]}.**"
+        f"fault {counts[PAPERS]} / differs by ours {counts[OURS]}{left}.**"
     )
 
 

@@ -94,6 +94,8 @@ def table(runs: dict[str, Runs]) -> str:
     head = [f"to {t:g}: solved, median" for t in TOLERANCES]
     rows = ["| Siconos | " + " | ".join(head) + " |", "|---|" + "---|" * len(head)]
     for name, solver in SOLVERS.items():
+        if not all(name in entry["methods"] for entry in theirs.values()):
+            continue
         cells = []
         for t in TOLERANCES:
             costs = [COST.met(entry["methods"][name], t) for entry in theirs.values()]

@@ -170,7 +170,7 @@ def _problems(stored: dict, out: Path, *, quick: bool) -> list[str]:
     done = len(stored.get("wall", {}).get("runs", {}))
     if done < PAPER_SERIES.chosen and not quick:
         lines.append(
-            f"Measured on {done} of the {PAPER_SERIES.chosen} problems so far: "
+            f"Measured on {done} problems so far, of {PAPER_SERIES.chosen} in all: "
             + ", ".join(stored.get("wall", {}).get("runs", {}))
             + f" (step, contacts, iterations of Newton); `{COMMAND} --missing` goes on."
         )
@@ -195,7 +195,9 @@ def _claims(stored: dict, siconos: dict) -> tuple[list[str], list[dict]]:
         for c, v, other in zip(ours, verdicts, theirs, strict=True)
     ]
     table = claims.table(ours, seconds, theirs)
-    return [claims.opening(verdicts), f"## The paper's claims\n\n{CLAIMS}\n\n{table}"], told
+    left = sum(claim.undecided for claim in ours)
+    text = f"## The paper's claims\n\n{CLAIMS}\n\n{table}"
+    return [claims.opening(verdicts, left), text], told
 
 
 def _head(stored: dict, said: list[str], *, quick: bool) -> str:
@@ -275,7 +277,7 @@ counts with what it really took, and `≥` or `≤` says so.
 {methods}"""
 CLAIMS = """The verdict is that of operations to (13), the paper's own measure.  *Differs by the
 paper's fault*: the same methods in Siconos, by whose authors the paper is, differ on these
-problems too; *by ours*: they do not, or were not asked."""
+problems too; *by ours*: they do not, were not asked, or our limit ended the runs too early."""
 VARIANTS = """## Variants
 
 {problems} problems of the wall from the easiest to the hardest, by our judge, {limit:g} s for a
@@ -292,7 +294,7 @@ SICONOS = """## Within Siconos
 
 {table}
 
-What a Newton step takes, given W, ours (NSN-AC) and theirs (NLS_AC, with MUMPS) in one run:
+What a Newton step takes, given W, ours (NSN-AC) and theirs (NLS_AC, with MUMPS):
 
 {steps}"""
 PICTURES = """## The cracking joints

@@ -215,6 +215,11 @@ def test_the_first_line_counts_verdicts():
     assert claims.opening(verdicts) == (
         "**Of the 5 claims: agrees 2 / differs by the paper's fault 1 / differs by ours 2.**"
     )
+    early = claims.Claim("text", "1", "≥ 2", False, "why", undecided=True)
+    assert claims.verdict(early, no) == claims.verdict(no, early) == claims.OURS
+    assert "ours 1 (1 of them undecided within our limit).**" in claims.opening(
+        [claims.OURS], 1
+    )
     page = claims.table([yes, no], [yes, None], [None, no])
     assert page.count("\n") == 3
     assert "differs, by Siconos too: why; Siconos: why" in page
