@@ -64,9 +64,9 @@ def test_equal_parts_are_one_rho(function):
 def test_natural_map_needs_one_rho():
     r, u, _ = random_state(3)
     law, rho = Coulomb(np.ones(len(r))), np.ones((len(r), 2))
-    with pytest.raises(InvalidInput, match="natural map needs one per contact"):
+    with pytest.raises(InvalidInput, match="whole cone needs one per contact"):
         NaturalMap().residual(r, u, law, rho)
-    with pytest.raises(InvalidInput, match="natural map needs one per contact"):
+    with pytest.raises(InvalidInput, match="whole cone needs one per contact"):
         NaturalMap().linearise(r, u, law, rho)
     for strategy in SPLIT:
         with pytest.raises(InvalidInput, match=f"one rho per contact, got {strategy.value}"):
@@ -402,7 +402,7 @@ def test_words_make_solvers(method, options, solver):
         ("semismooth-newton", {"rho": {"a": 1}}, "solver.rho: expected a number"),
         ("semismooth-newton", {"rho_strategy": "spit"}, "rho_strategy: expected constant or"),
         ("semismooth-newton", {"rho_strategy": "split", "function": "natural-map"},
-         "solver.rho_strategy: the natural map"),
+         "solver.rho_strategy: natural map works on the whole cone"),
         ("semismooth-newton", {"line_search": {"kind": ["a"]}}, "unknown value"),
         ("hybrid", {"first": {"relaxation": 3}}, "solver.first.relaxation: expected between"),
     ],
