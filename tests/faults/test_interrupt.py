@@ -20,6 +20,14 @@ ENDS = (0, 1, 130, -signal.SIGINT)  # -SIGINT: Python itself, before or after ou
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of another kind")
 
 
+@pytest.fixture(autouse=True)
+def as_in_the_foreground():
+    """Ctrl-C as Python has it: a test run in the background is started with it ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 def interrupted(command, moment, folder, **variables):
     """Exit code and errors of a command that gets Ctrl-C so many seconds after its start."""
     process = subprocess.Popen(
