@@ -43,9 +43,9 @@ def main(parts: tuple[str, ...], levels: str, results: Path | None) -> None:
     """Active sets and multigrid for contact with friction, as in the paper of 2008.
 
     PART is one of table4.1, readings, section3, table4.2, table4.3, parameters, figure4.3,
-    table5.1, strategies, newton (the cube), table6.1, section6, figure7.3 (the shell, up to
-    level 3), ring (ring and tool, coarse up to level 2); all of them by default.  Numbers of
-    other parts stay as they are stored.
+    table5.1, strategies, newton (the cube), table6.1, section6 (the shell, up to level 3),
+    figure7.3 (the same, up to level 2), ring (ring and tool, coarse up to level 2); all of
+    them by default.  Numbers of other parts stay as they are stored.
     """
     check_parts(parts, PARTS)
     chosen = levels_of(levels, 0, 5)

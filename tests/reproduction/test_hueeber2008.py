@@ -168,7 +168,9 @@ README = " ".join((ROOT / "reproduce/hueeber2008/README.md").read_text().split()
 
 def test_the_stored_page_is_that_of_the_stored_numbers():
     assert PAGE == page(STORED)
-    assert "differs by ours 0:" in PAGE.splitlines()[2]
+    ours = [v.text for v in verdicts.verdicts(STORED, REFERENCE)
+            if not v.agrees and v.fault == "ours"]  # fmt: skip
+    assert ours == ["full Newton does not depend on F"]  # 11, 9, 8 steps, see the notes
     for name in FIGURES:
         assert (ROOT / f"reproduce/hueeber2008/results/figure{name}.png").exists()
 
@@ -197,6 +199,11 @@ def test_the_readme_says_what_the_page_says():
     gain = verdicts.rate(STORED["ring"])
     text = "full Newton {} steps, fixed point {}, which gains a factor {:.2f}"
     assert text.format(*ring, gain) in README
+    shell_steps = [
+        "{} for {}".format(*(both[name]["steps"] for name in ("newton", "fixed-point")))
+        for both in STORED["figure7.3"].values()
+    ]
+    assert f"full Newton {', '.join(shell_steps)} steps" in README
 
 
 @pytest.mark.parametrize("words", [["table9"], ["--levels", "x"], ["--levels", "9"]])
