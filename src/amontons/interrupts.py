@@ -11,6 +11,7 @@ import _signal  # those of `signal` make enums of all numbers: 10 µs each, in e
 import signal
 import sys
 import threading
+from collections.abc import Callable
 from functools import partial
 from types import FrameType
 
@@ -21,8 +22,7 @@ BUSY = ("importlib", "numba", "llvmlite", "weakref", "_weakrefset")  # packages,
 
 def watch() -> None:
     """Let Ctrl-C wait for a better place from now on, for a program of our own."""
-    if _is_ours():
-        _signal.signal(SIGINT, partial(_handle, sys._getframe(1)))
+    _take(partial(_handle, sys._getframe(1)))
 
 
 class Watching:
@@ -46,33 +46,31 @@ class Watching:
             self._begin(sys._getframe(1))
 
     def _begin(self, root: FrameType) -> None:
-        self.ours = _is_ours()
-        if self.ours:
-            _signal.signal(SIGINT, partial(_handle, root))
+        self.ours = _take(partial(_handle, root))
 
     def __exit__(self, *error: object) -> None:
         if self.ours:
-            _signal.signal(SIGINT, signal.default_int_handler)
+            release()
 
 
 def hold() -> bool:
     """Let Ctrl-C wait until `release`; False where it is nothing to us or already watched."""
-    ours = _is_ours()
-    if ours:
-        _signal.signal(SIGINT, _again)
-    return ours
+    return _take(_again)
 
 
 def release() -> None:
-    """Ctrl-C as Python has it, after `hold`."""
+    """Ctrl-C as Python has it."""
     _signal.signal(SIGINT, signal.default_int_handler)
 
 
-def _is_ours() -> bool:
-    """True in the main thread of a program that leaves Ctrl-C to Python."""
+def _take(handler: Callable[[int, FrameType | None], None]) -> bool:
+    """Set a handler where a program leaves Ctrl-C to Python, in its main thread; else False."""
     if threading.get_ident() != threading.main_thread().ident:
         return False
-    return _signal.getsignal(SIGINT) is signal.default_int_handler
+    if _signal.getsignal(SIGINT) is not signal.default_int_handler:
+        return False
+    _signal.signal(SIGINT, handler)
+    return True
 
 
 def _handle(root: FrameType, number: int, frame: FrameType | None) -> None:

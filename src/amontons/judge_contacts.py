@@ -8,12 +8,16 @@ W r + q again, which for a problem of a few hundred contacts is most of what jud
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
+import numpy as np
 from numba import uint64
+from numpy.typing import NDArray
 
 from .compiled import njit
-from .judge import EPSILON, PENETRATION, contact_residual, hidden_square
+from .judge import EPSILON, PENETRATION, Weakest, contact_residual, hidden_square, ratio
 
+Array = NDArray[np.float64]
 OPEN, SLIP, STICK = 0, 1, 2  # the numbers of `status.ContactStatus`
 LARGER = 1.0 + 4.0 * EPSILON  # than its bound, more than rounding explains
 
@@ -101,4 +105,27 @@ def assess(  # noqa: PLR0913
     return error, worst, contact, EPSILON * math.sqrt(hidden), changed
 
 
-__all__ = ["assess", "settled_contact"]
+class Assessed(NamedTuple):
+    """What `assess` finds: errors unit-free, u and kept (nc, 3)."""
+
+    error: float
+    weakest: Weakest
+    u: Array
+    kept: Array
+    status: NDArray[np.int8]
+    sliding: NDArray[np.bool_]
+    changed: bool
+
+
+def assessed(data: tuple[Any, ...], r: Array, floor: Array, scale: float) -> Assessed:
+    """`assess` with the data that kernels take and r (nc, 3); scale: size of q, unit of u."""
+    u, kept = np.empty((2, len(r), 3))
+    status, sliding = np.empty((2, len(r)), np.int8)
+    error, worst, contact, hidden, changed = assess(*data, r, floor, u, kept, status, sliding)
+    weakest = Weakest(worst, contact if contact >= 0 else None, ratio(hidden, scale))
+    return Assessed(
+        ratio(error, scale), weakest, u, kept, status, sliding.view(np.bool_), changed
+    )
+
+
+__all__ = ["Assessed", "assess", "assessed", "settled_contact"]

@@ -13,7 +13,7 @@ from .cones import Coulomb
 from .judge import EPSILON, Criterion, Measure, Weakest
 from .nitsche_problem import NitscheProblem
 from .problem import FrictionProblem
-from .settling import Motion, Settled, settled_exactly, settled_state
+from .settling import Motion, Settled, motion, settled, settled_exactly
 from .solution import Step
 from .solvers.base import Iterate, natural_error_of
 from .solvers.first_iterate import own_motion
@@ -77,23 +77,22 @@ class Watch:
         problem = self.problem
         if isinstance(problem, NitscheProblem):
             return iterate, error, problem.weakest(iterate.r, iterate.v), None
-        if problem.measure is Measure.EXACT and problem.condensed().q_norm > 0:
+        if problem.measure is Measure.EXACT:
             u, told, own, weakest = settled_exactly(problem.condensed(), iterate.r)
             if told.changed:  # its motion is found again
                 iterate, error = replace(iterate, r=told.r, v=None), own
-            return (
-                iterate,
-                error,
-                weakest if error <= self.tolerance else None,
-                ((u, None), told),
-            )
-        motion, told = settled_state(problem, iterate.r, iterate.v)
+            weakest = weakest if error <= self.tolerance else None
+            return iterate, error, weakest, ((u, None), told)
+        v = iterate.v
+        moved, told = settled(
+            problem.law, problem.rho, iterate.r, lambda r: motion(problem, r, v)
+        )
         if told.r is not iterate.r:
-            iterate = replace(own_motion(problem, iterate), r=told.r)
-            error = problem.error(iterate.r, iterate.v)
+            iterate = replace(iterate, r=told.r)
+            error = problem.error(iterate.r, v)
         if error > self.tolerance:
-            return iterate, error, None, (motion, told)
-        return iterate, error, problem.weakest(iterate.r, iterate.v), (motion, told)
+            return iterate, error, None, (moved, told)
+        return iterate, error, problem.weakest(iterate.r, v), (moved, told)
 
     def _noted(
         self, iterate: Iterate, error: float, weakest: Weakest | None,
@@ -181,11 +180,12 @@ class Watch:
         One that hardly moves does not come back: its method may wait for something else.
         """
         same = [self._repeats(iterate, error, *old) for old in self.seen]
-        size = np.abs(iterate.r).max(initial=0.0)
-        moved = not self.seen or np.abs(self.seen[-1][1] - iterate.r).max(initial=0.0)
         self.seen.append((error, iterate.r))
         del self.seen[:-MEMORY]
-        return any(same) and not same[-1] and moved > AT_REST * size
+        if not any(same) or same[-1]:
+            return False
+        moved = np.abs(self.seen[-2][1] - iterate.r).max(initial=0.0)
+        return bool(moved > AT_REST * np.abs(iterate.r).max(initial=0.0))
 
     @staticmethod
     def _repeats(iterate: Iterate, error: float, old_error: float, old: Array) -> bool:

@@ -39,7 +39,7 @@ from .cones import Coulomb, Law, Tresca
 from .errors import InvalidInput, SingularOperator, UnsupportedForm, shown
 from .global_matrices import OPERATORS, GlobalMatrices, Shared, made_once
 from .judge import Measure, Weakest
-from .judge_contacts import assess
+from .judge_contacts import Assessed, assessed
 from .judge_sharp import sharp_error
 from .linear import Factor
 from .linear.bodies import Bodies
@@ -515,7 +515,7 @@ class FrictionProblem:
     def weakest(self, r: Array, v: Array | None = None) -> Weakest:
         """The contact farthest from its law on its own scale; arguments as in `error`."""
         if self.measure is Measure.EXACT:
-            return self.condensed()._weakest_exact(r)
+            return self.condensed().assessed(r).weakest
         if v is None:
             try:
                 v = self.velocity(r)[1]
@@ -531,16 +531,12 @@ class FrictionProblem:
         found = judge.weakest_of(r, u, self.law, self.rho, scale)
         return found._replace(hidden=self.rounding(r))
 
-    def _weakest_exact(self, r: Array) -> Weakest:
-        rows, nc = _rows(r), self.contacts
-        unused = (*np.empty((2, nc, 3)), *np.empty((2, nc), np.int8))
-        _, error, contact, hidden, _ = assess(*self.kernel_data, rows, self.floor, *unused)
-        hidden = judge.ratio(hidden, self.q_norm)
-        return Weakest(error, contact if contact >= 0 else None, hidden)
+    def assessed(self, r: Array) -> Assessed:
+        """All that is asked of reactions that may have converged (Delassus form only)."""
+        return assessed(self.kernel_data, _rows(r), self._floor, self.q_norm)
 
     @cached_property
-    def floor(self) -> Array:
-        """What is added to the scale of each contact, (nc,), unit of u: `blur`, or zeros."""
+    def _floor(self) -> Array:
         return self.blur if self.blur is not None else np.zeros(self.contacts)
 
     def exact_error(self, r: Array) -> float:

@@ -22,8 +22,8 @@ from .blocks import spatial
 from .compiled import njit
 from .cones import Law, Tresca
 from .errors import SingularOperator
-from .judge import Measure, Weakest, ratio
-from .judge_contacts import assess, settled_contact
+from .judge import Weakest
+from .judge_contacts import settled_contact
 from .problem import FrictionProblem
 
 Array = NDArray[np.float64]
@@ -72,35 +72,15 @@ def at_rest(problem: FrictionProblem) -> Motion:
     return problem.local_velocity(v), v
 
 
-def settled_state(
-    problem: FrictionProblem, r: Array, v: Array | None
-) -> tuple[Motion, Settled]:
-    """`settled` for a state, by the form and the v that judge it."""
-    exact = problem.measure is Measure.EXACT
-    form = problem.condensed() if exact else problem
-    kept = None if exact else v
-    return settled(problem.law, form.rho, r, lambda r: motion(form, r, kept))
-
-
 def settled_exactly(
     problem: FrictionProblem, r: Array
 ) -> tuple[Array, Settled, float, Weakest]:
-    """(u, `settled`, exact error, weakest contact) in the Delassus form; q is not zero."""
-    (nc, d), data, found = r.shape, problem.kernel_data, r
-    while True:
-        rows = found if d == 3 and found.flags.c_contiguous else spatial(found)
-        u, kept = np.empty((2, nc, 3))
-        status, sliding = np.empty((2, nc), np.int8)
-        error, worst, contact, hidden, changed = assess(
-            *data, rows, problem.floor, u, kept, status, sliding
-        )
-        if not changed:
-            break
-        found = np.ascontiguousarray(kept[:, :d])
-    size = problem.q_norm
-    weakest = Weakest(worst, contact if contact >= 0 else None, ratio(hidden, size))
-    told = Settled(found, status, sliding.view(np.bool_), found is not r)
-    return u[:, :d], told, ratio(error, size), weakest
+    """(u, `settled`, exact error, weakest contact) in the Delassus form."""
+    d, found = r.shape[1], r
+    while (at := problem.assessed(found)).changed:
+        found = np.ascontiguousarray(at.kept[:, :d])
+    told = Settled(found, at.status, at.sliding, found is not r)
+    return at.u[:, :d], told, at.error, at.weakest
 
 
 def settled(
@@ -136,5 +116,4 @@ def _settle(r, u, rho, coefficient, tresca, kept, status, sliding):  # noqa: PLR
 
 __all__ = [
     "Motion", "Settled", "at_rest", "motion", "settle", "settled", "settled_exactly",
-    "settled_state",
 ]  # fmt: skip

@@ -185,7 +185,7 @@ def test_no_load_and_no_contacts():
 
 
 def test_the_clock_stops_the_search(monkeypatch):
-    monkeypatch.setattr("amontons.analysis.solutions.enumerate.NODES", 5)
+    monkeypatch.setattr("amontons.analysis.solutions.pattern_leaves.NODES", 5)
     found = am.all_solutions(hild_triangle(6, mu=3.5), time_limit=1e-9)
     assert not found.complete
     assert "stopped" in found.reason

@@ -240,7 +240,8 @@ def test_friction_speaks_of_the_motion_since_the_last_step():
     assert pushed[5] > 1e-3
     assert np.abs(steps[5].state.slip - steps[1].state.slip).max() > 1e-3
     for step in steps:
-        assert abs(step.energies.defect) < 1e-7 * step.energies.turnover
+        rounding = 1e-12 * step.energies.elastic  # all of a step that nothing moves in
+        assert abs(step.energies.defect) < 1e-7 * step.energies.turnover + rounding
         assert step.energies.contact < 1e-12
 
 

@@ -18,8 +18,8 @@ By our signs x_N >= 0 and y_N >= 0 are the rates of r_N and u_N.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -172,11 +172,7 @@ def contact_rates(
         raise UnsupportedForm("rates: expected a problem in 2D with Coulomb friction")
     sets = path.index_sets(y, p, tolerance)
 
-    def at(factor: float) -> ContactRates:
-        rates = _eliminated(path, y, p, sets, factor)
-        return replace(rates, with_friction=at)
-
-    return at(1.0)
+    return _eliminated(path, y, p, sets, 1.0)
 
 
 def _eliminated(
@@ -195,11 +191,8 @@ def _eliminated(
     mu = factor * np.maximum(path.coefficient(p), 0.0)
     letters = np.where(system.sign > 0, "+", "-")
     letters[sets.frictionless] = "+"
-    return ContactRates(D, b, *groups, mu[groups[3]], sets, A, a, letters, _unset)
-
-
-def _unset(factor: float) -> ContactRates:
-    raise NotImplementedError
+    again = partial(_eliminated, path, y, p, sets)
+    return ContactRates(D, b, *groups, mu[groups[3]], sets, A, a, letters, again)
 
 
 class _System:

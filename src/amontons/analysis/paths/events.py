@@ -52,8 +52,26 @@ class Stop(Enum):
         return self.value
 
 
+class _OnPath:
+    """What the problem tells of a point of its path."""
+
+    problem: Any
+    state: Array
+    parameter: float
+
+    @property
+    def sets(self) -> IndexSets | None:
+        """The index sets of the contacts there; None for problems that do not tell."""
+        return told_sets(self.problem, self.state, self.parameter)
+
+    @property
+    def rates(self) -> ContactRates | None:
+        """What [LR] (35) says of tangents there; None for problems that do not tell."""
+        return told_rates(self.problem, self.state, self.parameter)
+
+
 @dataclass(frozen=True, eq=False)
-class Event:
+class Event(_OnPath):
     """Something that happens on a branch, at a precisely located point.
 
     before, after: names of the pieces on the two sides, in the sense of the branch.  smooth:
@@ -72,16 +90,6 @@ class Event:
     stop: Stop | None = None
     detail: str = ""
     problem: Any = field(default=None, repr=False)
-
-    @property
-    def sets(self) -> IndexSets | None:
-        """The index sets of the contacts there; None for problems that do not tell."""
-        return told_sets(self.problem, self.state, self.parameter)
-
-    @property
-    def rates(self) -> ContactRates | None:
-        """What [LR] (35) says of tangents there; None for problems that do not tell."""
-        return told_rates(self.problem, self.state, self.parameter)
 
     def record(self) -> dict[str, Any]:
         """What the JSON file holds."""
@@ -109,7 +117,7 @@ class Event:
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
+class Point(_OnPath):
     """One point of a branch, with all that is needed to go on from there.
 
     direction, rate: the tangent (y', p') in the sense of travel, of weighted length 1;
@@ -124,16 +132,6 @@ class Point:
     arclength: float = 0.0
     step: float = 0.0
     problem: Any = field(default=None, repr=False)
-
-    @property
-    def sets(self) -> IndexSets | None:
-        """The index sets of the contacts there; None for problems that do not tell."""
-        return told_sets(self.problem, self.state, self.parameter)
-
-    @property
-    def rates(self) -> ContactRates | None:
-        """What [LR] (35) says of tangents there; None for problems that do not tell."""
-        return told_rates(self.problem, self.state, self.parameter)
 
     def reversed(self) -> Point:
         """The same point, to go the other way."""

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ...clock import NEVER, Deadline
 from ..solutions import pattern_search as search
+from ..solutions.pattern_leaves import NODE, leaves_of
 
 Array = NDArray[np.float64]
 States = NDArray[np.int8]
@@ -23,8 +24,6 @@ REACH = 1e6  # bound of x where none is known, in the size of c and D
 SLACK = 1e-9  # violation of a condition that counts as none
 SAME = 1e-8  # distance of two solutions that count as one
 SINGULAR = 1e-11  # of a system, relative
-BATCH = 2000  # nodes between two looks, up to 20 contacts
-NODE = 10.0  # operations of a node per square of the rates
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,24 +139,9 @@ class _Tree:
 
     def leaves(self) -> Iterator[tuple[States, int, bool]]:
         """(patterns that are not excluded, nodes, done?) in turns."""
-        m, n = len(self.rhs), self.blocks
-        levels = 2 * n + 2
-        D = np.empty((levels, m, m + 1))
-        basic, nonbasic = np.empty((2, levels, m), dtype=np.int64)
-        states = np.empty((levels, n), dtype=np.int8)
-        turn = np.zeros((levels, 3), dtype=np.int64)
-        batch = max(20, BATCH * 20**2 // max(20, n) ** 2)
-        leaves, cut = np.empty((2, batch, n), dtype=np.int8)
-        proofs, spread = np.empty((batch, m)), np.zeros(m)
-        reacts = np.ones(n, dtype=bool)
-        search.start_inplace(D, basic, nonbasic, states, self.A, self.rhs)
-        done, level = False, 0
-        while not done:
-            done, level, nodes, count, _ = search.search_inplace(
-                self.A, spread, self.rhs, self.low, self.high, reacts, self.frictional,
-                D, basic, nonbasic, states, turn, level, leaves, cut, proofs,
-            )  # fmt: skip
-            yield leaves[:count].copy(), nodes, done
+        spread, reacts = np.zeros(len(self.rhs)), np.ones(self.blocks, dtype=bool)
+        box = self.low, self.high
+        return leaves_of(self.A, spread, self.rhs, box, reacts, self.frictional)
 
     def solved(self, states: States) -> tuple[Array | None, bool]:
         """(x of a pattern, or None; are there more?)."""

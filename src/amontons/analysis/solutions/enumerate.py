@@ -26,6 +26,7 @@ from ...problem import FrictionProblem
 from ..multipliers.scales import RESOLVED, UNRESOLVED, load_shares
 from . import pattern_search as search
 from .local_degree import UNKNOWN, Degree, degree
+from .pattern_leaves import NODE, Cut, leaves_of
 from .piece_solution import DATA, Existence, PieceAnswer, examined
 from .scaled_problem import REACH, SLACK, ScaledProblem, States
 
@@ -36,8 +37,6 @@ Array = NDArray[np.float64]
 LETTERS = {search.OPEN_OR_CLOSED: ".", search.CLOSED: "c", search.OPEN: "f",
            search.STICK: "s", search.SLIP_PLUS: "+", search.SLIP_MINUS: "-",
            search.FRICTIONLESS: "+"}  # fmt: skip
-NODES = 2000  # patterns between two looks at the clock, up to 20 contacts
-NODE = 10.0  # operations of a pattern per square of the reactions
 LEAF = 2e6  # the same of a complete one, besides its linear system
 CONTACTS = 200  # up to which the dictionaries of all levels need less than 0.6 GB
 
@@ -212,9 +211,6 @@ def missing(total: int, expected: int = 1) -> str | None:
 
 
 # ------------------------------------------------------------------- the search
-Cut = tuple[States, Array]  # pattern and multipliers
-
-
 def _collect(
     piece: ScaledProblem,
     deadline: Deadline,
@@ -225,7 +221,9 @@ def _collect(
     found: list[PieceAnswer] = []
     undecided = nodes = 0
     node, leaf = NODE * (2.0 * piece.contacts) ** 2, LEAF + 10.0 * (2.0 * piece.contacts) ** 3
-    for leaves, more, done in _leaves(piece, cuts):
+    box = piece.box
+    search_space = (box.A, box.spread, box.c, (box.low, box.high), piece.reacts, piece.mu > 0)
+    for leaves, more, done in leaves_of(*search_space, cuts):
         nodes += more
         deadline.spend(node * more)
         for k, states in enumerate(leaves):
@@ -244,29 +242,6 @@ def _collect(
         if not done and deadline.passed:
             return found, undecided, nodes, True
     return found, undecided, nodes, False
-
-
-def _leaves(piece: ScaledProblem, cuts: list[Cut] | None) -> Iterator[tuple[States, int, bool]]:
-    """(complete patterns that the search could not exclude, nodes, done?) in turns."""
-    nc = piece.contacts
-    m, levels = 2 * nc, 2 * nc + 2
-    D = np.empty((levels, m, m + 1))
-    basic, nonbasic = np.empty((2, levels, m), dtype=np.int64)
-    states, turn = np.empty((levels, nc), dtype=np.int8), np.zeros((levels, 3), dtype=np.int64)
-    nodes = max(20, NODES * 20**2 // max(20, nc) ** 2)  # a node costs some nc^2 and more
-    leaves, cut = np.empty((2, nodes, nc), dtype=np.int8)
-    proofs = np.empty((nodes, m))
-    box = piece.box
-    search.start_inplace(D, basic, nonbasic, states, box.A, box.c)
-    done, level = False, 0
-    while not done:
-        done, level, nodes, count, excluded = search.search_inplace(
-            box.A, box.spread, box.c, box.low, box.high, piece.reacts, piece.mu > 0,
-            D, basic, nonbasic, states, turn, level, leaves, cut, proofs,
-        )  # fmt: skip
-        if cuts is not None:
-            cuts += zip(cut[:excluded].copy(), proofs[:excluded].copy(), strict=True)
-        yield leaves[:count].copy(), nodes, done
 
 
 def _merged(
