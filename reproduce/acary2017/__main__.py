@@ -28,7 +28,7 @@ Parts, in their order (--only A,B takes some of them):
   wall      the methods of the paper and ours on the 50 problems of the wall
   variants  line search, other functions, more accurate contacts, Jacobi, on 5 of them
   fine      some methods on 2 problems of a finer wall
-  fclib     the methods on the FCLib files
+  fclib     the methods on the FCLib files, ours and those of Siconos
   siconos   the methods of the paper in Siconos on 5 problems
   rigid     the wall of rigid and of elastic blocks: rank of H, and the order of Newton
   step      one warm-started time step against every solver of Siconos
@@ -128,7 +128,9 @@ def _do(
             chosen = [name for name in names if name in VARIANTS]
             report.measure(out, "variants", report.some(paths), chosen, limit, machine, missing)
         if "siconos" in parts and shutil.which(siconos):
-            report.within_siconos(out, paths, siconos, limit, machine)
+            report.within_siconos(
+                out, "wall", report.some(paths), siconos, limit, machine, missing
+            )
     if fine is not None and {"problems", "fine", "step"} & set(parts):
         paths = wall.write_problems(fine, problems, click.echo)
         if "fine" in parts:
@@ -139,6 +141,10 @@ def _do(
         if paths:
             chosen = [name for name in names if name in FCLIB]
             report.measure(out, "fclib", paths, chosen, limit / 10, machine, missing)
+            if shutil.which(siconos):
+                report.within_siconos(
+                    out, "fclib", paths, siconos, limit / 10, machine, missing
+                )
         else:
             click.echo(f"fclib: no files in {data}; name its folder with --shared")
     if "rigid" in parts:

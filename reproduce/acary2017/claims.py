@@ -126,9 +126,9 @@ def _upk(runs: Runs, cost: Cost) -> Claim:
     )  # fmt: skip
 
 
-def most_robust(runs: Runs, where: str) -> Claim:
+def most_robust(runs: Runs, where: str, cost: Cost = PAPER) -> Claim:
     """The claim about the hybrid on other problems than the paper's."""
-    counts = {name: solved(runs, name, 1e-6) for name in PRINTED}
+    counts = {name: solved(runs, name, 1e-6, cost) for name in PRINTED}
     ends = Counter(entry["methods"][HYBRID]["outcome"] for entry in runs.values())
     failed = [f"{k} {end.replace('_', ' ')}" for end, k in ends.items() if end != "converged"]
     return Claim(

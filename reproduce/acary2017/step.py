@@ -128,13 +128,14 @@ def _ours(problem: am.FrictionProblem, solver: Any, r: np.ndarray) -> dict[str, 
 def write_problem(
     path: Path, problem: am.FrictionProblem, condensed: am.FrictionProblem, r: np.ndarray
 ) -> None:
-    """The problem in both forms with its warm start, for the workers."""
-    W = sparse.csr_array(condensed.W)
-    arrays = {"mu": problem.mu, "q": condensed.q.ravel(), "f": problem.f,
-              "w": problem.w.ravel(), "r0": r.ravel()}  # fmt: skip
+    """The problem in the forms it has with its warm start, for the workers."""
+    matrices = {"W": sparse.csr_array(condensed.W)}
     u, v = problem.velocity(r)
-    arrays |= {"u0": u.ravel(), "v0": v}
-    for name, matrix in (("W", W), ("M", problem.M), ("H", problem.H)):
+    arrays = {"mu": problem.mu, "q": condensed.q.ravel(), "r0": r.ravel(), "u0": u.ravel()}
+    if problem.form is am.Form.GLOBAL:
+        matrices |= {"M": problem.M, "H": problem.H}
+        arrays |= {"f": problem.f, "w": problem.w.ravel(), "v0": v}
+    for name, matrix in matrices.items():
         for part in ("data", "indices", "indptr"):
             arrays[f"{name}_{part}"] = getattr(matrix, part)
     np.savez(path, **arrays)

@@ -13,6 +13,7 @@ from click.testing import CliRunner
 import amontons as am
 from amontons.analysis import performance_profile
 from amontons.evolution import Energies
+from amontons.gallery import random_delassus
 from amontons.plots import SI, Frame, draw_film, energy_figure, series_figure
 
 SPENT = 7.0  # seconds of a made-up run that failed
@@ -342,6 +343,30 @@ def test_runs_of_siconos_look_like_ours_and_end_at_the_first_miss(problems, monk
     assert len(claims.claims(found["siconos"], peers.COST)) == 8
     assert "| NSGS-AC (NSGS) | 1, 500 ms | 1, 500 ms | 0, - | 0, - |" in peers.table(found)
     assert "| 71.4 ms |" in peers.steps_table(found)
+
+
+def test_runs_of_siconos_go_on_where_they_were_stopped(problems, tmp_path, monkeypatch):
+    asked = []
+
+    def calls(python, file, solver, *rest):
+        asked.append((solver, set(np.load(file).files)))
+        return [{"seconds": 0.5, "iterations": 7, "error": 1e-7}], "", 0.5
+
+    monkeypatch.setattr(peers, "calls", calls)
+    small = tmp_path / "small.hdf5"
+    am.write_fclib(random_delassus(0, 4), small)
+    run = {"python": "", "limit": 2.0, "machine": {}}
+    report.within_siconos(tmp_path, "fclib", [small], **run)
+    assert not {"M", "M_data", "f"} & asked[0][1]  # a file with W
+    first = len(asked)
+    report.within_siconos(tmp_path, "fclib", [small, problems[0]], **run, missing=True)
+    assert len(asked) == 2 * first  # the new one
+    record = race.load(tmp_path / "siconos-fclib.json")
+    assert len(record["runs"]["siconos"]) == 2
+    claim = claims.most_robust(record["runs"]["siconos"], "two", peers.COST)
+    assert claim.agrees and "NSN-AC-HYBRID 2" in claim.found
+    report.within_siconos(tmp_path, "fclib", [small], **run | {"limit": 3.0}, missing=True)
+    assert len(asked) == 3 * first  # another limit
 
 
 def test_one_column_against_siconos_runs_again_beside_the_quickest_only(problems, monkeypatch):
