@@ -390,8 +390,7 @@ def p_matrix_friction(
     tangents of the problem and a square in the place of the friction disc in 3D; that depends
     on the tangents and is not safe.  gap: relative distance of the bounds that is good enough
     in 3D.  time_limit: seconds, by default the work of about 60 s, counted in operations.
-    Raises UnsupportedForm for more than 10 contacts in 2D, 5 in 3D (4 with given tangents), and
-    under Tresca's law.
+    Raises UnsupportedForm for more than 10 contacts in 2D, 4 in 3D, and under Tresca's law.
     """
     from .analysis.certificates.older_criteria import p_matrix_friction as ask
 
@@ -408,7 +407,7 @@ def full_contact_friction(
 
     Not safe where contacts open: below it rates are unique while all contacts stay closed.
     sharp: what that needs in 3D, the printed c is smaller there.  Raises UnsupportedForm for
-    more than 12 contacts in 2D, 5 in 3D, and under Tresca's law.  Others as of
+    more than 12 contacts in 2D, 4 in 3D, and under Tresca's law.  Others as of
     `p_matrix_friction`.
     """
     from .analysis.certificates.older_criteria import full_contact_friction as ask

@@ -135,7 +135,7 @@ class _Part:
     @property
     def cost(self) -> float:
         """Operations of a box."""
-        return 200.0 + 50.0 * len(self.own) ** 3
+        return 6000.0 + 1500.0 * 2 ** len(self.own)
 
     # ------------------------------------------------------------------ upper bounds
     def descend(self) -> None:
@@ -146,7 +146,11 @@ class _Part:
         if not self.turns:
             angles[:, k:] = np.pi * random.integers(0, 2, (SAMPLED, k))
         largest = min(FAR * self.found.upper, LARGEST)  # other groups may fail much later
-        values = np.array([self._value(row, largest) for row in angles])
+        values = np.full(SAMPLED, np.inf)
+        for i, row in enumerate(angles):
+            if self.deadline.passed:
+                return
+            values[i] = self._value(row, largest)
         for start in np.argsort(values)[:POLISHED]:
             if np.isfinite(values[start]) and not self.deadline.passed:
                 self._polish(angles[start])

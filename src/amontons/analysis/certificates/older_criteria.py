@@ -59,8 +59,7 @@ Array = NDArray[np.float64]
 Ask = Callable[[Array, Array, float, Deadline], Found]
 AskPlanar = Callable[[Pieces, Deadline], Found]
 SECONDS = 60.0  # whose work a criterion without a time limit may take
-DISCS = 5  # contacts in 3D up to which a criterion is computed
-PRINTED = 4  # the same with the given tangents: 13^n principal minors
+DISCS = 4  # contacts in 3D up to which a criterion is computed
 SINGULAR = 1e12  # condition of W from which on it counts as singular
 
 
@@ -96,13 +95,13 @@ def p_matrix_friction(
     the tangents of the problem and m in a square in 3D; it depends on the tangents and is not
     safe for friction discs.  gap: relative distance of the bounds that is good enough in 3D.
     time_limit: seconds; without it operations are counted, as many as take about SECONDS.
-    Raises UnsupportedForm for more than COMPARED contacts in 2D, DISCS in 3D (PRINTED with
-    given tangents), and under Tresca's law.
+    Raises UnsupportedForm for more than COMPARED contacts in 2D, DISCS in 3D, and under
+    Tresca's law.
     """
     if problem.dimension == 2:
         return _planar(problem, COMPARED, _p_matrix_planar, time_limit)
     if given_tangents:
-        return _spatial(problem, PRINTED, _given_tangents, gap, time_limit)
+        return _spatial(problem, DISCS, _given_tangents, gap, time_limit)
     return _spatial(problem, DISCS, _p_matrix_discs, gap, time_limit)
 
 
@@ -182,7 +181,7 @@ def _p_matrix_discs(W: Array, shape: Array, gap: float, deadline: Deadline) -> F
 
 
 def _given_tangents(W: Array, shape: Array, gap: float, deadline: Deadline) -> Found:
-    """All principal minors at the corners of all squares: they are affine in every m."""
+    """All 13^n principal minors at the corners of the squares: they are affine in every m."""
     found = Found()
     for rows, normals, m in _minors(len(shape)):
         deadline.spend(50.0 * len(rows) ** 3)
