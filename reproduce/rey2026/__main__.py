@@ -15,7 +15,17 @@ from types import ModuleType
 import click
 
 from ..record import check_parts, heading, regenerate
-from . import alart_curnier, extra, nitsche, primal_dual, report, solutions, uzawa, verdict
+from . import (
+    alart_curnier,
+    extra,
+    extruded,
+    nitsche,
+    primal_dual,
+    report,
+    solutions,
+    uzawa,
+    verdict,
+)
 
 HERE = Path(__file__).parent
 PAPER: dict[str, dict] = json.loads((HERE / "paper.json").read_text())
@@ -28,7 +38,8 @@ ALGORITHMS: dict[str, ModuleType] = {
     "uzawa": uzawa,
 }
 TABLES = [name for name, table in PAPER.items() if table.get("algorithm") in ALGORITHMS]
-EXTRA = ("example", "kept", "symmetric", "integral", "strict", "readings", "meshes")
+EXTRA = ("example", "kept", "symmetric", "integral", "strict", "readings", "meshes",
+         "criteria3d")  # fmt: skip
 PARTS = (*TABLES, "enumeration", "figure1", "refinement", "mu_crit", *EXTRA)
 SEED = 2026
 
@@ -92,6 +103,8 @@ def beside(part: str, draws: int) -> list | dict | Iterator[dict]:
         return extra.strict(PAPER)
     if part == "readings":
         return extra.readings(PAPER, draws, SEED)
+    if part == "criteria3d":
+        return extruded.criteria()
     return extra.meshes(draws, SEED)
 
 
@@ -132,6 +145,8 @@ def _beside(record: dict) -> list[str]:
               "symmetric": "Nitsche's symmetric variant (θ = 1)",
               "strict": "One element with 1e-10 for the judge and for naming"}  # fmt: skip
     lines: list[str] = []
+    if "criteria3d" in record:
+        lines += report.criteria(record["criteria3d"])
     if "example" in record:
         lines += report.example(record["example"])
     if "kept" in record:

@@ -115,6 +115,27 @@ def critical(record: Mapping, paper: Mapping) -> list[str]:
     return [*lines, ""]
 
 
+def criteria(record: Mapping) -> list[str]:
+    """Both criteria in 3D."""
+    names = ("energy", "mu_P", "critical", "mu_c sharp", "mu_c", "mu_P given")
+    lines = ["## criteria3d: the triangle extruded, critical coefficients in 3D", "",
+             "Not in the paper. energy: the bound of `am.uniqueness` for every load in 3D; "
+             "mu_P: friction discs and every choice of tangents; critical: from there on some "
+             "load has several solutions; mu_c: c as printed; sharp: with the normal force "
+             "alone; given: mu_P as printed, squares and the given tangents. The first three "
+             "are safe, the others are not.", "",
+             "| n_c | energy | mu_P | critical | mu_c, sharp | mu_c | mu_P, given tangents |",
+             "|---|---|---|---|---|---|---|"]  # fmt: skip
+    for n_c, one in record.items():
+        cells = []
+        for name in names:
+            low, high = one[name] if name != "energy" else (one[name], one[name])
+            same = high - low <= 1e-5 * high
+            cells.append(f"{high:.4f}" if same else f"{low:.4f} to {high:.4f}")
+        lines.append(f"| {n_c} | " + " | ".join(cells) + " |")
+    return [*lines, ""]
+
+
 def figure(record: Mapping) -> list[str]:
     """Figure 1 and the solutions that it shows."""
     lines = ["## Figure 1: n_c = 25, μ = 3.5", ""]

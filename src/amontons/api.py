@@ -28,6 +28,7 @@ from .solvers.base import Iterate, Solver
 if TYPE_CHECKING:
     from .analysis.basins import Basins
     from .analysis.certificates.critical_friction import CriticalFriction
+    from .analysis.certificates.older_criteria import CriterionFriction
     from .analysis.certificates.opening import Opening
     from .analysis.certificates.uniqueness import Uniqueness
     from .analysis.paths.continuation import Continuation
@@ -377,6 +378,50 @@ def critical_friction(
     if discrete.dimension == 2 and isinstance(discrete.law, Coulomb):  # else it says so
         _check_has_W(problem, "critical friction", limit)
     return bounds(discrete, gap=gap, time_limit=limit)
+
+
+def p_matrix_friction(
+    problem: FrictionProblem | Model, *, given_tangents: bool = False, gap: float = 1e-2,
+    time_limit: TimeLimit = None,
+) -> CriterionFriction:  # fmt: skip
+    """The friction up to which the P-matrix criterion holds, in 2D and 3D, for few contacts.
+
+    Below its `lower` every load has at most one solution.  given_tangents: as printed, with the
+    tangents of the problem and a square in the place of the friction disc in 3D; that depends
+    on the tangents and is not safe.  gap: relative distance of the bounds that is good enough
+    in 3D.  time_limit: seconds, by default the work of about 60 s, counted in operations.
+    Raises UnsupportedForm for more than 10 contacts in 2D, 4 in 3D, and under Tresca's law.
+    """
+    from .analysis.certificates.older_criteria import p_matrix_friction as ask
+
+    limit = _begun(time_limit)
+    discrete = _with_W(problem, "the P-matrix criterion", limit)
+    return ask(discrete, given_tangents=given_tangents, gap=gap, time_limit=limit)
+
+
+def full_contact_friction(
+    problem: FrictionProblem | Model, *, sharp: bool = False, gap: float = 1e-2,
+    time_limit: TimeLimit = None,
+) -> CriterionFriction:  # fmt: skip
+    """The friction c / sqrt(1 - c^2) of the full contact number c, in 2D and 3D.
+
+    Not safe where contacts open: below it rates are unique while all contacts stay closed.
+    sharp: what that needs in 3D, the printed c is smaller there.  Raises UnsupportedForm for
+    more than 12 contacts in 2D, 4 in 3D, and under Tresca's law.  Others as of
+    `p_matrix_friction`.
+    """
+    from .analysis.certificates.older_criteria import full_contact_friction as ask
+
+    limit = _begun(time_limit)
+    discrete = _with_W(problem, "full contact", limit)
+    return ask(discrete, sharp=sharp, gap=gap, time_limit=limit)
+
+
+def _with_W(problem: FrictionProblem | Model, verb: str, limit: TimeLimit) -> FrictionProblem:
+    discrete = _discrete(problem)
+    if isinstance(discrete.law, Coulomb):  # else the verb says so
+        _check_has_W(problem, verb, limit)
+    return discrete
 
 
 def solve_any_form(

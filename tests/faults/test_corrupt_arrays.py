@@ -201,7 +201,8 @@ def test_no_contacts_are_solved_or_refused_in_words(d, law):
     for given in (problem, whole):
         assert am.solve(given).r.shape == (0, d)
         for ask in (am.all_solutions, am.multistart, am.uniqueness, am.critical_friction,
-                    am.follow, am.diagram):  # fmt: skip
+                    am.p_matrix_friction, am.full_contact_friction, am.follow,
+                    am.diagram):  # fmt: skip
             with suppress(am.AmontonsError):
                 ask(given)
 

@@ -18,6 +18,7 @@ sys.path.insert(0, str(ROOT))  # the reproductions are not installed
 from reproduce.rey2026 import (  # noqa: E402
     alart_curnier,
     extra,
+    extruded,
     primal_dual,
     report,
     solutions,
@@ -146,6 +147,21 @@ def test_three_solutions_above_mu_3_and_the_printed_thresholds(tmp_path):
     drawn = solutions.slip_figure(tmp_path / "figure.png", n_c=7)
     assert sorted(one["counts"]["slip"] for one in drawn["solutions"]) == [0, 0, 7]
     assert (tmp_path / "figure.png").stat().st_size > 10_000
+
+
+def test_the_criteria_of_the_extruded_triangle():
+    (first,) = extruded.criteria((1,))
+    one = first["1"]
+    for name in ("mu_P", "critical", "mu_c sharp", "mu_P given"):
+        assert one[name][0] < 2.2 and one[name][1] == pytest.approx(2.2)  # as in 2D
+    assert one["energy"] < one["mu_P"][0]
+    assert one["mu_c"][1] < one["mu_c sharp"][1]
+    for contacts in (1, 2, 3):
+        assert extruded.extruded(contacts).assemble().contacts == contacts
+    page = (ROOT / "reproduce" / "rey2026" / "results" / "results.md").read_text()
+    assert "\n".join(report.criteria(json.loads(
+        (ROOT / "reproduce" / "rey2026" / "results" / "results.json").read_text()
+    )["criteria3d"])) in page  # fmt: skip
 
 
 def test_mass_and_lengths_integrate_shape_functions():

@@ -67,6 +67,8 @@ VERBS = {
     "multistart": lambda p: am.multistart(p, starts=10**6, time_limit=LIMIT),
     "uniqueness": lambda p: am.uniqueness(p, time_limit=LIMIT),
     "critical_friction": lambda p: am.critical_friction(p, time_limit=LIMIT),
+    "p_matrix_friction": lambda p: am.p_matrix_friction(p, time_limit=LIMIT),
+    "full_contact_friction": lambda p: am.full_contact_friction(p, time_limit=LIMIT),
     "certify_load": lambda p: certify_load(p, solution_of(p), time_limit=LIMIT),
     "quick_verdict": quick_verdict,
     "follow the load": lambda p: am.follow(p, "load", (0.0, 1.0), time_limit=LIMIT),

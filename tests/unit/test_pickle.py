@@ -73,6 +73,7 @@ RESULTS = {
     "some solutions": lambda: am.multistart(random_delassus(1, 3, 2), starts=5),
     "verdict": lambda: am.uniqueness(random_delassus(1, 3, 2)),
     "critical friction": lambda: am.critical_friction(random_delassus(1, 2, 2)),
+    "criterion in 3D": lambda: am.p_matrix_friction(random_delassus(1, 1, 3)),
     "step in dynamics": lambda: last(model(), am.MoreauJean(0.1), 0.2),
     "quasi-static step": lambda: last(pair(), am.QuasiStatic(0.5), 1.0),
     "case": lambda: am.read_case("example:slab"),

@@ -4,6 +4,7 @@ from .basin_methods import BasinMethod, Ended, RunLimits
 from .basin_solutions import KnownSolution
 from .basins import BasinRun, Basins
 from .certificates.critical_friction import CriticalFriction, Witness
+from .certificates.older_criteria import CriterionFriction
 from .certificates.opening import Existence, Opening
 from .certificates.uniqueness import Uniqueness, Verdict
 from .grading import graded
@@ -27,6 +28,7 @@ __all__ = [
     "Claim",
     "ContactRates",
     "Continuation",
+    "CriterionFriction",
     "CriticalFriction",
     "Diagram",
     "Ended",

@@ -245,14 +245,15 @@ def _comparison(
         exact_threshold(pieces, threshold, deadline, pieces.allowed(tangent=True))
         p_matrix = threshold.upper if threshold.proved else None
     full = full_contact_threshold(pieces, deadline)
-    return p_matrix, full
+    return p_matrix, full.upper if full is not None and full.proved else None
 
 
-def full_contact_threshold(pieces: Pieces, deadline: Deadline = NEVER) -> float | None:
+def full_contact_threshold(pieces: Pieces, deadline: Deadline = NEVER) -> Threshold | None:
     """Smallest t at which a pattern without free contacts is singular; not a safe friction.
 
     In terms of u = 0 off the slipping tangents, such a piece reads (K u)_T = m (K u)_N with
-    K = W^-1: the patterns of K' with T and N exchanged and stick in the place of free.
+    K = W^-1: the patterns of K' with T and N exchanged and stick in the place of free.  None
+    for a singular W or more than FULL_CONTACT contacts.
     """
     if pieces.contacts > FULL_CONTACT or np.linalg.cond(pieces.W) > 1e12:
         return None
@@ -263,4 +264,17 @@ def full_contact_threshold(pieces: Pieces, deadline: Deadline = NEVER) -> float 
     allowed[:, STICK] = False
     threshold = Threshold()
     exact_threshold(dual, threshold, deadline, allowed=allowed)
-    return threshold.upper if threshold.proved else None
+    return threshold
+
+
+def full_contact_difference(pieces: Pieces, threshold: Threshold) -> Array | None:
+    """r = K u (2 k,) of the singular piece behind a threshold of `full_contact_threshold`.
+
+    Its matrix K' there is the transpose of (K u)_T + m (K u)_N on the slipping contacts.
+    """
+    if threshold.states is None:
+        return None
+    slip, m = pieces.slipping(threshold.states)
+    K = np.linalg.inv(pieces.W)[:, 2 * slip + 1]
+    rows = K[2 * slip + 1] + threshold.upper * m[:, None] * K[2 * slip]
+    return K @ np.linalg.svd(rows)[2][-1]

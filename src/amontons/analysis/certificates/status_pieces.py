@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,17 +52,7 @@ class Pieces:
         """The pieces of a 2D Coulomb problem; raises UnsupportedForm for any other."""
         if problem.dimension != 2:
             raise UnsupportedForm("critical friction: expected a 2D problem, this one is 3D")
-        mu = problem.mu
-        local = problem.condensed(deadline)
-        nc = local.contacts
-        W = dense(local.W, 4)
-        own = np.arange(nc)
-        size = np.linalg.norm(W.reshape(nc, 2, nc, 2)[own, :, own], 2, axis=(1, 2))
-        places = np.flatnonzero(size > 0)
-        root = np.exp2(np.round(np.log2(size[places]) / 2)).repeat(2)
-        rows = (2 * places[:, None] + [0, 1]).ravel()
-        return cls(W[np.ix_(rows, rows)] / root / root[:, None], friction_shape(mu)[places],
-                   root, places, nc)  # fmt: skip
+        return cls(*reacting(problem, deadline))
 
     @cached_property
     def contacts(self) -> int:
@@ -163,9 +154,40 @@ class Pieces:
 
     def reaction(self, r: Array) -> Array:
         """r (nc, 2) in the units of the problem, the largest entry being 1."""
-        whole = np.zeros((self.total, 2))
-        whole[self.places] = (r / self.scale).reshape(-1, 2)
+        part = Reacting(self.W, self.shape, self.scale, self.places, self.total)
+        return part.reaction(r)
+
+
+class Reacting(NamedTuple):
+    """W (k d, k d), shape (k,) and scale (k d,) of the contacts that react, see `Pieces`."""
+
+    W: Array
+    shape: Array
+    scale: Array
+    places: NDArray[np.int64]
+    total: int
+
+    def reaction(self, r: Array) -> Array:
+        """r (nc, d) in the units of the problem, the largest entry being 1."""
+        d = len(self.W) // len(self.shape)
+        whole = np.zeros((self.total, d))
+        whole[self.places] = (r.ravel() / self.scale).reshape(-1, d)
         return whole / max(np.abs(whole).max(initial=0.0), np.finfo(float).tiny)
+
+
+def reacting(problem: FrictionProblem, deadline: Deadline = NEVER) -> Reacting:
+    """The contacts of a Coulomb problem that react; the global form is condensed."""
+    mu = problem.mu
+    local = problem.condensed(deadline)
+    nc, d = local.contacts, local.dimension
+    W = dense(local.W, 4)
+    own = np.arange(nc)
+    size = np.linalg.norm(W.reshape(nc, d, nc, d)[own, :, own], 2, axis=(1, 2))
+    places = np.flatnonzero(size > 0)
+    root = np.exp2(np.round(np.log2(size[places]) / 2)).repeat(d)
+    rows = (d * places[:, None] + np.arange(d)).ravel()
+    return Reacting(W[np.ix_(rows, rows)] / root / root[:, None], friction_shape(mu)[places],
+                    root, places, nc)  # fmt: skip
 
 
 def friction_shape(mu: Array) -> Array:
