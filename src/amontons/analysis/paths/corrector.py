@@ -159,6 +159,25 @@ class Curve:
                 return y
         return None
 
+    def on_plane(
+        self, y: Array, p: float, ty: Array, tp: float, tolerances: Tolerances
+    ) -> tuple[Array, float] | None:
+        """The point (y, p) of the curve on the plane through a point across a direction.
+
+        By Newton steps; None without convergence.
+        """
+        for _ in range(2 * tolerances.corrections):
+            right = np.append(-self.residual(y, p), 0.0)
+            try:
+                change = Factored(self.bordered(*self.jacobian(y, p), ty, tp)).solve(right)
+            except np.linalg.LinAlgError:
+                return None
+            y, p = y + change[:-1], p + float(change[-1])
+            size = self.length(change[:-1], float(change[-1]))
+            if size <= max(tolerances.change, UNIT * self.length(y, p)):
+                return y, p
+        return None
+
     def bordered(self, J: Matrix, Jp: Array, ty: Array, tp: float) -> Matrix:
         """[J Jp; w T], (n + 1, n + 1), of derivatives and a tangent."""
         row = self.weight * ty
