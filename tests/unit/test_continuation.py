@@ -18,7 +18,7 @@ from amontons.analysis.paths.following import (
     track_both,
 )
 from amontons.analysis.paths.friction_path import FrictionPath
-from amontons.analysis.paths.path import EventKind, Stop
+from amontons.analysis.paths.path import EventKind, Stop, corrected
 from amontons.analysis.paths.starting import exact_state
 from amontons.analysis.solutions.enumerate import enumerate_solutions
 from amontons.errors import InvalidInput, SingularOperator
@@ -123,6 +123,53 @@ def test_a_branch_point_is_found_with_its_other_line():
     assert len(event.directions) == 4
     np.testing.assert_allclose(abs(event.directions[2]), [1, 0], atol=1e-5)
     assert branch.stops == (Stop.INTERVAL, Stop.INTERVAL)
+
+
+def hyperbola(gap):
+    """x^2 - p^2 = gap^2: two curves that pass by each other at a distance of 2 gap."""
+    return Smooth(lambda y, p: y**2 - p**2 - gap**2, lambda y, p: np.diag(2 * y),
+                  lambda y, p: np.array([-2 * p]))  # fmt: skip
+
+
+def unfolded(height):
+    """x (x^2 - p) = height: the curve from the left goes up, or down, and does not branch."""
+    return Smooth(lambda y, p: y * (y**2 - p) - height, lambda y, p: np.diag(3 * y**2 - p),
+                  lambda y, p: -y)  # fmt: skip
+
+
+@pytest.mark.parametrize("max_step", [0.1, 0.4])
+@pytest.mark.parametrize(("problem", "start", "end"), [
+    (hyperbola(1e-2), 1.0, 1.0), (hyperbola(1e-3), 1.0, 1.0),
+    (unfolded(1e-6), 0.0, 1.0), (unfolded(-1e-8), 0.0, -1.0),
+])  # fmt: skip
+def test_curves_that_pass_by_each_other_have_no_branch_point(problem, start, end, max_step):
+    """The steps shrink where one would lead from one to the other."""
+    start = corrected(problem, np.array([start]), -1.0)
+    options = Continuation(max_step=max_step)
+    branch = continue_both(problem, start, -1.0, Limits((-1.0, 1.0)), options)
+    assert {e.kind for e in branch.events} == {EventKind.END}
+    assert branch.points[-1].parameter == 1
+    assert branch.points[-1].state[0] == pytest.approx(end, abs=1e-3)
+
+
+def test_a_gap_too_narrow_for_the_steps_ends_the_walk_without_a_branch_point():
+    start = corrected(hyperbola(1e-5), np.ones(1), -1.0)
+    branch = continue_both(hyperbola(1e-5), start, -1.0, Limits((-1.0, 1.0)))
+    assert {e.kind for e in branch.events} == {EventKind.END}
+    assert branch.stops[1] in (Stop.STEP_TOO_SMALL, Stop.SINGULAR)
+    assert abs(branch.points[-1].parameter) < 1e-3
+
+
+@pytest.mark.parametrize("slope", [2.0, -0.5, 30.0])
+def test_both_lines_of_a_branch_point_are_told(slope):
+    """x (x - slope p), whose lines are not orthogonal."""
+    crossing = Smooth(lambda y, p: y * (y - slope * p), lambda y, p: np.diag(2 * y - slope * p),
+                      lambda y, p: -slope * y)  # fmt: skip
+    branch = continue_both(crossing, np.zeros(1), -0.5, Limits((-1.0, 1.0)))
+    (event,) = [e for e in branch.events if e.kind is EventKind.BRANCH]
+    assert event.parameter == pytest.approx(0.0, abs=1e-12)
+    slopes = event.directions[:, 0] / event.directions[:, 1]
+    np.testing.assert_allclose(slopes, [0, 0, slope, slope], atol=1e-6)
 
 
 def test_end_of_interval_is_met_exactly_and_the_walk_goes_on_from_any_point():

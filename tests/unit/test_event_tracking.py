@@ -7,7 +7,7 @@ import amontons as am
 from amontons.analysis.paths.diagram import bifurcation_diagram
 from amontons.analysis.paths.event_tracking import leaving, track
 from amontons.analysis.paths.first_order import orientation
-from amontons.analysis.paths.following import Limits, track_both
+from amontons.analysis.paths.following import Limits, continue_both, track_both
 from amontons.analysis.paths.friction_path import FrictionPath
 from amontons.analysis.paths.path import EventKind, Stop
 from amontons.analysis.paths.starting import exact_state, polished
@@ -53,6 +53,26 @@ def test_little_friction_has_no_fold():
     branch = track_both(path, exact_state(path, 0.0), 0.0, Limits((0.0, 2.5)))
     assert not branch.folds
     assert branch.points[-1].parameter == 2.5
+
+
+def corner(gap):
+    """(q_N, q_T) on a line past 0 at a distance: there free, slip, stick and slip meet."""
+    ends = [am.FrictionProblem.from_delassus(ONE, [[0.3 * p + gap, p]], [2.0]) for p in (-1, 1)]
+    return FrictionPath(*ends)
+
+
+@pytest.mark.parametrize(("follow", "near", "far"), [
+    (track_both, 3e-11, 1e-9), (continue_both, 3e-10, 1e-8),
+])  # fmt: skip
+def test_curves_that_pass_by_each_other_are_no_branch_point_or_called_unresolved(
+    follow, near, far
+):
+    for gap in (0.0, near, -near, far, -far):
+        path = corner(gap)
+        branch = follow(path, exact_state(path, 0.0), 0.0, Limits((0.0, 1.0)))
+        told = [e.detail for e in branch.events if e.kind is EventKind.BRANCH]
+        assert len(told) == (abs(gap) <= near)
+        assert all(("unresolved" in detail) == (gap != 0) for detail in told)
 
 
 def test_starting_in_the_middle_gives_the_same_curve():

@@ -132,3 +132,70 @@ def test_kinks_are_located_in_a_few_corrections():
     changes = [e.parameter for e in branch.events if e.kind is am.EventKind.STATUS]
     np.testing.assert_allclose(changes, np.arange(100) / 100, atol=1e-12)
     assert problem.calls < 40 * 100
+
+
+class Bends:
+    """y = f(p), or |y - f(p)| = slope |p|, with f straight but for its kinks."""
+
+    def __init__(self, kinks, changes, slope=0.0):
+        self.kinks, self.changes, self.slope = np.array(kinks), np.array(changes), slope
+
+    def _curve(self, p):
+        beyond = np.maximum(p - self.kinks, 0)
+        return 0.5 * p + self.changes @ beyond, 0.5 + self.changes @ (p > self.kinks)
+
+    def residual(self, y, p):
+        off = y - self._curve(p)[0]
+        return off if not self.slope else np.abs(off) - self.slope * np.abs(p)
+
+    def jacobian(self, y, p):
+        value, rate = self._curve(p)
+        side = np.sign(y[0] - value) if self.slope else 1.0
+        return side * np.eye(1), -np.array([side * rate + self.slope * np.sign(p)])
+
+    def piece(self, y, p):
+        value = self._curve(p)[0]
+        sides = (p > 0, y[0] > value) if self.slope else ()
+        return (int((p > self.kinks).sum()), *map(bool, sides))
+
+
+def graded(seed):
+    """Kinks at 1e-6 to 1e-4 from one another."""
+    rng = np.random.default_rng(seed)
+    gaps = 10 ** rng.uniform(-6, -4, 20)
+    return np.append(0.0, np.cumsum(gaps)), rng.uniform(-0.2, 0.2, 21)
+
+
+@pytest.mark.parametrize("kinks_and_changes", [
+    ([0.0, 7.143e-6, 8.2343e-5], [0.1, 0.1, 0.1]),
+    ([0.0, 7.143e-6, 8.2343e-5], [0.1, 0.1, -0.1]),
+    *(graded(seed) for seed in range(3)),
+])  # fmt: skip
+def test_a_graph_whose_kinks_follow_closely_has_no_branch_point(kinks_and_changes):
+    """What a solution along a later piece's line tells from the curve is the kinks between."""
+    problem = Bends(*kinks_and_changes)
+    branch = am.follow(problem, start=[-0.0005], at=-0.001, interval=(-0.002, 0.004))
+    inner = [event for event in branch.events if event.kind is not am.EventKind.END]
+    assert {event.kind for event in inner} == {am.EventKind.STATUS}
+    np.testing.assert_allclose([e.parameter for e in inner], problem.kinks, atol=1e-12)
+
+
+@pytest.mark.parametrize("apart", [1e-8, 5e-8, 3e-7])
+def test_two_kinks_close_by_do_not_close_a_curve(apart):
+    problem = Bends([0.0, apart], [0.1, 0.1])
+    branch = am.follow(problem, start=[-0.0005], at=-0.001, interval=(-0.002, 0.002))
+    assert branch.stops == (am.Stop.INTERVAL, am.Stop.INTERVAL)
+    changes = [e.parameter for e in branch.events if e.kind is am.EventKind.STATUS]
+    np.testing.assert_allclose(changes, [0, apart], atol=1e-12)
+
+
+@pytest.mark.parametrize("slope", [0.1, 0.05, 0.002])
+def test_a_branch_point_with_kinks_close_behind_it_is_told(slope):
+    problem = Bends([0.0, 7.143e-6, 8.2343e-5], [0.1, 0.1, 0.1], slope)
+    start = [-0.0005 + slope * 0.001]
+    branch = am.follow(problem, start=start, at=-0.001, interval=(-0.002, 0.002))
+    (event,) = [e for e in branch.events if e.kind is am.EventKind.BRANCH]
+    assert event.parameter == pytest.approx(0, abs=1e-9)
+    slopes = event.directions[:, 0] / event.directions[:, 1]
+    wanted = [0.5 - slope, 0.5 + slope, 0.6 - slope, 0.6 + slope]
+    np.testing.assert_allclose(np.sort(slopes), np.sort(wanted), atol=1e-6)

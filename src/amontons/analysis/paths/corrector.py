@@ -134,7 +134,7 @@ class Curve:
             ty, tp = self.unit(answer[:-1, 1], float(answer[-1, 1]))
             if self.length(dy, dp) <= max(tolerances.change, UNIT * self.length(y, p)):
                 rest = float(np.linalg.norm(self.residual(y, p)))
-                if rest <= tolerances.residual or rest <= self._rounding(y, p):
+                if rest <= tolerances.residual or rest <= self.rounding(y, p):
                     return Spot(y, p, ty, tp, factor.sign), count
         return None
 
@@ -157,6 +157,25 @@ class Curve:
             y = y + change
             if self.length(change, 0.0) <= max(tolerances.change, UNIT * self.length(y, p)):
                 return y
+        return None
+
+    def on_plane(
+        self, y: Array, p: float, ty: Array, tp: float, tolerances: Tolerances
+    ) -> tuple[Array, float] | None:
+        """The point (y, p) of the curve on the plane through a point across a direction.
+
+        By Newton steps; None without convergence.
+        """
+        for _ in range(2 * tolerances.corrections):
+            right = np.append(-self.residual(y, p), 0.0)
+            try:
+                change = Factored(self.bordered(*self.jacobian(y, p), ty, tp)).solve(right)
+            except np.linalg.LinAlgError:
+                return None
+            y, p = y + change[:-1], p + float(change[-1])
+            size = self.length(change[:-1], float(change[-1]))
+            if size <= max(tolerances.change, UNIT * self.length(y, p)):
+                return y, p
         return None
 
     def bordered(self, J: Matrix, Jp: Array, ty: Array, tp: float) -> Matrix:

@@ -31,6 +31,7 @@ from .tangents import Tangent
 Array = NDArray[np.float64]
 NONE = 1e-13  # rate of a condition, relative to the largest, that counts as zero
 EXACT = 1e-11  # rest of the equations above which the inverse is made anew
+ROUNDING = 1e-13  # scaled condition at an event that is one of rounding
 RENEWAL = 100  # events after which it is made anew in any case
 SIGN = {"+": 1.0, "-": -1.0}
 
@@ -300,7 +301,7 @@ class _Walk:
             return self._end(Stop.INTERVAL)
         tied = self._tied(y, u)
         if len(tied) > 1:
-            return self._corner(y, p, before)
+            return self._corner(y, p, before, max(tied))
         self.line.cross(*border, u)
         self.y, self.p, self.u = self.line.point()
         self._aim()
@@ -326,20 +327,22 @@ class _Walk:
         contact, which = np.unravel_index(int(steps.argmin()), steps.shape)
         return step, (int(contact), int(which))
 
-    def _tied(self, y: Array, u: Array) -> list[tuple[int, int]]:
-        """Conditions that vanish at an event; closing without slip counts twice."""
+    def _tied(self, y: Array, u: Array) -> list[float]:
+        """Sizes of conditions that vanish at an event; closing without slip counts twice."""
         size = max(1.0, float(np.abs(y).max(initial=0)))
-        values = self.line.conditions(y, u)
-        zero = np.abs(values) <= TIE * size
-        out = [(int(i), int(k)) for i, k in np.argwhere(zero)]
-        return out + [
-            (i, 1) for i, k in out
+        values = np.abs(self.line.conditions(y, u))
+        zero = values <= TIE * size
+        closing = [
+            abs(float(u[2 * i + 1])) for i in np.flatnonzero(zero[:, 0])
             if self.line.letters[i] == "f" and self.line.mu[i] > 0
-            and abs(u[2 * i + 1]) <= TIE * size
         ]  # fmt: skip
+        return [*values[zero].tolist(), *(slip for slip in closing if slip <= TIE * size)]
 
-    def _corner(self, y: Array, p: float, before: str) -> Event:
-        """Over a point where several conditions vanish: by the first-order system."""
+    def _corner(self, y: Array, p: float, before: str, apart: float) -> Event:
+        """Over a point where several conditions vanish: by the first-order system.
+
+        apart: the largest of them.
+        """
         self.y, self.p = y, p
         self.u = self.path.W @ y + self.path.free(p)
         system = leaving(self.path, y, p)
@@ -354,10 +357,10 @@ class _Walk:
         self.line = Line(self.path, chosen, y, p)
         self.y, self.p, self.u = self.line.point()
         self._aim()
-        detail = system.reason
         if len(others) > 1 or system.sets:
             rows = np.array([np.append(t.direction, t.rate) for t in system.tangents])
             self._note_turn()
+            detail = system.told(apart, ROUNDING * max(1.0, float(np.abs(y).max(initial=0))))
             return Event(EventKind.BRANCH, self.p, self.y, self.travelled, before, self.pattern,
                          directions=rows, detail=detail, problem=self.path)  # fmt: skip
         return self._event(before)

@@ -3,6 +3,9 @@
 Pieces around the point are met by probes: ahead, aside, and along the tangent lines of the
 pieces that have been met.  A direction counts if it lies in its piece and a solution is found
 along it, at distances at which one that only seems to be there would show ([LR] example 1).
+Two directions count as two curves only if their solutions, on one plane across both, are apart:
+where they have an angle at the nearest distance that resolves it, as further away other kinks
+lie between; where they touch at any distance at which both are on the pieces they began on.
 
 [LR] T. Ligurský, Y. Renard, CMAME 280 (2014), section 2.
 """
@@ -30,8 +33,9 @@ ACROSS = 1e-3  # of probes beside a direction, in that along it
 PIECES = 8  # that are looked at
 NEAR = 0.1  # distance of a solution to its prediction, in that to the point
 ALIKE = 0.9  # cosine of directions that may belong to one curve
-SHIFTED = 1e-2  # distance across a curve, in that along it, which a bend may make
+RESOLVED = (1e-7, 1e-6, 1e-5)  # where curves with an angle are held against each other
 APART = 1e-10  # distance of two solutions of size one that are not the same
+CLEAR = 10.0  # of it, that directions are to be apart where their angle tells
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,16 +79,23 @@ class LocalWays:
     ) -> list[Tangent]:
         """One tangent per curve, of those that lead into their piece; the sure ones if any.
 
-        Where a piece is short the one behind it has a solution nearby, too, on the same curve:
-        the tangent with the least distance to its solution is that of the curve.  back: one
-        whose curve is left out.
+        Those that can not be told from one count as one.  Where a piece is short the one
+        behind it has a solution nearby, too, on the same curve: the tangent with the least
+        distance to its solution is that of the curve.  back: one whose curve is left out.
         """
         kept: list[Way] = []
         for tangent in candidates:
             way = self._way(tangent)
-            if way is None or (back is not None and self._one(tangent, back)):
+            if way is None:
                 continue
-            same = [k for k, other in enumerate(kept) if self._one(tangent, other.tangent)]
+            known = False if back is None else self._one(tangent, back)
+            if known:
+                continue
+            way = replace(way, sure=way.sure and known is not None)
+            same = [
+                k for k, other in enumerate(kept)
+                if self._one(tangent, other.tangent) is not False
+            ]  # fmt: skip
             if not same:
                 kept.append(way)
             elif way.off < kept[same[0]].off:
@@ -165,24 +176,42 @@ class LocalWays:
     def _cosine(self, a: Tangent, b: Tangent) -> float:
         return product(a.direction, a.rate, b.direction, b.rate, self.weight)
 
-    def _one(self, a: Tangent, b: Tangent) -> bool:
-        """True where two directions lead along the same curve."""
+    def _one(self, a: Tangent, b: Tangent) -> bool | None:
+        """Whether two directions lead along the same curve; None where that can not be told."""
         along = self._cosine(a, b)
         if along < ALIKE:
             return False
-        for distances in (TOLD, (BEGIN,)):  # the latter where solutions do not go far
-            told = [self._coincide(a, b, h) for h in distances]
-            if any(one is not None for one in told):
-                return all(one is not False for one in told)
-        return along >= 1 - SAME
+        if along >= 1 - SAME:
+            told = [self._coincide(a, b, h) for h in TOLD if self._begun(a, b, h)]
+            return all(one is not False for one in told)
+        angle = np.sqrt(2 * (1 - along))
+        size = max(1.0, float(np.abs(self.spot.y).max(initial=0)))
+        told = (
+            self._coincide(a, b, h) for h in RESOLVED if h * angle > CLEAR * APART * size
+        )
+        return next((one for one in told if one is not None), None)
+
+    def _begun(self, a: Tangent, b: Tangent, h: float) -> bool:
+        """True where the solutions at a distance are on the pieces of both directions."""
+        spots = [(t, self._solution(t, h)) for t in (a, b)]
+        return all(s is not None and self._piece(s.y, s.p) == t.piece for t, s in spots)
 
     def _coincide(self, a: Tangent, b: Tangent, h: float) -> bool | None:
-        """Whether the solutions at a distance lie on one curve; None where one is missing."""
+        """Whether the solutions at a distance are one on a plane across both directions.
+
+        None where one is missing.
+        """
         x, z = self._solution(a, h), self._solution(b, h)
         if x is None or z is None:
             return None
-        y, p = x.y - z.y, x.p - z.p
-        shift = self.curve.product(y, p, z.ty, z.tp)
-        across = self.curve.length(y - shift * z.ty, p - shift * z.tp)
+        normal = self.curve.unit(a.direction + b.direction, a.rate + b.rate)
+        half = self.curve.product(z.y - x.y, z.p - x.p, *normal) / 2
+        found = []
+        for spot, way in ((x, half), (z, -half)):
+            place = spot.ahead(way / self.curve.product(spot.ty, spot.tp, *normal))
+            found.append(self.curve.on_plane(*place, *normal, self.tolerances))
+        one, other = found
+        if one is None or other is None:
+            return None
         size = max(1.0, float(np.abs(x.y).max(initial=0)))
-        return across <= APART * size + SHIFTED * abs(shift)
+        return self.curve.length(one[0] - other[0], one[1] - other[1]) <= APART * size

@@ -73,9 +73,9 @@ class PassedEvents:
         """CLOSED, JOINED, or None where all is new."""
         before, self.before = self.before, point
         if event is not None and event.kind in (EventKind.FOLD, EventKind.STATUS):
-            if any(_same_place(event, other) for other in self.own):
+            if any(_same_event(event, other) for other in self.own):
                 return Stop.CLOSED
-            if any(_same_place(event, other) for other in self.known):
+            if any(_same_event(event, other) for other in self.known):
                 return Stop.JOINED
             self.own.append(event)
         return Stop.CLOSED if self._through_start(before, point) else None
@@ -99,6 +99,9 @@ class PassedEvents:
         return bool(length <= CHORD * (b.arclength - a.arclength))
 
 
-def _same_place(a: Event, b: Event) -> bool:
+def _same_event(a: Event, b: Event) -> bool:
+    """True for one place between the same two pieces; others may follow closely."""
+    if {a.before, a.after} != {b.before, b.after}:
+        return False
     near = abs(a.parameter - b.parameter) <= PLACE * max(1.0, abs(b.parameter))
     return near and same(a.state, b.state, PLACE)

@@ -58,6 +58,19 @@ class FirstOrder:
     cones: tuple[TangentCone, ...] = ()
     problem: Any = field(default=None, repr=False)
 
+    def told(self, apart: float, rounding: float) -> str:
+        """The reason, and whether the point is one: borders that meet there up to a distance.
+
+        apart: the largest distance to a border that counts as none there.
+        """
+        if apart <= rounding:
+            return self.reason
+        unresolved = (
+            f"unresolved: borders of pieces meet here within {apart:.1e}, and curves that pass "
+            "by each other at that distance are taken as one"
+        )
+        return "; ".join(filter(None, (self.reason, unresolved)))
+
     def others(
         self, direction: Array, rate: float, weight: float, piece: Hashable
     ) -> list[Tangent]:

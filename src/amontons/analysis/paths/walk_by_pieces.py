@@ -16,11 +16,12 @@ from .border import Border
 from .corrector import Curve, Spot, determinant_sign
 from .first_order import first_order
 from .path import EventKind, Stop
-from .tangents import Tangent
+from .tangents import FirstOrder, Tangent
 from .walk import Found, Walk
 
 Array = NDArray[np.float64]
 NEARLY, AHEAD = 1e-3, 10.0  # over the smallest step: to measure rates, to look for a corner
+MET = 10.0  # borders that a located point may miss, in what locates one of them
 LOCATED = 1e-3  # margin of a located border, relative to the one that counts as zero
 
 
@@ -92,11 +93,17 @@ class WalkByPieces(Walk):
         turned = self._note_turn()
         if several:
             rows = np.array([np.append(t.direction, t.rate) for t in system.tangents])
-            detail = system.reason
+            detail = system.told(self._apart(system, tolerance), MET * LOCATED * tolerance)
             event = self._event(EventKind.BRANCH, before, directions=rows, detail=detail)
         else:
             event = self._event(EventKind.FOLD if turned else EventKind.STATUS, before)
         return [(self.here(), event)]
+
+    def _apart(self, system: FirstOrder, tolerance: float) -> float:
+        """The largest margin that counts as zero, among those of pieces with a tangent."""
+        s = self.spot
+        margins = [np.abs(self.problem.margins(t.piece, s.y, s.p)) for t in system.tangents]  # type: ignore[attr-defined]
+        return max((float(m[m <= tolerance].max(initial=0.0)) for m in margins), default=0.0)
 
     def _straightest(self, others: list[Tangent]) -> Tangent:
         """The tangent that keeps the orientation and turns least."""
