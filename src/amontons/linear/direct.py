@@ -6,8 +6,16 @@ not symmetric go to MUMPS first where it is installed (extra `mumps`): the whole
 Newton step on a wall of 7 240 unknowns takes it 0.16 s, rslab 0.30 s.  Every factor is tried on
 a known right-hand side before it is trusted.
 
+The LU of rslab pivots within its supernodes only.  In a saddle point matrix [M, -H; G H^T, 0] a
+few of ten thousand pivots come out as rounding, and the factor is wrong in as many directions.
+They are lifted to SMALL_PIVOT, as usual with static pivots [LD], and GMRES with the factor as
+preconditioner removes what that does.
+
 The threads of rslab do not survive a fork, and wait for each other forever in the new process:
 there SuperLU takes its place, also in factors that were made before.
+
+[LD] X. Li, J. Demmel, "Making sparse Gaussian elimination scalable by static pivoting",
+Proceedings of Supercomputing (1998).
 """
 
 from __future__ import annotations
@@ -30,14 +38,17 @@ from scipy.sparse import linalg as sparse_linalg
 
 from ..errors import InvalidInput, MissingDependency, SingularOperator
 from ..options import check_options
-from .base import stored
+from .base import by_columns, stored
 
 Array = NDArray[np.float64]
 Solve = Callable[[Array], Array]
 REFINE_ABOVE = 1e-14  # relative residual of the trial solve above which solves are refined
+CORRECT_ABOVE = 1e-12  # the same after a refinement, from which GMRES takes its place
+CORRECTED, CORRECTIONS = 1e-15, 40  # residual and steps at which that ends
 INTERRUPTIBLE = 20_000  # unknowns from which a factorisation takes longer than one waits
 FAILURES = (ArithmeticError, RuntimeError, MemoryError, ValueError, ImportError)  # of packages
 QUICK_ORDER = 30_000  # unknowns up to which nested dissection costs MUMPS more than it saves
+SMALL_PIVOT = 1.5e-8  # of the scaled matrix, the root of rounding as in [LD]
 RESIDUAL_LIMIT = 1e-6  # relative residual of the trial solve above which a factor is refused
 
 
@@ -181,7 +192,7 @@ class DirectFactor:
 
 
 def checked(matrix: sparse.csc_array, solve: Solve) -> Solve:
-    """`solve`, once refined where it is inexact, after a trial with a known solution.
+    """`solve`, refined or corrected where it is inexact, after a trial with a known solution.
 
     A singular matrix shows here, whatever the backend says; so do perturbed pivots, which
     lose digits of indefinite matrices.
@@ -189,11 +200,16 @@ def checked(matrix: sparse.csc_array, solve: Solve) -> Solve:
     x = np.cos(np.arange(matrix.shape[0]))
     b = matrix @ x
     scale = max((np.abs(matrix) @ np.abs(x)).max(initial=0.0), np.finfo(float).tiny)
-    found = solve(b)
-    if np.isfinite(found).all() and np.abs(matrix @ found - b).max() > REFINE_ABOVE * scale:
-        solve = _Refined(matrix, solve)
-        found = solve(b)
-    residual = np.abs(matrix @ found - b).max() / scale
+
+    def residual_of(found: Array) -> float:
+        return float(np.abs(matrix @ found - b).max(initial=0.0) / scale)
+
+    plain, found = solve, solve(b)
+    for better, above in ((_Refined, REFINE_ABOVE), (_Corrected, CORRECT_ABOVE)):
+        if np.isfinite(found).all() and residual_of(found) > above:
+            solve = better(matrix, plain)
+            found = solve(b)
+    residual = residual_of(found)
     if not np.isfinite(found).all() or residual > RESIDUAL_LIMIT:
         raise SingularOperator(f"trial solve failed with relative residual {residual:.1e}")
     growth = np.abs(found - x).max()
@@ -215,6 +231,33 @@ class _Refined:
         return x + self.solve(b - self.matrix @ x)
 
 
+@dataclass(frozen=True, eq=False)
+class _Corrected:
+    """GMRES with `solve`, which is wrong in a few directions only, as preconditioner."""
+
+    matrix: sparse.csc_array
+    solve: Solve
+
+    def __call__(self, b: Array) -> Array:
+        """The solution x, shape of b."""
+        return by_columns(self._one, b)
+
+    def _one(self, b: Array) -> Array:
+        operator = sparse_linalg.LinearOperator(
+            self.matrix.shape, matvec=lambda y: self.matrix @ self.solve(y), dtype=float
+        )
+        x, left = np.zeros(len(b)), b
+        for _ in range(2):  # the second time for the digits that the sum over directions lost
+            y, _ = sparse_linalg.gmres(
+                operator, left, rtol=CORRECTED, atol=0.0, restart=CORRECTIONS, maxiter=1
+            )
+            x = x + self.solve(y)
+            left = b - self.matrix @ x
+            if np.linalg.norm(left) <= REFINE_ABOVE * np.linalg.norm(b):
+                break
+        return x
+
+
 def _symmetric(matrix: sparse.csc_array) -> bool:
     """True when A equals its transpose to a few roundings."""
     difference = abs(matrix - matrix.T)
@@ -225,9 +268,26 @@ def _rslab(matrix: sparse.csc_array, threads: int) -> tuple[Solve, float | None]
     import rslab
 
     rslab.set_log_level("error")  # a singular matrix is reported by our own check
-    stop = rslab.Interrupt()
-    options = {"threads": threads} if threads else {}
-    factorise = rslab.ldlt if _symmetric(matrix) else rslab.lu
+    if _symmetric(matrix):
+        return _rslab_factor(rslab.ldlt, matrix, threads)[:2]
+    solve, flops, lifted = _rslab_factor(rslab.lu, matrix, threads, SMALL_PIVOT)
+    if lifted:
+        try:
+            checked(matrix, solve)
+        except SingularOperator:  # small pivots that were none of rounding
+            return _rslab_factor(rslab.lu, matrix, threads)[:2]
+    return solve, flops
+
+
+def _rslab_factor(
+    factorise: Callable[..., Any], matrix: sparse.csc_array, threads: int, least: float = 0.0
+) -> tuple[Solve, float | None, int]:
+    """Solves, operations, and how many pivots were below `least` and lifted to it."""
+    from rslab import Interrupt
+
+    stop = Interrupt()
+    options: dict[str, Any] = {"threads": threads} if threads else {}
+    options |= {"preconditioner": least} if least else {}
     if matrix.shape[0] > INTERRUPTIBLE:
         run = partial(factorise, matrix, interrupt=stop, **options)
         factor = _cancelled_by_ctrl_c(run, stop.cancel)
@@ -238,9 +298,12 @@ def _rslab(matrix: sparse.csc_array, threads: int) -> tuple[Solve, float | None]
         b = np.ascontiguousarray(b, dtype=float)
         return factor.solve(b) if b.ndim == 1 else factor.solve_many(b)
 
-    stages = getattr(factor, "diagnostics", lambda: {})().get("stages", [])
-    told = [stage["flops"] for stage in stages if stage.get("name") == "factor"]
-    return solve, float(told[0]) if told else None
+    found = getattr(factor, "diagnostics", lambda: {})()
+    told = [
+        stage["flops"] for stage in found.get("stages", []) if stage.get("name") == "factor"
+    ]
+    lifted = int(found.get("numeric", {}).get("perturbed") or 0)
+    return solve, float(told[0]) if told else None, lifted
 
 
 def _cancelled_by_ctrl_c(run: Callable[[], Any], cancel: Callable[[], None]) -> Any:
@@ -281,7 +344,9 @@ def _superlu(matrix: sparse.csc_array, threads: int) -> tuple[Solve, float | Non
     with warnings.catch_warnings():
         warnings.simplefilter("error", sparse_linalg.MatrixRankWarning)
         factor = sparse_linalg.splu(sparse.csc_matrix(matrix), permc_spec="MMD_AT_PLUS_A")
-    flops = 2.0 * float(np.diff(factor.L.indptr) @ np.diff(factor.U.tocsr().indptr))
+    # as floats: the sum of some 10 000 unknowns is beyond the integers of an indptr
+    columns, rows = np.diff(factor.L.indptr), np.diff(factor.U.tocsr().indptr)
+    flops = 2.0 * float(columns.astype(float) @ rows.astype(float))
     return lambda b: factor.solve(np.asarray(b, dtype=float)), flops
 
 
