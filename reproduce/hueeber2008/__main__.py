@@ -7,7 +7,7 @@ import os
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import click
@@ -44,8 +44,9 @@ def main(parts: tuple[str, ...], levels: str, results: Path | None) -> None:
 
     PART is one of table4.1, readings, section3, table4.2, table4.3, parameters, figure4.3,
     table5.1, strategies, newton (the cube), table6.1, section6 (the shell, up to level 3),
-    figure7.3 (the same, up to level 2), ring (ring and tool, coarse up to level 2); all of
-    them by default.  Numbers of other parts stay as they are stored.
+    figure7.3 (the same, levels 2 and 3), ring (ring and tool, coarse up to level 2); all of
+    them by default.  Numbers of other parts, of figure7.3 also those of other levels, stay as
+    they are stored.
     """
     check_parts(parts, PARTS)
     chosen = levels_of(levels, 0, 5)
@@ -67,7 +68,7 @@ def page(record: dict) -> str:
         if part in record:
             lines += [*_beside(part, record), *note(part)]
     if "ring" in record:
-        both = {"ring": record["ring"], **record.get("figure7.3", {})}
+        both = {"ring": record["ring"], **dict(sorted(record.get("figure7.3", {}).items()))}
         lines += [*tables.section7(both), *note("section7")]
     lines += [f"![Figure {name}](figure{name}.png)\n" for name in FIGURES]
     return "\n".join(lines)
@@ -183,7 +184,7 @@ def _newton(levels: list[int], out: Path) -> dict:
     return _records(cube.newton([k for k in levels if k < 5]))
 
 
-WORK: dict[str, Callable[[list[int], Path], dict]] = {
+WORK: dict[str, Callable[[list[int], Path], dict | Iterator[dict]]] = {
     "table4.1": _table41, "readings": _readings, "table4.2": _table42, "table4.3": _table43,
     "section3": lambda levels, out: cube.robust(levels), "parameters": _parameters,
     "figure4.3": _figure43, "table5.1": _table51, "strategies": _strategies, "newton": _newton,

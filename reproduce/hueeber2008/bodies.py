@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -78,12 +79,16 @@ def ring_and_tool(levels: list[int], out: Path) -> dict:
     return records(found)
 
 
-def figure73(levels: list[int], out: Path) -> dict:
-    """Section 7 on the shell, up to level 2, which the direct solver does soon: figure 7.3."""
-    level = min(max(levels), 2)
-    compared = {f"shell, F = {mu}": shell.newton(level, mu) for mu in (0.2, 0.4, 0.6)}
+def figure73(levels: list[int], out: Path) -> Iterator[dict]:
+    """Section 7 on the shell, levels 2 and 3, pair by pair; figure 7.3 on the finest."""
+    chosen = [k for k in levels if 2 <= k <= FINEST] or [min(max(levels), FINEST)]
+    compared: dict[str, dict[str, Run]] = {}
+    for level in chosen:
+        compared = {}
+        for mu in (0.2, 0.4, 0.6):
+            found = compared[f"shell, F = {mu}"] = shell.newton(level, mu)
+            yield {f"shell, level {level}, F = {mu}": records(found)}
     figures.newton(compared, out / "figure7.3.png")
-    return {name: records(runs) for name, runs in compared.items()}
 
 
 def _contacts(

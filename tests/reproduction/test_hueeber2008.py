@@ -170,7 +170,7 @@ def test_the_stored_page_is_that_of_the_stored_numbers():
     assert PAGE == page(STORED)
     ours = [v.text for v in verdicts.verdicts(STORED, REFERENCE)
             if not v.agrees and v.fault == "ours"]  # fmt: skip
-    assert ours == ["full Newton does not depend on F"]  # 11, 9, 8 steps, see the notes
+    assert ours == ["full Newton does not depend on F"]  # on level 2, see the notes
     for name in FIGURES:
         assert (ROOT / f"reproduce/hueeber2008/results/figure{name}.png").exists()
 
@@ -201,9 +201,10 @@ def test_the_readme_says_what_the_page_says():
     assert text.format(*ring, gain) in README
     shell_steps = [
         "{} for {}".format(*(both[name]["steps"] for name in ("newton", "fixed-point")))
-        for both in STORED["figure7.3"].values()
+        for _, both in sorted(STORED["figure7.3"].items())
     ]
-    assert f"full Newton {', '.join(shell_steps)} steps" in README
+    for level in range(0, len(shell_steps), 3):
+        assert ", ".join(shell_steps[level : level + 3]) in README
 
 
 @pytest.mark.parametrize("words", [["table9"], ["--levels", "x"], ["--levels", "9"]])

@@ -1,5 +1,7 @@
 """Linear solvers against dense NumPy, and how they refuse what can not be solved."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy import sparse
@@ -52,6 +54,53 @@ def test_direct_against_dense(backend, kind):
     assert factor.exact
     assert factor.iterations == 0
     assert backend in (None, factor.backend)
+
+
+def singular_parts(parts, rng, size=20, border=6):
+    """Dense blocks of rank size - 1, made regular by a border: a well-posed whole.
+
+    Pivots within a block leave the last of each as rounding.
+    """
+    n = parts * size
+    A = 6 * np.eye(n + border)
+    for k in range(parts):
+        block = rng.standard_normal((size, size))
+        block[:, -1] = block[:, :-1] @ rng.standard_normal(size - 1)
+        A[k * size : (k + 1) * size, k * size : (k + 1) * size] = block
+    A[:n, n:], A[n:, :n] = rng.standard_normal((n, border)), rng.standard_normal((border, n))
+    return sparse.csc_array(A)
+
+
+@pytest.mark.parametrize("backend", [None, *INSTALLED])
+@pytest.mark.parametrize("parts", [1, 4])
+def test_direct_where_pivots_of_a_part_are_rounding(backend, parts):
+    rng = np.random.default_rng(parts)
+    A = singular_parts(parts, rng)
+    assert np.linalg.cond(A.toarray()) < 1e4
+    factor = Direct(backend).factor(A)
+    assert backend in (None, factor.backend)
+    for b in (rng.standard_normal(A.shape[0]), rng.standard_normal((A.shape[0], 2))):
+        exact = np.linalg.solve(A.toarray(), b)
+        np.testing.assert_allclose(factor.solve(b), exact, rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("directions", [2, 20])
+def test_a_factor_that_is_wrong_in_a_few_directions_is_corrected(directions):
+    n = 80
+    rng = np.random.default_rng(0)
+    A = rng.standard_normal((n, n)) + 20 * np.eye(n)
+    error = 30 * rng.standard_normal((n, directions)) @ rng.standard_normal((directions, n))
+    inverse = np.linalg.inv(A + error)
+    solve = direct.checked(sparse.csc_array(A), lambda b: inverse @ b)
+    for b in (rng.standard_normal(n), rng.standard_normal((n, 2)), np.zeros(n)):
+        np.testing.assert_allclose(solve(b), np.linalg.solve(A, b), rtol=0, atol=1e-12)
+
+
+def test_a_factor_of_another_matrix_is_refused():
+    rng = np.random.default_rng(0)
+    A, inverse = rng.standard_normal((2, 200, 200))
+    with pytest.raises(SingularOperator, match="trial solve failed"):
+        direct.checked(sparse.csc_array(A), lambda b: inverse @ b)
 
 
 @pytest.mark.parametrize("backend", [None, *INSTALLED])
@@ -113,6 +162,15 @@ def test_factors_tell_their_operations(backend):
     found = Direct(backend).factor(A)
     dense = 2 / 3 * n**3
     assert found.flops is None or 0.5 * dense < found.flops < 2 * dense
+
+
+def test_operations_beyond_the_integers_of_a_sparse_factor(monkeypatch):
+    n = 60_000
+    rows = SimpleNamespace(indptr=np.array([0, n, 2 * n], dtype=np.int32))
+    factor = SimpleNamespace(L=rows, U=SimpleNamespace(tocsr=lambda: rows), solve=None)
+    monkeypatch.setattr(direct.sparse_linalg, "splu", lambda matrix, permc_spec: factor)
+    _, flops = direct._superlu(sparse.csc_array(np.eye(2)), 0)
+    assert flops == 2 * 2 * n**2
 
 
 def test_direct_leaves_its_argument_alone():

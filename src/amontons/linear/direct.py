@@ -9,11 +9,13 @@ a known right-hand side before it is trusted.
 The LU of rslab pivots within its supernodes only.  In a saddle point matrix [M, -H; G H^T, 0] a
 few of ten thousand pivots come out as rounding, and the factor is wrong in as many directions.
 They are lifted to SMALL_PIVOT, as usual with static pivots [LD], and GMRES with the factor as
-preconditioner removes what that does.
+preconditioner, which has to be the flexible one [AD], removes what that does.
 
 The threads of rslab do not survive a fork, and wait for each other forever in the new process:
 there SuperLU takes its place, also in factors that were made before.
 
+[AD] M. Arioli, I. Duff, "Using FGMRES to obtain backward stability in mixed precision",
+Electronic Transactions on Numerical Analysis 33 (2009).
 [LD] X. Li, J. Demmel, "Making sparse Gaussian elimination scalable by static pivoting",
 Proceedings of Supercomputing (1998).
 """
@@ -44,7 +46,7 @@ Array = NDArray[np.float64]
 Solve = Callable[[Array], Array]
 REFINE_ABOVE = 1e-14  # relative residual of the trial solve above which solves are refined
 CORRECT_ABOVE = 1e-12  # the same after a refinement, from which GMRES takes its place
-CORRECTED, CORRECTIONS = 1e-15, 40  # residual and steps at which that ends
+CORRECTED, CORRECTIONS = 1e-15, 30  # residual and steps at which that ends
 INTERRUPTIBLE = 20_000  # unknowns from which a factorisation takes longer than one waits
 FAILURES = (ArithmeticError, RuntimeError, MemoryError, ValueError, ImportError)  # of packages
 QUICK_ORDER = 30_000  # unknowns up to which nested dissection costs MUMPS more than it saves
@@ -233,7 +235,10 @@ class _Refined:
 
 @dataclass(frozen=True, eq=False)
 class _Corrected:
-    """GMRES with `solve`, which is wrong in a few directions only, as preconditioner."""
+    """Flexible GMRES with `solve`, which is wrong in a few directions, as preconditioner [AD].
+
+    A solve with small pivots is rounded more than a product; it is only used as it came out.
+    """
 
     matrix: sparse.csc_array
     solve: Solve
@@ -243,18 +248,10 @@ class _Corrected:
         return by_columns(self._one, b)
 
     def _one(self, b: Array) -> Array:
-        operator = sparse_linalg.LinearOperator(
-            self.matrix.shape, matvec=lambda y: self.matrix @ self.solve(y), dtype=float
+        factor = sparse_linalg.LinearOperator(self.matrix.shape, self.solve, dtype=float)
+        x, _ = sparse_linalg.gcrotmk(
+            self.matrix, b, rtol=CORRECTED, atol=0.0, M=factor, m=CORRECTIONS, maxiter=2
         )
-        x, left = np.zeros(len(b)), b
-        for _ in range(2):  # the second time for the digits that the sum over directions lost
-            y, _ = sparse_linalg.gmres(
-                operator, left, rtol=CORRECTED, atol=0.0, restart=CORRECTIONS, maxiter=1
-            )
-            x = x + self.solve(y)
-            left = b - self.matrix @ x
-            if np.linalg.norm(left) <= REFINE_ABOVE * np.linalg.norm(b):
-                break
         return x
 
 
