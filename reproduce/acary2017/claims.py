@@ -179,15 +179,17 @@ def opening(verdicts: Sequence[str], undecided: int = 0) -> str:
 
 
 def table(
-    ours: Sequence[Claim], seconds: Sequence[Claim | None], theirs: Sequence[Claim | None]
-) -> str:
-    """Markdown: every claim by operations, by seconds, and by Siconos in seconds."""
+    ours: Sequence[Claim], seconds: Sequence[Claim | None], theirs: Sequence[Claim | None],
+    their_seconds: Sequence[Claim | None],
+) -> str:  # fmt: skip
+    """Markdown: every claim by operations and by seconds, of ours and within Siconos."""
     rows = [
-        "| the paper says | paper | ours, operations | ours, seconds | Siconos, seconds | |",
-        "|---|---|---|---|---|---|",
+        "| the paper says | paper | ours, operations | ours, seconds | Siconos, operations | "
+        "Siconos, seconds | |",
+        "|---|---|---|---|---|---|---|",
     ]
-    for claim, timed, other in zip(ours, seconds, theirs, strict=True):
-        cells = [_cell(timed), _cell(other)]
+    for claim, timed, other, last in zip(ours, seconds, theirs, their_seconds, strict=True):
+        cells = [_cell(timed), _cell(other), _cell(last)]
         said_here = verdict(claim, other)
         why = f"{said_here}: {claim.reason}" if not claim.agrees else said_here
         if other is not None and not claim.agrees:

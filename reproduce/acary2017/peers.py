@@ -3,21 +3,29 @@
 From r = 0, given W, one call of Siconos after another, each asked for less.  Siconos stops on
 its own error; for each tolerance of (13) the quickest call that meets it counts.  What is
 stored looks like our own runs, so the same claims are drawn from it.
+
+Siconos counts no operations.  A Newton step of it is a sparse LU of MUMPS, which tells what its
+elimination takes; a sweep takes what one of ours does.  Its iterations times these are its cost
+by operations; what judging and forming matrices takes is left out.
 """
 
 from __future__ import annotations
 
+import math
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy import sparse
 
 import amontons as am
 from amontons.judge import published_natural_error
+from amontons.solve import drive
 
-from .methods import HYBRID, METHODS
+from .claims import HYBRID_SWEEPS
+from .methods import HYBRID, METHODS, SWEEPING
 from .race import TOLERANCES, Cost, Runs, best_run, key
 from .ratios import cost_text, number, solved
 from .step import calls, write_problem
@@ -86,6 +94,62 @@ def _run(
         "limit": limit,
         "met": {"13": met},
     }
+
+
+def elimination_flops(problem: am.FrictionProblem) -> float | None:
+    """Operations of MUMPS in an LU of Newton's matrix on W at the solution; None without it.
+
+    Rows of open contacts are those of the identity, as in (8) to (10); where the others are
+    scaled does not matter to the count.
+    """
+    try:
+        import mumps
+    except ImportError:
+        return None
+    found = drive(problem, tolerance=TOLERANCES[-1])
+    closed = np.repeat(found.status != am.ContactStatus.OPEN, problem.dimension)
+    weights = np.where(closed, np.repeat(problem.rho, problem.dimension), 0.0)
+    matrix = sparse.diags_array(weights) @ sparse.csr_array(problem.W)
+    matrix += sparse.diags_array(np.where(closed, 1e-3, 1.0))
+    context = mumps.Context()
+    context.set_matrix(sparse.csc_matrix(matrix))
+    context.factor()
+    return float(context.mumps_instance.rinfog[3])
+
+
+def with_operations(theirs: Runs, ours: Runs, steps: dict[str, float | None]) -> Runs | None:
+    """Runs of Siconos with operations, from our sweeps and the LU of MUMPS; None if unknown.
+
+    ours: runs of both sweeping methods on the same problems; steps: of `elimination_flops`.
+    """
+    out: Runs = {}
+    for stem, entry in theirs.items():
+        step, mine = steps.get(stem), ours.get(stem, {"methods": {}})["methods"]
+        if step is None or not all(mine.get(name, {}).get("flops") for name in SWEEPING):
+            return None
+        sweep = {name: mine[name]["flops"] / mine[name]["iterations"] for name in SWEEPING}
+        methods = {
+            name: _counted(run, name, sweep, step) for name, run in entry["methods"].items()
+        }
+        out[stem] = entry | {"methods": methods}
+    return out
+
+
+def _counted(
+    run: dict[str, Any], name: str, sweep: dict[str, float], step: float
+) -> dict[str, Any]:
+    """A run with the operations of its iterations."""
+
+    def flops(iterations: float) -> float:
+        if name in sweep:
+            return sweep[name] * iterations
+        first = min(HYBRID_SWEEPS, iterations) if name == HYBRID else 0
+        return sweep[SWEEPING[0]] * first + step * (iterations - first)
+
+    met = {key: [*found[:2], flops(found[1])] for key, found in run["met"]["13"].items()}
+    last = next(reversed(met.values()), None)
+    rate = last[2] / last[0] if last else math.nan  # of a run that ended at the limit
+    return run | {"met": {"13": met}, "flops": rate * run["seconds"]}
 
 
 def table(runs: dict[str, Runs]) -> str:

@@ -221,7 +221,7 @@ def test_the_first_line_counts_verdicts():
     assert "ours 1 (1 of them undecided within our limit).**" in claims.opening(
         [claims.OURS], 1
     )
-    page = claims.table([yes, no], [yes, None], [None, no])
+    page = claims.table([yes, no], [yes, None], [None, no], [None, no])
     assert page.count("\n") == 3
     assert "differs, by Siconos too: why; Siconos: why" in page
 
@@ -343,6 +343,28 @@ def test_runs_of_siconos_look_like_ours_and_end_at_the_first_miss(problems, monk
     assert len(claims.claims(found["siconos"], peers.COST)) == 8
     assert "| NSGS-AC (NSGS) | 1, 500 ms | 1, 500 ms | 0, - | 0, - |" in peers.table(found)
     assert "| 71.4 ms |" in peers.steps_table(found)
+
+
+def test_runs_of_siconos_are_counted_in_operations():
+    met = {"0.01": [0.5, 13, None], "0.0001": [2.0, 1000, None]}
+    run = {"met": {"13": met}, "seconds": 4.0, "flops": None}
+    mine = {"methods": {name: {"flops": 50.0, "iterations": 10} for name in SWEEPING}}
+    theirs = {"a": {"methods": {"NSGS-AC": run, "NSN-AC": run, "NSN-AC-HYBRID": run}}}
+    found = peers.with_operations(theirs, {"a": mine}, {"a": 7.0})["a"]["methods"]
+    assert found["NSGS-AC"]["met"]["13"]["0.01"] == [0.5, 13, 65.0]
+    assert found["NSGS-AC"]["flops"] == 10_000.0  # of 4 s, 5000 of them in 2 s
+    assert found["NSN-AC"]["met"]["13"]["0.01"][2] == 91.0
+    assert found["NSN-AC-HYBRID"]["met"]["13"]["0.0001"][2] == 100 * 5 + 900 * 7
+    assert run["flops"] is None
+    assert peers.with_operations(theirs, {"a": mine}, {}) is None
+    assert peers.with_operations(theirs, {}, {"a": 7.0}) is None
+
+
+def test_mumps_counts_the_operations_of_a_newton_step(problems):
+    pytest.importorskip("mumps")
+    problem = am.read_fclib(problems[-1]).condensed()
+    size = 3 * problem.contacts
+    assert 0 < peers.elimination_flops(problem) < size**3
 
 
 def test_runs_of_siconos_go_on_where_they_were_stopped(problems, tmp_path, monkeypatch):
