@@ -138,7 +138,7 @@ class Curve:
                     return Spot(y, p, ty, tp, factor.sign), count
         return None
 
-    def _rounding(self, y: Array, p: float) -> float:
+    def rounding(self, y: Array, p: float) -> float:
         """What the last digits of y and p change in H."""
         J, Jp = self.jacobian(y, p)
         return UNIT * float(np.linalg.norm(abs(J) @ np.abs(y) + np.abs(Jp * p)))

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from .branch_point import branch_point
 from .corrector import Curve, Spot
-from .first_order import kernel
+from .crossing import Crossing, crossing
 from .path import Event, EventKind, PathProblem, Point, Stop
 from .tangents import Tangent
 
@@ -48,6 +48,7 @@ class Walk(ABC):
         self.stop: Stop | None = None
         self.turn = self._sense(tp)
         self.sign = 0  # of the bordered determinant on this piece, 0 unknown
+        self._asked: tuple[Spot, tuple[Spot | None, Crossing | None]] | None = None
         self.kinks_here = 0  # kinks passed without getting on
 
     def here(self) -> Point:
@@ -61,15 +62,17 @@ class Walk(ABC):
         reduced = False
         while True:
             new = self._corrected(self.step)
-            if new is not None:
-                spot, count = new
-                if not self._leaves(spot):
-                    return self._accept(spot, count, reduced)
-            found = self._over_border(self.step, None if new is None else new[0])
+            jumps = found = None
+            if new is not None and not self._leaves(new[0]):
+                jumps = self._jumps(new[0])
+                if not jumps:
+                    return self._accept(*new, reduced)
+            if not jumps:
+                found = self._over_border(self.step, None if new is None else new[0])
             if found is not None:
                 return found
             if self.step <= self.options.min_step:
-                return self._stuck()
+                return self._at_gap() if jumps else self._stuck()
             self.step = max(self.step * self.options.shrink, self.options.min_step)
             reduced = True
 
@@ -83,6 +86,11 @@ class Walk(ABC):
         if self.curve.product(new.ty, new.tp, s.ty, s.tp) < self.cosine:
             return None
         return found
+
+    def _at_gap(self) -> Found:
+        """The end where curves pass by each other too closely for the smallest step."""
+        detail = "a determinant changes its sign ahead, but no branch point was found"
+        return [(self.here(), self._ended(Stop.SINGULAR, detail))]
 
     # ---------------------------------------------------------------- inside of a piece
     def _accept(self, spot: Spot, count: int, reduced: bool) -> Found:
@@ -129,25 +137,36 @@ class Walk(ABC):
 
     def _branch_point(self, spot: Spot) -> Found:
         """The point where the bordered determinant changes its sign, and the other line."""
-        located = branch_point(self.curve, self.spot, spot, self.options.tolerances)
-        point = located or spot
-        lines = kernel(*self.curve.jacobian(point.y, point.p), self.curve.weight, 1e-5)
-        rows = [np.append(point.ty, point.tp), -np.append(point.ty, point.tp)]
-        for line in lines.T:
-            along = self.curve.product(line[:-1], line[-1], point.ty, point.tp)
-            rest = line - along * np.append(point.ty, point.tp)
-            size = self.curve.length(rest[:-1], float(rest[-1]))
-            if size > 0.5:
-                rows += [rest / size, -rest / size]
-                break
-        if located is None and len(rows) == 2:
+        found = self._crossed(spot)[1]
+        if found is None:
             return []  # a curve on the border of two pieces takes its derivatives in turns
-        event = Event(EventKind.BRANCH, point.p, point.y, self.travelled + self.curve.length(
-            point.y - self.spot.y, point.p - self.spot.p), self.piece, self.piece,
-            directions=np.array(rows), detail="other lines to first order",
-            problem=self.problem)  # fmt: skip
-        return [(replace(self.here(), parameter=point.p, state=point.y,
+        own, other = found.lines
+        way = self.curve.length(found.y - self.spot.y, found.p - self.spot.p)
+        event = Event(EventKind.BRANCH, found.p, found.y, self.travelled + way, self.piece,
+                      self.piece, directions=np.array([own, -own, other, -other]),
+                      detail="other lines to first order", problem=self.problem)  # fmt: skip
+        return [(replace(self.here(), parameter=event.parameter, state=event.state,
                          arclength=event.arclength), event)]  # fmt: skip
+
+    def _jumps(self, spot: Spot) -> bool:
+        """True for a point of another curve.
+
+        On the way to it the determinant changes its sign, but there is no branch point.
+        """
+        if not (self.sign and spot.sign and spot.sign != self.sign):
+            return False
+        located, found = self._crossed(spot)
+        return located is not None and found is None
+
+    def _crossed(self, spot: Spot) -> tuple[Spot | None, Crossing | None]:
+        """Where the determinant vanishes on the way to a point, and the curves that cross."""
+        if self._asked is None or self._asked[0] is not spot:
+            tolerances = self.options.tolerances
+            located = branch_point(self.curve, self.spot, spot, tolerances)
+            reach = self.curve.length(spot.y - self.spot.y, spot.p - self.spot.p)
+            found = crossing(self.curve, located or spot, reach, tolerances)
+            self._asked = spot, (located, found)
+        return self._asked[1]
 
     def _zero(self, spot: Spot, test: Any) -> Spot | None:
         """Where a test function, positive here and negative at `spot`, vanishes."""

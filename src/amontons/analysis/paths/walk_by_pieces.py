@@ -43,7 +43,7 @@ class WalkByPieces(Walk):
         o = self.options
         border = Border(self.problem, self.curve, self.spot, o.tolerances)
         inside = border.located(step, spot, LOCATED * o.border)
-        if inside is None:
+        if inside is None or self._jumps(inside):
             return None
         out = self._between(inside)
         if self.stop is not None:

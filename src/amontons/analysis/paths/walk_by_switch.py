@@ -58,6 +58,8 @@ class WalkBySwitch(Walk):
         if found is None:
             return None
         last, ends = found
+        if self._jumps(last):
+            return None
         return self._passed(last) if ends else self._accept(last, 0, True)
 
     def _stuck(self) -> Found:
