@@ -209,3 +209,12 @@ def test_limits_and_bad_input():
         am.full_contact_friction(hild_triangle(13))
     with pytest.raises(am.AmontonsError):
         am.p_matrix_friction(box_tower())
+
+
+@pytest.mark.parametrize("ask", [am.p_matrix_friction, am.full_contact_friction])
+@pytest.mark.parametrize("d", [2, 3])
+def test_any_friction_is_safe_where_nothing_can_react(ask, d):
+    empty = am.FrictionProblem.from_delassus(np.zeros((0, 0)), np.zeros((0, d)), np.zeros(0))
+    found = ask(empty)
+    assert found.lower == found.upper == np.inf
+    assert "no contact" in found.reason

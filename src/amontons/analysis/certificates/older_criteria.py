@@ -157,7 +157,7 @@ def _spatial(
         if W.size and not np.linalg.cond(W) < SINGULAR:
             found = Found(reason="W is singular: reactions are not unique without friction too")
         elif not W.size:
-            found = Found(np.inf, reason="no contact can react")
+            found = _nothing_reacts()
         else:
             found = ask(W, part.shape, gap, deadline)
     except TimeUp as reason:
@@ -224,12 +224,17 @@ def _planar(
     _check_size(problem, most)
     try:
         pieces = Pieces.of(problem, deadline)
-        found = ask(pieces, deadline)
+        found = ask(pieces, deadline) if pieces.contacts else _nothing_reacts()
     except TimeUp as reason:
         found = Found(reason=str(reason))
     difference = None if found.difference is None else pieces.reaction(found.difference)
     return CriterionFriction(found.lower, found.upper, difference, found.examined,
                              now() - began, found.reason)  # fmt: skip
+
+
+def _nothing_reacts() -> Found:
+    """Where no contact reacts every load has one solution, whatever the friction."""
+    return Found(np.inf, np.inf, reason="no contact can react")
 
 
 def _p_matrix_planar(pieces: Pieces, deadline: Deadline) -> Found:
