@@ -5,10 +5,11 @@ import json
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from two_meshes import joined, write_gmsh
 
 import amontons as am
 from amontons.cli import main
-from amontons.fem.facets import Cells, Facets
+from amontons.fem.facets import Cells
 
 SOFT = am.LinearElastic(young=100, poisson=0.0)
 METHODS = ["nodal", "mortar"]
@@ -33,21 +34,6 @@ def two(d, method, high=None, low=None, mu=0.3, **parts):
     contact = am.Contact("upper.bottom", master="lower.top", mu=mu, method=method)
     supports = [am.Fix("lower.bottom", 0), am.Fix("upper.top", 0)]
     return am.Model(bodies, **({"supports": supports, "contacts": [contact]} | parts))
-
-
-def joined(low, high):
-    """Two meshes as one, with surfaces "floor", "low", "high", "roof" from below."""
-    n = len(low.points)
-
-    def moved(facets):
-        return tuple(Facets(f.kind, f.nodes + n) for f in facets)
-
-    surfaces = {
-        "floor": low.surfaces["bottom"], "low": low.surfaces["top"],
-        "high": moved(high.surfaces["bottom"]), "roof": moved(high.surfaces["top"]),
-    }  # fmt: skip
-    cells = (*low.cells, *(Cells(b.kind, b.nodes + n, b.region) for b in high.cells))
-    return am.Mesh(np.concatenate([low.points, high.points]), cells, surfaces)
 
 
 # ------------------------------------------------------------------- bodies apart
@@ -367,30 +353,6 @@ master = "low"
 friction = {{ coulomb = 0.3 }}
 method = "{method}"
 """
-GMSH = {"line": 1, "tri": 2, "quad": 3, "tet": 4, "hex": 5}
-
-
-def write_gmsh(path, mesh, *, repeat=False):
-    """A mesh in gmsh's format 2.2 with its named surfaces."""
-    blocks = [("solid", mesh.dim, b.kind, b.nodes) for b in mesh.cells]
-    blocks += [(name, mesh.dim - 1, b.kind, b.nodes)
-               for name, facets in mesh.surfaces.items() for b in facets]  # fmt: skip
-    if repeat:
-        blocks.append((*blocks[0][:3], blocks[0][3][:1]))
-    names = {name: (k + 1, dim) for k, (name, dim, *_) in enumerate(blocks)}
-    lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(names))]
-    lines += [f'{dim} {k} "{name}"' for name, (k, dim) in names.items()]
-    lines += ["$EndPhysicalNames", "$Nodes", str(len(mesh.points))]
-    points = np.pad(mesh.points, ((0, 0), (0, 3 - mesh.dim)))
-    lines += [f"{k + 1} {x} {y} {z}" for k, (x, y, z) in enumerate(points.tolist())]
-    rows = [(GMSH[kind], names[name][0], row + 1)
-            for name, _, kind, nodes in blocks for row in nodes]  # fmt: skip
-    lines += ["$EndNodes", "$Elements", str(len(rows))]
-    for k, (kind, label, nodes) in enumerate(rows):
-        lines.append(f"{k + 1} {kind} 2 {label} {label} " + " ".join(map(str, nodes)))
-    path.write_text("\n".join([*lines, "$EndElements", ""]))
-
-
 def run_case(folder, mesh, method, *changes, repeat=False):
     """Exit code, what is said on stderr, and the result or None."""
     write_gmsh(folder / "two.msh", mesh, repeat=repeat)

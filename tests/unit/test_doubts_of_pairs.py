@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from test_contact_abuse import joined, write_gmsh
+from two_meshes import joined, write_gmsh
 
 import amontons as am
 from amontons.cli import main
