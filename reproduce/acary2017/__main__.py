@@ -38,7 +38,7 @@ Parts, in their order (--only A,B takes some of them):
 \b
 Examples:
   python -m reproduce.acary2017 --quick              a tiny wall, some minutes
-  python -m reproduce.acary2017                      all of it, some two hours on one core
+  python -m reproduce.acary2017                      all of it, some five hours on one core
   python -m reproduce.acary2017 --missing            go on where it was stopped
   python -m reproduce.acary2017 --only wall,fclib --methods Auto
                                                      measure one column again
@@ -78,9 +78,9 @@ def _words(text: str | None, known: Sequence[str], option: str) -> list[str]:
 @click.option(
     "--methods", metavar="A,B", help="Methods to run; the others keep their stored runs."
 )
-@click.option("--limit", type=float, default=20.0, show_default=True, metavar="SECONDS",
+@click.option("--limit", type=float, default=60.0, show_default=True, metavar="SECONDS",
               help="Of processor time for one solve of the wall, the same for all methods; "
-              "a tenth of it for an FCLib file, twice as much on the finer wall."
+              "a thirtieth of it for an FCLib file, twice as much on the finer wall."
               )  # fmt: skip
 @click.option("--missing", is_flag=True,
               help="Measure only what is not stored yet with this limit.")  # fmt: skip
@@ -140,10 +140,10 @@ def _do(
         paths = sorted(data.glob("*.hdf5"), key=lambda path: path.stat().st_size)
         if paths:
             chosen = [name for name in names if name in FCLIB]
-            report.measure(out, "fclib", paths, chosen, limit / 10, machine, missing)
+            report.measure(out, "fclib", paths, chosen, limit / 30, machine, missing)
             if shutil.which(siconos):
                 report.within_siconos(
-                    out, "fclib", paths, siconos, limit / 10, machine, missing
+                    out, "fclib", paths, siconos, limit / 30, machine, missing
                 )
         else:
             click.echo(f"fclib: no files in {data}; name its folder with --shared")

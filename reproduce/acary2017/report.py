@@ -211,8 +211,8 @@ def _claims(stored: dict, siconos: dict) -> tuple[list[str], list[dict]]:
         counted = list(claims.claims(operations, PAPER)) if operations else list(theirs)
     if "fclib" in stored:
         where, within = SETS["fclib"], siconos["fclib"]["runs"].get("siconos")
-        ours = [*ours, claims.most_robust(stored["fclib"]["runs"], where, PAPER)]
-        seconds = [*seconds, claims.most_robust(stored["fclib"]["runs"], where, CLOCK)]
+        ours = [*ours, claims.most_robust(stored["fclib"]["runs"], where, CLOCK)]
+        seconds = [*seconds, None]  # whether a problem is solved is no question of cost
         theirs.append(claims.most_robust(within, where, peers.COST) if within else None)
         counted.append(theirs[-1])
     verdicts = [claims.verdict(c, other) for c, other in zip(ours, counted, strict=True)]

@@ -202,9 +202,11 @@ def test_claims_follow_the_numbers():
     differs = [claim.agrees for claim in claims.claims(near)]
     assert differs == [True, True, False, False, False, False, False, False]
     few = made_up(**{name.replace("-", "_"): [1.0, None] for name in PRINTED})
-    assert claims.most_robust(few, "two").agrees
+    assert claims.most_robust(few, "two", race.CLOCK).agrees
     few["wall-0000-100-4"]["methods"]["NSN-AC-HYBRID"]["met"] = {}
-    assert not claims.most_robust(few, "two").agrees
+    assert not claims.most_robust(few, "two", race.CLOCK).agrees
+    nobody = made_up(**{name.replace("-", "_"): [None, None] for name in PRINTED})
+    assert not claims.most_robust(nobody, "two", race.CLOCK).agrees
 
 
 def test_the_first_line_counts_verdicts():
