@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import amontons as am
-from amontons.analysis.paths.first_order import COMBINATIONS, first_order
+from amontons.analysis.paths.first_order import COMBINATIONS, _combinations, first_order
 from amontons.analysis.paths.friction_path import FrictionPath
 from amontons.analysis.paths.path import Stop
 
@@ -83,3 +83,9 @@ def test_the_end_of_the_interval_counts_where_the_last_event_is():
     assert np.abs(branch.at(0.0)[0]).max() < 1e-10
     assert len(branch.at(1.0)) == 1
     assert branch.at(-0.01) == []
+
+
+def test_more_combinations_than_floats_can_count_are_infinitely_many():
+    """NumPy would warn of an overflow, which must not reach who follows a load."""
+    assert _combinations(["fs", "s"]) == 2
+    assert _combinations(["fs+"] * 2000) == np.inf

@@ -12,6 +12,7 @@ Orientation: along a curve without branch points sign(p') sign(det J_y) does not
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable, Sequence
 from itertools import product
 from typing import Any
@@ -236,7 +237,7 @@ def _by_search(path: FrictionPath, y: Array, p: float, tolerance: float) -> Firs
 
 
 def _combinations(choices: Sequence[str]) -> float:
-    return float(np.prod([float(len(c)) for c in choices]))
+    return math.prod(float(len(c)) for c in choices)  # inf beyond floats, without a warning
 
 
 def _from_rest(

@@ -22,6 +22,7 @@ variables" (1970), section 6.2 (homotopy invariance).
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -70,7 +71,7 @@ def degree(scaled: ScaledProblem, group: Sequence[PieceAnswer]) -> Degree:
     off_r = np.max([np.abs(g.r - first.r) + g.off_r for g in group], axis=0)
     off_u = np.max([np.abs(g.u - first.u) + g.off_u for g in group], axis=0)
     choices = [_statuses(scaled, first, i, off_r, off_u) for i in range(scaled.contacts)]
-    if np.prod([float(len(own)) for own in choices]) > PIECES:
+    if math.prod(len(own) for own in choices) > PIECES:
         return UNKNOWN
     pieces = []
     for states in itertools.product(*choices):
