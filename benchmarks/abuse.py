@@ -33,11 +33,11 @@ from abuse_problems import (
 from numpy.typing import NDArray
 
 import amontons as am
-from amontons.api import solve_any_form
-from amontons.cones import Tresca
-from amontons.errors import AmontonsError
-from amontons.problem import Form, FrictionProblem
-from amontons.solution import FrictionSolution
+from amontons.app.api import solve_any_form
+from amontons.core.errors import AmontonsError
+from amontons.problem.friction import Form, FrictionProblem
+from amontons.problem.law.cones import Tresca
+from amontons.problem.solution import FrictionSolution
 
 NOTE = """\
 `Auto` and one other solver in turn, options too, solve each problem to 1e-8 (1e-6 in single

@@ -24,7 +24,7 @@ import numpy as np
 from scipy import sparse
 
 import amontons as am
-from amontons.gallery import box_tower, random_delassus
+from amontons.mechanics.ready.gallery import box_tower, random_delassus
 
 Random = np.random.Generator
 SECONDS = 60.0  # for a case: a hang, not a slow machine
@@ -172,7 +172,7 @@ def _command(folder: Path, *arguments: str, most: int | None = None) -> str:
 
 
 def _child(folder: Path, arguments: tuple[str, ...], words: Path, most: int | None) -> None:
-    from amontons.cli import main
+    from amontons.app.cli import main
 
     os.chdir(folder)
     place = os.open(words, os.O_WRONLY | os.O_CREAT)

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from amontons.cones import Coulomb, Law, Tresca
-from amontons.problem import FrictionProblem
+from amontons.problem.friction import FrictionProblem
+from amontons.problem.law.cones import Coulomb, Law, Tresca
 
 Array = NDArray[np.float64]
 Random = np.random.Generator

@@ -49,7 +49,7 @@ def timed(solve):
 def work(folder):
     """Names and CPU seconds of all solves of this process, one line each."""
     import amontons as am
-    from amontons.solve import drive
+    from amontons.solvers.driver import drive
 
     def cube(cells):
         body = am.Body(am.box((1, 1, 1), cells=(cells,) * 3), am.LinearElastic(200, 0.3))

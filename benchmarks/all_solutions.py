@@ -19,9 +19,9 @@ import numpy as np
 from machine import describe
 
 import amontons as am
-from amontons.analysis.certificates.load_certificate import certify_load
-from amontons.hild import hild_triangle
-from amontons.problem import FrictionProblem
+from amontons.analysis.certificates.one_load.certificate import certify_load
+from amontons.mechanics.ready.hild import hild_triangle
+from amontons.problem.friction import FrictionProblem
 
 RESULTS = Path(__file__).parent / "results"
 sys.path.append(str(Path(__file__).parents[1] / "tests" / "unit"))

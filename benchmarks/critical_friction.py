@@ -28,7 +28,7 @@ from amontons.analysis.certificates import friction_branching
 from amontons.analysis.certificates.determinant_search import POSITIVE
 from amontons.analysis.certificates.friction_branching import Branching
 from amontons.analysis.certificates.status_pieces import Pieces
-from amontons.hild import hild_triangle
+from amontons.mechanics.ready.hild import hild_triangle
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parent / "tests" / "unit"))

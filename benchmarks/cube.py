@@ -24,7 +24,7 @@ import numpy as np
 from machine import describe
 
 import amontons as am
-from amontons.solve import drive
+from amontons.solvers.driver import drive
 
 HERE = Path(__file__).parent
 REFERENCE = HERE.parent / "tests/data/cube.json"

@@ -34,7 +34,7 @@ from machine import describe
 from scipy import sparse
 
 import amontons as am
-from amontons.solve import drive
+from amontons.solvers.driver import drive
 
 HERE = Path(__file__).parent
 SOLVERS = ("NSGS", "NSGS_UPK", "NSN_AC", "NSN_FB", "NSN_NM", "ADMM")

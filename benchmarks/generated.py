@@ -3,8 +3,8 @@
 import numpy as np
 
 import amontons as am
-from amontons.evolution.moreau_jean import MovingModel
-from amontons.granular import SpherePacking
+from amontons.mechanics.ready.packings import SpherePacking
+from amontons.mechanics.steps.moreau_jean import MovingModel
 
 STONE = am.LinearElastic(young=2.2e9, poisson=0.2, density=2000)
 STEEL = am.LinearElastic(young=2.1e11, poisson=0.3, density=7800)

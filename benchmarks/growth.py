@@ -30,7 +30,7 @@ from generated import wall_step
 from machine import describe
 
 import amontons as am
-from amontons.granular import SpherePacking
+from amontons.mechanics.ready.packings import SpherePacking
 
 HERE = Path(__file__).parent
 KINDS = ("wall", "spheres")

@@ -21,7 +21,7 @@ from mortar_models import BallOnBlock, Rings, dragged, measured, stacked
 from scipy.spatial.transform import Rotation
 
 import amontons as am
-from amontons.contact import mortar_contact
+from amontons.mechanics.contact import mortar_contact
 from amontons.solvers import METHODS
 
 HERE = Path(__file__).parent

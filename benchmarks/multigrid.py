@@ -34,9 +34,9 @@ from machine import describe
 sys.path.insert(0, str(Path(__file__).parents[1]))  # for reproduce/
 
 import amontons as am
-import amontons.global_matrices
-from amontons.model import assembly
-from amontons.solve import drive
+from amontons.mechanics.model import assembly
+from amontons.problem import matrices
+from amontons.solvers.driver import drive
 from reproduce.hueeber2008.shell import model as shell
 
 HERE = Path(__file__).parent
@@ -175,10 +175,10 @@ def two_bodies_row(model, repeats):
 
 def two_bodies_rows(model, sizes, repeats):
     """Rows of the sizes of a model; the judge reads residuals and forms no W."""
-    usual, amontons.global_matrices.CHEAP = amontons.global_matrices.CHEAP, 0.0
-    usual_work, amontons.global_matrices.EXACT_WORK = amontons.global_matrices.EXACT_WORK, 0.0
+    usual, matrices.CHEAP = matrices.CHEAP, 0.0
+    usual_work, matrices.EXACT_WORK = matrices.EXACT_WORK, 0.0
     rows = [two_bodies_row(model(size), repeats) for size in sizes]
-    amontons.global_matrices.CHEAP, amontons.global_matrices.EXACT_WORK = usual, usual_work
+    matrices.CHEAP, matrices.EXACT_WORK = usual, usual_work
     return rows
 
 

@@ -31,8 +31,8 @@ sys.path.insert(0, str(ROOT))
 from amontons.analysis.paths.following import Limits, track_both  # noqa: E402
 from amontons.analysis.paths.parametrised import path_of  # noqa: E402
 from amontons.analysis.paths.starting import exact_state  # noqa: E402
-from amontons.files import replacing  # noqa: E402
-from amontons.vee import vee  # noqa: E402
+from amontons.core.files import replacing  # noqa: E402
+from amontons.mechanics.ready.vee import vee  # noqa: E402
 from benchmarks.machine import describe  # noqa: E402
 from reproduce.ligursky2014.vee import METHODS, follow, mesh  # noqa: E402
 

@@ -1,7 +1,7 @@
 """A tower of boxes, with friction from safe to slippery; saved for others as an FCLib file."""
 
 import amontons as am
-from amontons.gallery import box_tower
+from amontons.mechanics.ready.gallery import box_tower
 
 
 def main(frictions: tuple[float, ...] = (0.6, 0.3, 0.2)) -> list[str]:

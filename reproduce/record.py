@@ -9,8 +9,8 @@ from typing import Any
 
 import click
 
-from amontons.errors import AmontonsError
-from amontons.files import replacing
+from amontons.core.errors import AmontonsError
+from amontons.core.files import replacing
 from benchmarks.machine import describe
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import click
 
-from amontons.errors import AmontonsError
+from amontons.core.errors import AmontonsError
 from benchmarks.machine import describe
 
 from . import report, rigid, wall

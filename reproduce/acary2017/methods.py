@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import amontons as am
-from amontons.solvers.base import Solver
+from amontons.solvers.contract import Solver
 
 SWEEPS = 10  # between two judgements: a judgement costs nearly a sweep, as (13) in the paper
 FULL = am.FullStep()

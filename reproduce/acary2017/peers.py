@@ -21,8 +21,8 @@ import numpy as np
 from scipy import sparse
 
 import amontons as am
-from amontons.judge import published_natural_error
-from amontons.solve import drive
+from amontons.problem.judge.measures import published_natural_error
+from amontons.solvers.driver import drive
 
 from .claims import HYBRID_SWEEPS
 from .methods import HYBRID, METHODS, SWEEPING

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from amontons.analysis import performance_profile
-from amontons.files import replacing
-from amontons.plots import profile_figure
+from amontons.core.files import replacing
+from amontons.io.plots import profile_figure
 
 from .race import CLOCK, TOLERANCES, Cost, Runs, costs_to
 

@@ -24,12 +24,12 @@ from typing import Any
 import numpy as np
 
 import amontons as am
-from amontons.blocks import spatial
-from amontons.files import replacing
-from amontons.judge import natural_error
-from amontons.solution import Outcome, Step
-from amontons.solve import drive
-from amontons.solvers.base import Iterate
+from amontons.core.files import replacing
+from amontons.linear.blocks import spatial
+from amontons.problem.judge.measures import natural_error
+from amontons.problem.solution import Outcome, Step
+from amontons.solvers.contract import Iterate
+from amontons.solvers.driver import drive
 
 from .methods import METHODS, Method
 
@@ -178,7 +178,7 @@ def race(
 
 def _compile(methods: Iterable[Method]) -> None:
     """Let every method meet a small problem first."""
-    from amontons.gallery import random_delassus
+    from amontons.mechanics.ready.gallery import random_delassus
 
     small = random_delassus(0, 4)
     for method in methods:

@@ -10,9 +10,9 @@ import click
 import numpy as np
 
 import amontons as am
-from amontons.case import read_case
-from amontons.files import replacing
-from amontons.plots import SI, Frame, draw_film, energy_figure, series_figure
+from amontons.core.files import replacing
+from amontons.io.case import read_case
+from amontons.io.plots import SI, Frame, draw_film, energy_figure, series_figure
 
 from . import claims, peers, profiles, rigid, step, tables
 from .methods import HYBRID, NEWTON, PRINTED

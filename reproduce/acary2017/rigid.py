@@ -21,9 +21,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 import amontons as am
-from amontons.case import read_case
+from amontons.io.case import read_case
 from amontons.linear.rank import matrix_rank
-from amontons.solution import Outcome
+from amontons.problem.solution import Outcome
 
 from .race import load, store
 from .wall import CASE

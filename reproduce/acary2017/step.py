@@ -25,8 +25,8 @@ import numpy as np
 from scipy import sparse
 
 import amontons as am
-from amontons.solve import drive
-from amontons.solvers.base import Iterate
+from amontons.solvers.contract import Iterate
+from amontons.solvers.driver import drive
 
 from .race import fresh
 

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 import amontons as am
-from amontons.case import read_case
-from amontons.files import replacing
+from amontons.core.files import replacing
+from amontons.io.case import read_case
 
 CASE = Path(__file__).resolve().parents[2] / "examples" / "wall" / "wall.toml"
 COUNTED_TO = 1e-6  # error at which the iterations of Newton are counted

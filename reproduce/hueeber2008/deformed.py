@@ -12,7 +12,7 @@ import numpy as np
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 import amontons as am
-from amontons.fem import cell_stress, von_mises
+from amontons.mechanics.elements import cell_stress, von_mises
 
 from . import figures
 

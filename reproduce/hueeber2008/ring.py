@@ -12,7 +12,7 @@ from functools import cache
 import numpy as np
 
 import amontons as am
-from amontons.fem import Cells, Facets
+from amontons.mechanics.meshes import Cells, Facets
 
 from .runs import Run, run
 

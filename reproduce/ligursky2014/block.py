@@ -17,7 +17,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 import amontons as am
-from amontons.files import replacing
+from amontons.core.files import replacing
 
 from . import convergence
 from .curves import chord_error, sampled, thinned

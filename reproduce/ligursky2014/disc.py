@@ -19,7 +19,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 import amontons as am
-from amontons.fem import Cells, Facets
+from amontons.mechanics.meshes import Cells, Facets
 
 F, RADII = 0.5, (0.5, 10.0)
 UNTIL = 0.6

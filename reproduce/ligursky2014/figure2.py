@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from amontons.files import replacing
+from amontons.core.files import replacing
 
 Array = np.ndarray
 AHEAD = np.linspace(0, 1, 201)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import amontons as am
-from amontons.vee import vee as vee_model
+from amontons.mechanics.ready.vee import vee as vee_model
 
 from . import block, vee
 from .tables import table

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import amontons as am
-from amontons.vee import vee
+from amontons.mechanics.ready.vee import vee
 
 from .mixed import full_problem
 

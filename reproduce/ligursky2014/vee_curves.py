@@ -16,8 +16,8 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 import amontons as am
-from amontons.files import replacing
-from amontons.vee import vee as vee_model
+from amontons.core.files import replacing
+from amontons.mechanics.ready.vee import vee as vee_model
 
 from . import vee
 from .tables import table

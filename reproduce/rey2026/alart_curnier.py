@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 import amontons as am
 from amontons.analysis import Ended, RunLimits
-from amontons.cones import augmented_reaction, augmented_reaction_jacobian
+from amontons.problem.law.cones import augmented_reaction, augmented_reaction_jacobian
 
 from .triangle import SAME, Cell, Triangle, tally, triangle_of
 

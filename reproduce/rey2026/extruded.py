@@ -15,9 +15,9 @@ import numpy as np
 import amontons as am
 from amontons.analysis.certificates.energy_bound import energy_bound
 from amontons.analysis.certificates.older_criteria import CriterionFriction, critical_discs
-from amontons.clock import Deadline
-from amontons.dense import dense
-from amontons.hild import CORNERS
+from amontons.core.clock import Deadline
+from amontons.linear.dense import dense
+from amontons.mechanics.ready.hild import CORNERS
 
 THICKNESS = 0.5
 SIZES = (1, 2, 3)

@@ -12,7 +12,7 @@ import numpy as np
 
 import amontons as am
 from amontons.analysis.certificates.critical_friction import critical_friction
-from amontons.hild import hild_triangle
+from amontons.mechanics.ready.hild import hild_triangle
 
 from .triangle import Triangle, mesh
 

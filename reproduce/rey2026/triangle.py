@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import amontons as am
-from amontons.hild import (
+from amontons.mechanics.ready.hild import (
     free_displacement,
     hild_triangle,
     mesh_of_triangle,

@@ -3,14 +3,14 @@
 import signal
 import sys
 
-from .interrupts import watch
+from .core.interrupts import watch
 
 
 def run() -> None:
     """The command line; Ctrl-C is watched before the first large import."""
     try:
         watch()
-        from .cli import main
+        from .app.cli import main
 
         main()
     except KeyboardInterrupt:

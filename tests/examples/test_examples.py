@@ -8,9 +8,9 @@ import pytest
 from click.testing import CliRunner
 
 import amontons as am
-from amontons.case import read_case
-from amontons.cli import main
-from amontons.cli.sources import DATA, examples
+from amontons.app.cli import main
+from amontons.app.cli.sources import DATA, examples
+from amontons.io.case import read_case
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 SMALLER = {

@@ -10,9 +10,9 @@ import pytest
 from click.testing import CliRunner
 
 import amontons as am
-from amontons.case import DATA
-from amontons.cli import main
-from amontons.gallery import box_tower, random_delassus
+from amontons.app.cli import main
+from amontons.io.case import DATA
+from amontons.mechanics.ready.gallery import box_tower, random_delassus
 
 CASE = """
 title = "press"

@@ -15,7 +15,7 @@ from faults import Kind
 from whole import check_whole, left_over
 from worker import Ended, Worker
 
-from amontons.checkpoint import Checkpoint, load_checkpoint
+from amontons.io.checkpoint import Checkpoint, load_checkpoint
 
 CASE = """
 [mesh]

@@ -9,8 +9,8 @@ import pytest
 from scipy import sparse
 
 import amontons as am
-from amontons.checked_arrays import compressed
-from amontons.fem import Cells, Facets
+from amontons.core.arrays import compressed
+from amontons.mechanics.meshes import Cells, Facets
 
 W = np.eye(4) + 0.1
 Q = -np.ones((2, 2))

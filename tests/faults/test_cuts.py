@@ -10,16 +10,17 @@ from faults import OF_FILES, OF_PATHS
 from kills import CASE, SLOW, Runs, at_every_call, at_random, by_interrupts, by_signals
 from worker import COMPILING, Worker
 
-from amontons.checkpoint import load_checkpoint, save_checkpoint
+from amontons.io.checkpoint import load_checkpoint, save_checkpoint
 
 STAGES = (
-    ("amontons.cli.run:read_case", 1), ("amontons.cli.run:identity", 1),
-    ("amontons.cli.run:at_rest", 1), ("amontons.cli.run:evolve", 1),
-    ("amontons.evolution.stepping:drive", 1), ("amontons.evolution.stepping:drive", 5),
-    ("amontons.evolution.moreau_jean:MovingModel.advance", 4),
-    ("amontons.cli.run_folder:RunFolder.draw", 2),
-    ("amontons.cli.run_folder:RunFolder.save", 1),
-    ("amontons.cli.run_folder:RunFolder.save", 3),
+    ("amontons.app.cli.run:read_case", 1), ("amontons.app.cli.run:identity", 1),
+    ("amontons.app.cli.run:at_rest", 1), ("amontons.app.cli.run:evolve", 1),
+    ("amontons.mechanics.steps.stepping:drive", 1),
+    ("amontons.mechanics.steps.stepping:drive", 5),
+    ("amontons.mechanics.steps.moreau_jean:MovingModel.advance", 4),
+    ("amontons.app.cli.run_folder:RunFolder.draw", 2),
+    ("amontons.app.cli.run_folder:RunFolder.save", 1),
+    ("amontons.app.cli.run_folder:RunFolder.save", 3),
     (COMPILING, 1), (COMPILING, 3),
 )  # fmt: skip
 CHANGING = ("write", "replace", "fsync")

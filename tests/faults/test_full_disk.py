@@ -8,7 +8,7 @@ from whole import check_whole, left_over
 from worker import Worker
 
 import amontons as am
-from amontons.gallery import box_tower
+from amontons.mechanics.ready.gallery import box_tower
 
 SIZES = (4, 8, 12, 16, 20, 24, 28, 32, 40, 48, 60, 80)  # kB
 

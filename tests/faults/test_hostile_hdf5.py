@@ -13,7 +13,7 @@ import pytest
 from scipy import sparse
 
 import amontons as am
-from amontons.gallery import random_delassus
+from amontons.mechanics.ready.gallery import random_delassus
 
 LOCAL = "fclib_local"
 SECONDS = 60  # a hang, not a slow machine

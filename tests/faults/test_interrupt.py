@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 import amontons as am
-from amontons import interrupts
-from amontons.cli.stopping import Stopping
-from amontons.gallery import random_delassus
+from amontons.app.cli.stopping import Stopping
+from amontons.core import interrupts
+from amontons.mechanics.ready.gallery import random_delassus
 
 SECONDS = 120  # a hang, not a slow machine
 ENDS = (0, 1, 130, -signal.SIGINT)  # -SIGINT: Python itself, before or after our own code
@@ -87,7 +87,7 @@ def signalled(code, after=0.2):
     """What a process prints whose main thread runs `code` under `Watching`."""
     text = f"""
 import signal, sys, threading, time
-from amontons.interrupts import Watching
+from amontons.core.interrupts import Watching
 threading.Timer({after}, signal.raise_signal, (signal.SIGINT,)).start()
 began = time.perf_counter()
 try:
@@ -133,7 +133,7 @@ def test_imports_come_to_their_end(tmp_path):
 def test_a_program_that_is_itself_imported_can_be_interrupted(tmp_path):
     text = f"""
 import sys, time
-from amontons.interrupts import Watching
+from amontons.core.interrupts import Watching
 with Watching():
     {LOOP.format("    ")}
     print("not interrupted")

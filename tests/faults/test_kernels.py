@@ -6,7 +6,7 @@ import math
 import pytest
 from faults import Faults
 
-from amontons import compiled
+from amontons.core import compiled
 
 
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO, errno.EACCES])

@@ -8,7 +8,7 @@ from itertools import product
 import pytest
 
 import amontons as am
-from amontons.errors import LONGEST, clipped, shown
+from amontons.core.errors import LONGEST, clipped, shown
 
 FULL = "/dev/full"
 pytestmark = pytest.mark.skipif(not os.path.exists(FULL), reason="no /dev/full")

@@ -13,12 +13,12 @@ from kills import CASE, SLOW
 from whole import check_whole, left_over
 
 import amontons as am
-from amontons import output
-from amontons.checkpoint import Checkpoint, save_checkpoint
-from amontons.cli import main
-from amontons.evolution import at_rest
-from amontons.gallery import box_tower, one_contact_2d
-from amontons.solve import drive
+from amontons.app.cli import main
+from amontons.io import results as output
+from amontons.io.checkpoint import Checkpoint, save_checkpoint
+from amontons.mechanics.ready.gallery import box_tower, one_contact_2d
+from amontons.mechanics.steps import at_rest
+from amontons.solvers.driver import drive
 
 ERRORS = (errno.ENOSPC, errno.EIO, errno.EACCES, errno.EDQUOT, errno.EROFS)
 OLD = b"old"
@@ -214,7 +214,7 @@ def test_the_bytes_are_those_of_hdf5(tmp_path):
     """Made in memory or by HDF5 itself: the same file."""
     import h5py
 
-    from amontons.fclib import put_fclib
+    from amontons.io.fclib import put_fclib
 
     am.write_fclib(one_contact_2d(), tmp_path / "a.hdf5")
     with h5py.File(tmp_path / "b.hdf5", "w") as file:

@@ -83,10 +83,10 @@ class Worker:
 
 
 def _serve(said: str) -> None:
-    for name in ("cli.run", "fclib", "plots"):
+    for name in ("app.cli.run", "io.fclib", "io.plots"):
         importlib.import_module(f"amontons.{name}")
-    from amontons.gallery import one_contact_2d
-    from amontons.solve import drive
+    from amontons.mechanics.ready.gallery import one_contact_2d
+    from amontons.solvers.driver import drive
 
     drive(one_contact_2d())  # loads compiled code
     print(json.dumps({}), flush=True)
@@ -138,7 +138,7 @@ def _work(command: dict[str, Any], said: str) -> None:
 
 
 def _command(command: dict[str, Any], said: str) -> None:
-    from amontons.cli import main
+    from amontons.app.cli import main
 
     if "stage" in command:
         _interrupt_at(command["stage"], command["call"])

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import amontons as am
-from amontons.errors import InvalidInput
-from amontons.problem import FrictionProblem
+from amontons.core.errors import InvalidInput
+from amontons.problem.friction import FrictionProblem
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 PROBLEMS, SEED = 100, 20

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from amontons.cones import project_cone, project_disk
+from amontons.problem.law.cones import project_cone, project_disk
 
 number = st.floats(-1e6, 1e6, allow_nan=False, allow_subnormal=False)
 rows = arrays(float, (4, 3), elements=number)

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from amontons.errors import AmontonsError
-from amontons.fclib import read_fclib, write_fclib
-from amontons.gallery import box_tower, random_delassus
+from amontons.core.errors import AmontonsError
+from amontons.io.fclib import read_fclib, write_fclib
+from amontons.mechanics.ready.gallery import box_tower, random_delassus
 
 FUZZ = settings(
     max_examples=150, deadline=None, derandomize=True,

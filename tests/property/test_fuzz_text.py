@@ -4,10 +4,10 @@ import numpy as np
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from amontons.case import read_case
-from amontons.case.overrides import apply_overrides
-from amontons.errors import AmontonsError
-from amontons.expressions import FUNCTIONS, Expression
+from amontons.core.errors import AmontonsError
+from amontons.core.expressions import FUNCTIONS, Expression
+from amontons.io.case import read_case
+from amontons.io.case.overrides import apply_overrides
 
 FUZZ = settings(
     max_examples=300, deadline=None, derandomize=True,

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from amontons.problem import Form, FrictionProblem
-from amontons.solve import drive
+from amontons.problem.friction import Form, FrictionProblem
 from amontons.solvers import METHODS
+from amontons.solvers.driver import drive
 
 SOLVERS = [
     pytest.param(solver, id=name)

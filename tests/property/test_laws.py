@@ -5,8 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from amontons.cones import Coulomb, Tresca
-from amontons.one_contact import OPEN, SLIP, STICK, solve_one
+from amontons.problem.law.cones import Coulomb, Tresca
+from amontons.problem.law.one_contact import OPEN, SLIP, STICK, solve_one
 
 entry = st.floats(-3, 3).map(lambda x: round(x, 9))  # squares must not underflow
 matrix = arrays(float, (3, 3), elements=entry)

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 import amontons as am
-from amontons.api import solve_any_form
-from amontons.cones import Tresca
-from amontons.errors import UnsupportedForm
-from amontons.judge import Measure
-from amontons.problem import FrictionProblem
-from amontons.settling import settle, settled
+from amontons.app.api import solve_any_form
+from amontons.core.errors import UnsupportedForm
+from amontons.problem.friction import FrictionProblem
+from amontons.problem.judge.measures import Measure
+from amontons.problem.law.cones import Tresca
+from amontons.problem.settling import settle, settled
+from amontons.problem.status import ContactStatus, classify
 from amontons.solvers import METHODS
-from amontons.status import ContactStatus, classify
 
 STEEL = am.LinearElastic(young=200.0, poisson=0.3)
 SOLVERS = [pytest.param(solver, id=name) for name, solver in METHODS.items()]

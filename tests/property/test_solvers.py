@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from amontons import gallery
-from amontons.cones import Tresca
-from amontons.errors import UnsupportedForm
-from amontons.problem import Form, FrictionProblem
-from amontons.solution import Outcome
-from amontons.solve import drive
+from amontons.core.errors import UnsupportedForm
+from amontons.mechanics.ready import gallery
+from amontons.problem.friction import Form, FrictionProblem
+from amontons.problem.law.cones import Tresca
+from amontons.problem.solution import Outcome
 from amontons.solvers import METHODS, GaussSeidel
-from amontons.solvers.base import Iterate
+from amontons.solvers.contract import Iterate
+from amontons.solvers.driver import drive
 
 SOLVERS = [pytest.param(solver, id=name) for name, solver in METHODS.items()]
 TOLERANCE = 1e-8

@@ -12,9 +12,9 @@ from click.testing import CliRunner
 
 import amontons as am
 from amontons.analysis import performance_profile
-from amontons.evolution import Energies
-from amontons.gallery import random_delassus
-from amontons.plots import SI, Frame, draw_film, energy_figure, series_figure
+from amontons.io.plots import SI, Frame, draw_film, energy_figure, series_figure
+from amontons.mechanics.ready.gallery import random_delassus
+from amontons.mechanics.steps import Energies
 
 SPENT = 7.0  # seconds of a made-up run that failed
 ROOT = Path(__file__).resolve().parents[2]

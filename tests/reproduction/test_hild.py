@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import amontons as am
-from amontons.case import read_case
-from amontons.cli.sources import DATA
-from amontons.errors import InvalidInput
-from amontons.hild import (
+from amontons.app.cli.sources import DATA
+from amontons.core.errors import InvalidInput
+from amontons.io.case import read_case
+from amontons.mechanics.ready.hild import (
     free_displacement,
     hild_triangle,
     mesh_of_triangle,

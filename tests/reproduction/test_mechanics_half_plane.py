@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from amontons.gallery import cylinder_on_half_plane
-from amontons.solve import drive
+from amontons.mechanics.ready.gallery import cylinder_on_half_plane
+from amontons.solvers.driver import drive
 
 HALF_WIDTH, MU = 0.2, 0.5
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import amontons as am
-from amontons.solve import drive
+from amontons.solvers.driver import drive
 
 MATERIAL = am.LinearElastic(young=200, poisson=0.3)
 FLOOR = am.Plane(normal=(0, 0, 1))

@@ -3,7 +3,7 @@
 import numpy as np
 
 import amontons as am
-from amontons.fem.facets import Cells, Facets
+from amontons.mechanics.meshes.facets import Cells, Facets
 
 GMSH = {"line": 1, "tri": 2, "quad": 3, "tet": 4, "hex": 5}
 

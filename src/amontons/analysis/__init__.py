@@ -1,8 +1,8 @@
 """Questions about problems and solvers; sees discrete problems only."""
 
-from .basin_methods import BasinMethod, Ended, RunLimits
-from .basin_solutions import KnownSolution
-from .basins import BasinRun, Basins
+from .basins.methods import BasinMethod, Ended, RunLimits
+from .basins.solutions import KnownSolution
+from .basins.study import BasinRun, Basins
 from .certificates.critical_friction import CriticalFriction, Witness
 from .certificates.older_criteria import CriterionFriction
 from .certificates.opening import Existence, Opening

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checked_arrays import real
-from ..errors import InvalidInput
+from ..core.arrays import real
+from ..core.errors import InvalidInput
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..errors import InvalidInput
+from ..core.errors import InvalidInput
 
 Array = NDArray[np.float64]
 

@@ -38,8 +38,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from ..errors import InvalidInput, MissingDependency, SingularOperator
-from ..options import check_options
+from ..core.errors import InvalidInput, MissingDependency, SingularOperator
+from ..core.options import check_options
 from .base import by_columns, stored
 
 Array = NDArray[np.float64]

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..errors import UnsupportedForm
+from ..core.errors import UnsupportedForm
 from .base import by_columns
 from .petsc import Petsc, check_converged, krylov, petsc
 

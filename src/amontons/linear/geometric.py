@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..errors import InvalidInput, SingularOperator
-from ..options import check_options
+from ..core.errors import InvalidInput, SingularOperator
+from ..core.options import check_options
 from .base import by_columns, check_stopping
 from .grid_matrix import GridMatrix
 from .hierarchy import Hierarchy, Nodes, components

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import njit
+from ..core.compiled import njit
 from .node_blocks import NodeBlocks, block_inverse
 
 Array = NDArray[np.float64]

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from ..errors import SingularOperator
-from ..options import check_options
+from ..core.errors import SingularOperator
+from ..core.options import check_options
 from .base import Factor, LinearSolver, by_columns, check_stopping, stored
 from .multigrid import AlgebraicMultigrid
 

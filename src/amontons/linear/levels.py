@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..checked_arrays import compressed, locked
-from ..errors import InvalidInput, shown
+from ..core.arrays import compressed, locked
+from ..core.errors import InvalidInput, shown
 
 Levels = tuple[sparse.csr_array, ...]
 Mask = NDArray[np.bool_]

@@ -21,7 +21,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SingularOperator
+from ..core.errors import SingularOperator
 
 Array = NDArray[np.floating]
 Index = NDArray[np.int64]

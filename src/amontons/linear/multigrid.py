@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..errors import InvalidInput
-from ..options import check_options
+from ..core.errors import InvalidInput
+from ..core.options import check_options
 from .base import stored
 
 Array = NDArray[np.float64]

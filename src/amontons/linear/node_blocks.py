@@ -14,7 +14,7 @@ from numba import uint64
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..compiled import njit
+from ..core.compiled import njit
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

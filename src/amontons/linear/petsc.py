@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..errors import InvalidInput, MissingDependency, SingularOperator
-from ..options import check_options
+from ..core.errors import InvalidInput, MissingDependency, SingularOperator
+from ..core.options import check_options
 from .base import by_columns, check_stopping
 
 Array = NDArray[np.float64]

@@ -19,8 +19,8 @@ from scipy.linalg.lapack import dpstrf
 from scipy.sparse import csgraph
 from scipy.sparse.linalg import splu
 
-from ..clock import NEVER, Deadline
-from ..dense import dense
+from ..core.clock import NEVER, Deadline
+from .dense import dense
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from ..errors import SingularOperator
+from ..core.errors import SingularOperator
 
 LARGEST_BLOCK = 48  # unknowns coupled with each other, above which a sparse factor is cheaper
 

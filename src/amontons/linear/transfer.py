@@ -9,7 +9,7 @@ from numba import uint64
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..compiled import njit
+from ..core.compiled import njit
 from .node_blocks import NodeBlocks, with_diagonal
 
 Array = NDArray[np.float64]

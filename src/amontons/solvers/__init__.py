@@ -1,26 +1,26 @@
 """Solvers of the discrete problem, one file per family; a new one is a file and a line here."""
 
-from .active_conditions import FrictionFunction, Modification
-from .active_multigrid import CycleShape, MultigridCycle
-from .active_set import ActiveSet, ActiveSetIterate, ChangeNorm, FrictionBound
+from .active_set.conditions import FrictionFunction, Modification
+from .active_set.multigrid import CycleShape, MultigridCycle
+from .active_set.sets import ActiveSet, ActiveSetIterate, ChangeNorm, FrictionBound
 from .augmentation import RhoStrategy
-from .base import Breakdown, Iterate, Solver, Target
-from .compressed import CompressedDelassus
-from .contact_multigrid import ContactMultigrid
-from .fischer_burmeister import FischerBurmeister
-from .functions import AlartCurnier, ComplementarityFunction, JeanMoreau, NaturalMap
-from .gauss_seidel import Batch, GaussSeidel
-from .gradient import AcceleratedGradient, GradientIterate, Metric, Restart
-from .hybrid import Auto, Hybrid
-from .inexact import InexactNewton
-from .interior_point import InteriorPoint
-from .jacobi import Jacobi
-from .line_search import Armijo, FullStep, GoldsteinPrice, LineSearch, NonMonotone
-from .local_contact import LocalSolver
-from .newton import SemismoothNewton
-from .smoothing import ProximalPoint, SmoothingNewton
-from .sweeps import SweepOrder
-from .uzawa import InnerStart, Uzawa
+from .auto.compressed import CompressedDelassus
+from .auto.hybrid import Auto, Hybrid
+from .contract import Breakdown, Iterate, Solver, Target
+from .gradient.accelerated import AcceleratedGradient, GradientIterate, Metric, Restart
+from .gradient.uzawa import InnerStart, Uzawa
+from .multigrid.cycles import ContactMultigrid
+from .newton.fischer_burmeister import FischerBurmeister
+from .newton.functions import AlartCurnier, ComplementarityFunction, JeanMoreau, NaturalMap
+from .newton.inexact import InexactNewton
+from .newton.interior_point import InteriorPoint
+from .newton.line_search import Armijo, FullStep, GoldsteinPrice, LineSearch, NonMonotone
+from .newton.semismooth import SemismoothNewton
+from .newton.smoothing import ProximalPoint, SmoothingNewton
+from .sweeps.gauss_seidel import Batch, GaussSeidel
+from .sweeps.jacobi import Jacobi
+from .sweeps.kernels import SweepOrder
+from .sweeps.local_contact import LocalSolver
 
 METHODS: dict[str, type] = {
     "accelerated-gradient": AcceleratedGradient,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import njit
+from ..core.compiled import njit
 
 Array = NDArray[np.float64]
 RANK = 1e-13  # is added to the diagonal of the scaled Gram matrix

@@ -28,7 +28,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from ..problem import Form, FrictionProblem
+from ..problem.friction import Form, FrictionProblem
 
 Array = NDArray[np.float64]
 LARGEST_CONDITION = 1e4  # of W_ii or W_TT: a singular block must not give rho = 0 or infinity

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..problem import Form, FrictionProblem
+from ..problem.friction import Form, FrictionProblem
 from .augmentation import own_blocks
 
 Array = NDArray[np.float64]

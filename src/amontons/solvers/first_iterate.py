@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checked_arrays import real
-from ..errors import InvalidInput
-from ..judge import Measure
-from ..nitsche_problem import NitscheProblem
-from ..problem import Form, FrictionProblem
-from .base import Iterate
+from ..core.arrays import real
+from ..core.errors import InvalidInput
+from ..problem.friction import Form, FrictionProblem
+from ..problem.judge.measures import Measure
+from ..problem.nitsche import NitscheProblem
+from .contract import Iterate
 
 Array = NDArray[np.float64]
 

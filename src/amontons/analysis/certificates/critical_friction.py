@@ -23,9 +23,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ...clock import NEVER, Deadline, TimeLimit, deadline_of, now
-from ...errors import InvalidInput, TimeUp
-from ...problem import FrictionProblem
+from ...core.clock import NEVER, Deadline, TimeLimit, deadline_of, now
+from ...core.errors import InvalidInput, TimeUp
+from ...problem.friction import FrictionProblem
 from .determinant_search import NEGATIVE, POSITIVE, STICK, STOPPED, UNKNOWN
 from .energy_bound import energy_bound
 from .exact_threshold import LARGEST, Threshold, exact_threshold, search_windows

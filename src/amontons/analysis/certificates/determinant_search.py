@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...compiled import njit
+from ...core.compiled import njit
 
 FREE, SLIP_PLUS, SLIP_MINUS, STICK, TANGENT = range(5)
 POSITIVE, NEGATIVE, UNKNOWN, STOPPED = 1, -1, 0, 2

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from ...clock import Deadline
+from ...core.clock import Deadline
 from . import slip_arcs as arcs
 from .energy_bound import energy_bound
 from .exact_threshold import LARGEST

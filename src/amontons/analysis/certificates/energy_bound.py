@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cholesky, solve_triangular
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
-from ...clock import NEVER, Deadline
+from ...core.clock import NEVER, Deadline
 from ..multipliers.rounding import EPSILON, is_positive_definite, unit_scale
 
 Array = NDArray[np.float64]

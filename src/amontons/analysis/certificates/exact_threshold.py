@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ...clock import NEVER, Deadline
+from ...core.clock import NEVER, Deadline
 from . import determinant_search as search
 from .determinant_search import FREE, NEGATIVE, POSITIVE, STOPPED, UNKNOWN
 from .status_pieces import Pieces, States

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...clock import Deadline
+from ...core.clock import Deadline
 from .determinant_search import FREE, POSITIVE, SLIP_MINUS, SLIP_PLUS, STICK, STOPPED, eliminate
 from .exact_threshold import first_failure
 from .pair_multipliers import FEW, PairMultipliers, find_pair_multipliers, proves

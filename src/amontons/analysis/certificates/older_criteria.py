@@ -42,9 +42,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from ...clock import Deadline, TimeLimit, deadline_of, now
-from ...errors import InvalidInput, TimeUp, UnsupportedForm
-from ...problem import FrictionProblem
+from ...core.clock import Deadline, TimeLimit, deadline_of, now
+from ...core.errors import InvalidInput, TimeUp, UnsupportedForm
+from ...problem.friction import FrictionProblem
 from .critical_friction import (
     COMPARED,
     FULL_CONTACT,

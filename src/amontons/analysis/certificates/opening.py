@@ -43,12 +43,12 @@ from scipy.linalg import solve_triangular
 from scipy.linalg.lapack import dpstrf
 from scipy.sparse.linalg import lsmr
 
-from ...clock import Deadline, TimeLimit, deadline_of, now
-from ...cones import Coulomb
-from ...dense import dense
-from ...errors import InvalidInput, SingularOperator, TimeUp
-from ...indefinite import negative_direction
-from ...problem import Form, FrictionProblem
+from ...core.clock import Deadline, TimeLimit, deadline_of, now
+from ...core.errors import InvalidInput, SingularOperator, TimeUp
+from ...linear.dense import dense
+from ...problem.friction import Form, FrictionProblem
+from ...problem.indefinite import negative_direction
+from ...problem.law.cones import Coulomb
 from .opening_program import Cones, iterates
 
 Array = NDArray[np.float64]

@@ -29,7 +29,7 @@ from scipy import sparse
 from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse.linalg import splu
 
-from ...clock import Deadline
+from ...core.clock import Deadline
 
 Array = NDArray[np.float64]
 Solve = Callable[[Array], Array]

@@ -27,8 +27,8 @@ from numpy.typing import NDArray
 from scipy import linalg
 from scipy.sparse.csgraph import minimum_spanning_tree
 
-from ...clock import TimeLimit
-from ..multipliers.multiplier_lmi import (
+from ...core.clock import TimeLimit
+from ..multipliers.lmi import (
     Family,
     LmiOutcome,
     Multipliers,

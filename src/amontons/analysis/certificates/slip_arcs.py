@@ -24,7 +24,7 @@ import math
 
 import numpy as np
 
-from ...compiled import njit
+from ...core.compiled import njit
 
 PROVED, FAILED, SMALL, STOPPED = 1, -1, 0, 2
 TINY = 1e-12  # of the size of a matrix, within which an entry counts as zero

@@ -19,10 +19,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...clock import NEVER, Deadline
-from ...dense import dense
-from ...errors import InvalidInput, UnsupportedForm
-from ...problem import FrictionProblem
+from ...core.clock import NEVER, Deadline
+from ...core.errors import InvalidInput, UnsupportedForm
+from ...linear.dense import dense
+from ...problem.friction import FrictionProblem
 from ..multipliers.rounding import EPSILON, determinant_sign
 from .determinant_search import FREE, SLIP_MINUS, SLIP_PLUS, STICK, TANGENT
 

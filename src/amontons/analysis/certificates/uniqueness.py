@@ -13,20 +13,20 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from ...clock import Deadline, TimeLimit, deadline_of, now
-from ...cones import Tresca
-from ...dense import dense
-from ...errors import InvalidInput, SingularOperator, TimeUp
-from ...problem import FrictionProblem
-from ...solution import FrictionSolution
-from ...solve import drive
+from ...core.clock import Deadline, TimeLimit, deadline_of, now
+from ...core.errors import InvalidInput, SingularOperator, TimeUp
+from ...linear.dense import dense
+from ...problem.friction import FrictionProblem
+from ...problem.law.cones import Tresca
+from ...problem.solution import FrictionSolution
+from ...solvers.driver import drive
 from ..multipliers.scales import UNRESOLVED, contact_sizes, resolves
-from ..solutions.disc_search import enumerate_discs
+from ..solutions.discs.search import enumerate_discs
 from ..solutions.enumerate import PieceSolution, Solutions, enumerate_solutions
 from .critical_friction import CriticalFriction, Witness, critical_friction
 from .energy_bound import energy_bound
-from .load_answer import LoadCertificate, LoadOutcome
-from .load_certificate import certify_load
+from .one_load.answer import LoadCertificate, LoadOutcome
+from .one_load.certificate import certify_load
 from .status_pieces import friction_shape
 
 Array = NDArray[np.float64]

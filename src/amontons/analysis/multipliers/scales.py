@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...dense import dense
-from ...problem import FrictionProblem
+from ...linear.dense import dense
+from ...problem.friction import FrictionProblem
 
 Array = NDArray[np.float64]
 UNRESOLVED = "the loads of contacts differ too much to tell solutions at the least loaded apart"

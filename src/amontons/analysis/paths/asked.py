@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checked_arrays import real
-from ...errors import InvalidInput
-from ...problem import FrictionProblem
+from ...core.arrays import real
+from ...core.errors import InvalidInput
+from ...problem.friction import FrictionProblem
 from . import checks
 from .continuation import Continuation
 from .corrector import Curve
@@ -25,7 +25,7 @@ from .starting import polished
 from .tangents import FirstOrder, Tangent
 
 if TYPE_CHECKING:
-    from ...model import Model
+    from ...mechanics.model import Model
 
 Array = NDArray[np.float64]
 

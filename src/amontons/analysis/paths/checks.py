@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InvalidInput
+from ...core.errors import InvalidInput
 from .continuation import Continuation
 from .friction_path import FrictionPath
 from .load_path import LoadPath

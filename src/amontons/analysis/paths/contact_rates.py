@@ -25,8 +25,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...clock import NEVER, Deadline
-from ...errors import InvalidInput, SingularOperator, UnsupportedForm
+from ...core.clock import NEVER, Deadline
+from ...core.errors import InvalidInput, SingularOperator, UnsupportedForm
 from .index_sets import IndexSets
 from .rate_claims import Claim, all_pieces_regular, is_P_matrix, strictly_copositive
 from .rate_search import RateSolutions, rate_solutions

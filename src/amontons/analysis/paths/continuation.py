@@ -17,8 +17,8 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InvalidInput
-from ...options import check_options
+from ...core.errors import InvalidInput
+from ...core.options import check_options
 from .corrector import Curve, Tolerances
 from .first_order import first_order
 from .path import Event, PathProblem, Point

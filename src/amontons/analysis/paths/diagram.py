@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...clock import Deadline, now
-from ...errors import SingularOperator, TimeUp, UnsupportedForm
+from ...core.clock import Deadline, now
+from ...core.errors import SingularOperator, TimeUp, UnsupportedForm
 from .continuation import Continuation
 from .following import Limits, follow_path, track_both
 from .friction_path import FrictionPath

@@ -22,7 +22,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InvalidInput, SingularOperator
+from ...core.errors import InvalidInput, SingularOperator
 from .friction_path import FrictionPath
 from .path import Event, EventKind, Point, Stop, weight_of
 from .straight import TIE, check_straight, leaving

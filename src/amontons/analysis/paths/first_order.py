@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from ...errors import NotConverged, SingularOperator
+from ...core.errors import NotConverged, SingularOperator
 from .cones import TangentCone, edges_and_lines, unit_rows
 from .contact_rates import contact_rates
 from .corrector import determinant_sign

@@ -10,8 +10,8 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from ...clock import NEVER, Deadline, deadline_of, now
-from ...errors import InvalidInput, TimeUp
+from ...core.clock import NEVER, Deadline, deadline_of, now
+from ...core.errors import InvalidInput, TimeUp
 from .continuation import Continuation
 from .friction_path import FrictionPath
 from .meeting import PassedEvents, PassedLines

@@ -24,13 +24,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...clock import NEVER, Deadline, now
-from ...cones import Coulomb, Tresca
-from ...dense import dense
-from ...errors import InvalidInput, UnsupportedForm
-from ...problem import Form, FrictionProblem
-from ...settling import settled
-from ...solution import FrictionSolution
+from ...core.clock import NEVER, Deadline, now
+from ...core.errors import InvalidInput, UnsupportedForm
+from ...linear.dense import dense
+from ...problem.friction import Form, FrictionProblem
+from ...problem.law.cones import Coulomb, Tresca
+from ...problem.settling import settled
+from ...problem.solution import FrictionSolution
 from .index_sets import IndexSets, index_sets
 from .path import judged
 

@@ -24,18 +24,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...clock import NEVER, Deadline, now
-from ...cones import Coulomb
-from ...contact.current import BACK, OPEN, SLIP, STICK, Pieces
-from ...errors import InvertedCells, NotConverged, UnsupportedForm
-from ...evolution.system import Motion
-from ...model import Model
-from ...model.large_deformation import LargeDeformation, large_step
-from ...model.nodal_forces import NodalForces
-from ...settling import settle
-from ...solution import ContactStatus, FrictionSolution, Outcome
-from ...solve import drive
-from ...solvers.nonlinear_newton import NonlinearNewton
+from ...core.clock import NEVER, Deadline, now
+from ...core.errors import InvertedCells, NotConverged, UnsupportedForm
+from ...mechanics.contact.current import BACK, OPEN, SLIP, STICK, Pieces
+from ...mechanics.model import Model
+from ...mechanics.model.large_deformation import LargeDeformation, large_step
+from ...mechanics.model.nodal_forces import NodalForces
+from ...mechanics.steps.system import Motion
+from ...problem.law.cones import Coulomb
+from ...problem.settling import settle
+from ...problem.solution import ContactStatus, FrictionSolution, Outcome
+from ...solvers.driver import drive
+from ...solvers.newton.nonlinear import NonlinearNewton
 from .index_sets import IndexSets, index_sets
 from .path import SOLVED, judged
 

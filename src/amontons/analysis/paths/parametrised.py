@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checked_arrays import real
-from ...errors import InvalidInput, NotConverged, SingularOperator
-from ...evolution.system import Motion
-from ...problem import Form, FrictionProblem
-from ...solution import Outcome
-from ...solve import drive
+from ...core.arrays import real
+from ...core.errors import InvalidInput, NotConverged, SingularOperator
+from ...mechanics.steps.system import Motion
+from ...problem.friction import Form, FrictionProblem
+from ...problem.solution import Outcome
+from ...solvers.driver import drive
 from .friction_path import FrictionPath
 from .load_path import LoadPath, load_path
 from .path import PathProblem
 from .starting import exact_state
 
 if TYPE_CHECKING:
-    from ...model import Model
+    from ...mechanics.model import Model
 
 Array = NDArray[np.float64]
 PARAMETERS = ("load", "friction")

@@ -22,9 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...clock import NEVER, Deadline
-from ...judge import Measure
-from ...solution import Convergence, Outcome, Step
+from ...core.clock import NEVER, Deadline
+from ...problem.judge.measures import Measure
+from ...problem.solution import Convergence, Outcome, Step
 from .events import Event, EventKind, Point, Stop
 
 Array = NDArray[np.float64]

@@ -16,13 +16,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ...clock import NEVER, Deadline
-from ...errors import InvalidInput
-from ...evolution.passage import Arrival
-from ...model.large_deformation import LargeDeformation
-from ...options import check_options
-from ...problem import FrictionProblem
-from ...solvers.base import Breakdown, Target
+from ...core.clock import NEVER, Deadline
+from ...core.errors import InvalidInput
+from ...core.options import check_options
+from ...mechanics.model.large_deformation import LargeDeformation
+from ...mechanics.steps.passage import Arrival
+from ...problem.friction import FrictionProblem
+from ...solvers.contract import Breakdown, Target
 from .continuation import Continuation
 from .following import Limits, follow_along
 from .friction_path import FrictionPath

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import SingularOperator
+from ...core.errors import SingularOperator
 from .corrector import Curve, Spot
 from .local_ways import LocalWays
 from .path import name_of

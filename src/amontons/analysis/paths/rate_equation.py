@@ -26,8 +26,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checked_arrays import real
-from ...errors import InvalidInput
+from ...core.arrays import real
+from ...core.errors import InvalidInput
 from .checks import check_options, check_start, checked_limits
 from .continuation import Continuation
 from .following import Limits, follow_path

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...clock import NEVER, Deadline
+from ...core.clock import NEVER, Deadline
 from ..solutions import pattern_search as search
 from ..solutions.pattern_leaves import NODE, leaves_of
 

@@ -22,10 +22,10 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from ...clock import Deadline
-from ...problem import FrictionProblem
-from ...solution import Outcome
-from ...solve import drive
+from ...core.clock import Deadline
+from ...problem.friction import FrictionProblem
+from ...problem.solution import Outcome
+from ...solvers.driver import drive
 from .friction_path import FrictionPath
 
 Array = NDArray[np.float64]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InvalidInput, SingularOperator
-from ...problem import FrictionProblem
+from ...core.errors import InvalidInput, SingularOperator
+from ...problem.friction import FrictionProblem
 from .event_tracking import track
 from .friction_path import FrictionPath
 from .path import PathProblem, Stop, corrected, timed

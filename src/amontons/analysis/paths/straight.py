@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import UnsupportedForm
+from ...core.errors import UnsupportedForm
 from .first_order import first_order
 from .friction_path import FrictionPath
 from .tangents import FirstOrder

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import SingularOperator
+from ...core.errors import SingularOperator
 from .continuation import Continuation
 from .event_tracking import track
 from .friction_path import FrictionPath

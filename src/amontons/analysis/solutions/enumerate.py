@@ -20,9 +20,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...clock import Deadline, TimeLimit, deadline_of, now
-from ...errors import InvalidInput, TimeUp, UnsupportedForm
-from ...problem import FrictionProblem
+from ...core.clock import Deadline, TimeLimit, deadline_of, now
+from ...core.errors import InvalidInput, TimeUp, UnsupportedForm
+from ...problem.friction import FrictionProblem
 from ..multipliers.scales import RESOLVED, UNRESOLVED, load_shares
 from . import pattern_search as search
 from .local_degree import UNKNOWN, Degree, degree
@@ -31,7 +31,7 @@ from .piece_solution import DATA, Existence, PieceAnswer, examined
 from .scaled_problem import REACH, SLACK, ScaledProblem, States
 
 if TYPE_CHECKING:
-    from .disc_proof import DiscProof
+    from .discs.proof import DiscProof
 
 Array = NDArray[np.float64]
 LETTERS = {search.OPEN_OR_CLOSED: ".", search.CLOSED: "c", search.OPEN: "f",

@@ -17,8 +17,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ...clock import NEVER, Deadline
-from ...problem import FrictionProblem
+from ...core.clock import NEVER, Deadline
+from ...problem.friction import FrictionProblem
 from . import pattern_search as search
 from .multistart import certain_error, described, statuses
 from .newton_batch import FREE, SLIP, STICK, Stack

@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from ...clock import NEVER, Deadline, TimeLimit, deadline_of, now
-from ...errors import InvalidInput, TimeUp
-from ...problem import FrictionProblem
-from ...solve import drive
+from ...core.clock import NEVER, Deadline, TimeLimit, deadline_of, now
+from ...core.errors import InvalidInput, TimeUp
+from ...problem.friction import FrictionProblem
+from ...solvers.driver import drive
 from .enumerate import PieceSolution, Solutions
 from .newton_batch import FREE, SLIP, STICK, Stack
 

@@ -18,11 +18,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...clock import NEVER, Deadline
-from ...cones import Coulomb
-from ...dense import dense
-from ...problem import FrictionProblem
-from ...solvers.functions import AlartCurnier
+from ...core.clock import NEVER, Deadline
+from ...linear.dense import dense
+from ...problem.friction import FrictionProblem
+from ...problem.law.cones import Coulomb
+from ...solvers.newton.functions import AlartCurnier
 from ..multipliers.scales import contact_sizes, load_size, power_of_two
 
 Array = NDArray[np.float64]

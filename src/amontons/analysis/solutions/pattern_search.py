@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...compiled import njit
+from ...core.compiled import njit
 
 FREE, POSITIVE, NEGATIVE, FIXED = 0, 1, 2, 3  # bounds of a variable, closed
 OPEN_OR_CLOSED, CLOSED, OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS = range(7)

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.optimize import linprog
 
-from ...dense import dense
-from ...problem import FrictionProblem
+from ...linear.dense import dense
+from ...problem.friction import FrictionProblem
 from ..multipliers.rounding import EPSILON, gamma
 from ..multipliers.scales import contact_sizes, load_size, power_of_two
 from . import pattern_search as search

@@ -1,0 +1,1 @@
+"""The study which solution a method finds: methods, parameters, starts."""

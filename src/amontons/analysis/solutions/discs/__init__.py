@@ -1,0 +1,1 @@
+"""All solutions in 3D: regions of statuses and slip directions."""

@@ -1,0 +1,112 @@
+"""`amontons follow`: solution curves over the load or the friction, with folds and events."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ...analysis.paths.path import Branch, Event, EventKind, Stop
+from ...core.errors import InvalidInput
+from ...core.files import made, write_bytes
+from ...io.results import to_json, versions
+from .. import api
+from .sources import open_source
+from .terminal import check_folder, check_writable, deliver_json, shortened, show_table
+
+SCHEMA = "amontons/follow/1"
+UNFINISHED = 1  # exit code
+FINISHED = (Stop.INTERVAL, Stop.CLOSED, Stop.JOINED, Stop.NOT_STARTED)
+ALIASES = {"t": "load"}  # the time of loads that depend on it
+ROWS = 30  # events that the table shows
+SHOWN = 40  # letters of a pattern
+
+
+def run(
+    source: str, overrides: Sequence[str], parameter: str, low: float, high: float,
+    mu: float | None, every: bool, max_points: int, time_limit: float | None,
+    folder: str | None, json_copy: str | None, quiet: bool,
+) -> int:  # fmt: skip
+    """Follow, write, show; the exit code."""
+    check_writable(json_copy, "--json")
+    opened = open_source(source, overrides)
+    if not low < high:
+        raise InvalidInput(f"--from, --to: expected a smaller and a larger number, got {low:g} "
+                           f"and {high:g}")  # fmt: skip
+    place = check_folder(f"{opened.name}-results" if folder is None else folder)
+    target = opened.target if mu is None else opened.target.with_mu(mu)
+    name = ALIASES.get(parameter, parameter)
+    at: Sequence[float] = ()
+    limits: dict[str, Any] = {"max_points": max_points, "time_limit": time_limit,
+                              "options": opened.settings.continuation()}  # fmt: skip
+    if every:
+        found = api.diagram(target, name, (low, high), **limits)
+        branches, complete, reason = list(found), found.complete, found.reason
+        at = found.at
+    else:
+        branches, complete, reason = [api.follow(target, name, (low, high), **limits)], None, ""
+    text = to_json(record(branches, parameter, (low, high), complete, reason, at))
+    _write(place, text, branches, opened.title)
+    if json_copy is not None:
+        deliver_json(text, json_copy)
+    if json_copy != "-" and not quiet:
+        _show(opened.title, parameter, branches, reason, place)
+    ended = all(stop in FINISHED for branch in branches for stop in branch.stops)
+    return 0 if ended and complete is not False else UNFINISHED
+
+
+def record(
+    branches: Sequence[Branch], parameter: str, interval: tuple[float, float],
+    complete: bool | None, reason: str, at: Sequence[float] = (),
+) -> dict[str, Any]:  # fmt: skip
+    """What follow.json holds; points and events name their branch.
+
+    complete: all solutions at the values `at` are on these branches, which says nothing of the
+    values between them.
+    """
+    parts = [branch.record() for branch in branches]
+
+    def rows(key: str) -> list[dict[str, Any]]:
+        return [{"branch": k, **row} for k, part in enumerate(parts) for row in part[key]]
+
+    return {
+        "schema": SCHEMA, "parameter": parameter, "interval": list(interval),
+        "points": rows("points"), "events": rows("events"),
+        "branches": [{"stops": part["stops"], "closed": part["closed"]} for part in parts],
+        "complete": complete, "at": list(at), "reason": reason, "versions": versions(),
+    }  # fmt: skip
+
+
+def _write(place: Path, text: str, branches: list[Branch], title: str) -> None:
+    from ...io.plots import branch_figure, save_figure
+
+    with made(place):
+        write_bytes(place / "follow.json", text.encode("utf-8"))
+        if branches:
+            save_figure(branch_figure(branches, title=title), place / "follow.png")
+
+
+def _show(title: str, parameter: str, branches: list[Branch], reason: str, place: Path) -> None:
+    events = [(k, e) for k, branch in enumerate(branches) for e in branch.events]
+    shown = [item for item in events if item[1].kind is not EventKind.STATUS]
+    rest = ROWS - len(shown)
+    if len(events) - len(shown) <= rest:
+        shown = events
+    rows = [[str(k), e.kind.name.lower(), f"{e.parameter:.10g}", _way(e)] for k, e in shown]
+    show_table(title, ["branch", "event", parameter, ""], rows, numbers="left")
+    if len(shown) < len(events):
+        click.echo(f"{len(events) - len(shown)} changes of status are in follow.json")
+    for branch in branches:
+        click.echo(str(branch))
+    if reason:
+        click.echo(reason)
+    click.echo(f"results in {place}/")
+
+
+def _way(event: Event) -> str:
+    if event.stop is not None:
+        return event.stop.advice
+    words = [str(word) for word in (event.before, event.after) if word is not None]
+    return " -> ".join(shortened(word, SHOWN) for word in words)

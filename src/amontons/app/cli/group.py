@@ -1,0 +1,71 @@
+"""How commands end: exit codes, and one clear message for a user's mistake."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Any
+
+import click
+
+from ...core.errors import AmontonsError, TimeUp
+from .streams import open_missing, printed
+
+UNFINISHED, BAD_INPUT, INTERRUPTED = 1, 2, 130  # the last as shells tell of signals
+
+
+class Commands(click.Group):
+    """A group whose commands return their exit code and may raise AmontonsError."""
+
+    def main(self, args: Sequence[str] | None = None, *more: Any, **options: Any) -> Any:
+        """Run and exit; that something could not be printed is said on stderr."""
+        if not options.pop("standalone_mode", True):
+            return super().main(args, *more, standalone_mode=False, **options)
+        open_missing()
+        try:
+            code = super().main(args, *more, standalone_mode=False, **options)
+        except click.ClickException as error:
+            _say(error.show)
+            code = error.exit_code
+        except (click.Abort, KeyboardInterrupt):
+            _say_line("Interrupted.")
+            code = INTERRUPTED
+        reason = printed()
+        if reason is not None:
+            _say_line(f"Error: standard output: can not be written: {reason}")
+            code = BAD_INPUT
+        sys.exit(code if isinstance(code, int) else 0)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a command; a user's mistake becomes one message and exit code 2."""
+        try:
+            code = super().invoke(ctx)
+        except TimeUp as error:
+            _say_line(f"Not finished: {printable(str(error))}")
+            ctx.exit(UNFINISHED)
+        except AmontonsError as error:
+            _say_line(f"Error: {printable(str(error))}")
+            ctx.exit(BAD_INPUT)
+        except MemoryError:
+            _say_line("Error: not enough memory for this problem")
+            ctx.exit(BAD_INPUT)
+        except KeyboardInterrupt:
+            _say_line("Interrupted.")
+            ctx.exit(INTERRUPTED)
+        ctx.exit(code if isinstance(code, int) else 0)
+
+
+def _say_line(text: str) -> None:
+    _say(lambda: click.echo(text, err=True))
+
+
+def _say(show: Any) -> None:
+    """Print on stderr, if anybody can read it."""
+    with suppress(OSError):
+        show()
+
+
+def printable(text: str) -> str:
+    """The text without what a terminal can not show, such as bytes that are not UTF-8."""
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")

@@ -1,0 +1,271 @@
+"""`amontons run`: the steps of a case in time, written as they come, restartable."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from ...core.clock import Deadline, now
+from ...core.errors import FileFormatError, InvalidInput, NotConverged, NotWritten
+from ...core.files import make_folder, remove_empty
+from ...io.case import Case, Settings, identity, read_case
+from ...io.checkpoint import export_fclib, steps_of
+from ...mechanics.steps import Energies, TimeStep, at_rest, evolve
+from ...mechanics.steps.stepping import at_end
+from ...problem.solution import Outcome
+from .doubts import Doubts
+from .locking import locked
+from .run_folder import BALANCE, PICTURES, WORKS, RunFolder, clear, continued
+from .sources import case_file, naming_keys, with_flags
+from .stopping import Stopping
+from .terminal import check_folder, say_growth
+
+if TYPE_CHECKING:
+    from ...io.plots import Frame
+
+
+@dataclass
+class _Run:
+    """One call: the case, what was asked for, and the frames that are drawn at the end."""
+
+    case: Case
+    settings: Settings
+    every: int
+    pictures: bool
+    quiet: bool
+    time_limit: float | None
+    deadline: Deadline
+    stop: Stopping
+    frames: list[Frame] = field(default_factory=list)
+    doubts: Doubts = field(default_factory=Doubts)
+    failed: bool = False  # the step after the last one did not converge
+
+    def unfinished(self, time: float) -> str:
+        """What its pictures are stamped with where the last step at `time` is not the end."""
+        assert self.case.evolution is not None
+        if self.ended(time):
+            return ""
+        until = f"t = {time:.6g} of {self.case.evolution.until:g}"
+        why = ", the next step did not converge" if self.failed else ""
+        return f"NOT FINISHED ({until}{why})"
+
+    def ended(self, time: float) -> bool:
+        """True for the time of the last step."""
+        assert self.case.evolution is not None
+        return at_end(time, self.case.evolution.until, self.case.evolution.method.step)
+
+
+def run(
+    case: str, overrides: Sequence[str], tolerance: float | None, time_limit: float | None,
+    folder: str | None, export: str | None, every: int, pictures: bool, restart: bool,
+    quiet: bool, export_steps: str | None = None,
+) -> int:  # fmt: skip
+    """Step and write; returns the exit code."""
+    if time_limit is not None and not time_limit > 0:
+        raise InvalidInput(f"--time-limit: expected seconds > 0, got {time_limit}")
+    chosen = _chosen(export, export_steps)
+    deadline = Deadline.after(time_limit)
+    path = case_file(case)
+    read = read_case(path, overrides)
+    if read.evolution is None:
+        raise FileFormatError(
+            f"{case}: evolution: missing, expected a table with kind, step, until; one state "
+            f"without time is found by: amontons solve {case}"
+        )
+    place = check_folder(f"{path.stem}-results" if folder is None else folder)
+    exported = None if export is None else check_folder(export, "--export-fclib")
+    with naming_keys(read.model, str(path)):
+        _ = read.model.discretisation, read.model.law
+    if not quiet:
+        say_growth(read)
+    settings = with_flags(read.settings, tolerance)
+    with Stopping() as stop, ExitStack() as stack:
+        asked = _Run(read, settings, every, pictures, quiet, time_limit, deadline, stop)
+        for each in {p.resolve(): p for p in (place, exported) if p is not None}.values():
+            stack.callback(remove_empty, make_folder(each))
+            stack.enter_context(locked(each))
+            clear(each, path.stem)
+        try:
+            with stop.breaking():
+                results, steps = _prepared(asked, place, restart=restart)
+        except KeyboardInterrupt:
+            click.echo(f"{stop.word}.", err=True)
+            return stop.code
+        with _saying_what_is_safe(results):
+            if exported is not None:
+                steps = export_fclib(steps, exported, path.stem, chosen)
+            return _follow(steps, results, asked)
+
+
+def _chosen(export: str | None, steps: str | None) -> list[range] | None:
+    """The steps of --export-steps, None for all."""
+    if steps is None:
+        return None
+    if export is None:
+        raise InvalidInput("--export-steps: needs --export-fclib DIR")
+    try:
+        return steps_of(steps)
+    except InvalidInput as reason:
+        raise InvalidInput(f"--export-{reason}") from None
+
+
+def _prepared(
+    asked: _Run, place: Path, *, restart: bool
+) -> tuple[RunFolder, Iterator[TimeStep]]:
+    """The folder of results and the steps, from the beginning or from the checkpoint."""
+    read, settings = asked.case, asked.settings
+    assert read.evolution is not None
+    case = identity(read, settings)
+    if restart:
+        results, start, changed = continued(place, case)
+        for text in changed:
+            click.echo(f"--restart: {text}, from step {start.index + 1} on", err=True)
+    else:
+        results, start = RunFolder(place, case), at_rest(read.model)
+    steps = evolve(
+        read.model, read.evolution.method, until=read.evolution.until, start=start,
+        solver=settings.solver(), tolerance=settings.tolerance,
+        contact_tolerance=settings.contact_tolerance, max_iterations=settings.max_iterations,
+        time_limit=settings.time_limit,
+        deadline=asked.deadline,
+    )  # fmt: skip
+    if not restart:
+        results.save(start)
+    return results, steps
+
+
+@contextmanager
+def _saying_what_is_safe(results: RunFolder) -> Iterator[None]:
+    try:
+        yield
+    except NotWritten as reason:
+        raise NotWritten(
+            f"{reason}; the state after step {results.saved} is safe, go on with --restart"
+        ) from None
+
+
+def _follow(steps: Iterator[TimeStep], results: RunFolder, asked: _Run) -> int:
+    """Take the steps; the state is written whenever a picture is, and at the end."""
+    last, code = None, 0
+    try:
+        while True:
+            began = now()
+            with asked.stop.breaking():
+                step = next(steps, None)
+            if step is None:
+                break
+            results.add(step, now() - began)
+            last = step
+            asked.doubts.note(step, quiet=asked.quiet)
+            if step.state.index % asked.every == 0:
+                _keep(step, results, asked)
+            if not asked.quiet:
+                _show(step, asked)
+            if asked.stop.received is not None:  # where a library has swallowed it
+                raise KeyboardInterrupt
+            if asked.deadline.passed and not asked.ended(step.time):
+                code = _stopped(asked, step.time)
+                break
+    except KeyboardInterrupt:
+        click.echo(f"{asked.stop.word}; go on with --restart.", err=True)
+        code = asked.stop.code
+    except NotConverged as failure:
+        code = _failed(failure, results, asked)
+    except InvalidInput as reason:  # supports that push a node into what it meets
+        if not isinstance(reason, NotWritten):
+            _keep_last(last, results, asked)
+        raise
+    _keep_last(last, results, asked)
+    if asked.frames:
+        _draw(results, asked)
+    if not asked.quiet:
+        _summary(results)
+        for line in asked.doubts.lines():
+            click.echo(line)
+    return code
+
+
+def _failed(failure: NotConverged, results: RunFolder, asked: _Run) -> int:
+    """Say why a step was not made; returns the exit code."""
+    late = failure.solution.convergence.outcome is Outcome.TIME_LIMIT
+    if late and asked.deadline.passed:
+        time = results.rows[-1][1] if results.rows else 0.0
+        return _stopped(asked, time)
+    sys.stdout.flush()
+    click.echo(f"Not converged: {failure}", err=True)
+    asked.failed = True
+    return 1
+
+
+def _stopped(asked: _Run, time: float) -> int:
+    """Say that the time of the run is over; returns the exit code."""
+    assert asked.case.evolution is not None
+    sys.stdout.flush()
+    click.echo(
+        f"Stopped by --time-limit {asked.time_limit:g} at t = {time:.6g} of "
+        f"{asked.case.evolution.until:g}; go on with --restart.", err=True,
+    )  # fmt: skip
+    return 1
+
+
+def _keep_last(last: TimeStep | None, results: RunFolder, asked: _Run) -> None:
+    if last is not None and results.saved < last.state.index:
+        _keep(last, results, asked)
+
+
+def _keep(step: TimeStep, results: RunFolder, asked: _Run) -> None:
+    """Write the picture of a step and its state."""
+    results.draw(step)
+    results.save(step.state)
+    if asked.pictures:
+        from ...io.plots import Frame
+
+        asked.frames.append(Frame.of(step))
+
+
+def _draw(results: RunFolder, asked: _Run) -> None:
+    """Pictures and film of the steps of this call, energies of all steps so far."""
+    from ...io.plots import draw_film, energy_figure, save_figure
+
+    table = results.table
+    times = table["time"].tolist()
+    note = asked.unfinished(times[-1])
+    frames = [*asked.frames[:-1], replace(asked.frames[-1], stamp=note)]
+    draw_film(asked.case.model, frames, results.folder / PICTURES)
+    works = [Energies(*row) for row in table[list(WORKS)].tolist()]
+    save_figure(energy_figure(times, works, note=note), results.folder / BALANCE)
+
+
+def _show(step: TimeStep, asked: _Run) -> None:
+    """A line per written step; on a terminal the steps between pass by on one line."""
+    assert asked.case.evolution is not None
+    told = step.state.index % asked.every == 0 or asked.ended(step.time)
+    if told or (step.passage is not None and step.passage.jumped):
+        click.echo(f"{'' if not sys.stdout.isatty() else chr(13)}{step}")
+    elif sys.stdout.isatty():
+        until = asked.case.evolution.until
+        click.echo(f"\rt = {step.time:.6g} of {until:.6g} ", nl=False)
+
+
+def _summary(results: RunFolder) -> None:
+    """Sums of all works, and where the results are."""
+    table = results.table
+    if not len(table):
+        return
+    sums = {name: float(table[name].sum()) for name in (*WORKS, "defect")}
+    click.echo(
+        f"{len(table)} steps; work of loads {sums['loads']:.4g}, supports "
+        f"{sums['supports']:.4g}, contact {sums['contact']:.4g}; dissipated by damping "
+        f"{sums['damping']:.4g}, by the scheme {sums['numerical']:.4g}; "
+        f"gain {sums['gain']:.4g}, defect {sums['defect']:.1e}"
+    )
+    jumps = [f"{time:.6g}" for time in table["jump"] if time == time]
+    if jumps:
+        click.echo(f"jumps at t = {', '.join(jumps)}")
+    click.echo(f"results in {results.folder}/")

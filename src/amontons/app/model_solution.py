@@ -1,0 +1,84 @@
+"""The solution of a model: the discrete solution, and what it means in words of mechanics."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from ..core.warned import ResultWarning
+from ..io import results as output
+from ..problem.solution import FrictionSolution
+
+if TYPE_CHECKING:
+    from ..mechanics.model import ContactFields, Model
+
+OF_SOLUTION = (
+    "problem", "r", "u", "v", "status", "sliding", "margin", "convergence", "converged",
+    "pattern", "counts", "fclib_error", "max_penetration", "max_cone_violation",
+)  # fmt: skip
+OF_FIELDS = (
+    "displacement", "points", "frames", "weights", "gap", "pressure", "shear", "slip", "force",
+    "resultant",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class ModelSolution:
+    """A solved model.  Forwards what FrictionSolution and ContactFields know.
+
+    displacement: (nodes, dim) per body; gap, pressure (nc,), shear, slip (nc, d-1) per contact;
+    resultant (d,): force of the obstacles on the slaves, global axes; r, u, v, status and so
+    on as in FrictionSolution.
+    """
+
+    model: Model
+    solution: FrictionSolution
+    fields: ContactFields
+    assemble_seconds: float = 0.0
+
+    def __getattr__(self, name: str) -> Any:
+        if name in OF_SOLUTION:
+            return getattr(self.solution, name)
+        if name in OF_FIELDS:
+            return getattr(self.fields, name)
+        raise AttributeError(f"ModelSolution has no attribute {name!r}")
+
+    def __dir__(self) -> list[str]:
+        return sorted([*object.__dir__(self), *OF_SOLUTION, *OF_FIELDS])
+
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{count} {name}" for name, count in self.solution.counts.items())
+        outcome = self.solution.convergence.outcome.name.lower().replace("_", " ")
+        return f"<ModelSolution of {self.model.name or 'model'}: {counts}; {outcome}>"
+
+    @cached_property
+    def warnings(self) -> tuple[ResultWarning, ...]:
+        """Reasons to doubt a result that has converged, each with a name."""
+        from ..mechanics.model.doubts import model_warnings
+
+        return self.solution.warnings + model_warnings(self.model, self.fields)
+
+    def __str__(self) -> str:
+        return output.describe(self.output)
+
+    @property
+    def output(self) -> output.Output:
+        """What the writers need."""
+        return output.Output(
+            self.solution,
+            self.model,
+            self.fields,
+            title=self.model.name or "model",
+            assemble_seconds=self.assemble_seconds,
+            warnings=self.warnings,
+        )
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write the solution; the suffix decides: .vtu, .h5 (or .hdf5), .json."""
+        output.write(self.output, path)
+
+    def plot(self, path: str | os.PathLike[str]) -> None:
+        """Draw the status map of the contact surface and the pressure: .png, .svg or .pdf."""
+        output.plot(self.output, path)

@@ -1,0 +1,1 @@
+"""What everybody may use: errors, arrays, files, expressions, time, kernels."""

@@ -1,0 +1,132 @@
+"""Compiled functions, and the folder in which they are kept from one run to the next.
+
+Numba would keep them beside the package: there they outlive it, so that a removed package can
+still be imported, and where nobody may write it gives up.  Here they are kept in the user's
+cache, or where NUMBA_CACHE_DIR says, else in a folder that goes when the process ends.
+
+Numba takes what it has kept as valid while the file of a function is the same, whatever has
+become of the functions that it calls.  So all kernels are kept under a digest of all of them.
+"""
+
+from __future__ import annotations
+
+import atexit
+import hashlib
+import os
+import shutil
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core import config
+
+PACKAGE = Path(__file__).resolve().parents[1]
+MARK = b"njit("  # in every file with kernels
+ROOT = 0  # whose folders anybody may trust
+PATIENCE = 30 * 24 * 3600.0  # seconds after which kernels of another version may go
+Function = Callable[..., Any]
+
+
+def njit(**options: Any) -> Callable[[Function], Function]:
+    """`numba.njit` with the same options, its results kept in our folder."""
+
+    def decorate(function: Function) -> Function:
+        with _kept_in(_folder()):
+            made = numba.njit(**options)(function)
+        made._cache.save_overload = _if_it_can(made._cache.save_overload)
+        return made
+
+    return decorate
+
+
+def _if_it_can(save: Function) -> Function:
+    """Keep a result where there is room for it; on a full disk it is compiled again."""
+
+    def kept(*arguments: Any) -> None:
+        with suppress(OSError):
+            save(*arguments)
+
+    return kept
+
+
+@contextmanager
+def _kept_in(folder: str) -> Iterator[None]:
+    """Numba asks where to keep a function when it meets the function, not when it compiles."""
+    before = config.CACHE_DIR
+    config.CACHE_DIR = folder
+    try:
+        yield
+    finally:
+        config.CACHE_DIR = before
+
+
+@cache
+def _folder() -> str:
+    """A folder that is there and can be written, of this user alone."""
+    with suppress(OSError, RuntimeError):  # nobody may write there, or there is no home
+        above = _preferred()
+        _forget_old(above)
+        return _made(above / f"kernels-{_digest()}")
+    return _made_for_this_process()
+
+
+def _preferred() -> Path:
+    """What the user says, else the place for caches of this system."""
+    if config.CACHE_DIR:
+        return Path(config.CACHE_DIR) / "amontons"
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA", Path.home())) / "amontons" / "cache"
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches" / "amontons"
+    given = os.environ.get("XDG_CACHE_HOME", "")
+    return (Path(given) if os.path.isabs(given) else Path.home() / ".cache") / "amontons"
+
+
+def _made(folder: Path) -> str:
+    """The folder, made and tried; raises OSError where it can not be trusted or written.
+
+    What is kept is code: a folder of another user would run it here.
+    """
+    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    if hasattr(os, "getuid") and folder.stat().st_uid not in (os.getuid(), ROOT):
+        raise PermissionError(f"{folder}: belongs to another user")
+    tempfile.TemporaryFile(dir=folder).close()
+    os.utime(folder)  # in use
+    return str(folder)
+
+
+def _made_for_this_process() -> str:
+    """A folder that is removed at the end."""
+    folder, owner = tempfile.mkdtemp(prefix="amontons-"), os.getpid()
+
+    def remove() -> None:
+        if os.getpid() == owner:  # not a forked process, which has the same folder
+            shutil.rmtree(folder, ignore_errors=True)
+
+    atexit.register(remove)
+    return folder
+
+
+def _forget_old(above: Path) -> None:
+    """Remove kernels of other versions that have not been used for long."""
+    with suppress(OSError):
+        for folder in above.glob("kernels-*"):
+            if time.time() - folder.stat().st_mtime > PATIENCE:
+                shutil.rmtree(folder, ignore_errors=True)
+
+
+def _digest() -> str:
+    """Sixteen letters that change with any file that holds kernels."""
+    found = hashlib.sha256()
+    for path in sorted(PACKAGE.rglob("*.py")):
+        text = path.read_bytes()
+        if MARK in text:
+            found.update(f"{path.relative_to(PACKAGE)} {len(text)} ".encode())
+            found.update(text)
+    return found.hexdigest()[:16]

@@ -1,0 +1,82 @@
+"""Numbers and expressions of a case file, and what has them on a surface."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...core.errors import AmontonsError, InvalidInput, shown
+from ...core.expressions import Expression
+from .tables import Blame, Table
+
+if TYPE_CHECKING:
+    from ...mechanics.meshes import Mesh
+
+
+def on_surface(
+    kind: type, table: Table, mesh: Mesh, *more: str, free: bool = False
+) -> Any:  # fmt: skip
+    """A support or load of a table, on a surface that the mesh has; more: its other keys."""
+    part = on_named(kind, table, mesh.dim, *more, free=free)
+    with Blame(table, "on"):
+        mesh.surface(part.on)
+    return part
+
+
+def on_named(kind: type, table: Table, dim: int, *more: str, free: bool = False) -> Any:
+    """The same where the names of surfaces are not known yet."""
+    table.only("on", "value", *more)
+    value = vector(table, "value", dim, free=free)
+    return kind(table.text("on"), value, **configuration(table))
+
+
+def configuration(table: Table) -> dict[str, str]:
+    """The key configuration, where it is given."""
+    if "configuration" not in table.data:
+        return {}
+    return {"configuration": table.choice("configuration", ("reference", "current"))}
+
+
+def pressure_on(table: Table, mesh: Mesh) -> Any:
+    """The pressure of a table [[pressure]]."""
+    from ...mechanics.model import Pressure
+
+    table.only("on", "value")
+    name = table.text("on")
+    with Blame(table, "on"):
+        mesh.surface(name)
+    value = _entry(table, "value", table.need("value", "a number or an expression"), mesh.dim)
+    return Pressure(name, value)
+
+
+def vector(table: Table, key: str, dim: int, *, free: bool = False) -> list:
+    """One number, expression or, for supports, "free" (None) per component."""
+    words = "numbers or expressions" + (' or "free"' if free else "")
+    values = table.need(key, f"a list of {dim} {words}")
+    if not isinstance(values, list) or len(values) != dim:
+        alone = isinstance(values, int | float | str) and values != "free"
+        write = f"; write {[*[0] * (dim - 1), values]}" if alone else ""
+        raise table.error(key, f"expected a list of {dim} {words}, got {shown(values)}{write}")
+    return [
+        None if free and value == "free" else _entry(table, f"{key}[{k}]", value, dim)
+        for k, value in enumerate(values)
+    ]
+
+
+def scalar(table: Table, key: str) -> float | Expression:
+    """A number, or an expression in x, y, z."""
+    return _entry(table, key, table.need(key, "a number or an expression"), 3)
+
+
+def _entry(table: Table, key: str, value: Any, dim: int) -> float | Expression:
+    """A finite number, or an expression; one without variables is a number at once."""
+    if not isinstance(value, str):
+        return table.as_number(key, value)
+    try:
+        expression = Expression(value)
+        if dim == 2 and "z" in expression.names:
+            raise InvalidInput(f"expression {value!r}: 'z' does not exist in 2D")
+        return expression if expression.names else float(expression(np.zeros(3)))
+    except AmontonsError as reason:
+        raise table.error(key, str(reason)) from None

@@ -1,0 +1,119 @@
+"""Contact of a 3D model: maps of status and pressure on a surface, arrows of shear."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from ...problem.solution import ContactStatus
+from .contact_pairs import ContactPair
+from .style import COLOURS, INK, round_below
+
+if TYPE_CHECKING:
+    from ...mechanics.model import Model
+
+Array = NDArray[np.float64]
+Patches = Iterator[tuple[Array, NDArray[np.int64]]]  # polygons (k, corners, 2) and their nodes
+QUARTERS = {"quad9": ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3))}
+MAX_ARROWS = 400
+ARROW_LENGTH = 2.2  # of the longest, in spacings of the arrows: neighbours stay apart
+
+
+def draw_maps(
+    figure: Figure, left: Axes, right: Axes, pair: ContactPair, model: Model, *, named: bool
+) -> None:
+    """The surface seen along its mean normal: status left, pressure and shear arrows right."""
+    origin, axes, names = _view(pair.points)
+    patches, owner = _node_patches(model, pair, origin, axes)
+    colours = np.array([COLOURS[status] for status in ContactStatus])[pair.status]
+    known = owner >= 0
+    face = np.where(known, colours[np.maximum(owner, 0)], "#FFFFFF")
+    left.add_collection(
+        PolyCollection(patches, facecolors=face, edgecolors=face, linewidths=0.2)
+    )
+    pressure = np.where(known, pair.pressure[np.maximum(owner, 0)], 0.0)
+    shown = PolyCollection(patches, array=pressure, cmap="YlOrRd", edgecolors="face",
+                           linewidths=0.2)  # fmt: skip
+    right.add_collection(shown)
+    figure.colorbar(shown, ax=right, label="pressure", shrink=0.85)
+    tips = _shear_arrows(right, pair, origin, axes)
+    place = f" on {pair.name}" if named else ""
+    left.set_title(f"Contact status{place}")
+    right.set_title("Pressure, and shear on the slave (arrows)")
+    for panel in (left, right):
+        panel.set(aspect="equal", xlabel=names[0], ylabel=names[1])
+        panel.update_datalim(tips)  # no arrow leaves the frame; both panels show the same
+        panel.autoscale_view()
+
+
+def _view(points: Array) -> tuple[Array, Array, tuple[str, str]]:
+    """Origin and two axes (2, 3) to draw on: global ones if the surface is flat along them."""
+    spread = np.ptp(points, axis=0)
+    flat = int(np.argmin(spread))
+    if spread[flat] <= 0.5 * np.sort(spread)[1]:
+        kept = [k for k in range(3) if k != flat]
+        return np.zeros(3), np.eye(3)[kept], ("xyz"[kept[0]], "xyz"[kept[1]])
+    origin = points.mean(axis=0)
+    axes = np.linalg.svd(points - origin, full_matrices=False)[2][:2]
+    return origin, axes, ("first principal direction", "second principal direction")
+
+
+def _node_patches(
+    model: Model, pair: ContactPair, origin: Array, axes: Array
+) -> tuple[list[Array], NDArray[np.int64]]:
+    """Facets cut into one patch per node, and the contact at that node or -1."""
+    patches, owner = [], []
+    points = (model.bodies[pair.body].mesh.points - origin) @ axes.T
+    contact = np.full(len(points), -1)
+    contact[pair.node] = np.arange(len(pair.node))
+    for facets in pair.facets:
+        cut = _thirds if facets.kind == "tri6" else _quarters
+        for table in QUARTERS.get(facets.kind, [slice(None)]):
+            for patch, nodes in cut(points, facets.nodes[:, table]):
+                patches.extend(patch)
+                owner.append(contact[nodes])
+    return patches, np.concatenate(owner)
+
+
+def _quarters(points: Array, nodes: NDArray[np.int64]) -> Patches:
+    """A quadrilateral per corner: to the middles of the sides and the centre."""
+    corners = points[nodes]
+    centre = corners.mean(axis=1)
+    after = 0.5 * (corners + np.roll(corners, -1, axis=1))
+    for k in range(corners.shape[1]):
+        patch = np.stack([corners[:, k], after[:, k], centre, after[:, k - 1]], axis=1)
+        yield patch, nodes[:, k]
+
+
+def _thirds(points: Array, nodes: NDArray[np.int64]) -> Patches:
+    """A triangle per side for the node in its middle: the corners have no contact."""
+    corners = points[nodes[:, :3]]
+    centre = corners.mean(axis=1)
+    for k in range(3):
+        yield np.stack([corners[:, k], corners[:, k - 2], centre], axis=1), nodes[:, 3 + k]
+
+
+def _shear_arrows(axes: Axes, pair: ContactPair, origin: Array, view: Array) -> Array:
+    """Shear tractions in global axes, at most MAX_ARROWS of them; returns their tips (k, 2)."""
+    shear = np.einsum("ik,ikc->ic", pair.shear, pair.frames[:, 1:]) @ view.T
+    if not shear.any():
+        return np.empty((0, 2))
+    stride = -(-len(shear) // MAX_ARROWS)
+    at, shear = ((pair.points - origin) @ view.T)[::stride], shear[::stride]
+    spacing = np.sqrt(np.prod(np.maximum(np.ptp(at, axis=0), 1e-12)) / len(at))
+    length = np.linalg.norm(shear, axis=1)
+    shown = length > 1e-3 * length.max()
+    at, shear = at[shown], shear[shown]
+    scale = length.max() / (ARROW_LENGTH * spacing)
+    arrows = axes.quiver(at[:, 0], at[:, 1], shear[:, 0], shear[:, 1], color=INK, angles="xy",
+                         scale_units="xy", scale=scale, width=0.003, pivot="tail")  # fmt: skip
+    value = round_below(float(length.max()))
+    axes.quiverkey(arrows, 0.86, -0.12, value, f"{value:g}", labelpos="S", color=INK,
+                   labelsep=0.05, fontproperties={"size": 9})  # fmt: skip
+    return at + shear / scale

@@ -1,0 +1,292 @@
+"""Solutions as files: VTK, HDF5, JSON and figures, each complete or not there at all."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import platform
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.errors import InvalidInput
+from ..core.files import made, put, replacing
+from ..core.warned import ResultWarning
+from ..problem.solution import Convergence, FrictionSolution
+from ..solvers import METHODS
+
+if TYPE_CHECKING:
+    from h5py import File
+
+    from ..mechanics.model import ContactFields, Model
+
+Array = NDArray[np.float64]
+SCHEMA = "amontons/solution/1"
+LIBRARIES = ("amontons", "numpy", "scipy", "numba", "ngsolve")
+MOST_SETS = 12  # changes of sets that a summary shows; solution.json has all
+FIGURES = (".png", ".svg", ".pdf")
+
+
+@dataclass(frozen=True, eq=False)
+class Output:
+    """A solution and what is known about where it comes from.
+
+    model and fields go together; from_fclib: the HDF5 file is then an FCLib file as well.
+    """
+
+    solution: FrictionSolution
+    model: Model | None = None
+    fields: ContactFields | None = None
+    title: str = ""
+    method: str = ""  # as on the command line; empty: the name of the solver's class
+    assemble_seconds: float = 0.0
+    assemble_compiling: float = 0.0  # seconds of compiling that are in no other number
+    from_fclib: bool = False
+    uniqueness: dict[str, Any] | None = None  # what is known about other solutions
+    warnings: tuple[ResultWarning, ...] = ()
+
+
+# ------------------------------------------------------------------------------- choosing
+def write(output: Output, path: str | os.PathLike[str]) -> None:
+    """Write one file; the suffix decides: .vtu, .h5 (or .hdf5), .json."""
+    writers = {".vtu": write_vtu, ".h5": write_h5, ".hdf5": write_h5, ".json": write_json}
+    suffix = Path(path).suffix.lower()
+    if suffix not in writers:
+        raise InvalidInput(
+            f"{path}: expected a name that ends in {', '.join(writers)}, got {suffix!r}"
+        )
+    with replacing(path) as temporary:
+        writers[suffix](output, temporary)
+
+
+def plot(output: Output, path: str | os.PathLike[str]) -> None:
+    """Draw the status figure; the suffix decides: .png, .svg, .pdf."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in FIGURES:
+        raise InvalidInput(
+            f"{path}: expected a name that ends in {', '.join(FIGURES)}, got {suffix!r}"
+        )
+    with replacing(path) as temporary:
+        plot_status(output, temporary)
+
+
+def plot_status(output: Output, path: Path) -> None:
+    """Write status.png."""
+    from .plots import picture, status_figure
+
+    figure = status_figure(output.solution, output.fields, output.title, output.model)
+    put(path, picture(figure, path.suffix))
+
+
+def plot_convergence(output: Output, path: Path) -> None:
+    """Write convergence.png."""
+    from .plots import convergence_figure, picture
+
+    figure = convergence_figure(output.solution.convergence, output.title)
+    put(path, picture(figure, path.suffix))
+
+
+def save(
+    output: Output, folder: str | os.PathLike[str], copy: str | os.PathLike[str] | None = None
+) -> list[Path]:
+    """Write all files of a solution into a folder, made if need be; returns their paths.
+
+    copy: where a second solution.json goes.  Nothing is renamed before all is written, and a
+    failure leaves no new folder.
+    """
+    text = to_json(summary(output))  # before the first folder: it evaluates the solution
+    writers: dict[str, Callable[[Output, Path], None]] = {
+        "solution.json": lambda output, path: _write_text(path, text), "solution.h5": write_h5,
+        "status.png": plot_status, "convergence.png": plot_convergence,
+    }  # fmt: skip
+    if output.model is not None:
+        writers["solution.vtu"] = write_vtu
+    folder = Path(folder)
+    jobs = [(folder / name, writer) for name, writer in writers.items()]
+    if copy is not None:
+        jobs.append((Path(copy), writers["solution.json"]))
+    with ExitStack() as stack:
+        stack.enter_context(made(folder))
+        for path, writer in jobs:
+            writer(output, stack.enter_context(replacing(path)))
+    return [path for path, _ in jobs]
+
+
+def _write_text(path: Path, text: str) -> None:
+    put(path, text.encode("utf-8"))
+
+
+# ----------------------------------------------------------------------------------- JSON
+def summary(output: Output) -> dict[str, Any]:
+    """The record of a solve, schema amontons/solution/1; None for what is not finite."""
+    found, record = output.solution, output.solution.convergence
+    problem = found.problem
+    setup = record.history[0].seconds if record.history else 0.0
+    contacts = {"total": problem.contacts, **found.counts, "sliding": int(found.sliding.sum())}
+    resultant = None if output.fields is None else output.fields.resultant.tolist()
+    data = {
+        "schema": SCHEMA,
+        "title": output.title or problem.name,
+        "outcome": record.outcome.name.lower(),
+        "advice": record.advice,
+        "detail": record.detail,
+        "method": output.method or _method_name(record.solver),
+        "error": record.error,
+        "contact_error": record.contact_error,
+        "weakest": record.weakest,
+        "fclib_error": found.fclib_error,
+        "measure": record.measure.value,
+        "tolerance": record.tolerance,
+        "contact_tolerance": record.contact_tolerance,
+        "iterations": record.iterations,
+        "linear_iterations": record.linear_iterations,
+        "flops": record.flops,
+        "seconds": {
+            "assemble": output.assemble_seconds,
+            "setup": setup,  # factorisation and all else before the first judgement
+            "solve": record.seconds - setup,
+            "total": output.assemble_seconds + record.seconds,  # without compiling
+            "compiling": output.assemble_compiling + record.compiling,
+        },
+        "dimension": problem.dimension,
+        "unknowns": problem.unknowns,
+        "contacts": contacts,
+        "active_sets": _active_sets(record),
+        "resultant": resultant,
+        "max_penetration": found.max_penetration,
+        "max_cone_violation": found.max_cone_violation,
+        "uniqueness": output.uniqueness,
+        "warnings": [warning.record for warning in output.warnings],
+        "versions": versions(),
+    }
+    return finite(data)
+
+
+def _active_sets(record: Convergence) -> dict[str, Any] | None:
+    """What an active set method did step by step; None for other methods.
+
+    normal, tangential: |A_n| and |A_tau|; change: of u; settled: the first iteration with the
+    final sets, kept from then on.
+    """
+    steps = [
+        {"iteration": step.iteration, "error": step.error,
+         "linear_iterations": step.linear_iterations, **asdict(step.sets)}
+        for step in record.history if step.sets is not None
+    ]  # fmt: skip
+    return {"settled": record.sets_settled, "steps": steps} if steps else None
+
+
+def _sets_in_words(record: Convergence) -> str:
+    """A line with the iterations in which the active sets changed, "" without any."""
+    new = [step for step in record.history if step.sets is not None and not step.sets.kept]
+    if not new:
+        return ""
+    shown = [f"{step.iteration}: {step.sets}" for step in new]
+    if len(shown) > MOST_SETS:
+        shown = [*shown[: MOST_SETS - 1], "…", shown[-1]]
+    return (
+        f"active sets open/stick/slip, where they change: {', '.join(shown)} (of "
+        f"{record.iterations} iterations)"
+    )
+
+
+def _method_name(solver: str) -> str:
+    """Name on the command line of a solver's class, the class itself if it has none."""
+    return next((name for name, kind in METHODS.items() if kind.__name__ == solver), solver)
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python and of the libraries that are installed."""
+    found = {"python": platform.python_version()}
+    for name in LIBRARIES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def finite(value: Any) -> Any:
+    """The same data with None for numbers that JSON can not hold."""
+    if isinstance(value, dict):
+        return {key: finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    if isinstance(value, float | np.floating):
+        return float(value) if math.isfinite(value) else None
+    return value
+
+
+def to_json(data: Any) -> str:
+    """JSON text, strict: no NaN."""
+    return json.dumps(finite(data), indent=2, allow_nan=False) + "\n"
+
+
+def write_json(output: Output, path: Path) -> None:
+    """Write solution.json."""
+    _write_text(path, to_json(summary(output)))
+
+
+def describe(output: Output) -> str:
+    """What a person wants to know, in a few lines."""
+    text = str(output.solution)
+    if output.model is not None and not output.solution.problem.name:
+        text = f"{output.title or 'model'}: {text.partition(': ')[2]}"
+    lines = [text]
+    if output.solution.convergence.stamp:
+        lines.append("NOT CONVERGED: what follows is no solution")
+    sets = _sets_in_words(output.solution.convergence)
+    if sets:
+        lines.append(sets)
+    if output.fields is not None:
+        names = ("x", "y", "z")[: len(output.fields.resultant)]
+        total = output.fields.resultant
+        total = np.where(np.abs(total) > 1e-8 * np.abs(total).max(), total, 0.0)
+        pairs = zip(names, total, strict=True)
+        force = ", ".join(f"{name} {value:.6g}" for name, value in pairs)
+        lines.append(f"resultant on the slave: {force}")
+        lines.append(f"largest pressure: {output.fields.pressure.max(initial=0.0):.6g}")
+    lines += map(str, output.warnings)
+    return "\n".join(lines)
+
+
+# ------------------------------------------------------------------------------ HDF5, VTK
+def write_h5(output: Output, path: Path) -> None:
+    """Write solution.h5: r, u, v, status, sliding, margin, and points, frames of a model.
+
+    The solution of an FCLib problem is written as an FCLib file, with the group /solution.
+    """
+    from .fclib import hdf5_bytes, put_arrays, put_fclib
+
+    found, fields = output.solution, output.fields
+    arrays = {"r": found.r, "u": found.u, "v": found.v, "status": found.status,
+              "sliding": found.sliding.astype(np.int8), "margin": found.margin}  # fmt: skip
+    if output.model is not None and fields is not None:
+        arrays |= {"points": fields.points, "frames": fields.frames, "weights": fields.weights}
+        for body, values in zip(output.model.bodies, fields.displacement, strict=True):
+            arrays[f"displacement/{body.name}"] = values
+    notes = {"schema": SCHEMA, "outcome": found.convergence.outcome.name.lower(),
+             "error": found.convergence.error, "converged": int(found.converged)}  # fmt: skip
+
+    def fill(file: File) -> None:
+        if output.from_fclib:
+            put_fclib(file, found.problem, solution=found)
+        put_arrays(file, {k: a for k, a in arrays.items() if a is not None}, notes)
+
+    put(path, hdf5_bytes(fill))
+
+
+def write_vtu(output: Output, path: Path) -> None:
+    """Write solution.vtu; raises InvalidInput for a problem without geometry."""
+    from .vtk import write_model
+
+    if output.model is None or output.fields is None:
+        raise InvalidInput("vtu: this solution has no mesh; write .h5 or .json")
+    write_model(output.model, output.fields, output.solution, path)

@@ -1,0 +1,1 @@
+"""From meshes to discrete problems: elements, contact, models, steps in time."""

@@ -1,0 +1,255 @@
+"""Contact of nodes with obstacles where the nodes are now: the law, and its exact derivative.
+
+Per contact, at position x with the normal n(x) and gap g(x) of its obstacle, lambda the force
+on the node in global axes, and s = x - x_before + drift the motion since the last step:
+
+    y = lambda - rho s,   z_N = lambda . n - rho g,   z_T = (I - n n^T) y                   (1)
+    law(lambda, x) = lambda - max(z_N, 0) n - P(z_T),   P: |.| <= mu max(z_N, 0) or a bound (2)
+
+which is zero exactly where g >= 0, lambda . n >= 0, one of them zero, and friction opposes the
+motion along the tangent plane at x: [AC], [LR] problem (P) with the other sign of lambda.
+Forces in global axes leave the choice of tangents free, so that (2) turns with the frame.
+rho > 0 has the unit of force over length.  drift is (1 - gamma) V_T of [LR], else zero.
+
+Components that supports prescribe are left out: lambda and s count as zero there, the support
+takes them.
+
+[AC] P. Alart, A. Curnier, CMAME 92 (1991).
+[LR] T. Ligurský, Y. Renard, CMAME 280 (2014).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...problem.law.cones import Coulomb, Law
+from .geometry import Obstacle, frames
+
+Array = NDArray[np.float64]
+Pieces = NDArray[np.int8]
+OPEN, STICK, SLIP, BACK = 0, 1, 2, 3  # pieces of the law; BACK: slip against t, 2D only
+
+
+@dataclass(frozen=True, eq=False)
+class CurrentContact:
+    """Contacts of several obstacles: each meets `counts` nodes, one after another.
+
+    rho (nc,), force per length; free (nc, d), bool: components without a support.
+    """
+
+    obstacles: Sequence[Obstacle]
+    counts: Sequence[int]
+    law: Law
+    rho: Array
+    free: NDArray[np.bool_]
+
+    def _gathered(self, name: str, x: Array) -> Array:
+        """What the obstacles say at their nodes."""
+        parts = np.split(x, np.cumsum(self.counts)[:-1])
+        pairs = zip(self.obstacles, parts, strict=True)
+        return np.concatenate([getattr(obstacle, name)(part) for obstacle, part in pairs])
+
+    def gap(self, x: Array) -> Array:
+        """Gaps at positions x (nc, d): (nc,)."""
+        return self._gathered("gap", x)
+
+    def normals(self, x: Array) -> Array:
+        """Normals at positions x (nc, d): (nc, d)."""
+        return self._gathered("normals", x)
+
+    def gap_slopes(self, x: Array) -> Array:
+        """Gradients of the gaps, (nc, d)."""
+        return self._gathered("gap_slopes", x)
+
+    def normal_slopes(self, x: Array) -> Array:
+        """Derivatives of the normals by position, (nc, d, d)."""
+        return self._gathered("normal_slopes", x)
+
+    def local(self, force: Array, motion: Array, x: Array) -> tuple[Array, Array, Array]:
+        """(r, u, frames): reactions and [gap, slip], (nc, d), in the frames (nc, d, d) at x."""
+        axes = frames(self.normals(x))
+        r = np.einsum("pkc,pc->pk", axes, force * self.free)
+        u = np.einsum("pkc,pc->pk", axes, motion * self.free)
+        u[:, 0] = self.gap(x)
+        return r, u, axes
+
+    def at(self, force: Array, motion: Array, x: Array) -> ContactPoint:
+        """The law at forces lambda, motions s and positions x, all (nc, d)."""
+        return ContactPoint(self, force * self.free, motion * self.free, x)
+
+
+@dataclass(frozen=True, eq=False)
+class ContactPoint:
+    """Where (2) is evaluated; arrays are made when they are asked for."""
+
+    contact: CurrentContact
+    force: Array
+    motion: Array
+    x: Array
+
+    @cached_property
+    def n(self) -> Array:
+        """Normals, (nc, d)."""
+        return self.contact.normals(self.x)
+
+    @cached_property
+    def y(self) -> Array:
+        """lambda - rho s, (nc, d)."""
+        return self.force - self.contact.rho[:, None] * self.motion
+
+    @cached_property
+    def y_normal(self) -> Array:
+        """n . y, (nc,)."""
+        return (self.n * self.y).sum(axis=1)
+
+    @cached_property
+    def z_normal(self) -> Array:
+        """z_N, (nc,): positive where closed."""
+        return (self.n * self.force).sum(axis=1) - self.contact.rho * self.contact.gap(self.x)
+
+    @cached_property
+    def z_tangent(self) -> Array:
+        """z_T, (nc, d), in global axes."""
+        return self.y - self.n * self.y_normal[:, None]
+
+    @cached_property
+    def bound(self) -> Array:
+        """Largest friction force, (nc,)."""
+        return self._bound(self.z_normal > 0)
+
+    def _bound(self, closed: NDArray[np.bool_]) -> Array:
+        law = self.contact.law
+        if isinstance(law, Coulomb):
+            return law.mu * np.where(closed, self.z_normal, 0.0)
+        return np.array(law.coefficient)
+
+    @cached_property
+    def along(self) -> Array:
+        """2D: component of z_T along the tangent t of `frames`, (nc,); its length in 3D."""
+        if self.n.shape[1] == 2:
+            return (self.z_tangent * _tangents(self.n)).sum(axis=1)
+        return np.linalg.norm(self.z_tangent, axis=1)
+
+    @cached_property
+    def pieces(self) -> Pieces:
+        """Which piece of the law is active, (nc,): OPEN, STICK, SLIP or, in 2D, BACK.
+
+        Contacts without friction slip.  Under a given bound also open contacts stick or slip;
+        they have 4 added.
+        """
+        slide = np.abs(self.along) > self.bound
+        out = np.where(slide, np.where(self.along < 0, BACK, SLIP), STICK)
+        closed = self.z_normal > 0
+        if isinstance(self.contact.law, Coulomb):
+            out[self.contact.law.mu == 0] = SLIP
+            out[~closed] = OPEN
+        else:
+            out[~closed] += 4
+        return out.astype(np.int8)
+
+    def residual(self, pieces: Pieces | None = None) -> Array:
+        """(2), (nc, d), unit of force; or the selection functions of given pieces."""
+        if pieces is not None:
+            return self._selected(pieces)
+        normal = np.maximum(self.z_normal, 0.0)[:, None] * self.n
+        length = np.linalg.norm(self.z_tangent, axis=1)
+        scale = np.where(length > self.bound, self.bound / np.where(length > 0, length, 1), 1.0)
+        return self.force - normal - scale[:, None] * self.z_tangent
+
+    def _selected(self, pieces: Pieces) -> Array:
+        """(2) as if the given pieces were active."""
+        closed, kind = (pieces > 0) & (pieces < 4), pieces % 4
+        normal = np.where(closed, self.z_normal, 0.0)[:, None] * self.n
+        bound = self._bound(closed)
+        if self.n.shape[1] == 2:
+            sign = np.select([kind == SLIP, kind == BACK], [1.0, -1.0], 0.0)
+            slip = (sign * bound)[:, None] * _tangents(self.n)
+        else:
+            length = np.where(self.along > 0, self.along, 1.0)
+            slip = (np.where(kind >= SLIP, bound, 0.0) / length)[:, None] * self.z_tangent
+        return self.force - normal - slip - (kind == STICK)[:, None] * self.z_tangent
+
+    def margins(self, pieces: Pieces) -> Array:
+        """Distances to the borders of given pieces, (nc, 3): all positive inside of them.
+
+        Contacts without friction slip: no point is inside of their other closed pieces.
+        """
+        closed = (pieces > 0) & (pieces < 4)
+        z = np.where(closed, self.z_normal, -self.z_normal)
+        bound, kind = self._bound(closed), pieces % 4
+        far = np.full(len(z), np.inf)
+        borders = [bound - self.along, self.along - bound, -self.along - bound]
+        ahead = np.select([kind == STICK, kind == SLIP, kind == BACK], borders, far)
+        behind = np.where(kind == STICK, bound + self.along, far)
+        if isinstance(self.contact.law, Coulomb):
+            without = self.contact.law.mu == 0
+            other = without & ((kind == STICK) | (kind == BACK))  # pieces they do not have
+            ahead[without], behind[without] = np.inf, np.inf
+            ahead[other] = -np.inf
+        return np.stack([z, ahead, behind], axis=1)
+
+    def derivatives(self, pieces: Pieces | None = None) -> tuple[Array, Array, Array]:
+        """Derivatives of (2) by lambda, x and s, each (nc, d, d), on some (the active) pieces.
+
+        x moves n and g only: its part in s is the third array.
+        """
+        pieces = self.pieces if pieces is None else pieces
+        n, d = self.n, self.n.shape[1]
+        bend = self.contact.normal_slopes(self.x)
+        slope = self.contact.gap_slopes(self.x)
+        closed = ((pieces > 0) & (pieces < 4)).astype(float)
+        rho = self.contact.rho[:, None, None]
+        eye = np.eye(d)
+        tangential = eye - n[:, :, None] * n[:, None, :]
+        # z_N: row vectors by lambda and by x
+        z_x = np.einsum("pi,pij->pj", self.force, bend) - self.contact.rho[:, None] * slope
+        # z_T by x at fixed y
+        turned = -bend * self.y_normal[:, None, None]
+        turned -= n[:, :, None] * np.einsum("pi,pij->pj", self.y, bend)[:, None, :]
+        in_z, in_bound = self._friction(pieces)
+        if isinstance(self.contact.law, Coulomb):
+            in_bound = in_bound * (self.contact.law.mu * closed)[:, None]
+        else:
+            in_bound = np.zeros_like(in_bound)
+        normal = closed[:, None] * n + in_bound  # of the force, per z_N
+        by_force = eye - normal[:, :, None] * n[:, None, :] - in_z @ tangential
+        by_x = -normal[:, :, None] * z_x[:, None, :] - in_z @ turned
+        by_x -= (closed * self.z_normal)[:, None, None] * bend
+        if d == 2:
+            by_x -= self._turned_slip(pieces, bend)
+        by_motion = rho * (in_z @ tangential)
+        free = self.contact.free[:, None, :]
+        return by_force * free, by_x * free, by_motion * free
+
+    def _friction(self, pieces: Pieces) -> tuple[Array, Array]:
+        """Derivatives of P by z_T, (nc, d, d), and by the bound, (nc, d)."""
+        d, kind = self.n.shape[1], pieces % 4
+        in_z = np.where((kind == STICK)[:, None, None], np.eye(d), 0.0)
+        slip = kind >= SLIP
+        if d == 2:
+            sign = np.where(kind == SLIP, 1.0, -1.0)
+            return in_z, np.where(slip, sign, 0.0)[:, None] * _tangents(self.n)
+        length = np.where(self.along > 0, self.along, 1.0)
+        s = self.z_tangent / length[:, None]
+        bound = self._bound((pieces > 0) & (pieces < 4))
+        turning = (bound / length)[:, None, None] * (np.eye(d) - s[:, :, None] * s[:, None, :])
+        in_z = np.where(slip[:, None, None], turning, in_z)
+        return in_z, np.where(slip[:, None], s, 0.0)
+
+    def _turned_slip(self, pieces: Pieces, bend: Array) -> Array:
+        """2D: the derivative of +-t at a fixed bound, (nc, 2, 2): dt = -n (t . dn)."""
+        kind = pieces % 4
+        sign = np.select([kind == SLIP, kind == BACK], [1.0, -1.0], 0.0)
+        size = sign * self._bound((pieces > 0) & (pieces < 4))
+        along = np.einsum("pi,pij->pj", _tangents(self.n), bend)
+        return -size[:, None, None] * self.n[:, :, None] * along[:, None, :]
+
+
+def _tangents(n: Array) -> Array:
+    """t of `frames` in 2D, (nc, 2)."""
+    return np.stack([n[:, 1], -n[:, 0]], axis=1)

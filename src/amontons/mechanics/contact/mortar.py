@@ -1,0 +1,364 @@
+"""Dual mortar contact: gaps and displacements compared on average, one average per slave node.
+
+With the dual basis psi of the slave surface ([HSW] section 2, see `dual`) and
+
+    D_p = int psi_p phi_p,    M_pq = int psi_p phi_q^master,
+
+    u_p = R_p (v_p - sum_q (M_pq / D_p) v_q) + [gap_p, 0, 0],    gap_p = (1 / D_p) int g psi_p,
+
+R_p with rows n, t1(, t2), n out of the master into the slave, g > 0 where they are apart.  The
+reaction r_p = D_p lambda_p is a nodal force, lambda_p a traction.  All integrals are sums over
+segments: a uniform pressure then passes between flat meshes that do not match, and the forces
+on both sides cancel.  g is the gap of the curved surfaces (`curvature`), all else is of the
+facets.  Small strains: all is taken once, in the reference configuration.
+
+No multiplier is there for nodes that supports hold in the normal direction, and for those of
+which hardly anything faces the other side; their neighbours take their share, and feel their
+displacement: u_p then has the term R_p (int psi_p phi_s / D_p) v_s of such a node s.
+Components of the displacement that supports hold on both sides for good (planes of symmetry)
+are left out of u, and of the normals.  For good means to one value that does not depend on
+time: sides that are held at first and then moved apart slide, and friction acts.
+
+[HSW] S. Hüeber, G. Stadler, B. Wohlmuth, "A primal-dual active set algorithm for
+three-dimensional contact problems with Coulomb friction", SIAM J. Sci. Comput. 30 (2008).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ...core.errors import InvalidInput
+from ..meshes.cells import CELLS
+from ..meshes.facets import Facets
+from ..meshes.mesh import Mesh
+from ..meshes.surfaces import nodal_normals, nodal_weights
+from .clipping import line_rule, square_rule, triangle_rule
+from .curvature import heights
+from .dual import dual_functions, nodes_with_multiplier
+from .geometry import Obstacle, frames
+from .nodal import ContactRows, Field, check_exterior, contact_nodes
+from .overlap import check_different, not_facing
+from .pairs import KINDS, MAX_NODES
+from .segments import Segments, Surface, in_front
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+NO_MOTION = 0.1  # free part of an averaged normal below which supports hold the node in it
+EXACT = 1e-9  # the same for the normals of obstacles
+HARDLY = 0.1  # covered part of a node's weight below which it gets no multiplier
+AROUND = 0.7  # cosine between normals below which a facet lies around an edge
+ROUNDING = 1e-14  # averages below this are zeros with rounding errors
+SAME = 1e-12  # prescribed values that differ by less, relative to the largest, agree
+IN_PLANE = 1e-6  # of the surface's, or a facet's, size: how far a plane's nodes lie from it
+COVERED = 1e-6  # part of a facet that may be missing where it faces the other side as a whole
+RULES = {"line": line_rule(4), "tri": triangle_rule(4), "quad": square_rule(4)}
+
+
+def mortar_obstacle(
+    mesh: Mesh, surface: str, obstacle: Obstacle, *, held: Mask | None = None
+) -> tuple[ContactRows, Mask]:
+    """Contacts of a surface with a rigid obstacle in the mesh's own dofs, and found.
+
+    held (n, dim): components that supports prescribe, by default none.
+    found, (slave nodes,): nodes with a multiplier; only these have rows.
+    """
+    check_exterior(mesh, surface)
+    slave = Surface.of(mesh.points, mesh.surface(surface), surface)
+    n, dim = mesh.points.shape
+    normals = np.zeros((n, dim))
+    on = np.unique(slave.nodes)
+    normals[on] = obstacle.normals(mesh.points[on])
+    mass, moment = _against(slave, obstacle)
+    without = _held(normals, held, EXACT)
+    average = _Average.of(slave, np.arange(len(slave.nodes)), mass, without)
+    nodes = average.nodes
+    gap = average.of_moments(np.arange(len(moment)), moment[:, :, None])[:, 0]
+    rows = average.rows(frames(normals[nodes]), gap, None)
+    return rows, np.isin(contact_nodes(mesh, surface)[0], nodes)
+
+
+def mortar_contact(
+    slave: Mesh,
+    surface: str,
+    master: Mesh,
+    master_surface: str,
+    *,
+    held: Mask | None = None,
+    lasting: Array | None = None,
+    master_lasting: Array | None = None,
+) -> tuple[ContactRows, sparse.csc_array, Mask]:
+    """Contacts of a slave with a master surface: rows, their part on the master, and found.
+
+    As `pair_contact`: rows.H in the dofs of the slave mesh, the second matrix (n_master, nc d)
+    in those of the master; found, (slave nodes,): nodes with a multiplier.  held (n, dim):
+    components of the slave that supports prescribe; lasting, master_lasting (n, dim): values
+    that they prescribe at all times, NaN elsewhere.
+    Raises InvalidInput when the bodies do not face each other, for a surface in contact with
+    itself, and for facets without area.  Cost linear in the facets.
+    """
+    check_exterior(slave, surface)
+    check_exterior(master, master_surface)
+    check_different(slave, surface, master, master_surface)
+    over = Surface.of(slave.points, slave.surface(surface), surface)
+    under = Surface.of(master.points, master.surface(master_surface), master_surface)
+    parts = in_front(over, under, master, joined=slave is master)
+    if not len(parts.slave):
+        raise InvalidInput(not_facing(slave, surface, master, master_surface))
+    facets, of = np.unique(parts.slave, return_inverse=True)
+    normals = -_normals(over, facets)
+    mass = np.zeros((len(facets), MAX_NODES, MAX_NODES))
+    np.add.at(mass, of, parts.mass)
+    average = _Average.of(over, facets, mass, _held(normals, held, NO_MOTION))
+    across = average.onto(parts, of, under)
+    fixed = _held_together(
+        average.nodes, across, (slave.points, _values(lasting, slave)),
+        (master.points, _values(master_lasting, master)), _at_end(over),
+    )  # fmt: skip
+    axes = frames(_within(normals[average.nodes], fixed))
+    apart = average.onto_slave @ slave.points - across @ master.points
+    apart += average.of_moments(of, parts.bulge)
+    gap = np.einsum("pc,pc->p", axes[:, 0], apart)
+    size = max(np.abs(mesh.points).max(initial=0.0) for mesh in (slave, master))
+    gap[np.abs(gap) < ROUNDING * size] = 0.0
+    rows = average.rows(axes, gap, fixed)
+    found = np.isin(contact_nodes(slave, surface)[0], average.nodes)
+    return rows, -coupled_columns(across, axes, fixed), found
+
+
+@dataclass(frozen=True, eq=False)
+class _Average:
+    """Averages of nodal values over the slave surface, one for each node with multiplier.
+
+    nodes (nc,); weights (nc,): D_p; facets (f,) that take part, mass (f, 4, 4): int phi phi on
+    what faces the other side, psi (f, 4, 4): dual functions; onto_slave (nc, n): 1 at the node,
+    its average of others without multiplier besides.
+    """
+
+    surface: Surface
+    facets: Index
+    mass: Array
+    nodes: Index
+    weights: Array
+    psi: Array
+    onto_slave: sparse.csr_array
+
+    @classmethod
+    def of(cls, surface: Surface, facets: Index, mass: Array, held: Mask) -> _Average:
+        """From int phi phi (f, 4, 4) on some facets (f,); held (n,): no multiplier wanted."""
+        n = len(surface.points)
+        nodes, real = surface.nodes[facets], surface.real[facets]
+        whole = nodal_weights(surface.points, surface.blocks)
+        reached = _scatter(n, nodes, mass.sum(axis=2)) / np.where(whole > 0, whole, 1.0)
+        kept = nodes_with_multiplier(nodes, real, held, reached < HARDLY, reached)
+        psi = dual_functions(mass, kept[nodes] & real, real)
+        chosen = np.unique(nodes[kept[nodes] & real])
+        product = _between(nodes, psi @ mass, nodes, (n, n))[chosen]
+        weights = _scatter(n, nodes, np.einsum("faa->fa", psi @ mass))[chosen]
+        extra = product @ sparse.diags_array(np.where(kept, 0.0, 1.0))
+        own = sparse.csr_array(
+            (np.ones(len(chosen)), (np.arange(len(chosen)), chosen)), shape=(len(chosen), n)
+        )
+        return cls(surface, facets, mass, chosen, weights, psi,
+                   own + _cleaned(extra, weights))  # fmt: skip
+
+    @property
+    def points(self) -> Array:
+        """Points of the mesh, (n, dim)."""
+        return self.surface.points
+
+    @property
+    def facet_nodes(self) -> Index:
+        """Nodes of the facets that take part, (f, 4)."""
+        return self.surface.nodes[self.facets]
+
+    def of_function(self, field: Field) -> Array:
+        """int f psi_p / int psi_p, (nc,); f is interpolated on facets that face it in part."""
+        at_nodes = np.zeros(len(self.points))
+        used = np.unique(self.facet_nodes)
+        at_nodes[used] = field(self.points[used])
+        moments = np.einsum("fab,fb->fa", self.mass, at_nodes[self.facet_nodes])
+        exact = np.zeros((len(self.surface.nodes), MAX_NODES))
+        for of, phi, area, x in _gauss_points(self.surface):
+            exact[of, : len(phi)] += (area * field(phi @ x))[:, None] * phi
+        covered = self.mass.sum(axis=(1, 2))
+        whole = covered > (1 - COVERED) * self.surface.area[self.facets]
+        moments[whole] = exact[self.facets[whole]]
+        both = np.stack([moments, self.mass.sum(axis=2)], axis=2)
+        field_and_one = self.of_moments(np.arange(len(self.facets)), both)
+        return field_and_one[:, 0] / field_and_one[:, 1]
+
+    def onto(self, parts: Segments, of: Index, master: Surface) -> sparse.csr_array:
+        """Averages of the master's nodal values, (nc, n_master); of: facet of every segment."""
+        shape = (len(self.points), len(master.points))
+        moments = self.psi[of] @ parts.cross
+        product = _between(self.facet_nodes[of], moments, master.nodes[parts.master], shape)
+        return _cleaned(product[self.nodes], self.weights)
+
+    def of_moments(self, of: Index, moments: Array) -> Array:
+        """Averages (nc, c) of a field given as int phi_a field (k, 4, c); of: facets (k,)."""
+        values, where, n = self.psi[of] @ moments, self.facet_nodes[of], len(self.points)
+        sums = [_scatter(n, where, values[:, :, c]) for c in range(values.shape[2])]
+        return np.stack(sums, axis=1)[self.nodes] / self.weights[:, None]
+
+    def rows(self, axes: Array, gap: Array, fixed: Mask | None) -> ContactRows:
+        """Contacts with given frames and gaps, in the dofs of the slave."""
+        fixed = np.zeros(axes.shape[:2], dtype=bool) if fixed is None else fixed
+        H = coupled_columns(self.onto_slave, axes, fixed)
+        return ContactRows(
+            self.nodes, self.points[self.nodes], self.weights, gap, axes, H, self.of_function
+        )
+
+
+def coupled_columns(weights: sparse.csr_array, axes: Array, fixed: Mask) -> sparse.csc_array:
+    """H (n d, nc d) of averages weights (nc, n), seen in frames (nc, d, d).
+
+    fixed (nc, d): components that do not count.
+    """
+    entries = weights.tocoo()
+    contact, node = entries.coords
+    d = axes.shape[1]
+    values = entries.data[:, None, None] * (axes * ~fixed[:, None, :])[contact]
+    rows = np.broadcast_to((node[:, None] * d + np.arange(d))[:, None, :], values.shape)
+    columns = np.broadcast_to((contact[:, None] * d + np.arange(d))[:, :, None], values.shape)
+    shape = (weights.shape[1] * d, weights.shape[0] * d)
+    out = sparse.coo_array(
+        (values.ravel(), (rows.ravel(), columns.ravel())), shape=shape
+    ).tocsc()
+    out.eliminate_zeros()
+    return out
+
+
+# -------------------------------------------------------------------- the two sides
+def _normals(slave: Surface, facets: Index) -> Array:
+    """Normals at the nodes, (n, dim), averages without facets around an edge from `facets`.
+
+    Those that face the other side (f,) count, and all that turn from them by less than AROUND.
+    """
+    facing = np.zeros(len(slave.nodes), dtype=bool)
+    facing[facets] = True
+    first = np.zeros(slave.points.shape)
+    share = (slave.area / slave.corners)[facets, None, None] * slave.normal[facets, None]
+    np.add.at(first, slave.nodes[facets], share * slave.real[facets, :, None])
+    length = np.linalg.norm(first, axis=1)
+    along = np.einsum("fac,fc->fa", first[slave.nodes], slave.normal)
+    turned = ((along < AROUND * length[slave.nodes]) & slave.real).any(axis=1) & ~facing
+    blocks = np.split(turned, np.cumsum([len(b.nodes) for b in slave.blocks])[:-1])
+    kept = [Facets(b.kind, b.nodes[~out]) for b, out in zip(slave.blocks, blocks, strict=True)]
+    return nodal_normals(slave.points, tuple(kept))
+
+
+def _against(slave: Surface, obstacle: Obstacle) -> tuple[Array, Array]:
+    """int phi phi (f, 4, 4) and int g phi (f, 4) of whole facets, g the obstacle's gap."""
+    mass = np.zeros((len(slave.nodes), MAX_NODES, MAX_NODES))
+    moment = np.zeros((len(slave.nodes), MAX_NODES))
+    for of, phi, area, x in _gauss_points(slave):
+        n = len(phi)
+        mass[of, :n, :n] += area[:, None, None] * np.outer(phi, phi)
+        height = heights(np.broadcast_to(phi, (len(of), 1, n)), slave.slopes[of, :n], x)
+        gap = obstacle.gap(phi @ x + height * slave.normal[of])
+        moment[of, :n] += (area * gap)[:, None] * phi
+    return mass, moment
+
+
+def _gauss_points(side: Surface) -> Iterator[tuple[Index, Array, Array, Array]]:
+    """Point after point: facets (k,), shape functions (a,), weights (k,), corners (k, a, d)."""
+    for n in np.unique(side.corners):
+        cell, of = CELLS[KINDS[n - 2]], np.flatnonzero(side.corners == n)
+        x = side.points[side.nodes[of, :n]]
+        for at, weight in zip(*RULES[cell.kind], strict=True):
+            jac = cell.jacobians(x, at)
+            area = weight * np.sqrt(np.linalg.det(np.swapaxes(jac, 1, 2) @ jac))
+            yield of, cell.shape(at), area, x
+
+
+# -------------------------------------------------------------------- supports
+def _values(lasting: Array | None, mesh: Mesh) -> Array:
+    return np.full(mesh.points.shape, np.nan) if lasting is None else lasting
+
+
+def _held(normals: Array, held: Mask | None, threshold: float) -> Mask:
+    """Nodes (n,) that supports hold in the direction of their normal; held (n, dim)."""
+    free = np.ones(normals.shape, dtype=bool) if held is None else ~held
+    return np.linalg.norm(normals * free, axis=1) < threshold
+
+
+def _held_together(
+    nodes: Index, across: sparse.csr_array, slave: tuple[Array, Array],
+    master: tuple[Array, Array], at_end: Mask,
+) -> Mask:  # fmt: skip
+    """Components (nc, d) held for good to one value at the slave and at what lies opposite.
+
+    slave, master: points and lasting values, (n, d) each.  All nodes opposite are held so, or
+    those on the plane at which the slave ends (at_end (n, d)) and which stays a plane, as one
+    of symmetry: there the mirror image of the others brings their average to the same value.
+    """
+    contact, node = across.tocoo().coords
+    own, (x, values), (y, others) = nodes[contact], slave, master
+    size = np.nanmax(np.abs(np.concatenate([values, others, np.zeros_like(others[:1])])))
+    with np.errstate(invalid="ignore"):
+        agree = np.abs(values[own] - others[node]) <= SAME * size
+    near = IN_PLANE * float(np.ptp(x[nodes], axis=0).max())
+    in_plane = np.abs(x[own] - y[node]) <= near
+    every = np.ones((len(nodes), x.shape[1]), dtype=bool)
+    some, beside = np.zeros_like(every), np.zeros_like(every)
+    np.logical_and.at(every, contact, agree)
+    np.logical_or.at(some, contact, agree)
+    np.logical_or.at(beside, contact, agree & in_plane)
+    mirror = beside & at_end[nodes]
+    for k in range(x.shape[1]):
+        for first in _planes(x[nodes[mirror[:, k]], k], near):
+            on = np.abs(x[:, k] - first) <= near
+            if np.nanmax(values[on, k]) - np.nanmin(values[on, k]) > SAME * size:
+                mirror[on[nodes], k] = False
+    return some & (every | mirror)
+
+
+def _planes(coordinates: Array, near: float) -> Array:
+    """One coordinate of each group of them that are as near."""
+    ordered = np.unique(coordinates)
+    return ordered[np.diff(ordered, prepend=-np.inf) > near]
+
+
+def _at_end(side: Surface) -> Mask:
+    """Components (n, d) in which all facets of a node lie on one side of it."""
+    x = side.points[side.nodes]  # padded by the last: minima and maxima stay
+    low, high = np.full(side.points.shape, np.inf), np.full(side.points.shape, -np.inf)
+    np.minimum.at(low, side.nodes, np.broadcast_to(x.min(axis=1, keepdims=True), x.shape))
+    np.maximum.at(high, side.nodes, np.broadcast_to(x.max(axis=1, keepdims=True), x.shape))
+    near = IN_PLANE * np.maximum(high - low, 0.0).max(axis=1, keepdims=True)
+    return (side.points <= low + near) | (side.points >= high - near)
+
+
+def _within(normals: Array, fixed: Mask) -> Array:
+    """Unit normals without their fixed components (nc, d), where something is left of them."""
+    inside = normals * ~fixed
+    length = np.linalg.norm(inside, axis=1)
+    able = length > NO_MOTION
+    return np.where(able[:, None], inside / np.where(able, length, 1.0)[:, None], normals)
+
+
+# -------------------------------------------------------------------- sums over facets
+def _scatter(n: int, nodes: Index, values: Array) -> Array:
+    """Sums (n,) of values (f, a) at nodes (f, a)."""
+    return np.bincount(nodes.ravel(), values.ravel(), minlength=n)
+
+
+def _between(rows: Index, values: Array, columns: Index, shape: tuple) -> sparse.csr_array:
+    """Sum of blocks (f, a, b) at nodes rows (f, a) and columns (f, b)."""
+    where = (np.broadcast_to(rows[:, :, None], values.shape).ravel(),
+             np.broadcast_to(columns[:, None, :], values.shape).ravel())  # fmt: skip
+    return sparse.coo_array((values.ravel(), where), shape=shape).tocsr()
+
+
+def _cleaned(product: sparse.csr_array, weights: Array) -> sparse.csr_array:
+    """Rows over their weights, without rounding errors of zero."""
+    out = sparse.csr_array(sparse.diags_array(1 / weights) @ product)
+    out.data[np.abs(out.data) < ROUNDING] = 0.0
+    out.eliminate_zeros()
+    return out

@@ -1,0 +1,265 @@
+"""Segments: the parts of slave facets that face one master facet each, and integrals on them.
+
+The parts and the points on them are those of `cuts`; the cost of the search for pairs of facets
+grows with their number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from ...core.errors import InvalidInput
+from ..meshes.facets import Facets, corner_facets
+from ..meshes.mesh import Mesh
+from ..meshes.surfaces import facet_areas, facet_normals, nodal_normals
+from .curvature import heights, slopes
+from .cuts import Cuts, cuts, functions
+from .overlap import inside
+from .pairs import AROUND, BESIDE, DEEP, EDGEWISE, KINDS, MAX_NODES
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+FLAT_FACET = 1e-12  # area, relative to the square of the longest side, of a degenerate facet
+SLIVER = 1e-8  # part of a facet; biorthogonal functions on less are lost in rounding
+TWICE = 1e-6  # coverage above 1 by less is rounding
+CHUNK = 2000  # slave facets at a time, for memory
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Facets of all kinds of a surface in one table, with nodes (f, 4) padded by the last.
+
+    corners (f,): how many are real; centre, normal (f, dim), outward; radius, area (f,);
+    slopes (f, 4, dim): of the curved surface that the facets stand for, see `curvature`.
+    order: 1, or 2 for displacements of second order on them.
+    """
+
+    points: Array
+    nodes: Index
+    corners: Index
+    centre: Array
+    normal: Array
+    radius: Array
+    area: Array
+    slopes: Array
+    blocks: tuple[Facets, ...]
+    order: int = 1
+
+    @classmethod
+    def of(cls, points: Array, facets: tuple[Facets, ...], name: str) -> Surface:
+        """The table; raises InvalidInput for facets of second order or without area."""
+        if other := {block.kind for block in facets} - set(KINDS):
+            raise InvalidInput(
+                f"surface {name!r}: expected facets of first order, got {other.pop()!r}; take "
+                'order = 1 and finer cells, or method="nitsche"'
+            )
+        return cls.of_corners(points, facets, name)
+
+    @classmethod
+    def of_corners(cls, points: Array, facets: tuple[Facets, ...], name: str) -> Surface:
+        """The table of the corners of facets of any order, whose sides are straight."""
+        order = 2 if {block.kind for block in facets} - set(KINDS) else 1
+        blocks = tuple(corner_facets(block) for block in facets if len(block.nodes))
+        nodes = np.concatenate([_padded(block.nodes) for block in blocks])
+        corners = np.concatenate([np.full(len(b.nodes), b.nodes.shape[1]) for b in blocks])
+        area = np.concatenate([facet_areas(points, block) for block in blocks])
+        normal = np.concatenate([facet_normals(points, block) for block in blocks])
+        length = np.linalg.norm(normal, axis=1)
+        x = points[nodes]
+        real = np.arange(MAX_NODES) < corners[:, None]
+        centre = np.einsum("fa,fac->fc", real / corners[:, None], x)
+        radius = np.linalg.norm(x - centre[:, None], axis=2).max(axis=1)
+        power = points.shape[1] - 1
+        bad = np.flatnonzero(np.minimum(area, length) <= FLAT_FACET * radius**power)
+        if bad.size:
+            where = nodes[bad[0], : corners[bad[0]]]
+            raise InvalidInput(
+                f"surface {name!r}: the facet with nodes {where.tolist()} near "
+                f"{centre[bad[0]].tolist()} has no area; {bad.size} such facets, expected none"
+            )
+        normal = normal / length[:, None]
+        curved = slopes(points, blocks, nodes, real, normal)
+        return cls(points, nodes, corners, centre, normal, radius, area, curved, blocks, order)
+
+    @property
+    def real(self) -> Mask:
+        """Which slots of nodes are real, (f, 4)."""
+        return np.arange(MAX_NODES) < self.corners[:, None]
+
+
+@dataclass(frozen=True, eq=False)
+class Segments:
+    """Integrals on k segments: facets slave, master (k,); a, b are slots of their nodes.
+
+    mass (k, a, b): int phi_a phi_b; cross (k, a, b): int phi_a phi_b^master; bulge (k, a, dim):
+    int phi_a times how far the curved slave lies outside of its facet, less the same of the
+    master, as vectors; area (k,); gap (k,): mean distance of the facets along the slave's
+    normal, < 0 where they overlap.
+    """
+
+    slave: Index
+    master: Index
+    mass: Array
+    cross: Array
+    bulge: Array
+    area: Array
+    gap: Array
+
+    def at(self, chosen: Index | Mask) -> Segments:
+        """A selection of these segments."""
+        return Segments(*(getattr(self, one.name)[chosen] for one in fields(self)))
+
+
+def segments(slave: Surface, master: Surface, *, joined: bool = False) -> Segments:
+    """All segments of two surfaces that face each other.
+
+    joined: both are in one mesh, with common numbers; facets that share a node are no pair.
+    """
+    found = []
+    for chunk, facet in _candidates(slave, master):
+        if joined:
+            same = slave.nodes[chunk][:, :, None] == master.nodes[facet][:, None, :]
+            apart = ~same.any(axis=(1, 2))
+            chunk, facet = chunk[apart], facet[apart]
+        for of, opposite, parts in cuts(slave, master, chunk, facet):
+            found.append(_summed(slave, master, of, opposite, parts))
+    every = _joined(found, slave.points.shape[1])
+    reached = np.bincount(every.slave, every.area, minlength=len(slave.nodes))
+    return every.at((reached > SLIVER * slave.area)[every.slave])
+
+
+def in_front(over: Surface, under: Surface, master: Mesh, *, joined: bool) -> Segments:
+    """Segments that count: the nearest, and deep ones only where the bodies really overlap."""
+    every = segments(over, under, joined=joined)
+    deep = is_deep(over, under, every)
+    facets = np.unique(every.slave[deep])
+    beside = over.centre[facets] + BESIDE * over.radius[facets, None] * over.normal[facets]
+    counts = ~deep | np.isin(every.slave, facets[inside(master, beside)])
+    return nearest(over, every.at(counts))
+
+
+def is_deep(slave: Surface, master: Surface, every: Segments) -> Mask:
+    """Segments (k,) that overlap by more than the larger facet: perhaps through the body."""
+    size = np.maximum(slave.radius[every.slave], master.radius[every.master])
+    return every.gap < -DEEP * size
+
+
+def nearest(slave: Surface, every: Segments) -> Segments:
+    """Without the parts behind others: the nearest segments that cover each facet once."""
+    order = np.lexsort((np.abs(every.gap), every.slave))
+    area = every.area[order]
+    covered = np.cumsum(area)
+    first = np.ones(len(order), dtype=bool)
+    first[1:] = np.diff(every.slave[order]) > 0
+    before = np.maximum.accumulate(np.where(first, covered - area, 0.0))
+    kept = covered - before <= (1 + TWICE) * slave.area[every.slave[order]]
+    return every.at(np.sort(order[kept]))
+
+
+def _padded(nodes: Index) -> Index:
+    missing = MAX_NODES - nodes.shape[1]
+    return np.concatenate([nodes, np.repeat(nodes[:, -1:], missing, axis=1)], axis=1)
+
+
+def _joined(parts: list[Segments], dim: int) -> Segments:
+    none, square = np.zeros(0, dtype=np.int64), np.zeros((0, MAX_NODES, MAX_NODES))
+    empty = Segments(
+        none, none, square, square, np.zeros((0, MAX_NODES, dim)), np.zeros(0), np.zeros(0)
+    )
+    every = [empty, *parts]
+    return Segments(
+        *(np.concatenate([getattr(part, one.name) for part in every]) for one in fields(empty))
+    )
+
+
+# -------------------------------------------------------------------- search
+def _candidates(slave: Surface, master: Surface) -> Iterator[tuple[Index, Index]]:
+    """Pairs of facets that may face each other, a chunk of slave facets at a time."""
+    nodes = np.unique(master.nodes)
+    normals = nodal_normals(master.points, master.blocks)[nodes]
+    tree = cKDTree(master.points[nodes])
+    label = np.floor(np.log2(master.radius))
+    classes = [np.flatnonzero(label == value) for value in np.unique(label)]
+    trees = [(cKDTree(master.centre[c]), c, master.radius[c].max()) for c in classes]
+    for start in range(0, len(slave.nodes), CHUNK):
+        chunk = np.arange(start, min(start + CHUNK, len(slave.nodes)))
+        foot, beside = _feet(slave.centre[chunk], slave.normal[chunk], tree, normals)
+        reach = 2 * slave.radius[chunk] + beside
+        for centres, members, size in trees:
+            lists = centres.query_ball_point(foot, reach + size, return_sorted=True)
+            counts = np.array([len(one) for one in lists])
+            if not counts.any():
+                continue
+            facet = members[np.concatenate([np.asarray(f, dtype=np.int64) for f in lists if f])]
+            of = np.repeat(chunk, counts)
+            cosine = np.einsum("kc,kc->k", slave.normal[of], master.normal[facet])
+            facing = cosine < -EDGEWISE
+            yield of[facing], facet[facing]
+
+
+def _feet(centre: Array, normal: Array, tree: cKDTree, normals: Array) -> tuple[Array, Array]:
+    """Points (k, dim) in front of the facets about where the other side is; by how much beside.
+
+    The closest node that faces the facet gives the depth, then the one closest to that point.
+    """
+    foot, beside = centre, np.zeros(len(centre))
+    for _ in range(2):
+        distance, near = tree.query(foot, k=min(AROUND, tree.n))
+        distance, near = distance.reshape(len(foot), -1), near.reshape(len(foot), -1)
+        faces = np.einsum("kjc,kc->kj", normals[near], normal) < 0
+        first = np.where(faces.any(axis=1), faces.argmax(axis=1), faces.shape[1] - 1)
+        node = tree.data[near[np.arange(len(near)), first]]
+        depth = np.einsum("kc,kc->k", node - centre, normal)
+        foot = centre + depth[:, None] * normal
+        beside = np.linalg.norm(node - foot, axis=1)
+    return foot, beside
+
+
+# -------------------------------------------------------------------- integrals
+def _summed(
+    slave: Surface, master: Surface, of: Index, facet: Index, parts: Cuts
+) -> Segments:
+    """Integrals of the pairs that have a segment."""
+    pair, weight = parts.pair, parts.weight
+    sides = ((slave, of, parts.at), (master, facet, parts.opposite))
+    phi, psi = (
+        functions(KINDS[side.corners[which].max(initial=2) - 2], at)
+        for side, which, at in sides
+    )
+    k, n, m = len(of), phi.shape[2], psi.shape[2]
+    mass, cross = np.zeros((k, MAX_NODES, MAX_NODES)), np.zeros((k, MAX_NODES, MAX_NODES))
+    bulge = np.zeros((k, MAX_NODES, slave.points.shape[1]))
+    weighted = np.swapaxes(weight[:, :, None] * phi, 1, 2)
+    np.add.at(mass[:, :n, :n], pair, weighted @ phi)
+    np.add.at(cross[:, :n, :m], pair, weighted @ psi)
+    for side, facets, values, sign in ((slave, of, phi, 1), (master, facet, psi, -1)):
+        outside = _outside(side, facets[pair], values)
+        np.add.at(bulge[:, :n], pair, sign * (weighted @ outside))
+    area = mass.sum(axis=(1, 2))
+    on_slave = np.einsum("ka,kac->kc", mass.sum(axis=2), slave.points[slave.nodes[of]])
+    on_master = np.einsum("kb,kbc->kc", cross.sum(axis=1), master.points[master.nodes[facet]])
+    gap = np.einsum("kc,kc->k", on_master - on_slave, slave.normal[of])
+    gap /= np.where(area > 0, area, 1.0)
+    return Segments(of, facet, mass, cross, bulge, area, gap).at(area > 0)
+
+
+def _outside(side: Surface, facets: Index, values: Array) -> Array:
+    """Vectors (t, q, dim) from facets (t,) to the curved surface; values (t, q, a): phi."""
+    n = values.shape[2]
+    x, slope = side.points[side.nodes[facets, :n]], side.slopes[facets, :n]
+    return heights(values, slope, x)[:, :, None] * side.normal[facets, None]
+
+
+def bulge(side: Surface, facet: Index, shape: Array) -> Array:
+    """Vectors (q, dim) from points of facets (q,) to the curved surface; shape (q, 4): phi."""
+    out = np.zeros((len(facet), side.points.shape[1]))
+    for n in np.unique(side.corners[facet]):
+        mine = side.corners[facet] == n
+        out[mine] = _outside(side, facet[mine], shape[mine, None, :n])[:, 0]
+    return out

@@ -1,0 +1,130 @@
+"""Checks of cells at the border: shapes, node numbers, orientation, degenerate cells."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...core.arrays import integers
+from ...core.errors import InvalidInput
+from .cells import CELLS, FIRST, ReferenceCell
+
+if TYPE_CHECKING:
+    from .facets import Cells
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+STRAIGHT = 1e-9  # distance from the middle, relative to the largest cell
+FLAT = 1e-10  # det / (longest edge)^dim below which a cell counts as degenerate
+# node order of the mirrored cell
+MIRROR = {
+    "tri": [0, 2, 1],
+    "quad": [0, 3, 2, 1],
+    "tet": [0, 2, 1, 3],
+    "hex": [0, 3, 2, 1, 4, 7, 6, 5],
+    "wedge": [0, 2, 1, 3, 5, 4],
+    "pyramid": [0, 3, 2, 1, 4],
+}
+for _kind in ("tri6", "quad9", "tet10", "hex27"):
+    _corners, _parents = MIRROR[FIRST[_kind]], [set(p) for p in CELLS[_kind].parents]
+    MIRROR[_kind] = _corners + [
+        len(_corners) + _parents.index({_corners[k] for k in p}) for p in _parents
+    ]
+
+
+def checked_cells(points: Array, kind: str, nodes: ArrayLike, region: str) -> Index:
+    """Read-only node numbers (k, nodes), every cell positive; raises InvalidInput otherwise.
+
+    A cell negative at all its corners is mirrored; one that changes sign is not valid.
+    """
+    if kind not in CELLS or CELLS[kind].dim != points.shape[1]:
+        fitting = [c.kind for c in CELLS.values() if c.dim == points.shape[1]]
+        raise InvalidInput(f"cells: expected one of {', '.join(fitting)}, got {kind!r}")
+    cell = CELLS[kind]
+    table = integers(f"{kind} cells", nodes)
+    if table.ndim != 2 or table.shape[1] != cell.nodes:
+        raise InvalidInput(f"{kind} cells: expected shape (k, {cell.nodes}), got {table.shape}")
+    if table.min() < 0 or table.max() >= len(points):
+        raise InvalidInput(
+            f"{kind} cells: expected node numbers 0..{len(points) - 1}, "
+            f"got {table.min()}..{table.max()}"
+        )
+    _check_straight(cell, points[table], region)
+    low, high = _determinants(cell, points[table])
+    turned = high < -FLAT
+    table[turned] = table[np.flatnonzero(turned)[:, None], MIRROR[kind]]
+    bad = np.flatnonzero(~turned & (low <= FLAT))
+    if bad.size:
+        raise InvalidInput(
+            _complaint(kind, region, table[bad[0]], points, int(bad.size), low[bad[0]])
+        )
+    table.flags.writeable = False
+    return table
+
+
+def check_repeated(points: Array, blocks: Sequence[Cells]) -> None:
+    """Raise InvalidInput when cells have the same nodes: their stiffness would count twice."""
+    marks = np.random.default_rng(0).integers(2**63, size=len(points), dtype=np.uint64)
+    label = np.concatenate([marks[b.nodes].sum(axis=1) for b in blocks])  # modulo 2^64
+    order = np.argsort(label, kind="stable")
+    same = np.flatnonzero(np.diff(label[order]) == 0)
+    starts = np.cumsum([0, *(len(b.nodes) for b in blocks)])
+
+    def nodes_of(cell: int) -> Index:
+        k = int(np.searchsorted(starts, cell, side="right")) - 1
+        return np.sort(blocks[k].nodes[cell - starts[k]])
+
+    same = [k for k in same if np.array_equal(nodes_of(order[k]), nodes_of(order[k + 1]))]
+    if same:
+        nodes = nodes_of(order[same[0]])
+        centre = ", ".join(f"{c:.4g}" for c in points[nodes].mean(axis=0))
+        raise InvalidInput(
+            f"mesh: two cells near ({centre}) have the same nodes {nodes.tolist()}; "
+            f"{len(same)} such pairs, expected every cell once"
+        )
+
+
+def _check_straight(cell: ReferenceCell, coordinates: Array, region: str) -> None:
+    """Nodes between corners must be in the middle: the engine knows straight sides only."""
+    first = cell.corner_count
+    size = np.ptp(coordinates, axis=1).max(initial=0.0)
+    for k, parents in enumerate(cell.parents):
+        off = coordinates[:, first + k] - coordinates[:, list(parents)].mean(axis=1)
+        if np.abs(off).max() > STRAIGHT * size:
+            raise InvalidInput(
+                f"{cell.kind} cells: expected straight sides, nodes in the middle; region "
+                f"{region!r} has others"
+            )
+
+
+def _determinants(cell: ReferenceCell, coordinates: Array) -> tuple[Array, Array]:
+    """Smallest and largest Jacobian determinant of each cell over h^dim, each (k,)."""
+    size = np.ptp(coordinates, axis=1).max(axis=1)
+    scale = np.where(size > 0, size, 1.0) ** cell.dim
+    where = cell.gauss[0] if cell.kind == "pyramid" else cell.corners
+    values = np.stack([determinant(cell.jacobians(coordinates, x)) for x in where])
+    return values.min(axis=0) / scale, values.max(axis=0) / scale
+
+
+def determinant(matrices: Array) -> Array:
+    """Determinants of (k, 2, 2) or (k, 3, 3), (k,): written out, for speed."""
+    a = matrices
+    if a.shape[1] == 2:
+        return a[:, 0, 0] * a[:, 1, 1] - a[:, 0, 1] * a[:, 1, 0]
+    return np.einsum("ki,ki->k", a[:, :, 0], np.cross(a[:, :, 1], a[:, :, 2]))
+
+
+def _complaint(
+    kind: str, region: str, nodes: Index, points: Array, count: int, value: float
+) -> str:
+    centre = ", ".join(f"{c:.4g}" for c in points[nodes].mean(axis=0))
+    what = (
+        "degenerate (no volume)" if abs(value) <= FLAT else "folded (its Jacobian changes sign)"
+    )
+    return (
+        f"mesh: {kind} cell near ({centre}) in region {region!r} is {what}; "
+        f"{count} such cells, expected none"
+    )

@@ -1,0 +1,136 @@
+"""Sides of cells: outward orientation of given facets, and the boundary of a mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...core.arrays import integers
+from ...core.errors import InvalidInput
+from .cells import CELLS, FACET_KIND, FIRST
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Cells of one kind in one region: nodes (k, nodes per cell) in VTK order."""
+
+    kind: str
+    nodes: Index
+    region: str = "default"
+
+
+@dataclass(frozen=True, eq=False)
+class Facets:
+    """Facets of one kind ("line", "tri", "quad", "line3", …): nodes (k, nodes per facet).
+
+    Right-hand rule outwards; in 2D the outward normal is the right side of the direction.
+    """
+
+    kind: str
+    nodes: Index
+
+
+def corner_facets(facets: Facets) -> Facets:
+    """The same facets as those of first order on their corners; their sides are straight."""
+    kind = FIRST.get(facets.kind, facets.kind)
+    return Facets(kind, facets.nodes[:, : CELLS[kind].nodes])
+
+
+def sides(cells: tuple[Cells, ...], near: NDArray[np.bool_] | None = None) -> dict[int, Index]:
+    """All sides of all cells, outwards, by number of nodes: {nodes per side: (k, nodes)}.
+
+    near, (n,): only sides all of whose nodes are marked.
+    """
+    found: dict[int, list[Index]] = {}
+    for block in cells:
+        for side in CELLS[block.kind].facets:
+            nodes = block.nodes[:, side]
+            if near is not None:
+                nodes = nodes[near[nodes].all(axis=1)]
+            found.setdefault(len(side), []).append(nodes)
+    return {size: np.concatenate(tables) for size, tables in found.items()}
+
+
+def boundary(cells: tuple[Cells, ...]) -> tuple[Facets, ...]:
+    """Facets that belong to one cell only, outwards."""
+    out = []
+    dim = CELLS[cells[0].kind].dim if cells else 3
+    for size, nodes in sorted(sides(cells).items()):
+        _, first, count = np.unique(
+            np.sort(nodes, axis=1), axis=0, return_index=True, return_counts=True
+        )
+        out.append(Facets(FACET_KIND[dim, size], nodes[np.sort(first[count == 1])]))
+    return tuple(block for block in out if len(block.nodes))
+
+
+def inner_facets(cells: tuple[Cells, ...], facets: tuple[Facets, ...], points: int) -> int:
+    """How many of the given facets lie between two cells."""
+    near = np.zeros(points, dtype=bool)
+    for block in facets:
+        near[block.nodes] = True
+    known = sides(cells, near)
+    count = 0
+    for block in facets:
+        both = np.concatenate([known[block.nodes.shape[1]], block.nodes])
+        _, times = np.unique(np.sort(both, axis=1), axis=0, return_counts=True)
+        count += int((times > 2).sum())  # twice as a side of cells, once as a given facet
+    return count
+
+
+def oriented(
+    cells: tuple[Cells, ...], facets: tuple[Facets, ...], name: str, points: Array
+) -> tuple[Facets, ...]:
+    """The same facets outwards, each once; raises InvalidInput if one is no side of a cell.
+
+    A facet between two cells takes the direction out of the first.
+    """
+    blocks = [Facets(b.kind, _node_table(b, name, points)) for b in facets if len(b.nodes)]
+    near = np.zeros(len(points), dtype=bool)
+    for block in blocks:
+        near[block.nodes] = True
+    known = sides(cells, near)
+    return tuple(
+        Facets(b.kind, _looked_up(b.nodes, known.get(b.nodes.shape[1]), name, points))
+        for b in blocks
+    )
+
+
+def _node_table(block: Facets, name: str, points: Array) -> Index:
+    nodes = integers(f"surface {name!r}", block.nodes)
+    dim = points.shape[1]
+    kinds = {size: kind for (d, size), kind in FACET_KIND.items() if d == dim}
+    if nodes.ndim != 2 or kinds.get(nodes.shape[1]) != block.kind:
+        raise InvalidInput(
+            f"surface {name!r}: expected facets {', '.join(kinds.values())} in {dim}D, "
+            f"got {block.kind!r} with nodes of shape {nodes.shape}"
+        )
+    if nodes.min() < 0 or nodes.max() >= len(points):
+        raise InvalidInput(
+            f"surface {name!r}: expected node numbers 0..{len(points) - 1}, "
+            f"got {nodes.min()}..{nodes.max()}"
+        )
+    return nodes
+
+
+def _looked_up(nodes: ArrayLike, known: Index | None, name: str, points: Array) -> Index:
+    """Rows of `known` with the same nodes as the facets, each facet once."""
+    wanted = np.unique(np.sort(nodes, axis=1), axis=0)
+    if known is None:
+        known = np.zeros((0, wanted.shape[1]), dtype=np.int64)
+    both = np.concatenate([np.sort(known, axis=1), wanted])
+    _, label = np.unique(both, axis=0, return_inverse=True)
+    label = label.ravel()
+    place = np.full(label.max(initial=-1) + 1, -1)
+    place[label[: len(known)][::-1]] = np.arange(len(known))[::-1]  # the first cell wins
+    row = place[label[len(known) :]]
+    if (row < 0).any():
+        where = points[wanted[np.flatnonzero(row < 0)[0]]].mean(axis=0)
+        raise InvalidInput(f"surface {name!r}: the facet near {where} is no side of a cell")
+    out = known[row]
+    out.flags.writeable = False
+    return out

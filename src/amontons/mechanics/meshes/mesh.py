@@ -1,0 +1,149 @@
+"""Meshes as plain arrays: points, cells by region, outward facets of named surfaces."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ...core.arrays import LARGEST, real, squarable
+from ...core.errors import InvalidInput, shown
+from ...linear.levels import checked_levels
+from .cells import CELLS
+from .check import check_repeated, checked_cells
+from .facets import Cells, Facets, boundary, oriented
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A mesh in 2D or 3D, of first order or, see `second_order`, of second order.
+
+    points (n, dim), unit of length; cells: blocks by kind and region; surfaces: name -> facets.
+    Every point belongs to a cell; inverted cells are turned, degenerate and repeated ones
+    rejected.
+    grid: cells per direction if the mesh is a structured box (multigrid makes use of it).
+    levels: prolongations of nodal values, finest first: levels[0] has shape (n, nodes of the
+    next coarser mesh), levels[1] leads from the one after that to it, and so on; every coarse
+    node is a node of this mesh.  `box`, `refined` and `second_order` fill them.
+    """
+
+    points: Array
+    cells: tuple[Cells, ...]
+    surfaces: dict[str, tuple[Facets, ...]] = field(default_factory=dict)
+    grid: tuple[int, ...] | None = None
+    name: str = ""
+    levels: tuple[sparse.csr_array, ...] = ()
+
+    def __post_init__(self) -> None:
+        points = real("points", self.points)
+        if points.ndim != 2 or points.shape[1] not in (2, 3):
+            raise InvalidInput(f"points: expected shape (n, 2) or (n, 3), got {points.shape}")
+        largest = LARGEST ** (1 / (points.shape[1] - 1))  # areas are squared in 3D
+        object.__setattr__(self, "points", squarable("points", points, largest))
+        _check_parts("cells", self.cells, Cells)
+        if not isinstance(self.surfaces, Mapping):
+            raise InvalidInput(f"surfaces: expected name -> facets, got {shown(self.surfaces)}")
+        for name, facets in self.surfaces.items():
+            _check_parts(f"surface {name!r}", facets, Facets)
+        blocks = tuple(
+            Cells(b.kind, checked_cells(points, b.kind, b.nodes, b.region), b.region)
+            for b in self.cells
+            if len(b.nodes)
+        )
+        object.__setattr__(self, "cells", blocks)
+        self._check_use()
+        check_repeated(points, blocks)
+        surfaces = {k: oriented(blocks, v, k, points) for k, v in self.surfaces.items()}
+        object.__setattr__(self, "surfaces", surfaces)
+        object.__setattr__(self, "levels", checked_levels(self.levels, len(points)))
+
+    def _check_use(self) -> None:
+        if not self.cells:
+            raise InvalidInput(f"mesh: expected cells of dimension {self.dim}, got none")
+        if len({CELLS[block.kind].order for block in self.cells}) > 1:
+            raise InvalidInput("mesh: expected cells of one order, got both")
+        used = np.zeros(len(self.points), dtype=bool)
+        for block in self.cells:
+            used[block.nodes] = True
+        if not used.all():
+            raise InvalidInput(
+                f"points[{int(np.flatnonzero(~used)[0])}]: belongs to no cell; "
+                f"{int((~used).sum())} such points, leave them out and renumber"
+            )
+
+    def __repr__(self) -> str:
+        kinds = ", ".join(f"{len(b.nodes)} {b.kind}" for b in self.cells)
+        return (
+            f"Mesh({self.dim}D, {len(self.points)} points, {kinds}; regions "
+            f"{', '.join(self.regions)}; surfaces {', '.join(self.surfaces) or 'none'})"
+        )
+
+    @property
+    def dim(self) -> int:
+        """2 or 3."""
+        return self.points.shape[1]
+
+    @property
+    def order(self) -> int:
+        """1, or 2 with nodes also in the middle of edges, quadrilaterals and hexahedra."""
+        return CELLS[self.cells[0].kind].order
+
+    @property
+    def regions(self) -> tuple[str, ...]:
+        """Names of the regions in order of appearance."""
+        return tuple(dict.fromkeys(block.region for block in self.cells))
+
+    @property
+    def cell_count(self) -> int:
+        """Number of cells of all kinds."""
+        return sum(len(block.nodes) for block in self.cells)
+
+    def surface(self, name: str) -> tuple[Facets, ...]:
+        """Facets of a named surface; a wrong name lists the known ones and the nearest."""
+        if name not in self.surfaces:
+            raise InvalidInput(unknown("surface", name, self.surfaces))
+        facets = self.surfaces[name]
+        if not sum(len(block.nodes) for block in facets):
+            raise InvalidInput(f"surface {name!r}: holds no facets")
+        return facets
+
+    @cached_property
+    def boundary(self) -> tuple[Facets, ...]:
+        """All facets that belong to one cell only."""
+        return boundary(self.cells)
+
+    def surface_nodes(self, name: str) -> Index:
+        """Sorted node numbers of a surface, (k,)."""
+        return np.unique(np.concatenate([b.nodes.ravel() for b in self.surface(name)]))
+
+    def bounding_box(self) -> tuple[Array, Array]:
+        """Smallest and largest coordinates, each (dim,)."""
+        return self.points.min(axis=0), self.points.max(axis=0)
+
+
+def _check_parts(name: str, parts: object, kind: type) -> None:
+    """Raise InvalidInput for what is no sequence of blocks with tables of nodes."""
+    if not isinstance(parts, Sequence) or not all(isinstance(b, kind) for b in parts):
+        raise InvalidInput(f"{name}: expected blocks of {kind.__name__}, got {shown(parts)}")
+    for block in parts:
+        table = block.nodes
+        if not isinstance(table, Sequence | np.ndarray) or not getattr(table, "ndim", 1):
+            raise InvalidInput(f"{name}: expected a table of nodes, got {shown(block.nodes)}")
+
+
+def unknown(what: str, name: object, known: object) -> str:
+    """A message for a name that does not exist: lists the known ones and the nearest."""
+    names = [str(k) for k in known]  # type: ignore[attr-defined]
+    if not names:
+        return f"{what} {name!r}: not found, there are no named {what}s"
+    near = difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    return f"{what} {name!r}: not found, known: {', '.join(sorted(names))}{hint}"

@@ -1,0 +1,94 @@
+"""Integrals over surfaces and averaged normals, all from facets: no NGSolve here."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import InvalidInput
+from .cells import CELLS
+from .facets import Facets
+
+Array = NDArray[np.float64]
+
+ZERO = 1e-12  # weights below this part of the largest are rounding errors
+
+
+def facet_normals(points: Array, facets: Facets, at: Array | None = None) -> Array:
+    """Outward normals times area per reference area at a reference point (default: centre).
+
+    Shape (k, dim).  Their length is the ratio of areas ds / d reference.
+    """
+    cell = CELLS[facets.kind]
+    return outward(cell.jacobians(points[facets.nodes], cell.centre if at is None else at))
+
+
+def outward(jac: Array) -> Array:
+    """The same from the slopes of facets (k, dim, dim - 1) at a reference point each."""
+    if jac.shape[1] == 2:
+        tangent = jac[:, :, 0]
+        return np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
+    return np.cross(jac[:, :, 0], jac[:, :, 1])
+
+
+def facet_areas(points: Array, facets: Facets) -> Array:
+    """Area (length in 2D) of every facet, (k,)."""
+    return sum(
+        weight * np.linalg.norm(facet_normals(points, facets, at), axis=1)
+        for at, weight in zip(*CELLS[facets.kind].gauss, strict=True)
+    )
+
+
+def nodal_weights(points: Array, surface: tuple[Facets, ...]) -> Array:
+    """Integral of every node's shape function over a surface, (n,), area; 0 elsewhere.
+
+    It is zero also at the corners of triangles of second order.
+    """
+    weights = np.zeros(len(points))
+    for facets in surface:
+        cell = CELLS[facets.kind]
+        for at, weight in zip(*cell.gauss, strict=True):
+            area = weight * np.linalg.norm(facet_normals(points, facets, at), axis=1)
+            np.add.at(weights, facets.nodes, area[:, None] * cell.shape(at))
+    weights[np.abs(weights) < ZERO * weights.max(initial=0.0)] = 0.0
+    return weights
+
+
+def nodal_normals(points: Array, surface: tuple[Facets, ...]) -> Array:
+    """Outward unit normals at the nodes, averaged by area, (n, dim); 0 off the surface.
+
+    Raises InvalidInput where the facets around a node cancel.
+    """
+    normals = np.zeros_like(points)
+    for facets in surface:
+        cell = CELLS[facets.kind]
+        for at, weight in zip(*cell.gauss, strict=True):
+            vector = weight * facet_normals(points, facets, at)
+            for local, share in enumerate(cell.shape(at)):
+                np.add.at(normals, facets.nodes[:, local], share * vector)
+    length = np.linalg.norm(normals, axis=1)
+    on = nodal_weights(points, surface)
+    flat = (on > 0) & (length < 1e-9 * on)
+    if flat.any():
+        raise InvalidInput(
+            f"surface: its facets cancel at point {points[np.flatnonzero(flat)[0]]}, "
+            "no outward normal; is it an inner surface, listed from both sides?"
+        )
+    return normals / np.where(length > 0, length, 1.0)[:, None]
+
+
+def surface_load(points: Array, surface: tuple[Facets, ...], traction: Array) -> Array:
+    """Nodal forces (n, dim) of tractions (n, dim) given at the nodes, force per area.
+
+    The traction is interpolated by the shape functions and integrated with Gauss points.
+    """
+    load = np.zeros_like(points)
+    for facets in surface:
+        cell = CELLS[facets.kind]
+        for at, weight in zip(*cell.gauss, strict=True):
+            shape = cell.shape(at)
+            area = weight * np.linalg.norm(facet_normals(points, facets, at), axis=1)
+            value = np.einsum("a,kac->kc", shape, traction[facets.nodes]) * area[:, None]
+            for local, share in enumerate(shape):
+                np.add.at(load, facets.nodes[:, local], share * value)
+    return load

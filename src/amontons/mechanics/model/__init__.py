@@ -1,0 +1,13 @@
+"""Models: bodies, supports, loads, contacts; assembled to a discrete problem and recovered."""
+
+from ..elements.elasticity import LinearElastic
+from ..elements.hyperelasticity import CiarletGeymonat, NeoHookean
+from ..elements.rigid import Rigid
+from .fields import ContactFields
+from .model import Model
+from .parts import Body, BodyForce, Contact, Fix, Pressure, Traction
+from .processes import distributed
+
+__all__ = ["Body", "BodyForce", "CiarletGeymonat", "Contact", "ContactFields", "Fix",
+           "LinearElastic", "Model", "NeoHookean", "Pressure", "Rigid", "Traction",
+           "distributed"]  # fmt: skip

@@ -1,0 +1,292 @@
+"""From a model to matrices: bodies block by block, supports lifted, contacts in local rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ...core.errors import InvalidInput
+from ...linear.distributed import DistributedMatrix
+from ...linear.grid_matrix import GridMatrix
+from ...linear.levels import Levels, continued, free_levels
+from ..elements.elasticity import LinearElastic, stiffness
+from ..elements.rigid import Rigid
+from ..meshes.box import box
+from .held import check_outside
+from .parts import Body, Contact, Fix, Load
+from .placing import Placed, place
+from .rigid import Piece, near_nullspace, pieces
+from .rigid_bodies import RigidBodies
+from .supports import Prescribed, external_load, locate
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+ROUNDING = 1e-14  # of the displacements, up to which their difference is none
+SAME_PLACE = 1e-12  # of the largest displacement: what rounding moves of a rigid body
+GRID_FROM = 50_000  # dofs of a box of equal cells from which its stiffness is not stored
+
+
+@dataclass(frozen=True, eq=False)
+class Discretisation:
+    """All arrays of a model at load factor 1, whatever the friction.
+
+    K (dofs, dofs): stiffness of the whole model, an operator for one large box; free, fixed:
+    its dofs; prescribed (dofs,), load (n,): force on the unknowns with the prescribed values
+    lifted in; rigid: the bodies that do not deform, None without, when the unknowns (n,) are
+    the free dofs; gap (nc,); carried (nc, d): part of the local displacement that the
+    supports prescribe; levels: prolongations of the free dofs from coarser meshes, finest first
+    (none where K is an operator, which has its own); nodal_levels: of the nodes, body by body.
+    """
+
+    offsets: Index
+    K: sparse.csr_array | GridMatrix | DistributedMatrix
+    free: Index
+    fixed: Index
+    prescribed: Array
+    M: sparse.csc_array | GridMatrix | DistributedMatrix
+    H: sparse.csc_array
+    load: Array
+    gap: Array
+    carried: Array
+    placed: tuple[Placed, ...]
+    parts: list[Piece]
+    whole_H: sparse.csc_array
+    levels: Levels = ()
+    nodal_levels: tuple[Levels, ...] = ()
+    rigid: RigidBodies | None = None
+
+    def continued(self, prescribed: Array) -> Array | None:
+        """Prescribed values (dofs,) continued into the bodies, (n,); None without levels."""
+        if not any(self.nodal_levels) or self.rigid is not None:
+            return None
+        counts = np.diff(self.offsets) // self.placed[0].rows.points.shape[1]
+        return continued(
+            self.nodal_levels, counts.tolist(), prescribed, self.is_fixed
+        )[self.free]  # fmt: skip
+
+    @cached_property
+    def is_fixed(self) -> NDArray[np.bool_]:
+        """Dofs (dofs,) that supports prescribe."""
+        out = np.zeros(self.dofs, dtype=bool)
+        out[self.fixed] = True
+        return out
+
+    @property
+    def dofs(self) -> int:
+        """Free and fixed degrees of freedom."""
+        return len(self.prescribed)
+
+    def local(self, displacement: Array) -> Array:
+        """Local displacements (nc, d) of displacements (dofs,), gaps not included.
+
+        Where both sides move by the same they are zero: rounding would tell friction a way.
+        """
+        return _local(self.whole_H, self._sizes, displacement, self.carried.shape[1])
+
+    @cached_property
+    def _sizes(self) -> sparse.csc_array:
+        """|H| of the whole model, (dofs, nc d)."""
+        return abs(self.whole_H)
+
+    @property
+    def stored_stiffness(self) -> sparse.csr_array:
+        """K with its entries, also where it is an operator."""
+        return sparse.csr_array(self.K.tocsc()) if isinstance(self.K, GridMatrix) else self.K
+
+    @property
+    def near_nullspace(self) -> Array | None:
+        """Rigid modes on the free dofs, (n, k); None with rigid bodies."""
+        if self.rigid is not None:
+            return None
+        return near_nullspace(self.parts, self.free, self.dofs)
+
+    # ------------------------------------------------------------------ unknowns
+    @property
+    def unknowns(self) -> int:
+        """Of the discrete problem: free dofs, and the motions of rigid bodies."""
+        return len(self.free) if self.rigid is None else len(self.rigid.driven)
+
+    @cached_property
+    def held(self) -> Index:
+        """Dofs with forces of supports, or those that keep a body rigid, which do no work."""
+        if self.rigid is None:
+            return self.fixed
+        return np.union1d(self.fixed, self.rigid.dofs)
+
+    def gathered(self, force: Array) -> Array:
+        """Forces on the unknowns (n, ...) of nodal forces (dofs, ...), none on driven ones."""
+        return force[self.free] if self.rigid is None else self.rigid.spread.T @ force
+
+    def reduced(self, whole: sparse.csr_array) -> sparse.csc_array:
+        """A matrix (dofs, dofs) in the unknowns, (n, n)."""
+        if self.rigid is not None:
+            return self.rigid.matrix(whole)
+        return sparse.csc_array(whole[self.free][:, self.free])
+
+    def with_driven(self, force: Array, M: sparse.csc_array, prescribed: Array) -> Array:
+        """Forces (n,) with those that give driven unknowns of M their prescribed values."""
+        if self.rigid is None:
+            return force
+        values = self.rigid.driven_values(prescribed)
+        return np.where(self.rigid.driven, M.diagonal() * values, force)
+
+    def spread(self, v: Array, prescribed: Array) -> Array:
+        """Values of all dofs (dofs,) of unknowns v (n,), and what is prescribed, completed."""
+        if self.rigid is not None:
+            return prescribed + self.rigid.spread @ v
+        out = prescribed.copy()
+        out[self.free] = v
+        return out
+
+    def moved(self, displacement: Array) -> bool:
+        """Whether any dof has gone where supports alone do not bring it, (dofs,)."""
+        if self.rigid is None:
+            return bool(displacement[self.free].any())
+        held = self.rigid.completed(np.where(self.is_fixed, displacement, 0.0))
+        size = np.abs(displacement).max(initial=0.0)
+        return bool(np.abs(displacement - held).max(initial=0.0) > SAME_PLACE * size)
+
+    def completed(self, prescribed: Array) -> Array:
+        """Prescribed values (dofs,), continued over rigid bodies."""
+        return prescribed if self.rigid is None else self.rigid.completed(prescribed)
+
+
+def discretise(
+    bodies: tuple[Body, ...],
+    supports: tuple[Fix, ...],
+    loads: tuple[Load, ...],
+    contacts: tuple[Contact, ...],
+    K: DistributedMatrix | None = None,
+) -> Discretisation:
+    """Assemble everything that depends on neither friction nor load factor; K if not given."""
+    offsets = np.cumsum([0, *(body.mesh.points.size for body in bodies)])
+    given = Prescribed.of(bodies, supports, offsets)
+    is_fixed = given.is_fixed
+    rigid = RigidBodies.of(bodies, offsets, is_fixed)
+    fixed = np.flatnonzero(is_fixed)
+    free = np.flatnonzero(~is_fixed) if rigid is None else rigid.free
+    if not (free.size if rigid is None else (~rigid.driven).any()):
+        raise InvalidInput("supports: every degree of freedom is fixed, nothing left to solve")
+    if K is None:
+        K = _stiffness(bodies)
+    prescribed = np.where(is_fixed, given.values, 0.0)
+    if rigid is not None:
+        prescribed = rigid.completed(prescribed)
+    placed = tuple(place(bodies, contact, given, offsets) for contact in contacts)
+    _check_once(bodies, contacts, placed)
+    whole_H = sparse.hstack([p.H for p in placed], format="csc")
+    if not whole_H.shape[1]:
+        for held in (p.held for p in placed if p.held is not None):
+            check_outside(held, held.left(prescribed), bodies, supports, offsets, "")
+        raise InvalidInput(
+            "contacts: every slave node is fixed by a support, no contact is left"
+        )
+    load = external_load(bodies, loads, offsets)
+    d = bodies[0].mesh.dim
+    if rigid is not None:
+        M, H = rigid.matrix(K), sparse.csc_array(rigid.spread.T @ whole_H)
+        force = rigid.spread.T @ (load - K @ prescribed)
+        load = np.where(rigid.driven, M.diagonal() * rigid.driven_values(prescribed), force)
+    else:
+        M = sparse.csc_array(K[free][:, free]) if sparse.issparse(K) else K.on(free)
+        H = sparse.csc_array(whole_H.tocsr()[free])
+        load = (load - K @ prescribed)[free]
+    return Discretisation(
+        offsets, K, free, fixed, prescribed, M=M, H=H, load=load,
+        gap=np.concatenate([p.rows.gap for p in placed]),
+        carried=_local(whole_H, abs(whole_H), prescribed, d),
+        placed=placed,
+        parts=[
+            piece
+            for k, body in enumerate(bodies)
+            for piece in pieces(body.mesh, body.name, int(offsets[k]))
+        ],
+        whole_H=whole_H,
+        levels=()
+        if not sparse.issparse(K) or rigid is not None  # operators have their own, or none
+        else free_levels(
+            [b.mesh.levels for b in bodies], [len(b.mesh.points) for b in bodies], d, is_fixed
+        ),
+        nodal_levels=tuple(body.mesh.levels for body in bodies),
+        rigid=rigid,
+    )  # fmt: skip
+
+
+def _local(
+    H: sparse.csc_array, sizes: sparse.csc_array, displacement: Array, d: int
+) -> Array:  # fmt: skip
+    """H^T displacement in rows of d, without what rounding leaves of differences; |H|."""
+    out = H.T @ displacement
+    small = np.abs(out)
+    most = ROUNDING * float(np.abs(displacement).max(initial=0.0)) * len(displacement)
+    if ((small > 0) & (small <= most)).any():
+        out[small <= ROUNDING * (sizes.T @ np.abs(displacement))] = 0.0
+    return out.reshape(-1, d)
+
+
+def _stiffness(bodies: tuple[Body, ...]) -> sparse.csr_array | GridMatrix:
+    """Of all bodies: stored, or an operator for one large box."""
+    grid = _grid(bodies)
+    if grid is not None:
+        return grid
+    parts = [_stiffness_of(body) for body in bodies]
+    return parts[0] if len(parts) == 1 else sparse.block_diag(parts, format="csr")
+
+
+def _stiffness_of(body: Body) -> sparse.csr_array:
+    """Of one body; a rigid one resists by its unknowns, not by stiffness."""
+    if isinstance(body.material, Rigid):
+        return sparse.csr_array((body.mesh.points.size,) * 2)
+    return stiffness(body.mesh, body.material).tocsr()
+
+
+def _grid(bodies: tuple[Body, ...]) -> GridMatrix | None:
+    """The stiffness as an operator for one large box of equal hexahedra, of one material."""
+    body, mesh = bodies[0], bodies[0].mesh
+    uniform = len(mesh.cells) == 1 and isinstance(body.material, LinearElastic)
+    if len(bodies) > 1 or not uniform or mesh.grid is None or mesh.cells[0].kind != "hex":
+        return None
+    if mesh.points.size < GRID_FROM or not mesh.levels:
+        return None
+    if mesh.levels[0].shape[1] != np.prod([n // 2 + 1 for n in mesh.grid]):
+        return None  # stretched cells, coarsened in some directions only
+    low, high = mesh.bounding_box()
+    cell = box((high - low) / mesh.grid, cells=1)
+    dofs = (cell.cells[0].nodes[0][:, None] * 3 + np.arange(3)).ravel()
+    element = stiffness(cell, body.material).toarray()[np.ix_(dofs, dofs)]
+    return GridMatrix(mesh.grid, element, np.arange(mesh.points.size), mesh.levels)
+
+
+def _check_once(
+    bodies: tuple[Body, ...], contacts: tuple[Contact, ...], placed: tuple[Placed, ...]
+) -> None:
+    """A pair given twice, also with exchanged sides, would share its load at random."""
+    seen: dict[tuple, list[Placed]] = {}
+    for contact, found in zip(contacts, placed, strict=True):
+        slave = locate(bodies, contact.slave)
+        if contact.master is None:
+            pair, again = (slave, repr(contact.obstacle)), "with the same obstacle"
+        else:
+            master = locate(bodies, contact.master)
+            pair, again = (slave, master), f"with {contact.master!r}"
+            if (master, slave) in seen and contact.where is None:
+                raise InvalidInput(
+                    f"contact on {contact.slave!r}: the contact {again} is there already, with "
+                    "slave and master exchanged; expected every pair once"
+                )
+        for other in seen.setdefault(pair, []):
+            if both := len(_rows_of(other.rows.points) & _rows_of(found.rows.points)):
+                raise InvalidInput(
+                    f"contact on {contact.slave!r}: {both} of its points have a contact "
+                    f"{again} already; expected every pair once"
+                )
+        seen[pair].append(found)
+
+
+def _rows_of(points: Array) -> set[tuple[float, ...]]:
+    """Points as a set."""
+    return set(map(tuple, points.tolist()))

@@ -1,0 +1,36 @@
+"""What may be wrong with the solution of a model though it has converged: named warnings.
+
+Each check is a function of the model and its fields that returns the warnings it has; a new
+one is a function in a file of its own and a name in CHECKS.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from ...core.warned import ResultWarning
+from .fields import ContactFields
+from .loading import no_load
+from .locking import volumetric_locking
+from .matching import nodal_on_non_matching
+from .rotation import large_rotation
+from .sliding import sliding_beyond_curvature, sliding_beyond_pairs
+
+if TYPE_CHECKING:
+    from .model import Model
+
+Check = Callable[["Model", ContactFields], list[ResultWarning]]
+CHECKS: tuple[Check, ...] = (
+    no_load,
+    volumetric_locking,
+    large_rotation,
+    nodal_on_non_matching,
+    sliding_beyond_pairs,
+    sliding_beyond_curvature,
+)
+
+
+def model_warnings(model: Model, fields: ContactFields) -> tuple[ResultWarning, ...]:
+    """All warnings about a solved state of a model, in the order of CHECKS."""
+    return tuple(warning for check in CHECKS for warning in check(model, fields))

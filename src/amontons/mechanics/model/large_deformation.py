@@ -1,0 +1,393 @@
+"""Bodies in large deformations against obstacles: the discrete nonlinear problem.
+
+With f_int the nodal forces of the bodies, hyperelastic or linear, at displacements v, and f the
+loads, which may follow the body, the force that a contact has to supply is lambda = f_int - f
+at its node.  The displacements v of the free dofs are all the unknowns of
+
+    F(v) = f_int(v) - f(v)        on free dofs that are no contact,                         (1)
+         = law(lambda(v), X + v)  at contacts, (2) of `contact.current`,
+
+which is continuous and piecewise smooth; all its entries are forces.  Friction speaks of the
+motion since `before`, the displacements at the end of the last step: [LR] section 3.
+`linearised` is the tangent problem at a state, as a `FrictionProblem`: it has the same
+reactions, gaps and slips there, so that statuses, files and pictures need nothing else.
+
+Left out: master surfaces, friction on components of a contact's motion that supports hold.
+
+[LR] T. Ligurský, Y. Renard, "A continuation problem for computing solutions of discretised
+evolution problems with application to plane quasi-static contact problems with friction",
+Comput. Methods Appl. Mech. Engrg. 280 (2014).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ...core.errors import InvertedCells
+from ...problem.friction import Form, FrictionProblem
+from ...problem.judge import measures as judge
+from ...problem.judge.measures import Measure, Weakest
+from ...problem.law.cones import Law
+from ...problem.solution import FrictionSolution
+from ..contact.current import STICK, ContactPoint, Pieces
+from ..contact.nodal import contact_columns
+from ..elements.linear_body import LinearBody
+from .nodal_forces import NodalForces, nodal_forces
+from .nonlinear_parts import NonlinearParts, nonlinear_parts
+
+if TYPE_CHECKING:
+    from .model import Model
+
+Array = NDArray[np.float64]
+TOUCHING = 1e-9  # gaps up to this part of the size count as closed where nothing holds a body
+
+
+@dataclass(frozen=True, eq=False)
+class LargeDeformation:
+    """One static problem, or one step, of large deformations.
+
+    load, prescribed (dofs,): nodal forces, also as an array of dead ones, and values on the
+    fixed dofs, zero on the free ones;
+    before (nc, d): displacements of the contacts since which friction counts; drift (nc, d):
+    motion added to that since then; known: load, prescribed values (dofs,) and state v (n,)
+    from which load steps may begin, by default the undeformed state.
+    """
+
+    parts: NonlinearParts
+    load: NodalForces
+    prescribed: Array
+    before: Array
+    drift: Array
+    known: tuple[NodalForces | Array, Array, Array] | None = None
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "load", NodalForces.of(self.load))
+
+    # ---------------------------------------------------------------- sizes
+    form = Form.GLOBAL
+    measure = Measure.RESIDUAL
+
+    @property
+    def law(self) -> Law:
+        """Friction law of all contacts."""
+        return self.parts.contact.law
+
+    @property
+    def rho(self) -> Array:
+        """Augmentation parameter, (nc,), force per length."""
+        return self.parts.contact.rho
+
+    @property
+    def unknowns(self) -> int:
+        """Free dofs n."""
+        return len(self.parts.free)
+
+    @property
+    def contacts(self) -> int:
+        """Number of contacts nc."""
+        return len(self.parts.at)
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        return self.parts.dimension
+
+    # ---------------------------------------------------------------- states
+    def displacement(self, v: Array) -> Array:
+        """Displacements of all nodes, (nodes, d), of those of the free dofs v (n,)."""
+        out = self.prescribed.copy()
+        out[self.parts.free] = v
+        return out.reshape(self.parts.X.shape)
+
+    def _moved(self, u: Array) -> tuple[Array, Array]:
+        """Positions of the contacts and their motion since the last step, (nc, d)."""
+        at = u.ravel()[self.parts.at]
+        return self.parts.points + at, at - self.before + self.drift
+
+    def _point(self, u: Array, rest: Array) -> ContactPoint:
+        """The law at displacements u (nodes, d), where the bodies need `rest` (dofs,)."""
+        x, motion = self._moved(u)
+        return self.parts.contact.at(rest[self.parts.at], motion, x)
+
+    def _needed(self, u: Array) -> Array:
+        """f_int - f (dofs,) at displacements u (nodes, d)."""
+        return self.parts.forces(u) - self.load.at(u)
+
+    def _needed_slopes(self, u: Array) -> tuple[Array, Array]:
+        """The same with its derivative in node blocks (m, d, d)."""
+        inner, blocks = self.parts.tangent(u)
+        load, slopes = self.load.slopes(u)
+        for nodes, part in slopes:
+            self.parts.subtract_inplace(blocks, nodes, part)
+        return inner - load, blocks
+
+    def contact_point(self, v: Array) -> ContactPoint:
+        """The contact law at a state."""
+        u = self.displacement(v)
+        return self._point(u, self._needed(u))
+
+    def residual(self, v: Array, pieces: Pieces | None = None) -> Array:
+        """F(v), (n,), unit of force, or the selection function of given pieces.
+
+        Raises InvertedCells where it is not defined.
+        """
+        u = self.displacement(v)
+        rest = self._needed(u)
+        rest[self.parts.at] = self._point(u, rest).residual(pieces)
+        return rest[self.parts.free]
+
+    def tangent(self, v: Array, pieces: Pieces | None = None) -> sparse.csc_array:
+        """dF/dv, (n, n), of the active piece of the law or of the given one, (nc,)."""
+        return self.linearisation(v, pieces).matrix
+
+    def linearisation(self, v: Array, pieces: Pieces | None = None) -> Linearisation:
+        """F and its derivatives at a state."""
+        u = self.displacement(v)
+        rest, blocks = self._needed_slopes(u)
+        point = self._point(u, rest)
+        return Linearisation(self, u, rest, blocks, point, *point.derivatives(pieces))
+
+    def pieces(self, v: Array) -> Pieces:
+        """The active piece of the law at every contact, see `ContactPoint.pieces`."""
+        return self.contact_point(v).pieces
+
+    # ---------------------------------------------------------------- what the driver asks
+    @property
+    def guess(self) -> None:
+        """No better first state is known than `known_state`."""
+
+    def assembled(self) -> LargeDeformation:
+        """Itself."""
+        return self
+
+    def reactions(self, v: Array) -> Array:
+        """Contact forces r (nc, d) in the frames at the state v."""
+        return self._local(v)[0]
+
+    def _local(self, v: Array) -> tuple[Array, Array, Array, Array]:
+        """r, u, frames of `CurrentContact.local`, and f_int - f (dofs,)."""
+        u = self.displacement(v)
+        rest = self._needed(u)
+        x, motion = self._moved(u)
+        return *self.parts.contact.local(rest[self.parts.at], motion, x), rest
+
+    def local_velocity(self, v: Array) -> Array:
+        """u = [gap, slip since the last step], (nc, d), in the frames at the state v."""
+        x, motion = self._moved(self.displacement(v))
+        return self.parts.contact.local(np.zeros_like(x), motion, x)[1]
+
+    def error(self, r: Array, v: Array | None = None) -> float:
+        """The residual measure of `judge` at reactions r and state v; infinite if inverted.
+
+        Forces are compared with those at supports, loads and contacts, the law at contacts with
+        their gaps, slips and r / rho: sizes of linear elasticity would be those of rotations.
+        """
+        if v is None or not (np.isfinite(v).all() and np.isfinite(r).all()):
+            return np.inf
+        try:
+            _, u, axes, rest = self._local(v)
+        except InvertedCells:
+            return np.inf
+        load, length = self._sizes(v, r, u, rest)
+        rest[self.parts.at] -= np.einsum("pkc,pk->pc", axes, r)
+        balance = float(np.linalg.norm(rest[self.parts.free]))
+        law = judge.scaled_residual(r, u, self.law, self.rho)
+        return max(balance / load, law / length)
+
+    def _sizes(self, v: Array, r: Array, u: Array, rest: Array) -> tuple[float, float]:
+        """Sizes of the forces and of u, at least what rounding can resolve."""
+        held = rest.copy()
+        held[self.parts.free] = self.load.at(self.displacement(v))[self.parts.free]
+        load = np.hypot(np.linalg.norm(held), np.linalg.norm(rest[self.parts.at]))
+        length = np.hypot(np.linalg.norm(u), np.linalg.norm(r / self.rho[:, None]))
+        least = self.parts.resolved
+        return max(float(load), least[0]), max(float(length), least[1])
+
+    def weakest(self, r: Array, v: Array | None = None) -> Weakest:
+        """The contact farthest from its law beside its own gap, slip and r / rho."""
+        if v is None or not (np.isfinite(v).all() and np.isfinite(r).all()):
+            return Weakest(np.inf, None)
+        try:
+            u = self._local(v)[1]
+        except InvertedCells:
+            return Weakest(np.inf, None)
+        own = np.linalg.norm(u, axis=1) + np.linalg.norm(r / self.rho[:, None], axis=1)
+        return judge.weakest_of(r, u, self.law, self.rho, own + self.parts.resolved[1])
+
+    def certain_error(self, r: Array, v: Array | None = None) -> float:
+        """The error, or what rounding may hide in it where that is more."""
+        return max(self.error(r, v), self.rounding(r))
+
+    def rounding(self, r: Array) -> float:
+        """What rounding alone may hide in `error`: its scales take care of that."""
+        return 0.0
+
+    # ---------------------------------------------------------------- load steps
+    @property
+    def known_state(self) -> Array:
+        """The state v (n,) at share 0 of the load."""
+        return np.zeros(self.unknowns) if self.known is None else self.known[2]
+
+    @property
+    def meets_first(self) -> bool:
+        """True where some body keeps small strains: its cells may be inverted."""
+        return any(isinstance(body, LinearBody) for body in self.parts.bodies)
+
+    def at_share(self, share: float) -> LargeDeformation:
+        """The problem at a share of the way from the known load to this one."""
+        if self.known is None:
+            return replace(self, load=share * self.load, prescribed=share * self.prescribed)
+        load, prescribed, _ = self.known
+        return replace(
+            self,
+            load=self.load * share + (1 - share) * NodalForces.of(load),
+            prescribed=prescribed + share * (self.prescribed - prescribed),
+        )
+
+    def predicted(self, share: float, goal: float, v: Array) -> tuple[Linearisation, Array]:
+        """The linearisation at a share, and the first-order change of F, (n,), to another."""
+        now, then = self.at_share(share), self.at_share(goal)
+        here = now.linearisation(v)
+        return here, here.shifted(then.load - now.load, then.prescribed - now.prescribed)
+
+    def towards(self, share: float, goal: float, v: Array) -> FrictionProblem:
+        """The tangent problem at a share and state v, under the load of another share."""
+        now, then = self.at_share(share), self.at_share(goal)
+        tangent = now.linearised(v)
+        moved = then.prescribed - now.prescribed
+        displaced = now.displacement(v)
+        _, blocks = now._needed_slopes(displaced)
+        force = (then.load - now.load).at(displaced) - self.parts.matrix(blocks) @ moved
+        normals = self.parts.contact.normals(now._moved(displaced)[0])
+        w = np.array(tangent.w)
+        w[:, 0] += (normals * moved[self.parts.at]).sum(axis=1)
+        return replace(tangent, f=tangent.f + force[self.parts.free], w=w)
+
+    def closed_pieces(self, v: Array) -> list[Pieces]:
+        """The active pieces with touching contacts stuck, then with all of them stuck."""
+        point = self.contact_point(v)
+        gap = self.parts.contact.gap(point.x)
+        size = np.ptp(self.parts.X, axis=0).max()
+        return [
+            np.where((point.pieces % 4 == 0) & (gap <= limit), STICK, point.pieces)
+            for limit in (TOUCHING * size, np.inf)
+        ]
+
+    # ---------------------------------------------------------------- results
+    def solved(self, found: FrictionSolution) -> FrictionSolution:
+        """The same solution, of the tangent problem at its state unless cells are inverted."""
+        assert found.v is not None
+        try:
+            return replace(found, problem=self.linearised(found.v))
+        except InvertedCells:
+            return found
+
+    def linearised(self, v: Array) -> FrictionProblem:
+        """The tangent problem at v: same reactions, gaps and slips there, frames of there."""
+        parts = self.parts
+        moved = self.displacement(v)
+        _, blocks = self._needed_slopes(moved)
+        r, u, axes, rest = self._local(v)
+        bend = parts.contact.normal_slopes(self._moved(moved)[0])
+        blocks[parts.diagonal] -= _turned(axes, r, bend)
+        nodes = parts.at[:, 0] // self.dimension
+        H = sparse.csc_array(contact_columns(nodes, axes, parts.X.size).tocsr()[parts.free])
+        M = parts.on_free(blocks)
+        load, length = self._sizes(v, r, u, rest)
+        w = u - (H.T @ v).reshape(u.shape)
+        return FrictionProblem.from_global(
+            M, H, M @ v - rest[parts.free], w, self.law, load_scale=load, u_scale=length,
+            name=self.name,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Linearisation:
+    """F and its derivatives at one state.
+
+    u (nodes, d): displacements; rest (dofs,): f_int - f; blocks: its derivative; by_force,
+    by_x, by_motion (nc, d, d): those of the contact law.
+    """
+
+    problem: LargeDeformation
+    u: Array
+    rest: Array
+    blocks: Array
+    point: ContactPoint
+    by_force: Array
+    by_x: Array
+    by_motion: Array
+
+    @property
+    def residual(self) -> Array:
+        """F, (n,)."""
+        parts = self.problem.parts
+        out = self.rest.copy()
+        out[parts.at] = self.point.residual()
+        return out[parts.free]
+
+    @cached_property
+    def matrix(self) -> sparse.csc_array:
+        """dF/dv, (n, n)."""
+        parts = self.problem.parts
+        blocks = self.blocks.copy()
+        rows = np.flatnonzero(parts.row_contact >= 0)
+        blocks[rows] = self.by_force[parts.row_contact[rows]] @ blocks[rows]
+        blocks[parts.diagonal] += self.by_x + self.by_motion
+        return parts.on_free(blocks)
+
+    def shifted(
+        self, load: NodalForces | Array, prescribed: Array, drift: Array | None = None
+    ) -> Array:
+        """First-order change of F, (n,), with changes of load, prescribed (dofs,) and drift."""
+        parts = self.problem.parts
+        change = parts.matrix(self.blocks) @ prescribed - NodalForces.of(load).at(self.u)
+        at = np.einsum("pij,pj->pi", self.by_force, change[parts.at])
+        if drift is not None:
+            at += np.einsum("pij,pj->pi", self.by_motion, drift)
+        change[parts.at] = at
+        return change[parts.free]
+
+
+def _turned(axes: Array, r: Array, bend: Array) -> Array:
+    """Derivative of the forces sum_k r_k axis_k by the position, (nc, d, d).
+
+    dn = bend dx, and tangents are carried along: dt = -n (t . dn).
+    """
+    n, t = axes[:, 0], axes[:, 1:]
+    along = np.einsum("pk,pkc,pcj->pj", r[:, 1:], t, bend)
+    return r[:, 0, None, None] * bend - n[:, :, None] * along[:, None, :]
+
+
+def large_deformation(model: Model) -> LargeDeformation:
+    """The static problem of a model in large deformations, at its load factor.
+
+    Friction speaks of the motion from the undeformed state.
+    """
+    nonlinear_parts(model)  # says what is not supported
+    linear = model.discretisation
+    load, factor = nodal_forces(model, model.loads), model.load_factor
+    model.check_outside(factor * linear.prescribed)
+    return large_step(model, factor * load, factor * linear.prescribed)
+
+
+def large_step(
+    model: Model, load: NodalForces | Array, prescribed: Array, before: Array | None = None,
+    known: tuple[NodalForces | Array, Array, Array] | None = None,
+) -> LargeDeformation:  # fmt: skip
+    """One step under nodal forces and prescribed values (dofs,), since displacements `before`.
+
+    before (nc, d): of the contacts, zero by default; known: see `LargeDeformation`.
+    """
+    parts = nonlinear_parts(model)
+    model.check_held()
+    before = np.zeros(parts.at.shape) if before is None else before
+    return LargeDeformation(parts, NodalForces.of(load), prescribed, before,
+                            np.zeros_like(before), known, model.name)  # fmt: skip

@@ -1,0 +1,221 @@
+"""What large deformations compute with: bodies, contacts, the pattern of the tangent.
+
+The tangent of the whole model is a list of node blocks, body after body; its free rows and
+columns always have the same pattern, so that they are one `take` away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ...core.errors import UnsupportedForm
+from ..contact.current import CurrentContact
+from ..elements.hyperelasticity import HyperelasticBody, is_hyperelastic
+from ..elements.linear_body import LinearBody
+from ..elements.rigid import Rigid
+from .parts import CURRENT
+
+if TYPE_CHECKING:
+    from .model import Model
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+RESOLVED = 1e-7  # of stresses like moduli, and of displacements like the size
+
+
+@dataclass(frozen=True, eq=False)
+class NonlinearParts:
+    """Everything that depends on neither load nor memory.
+
+    X (nodes, d): reference positions; ends: where the nodes of the next body begin; free (n,):
+    free dofs; at (nc, d): dofs of the contacts; row_contact (m,): the contact in whose row a
+    node block lies, -1 for none; diagonal (nc,): the diagonal block of a contact;
+    columns, pointers: all node blocks as rows of a matrix; taken: for every entry of the matrix
+    of the free dofs its place in the list of blocks.
+    """
+
+    bodies: tuple[HyperelasticBody | LinearBody, ...]
+    X: Array
+    ends: Index
+    free: Index
+    contact: CurrentContact
+    at: Index
+    row_contact: Index
+    diagonal: Index
+    columns: Index
+    pointers: Index
+    taken: sparse.csc_array
+
+    @cached_property
+    def points(self) -> Array:
+        """Reference positions of the contacts, (nc, d)."""
+        return self.X.ravel()[self.at]
+
+    @cached_property
+    def resolved(self) -> tuple[float, float]:
+        """Sizes of forces and of u that rounding leaves with some eight digits."""
+        forces = np.concatenate([body.unit_forces() for body in self.bodies])
+        around = self.points - self.X.mean(axis=0)
+        return (RESOLVED * float(np.linalg.norm(forces)),
+                RESOLVED * float(np.linalg.norm(around)))  # fmt: skip
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        return self.X.shape[1]
+
+    def forces(self, u: Array) -> Array:
+        """Nodal forces of the bodies (dofs,) at displacements u (nodes, d)."""
+        parts = zip(self.bodies, np.split(u, self.ends), strict=True)
+        return np.concatenate([body.forces(part).ravel() for body, part in parts])
+
+    def tangent(self, u: Array) -> tuple[Array, Array]:
+        """(forces (dofs,), node blocks (m, d, d) of their derivative) at displacements u."""
+        parts = zip(self.bodies, np.split(u, self.ends), strict=True)
+        both = [body.tangent(part) for body, part in parts]
+        return np.concatenate([f.ravel() for f, _ in both]), np.concatenate(
+            [b for _, b in both]
+        )
+
+    def energy(self, u: Array) -> float:
+        """Stored energy at displacements u (nodes, d)."""
+        parts = zip(self.bodies, np.split(u, self.ends), strict=True)
+        return sum(body.energy(part) for body, part in parts)
+
+    @cached_property
+    def _order(self) -> Index:
+        """One ascending number per node block."""
+        rows = np.repeat(np.arange(len(self.X)), np.diff(self.pointers))
+        return rows * len(self.X) + self.columns
+
+    def subtract_inplace(self, blocks: Array, nodes: Index, slopes: Array) -> None:
+        """Take derivatives (k, a, a, d, d), at all pairs of nodes (k, a), from node blocks."""
+        pairs = nodes[:, :, None] * len(self.X) + nodes[:, None, :]
+        places = np.searchsorted(self._order, pairs.ravel())
+        np.subtract.at(blocks, places, slopes.reshape(-1, *blocks.shape[1:]))
+
+    def matrix(self, blocks: Array) -> sparse.bsr_array:
+        """Node blocks as a matrix (dofs, dofs)."""
+        return _matrix(blocks, self.columns, self.pointers)
+
+    def on_free(self, blocks: Array) -> sparse.csc_array:
+        """Node blocks as the matrix (n, n) of the free dofs."""
+        t = self.taken
+        return sparse.csc_array((blocks.ravel()[t.data], t.indices, t.indptr), shape=t.shape)
+
+
+def nonlinear_parts(model: Model) -> NonlinearParts:
+    """The parts of a model, made once for all its variants.
+
+    Raises UnsupportedForm for what finite strains do not have.
+    """
+    if "nonlinear" not in model._shared:
+        model._shared["nonlinear"] = _nonlinear_parts(model)
+    parts = model._shared["nonlinear"]
+    return replace(parts, contact=replace(parts.contact, law=model.law))
+
+
+def _nonlinear_parts(model: Model) -> NonlinearParts:
+    _check_supported(model)
+    linear = model.discretisation  # of the tangent at rest: same dofs, contacts and checks
+    bodies = tuple(
+        (HyperelasticBody if is_hyperelastic(body.material) else LinearBody)(
+            body.mesh, body.material  # type: ignore[arg-type]
+        )
+        for body in model.bodies
+    )
+    X = np.concatenate([body.mesh.points for body in model.bodies])
+    d = X.shape[1]
+    nodes = np.concatenate([p.rows.nodes + linear.offsets[p.body] // d for p in linear.placed])
+    _check_single(nodes)
+    at = nodes[:, None] * d + np.arange(d)
+    is_free = np.zeros(linear.dofs, dtype=bool)
+    is_free[linear.free] = True
+    rows, columns = _pattern(bodies)
+    contact_of = np.full(len(X), -1)
+    contact_of[nodes] = np.arange(len(nodes))
+    numbers = np.arange(len(rows) * d * d, dtype=np.int64).reshape(-1, d, d)
+    pointers = np.searchsorted(rows, np.arange(len(X) + 1))
+    taken = _matrix(numbers + 1, columns, pointers).tocsr()[linear.free].tocsc()[:, linear.free]
+    taken.sort_indices()
+    taken.data -= 1
+    contact = CurrentContact(
+        [c.obstacle for c in model.contacts],  # type: ignore[misc]
+        [len(p.rows.nodes) for p in linear.placed],
+        model.law,
+        _stiffness_at(linear.stored_stiffness, at),
+        is_free[at],
+    )
+    return NonlinearParts(bodies, X, linear.offsets[1:-1] // d, linear.free, contact, at,
+                          contact_of[rows], np.flatnonzero(rows == columns)[nodes],
+                          columns, pointers, sparse.csc_array(taken))  # fmt: skip
+
+
+def _check_supported(model: Model) -> None:
+    asked = all(contact.configuration == CURRENT for contact in model.contacts)
+    for body in model.bodies:
+        if isinstance(body.material, Rigid):
+            raise UnsupportedForm(
+                f"body {body.name!r} is rigid, and contact in the current configuration needs "
+                "bodies that deform"
+            )
+        if not (asked or is_hyperelastic(body.material)):
+            raise UnsupportedForm(
+                f"body {body.name!r}: others have hyperelastic laws and this one is linear "
+                "elastic; give all of them NeoHookean or CiarletGeymonat, or say that it keeps "
+                "small strains by configuration='current' of the contacts"
+            )
+    for contact in model.contacts:
+        if contact.obstacle is None or contact.method != "nodal":
+            raise UnsupportedForm(
+                f"contact on {contact.slave!r}: large deformations have nodal contact with an "
+                "obstacle only; use method='nodal' and no master"
+            )
+        for name in ("gap_slopes", "normal_slopes"):
+            if not hasattr(contact.obstacle, name):
+                raise UnsupportedForm(
+                    f"obstacle: large deformations need its method {name}, as Plane, Sphere "
+                    f"and LevelSet have it; got {contact.obstacle!r}"
+                )
+
+
+def _check_single(nodes: Index) -> None:
+    if len(np.unique(nodes)) < len(nodes):
+        raise UnsupportedForm(
+            "contacts: a node meets two obstacles, large deformations allow one; join both "
+            "into one LevelSet, or leave the node out of one of them (where)"
+        )
+
+
+def _pattern(bodies: Sequence[HyperelasticBody]) -> tuple[Index, Index]:
+    """Rows and columns (nodes) of all blocks."""
+    rows, columns, start = [], [], 0
+    for body in bodies:
+        count = len(body.mesh.points)
+        rows.append(np.repeat(np.arange(count), np.diff(body.pointers)) + start)
+        columns.append(body.columns.astype(np.int64) + start)
+        start += count
+    return np.concatenate(rows), np.concatenate(columns)
+
+
+def _matrix(blocks: NDArray, columns: Index, pointers: Index) -> sparse.bsr_array:
+    """The matrix of node blocks in rows of nodes."""
+    size = (len(pointers) - 1) * blocks.shape[1]
+    return sparse.bsr_array((blocks, columns, pointers), shape=(size, size))
+
+
+def _stiffness_at(K: sparse.csr_array, at: Index) -> Array:
+    """Least stiffness of every contact's node with all others held, (nc,), at rest."""
+    nc, d = at.shape
+    part = K.tocsr()[at.ravel()][:, at.ravel()].tocsr()
+    blocks = np.array([
+        part[i * d : (i + 1) * d, i * d : (i + 1) * d].toarray() for i in range(nc)
+    ]).reshape(nc, d, d)  # fmt: skip
+    return 1.0 / np.linalg.norm(np.linalg.inv(blocks), 2, axis=(1, 2))

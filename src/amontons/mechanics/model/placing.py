@@ -1,0 +1,239 @@
+"""The contacts of one pair, placed in a model: those that can meet and are free to react."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ...core.errors import InvalidInput, UnsupportedForm
+from ..contact import (
+    ContactRows,
+    Mismatch,
+    Nitsche,
+    NitscheTerms,
+    contact_nodes,
+    mismatch,
+    mortar_contact,
+    mortar_obstacle,
+    nitsche_obstacle,
+    nitsche_pair,
+    nodal_contact,
+    pair_contact,
+)
+from ..contact.segments import Surface
+from ..elements.elasticity import LinearElastic, materials_by_region
+from ..elements.rigid import Rigid
+from ..meshes.mesh import Mesh
+from ..meshes.surfaces import facet_normals
+from .held import HeldNodes
+from .parts import Body, Contact
+from .supports import Prescribed, locate
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+AWAY = 0.1  # cosine between outward normal and obstacle's above which a facet looks away
+FREE = 1e-9  # free part of a normal up to which supports hold it
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """Contacts of one pair: body of the slave, kept (slave nodes,), rows of the kept ones.
+
+    H (dofs, nc d): the rows in the dofs of the whole model, with those of a master body.
+    held: slave nodes without a contact, as supports hold them along the normal.
+    By Nitsche's method Gauss points of the slave take the place of its nodes, and `nitsche`
+    holds their tractions, also in the dofs of the whole model.
+    sides: mesh and surface of slave and master, None with an obstacle.
+    """
+
+    body: int
+    kept: NDArray[np.bool_]
+    all_points: Array
+    rows: ContactRows
+    H: sparse.csc_array
+    held: HeldNodes | None = None
+    nitsche: NitscheTerms | None = None
+    sides: tuple[Mesh, str, Mesh, str] | None = None
+
+    @cached_property
+    def mismatch(self) -> Mismatch:
+        """How far the meshes of a nodal pair are from each other, slave nodes as in kept."""
+        assert self.sides is not None
+        return mismatch(*self.sides)
+
+    @cached_property
+    def master(self) -> Surface:
+        """Facets of the master."""
+        assert self.sides is not None
+        _, _, mesh, name = self.sides
+        return Surface.of_corners(mesh.points, mesh.surface(name), name)
+
+    @cached_property
+    def narrowest(self) -> float:
+        """Length than which no facet of the master is narrower."""
+        power = self.master.points.shape[1] - 2
+        return float((self.master.area / (2 * self.master.radius) ** power).min())
+
+
+def place(
+    bodies: tuple[Body, ...], contact: Contact, given: Prescribed, offsets: Index
+) -> Placed:
+    """Contacts of one pair without those whose normal the supports prescribe."""
+    k = locate(bodies, contact.slave)[0]
+    d = bodies[k].mesh.dim
+    rows, H, met, points, terms = _met(bodies, contact, given, offsets)
+    kept = ~_has_held_normal(H, d, given.is_fixed) & _wanted(contact, points)[met]
+    all_kept = met.copy()
+    all_kept[met] = kept
+    held = _held_nodes(bodies, contact, given.is_fixed, offsets)
+    terms = None if terms is None else terms.at(kept)
+    return Placed(k, all_kept, points, rows.at(kept), H[:, np.repeat(kept, d)], held, terms,
+                  _sides(bodies, contact))  # fmt: skip
+
+
+def _has_held_normal(H: sparse.csc_array, d: int, is_fixed: Mask) -> Mask:
+    """Contacts (nc,) whose normal only has dofs that supports prescribe, of both sides."""
+    normal = sparse.csc_array(H[:, ::d]).multiply(~is_fixed[:, None])
+    return np.sqrt(np.asarray(normal.power(2).sum(axis=0)).ravel()) <= FREE
+
+
+def _held_nodes(
+    bodies: tuple[Body, ...], contact: Contact, is_fixed: Mask, offsets: Index
+) -> HeldNodes | None:
+    """Slave nodes that take part and can not move along the normal, whatever the method."""
+    k, surface = locate(bodies, contact.slave)
+    slave, first, total = bodies[k].mesh, int(offsets[k]), int(offsets[-1])
+    nodes = contact_nodes(slave, surface)[0]
+    d = slave.dim
+    if not is_fixed[first + nodes[:, None] * d + np.arange(d)].any():
+        return None
+    if contact.obstacle is not None:
+        rows = nodal_contact(slave, surface, contact.obstacle)
+        H = _shifted(rows.H, first, total)
+    else:
+        assert contact.master is not None
+        j, other = locate(bodies, contact.master)
+        try:
+            rows, on_master, _ = pair_contact(slave, surface, bodies[j].mesh, other)
+        except InvalidInput:
+            return None  # no node faces the master: averages may still do
+        H = _shifted(rows.H, first, total) + _shifted(on_master, int(offsets[j]), total)
+    held = _has_held_normal(sparse.csc_array(H), d, is_fixed) & _wanted(contact, rows.points)
+    if not held.any():
+        return None
+    size = np.abs(slave.points).max() + np.ptp(slave.points, axis=0).max()
+    columns = sparse.csc_array(sparse.csc_array(H)[:, np.repeat(held, d)])
+    return HeldNodes.of(contact, rows.at(held), columns, first, size)
+
+
+def _sides(bodies: tuple[Body, ...], contact: Contact) -> tuple[Mesh, str, Mesh, str] | None:
+    """Mesh and surface of slave and master."""
+    if contact.master is None:
+        return None
+    (k, surface), (j, other) = (locate(bodies, n) for n in (contact.slave, contact.master))
+    return bodies[k].mesh, surface, bodies[j].mesh, other
+
+
+def _met(
+    bodies: tuple[Body, ...], contact: Contact, given: Prescribed, offsets: Index
+) -> tuple[ContactRows, sparse.csc_array, NDArray[np.bool_], Array, NitscheTerms | None]:
+    """Contacts of one pair, H in the dofs of the model, which of all points meet, and terms."""
+    if contact.nitsche is not None:
+        return _met_by_nitsche(bodies, contact, contact.nitsche, offsets)
+    k, surface = locate(bodies, contact.slave)
+    slave, size = bodies[k].mesh, int(offsets[-1])
+    points = slave.points[contact_nodes(slave, surface)[0]]
+    mortar = contact.method == "mortar"
+    held, lasting = given.by_body(offsets, slave.dim)
+    if contact.obstacle is not None:
+        rows = nodal_contact(slave, surface, contact.obstacle)
+        _check_faces(slave, surface, contact, rows)
+        met = np.ones(len(rows.nodes), dtype=bool)
+        if mortar:
+            rows, met = mortar_obstacle(slave, surface, contact.obstacle, held=held[k])
+        return rows, _shifted(rows.H, int(offsets[k]), size), met, points, None
+    assert contact.master is not None
+    j, other = locate(bodies, contact.master)
+    master = bodies[j].mesh
+    if mortar:
+        rows, on_master, met = mortar_contact(
+            slave, surface, master, other, held=held[k], lasting=lasting[k],
+            master_lasting=lasting[j],
+        )  # fmt: skip
+    else:
+        rows, on_master, met = pair_contact(slave, surface, master, other)
+    H = _shifted(rows.H, int(offsets[k]), size) + _shifted(on_master, int(offsets[j]), size)
+    return rows, sparse.csc_array(H), met, points, None
+
+
+def _met_by_nitsche(
+    bodies: tuple[Body, ...], contact: Contact, options: Nitsche, offsets: Index
+) -> tuple[ContactRows, sparse.csc_array, NDArray[np.bool_], Array, NitscheTerms | None]:
+    """The same for the Gauss points of Nitsche's method."""
+    k, surface = locate(bodies, contact.slave)
+    body, first, size = bodies[k], int(offsets[k]), int(offsets[-1])
+    laws = [body.material] if isinstance(body.material, Rigid) else (
+        materials_by_region(body.mesh, body.material).values()
+    )
+    if not all(isinstance(law, LinearElastic) for law in laws):
+        raise UnsupportedForm(
+            f"contact on {contact.slave!r}: Nitsche's method takes the stress from "
+            'LinearElastic; use method="nodal"'
+        )
+    if contact.obstacle is not None:
+        rows, terms = nitsche_obstacle(
+            body.mesh, surface, contact.obstacle, body.material, options
+        )
+        H = _shifted(rows.H, first, size)
+    else:
+        assert contact.master is not None
+        j, other = locate(bodies, contact.master)
+        rows, terms, on_master = nitsche_pair(
+            body.mesh, surface, bodies[j].mesh, other, body.material, options
+        )
+        H = _shifted(rows.H, first, size) + _shifted(on_master, int(offsets[j]), size)
+    terms = replace(terms, traction=_shifted(terms.traction, first, size))
+    met = np.ones(len(rows.points), dtype=bool)
+    return rows, sparse.csc_array(H), met, rows.points, terms
+
+
+def _check_faces(mesh: Mesh, surface: str, contact: Contact, rows: ContactRows) -> None:
+    """Raise InvalidInput when the slave looks away from its obstacle everywhere."""
+    normal = np.full(mesh.points.shape, np.nan)
+    normal[rows.nodes] = rows.frames[:, 0]
+    toward = -1.0
+    for facets in mesh.surface(surface):
+        outward = facet_normals(mesh.points, facets)
+        outward /= np.linalg.norm(outward, axis=1)[:, None]
+        cosine = -np.einsum("fc,fkc->fk", outward, normal[facets.nodes])
+        toward = max(toward, float(np.where(np.isnan(cosine), -1.0, cosine).max(initial=-1.0)))
+    if toward < -AWAY:
+        raise InvalidInput(
+            f"contact on {contact.slave!r}: no facet of it faces the obstacle; a normal of the "
+            f"obstacle points into the body, here it is {rows.frames[0, 0].round(3).tolist()}"
+        )
+
+
+def _wanted(contact: Contact, points: Array) -> NDArray[np.bool_]:
+    """Which slave nodes a contact asks for, (n,)."""
+    if contact.where is None:
+        return np.ones(len(points), dtype=bool)
+    wanted = np.asarray(contact.where(points))
+    if wanted.shape != (len(points),) or wanted.dtype != bool:
+        raise InvalidInput(
+            f"contact on {contact.slave!r}: expected where to return ({len(points)},) of bool "
+            f"for points {points.shape}, got {wanted.dtype} of shape {wanted.shape}"
+        )
+    return wanted
+
+
+def _shifted(H: sparse.csc_array, offset: int, size: int) -> sparse.csc_array:
+    """Columns on one body in the dofs of the whole model, (size, nc d)."""
+    part = H.tocoo()
+    entries = (part.data, (part.coords[0] + offset, part.coords[1]))
+    return sparse.coo_array(entries, shape=(size, H.shape[1])).tocsc()

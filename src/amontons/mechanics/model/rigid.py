@@ -1,0 +1,175 @@
+"""Rigid-body modes of connected pieces: which of them supports and contacts hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from ...core.errors import SingularOperator
+from ..meshes.mesh import Mesh
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+RANK = 1e-9  # singular values below this part of the largest possible one count as zero
+UNNAMED = "default"  # the region of cells without a name
+NAMES = {
+    2: ("translation along x", "translation along y", "rotation in the plane"),
+    3: ("translation along x", "translation along y", "translation along z",
+        "rotation about x", "rotation about y", "rotation about z"),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A connected part of a body: name, dofs (k,) in the whole model, modes (k, 3 or 6)."""
+
+    name: str
+    dofs: Index
+    modes: Array
+
+
+def pieces(mesh: Mesh, name: str, offset: int) -> list[Piece]:
+    """Connected pieces of a mesh whose dofs start at `offset`."""
+    labels = _labels(mesh)
+    titles = _titles(mesh, name, labels)
+    out = []
+    for label, title in enumerate(titles):
+        nodes = np.flatnonzero(labels == label)
+        dofs = offset + (nodes[:, None] * mesh.dim + np.arange(mesh.dim)).ravel()
+        out.append(Piece(title, dofs, rigid_modes(mesh.points[nodes])))
+    return out
+
+
+def _titles(mesh: Mesh, name: str, labels: NDArray[np.int32]) -> list[str]:
+    """A name for every piece: of its regions where these are its alone, else a number.
+
+    The name of the body stands before it where the user gave one.
+    """
+    count = int(labels.max()) + 1
+    if count == 1:
+        return [name]
+    regions: list[dict[str, None]] = [{} for _ in range(count)]
+    for block in mesh.cells:
+        for label in np.unique(labels[block.nodes[:, 0]]):
+            regions[label][block.region] = None
+    titles = []
+    for label, own in enumerate(regions):
+        number = f"part {label + 1} of {count}"
+        others = {region for k, some in enumerate(regions) if k != label for region in some}
+        if UNNAMED in own or others & set(own):
+            titles.append(f"{name} ({number})")
+            continue
+        title = " and ".join(own)
+        title = title if name.startswith("body") else f"{name}.{title}"
+        titles.append(f"{title} ({number})" if UNNAMED in others else title)
+    return titles
+
+
+def _labels(mesh: Mesh) -> NDArray[np.int32]:
+    """Number of the connected piece of every node, (n,)."""
+    links = [
+        np.stack([np.repeat(b.nodes[:, 0], b.nodes.shape[1] - 1), b.nodes[:, 1:].ravel()])
+        for b in mesh.cells
+    ]
+    start, end = np.concatenate(links, axis=1)
+    n = len(mesh.points)
+    graph = sparse.coo_array((np.ones(len(start)), (start, end)), shape=(n, n))
+    return csgraph.connected_components(graph, directed=False)[1]
+
+
+def rigid_modes(points: Array) -> Array:
+    """Translations, then rotations about the centre scaled to size 1: (n dim, 3 or 6)."""
+    n, dim = points.shape
+    x = points - points.mean(axis=0)
+    size = np.abs(x).max()
+    x = x / (size if size > 0 else 1.0)
+    columns = [np.tile(row, (n, 1)) for row in np.eye(dim)]
+    if dim == 2:
+        columns.append(np.stack([-x[:, 1], x[:, 0]], axis=1))
+    else:
+        columns += [np.cross(axis, x) for axis in np.eye(3)]
+    return np.stack([column.ravel() for column in columns], axis=1)
+
+
+def loose_modes(parts: list[Piece], fixed: NDArray[np.bool_]) -> list[tuple[Piece, Array]]:
+    """Pieces with the modes that supports leave free: bases (6, k), orthonormal, k > 0."""
+    out = []
+    for piece in parts:
+        basis = _null_space(piece.modes[fixed[piece.dofs]])
+        if basis.shape[1]:
+            out.append((piece, basis))
+    return out
+
+
+def check_held(
+    loose: list[tuple[Piece, Array]], H: sparse.csc_array, dofs: int, acting: NDArray[np.bool_]
+) -> None:
+    """Raise SingularOperator when a loose mode could not be held even by closed contacts.
+
+    H (dofs, nc d); acting (nc d,): contact rows that can carry a force, no shear if mu = 0.
+    """
+    if not loose:
+        return
+    motion, spread = rigid_motions(loose, dofs)
+    left = _null_space((H.T @ motion)[acting])
+    if not left.shape[1]:
+        return
+    texts = []
+    for k, (piece, basis) in enumerate(loose):
+        modes = basis @ left[spread == k]
+        if np.abs(modes).max(initial=0.0) > 1e-6:
+            texts.append(f"body {piece.name!r} is free to move: {describe(modes)}")
+    raise SingularOperator(
+        "; ".join(texts) + "; hold it with a support (Fix), friction or another contact"
+    )
+
+
+def rigid_motions(loose: list[tuple[Piece, Array]], dofs: int) -> tuple[Array, Index]:
+    """Loose modes of all pieces as columns (dofs, k), and the piece of each, (k,)."""
+    of = np.concatenate([np.full(basis.shape[1], k) for k, (_, basis) in enumerate(loose)])
+    motion = np.zeros((dofs, len(of)))
+    for k, (piece, basis) in enumerate(loose):
+        motion[np.ix_(piece.dofs, of == k)] = piece.modes @ basis
+    return motion, of
+
+
+def describe(modes: Array) -> str:
+    """Rigid modes (3 or 6, k) in words: the axis modes among them, or mixed ones."""
+    names = NAMES[2 if len(modes) == 3 else 3]
+    u, s, _ = np.linalg.svd(modes, full_matrices=False)
+    span = u[:, s > 1e-6 * max(s.max(initial=0.0), 1e-300)]
+    inside = np.linalg.norm(span, axis=1) > 1 - 1e-6
+    words = [name for name, is_in in zip(names, inside, strict=True) if is_in]
+    mixed = span.shape[1] - len(words)
+    if mixed:
+        involved = np.flatnonzero(~inside & (np.linalg.norm(span, axis=1) > 1e-6))
+        words.append(
+            f"{mixed} combination{'s' if mixed > 1 else ''} of "
+            + " and ".join(names[k] for k in involved)
+        )
+    return ", ".join(words)
+
+
+def near_nullspace(parts: list[Piece], free: Index, dofs: int) -> Array:
+    """Rigid modes of every piece on the free dofs, (len(free), 3 or 6): for multigrid.
+
+    Pieces share the columns: multigrid groups coupled nodes only, so it never mixes them.
+    """
+    out = np.zeros((dofs, max((piece.modes.shape[1] for piece in parts), default=0)))
+    for piece in parts:
+        out[piece.dofs, : piece.modes.shape[1]] = piece.modes
+    return out[free]
+
+
+def _null_space(matrix: Array) -> Array:
+    """Orthonormal basis (columns) of the null space of matrix (rows, k)."""
+    k = matrix.shape[1]
+    if not matrix.shape[0]:
+        return np.eye(k)
+    _, s, vt = np.linalg.svd(matrix, full_matrices=matrix.shape[0] < k)
+    rank = int((s > RANK * max(float(s[0]), RANK)).sum())
+    return vt[rank:].T

@@ -1,0 +1,143 @@
+"""Values that users give, as numbers or as functions of position, evaluated at nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...core.arrays import LARGEST, number, real
+from ...core.errors import InvalidInput, shown
+from .timing import steady_value
+
+Array = NDArray[np.float64]
+Component = float | Callable[..., float] | None
+VectorValue = float | Sequence[Component] | Callable[..., Sequence[float | None]]
+ScalarValue = ArrayLike | Callable[[Array], ArrayLike]
+
+
+def check_vector(value: object, what: str, *, free: bool = False) -> None:
+    """Raise InvalidInput for one number other than 0 in the place of a vector.
+
+    It could only be meant along every axis, which is hardly ever what is wanted.
+    """
+    if is_number(value) and value != 0:
+        leave = f"; (None, None, {value}) leaves the others free" if free else ""
+        raise InvalidInput(
+            f"{what}: expected a vector or 0, got the number {value}, which would count along "
+            f"every axis; write (0, 0, {value}), or (0, {value}) in 2D{leave}"
+        )
+
+
+def check_scalar(value: object, what: str) -> None:
+    """Raise InvalidInput for a number below 0, or an array with one."""
+    try:
+        numbers = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):  # a function, or nothing of use, which `scalar_at` tells
+        return
+    if (numbers < 0).any():
+        raise InvalidInput(f"{what}: expected numbers >= 0, got {numbers.min():g}")
+
+
+def vector_at(value: VectorValue, points: Array, what: str, *, free: bool = False) -> Array:
+    """A vector value at points (n, dim): (n, dim); a free component (None) becomes NaN.
+
+    Callables take one point x of shape (dim,): the whole value, or one component each; those
+    of (x, t) are taken at t = 0.
+    """
+    dim = points.shape[1]
+    value = steady_value(value)
+    if callable(value):
+        rows = [_row(value(x), dim, what, free) for x in points]
+        return np.array(rows, dtype=float).reshape(len(points), dim)
+    columns = [_column(entry, points, what, free) for entry in _entries(value, dim, what)]
+    return np.array(columns, dtype=float).T.reshape(len(points), dim)
+
+
+def component_at(value: Component, points: Array, what: str) -> Array:
+    """A number, or a function of one point x (dim,), at points (n, dim): (n,)."""
+    return np.array(_column(steady_value(value), points, what, False), dtype=float)
+
+
+def _column(entry: Component, points: Array, what: str, free: bool) -> Array | list[float]:
+    if callable(entry):
+        return [_number(entry(x), what, free) for x in points]
+    return np.full(len(points), _number(entry, what, free))
+
+
+def scalar_at(
+    value: ScalarValue, points: Array, what: str, *, each: str = "slave node"
+) -> Array:
+    """A scalar value at points (n, dim): (n,), finite and >= 0.
+
+    Callables take all points at once, (n, dim), and return (n,) or a number.
+    """
+    n = len(points)
+    if callable(value):
+        # never as many rows as columns: x[0] instead of x[:, 0] must not pass by chance
+        padded = np.tile(points, (4, 1))
+        found = real(what, value(padded))
+        if found.ndim == 1 and len(found) == len(padded):
+            found = found[:n]
+        elif found.ndim:
+            raise InvalidInput(
+                f"{what}: expected a function of points (n, {points.shape[1]}) "
+                f"that returns (n,), got shape {found.shape} for n = {len(padded)}; "
+                "x[:, 0] is the first coordinate"
+            )
+    else:
+        found = real(what, value)
+    if found.shape not in ((), (n,)):
+        raise InvalidInput(
+            f"{what}: expected a number or one per {each}, ({n},), got {found.shape}"
+        )
+    out = np.array(np.broadcast_to(found, (n,)))
+    bad = np.flatnonzero(~np.isfinite(out) | (out < 0))
+    if bad.size:
+        raise InvalidInput(
+            f"{what}: expected finite numbers >= 0, got {out[bad[0]]} at {points[bad[0]]}"
+        )
+    return out
+
+
+def is_number(value: object) -> bool:
+    """True for one number, in Python's or NumPy's form."""
+    return isinstance(value, int | float | np.number) or (
+        isinstance(value, np.ndarray) and value.ndim == 0
+    )
+
+
+def _entries(value: object, dim: int, what: str) -> list:
+    if is_number(value):
+        return [value] * dim
+    if not isinstance(value, Sequence | np.ndarray) or isinstance(value, str | bytes):
+        raise InvalidInput(
+            f"{what}: expected {dim} components or a function, got {shown(value)}"
+        )
+    entries = list(value)  # type: ignore[call-overload]
+    if len(entries) != dim:
+        raise InvalidInput(f"{what}: expected {dim} components, got {len(entries)}")
+    return entries
+
+
+def _row(values: object, dim: int, what: str, free: bool) -> list[float]:
+    if is_number(values):
+        raise InvalidInput(
+            f"{what}: expected {dim} components of the function, got the number {values}"
+        )
+    return [_number(entry, what, free) for entry in _entries(values, dim, what)]
+
+
+def _number(entry: object, what: str, free: bool) -> float:
+    if entry is None:
+        if free:
+            return np.nan
+        raise InvalidInput(
+            f"{what}: expected numbers, got None (only supports leave components free)"
+        )
+    if type(entry) is not float:  # what most functions return: no need to look closer
+        return number(what, entry)
+    if not abs(entry) <= LARGEST:
+        raise InvalidInput(f"{what}: expected a finite number, got {entry}")
+    return entry

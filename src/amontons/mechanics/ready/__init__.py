@@ -1,0 +1,1 @@
+"""Ready-made models: walls, packings, bodies with several solutions."""

@@ -1,0 +1,122 @@
+"""Quasi-static steps of large deformations: friction on the motion since the last step.
+
+Every step begins from the last state and goes to its load in load steps where it must.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.clock import NEVER, Deadline
+from ...problem.solution import FrictionSolution
+from ..contact import frames
+from ..model import Model
+from ..model.diagnosis import with_diagnosis
+from ..model.large_deformation import large_step
+from ..model.nodal_forces import NodalForces
+from ..model.nonlinear_parts import nonlinear_parts
+from .energy import Energies, Forces, path_work, slow_energies
+from .moreau_jean import Solve
+from .passage import Crossing, taken
+from .state import State, TimeStep, undeformed
+from .system import Motion
+
+Array = NDArray[np.float64]
+
+
+class LargeSlowModel:
+    """A model in large deformations and without inertia; `advance` makes one step."""
+
+    def __init__(self, model: Model, crossing: Crossing | None = None) -> None:
+        self.motion, self.crossing = Motion(model), crossing
+
+    def begin(self, state: State) -> State:
+        """The state before the first step: undeformed, also where supports hold the body."""
+        return undeformed(state, self.motion)
+
+    def _known(self, state: State) -> tuple[NodalForces | Array, Array, Array]:
+        """Load, prescribed values (dofs,) and free displacements (n,) of the last state."""
+        free = state.displacement[self.motion.parts.free]
+        if state.is_unloaded:
+            nothing = np.zeros_like(state.displacement)
+            return nothing, nothing, free
+        return *self.motion.applied(state.time), free
+
+    def advance(
+        self, state: State, time: float, solve: Solve, limit: Deadline = NEVER
+    ) -> TimeStep:
+        """One step from a state to a time; solve(problem, start) solves its problem.
+
+        limit: of the path to it where that is followed.
+        """
+        load, prescribed = self.motion.applied(time)
+        q0 = state.displacement
+        problem = large_step(
+            self.motion.body, load, prescribed, at_contacts(self.motion.body, q0),
+            self._known(state),
+        )  # fmt: skip
+        arrive = None
+        if self.crossing is not None:
+            drift = (time - state.time) * at_contacts(self.motion.body, state.velocity)
+            arrive = partial(self.crossing.along, problem, drift, limit)
+        found, passage = taken(
+            lambda start: solve(problem, start, None),  # type: ignore[arg-type]
+            arrive, state.force, (state.time, time),
+        )  # fmt: skip
+        solution = problem.solved(found)
+        assert solution.v is not None
+        q1 = problem.displacement(solution.v).ravel()
+        axes = frames(problem.contact_point(solution.v).n)
+        energies = self._energies(state, q1, load, solution.r, solution.u)
+        passed = time - state.time
+        velocity = (q1 - q0) / passed if passed else np.zeros_like(q1)
+        slip = state.slip + solution.u[:, 1:]
+        new = State(state.index + 1, time, q1, velocity, solution.r, slip)
+        active = np.arange(len(slip))
+        return TimeStep(self.motion.body, new, solution, active, energies, solution.u[:, 0],
+                        axes, passage)  # fmt: skip
+
+    def explained(self, solution: FrictionSolution) -> FrictionSolution:
+        """The same record; one that failed says which bodies give way."""
+        return with_diagnosis(solution, self.motion.body)
+
+    def _energies(
+        self, state: State, q1: Array, load: NodalForces, r: Array, u: Array
+    ) -> Energies:
+        """The balance of `slow_energies`; r, u (nc, d): reactions, [gap, slip] of the step."""
+        q0, load_0 = state.displacement, self.motion.load_of(state)
+        before, after = self._forces(q0, load_0, state.force), self._forces(q1, load, r)
+        friction = float((r[:, 1:] * u[:, 1:]).sum())
+        path = path_work(before, after, q1 - q0)
+        bend = self._bend(q0, q1, load_0, load)
+        return slow_energies(before, after, q1 - q0, self.motion.parts.fixed, friction, path,
+                             bend)  # fmt: skip
+
+    def _bend(self, q0: Array, q1: Array, before: NodalForces, after: NodalForces) -> float:
+        """Work of loads that follow the body beyond that of the mean of their ends.
+
+        By Simpson's rule, exact for pressures that grow along with a motion on a straight line.
+        """
+        if not (before.following or after.following):
+            return 0.0
+        shape = nonlinear_parts(self.motion.body).X.shape
+        ends = (before.at(q0.reshape(shape)) + after.at(q1.reshape(shape))) / 2
+        middle = (0.5 * (before + after)).at(((q0 + q1) / 2).reshape(shape))
+        return float((middle - ends) @ (q1 - q0)) * 2 / 3
+
+    def _forces(self, q: Array, load: NodalForces, r: Array) -> Forces:
+        """All forces at displacements q (dofs,); r (nc, d): in the frames there."""
+        parts = nonlinear_parts(self.motion.body)
+        axes = frames(parts.contact.normals(parts.points + q[parts.at]))
+        pushed = np.zeros_like(q)
+        pushed[parts.at] = np.einsum("pkc,pk->pc", axes, r)
+        moved = q.reshape(parts.X.shape)
+        return Forces(parts.forces(moved), load.at(moved), pushed, parts.energy(moved))
+
+
+def at_contacts(model: Model, displacement: Array) -> Array:
+    """Displacements of the contacts (nc, d) out of those of all dofs (dofs,)."""
+    return displacement[nonlinear_parts(model).at]

@@ -1,0 +1,326 @@
+"""Moreau-Jean time stepping of elastic bodies with contact, friction and impacts.
+
+With v_theta = theta v1 + (1 - theta) v0, q1 = q0 + h v_theta, and impulses r of the contacts,
+
+    M (v1 - v0) + h C v_theta + h K (q0 + theta h v_theta) = h f_theta + H r,
+    M_hat v1 = H r + f,   M_hat = M + theta h C + theta^2 h^2 K                          (1)
+
+A contact takes part when its gap, predicted as gap + prediction h u_N, is not positive; then
+the law holds between r and u1 + e (u_N of before, 0), e being the restitution ([J], [AB] 10.1).
+With `reach` those that are open by less take part too, and their law is that of the gap at the
+end, q1: they close without penetration.  In long steps, in which a contact that has opened a
+little would else go through, that keeps a wall of many joints together.
+
+That law alone can create energy, of the order of the step size, where a closed contact is about
+to open or a sliding one turns round: the law speaks of u1, the work of an impulse is that on
+(u0 + u1) / 2, see `energy`.  Where contacts would add more in a step than the scheme loses in
+it, those that do are solved again with the law on u_theta, which creates no energy at all.
+
+Restitution never does so but for the loads within its step: implicit steps lift a body that
+leaves the ground at once.  It is then made smaller by as much as that takes, of the order of
+h g / |u_N|; impacts at some h g or less, of bodies that come to rest, lose it.
+
+The law is one of contacts, so of nodes: e is the restitution of a body only where all of it
+moves with its nodes, as one that is stiff against the step (a period below h).  A soft body
+leaves after its waves have run through it, with what they bring back, whatever e.
+
+M_hat does not change, and its W falls apart into the bodies: it is formed once, and every step
+cuts the active contacts out of it.
+
+Left out: corrections of the penetration that an impact leaves, h (1 - theta) |u_N| at most.
+
+[AB] V. Acary, B. Brogliato, "Numerical methods for nonsmooth dynamical systems", Springer 2008.
+[J] M. Jean, "The non smooth contact dynamics method", CMAME 177 (1999).
+[A] V. Acary, "Energy conservation and dissipation properties of time-integration methods for
+nonsmooth elastodynamics with contact", ZAMM 96 (2016).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ...core.clock import NEVER, Deadline
+from ...core.errors import InvalidInput, UnsupportedForm
+from ...problem.friction import FrictionProblem
+from ...problem.law.cones import Coulomb, Law, Tresca
+from ...problem.nitsche import NO_MULTIPLIERS
+from ...problem.solution import FrictionSolution
+from ...solvers.contract import Iterate
+from ..model import Model
+from .energy import Energies
+from .state import State, TimeStep
+from .system import Inertia, Motion
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+Local = Callable[[FrictionProblem], FrictionProblem]
+Solve = Callable[[FrictionProblem, Iterate, Local | None], FrictionSolution]
+TOUCHING = 1e-9  # gaps below this part of the size of a contact's area count as closed
+TRIES = 3  # times that restitution is made smaller before the law on u_theta replaces it
+ENOUGH = 1.05  # times what a first-order estimate says that takes
+CREATED = 1.0  # energy contacts may create in a step, relative to the total, per tolerance
+W_LIMIT = 1e9  # bytes of W above which it is not formed
+
+
+@dataclass(frozen=True)
+class MoreauJean:
+    """Options of the dynamics; `step`, the step size, in the unit of time of the model."""
+
+    step: float
+    theta: float = 0.5  # 1/2: no numerical damping; 1: implicit Euler
+    restitution: float = 0.0  # of contacts: normal velocity after over before an impact
+    prediction: float = 0.5  # part of a step by which gaps are predicted
+    reach: float = 0.0  # length: predicted gaps up to which open contacts take part
+    mass_damping: float = 0.0  # Rayleigh, per time
+    stiffness_damping: float = 0.0  # Rayleigh, time
+    lumped: bool = False  # mass at the nodes instead of the consistent matrix
+    condense: bool = True  # form W once where it fits into memory; it pays after a few steps
+
+    def __post_init__(self) -> None:
+        _expect("step", self.step, self.step > 0, "> 0")
+        _expect("theta", self.theta, 0.5 <= self.theta <= 1, "from 1/2 to 1")
+        _expect("restitution", self.restitution, 0 <= self.restitution <= 1, "from 0 to 1")
+        _expect("prediction", self.prediction, 0 <= self.prediction <= 1, "from 0 to 1")
+        for name in ("reach", "mass_damping", "stiffness_damping"):
+            _expect(name, getattr(self, name), getattr(self, name) >= 0, ">= 0")
+
+        if self.reach > 0 and self.restitution > 0:
+            raise InvalidInput(
+                "reach: expected 0 with restitution, which speaks of velocities, got "
+                f"{self.reach!r}"
+            )
+
+    def prepare(self, model: Model, tolerance: float) -> MovingModel:
+        """The matrices of all steps; tolerance of their solves."""
+        if model.is_large:
+            raise UnsupportedForm(
+                "model: dynamics are those of small strains with contact in the reference "
+                "configuration; use QuasiStatic, or LinearElastic without configuration="
+            )
+        if model.contacts[0].nitsche is not None:
+            raise UnsupportedForm(f"model: {NO_MULTIPLIERS}")
+        return MovingModel(self, model, tolerance)
+
+
+class MovingModel:
+    """A model with the matrices of (1); `advance` makes one step."""
+
+    def __init__(self, method: MoreauJean, model: Model, tolerance: float) -> None:
+        self.method, self.motion, self.tolerance = method, Motion(model), tolerance
+        parts = self.motion.parts
+        inertia = Inertia(
+            self.motion.body, method.mass_damping, method.stiffness_damping, method.lumped
+        )
+        h, theta = method.step, method.theta
+        self.M, self.C, self.K = inertia.M, inertia.C, parts.stored_stiffness
+        self.M_hat = sparse.csr_array(self.M + theta * h * self.C + theta**2 * h**2 * self.K)
+        self.closed = TOUCHING * np.concatenate([p.rows.weights for p in parts.placed]) ** (
+            1 / (model.dimension - 1)
+        )
+        nc, d = parts.carried.shape
+        M_free = parts.reduced(self.M_hat)
+        self.base = FrictionProblem.from_global(
+            M_free, parts.H, np.zeros(parts.unknowns), np.zeros((nc, d)), self.motion.body.law,
+            near_nullspace=parts.near_nullspace, levels=parts.levels, name=model.name,
+        )  # fmt: skip
+        self._last_part: tuple[Index, FrictionProblem] | None = None
+        self._last_active: tuple[Index, FrictionProblem] = (np.arange(nc), self.base)
+
+    def begin(self, state: State) -> State:
+        """The state before the first step: as it is."""
+        return state
+
+    def advance(
+        self, state: State, time: float, solve: Solve, limit: Deadline = NEVER
+    ) -> TimeStep:
+        """One step from a state to a time; solve(problem, start) solves its problem."""
+        parts, method = self.motion.parts, self.method
+        h, theta = method.step, method.theta
+        v0, q0 = state.velocity, state.displacement
+        u0 = self._local(v0)
+        gap = parts.gap + self._local(q0)[:, 0]
+        near = self.closed + method.reach
+        active = np.flatnonzero(gap + method.prediction * h * u0[:, 0] <= near)
+        before, after = self.motion.prescribed(state.time), self.motion.prescribed(time)
+        held = (after - before) / h
+        force = theta * self.motion.load(time) + (1 - theta) * self.motion.load(state.time)
+        known = self.M @ v0 + h * (
+            force - (1 - theta) * (self.C @ v0) - self.K @ (q0 + h * theta * (1 - theta) * v0)
+        )
+        f = parts.gathered(known - self.M_hat @ held)
+        f = parts.with_driven(f, self.base.M, held)
+        carried = self._local(held)[active]  # by the supports
+        start = Iterate(h * state.force[active])
+        local = self._local_problem if self._condenses else None
+        shifts = _Shifts.of(u0[active], gap[active], method)
+        while True:
+            solution = solve(self._problem(active, f, carried + shifts.values), start, local)
+            v1 = parts.spread(_velocity(solution), held)
+            q1 = q0 + h * (theta * v1 + (1 - theta) * v0)
+            impulse = np.zeros_like(parts.carried)
+            impulse[active] = solution.r
+            energies = self._energies(state, v1, q1, force, impulse)
+            excess = energies.contact - self._allowed(energies)
+            changed = excess > 0 and shifts.changed(solution.r, self._local(v1)[active], excess)
+            if not changed:
+                break
+            shifts, start = changed, Iterate(solution.r)
+        u = self._local(q1)
+        new = State(state.index + 1, time, q1, v1, impulse / h, u[:, 1:])
+        return TimeStep(self.motion.body, new, solution, active, energies, parts.gap + u[:, 0])
+
+    def explained(self, solution: FrictionSolution) -> FrictionSolution:
+        """The same record: inertia balances any load."""
+        return solution
+
+    def _local(self, v: Array) -> Array:
+        """Local values of motions (dofs,): (nc, d)."""
+        return self.motion.parts.local(v)
+
+    def _problem(self, active: Index, f: Array, w: Array) -> FrictionProblem:
+        """The problem of the active contacts, with the matrices of the last one if it can."""
+        if not np.array_equal(self._last_active[0], active):
+            columns = _rows_of(active, w.shape[1])
+            H = sparse.csc_array(self.base.H[:, columns])  # type: ignore[index]
+            law = _law_at(self.motion.body.law, active)
+            problem = replace(self.base, H=H, law=law)
+            self._last_active = (active, problem)
+        problem = self._last_active[1]
+        if isinstance(problem.law, Tresca):  # impulses
+            bound = _law_at(self.motion.body.law, active).coefficient * self.method.step
+            return replace(problem, f=f, w=w, law=Tresca(bound))
+        return replace(problem, f=f, w=w)
+
+    @property
+    def _condenses(self) -> bool:
+        return self.method.condense and 8.0 * self.base.w.size**2 <= W_LIMIT  # type: ignore[union-attr]
+
+    @cached_property
+    def _whole(self) -> FrictionProblem:
+        """The Delassus form of all contacts: formed once, with what solvers keep of it."""
+        return self.base.condensed()
+
+    def _local_problem(self, problem: FrictionProblem) -> FrictionProblem:
+        """The Delassus form of a problem of the last active set."""
+        active = self._last_active[0]
+        if self._last_part is None or not np.array_equal(self._last_part[0], active):
+            self._last_part = (active, self._whole.restricted(active))
+        return replace(
+            self._last_part[1], q=problem.free_velocity, blur=problem.free_blur,
+            law=problem.law, name=problem.name,
+        )  # fmt: skip
+
+    def _allowed(self, energies: Energies) -> float:
+        """Energy that contacts may create, (1) of `energy`: that of the solve's tolerance."""
+        size = energies.total + abs(energies.loads) + abs(energies.supports)
+        return CREATED * self.tolerance * size
+
+    def _energies(
+        self, state: State, v1: Array, q1: Array, force: Array, impulse: Array
+    ) -> Energies:
+        """The balance of the step, see `energy`."""
+        parts, h, theta = self.motion.parts, self.method.step, self.method.theta
+        M, K, C = self.M, self.K, self.C
+        dv, dq = v1 - state.velocity, q1 - state.displacement
+        pushed = parts.whole_H @ impulse.ravel()
+        q_theta = state.displacement + theta * dq
+        # what supports, and the stiffness of rigid bodies, do for the balance of momentum
+        held = np.zeros_like(dq)
+        rest = M @ dv + C @ dq + h * (K @ q_theta - force) - pushed
+        held[parts.held] = rest[parts.held]
+        kinetic, elastic = 0.5 * v1 @ (M @ v1), 0.5 * q1 @ (K @ q1)
+        v0, q0 = state.velocity, state.displacement
+        work = float(pushed @ dq) / h
+        lost = float((theta - 0.5) * (dv @ (M @ dv) + dq @ (K @ dq)))
+        jump = min(max((theta - 0.5) * float(pushed @ dv), work), lost)
+        gain = kinetic + elastic - 0.5 * v0 @ (M @ v0) - 0.5 * q0 @ (K @ q0)
+        return Energies(
+            kinetic=float(kinetic), elastic=float(elastic), gain=float(gain),
+            loads=float(force @ dq), supports=float(held @ dq) / h,
+            contact=work - jump, damping=float(dq @ (C @ dq)) / h, numerical=lost - jump,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Shifts:
+    """What is added to u1 in the law of the active contacts, (k, d).
+
+    before (k, d): u0; opening (k,): gap over h, of open contacts; theta; restitution: that of
+    contacts with the law on u1; on_mean (k,): those with the law on u_theta; tries: how often
+    restitution was made smaller.
+    """
+
+    before: Array
+    opening: Array
+    theta: float
+    restitution: float
+    on_mean: Mask
+    tries: int = 0
+
+    @classmethod
+    def of(cls, before: Array, gap: Array, method: MoreauJean) -> _Shifts:
+        """Those of a step that begins with u0 (k, d) and gaps (k,)."""
+        none = np.zeros(len(before), dtype=bool)
+        opening = np.maximum(gap, 0) / method.step if method.reach else np.zeros(len(gap))
+        return cls(before, opening, method.theta, method.restitution, none)
+
+    @property
+    def values(self) -> Array:
+        """(k, d), unit of velocity."""
+        out = np.zeros_like(self.before)
+        out[:, 0] = self.restitution * self.before[:, 0]
+        mean = (1 - self.theta) / self.theta * self.before
+        out = np.where(self.on_mean[:, None], mean, out)
+        # gap at the end >= 0: u1 >= -(gap + (1 - theta) h u0) / (theta h)
+        is_open = self.opening > 0
+        out[is_open, 0] = (self.opening / self.theta + mean[:, 0])[is_open]
+        return out
+
+    def changed(self, r: Array, after: Array, excess: float) -> _Shifts | None:
+        """Laws that create less than r and u1 = after, (k, d), did by `excess`; None: no other.
+
+        First those on u_theta for contacts that create energy by themselves, then a smaller
+        restitution, then the law on u_theta for all that do work on it.
+        """
+        creating = (r * (self.before + after)).sum(axis=1) > 0
+        if (creating & ~self.on_mean).any():
+            return replace(self, on_mean=self.on_mean | creating)
+        impact = (self.before[:, 0] < 0) & ~self.on_mean
+        power = float(r[impact, 0] @ -self.before[impact, 0])
+        e = self.restitution
+        if e > 0 and power > 0 and self.tries < TRIES:
+            # impacts take (1 - e) power / 2, power ~ 1 + e: with e it changes by this slope
+            smaller = max(0.0, e - ENOUGH * excess * (1 + e) / (e * power))
+            return replace(self, restitution=smaller, tries=self.tries + 1)
+        mean = self.theta * after + (1 - self.theta) * self.before
+        working = (r * mean).sum(axis=1) > 0
+        if (working & ~self.on_mean).any():
+            return replace(self, on_mean=self.on_mean | working)
+        return None
+
+
+def _velocity(solution: FrictionSolution) -> Array:
+    assert solution.v is not None  # the problem is in global form
+    return solution.v
+
+
+def _rows_of(contacts: Index, d: int) -> Index:
+    """Rows of the local vectors of some contacts."""
+    return (contacts[:, None] * d + np.arange(d)).ravel()
+
+
+def _law_at(law: Law, contacts: Index) -> Law:
+    kind = Coulomb if isinstance(law, Coulomb) else Tresca
+    return kind(law.coefficient[contacts])
+
+
+def _expect(name: str, value: float, good: bool, wanted: str) -> None:
+    if not (np.isfinite(value) and good):
+        raise InvalidInput(f"{name}: expected a number {wanted}, got {value!r}")

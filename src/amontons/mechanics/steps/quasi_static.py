@@ -1,0 +1,139 @@
+"""Quasi-static steps: equilibrium at each time, friction on the slip since the last one.
+
+Loads and supports that depend on time are evaluated, and those beside them that do not are
+there in full from the first step on; where none does, all of them grow with the time as load
+factor.  The first step goes from the undeformed body to what is applied at its end, and
+friction speaks of the whole way: it is what `solve` finds.  Gaps are positions, so nothing
+drifts.
+
+A step may have several solutions, or none near the last one: then the body jumps.  A solver
+finds any of them; with `crossing` the step is followed from the last state, see `passage`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.clock import NEVER, Deadline
+from ...core.errors import InvalidInput, UnsupportedForm
+from ...problem.friction import FrictionProblem
+from ...problem.nitsche import NO_MULTIPLIERS
+from ...problem.solution import FrictionSolution
+from ..model import Model
+from ..model.diagnosis import with_diagnosis
+from .energy import Energies, Forces, slow_energies
+from .large_steps import LargeSlowModel
+from .moreau_jean import Solve
+from .passage import Crossing, taken
+from .state import State, TimeStep, undeformed
+from .system import Motion
+from .undetermined import carried_on
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class QuasiStatic:
+    """Steps of size `step` in time, or in the load factor where nothing depends on time.
+
+    Where anything depends on time, loads and supports that do not are applied in full in the
+    first step: write them as expressions in t (or functions of (x, t)) to let them grow.
+
+    crossing: follows the path of solutions from every step to the next, `PathCrossing()`; the
+    steps then say in `passage` whether and when the body jumped.
+    """
+
+    step: float
+    crossing: Crossing | None = None
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.step) and self.step > 0):
+            raise InvalidInput(f"step: expected a number > 0, got {self.step!r}")
+        if self.crossing is not None and not hasattr(self.crossing, "between"):
+            raise InvalidInput(
+                f"crossing: expected PathCrossing() or None, got {self.crossing!r}"
+            )
+
+    def prepare(self, model: Model, tolerance: float) -> SlowModel | LargeSlowModel:
+        """The matrices of all steps; equilibrium at the end never creates energy."""
+        if self.crossing is not None and model.contacts[0].nitsche is not None:
+            raise UnsupportedForm(f"crossing: {NO_MULTIPLIERS}")
+        kind = LargeSlowModel if model.is_large else SlowModel
+        return kind(model, self.crossing)
+
+
+class SlowModel:
+    """A model without inertia; `advance` makes one step."""
+
+    def __init__(self, model: Model, crossing: Crossing | None = None) -> None:
+        self.motion, self.crossing = Motion(model), crossing
+
+    def begin(self, state: State) -> State:
+        """The state before the first step: undeformed, also where supports hold the body."""
+        return undeformed(state, self.motion)
+
+    def advance(
+        self, state: State, time: float, solve: Solve, limit: Deadline = NEVER
+    ) -> TimeStep:
+        """One step from a state to a time; solve(problem, start) solves its problem.
+
+        limit: of the path to it where that is followed.
+        """
+        parts = self.motion.parts
+        load, prescribed = self.motion.applied(time)
+        problem = self.motion.body.increment(load, prescribed, state.slip)
+        arrive = None
+        if self.crossing is not None:
+            before = self._before(state, time)
+            arrive = partial(self.crossing.between, before, problem, state.force, limit)
+        solution, passage = taken(
+            lambda start: solve(problem, start, None), arrive, state.force, (state.time, time)
+        )
+        solution = carried_on(solution, state.force)
+        assert solution.v is not None
+        q1 = parts.spread(solution.v, prescribed)
+        dq = q1 - state.displacement
+        u = parts.local(q1)
+        energies = self._energies(state, q1, load, solution.r)
+        time_step = time - state.time
+        velocity = dq / time_step if time_step else np.zeros_like(dq)
+        new = State(state.index + 1, time, q1, velocity, solution.r, u[:, 1:])
+        active = np.arange(len(parts.gap))
+        return TimeStep(self.motion.body, new, solution, active, energies, parts.gap + u[:, 0],
+                        passage=passage)  # fmt: skip
+
+    def _before(self, state: State, time: float) -> FrictionProblem:
+        """The problem that the last state solves, slipping as it did: p = 0 of `passage`.
+
+        Its load is what the state balances, so that also a state at rest solves it.
+        """
+        parts, q = self.motion.parts, state.displacement
+        held = np.zeros_like(q)
+        held[parts.fixed] = q[parts.fixed]
+        held = parts.completed(held)
+        load = parts.K @ q - parts.whole_H @ state.force.ravel()
+        motion = (parts.whole_H.T @ state.velocity).reshape(parts.carried.shape)
+        drift = (time - state.time) * motion[:, 1:]
+        return self.motion.body.increment(load, held, state.slip - drift)
+
+    def explained(self, solution: FrictionSolution) -> FrictionSolution:
+        """The same record; one that failed says which bodies give way."""
+        return with_diagnosis(solution, self.motion.body, solution.problem.f)
+
+    def _energies(self, state: State, q1: Array, load: Array, r: Array) -> Energies:
+        """The balance of `slow_energies`; r (nc, d): reactions after the step."""
+        parts, dq = self.motion.parts, q1 - state.displacement
+        before = self._forces(
+            state.displacement, self.motion.load_of(state), parts.whole_H @ state.force.ravel()
+        )
+        after = self._forces(q1, load, parts.whole_H @ r.ravel())
+        friction = float((r[:, 1:] * parts.local(dq)[:, 1:]).sum())
+        return slow_energies(before, after, dq, parts.held, friction)
+
+    def _forces(self, q: Array, load: Array, pushed: Array) -> Forces:
+        inner = self.motion.parts.K @ q
+        return Forces(inner, load, pushed, float(0.5 * q @ inner))

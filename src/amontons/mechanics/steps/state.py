@@ -1,0 +1,235 @@
+"""Where an evolution stands, and what one step of it gives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.arrays import finite, integers, number
+from ...core.errors import InvalidInput, shown
+from ...core.warned import ResultWarning
+from ...problem.friction import FrictionProblem
+from ...problem.solution import ContactStatus, FrictionSolution
+from ..contact import forces
+from ..model import ContactFields, Fix, Model
+from ..model.doubts import model_warnings
+from ..model.supports import locate, prescribed_values
+from ..model.values import VectorValue, check_vector, vector_at
+from .energy import Energies
+from .passage import Passage
+from .system import Motion
+from .timed import part_at, steady
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+ARRAYS = {"displacement": 1, "velocity": 1, "force": 2, "slip": 2}  # name: dimensions
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """All that the next step needs: it may be saved, and the evolution goes on from it.
+
+    index: steps done; time; displacement, velocity (dofs,) of all bodies one after another;
+    force (nc, d): contact forces on the slaves in the local frames, zero where none is active;
+    slip (nc, d-1): tangential displacement since the start.
+    """
+
+    index: int
+    time: float
+    displacement: Array
+    velocity: Array
+    force: Array
+    slip: Array
+
+    def __post_init__(self) -> None:
+        index = integers("state: index", self.index)
+        if index.ndim or index < 0:
+            raise InvalidInput(f"state: index: expected steps done, got {shown(self.index)}")
+        object.__setattr__(self, "index", int(index))
+        object.__setattr__(self, "time", number("state: time", self.time))
+        for name, dimensions in ARRAYS.items():
+            array = finite(f"state: {name}", getattr(self, name), dimensions)
+            object.__setattr__(self, name, array)
+
+    @property
+    def is_unloaded(self) -> bool:
+        """True without displacements and contact forces: no load acts in equilibrium."""
+        return not (self.displacement.any() or self.force.any())
+
+
+@dataclass(frozen=True, eq=False)
+class TimeStep:
+    """One step: the state after it, its discrete problem's solution, its energies.
+
+    active (k,): the contacts that are in the problem, in order; the rest is open.  gap (nc,)
+    after the step, unit of length.  frames (nc, d, d): those of the deformed state where it is
+    large, else those of the model hold.  passage: the path of the step where it was followed.
+    """
+
+    model: Model
+    state: State
+    solution: FrictionSolution
+    active: Index
+    energies: Energies
+    gap: Array
+    frames: Array | None = None
+    passage: Passage | None = None
+
+    @property
+    def time(self) -> float:
+        """Time at the end of the step."""
+        return self.state.time
+
+    @property
+    def problem(self) -> FrictionProblem:
+        """The discrete problem: velocities and impulses in dynamics."""
+        return self.solution.problem
+
+    @property
+    def displacement(self) -> tuple[Array, ...]:
+        """Displacement of every body, (nodes, dim)."""
+        return self._by_body(self.state.displacement)
+
+    @property
+    def v(self) -> tuple[Array, ...]:
+        """Velocity of every body, (nodes, dim)."""
+        return self._by_body(self.state.velocity)
+
+    def _by_body(self, values: Array) -> tuple[Array, ...]:
+        offsets = self.model.discretisation.offsets
+        parts = np.split(values, offsets[1:-1])
+        return tuple(
+            part.reshape(body.mesh.points.shape)
+            for part, body in zip(parts, self.model.bodies, strict=True)
+        )
+
+    @cached_property
+    def status(self) -> NDArray[np.int8]:
+        """ContactStatus of all contacts, (nc,)."""
+        out = np.full(len(self.gap), int(ContactStatus.OPEN), dtype=np.int8)
+        out[self.active] = self.solution.status
+        return out
+
+    @cached_property
+    def sliding(self) -> NDArray[np.bool_]:
+        """True where the law lets a contact slide, (nc,)."""
+        out = np.zeros(len(self.gap), dtype=bool)
+        out[self.active] = self.solution.sliding
+        return out
+
+    @cached_property
+    def fields(self) -> ContactFields:
+        """Displacements, tractions and slip since the start, for writers and plots."""
+        placed = self.model.discretisation.placed
+        surfaces = [locate(self.model.bodies, c.slave) for c in self.model.contacts]
+        rows = [p.rows for p in placed]
+        frames = self.frames
+        if frames is None:
+            frames = np.concatenate([r.frames for r in rows])
+        weights = np.concatenate([r.weights for r in rows])
+        force = self._force
+        traction = self.state.force / weights[:, None]
+        return ContactFields(
+            displacement=self.displacement, points=np.concatenate([r.points for r in rows]),
+            frames=frames, weights=weights, gap=self.gap, pressure=traction[:, 0],
+            shear=traction[:, 1:], slip=self.state.slip, force=force,
+            resultant=force.sum(axis=0),
+            body=np.concatenate([np.full(len(p.rows.nodes), p.body) for p in placed]),
+            node=np.concatenate([r.nodes for r in rows]),
+            facets=tuple((k, self.model.bodies[k].mesh.surface(name)) for k, name in surfaces),
+        )  # fmt: skip
+
+    @cached_property
+    def warnings(self) -> tuple[ResultWarning, ...]:
+        """Reasons to doubt a step that has converged, each with a name."""
+        return self.solution.warnings + model_warnings(self.model, self.fields)
+
+    @property
+    def _force(self) -> Array:
+        """Contact forces on the slaves, (nc, d), global axes."""
+        if self.frames is not None:
+            return np.einsum("pkc,pk->pc", self.frames, self.state.force)
+        placed = self.model.discretisation.placed
+        return forces([p.rows for p in placed], self.state.force)
+
+    def resultant(self, pairs: Sequence[int] | None = None) -> Array:
+        """Sum of the contact forces on the slaves of some (all) contact pairs, global axes."""
+        placed = self.model.discretisation.placed
+        ends = np.cumsum([0, *(len(p.rows.nodes) for p in placed)])
+        total = np.zeros(self.model.dimension)
+        for k in range(len(placed)) if pairs is None else pairs:
+            total += self._force[ends[k] : ends[k + 1]].sum(axis=0)
+        return total
+
+    def __str__(self) -> str:
+        e = self.energies
+        counts = ((s.name.lower(), int((self.status == s).sum())) for s in ContactStatus)
+        doubts = "".join(f"; warning: {warning.name}" for warning in self.warnings)
+        return (
+            f"t = {self.time:.6g}: {', '.join(f'{number} {name}' for name, number in counts)}; "
+            f"kinetic {e.kinetic:.3e}, elastic {e.elastic:.3e}, contact {e.contact:.2e}; "
+            f"{self.solution.convergence}{doubts}"
+        )
+
+
+def at_rest(
+    model: Model,
+    *,
+    time: float = 0.0,
+    velocity: VectorValue | Sequence[VectorValue] = 0.0,
+    displacement: VectorValue | Sequence[VectorValue] = 0.0,
+) -> State:
+    """The model at a time without contact forces: undeformed, or displaced; with a velocity.
+
+    velocity, displacement: a value per component, a function of x, or a list of one of these
+    per body.  Fixed dofs start with their prescribed displacement and without velocity;
+    quasi-static steps of a model that is displaced nowhere else begin without that either.
+    """
+    parts = steady(model).discretisation
+    q, v = (
+        _at_nodes(model, value, name)
+        for value, name in ((displacement, "displacement"), (velocity, "velocity"))
+    )
+    v[parts.fixed] = 0.0
+    if parts.rigid is not None:
+        v = parts.rigid.nearest(v, np.zeros_like(v))
+    supports: tuple[Fix, ...] = tuple(part_at(s, time) for s in model.supports)  # type: ignore[misc]
+    q[parts.fixed] = prescribed_values(model.bodies, supports, parts.offsets)[parts.fixed]
+    if parts.rigid is not None:
+        q = parts.rigid.nearest(q, np.where(parts.is_fixed, q, 0.0))
+    u = parts.local(q)
+    return State(0, time, q, v, np.zeros_like(u), u[:, 1:])
+
+
+def _at_nodes(model: Model, value: object, name: str) -> Array:
+    """Values of all bodies at their nodes, (dofs,)."""
+    out = []
+    for body, own in zip(model.bodies, _one_each(value, len(model.bodies)), strict=True):
+        check_vector(own, name)
+        out.append(vector_at(own, body.mesh.points, name).ravel())
+    return np.concatenate(out)
+
+
+def undeformed(state: State, motion: Motion) -> State:
+    """A state `at_rest` with all displacements zero, also prescribed ones; others as they are.
+
+    Quasi-static steps begin there: what supports prescribe at first is part of the first step.
+    """
+    moved = motion.parts.moved(state.displacement) or state.velocity.any()
+    if state.index or moved or state.force.any():
+        return state
+    zero = np.zeros_like
+    return replace(state, displacement=zero(state.displacement), slip=zero(state.slip))
+
+
+def _one_each(value: object, bodies: int) -> list:
+    """A value for every body; a list of vectors or functions is one per body."""
+    if isinstance(value, list | tuple):
+        several = all(isinstance(v, list | tuple) or callable(v) for v in value)
+        if several and len(value) == bodies:
+            return list(value)
+    return [value] * bodies

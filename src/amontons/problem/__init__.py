@@ -1,0 +1,1 @@
+"""The discrete problem: data, laws, judge, status, solution."""

@@ -1,0 +1,1 @@
+"""The measure that decides whether something is a solution."""

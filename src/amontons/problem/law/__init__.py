@@ -1,0 +1,1 @@
+"""Laws of friction: cones, projections, a single contact."""

@@ -1,0 +1,221 @@
+"""What load and friction do not change: M and H, and what is prepared of them, each once.
+
+Variants of a problem (another load, other friction, the steps of an evolution) hold the same
+matrices.  What is made of them, a factor of M above all, stands in a dictionary that all
+variants share, together with the matrices it was made of: where a variant has another M or H,
+it is made again.
+
+W = H^T M^-1 H is formed here too, and it is decided when that is the best to solve with.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..core.clock import NEVER, Deadline
+from ..core.errors import InvalidInput
+from ..linear import ConjugateGradient, Direct, Factor, GeometricMultigrid, LinearSolver
+from ..linear.blocks import BlockRows
+from ..linear.bodies import Bodies, BodyFactor
+from ..linear.dense import DENSE_LIMIT
+from ..linear.distributed import DistributedMatrix
+from ..linear.geometric import prepared
+from ..linear.grid_matrix import GridMatrix
+from ..linear.hierarchy import Hierarchy
+from ..linear.levels import Levels
+from ..linear.loose_modes import loose_modes
+from ..linear.small_blocks import block_diagonal_inverse, diagonal_blocks_inverse
+from .condensation import SOLVE_COLUMNS, Condensation
+
+Array = NDArray[np.float64]
+Shared = dict[str, tuple[tuple, Any]]  # by name: the matrices it was made of, and what was made
+OPERATORS = (GridMatrix, DistributedMatrix)  # which M may be instead of a stored matrix
+DIRECT_LIMIT = 600_000  # unknowns of a mesh whose factor takes some 10 GB
+EXACT_WORK = 2e6  # n * nc * d up to which forming W costs nothing that matters
+LARGE_BODY = 10_000  # unknowns of a body with levels from which multigrid is the way
+CHEAP = 2.0  # work of W, relative to that of a compressed W, which is full and not exact
+
+
+def made_once(shared: Shared, name: str, sources: tuple, make: Callable[[], Any]) -> Any:
+    """What `make` gives, made once for all that share it and hold the same source matrices."""
+    entry = shared.get(name)
+    if entry is None or any(a is not b for a, b in zip(entry[0], sources, strict=True)):
+        entry = shared[name] = (sources, make())
+    return entry[1]
+
+
+@dataclass(frozen=True, eq=False)
+class GlobalMatrices:
+    """M (n, n), H (n, nc d), the rigid modes (n, k) and the levels of a `FrictionProblem`."""
+
+    M: sparse.csc_array
+    H: sparse.csc_array
+    dimension: int
+    near_nullspace: Array | None
+    levels: Levels
+    shared: Shared
+
+    @property
+    def contacts(self) -> int:
+        """Number of contacts nc."""
+        return self.H.shape[1] // self.dimension
+
+    def _kept(self, name: str, make: Callable[[], Any]) -> Any:
+        """What is made of M alone."""
+        return made_once(self.shared, name, (self.M,), make)
+
+    def _kept_of_both(self, name: str, make: Callable[[], Any]) -> Any:
+        """What is made of M and H."""
+        return made_once(self.shared, name, (self.M, self.H), make)
+
+    # ---------------------------------------------------------------- M
+    def stored(self) -> sparse.csc_array:
+        """M as a stored matrix where it is the operator of a grid."""
+        return self._kept("stored", self.M.tocsc)
+
+    def stored_levels(self) -> Levels:
+        """The levels that such an operator has for itself."""
+        return self._kept("stored levels", self.M.free_levels)  # type: ignore[attr-defined]
+
+    @cached_property
+    def bodies(self) -> Bodies:
+        """The blocks into which M falls apart."""
+        return self._kept("bodies", lambda: Bodies.of(self.M))
+
+    @cached_property
+    def small_blocks(self) -> sparse.csc_array | None:
+        """M^-1 when M is block diagonal with small blocks (rigid bodies), else None."""
+        if isinstance(self.M, OPERATORS):
+            return None
+        return self._kept("inverse", lambda: block_diagonal_inverse(self.M))
+
+    def factor(self) -> Factor:
+        """M prepared for solves, see `FrictionProblem.factor`."""
+        return self._kept("factor", self._factor)
+
+    def _factor(self) -> Factor:
+        M, modes = self.M, self.near_nullspace
+        if isinstance(M, GridMatrix):
+            return GeometricMultigrid().factor(M)  # type: ignore[arg-type]
+        if isinstance(M, DistributedMatrix):
+            return M.factor()
+        bodies = self.bodies
+        iterative = bodies.largest > DIRECT_LIMIT and modes is not None
+        if bodies.count > 1 and not iterative:
+            return bodies.factor(M)
+        solver: LinearSolver = ConjugateGradient() if iterative else Direct()
+        return solver.factor(M, modes)
+
+    @property
+    def loose_modes(self) -> Array:
+        """Rigid modes that M does not resist, orthonormal columns (n, k), see `linear`."""
+        return self._kept(
+            "loose modes", lambda: loose_modes(self.M, self.bodies, self.near_nullspace)
+        )
+
+    def solve(self, b: Array) -> Array:
+        """M^-1 b, b of shape (n,) or (n, k)."""
+        inverse = self.small_blocks
+        return inverse @ b if inverse is not None else self.factor().solve(b)
+
+    @property
+    def hierarchy(self) -> Hierarchy | None:
+        """Multigrid levels of M; None where the unknowns do not come in nodes."""
+        return self._kept(
+            "hierarchy",
+            lambda: prepared(self.M, self.levels, self.near_nullspace, self.dimension),
+        )
+
+    # ---------------------------------------------------------------- W
+    @property
+    def condensation(self) -> Condensation:
+        """W body by body."""
+        return self._kept_of_both(
+            "condensation", lambda: Condensation(self.bodies, self.H, self.dimension)
+        )
+
+    @property
+    def condensing_is_cheap(self) -> bool:
+        """True when W is the best to solve with, see `FrictionProblem.condensing_is_cheap`."""
+        return self._kept_of_both("cheap", self._condensing_is_cheap)
+
+    def _condensing_is_cheap(self) -> bool:
+        if isinstance(self.M, OPERATORS):
+            return False
+        if self.small_blocks is not None:
+            return True
+        n, m = self.H.shape
+        if n * m <= EXACT_WORK:
+            return True
+        if self.levels and self.bodies.largest >= LARGE_BODY:
+            return False
+        parts = self.condensation
+        fits = 8.0 * self.dimension**2 * parts.blocks <= DENSE_LIMIT
+        return fits and parts.work <= CHEAP * parts.compressed_work
+
+    def delassus(self, deadline: Deadline = NEVER) -> BlockRows | sparse.csr_array | Array:
+        """W = H^T M^-1 H: block rows of several bodies, sparse of rigid ones, dense of one.
+
+        Raises InvalidInput when it would not fit into memory, SingularOperator when M can not
+        be inverted, TimeUp when it is not there in time.
+        """
+        inverse = self.small_blocks
+        if inverse is not None:
+            return (self.H.T @ (inverse @ self.H)).tocsr()
+        factor = self.factor()
+        several = isinstance(factor, BodyFactor)
+        entries = (
+            self.dimension**2 * self.condensation.blocks if several else self.H.shape[1] ** 2
+        )
+        if 8.0 * entries > DENSE_LIMIT:
+            raise InvalidInput(
+                f"condensed: W would take {8e-9 * entries:.1f} GB for {self.contacts} "
+                "contacts; solve the global form with SemismoothNewton, "
+                "which does not form W"
+            )
+        if several:
+            return self.condensation.delassus(factor, deadline)  # type: ignore[arg-type]
+        return self._dense_delassus(deadline)
+
+    def _dense_delassus(self, deadline: Deadline) -> Array:
+        """By blocks of right-hand sides, so that memory stays near that of W itself."""
+        H = sparse.csc_array(self.H)
+        m = H.shape[1]
+        W = np.empty((m, m))
+        for part in self.column_parts(m):
+            deadline.check()
+            W[:, part] = H.T @ self.solve(H[:, part].toarray())
+        return W
+
+    def column_parts(self, count: int) -> list[slice]:
+        """Right-hand sides in parts that take no longer together than each for itself."""
+        exact = self.small_blocks is not None or self.factor().exact
+        size = SOLVE_COLUMNS if exact else 1
+        return [slice(first, first + size) for first in range(0, count, size)]
+
+    @property
+    def local_stiffness(self) -> Array:
+        """H_i^T D^-1 H_i, (nc, d, d), D the block diagonal of M: a cheap stand-in for W_ii."""
+        return self._kept_of_both("local stiffness", self._local_stiffness)
+
+    def _local_stiffness(self) -> Array:
+        M, d, n = self.M, self.dimension, self.H.shape[0]
+        size = d if n % d == 0 else 1
+        touched = np.unique(self.H.indices // size)  # the blocks that H sees
+        index = (touched[:, None] * size + np.arange(size)).ravel()
+        H = sparse.csr_array(self.H)[index]
+        part = M.part(index) if isinstance(M, OPERATORS) else M[:, index].tocsr()[index]
+        product = sparse.csc_array(diagonal_blocks_inverse(part, size) @ H)
+        full = (sparse.csr_array(H.T) @ product).tobsr((d, d))
+        out = np.zeros((self.contacts, d, d))
+        rows = np.repeat(np.arange(self.contacts), np.diff(full.indptr))
+        own = rows == full.indices
+        out[rows[own]] = full.data[own]
+        return out

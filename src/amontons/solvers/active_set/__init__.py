@@ -1,0 +1,1 @@
+"""Active sets with their linear problems."""

@@ -1,0 +1,269 @@
+"""Multigrid cycles for the linear problems of active set methods, after [HSW] section 4.
+
+The rows of the contact nodes carry the conditions of the active sets in the local basis,
+
+    F^T G_r F (M v - f) + F^T G_u (F v + w) = F^T b,
+
+F = frames, which keeps every node block 3x3 and couples a contact to no new node: block
+Gauss-Seidel respects Dirichlet, Robin and natural conditions alike.  Coarse levels are Galerkin
+products with test and trial functions that vanish in the Dirichlet directions of the finest
+level.  Only what couples to those directions changes from step to step:
+
+    P~^T (M + L) P~ = P^T M P - X - X^T + P~^T L P~,   P~ = P - Q P,
+    X = (Q P)^T M P - (Q P)^T M (Q P) / 2,             Q = projection onto Dirichlet directions,
+
+and the levels below take P^T of the difference.
+
+[HSW]: see `conditions`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ...core.errors import InvalidInput
+from ...core.options import check_options
+from ...linear.hierarchy import SMALL, Hierarchy, Nodes, components
+from ...linear.node_blocks import NodeBlocks, block_inverse, residual, sweep
+from ...linear.transfer import Transfer
+from ...problem.one_sided import HELD, OneSided
+from ..contract import check_at_least
+from .conditions import Conditions
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+class CycleShape(Enum):
+    """Order in which the levels are visited."""
+
+    V = "v"
+    W = "w"
+    F = "f"
+
+
+@dataclass(frozen=True)
+class MultigridCycle:
+    """Geometric multigrid: shape of the cycle, and symmetric Gauss-Seidel sweeps on each side.
+
+    The default is that of [HSW].  Without levels in the problem they are made algebraically.
+    """
+
+    shape: CycleShape = CycleShape.W
+    smoothing: int = 3  # symmetric block Gauss-Seidel sweeps before and after, each
+
+    def __post_init__(self) -> None:
+        check_options(self)
+        check_at_least(1, smoothing=self.smoothing)
+
+
+@dataclass(eq=False)
+class Contacts:
+    """Where contacts sit among node blocks: node (nc,), frames (nc, 3, 3) on the padded node.
+
+    idle (nc, 3): components of those nodes that are no unknowns.
+    """
+
+    node: Index
+    frames: Array
+    idle: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, basis: OneSided, nodes: Nodes) -> Contacts:
+        """From dofs and frames of the one-sided basis."""
+        nc, d = basis.dofs.shape
+        frames = np.zeros((nc, 3, 3))
+        place = np.where(basis.dofs == HELD, 0, nodes.place[basis.dofs])
+        contact, slot = np.nonzero(basis.dofs != HELD)
+        component = place[contact, slot] % 3
+        frames[contact, :d, component] = basis.frames[contact, :, slot]
+        idle = np.ones((nc, 3), dtype=bool)
+        idle[contact, component] = False
+        return cls(place[:, 0] // 3, frames, idle)
+
+    def to_nodes(self, blocks: Array) -> Array:
+        """F^T blocks F, (nc, 3, 3), of local blocks (nc, d, d)."""
+        d = blocks.shape[1]
+        F = self.frames[:, :d]
+        return np.einsum("kai,kab,kbj->kij", F, blocks, F)
+
+
+class ContactCycles:
+    """The linear problem of one step after another, and multigrid cycles for it."""
+
+    def __init__(self, basis: OneSided, d: int, modes: Array | None) -> None:
+        """modes (n, k): rigid modes of the bodies in the usual basis; they tell components."""
+        component = components(modes, basis.M.shape[0], d)
+        if component is None:
+            raise InvalidInput("near_nullspace: multigrid needs translations among its columns")
+        self.option = MultigridCycle()
+        self.nodes = Nodes.of(component)
+        place = None if self.nodes.plain else self.nodes.place
+        A = NodeBlocks.from_sparse(basis.M, place, self.nodes.count)
+        given = Hierarchy.of(A, component, basis.levels, basis.near_nullspace)
+        self.levels, self.coarse_inverse = given.levels, given.coarse_inverse
+        self.plain = [level.A.data.copy() for level in self.levels[1:]]
+        self.contacts = Contacts.of(basis, self.nodes)
+        self._prepare_rows()
+        self._prepare_galerkin()
+
+    # ------------------------------------------------------------------ finest level
+    def _prepare_rows(self) -> None:
+        """The original rows of the contact nodes, and where they are stored."""
+        A, node = self.levels[0].A, self.contacts.node
+        counts = np.diff(A.indptr)[node]
+        self.owner = np.repeat(np.arange(len(node)), counts)
+        start = np.cumsum(counts) - counts
+        self.stored = np.arange(counts.sum()) - np.repeat(start - A.indptr[node], counts)
+        self.rows = A.data[self.stored].copy()
+        self.own = np.flatnonzero(A.indices[self.stored] == node[self.owner])
+        self.size = np.abs(self.rows[self.own]).max(axis=(1, 2), initial=0.0)
+        self.none_held = np.zeros(A.nodes, dtype=bool)
+
+    def set(self, given: Conditions, f: Array, w: Array) -> None:
+        """Take over the conditions of a step; f (n,) load, w (nc, d) constant part of u."""
+        A, contacts = self.levels[0].A, self.contacts
+        K, U = contacts.to_nodes(given.G_r), contacts.to_nodes(given.G_u)
+        U[:, range(3), range(3)] += contacts.idle * self.size[:, None]
+        scale = self.size[:, None, None]  # Dirichlet rows in the unit of the others
+        U += (scale - 1) * contacts.to_nodes(self._dirichlet(given)[:, :, None] * given.G_u)
+        rows = np.matmul(K[self.owner], self.rows)
+        rows[self.own] += U
+        A.data[self.stored] = rows
+        A.inverse[contacts.node] = np.linalg.inv(rows[self.own])
+        force = given.b - np.einsum("kij,kj->ki", given.G_u, w)
+        force *= np.where(self._dirichlet(given), self.size[:, None], 1.0)
+        d = w.shape[1]
+        self.b = self.nodes.spread(f)
+        self.b[contacts.node] = np.einsum("kij,kj->ki", K, self.b[contacts.node])
+        self.b[contacts.node] += np.einsum("kai,ka->ki", contacts.frames[:, :d], force)
+        self._update_coarse(given)
+
+    @staticmethod
+    def _dirichlet(given: Conditions) -> NDArray[np.bool_]:
+        """Local directions in which a displacement is prescribed, (nc, d)."""
+        return np.einsum("kii->ki", given.G_r) == 0
+
+    # ------------------------------------------------------------------ coarse levels
+    def _prepare_galerkin(self) -> None:
+        """What the difference of the coarse matrices is made of: P and M on contact rows."""
+        self.prolongations = [_matrix(level.P) for level in self.levels[:-1]]
+        if not self.prolongations:
+            return
+        A, nodes = self.levels[0].A, self.contacts.node
+        size = 3 * A.nodes
+        M = sparse.bsr_array((A.data, A.indices, A.indptr), shape=(size, size))
+        self.unknowns = (3 * nodes[:, None] + np.arange(3)).ravel()
+        rows = M.tocsr()[self.unknowns]
+        self.P = self.prolongations[0][self.unknowns]
+        self.MP = sparse.csr_array(rows @ self.prolongations[0])
+        self.M_contact = sparse.csr_array(rows[:, self.unknowns])
+
+    def _update_coarse(self, given: Conditions) -> None:
+        """Galerkin matrices of this step, from the differences to the plain ones."""
+        if not self.prolongations:  # small enough to be solved at once
+            self.coarse_inverse = np.linalg.pinv(self.levels[0].A.dense(), rcond=SMALL)
+            return
+        fixed = self._dirichlet(given)
+        identity = np.eye(fixed.shape[1])
+        self.projection = self.contacts.to_nodes(fixed[:, :, None] * identity)
+        Q = _blocks(self.projection)
+        QP = Q @ self.P
+        X = QP.T @ (self.MP - 0.5 * (self.M_contact @ QP))
+        free = ~fixed
+        L = self.contacts.to_nodes(free[:, :, None] * given.G_u * free[:, None, :])
+        truncated = self.P - QP
+        delta = sparse.csr_array(truncated.T @ (_blocks(L) @ truncated) - X - X.T)
+        for k, level in enumerate(self.levels[1:]):
+            if k:
+                P = self.prolongations[k]
+                delta = sparse.csr_array(P.T @ (delta @ P))
+            _add_blocks(level.A, self.plain[k], delta)
+        self.coarse_inverse = np.linalg.pinv(self.levels[-1].A.dense(), rcond=SMALL)
+
+    # ------------------------------------------------------------------ cycles
+    def cycle(self, x: Array) -> float:
+        """One cycle in place on x, (nodes, 3); returns the residual after it over that of 0."""
+        shape = self.option.shape
+        self._visit(0, self.b, x, shape)
+        return self.residual(x)
+
+    def residual(self, x: Array) -> float:
+        """|b - A x| / |b| of the linear problem."""
+        level = self.levels[0]
+        A = level.A
+        residual(A.indptr, A.indices, A.data, x, self.b, level.r)
+        return float(np.linalg.norm(level.r) / max(np.linalg.norm(self.b), 1e-300))
+
+    def _visit(self, k: int, b: Array, x: Array, shape: CycleShape) -> None:
+        level = self.levels[k]
+        if level.P is None:
+            x[:] = (self.coarse_inverse @ b.reshape(-1)).reshape(-1, 3)
+            return
+        self._smooth(level.A, b, x)
+        coarse, A = self.levels[k + 1], level.A
+        residual(A.indptr, A.indices, A.data, x, b, level.r)
+        self._keep_free(k, level.r)
+        level.P.restrict(level.r, coarse.b)
+        coarse.x[:] = 0.0
+        self._visit(k + 1, coarse.b, coarse.x, shape)
+        if shape is not CycleShape.V and coarse.P is not None:
+            again = CycleShape.W if shape is CycleShape.W else CycleShape.V
+            self._visit(k + 1, coarse.b, coarse.x, again)
+        level.r[:] = 0.0
+        level.P.add(coarse.x, level.r)
+        self._keep_free(k, level.r)
+        x += level.r
+        self._smooth(level.A, b, x)
+
+    def _keep_free(self, k: int, values: Array) -> None:
+        """On the finest level, leave out the Dirichlet directions of the contact nodes."""
+        if k == 0:
+            node = self.contacts.node
+            values[node] -= np.einsum("kij,kj->ki", self.projection, values[node])
+
+    def _smooth(self, A: NodeBlocks, b: Array, x: Array) -> None:
+        held = self.none_held[: A.nodes]
+        for _ in range(self.option.smoothing):
+            sweep(A.indptr, A.indices, A.data, A.inverse, b, x, held, False)
+            sweep(A.indptr, A.indices, A.data, A.inverse, b, x, held, True)
+
+
+def _matrix(P: Transfer) -> sparse.csr_array:
+    """A transfer as a scalar matrix, without padding."""
+    if len(P.blocks):
+        shape = (3 * P.fine, 3 * P.coarse)
+        out = sparse.csr_array(sparse.bsr_array((P.blocks, P.indices, P.indptr), shape=shape))
+    else:
+        out = sparse.kron(P.scalar(), sparse.eye_array(3), format="csr")
+    fine, coarse = np.ones(3 * P.fine), np.ones(3 * P.coarse)
+    fine[P.idle], coarse[P.coarse_idle] = 0.0, 0.0
+    return sparse.csr_array(sparse.diags_array(fine) @ out @ sparse.diags_array(coarse))
+
+
+def _blocks(blocks: Array) -> sparse.csr_array:
+    """A block diagonal matrix."""
+    k = len(blocks)
+    tiles = sparse.bsr_array((blocks, np.arange(k), np.arange(k + 1)), shape=(3 * k, 3 * k))
+    return sparse.csr_array(tiles)
+
+
+def _add_blocks(A: NodeBlocks, plain: Array, delta: sparse.csr_array) -> None:
+    """Set A to its plain values plus a difference within its pattern."""
+    tiles = delta.tobsr((3, 3))
+    n = A.nodes
+    key = np.repeat(np.arange(n), np.diff(A.indptr)) * n + A.indices
+    wanted = np.repeat(np.arange(n), np.diff(tiles.indptr)) * n + tiles.indices
+    where = np.minimum(np.searchsorted(key, wanted), len(key) - 1)
+    known = key[where] == wanted  # the rest are zeros that a product has stored
+    where, values = where[known], tiles.data[known]
+    A.data[:] = plain
+    np.add.at(A.data, where, values)
+    diagonal = A.diagonal()
+    size = np.abs(plain[diagonal]).max(axis=(1, 2), initial=0.0)
+    A.inverse = block_inverse(A.data[diagonal], size)

@@ -1,0 +1,1 @@
+"""The choice of method: what `solve(problem)` runs."""

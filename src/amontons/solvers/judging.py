@@ -1,0 +1,205 @@
+"""The driver's memory of one solve: it judges every iterate and knows the best one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.clock import compiling, now
+from ..problem.friction import FrictionProblem
+from ..problem.judge.measures import EPSILON, Criterion, Measure, Weakest
+from ..problem.law.cones import Coulomb
+from ..problem.nitsche import NitscheProblem
+from ..problem.settling import Motion, Settled, motion, settled, settled_exactly
+from ..problem.solution import Step
+from .contract import Iterate, natural_error_of
+from .first_iterate import own_motion
+
+Array = NDArray[np.float64]
+Taken = Callable[[FrictionProblem | NitscheProblem, Iterate], Iterate]
+MEMORY = 64  # iterates among which a repetition counts as a cycle
+AT_REST = 1e-10  # relative change of r below which an iterate has not moved
+PATIENCE = 500  # iterates without any progress before a solve counts as stagnated
+PROGRESS = 0.99  # the best error must fall at least by this factor within PATIENCE
+BLUR = 1e-2  # rounding, relative to the tolerance, above which an error is evaluated sharply
+BLURRED = 20  # iterates that would do if rounding could hide no error in them
+TIGHTER = 0.3  # goal of a second start, relative to what would just do
+
+
+@dataclass
+class Watch:
+    """The driver's memory of one solve."""
+
+    problem: FrictionProblem | NitscheProblem
+    tolerance: float
+    contact_tolerance: float
+    criterion: Criterion = Criterion.JUDGE
+    patience: int | None = PATIENCE  # None: never stagnated
+    taken: Taken = own_motion  # what of an iterate is judged
+    started: float = field(default_factory=now)
+    compiled: float = field(default_factory=compiling)  # until then
+    best: Iterate | None = None
+    told: tuple[Motion, Settled] | None = None  # of the best iterate where it is good enough
+    error: float = np.inf
+    weakest: Weakest | None = None  # contact of the best iterate, once its error will do
+    iterations: int = 0
+    linear_iterations: int = 0
+    flops: float | None = 0.0  # None from the first iterate on that does not count its own
+    history: list[Step] = field(default_factory=list)
+    seen: list[tuple[float, Array]] = field(default_factory=list)
+    content: int = 0  # iterates in a row that the judge would take, but not the criterion
+    blurred: int = 0  # iterates whose error rounding hides
+    mark: tuple[int, float] = (0, np.inf)  # iterate and error of the last real progress
+
+    def judge(self, iterate: Iterate) -> Step:
+        """Judge an iterate and remember it if it is the best."""
+        iterate = self.taken(self.problem, iterate)
+        if self.criterion is Criterion.NATURAL:
+            error = natural_error_of(self.problem, iterate.r, iterate.v)  # type: ignore[arg-type]
+            return self._noted(iterate, error, None, None)
+        error, weakest, told = self.problem.error(iterate.r, iterate.v), None, None
+        if error <= self.tolerance:
+            iterate, error, weakest, told = self._settled(iterate, error)
+        if weakest is not None and weakest.hidden > BLUR * self.tolerance:
+            error = self.problem.certain_error(iterate.r, iterate.v)
+            if error > self.tolerance:
+                weakest = None
+                self.blurred += 1
+        return self._noted(iterate, error, weakest, told)
+
+    def _settled(
+        self, iterate: Iterate, error: float
+    ) -> tuple[Iterate, float, Weakest | None, tuple[Motion, Settled] | None]:
+        """An iterate whose error will do, with reactions that keep to their statuses."""
+        problem = self.problem
+        if isinstance(problem, NitscheProblem):
+            return iterate, error, problem.weakest(iterate.r, iterate.v), None
+        if problem.measure is Measure.EXACT:
+            u, told, own, weakest = settled_exactly(problem.condensed(), iterate.r)
+            if told.changed:  # its motion is found again
+                iterate, error = replace(iterate, r=told.r, v=None), own
+            weakest = weakest if error <= self.tolerance else None
+            return iterate, error, weakest, ((u, None), told)
+        v = iterate.v
+        moved, told = settled(
+            problem.law, problem.rho, iterate.r, lambda r: motion(problem, r, v)
+        )
+        if told.r is not iterate.r:
+            iterate = replace(iterate, r=told.r)
+            error = problem.error(iterate.r, v)
+        if error > self.tolerance:
+            return iterate, error, None, (moved, told)
+        return iterate, error, problem.weakest(iterate.r, v), (moved, told)
+
+    def _noted(
+        self, iterate: Iterate, error: float, weakest: Weakest | None,
+        told: tuple[Motion, Settled] | None,
+    ) -> Step:  # fmt: skip
+        """The line of the history about an iterate that has been judged."""
+        self.iterations += iterate.iterations
+        self.linear_iterations += iterate.linear_iterations
+        seconds = now() - self.started
+        self.flops = self._counted(iterate)
+        step = Step(
+            self.iterations, error, self.linear_iterations, seconds, iterate.sets, self.flops
+        )
+        self.history.append(step)
+        if self.best is None or self._better(error, weakest):
+            self.best, self.error, self.weakest = iterate, error, weakest
+            self.told = told
+        if error < PROGRESS * self.mark[1]:
+            self.mark = (len(self.history), error)
+        return step
+
+    def _counted(self, iterate: Iterate) -> float | None:
+        """Floating point operations so far, judgements among them; None if not counted."""
+        if self.flops is None or (iterate.flops is None and iterate.iterations):
+            return None
+        p = self.problem
+        judged = p.judge_flops if isinstance(p, FrictionProblem) else 0.0
+        return self.flops + (iterate.flops or 0.0) + judged
+
+    def _better(self, error: float, weakest: Weakest | None) -> bool:
+        """True for an error below the best; of those that will do, for the better contacts."""
+        if weakest is None or self.weakest is None:
+            return error < self.error
+        return weakest.error < self.weakest.error
+
+    @property
+    def converged(self) -> bool:
+        """True when the best iterate will do in the sum and at every contact."""
+        good = self.error <= self.tolerance
+        return good and (self.weakest is None or self.weakest.error <= self.contact_tolerance)
+
+    @property
+    def weak(self) -> bool:
+        """True when the best iterate will do in the sum alone."""
+        return self.error <= self.tolerance and not self.converged
+
+    @property
+    def in_words(self) -> str:
+        """Why the best iterate will not do though its error is small; "" where it would."""
+        if self.criterion is Criterion.NATURAL:
+            return ""
+        if self.best is not None and not self.converged:
+            hidden = self.problem.rounding(self.best.r)
+            law = self.problem.law
+            mu = law.mu.max(initial=0.0) if isinstance(law, Coulomb) else 0.0
+            if mu * EPSILON > self.tolerance:
+                return (
+                    f"rounding of the slip, times friction of {mu:.0e}, is above the "
+                    "tolerance: hold contacts that can not slip by supports, or take mu below "
+                    "1e7"
+                )
+            if hidden > self.tolerance:
+                return (
+                    f"rounding alone may hide an error of {hidden:.1e}: reactions are huge "
+                    "beside what loads the contacts"
+                )
+        if not self.weak or self.weakest is None:
+            return ""
+        return (
+            f"contact {self.weakest.contact} misses its law by {self.weakest.error:.1e} on its "
+            f"own scale, {self.contact_tolerance:.0e} is allowed"
+        )
+
+    def tighter(self, goal: float) -> float:
+        """The next goal for the error, so that the weakest contact will do too."""
+        if self.criterion is Criterion.NATURAL:
+            return TIGHTER * goal * min(self.tolerance / self.error, 1.0)
+        assert self.weakest is not None
+        share = TIGHTER * self.contact_tolerance / self.weakest.error
+        return max(min(self.error * share, TIGHTER * goal), np.finfo(float).tiny)
+
+    def cycled(self, iterate: Iterate, error: float) -> bool:
+        """True when this iterate was here before, with other iterates in between.
+
+        One that hardly moves does not come back: its method may wait for something else.
+        """
+        same = [self._repeats(iterate, error, *old) for old in self.seen]
+        self.seen.append((error, iterate.r))
+        del self.seen[:-MEMORY]
+        if not any(same) or same[-1]:
+            return False
+        moved = np.abs(self.seen[-2][1] - iterate.r).max(initial=0.0)
+        return bool(moved > AT_REST * np.abs(iterate.r).max(initial=0.0))
+
+    @staticmethod
+    def _repeats(iterate: Iterate, error: float, old_error: float, old: Array) -> bool:
+        if abs(old_error - error) > 1e-12 * error:
+            return False
+        size = np.abs(iterate.r).max(initial=0.0)
+        return bool(np.abs(old - iterate.r).max(initial=0.0) <= 1e-13 * size)
+
+    @property
+    def stagnated(self) -> bool:
+        """True when the best error has not moved for `patience` iterates.
+
+        Or when rounding has hidden that of BLURRED ones: more of them will not be known better.
+        """
+        if self.patience is None:
+            return False
+        return len(self.history) - self.mark[0] > self.patience or self.blurred > BLURRED

@@ -1,0 +1,1 @@
+"""Multigrid for problems with contact on the finest level."""

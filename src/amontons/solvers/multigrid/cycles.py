@@ -1,0 +1,244 @@
+"""Contact on meshes for about the price of one linear solve: multigrid with the law inside.
+
+One cycle, from v on the finest level:
+
+1. smooth: block Gauss-Seidel in the bulk, then every contact node solves its own problem of
+   contact and friction exactly (`nodes`); states, reactions and residual are of this v.
+2. coarse correction: one linear V(1,1) cycle on coarse levels that see these states, a Galerkin
+   tangent whose test and trial spaces are truncated to the directions in which the contacts can
+   move (`truncation`).  It is renewed when a state changes or the error has fallen far.
+3. smooth in reverse order.
+4. Anderson acceleration over a few cycles; forgotten when many states change.
+
+While many states change and the error hardly falls, step 2 is that of the convex problem with
+the present bounds of friction: nodes that it lets penetrate are lifted to the surface, and the
+step is taken as far as the energy of that problem falls.  This costs one more product.
+
+On geometric levels the start is nested: each level is solved to `coarse_tolerance` first, from
+the solution of the next coarser one.  No parameter depends on the units or on the law.
+
+The truncated coarse spaces go back to R. Kornhuber's monotone multigrid for obstacle problems;
+the tangent for Coulomb's law is that of the full Newton method in [HSW] section 7; the limited
+step follows [GK].
+
+[GK] C. Gräser, R. Kornhuber, "Multigrid methods for obstacle problems", J. Comput. Math. 27
+(2009).
+[HSW] S. Hüeber, G. Stadler, B. Wohlmuth, "A primal-dual active set algorithm for
+three-dimensional contact problems with Coulomb friction", SIAM J. Sci. Comput. 30 (2008).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import UnsupportedForm
+from ...core.options import check_options
+from ...linear.grid import GridBlocks
+from ...problem.friction import Form, FrictionProblem
+from ..anderson import Anderson
+from ..contract import Breakdown, Iterate, Patience, Target, check_at_least, check_positive
+from .levels import ContactLevels
+from .nodes import ContactNodes
+
+Array = NDArray[np.float64]
+MANY = 0.01  # share of contacts that change their state above which Anderson forgets
+GROWTH = 1e3  # of the error over the best one that counts as divergence
+GRID_DEPTH = 3  # past cycles to mix at most where M is not stored
+SLOW = 0.5  # fall of the error in a cycle above which, while states change, steps are limited
+CLOSE = 0.9  # share of the tolerance at which an iterate is handed to the judge
+
+
+@dataclass(frozen=True)
+class ContactMultigrid:
+    """Nonlinear multigrid for meshed bodies in contact, see the module.
+
+    depth: past cycles that Anderson acceleration combines, 0 for none.  update_ratio: the
+    tangent is renewed at the latest when the error has fallen by this factor.  Raises Breakdown
+    where contacts have no slave nodes of their own (`one_sided`) and where the cycles fail.
+    """
+
+    form: ClassVar[Form] = Form.GLOBAL
+    matrix_free: ClassVar[bool] = True  # M may be an operator
+    depth: int = 8
+    nested: bool = True
+    coarse_tolerance: float = 1e-2
+    update_ratio: float = 0.03
+    contact_sweeps: int = 1  # over the contact nodes after each sweep in the bulk
+    patience: int = 30  # cycles without halving the error before it gives up
+    report: int = 10  # cycles between iterates that are not yet good enough
+
+    def __post_init__(self) -> None:
+        check_options(self)
+        check_at_least(0, depth=self.depth)
+        check_at_least(
+            1, contact_sweeps=self.contact_sweeps, patience=self.patience, report=self.report
+        )
+        check_positive(coarse_tolerance=self.coarse_tolerance, update_ratio=self.update_ratio)
+
+    def iterates(
+        self, problem: FrictionProblem, start: Iterate, target: Target
+    ) -> Iterator[Iterate]:
+        """States of the finest level, when they seem good enough and every `report` cycles."""
+        if problem.form is not Form.GLOBAL:
+            raise UnsupportedForm("ContactMultigrid: the problem has no global form")
+        if not problem.contacts:
+            return
+        levels = ContactLevels.of(problem)
+        run = _Run(levels, self, levels.finest(problem), 0)
+        x = levels.start(problem, start)
+        if self.nested and start.v is None:
+            self._nested_start(levels, problem, x)
+        goal, since = CLOSE * target.tolerance, 0
+        for error in run.cycles(x):
+            since += 1
+            ready = error <= goal
+            if ready or since >= self.report or target.deadline.passed:
+                yield Iterate(
+                    run.contacts.r[:, : problem.dimension].copy(),
+                    levels.displacement(x),
+                    iterations=since,
+                    linear_iterations=since,
+                    stage="contact multigrid",
+                )
+                since = 0
+            if ready:
+                goal *= 0.3  # the judge was not content
+
+    def _nested_start(self, levels: ContactLevels, problem: FrictionProblem, x: Array) -> None:
+        """Add to x what the coarser levels find, from the coarsest one up."""
+        coarse = levels.coarse_problems(problem, x)
+        correction: Array | None = None
+        for k in range(len(coarse), 0, -1):
+            contacts, f = coarse[k - 1]
+            y = np.zeros_like(f)
+            if correction is not None:
+                levels.hierarchy.levels[k].P.add(correction, y)  # type: ignore[union-attr]
+            run = _Run(levels, self, (contacts, f, *levels.coarse_scales(k, f, problem)), k)
+            try:
+                for error in run.cycles(y):
+                    if error <= self.coarse_tolerance:
+                        break
+            except Breakdown:  # a bad start is better than none
+                pass
+            correction = y
+        if correction is not None:
+            levels.hierarchy.levels[0].P.add(correction, x)  # type: ignore[union-attr]
+
+
+class _Run:
+    """Cycles on level k as the finest one, for given contacts, load (nodes, 3) and scales."""
+
+    def __init__(
+        self,
+        levels: ContactLevels,
+        options: ContactMultigrid,
+        given: tuple[ContactNodes, Array, float, float],
+        k: int,
+    ) -> None:
+        self.levels, self.options, self.k = levels, options, k
+        self.contacts, self.f, self.load, self.length = given
+        self.hierarchy = levels.hierarchy
+        self.level = self.hierarchy.levels[k]
+        self.held = np.zeros(self.level.A.nodes, dtype=bool)
+        self.held[self.contacts.node] = True
+        self.change: Array | None = None
+        self.states = np.full_like(self.contacts.state, -2)  # of the tangent
+        self.frozen = False  # are the bounds of friction, in the tangent?
+        self.updates = 0
+        self.r = np.empty_like(self.f)
+
+    def cycles(self, x: Array) -> Iterator[float]:
+        """Errors of x, (nodes, 3), which is improved in place between them."""
+        depth = self.options.depth
+        if isinstance(self.level.A, GridBlocks):  # whose cycles are as cheap as the mixing
+            depth = min(depth, GRID_DEPTH)
+        mixing = Anderson(x.size, depth)
+        before = np.empty_like(x)
+        best = at_update = last = np.inf
+        patience = Patience(self.options.patience)
+        self.levels.take(self)
+        while True:
+            before[:] = x
+            self.smooth(x, backward=False)
+            for _ in range(self.options.contact_sweeps):
+                self.contacts.sweep(self.f, x)
+            changed = int(np.count_nonzero(self.contacts.state != self.states))
+            error = self.error(x)
+            yield error
+            if not np.isfinite(error) or error > GROWTH * best:
+                raise Breakdown("contact multigrid: the cycles diverge")
+            best = min(best, error)
+            if patience.over(error):
+                raise Breakdown("contact multigrid: the cycles have stalled")
+            unsettled = changed > MANY * len(self.contacts.node)
+            careful = unsettled and error > SLOW * last
+            last = error
+            fallen = error < self.options.update_ratio * at_update
+            if changed or careful or self.frozen or fallen:
+                self.renew(careful)
+                at_update = error
+            (self.correct_carefully if careful else self.correct)(x)
+            self.contacts.sweep(self.f, x, backward=True)
+            self.smooth(x, backward=True)
+            if unsettled:
+                mixing.forget()
+            mixing.mix(before.reshape(-1), x.reshape(-1))
+
+    def smooth(self, x: Array, backward: bool) -> None:
+        """One sweep in the bulk."""
+        self.level.A.smooth(self.f, x, self.held, backward)
+
+    def error(self, x: Array) -> float:
+        """What the judge will say, from the residual of x, which is kept."""
+        self.level.A.residual(x, self.f, self.r)
+        law = self.contacts.natural_map(x, self.r)
+        kept = self.r[self.contacts.node]
+        self.r[self.contacts.node] = 0.0
+        balance = float(np.linalg.norm(self.r))
+        self.r[self.contacts.node] = kept
+        return max(balance / self.load, law / self.length)
+
+    def renew(self, frozen: bool) -> None:
+        """The tangent at the present states on all coarser levels, for frozen bounds or not."""
+        self.frozen = frozen
+        contacts = self.contacts.frozen() if frozen else self.contacts
+        self.change = self.levels.truncation.change(self.k, contacts, *contacts.tangent())
+        self.levels.truncation.install(self.k, self.change)
+        self.states = self.contacts.state.copy()
+        self.updates += 1
+
+    def correct(self, x: Array, contacts: ContactNodes | None = None) -> None:
+        """x += V P (one V-cycle) on the rows of the tangent; exactly on the coarsest level."""
+        self.levels.take(self)
+        contacts = contacts or self.contacts
+        V, W, _ = contacts.tangent()  # the slip of now, or the solution would not rest
+        contacts.combine(W, self.r)
+        P = self.level.P
+        before = x[contacts.node]
+        if P is None:
+            x += self.levels.truncation.solve(self.k, self.change, self.r)
+        else:
+            coarse = self.hierarchy.levels[self.k + 1]
+            P.restrict(self.r, coarse.b)
+            self.hierarchy.cycle(self.k + 1, coarse.b, coarse.x)
+            P.add(coarse.x, x)
+        contacts.limit(V, before, x)
+
+    def correct_carefully(self, x: Array) -> None:
+        """The same for fixed bounds of friction, as far as the energy falls."""
+        contacts = self.contacts.frozen()
+        before, force = x.copy(), self.r.copy()
+        self.correct(x, contacts)
+        contacts.lift(x)
+        step = x - before
+        product = self.r
+        self.level.A.times(step, product)
+        length = contacts.step_length(
+            step, float(np.vdot(force, step)), float(np.vdot(step, product))
+        )
+        x[:] = before + length * step

@@ -1,0 +1,235 @@
+"""What the contact multigrid prepares of a problem: nodes, levels, contacts on every level."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ...linear.blocks import spatial
+from ...linear.hierarchy import Hierarchy, Level, Nodes
+from ...linear.node_blocks import NodeBlocks
+from ...linear.transfer import Transfer
+from ...problem.friction import FrictionProblem
+from ...problem.law.cones import Law, Tresca
+from ...problem.one_sided import OneSided, one_sided
+from ..contract import Breakdown, Iterate
+from .nodes import ContactNodes
+from .truncation import Truncation
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+TINY = float(np.finfo(float).tiny)
+ROUNDING = 1e-13  # of the weights of a prolongation
+
+
+@dataclass(eq=False)
+class ContactLevels:
+    """Of M and H alone: shared by all variants of a problem.
+
+    contacts: those of the finest level without a law; coarse: per coarser level the contacts
+    that sit on one of its nodes, (k,), and these contacts there.
+    """
+
+    basis: OneSided
+    nodes: Nodes
+    hierarchy: Hierarchy
+    contacts: ContactNodes
+    coarse: list[tuple[Index, ContactNodes]]
+    truncation: Truncation
+
+    @classmethod
+    def of(cls, problem: FrictionProblem) -> ContactLevels:
+        """Prepared once for all variants; raises Breakdown where the structure is missing."""
+        return problem.kept("contact multigrid", lambda: _prepare(problem))
+
+    # ------------------------------------------------------------------ the finest level
+    def finest(self, problem: FrictionProblem) -> tuple[ContactNodes, Array, float, float]:
+        """Contacts under the problem's law, load (nodes, 3), sizes of load and of u."""
+        contacts = _under(self.contacts, problem.law, spatial(problem.w), problem.rho)
+        f = self.nodes.spread(self.basis.to_load(problem.f))
+        load, length = problem.scales
+        return contacts, f, max(load, TINY), max(length, TINY)
+
+    def start(self, problem: FrictionProblem, start: Iterate) -> Array:
+        """First v at the nodes: of the start, else what continues prescribed displacements."""
+        v = start.v if start.v is not None else problem.guess
+        if v is None:
+            return np.zeros((self.nodes.count, 3))
+        return self.nodes.spread(self.basis.from_displacement(np.asarray(v)))
+
+    def displacement(self, x: Array) -> Array:
+        """v, (n,), of nodal values."""
+        return self.basis.to_displacement(self.nodes.gather(x))
+
+    # ------------------------------------------------------------------ coarser levels
+    def coarse_problems(
+        self, problem: FrictionProblem, x: Array
+    ) -> list[tuple[ContactNodes, Array]]:
+        """Contacts and load of the coarser levels for a correction of x, from the finer ones.
+
+        Galerkin loads; gaps at the contacts that sit on coarse nodes; Tresca's bounds summed.
+        """
+        if not self.coarse:
+            return []
+        levels = self.hierarchy.levels
+        f = self.nodes.spread(self.basis.to_load(problem.f))
+        product = np.empty_like(f)
+        self.hierarchy.reclaim()
+        levels[0].A.times(x, product)
+        f -= product
+        w = spatial(problem.w) + np.einsum("kai,ka->ki", self.contacts.H, x[self.contacts.node])
+        bound = np.zeros(levels[0].A.nodes)
+        bound[self.contacts.node] = problem.law.coefficient
+        out = []
+        for k, (kept, contacts) in enumerate(self.coarse):
+            P = levels[k].P
+            assert P is not None
+            restricted = np.zeros((P.coarse, 3))
+            P.restrict(f, restricted)
+            bound = P.scalar().T @ bound
+            law = problem.law.at(kept)
+            if isinstance(law, Tresca):
+                law = Tresca(bound[contacts.node])
+            out.append((_under(contacts, law, w[kept], contacts.rho), restricted))
+            f = restricted
+        return out
+
+    def coarse_scales(self, k: int, f: Array, problem: FrictionProblem) -> tuple[float, float]:
+        """Sizes of load and u on level k."""
+        load, length = problem.scales
+        share = len(self.coarse[k - 1][0]) / len(self.contacts.node)
+        size = float(np.linalg.norm(f))
+        return max(size if size > 0 else load, TINY), max(length * np.sqrt(share), TINY)
+
+    def take(self, run) -> None:
+        """Let the coarse matrices hold the tangent of this run."""
+        if self.hierarchy.owner is run:
+            return
+        self.hierarchy.reclaim()
+        if run.change is not None:
+            self.truncation.install(run.k, run.change)
+        self.hierarchy.owner, self.hierarchy.undo = run, self.truncation.restore
+
+
+def _under(contacts: ContactNodes, law: Law, w: Array, rho: Array) -> ContactNodes:
+    """The contacts with a law and gaps, without states."""
+    return contacts.with_law(w, law.coefficient, isinstance(law, Tresca), rho)
+
+
+def _prepare(problem: FrictionProblem) -> ContactLevels:
+    basis = one_sided(problem)
+    if basis is None:
+        raise Breakdown("contact multigrid: a contact has no slave node of its own")
+    hierarchy = problem.hierarchy
+    if hierarchy is None:
+        raise Breakdown("contact multigrid: the unknowns do not come in nodes")
+    hierarchy.reclaim()
+    if basis.coupling is not None:
+        hierarchy = _in_basis(hierarchy, basis)
+    A = hierarchy.levels[0].A
+    contacts = ContactNodes.of(basis, hierarchy.nodes, A)
+    if contacts is None:
+        raise Breakdown("contact multigrid: the contacts do not sit on nodes of their own")
+    if isinstance(A, NodeBlocks) and not (np.isfinite(A.inverse).all() and _positive(A)):
+        raise Breakdown("contact multigrid: M has a diagonal block that is not positive")
+    coarse = _coarse_contacts(hierarchy, contacts)
+    touched = [contacts.node, *(c.node for _, c in coarse)]
+    return ContactLevels(
+        basis, hierarchy.nodes, hierarchy, contacts, coarse, Truncation(hierarchy, touched)
+    )
+
+
+def _in_basis(hierarchy: Hierarchy, basis: OneSided) -> Hierarchy:
+    """Levels in one-sided bases: T' M T, and T^-1 P T_c with such a basis T_c of each level.
+
+    A contact whose slave node is one of the coarse level too sees there the coarse values of
+    the master side at its place, so that it has one node of its own on every level.
+    """
+    nodes = hierarchy.nodes
+    place = None if nodes.plain else nodes.place
+    levels = [Level(NodeBlocks.from_sparse(basis.M, place, nodes.count))]
+    size = 3 * nodes.count
+    C = basis.coupling.tocoo()  # type: ignore[union-attr]
+    entries = (C.data, (nodes.place[C.coords[0]], nodes.place[C.coords[1]]))
+    coupling = sparse.coo_array(entries, shape=(size, size)).tocsr()
+    for k, old in enumerate(hierarchy.levels[1:]):
+        P = hierarchy.levels[k].P
+        assert P is not None
+        if coupling.nnz:
+            P, coupling = _between_bases(P, coupling, geometric=k + 1 < hierarchy.geometric)
+        levels[-1].P = P
+        levels.append(Level(P.galerkin(levels[-1].A), old.P))
+    return Hierarchy(levels, hierarchy.geometric, nodes)
+
+
+def _between_bases(
+    P: Transfer, coupling: sparse.csr_array, geometric: bool
+) -> tuple[Transfer, sparse.csr_array]:
+    """((I - S C) P (I + S_c C_c), S_c C_c) for S C, (3 fine, 3 fine), of the finer level.
+
+    S_c C_c, (3 coarse, 3 coarse), are the rows of S C P at the nodes of both levels.
+    """
+    matrix = P.masked()
+    below = sparse.csr_array(coupling @ matrix)
+    coarse = sparse.csr_array((matrix.shape[1],) * 2)
+    if geometric:
+        node = np.unique(coupling.tocoo().coords[0] // 3)
+        parent = _parent(P, node)
+        node, parent = node[parent >= 0], parent[parent >= 0]
+        slot = np.arange(3)
+        pick = sparse.coo_array(
+            (
+                np.ones(3 * len(node)),
+                ((3 * parent[:, None] + slot).ravel(), (3 * node[:, None] + slot).ravel()),
+            ),
+            shape=(matrix.shape[1], matrix.shape[0]),
+        ).tocsr()
+        found = sparse.csr_array(pick @ below)
+        if not (found @ found).nnz:  # else a master node is a slave itself on the coarse level
+            coarse = found
+    out = matrix - below
+    if coarse.nnz:
+        out = out + out @ coarse
+    out = sparse.csr_array(out)
+    out.data[np.abs(out.data) < ROUNDING] = 0.0
+    out.eliminate_zeros()
+    tiles = sparse.bsr_array(out.tobsr((3, 3)))
+    return Transfer.of(tiles, P.idle, P.coarse_idle), coarse
+
+
+def _positive(A: NodeBlocks) -> bool:
+    """Whether all unknowns have a stiffness of their own."""
+    return bool((np.einsum("kii->ki", A.data[A.diagonal()]) > 0).all())
+
+
+def _coarse_contacts(
+    hierarchy: Hierarchy, contacts: ContactNodes
+) -> list[tuple[Index, ContactNodes]]:
+    """On the given levels, as long as there are contacts: (contacts, contacts there)."""
+    out: list[tuple[Index, ContactNodes]] = []
+    kept = np.arange(len(contacts.node))
+    for k in range(1, hierarchy.geometric):
+        P, A = hierarchy.levels[k - 1].P, hierarchy.levels[k].A
+        assert P is not None
+        if len(P.blocks):
+            break
+        parent = _parent(P, contacts.node)
+        found = parent >= 0
+        if not found.any() or len(np.unique(parent[found])) < found.sum():
+            break
+        kept = kept[found]
+        contacts = contacts.at(found, parent[found], A)
+        out.append((kept, contacts))
+    return out
+
+
+def _parent(P: Transfer, node: Index) -> Index:
+    """The coarse node that a fine node is, -1 where it is none."""
+    first = P.indptr[node]
+    single = np.diff(P.indptr)[node] == 1
+    at = np.where(single, first, 0)
+    same = single & (np.abs(P.weights[at] - 1) < 1e-12)
+    return np.where(same, P.indices[at], -1).astype(np.int64)

@@ -1,0 +1,328 @@
+"""Contact nodes of a mesh: exact local solves in sweeps, the natural map, and the tangent.
+
+At a contact node p with v = y + A_pp^-1 H r, where A_pp y is the load minus the forces of the
+neighbours,
+
+    u = W r + b,    W = H^T A_pp^-1 H,    b = H^T y + w
+
+is the problem of a single contact, which `one_contact` solves exactly.
+
+The tangent at the states found, in the displacements of the node, n and T the columns of H:
+
+    state                trial V        test W                               added L
+    open                 1              1                                    0
+    closed, stick        0              0                                    0
+    closed, slip         1 - n n^T      V + n (mu t^T V) / (|n| - mu t.n)    (bound / |u_T|)
+                                                                             T (1 - t t^T) T^T
+    open, Tresca slip    1              1                                    the same
+    open, Tresca stick   n n^T          n n^T                                0
+
+t: direction of slip as a vector of the node.  The test space of Coulomb slip holds all
+directions in which a force r_N (n - mu t) does no work.  Under Tresca's law W = V.
+
+A tangent that a support drives (`driven`) has no column in H and no row in W; its part of r
+moves nothing and is the friction that the law gives for u.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numba import uint64
+from numpy.typing import NDArray
+
+from ...core.compiled import njit
+from ...linear.grid import GridBlocks
+from ...linear.hierarchy import Nodes
+from ...linear.node_blocks import NodeBlocks, row_product
+from ...problem.judge.measures import contact_residual
+from ...problem.law.one_contact import OPEN, SLIP, solve_contact
+from ...problem.one_sided import HELD, OneSided
+from ..driven import moves
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+FREE, SLIDING, STUCK = 0, 1, 2  # of the tangential motion
+CLOSED = 3  # is added to it: a state is one number from 0 to 5
+HALVINGS = 10  # of the interval of a step length
+STIFF = 1e3  # L stays below this multiple of the node's own stiffness
+
+
+@dataclass(eq=False)
+class ContactNodes:
+    """Contacts at nodes: node (nc,), H (nc, 3, 3), w (nc, 3), coefficient (nc,), Tresca or not.
+
+    inverse, compliance, to_reaction (nc, 3, 3): A_pp^-1, H^T A_pp^-1 H and H^-1; rho (nc,): of
+    the judge; rows: of the matrix, see `NodeBlocks.entries`.  State of the iteration: r, u
+    (nc, 3), and state (nc,) of the last local solves.
+    """
+
+    node: Index
+    H: Array
+    inverse: Array
+    compliance: Array
+    to_reaction: Array
+    rho: Array
+    rows: tuple[Index, Index, NDArray[np.int32], Array]
+    w: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    coefficient: Array = field(default_factory=lambda: np.zeros(0))
+    tresca: bool = False
+    driven: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 3), dtype=bool))
+    r: Array = field(init=False)
+    u: Array = field(init=False)
+    state: NDArray[np.int8] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.r, self.u = np.zeros((len(self.node), 3)), np.zeros((len(self.node), 3))
+        self.state = np.full(len(self.node), -1, dtype=np.int8)
+
+    @classmethod
+    def at_nodes(cls, node: Index, H: Array, A: NodeBlocks | GridBlocks) -> ContactNodes:
+        """Contacts without a law at nodes of a level with matrix A."""
+        inverse = A.inverse_at(node)
+        compliance = np.einsum("kai,kab,kbj->kij", H, inverse, H)
+        size = np.linalg.norm(compliance, 2, axis=(1, 2)) if len(node) else np.zeros(0)
+        k, i = np.nonzero(np.abs(H).max(axis=1, initial=0.0) == 0)  # the second tangent in 2D
+        compliance[k, i, i] = 1.0
+        rows = A.entries(node)
+        return cls(node, H, inverse, compliance, np.linalg.pinv(H), 1 / size, rows)
+
+    def at(self, chosen: NDArray[np.bool_], node: Index, A: NodeBlocks) -> ContactNodes:
+        """Some of the contacts at nodes (k,) of another level."""
+        return ContactNodes.at_nodes(node, self.H[chosen], A)
+
+    def with_law(self, w: Array, coefficient: Array, tresca: bool, rho: Array) -> ContactNodes:
+        """The contacts under a law, without states."""
+        driven = (np.abs(self.H).max(axis=1, initial=0.0) == 0) & moves(w)
+        compliance = self.compliance
+        if driven.any():
+            compliance = compliance.copy()
+            k, i = np.nonzero(driven)
+            compliance[k, i, i] = 0.0
+        return replace(self, w=w, coefficient=coefficient, tresca=tresca, rho=rho,
+                       driven=driven, compliance=compliance)  # fmt: skip
+
+    @classmethod
+    def of(
+        cls, basis: OneSided, nodes: Nodes, A: NodeBlocks | GridBlocks
+    ) -> ContactNodes | None:
+        """From the one-sided basis; None where a contact is spread over several nodes."""
+        nc, d = basis.dofs.shape
+        held = basis.dofs == HELD
+        place = nodes.place[np.where(held, basis.dofs[:, :1], basis.dofs)]
+        node = place[:, 0] // 3
+        if (place // 3 != node[:, None]).any() or len(np.unique(node)) < nc:
+            return None
+        H = np.zeros((nc, 3, 3))
+        for slot in range(d):
+            rows = np.flatnonzero(~held[:, slot])
+            H[rows, place[rows, slot] % 3, :d] = basis.frames[rows, :, slot]
+        return cls.at_nodes(node, H, A)
+
+    def sweep(self, f: Array, x: Array, backward: bool = False) -> None:
+        """Solve every contact once in turn; r, u and state are those of these solves."""
+        _sweep(
+            *self.rows, self.node, self.H, self.inverse, self.compliance,
+            self.w, self.coefficient, self.tresca, f, x, self.r, self.u, self.state, backward,
+        )  # fmt: skip
+
+    def natural_map(self, x: Array, residual: Array) -> float:
+        """|natural map / rho|, unit of u, with r from the residual f - A x of the nodes.
+
+        r and u are set; unlike in `sweep` they are those of one state x.
+        """
+        return _natural_map(
+            self.node, self.H, self.to_reaction, self.w, self.coefficient, self.tresca,
+            self.rho, self.driven, x, residual, self.r, self.u,
+        )  # fmt: skip
+
+    def tangent(self) -> tuple[Array, Array, Array]:
+        """V, W and L, each (nc, 3, 3), at the present states."""
+        V, W, L = (np.empty_like(self.H) for _ in range(3))
+        size = STIFF / np.abs(self.inverse).max(axis=(1, 2))
+        _tangent(self.H, self.coefficient, self.tresca, self.r, self.u, self.state, size,
+                 V, W, L)  # fmt: skip
+        return V, W, L
+
+    def limit(self, V: Array, before: Array, x: Array) -> None:
+        """Keep of the motion since `before`, (nc, 3), what the trial space V allows."""
+        moved = x[self.node] - before
+        x[self.node] = before + np.einsum("kab,kb->ka", V, moved)
+
+    def frozen(self) -> ContactNodes:
+        """The same states under Tresca's law with the present bounds of Coulomb's."""
+        if self.tresca:
+            return self
+        out = replace(
+            self, coefficient=self.coefficient * np.maximum(self.r[:, 0], 0.0), tresca=True
+        )
+        out.r, out.u, out.state = self.r, self.u, self.state
+        return out
+
+    def lift(self, x: Array) -> None:
+        """Move nodes that penetrate to the surface, along the normal."""
+        n = self.H[:, :, 0]
+        gap = self.w[:, 0] + np.einsum("ca,ca->c", n, x[self.node])
+        x[self.node] -= (np.minimum(gap, 0.0) / np.einsum("ca,ca->c", n, n))[:, None] * n
+
+    def step_length(self, step: Array, force: float, stiffness: float) -> float:
+        """Length, up to 1, at which the energy along a step (nodes, 3) is least.
+
+        E'(a) = a stiffness - force + sum of bound |u_T + a d_T|'; under Tresca's law.
+        """
+        d = np.einsum("cai,ca->ci", self.H[:, :, 1:], step[self.node])
+
+        def slope(a: float) -> float:
+            u = self.u[:, 1:] + a * d
+            size = np.linalg.norm(u, axis=1)
+            work = np.einsum("ci,ci->c", u, d) / np.where(size > 0, size, 1.0)
+            return a * stiffness - force + float(self.coefficient @ work)
+
+        if slope(1.0) <= 0:
+            return 1.0
+        low, high = 0.0, 1.0
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if slope(middle) > 0 else (middle, high)
+        return low
+
+    def combine(self, W: Array, residual: Array) -> None:
+        """The rows of contacts become W^T of (law's force - force), in place."""
+        _combine(self.node, self.H, self.coefficient, self.tresca, self.u, self.state, W,
+                 residual)  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def _sweep(first, last, indices, data, node, H, inverse, compliance, w, coefficient, tresca,
+           f, x, r, u, state, backward):  # noqa: PLR0913 # fmt: skip
+    y, b = np.empty(3), np.empty(3)
+    for step in range(len(node)):
+        c = len(node) - 1 - step if backward else step
+        p = node[c]
+        s0, s1, s2 = row_product(indices, data, x, uint64(first[c]), uint64(last[c]))
+        g0, g1, g2 = f[p, 0] - s0, f[p, 1] - s1, f[p, 2] - s2
+        for i in range(3):
+            y[i] = x[p, i] + (
+                inverse[c, i, 0] * g0 + inverse[c, i, 1] * g1 + inverse[c, i, 2] * g2
+            )
+        for i in range(3):
+            b[i] = w[c, i] + H[c, 0, i] * y[0] + H[c, 1, i] * y[1] + H[c, 2, i] * y[2]
+        r0, r1, r2, kind = solve_contact(
+            compliance[c], b[0], b[1], b[2], coefficient[c], tresca, r[c, 1], r[c, 2]
+        )
+        state[c] = _code(kind, r1, r2, coefficient[c], tresca)
+        r[c, 0], r[c, 1], r[c, 2] = r0, r1, r2
+        g0 = H[c, 0, 0] * r0 + H[c, 0, 1] * r1 + H[c, 0, 2] * r2
+        g1 = H[c, 1, 0] * r0 + H[c, 1, 1] * r1 + H[c, 1, 2] * r2
+        g2 = H[c, 2, 0] * r0 + H[c, 2, 1] * r1 + H[c, 2, 2] * r2
+        for i in range(3):
+            x[p, i] = y[i] + (
+                inverse[c, i, 0] * g0 + inverse[c, i, 1] * g1 + inverse[c, i, 2] * g2
+            )
+            u[c, i] = b[i] + (
+                compliance[c, i, 0] * r0 + compliance[c, i, 1] * r1 + compliance[c, i, 2] * r2
+            )
+
+
+@njit(cache=True, error_model="numpy")
+def _code(kind, r1, r2, coefficient, tresca):
+    """The state as one number."""
+    if kind != OPEN:
+        return CLOSED + (SLIDING if kind == SLIP else STUCK)
+    if not tresca or coefficient == 0.0:
+        return FREE
+    return SLIDING if r1 * r1 + r2 * r2 >= 0.999999 * coefficient * coefficient else STUCK
+
+
+@njit(cache=True, error_model="numpy")
+def _natural_map(node, H, to_reaction, w, coefficient, tresca, rho, driven, x, residual, r, u):  # noqa: PLR0913
+    total = 0.0
+    for c in range(len(node)):
+        p = node[c]
+        for i in range(3):
+            s = w[c, i]
+            force = 0.0
+            for a in range(3):
+                s += H[c, a, i] * x[p, a]
+                force -= to_reaction[c, i, a] * residual[p, a]
+            u[c, i] = s
+            r[c, i] = force
+        if driven[c, 1] or driven[c, 2]:
+            bound = coefficient[c] if tresca else coefficient[c] * max(r[c, 0], 0.0)
+            slip = np.sqrt(u[c, 1] ** 2 + u[c, 2] ** 2)
+            for i in range(1, 3):
+                if driven[c, i] and slip > 0.0:
+                    r[c, i] = -bound * u[c, i] / slip
+        if rho[c] > 0.0:
+            e0, e1, e2 = contact_residual(
+                r[c, 0], r[c, 1], r[c, 2], u[c, 0], u[c, 1], u[c, 2], rho[c], coefficient[c],
+                tresca,
+            )  # fmt: skip
+            total += max(e0 * e0 + e1 * e1 + e2 * e2, 0.25 * min(u[c, 0], 0.0) ** 2)
+    return np.sqrt(total)
+
+
+@njit(cache=True, error_model="numpy")
+def _slip_vector(H, u):
+    """(t as a vector of the node, t1, t2, |u_T|); zero where nothing slips."""
+    t = np.zeros(3)
+    size = np.sqrt(u[1] * u[1] + u[2] * u[2])
+    if size == 0.0:
+        return t, 0.0, 0.0, 0.0
+    t1, t2 = u[1] / size, u[2] / size
+    for a in range(3):
+        t[a] = H[a, 1] * t1 + H[a, 2] * t2
+    return t, t1, t2, size
+
+
+@njit(cache=True, error_model="numpy")
+def _tangent(H, coefficient, tresca, r, u, state, size, V, W, L):  # noqa: PLR0913
+    V[:], W[:], L[:] = 0.0, 0.0, 0.0
+    n = np.empty(3)
+    for c in range(len(H)):
+        closed, motion = state[c] >= CLOSED, state[c] % CLOSED
+        length = np.sqrt(H[c, 0, 0] ** 2 + H[c, 1, 0] ** 2 + H[c, 2, 0] ** 2)
+        for a in range(3):
+            n[a] = H[c, a, 0] / length
+        for a in range(3):
+            for b in range(3):
+                one = 1.0 if a == b else 0.0
+                if motion == STUCK:
+                    V[c, a, b] = 0.0 if closed else n[a] * n[b]
+                else:
+                    V[c, a, b] = one - n[a] * n[b] if closed else one
+                W[c, a, b] = V[c, a, b]
+        if motion != SLIDING:
+            continue
+        t, t1, t2, slip = _slip_vector(H[c], u[c])
+        bound = coefficient[c] if tresca else coefficient[c] * r[c, 0]
+        if slip == 0.0 or not bound > 0.0:
+            continue
+        if not tresca:
+            along = length - coefficient[c] * (t[0] * n[0] + t[1] * n[1] + t[2] * n[2])
+            for b in range(3):
+                tv = t[0] * V[c, 0, b] + t[1] * V[c, 1, b] + t[2] * V[c, 2, b]
+                for a in range(3):
+                    W[c, a, b] += n[a] * coefficient[c] * tv / along
+        curvature = min(bound / slip, size[c])
+        for a in range(3):
+            across = -t2 * H[c, a, 1] + t1 * H[c, a, 2]
+            for b in range(3):
+                L[c, a, b] = curvature * across * (-t2 * H[c, b, 1] + t1 * H[c, b, 2])
+
+
+@njit(cache=True, error_model="numpy")
+def _combine(node, H, coefficient, tresca, u, state, W, residual):  # noqa: PLR0913
+    for c in range(len(node)):
+        if state[c] == FREE:
+            continue
+        p = node[c]
+        g0, g1, g2 = residual[p, 0], residual[p, 1], residual[p, 2]
+        if tresca and state[c] % CLOSED == SLIDING:
+            t, _, _, _ = _slip_vector(H[c], u[c])
+            g0 -= coefficient[c] * t[0]
+            g1 -= coefficient[c] * t[1]
+            g2 -= coefficient[c] * t[2]
+        for a in range(3):
+            residual[p, a] = W[c, 0, a] * g0 + W[c, 1, a] * g1 + W[c, 2, a] * g2

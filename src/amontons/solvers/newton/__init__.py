@@ -1,0 +1,1 @@
+"""Newton's methods: semismooth, inexact, smoothing, interior point."""

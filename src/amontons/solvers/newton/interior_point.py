@@ -1,0 +1,301 @@
+"""Interior point on the convex relaxation, with the sliding velocities frozen.
+
+With x = (mu r_N, r_T), S = diag(1/mu, 1, 1) and frozen s = |u_T|, Coulomb's law becomes
+
+    y = S (W r + q) + s e_N,   x and y in the Lorentz cone,   x . y = 0:
+
+a second-order cone program when W is symmetric, which has a solution whenever the relaxation is
+feasible, and which Mehrotra's predictor-corrector method solves in 20 to 40 steps, however
+degenerate it is: piles at rest with more reactions than balances are where every other method
+crawls.  With the Nesterov-Todd scaling D x = y, D = F F, lambda = F x, a step solves
+
+    (W + S^-1 D S^-1) dr = S^-1 (F p + R),   p = lambda^-1 o (sigma m e - lambda o lambda - c),
+
+R = y - S u - s e_N the residual, m = x . y / nc, c the corrector: W plus 3x3 blocks again, the
+matrix of `block_lu`.  Then s = |u_T| of the result, and so on [C, AANS]; accelerated sweeps
+from each result often end it at once, as most contacts of a pile stick and s = 0 was right.
+
+A contact with mu = 0 has the half line x_N >= 0 in place of the cone.
+
+[M] S. Mehrotra, "On the implementation of a primal-dual interior point method", SIAM J. Optim.
+2 (1992); [NT] Y. Nesterov, M. Todd, "Primal-dual interior-point methods for self-scaled
+cones", SIAM J. Optim. 8 (1998); [C] F. Cadoux, doctoral thesis, Grenoble 2009; [AANS] V. Acary,
+P. Armand, H. M. Nguyen, M. Shpakovych, "Second-order cone programming for frictional contact
+mechanics using interior point algorithm", Optim. Methods Softw. 39 (2024).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.clock import NEVER, Deadline
+from ...core.compiled import njit
+from ...core.options import check_options
+from ...linear.blocks import velocity_inplace
+from ...problem.friction import Form, FrictionProblem
+from ...problem.judge.measures import natural_error
+from ..contract import Iterate, Target, check_at_least, check_positive
+from ..sweeps.kernels import Acceleration, SweepOrder, sweep_data, watch_for
+from .block_lu import factorise_inplace, solve_inplace
+from .smoothing import PINNED, Workspace
+
+Array = NDArray[np.float64]
+BOUNDARY = 0.99  # part of the way to the boundary of the cones that a step goes
+STALLED = 5  # steps below SHORT in a row, after which the relaxation is left
+SHORT = 0.02
+ENOUGH = 0.02  # error of the relaxation, relative to that of the frozen s, which is then larger
+STAGE = "interior point"
+DEPTH = 10  # past sweeps that the acceleration combines
+
+
+@njit(cache=True, error_model="numpy")
+def _scale(b, w, v, out):
+    """out = F v with F = b [[w_0, w'], [w, I + w w' / (1 + w_0)]]."""
+    z = w[1] * v[1] + w[2] * v[2]
+    k = v[0] + z / (1.0 + w[0])
+    out[0], out[1], out[2] = b * (w[0] * v[0] + z), b * (v[1] + w[1] * k), b * (v[2] + w[2] * k)
+
+
+@njit(cache=True, error_model="numpy")
+def _unscale(b, w, v, out):
+    """out = F^-1 v."""
+    z = w[1] * v[1] + w[2] * v[2]
+    k = z / (1.0 + w[0]) - v[0]
+    out[0], out[1], out[2] = (w[0] * v[0] - z) / b, (v[1] + w[1] * k) / b, (v[2] + w[2] * k) / b
+
+
+@njit(cache=True, error_model="numpy")
+def _room(x, dx, rho):
+    """Largest a with x + a dx in all cones, of the contacts that can react."""
+    room = math.inf
+    for i in range(len(x)):
+        if rho[i] <= 0.0:
+            continue
+        d0, d1, d2 = dx[i, 0], dx[i, 1], dx[i, 2]
+        t = math.sqrt(x[i, 1] ** 2 + x[i, 2] ** 2)
+        a = d0 * d0 - d1 * d1 - d2 * d2
+        b = x[i, 0] * d0 - x[i, 1] * d1 - x[i, 2] * d2
+        c = (x[i, 0] - t) * (x[i, 0] + t)
+        root = b * b - a * c
+        if a < 0.0:
+            root = math.sqrt(max(root, 0.0))
+            room = min(room, c / (root - b) if b < 0.0 else (-b - root) / a)
+        elif b < 0.0 and root >= 0.0:
+            room = min(room, c / (math.sqrt(root) - b))
+        if d0 < 0.0:
+            room = min(room, -x[i, 0] / d0)
+    return room
+
+
+@njit(cache=True, error_model="numpy")
+def _nesterov_todd(x, y, mu, shift, i, beta, w, lam, extra):
+    """Scaling (beta, w) and lambda of contact i, and its block S^-1 D S^-1 plus the shift."""
+    tx, ty = math.sqrt(x[i, 1] ** 2 + x[i, 2] ** 2), math.sqrt(y[i, 1] ** 2 + y[i, 2] ** 2)
+    sx = math.sqrt((x[i, 0] - tx) * (x[i, 0] + tx))
+    sy = math.sqrt((y[i, 0] - ty) * (y[i, 0] + ty))
+    inner = (x[i, 0] * y[i, 0] + x[i, 1] * y[i, 1] + x[i, 2] * y[i, 2]) / (sx * sy)
+    g = 2.0 * math.sqrt(0.5 * (1.0 + inner))
+    beta[i] = math.sqrt(sy / sx)
+    w[i, 0] = (y[i, 0] / sy + x[i, 0] / sx) / g
+    w[i, 1] = (y[i, 1] / sy - x[i, 1] / sx) / g
+    w[i, 2] = (y[i, 2] / sy - x[i, 2] / sx) / g
+    _scale(beta[i], w[i], x[i], lam[i])
+    k, d = sy / sx, extra[i]
+    for a in range(3):
+        for b in range(3):
+            d[a, b] = 2.0 * k * w[i, a] * w[i, b]
+        d[a, a] += -k if a == 0 else k
+    if mu == 0.0:
+        d[1, 1] = d[2, 2] = PINNED * shift
+    else:
+        for a in range(3):
+            d[0, a] *= mu
+            d[a, 0] *= mu
+    for a in range(3):
+        d[a, a] += shift
+
+
+@njit(cache=True, error_model="numpy")
+def relax_inplace(  # noqa: PLR0913
+    indptr, indices, data, q, mu, rho, order, upper_start, upper, lower_start, lower,
+    r, x, y, s, shift, goal, steps,
+):  # fmt: skip
+    """Predictor-corrector steps on (r, x, y) with s frozen; x and y inside the cones on entry.
+
+    shift: added to the diagonal, relative to |W_ii|; goal: error, unit of u, at which to stop.
+    Returns steps done; r is the last iterate, and finite.
+    """
+    nc = len(mu)
+    extra, inverse, work = np.zeros((nc, 3, 3)), np.empty((nc, 3, 3)), np.zeros((nc, 3, 3))
+    U, L = np.empty((len(upper), 3, 3)), np.empty((len(upper), 3, 3))
+    zero, u, du = np.zeros((nc, 3)), np.empty((nc, 3)), np.empty((nc, 3))
+    rhs, dr = np.zeros((nc, 3)), np.empty((nc, 3))
+    dx, dy, residual = np.zeros((nc, 3)), np.zeros((nc, 3)), np.zeros((nc, 3))
+    lam, w, beta = np.empty((nc, 3)), np.empty((nc, 3)), np.empty(nc)
+    p, fa, fb = np.empty(3), np.empty(3), np.empty(3)
+    short = 0
+    for count in range(steps):
+        velocity_inplace(indptr, indices, data, q, r, u)
+        gap = away = 0.0
+        able = 0
+        for i in range(nc):
+            if rho[i] <= 0.0:
+                continue
+            able += 1
+            scale = 1.0 / mu[i] if mu[i] > 0.0 else 1.0
+            residual[i, 0] = y[i, 0] - scale * u[i, 0] - s[i]
+            for a in range(1, 3):
+                residual[i, a] = y[i, a] - u[i, a] if mu[i] > 0.0 else 0.0
+            for a in range(3):
+                gap += max(x[i, a] * y[i, a], 0.0) / rho[i]
+                away += residual[i, a] ** 2
+        error = natural_error(indptr, indices, data, q, mu, False, rho, r)
+        if error <= goal or math.sqrt(away + gap) <= max(ENOUGH * error, 0.1 * goal):
+            return count
+        total = 0.0
+        for i in range(nc):
+            if rho[i] <= 0.0:
+                for a in range(3):
+                    extra[i, a, a] = 1e300
+                continue
+            total += x[i, 0] * y[i, 0] + x[i, 1] * y[i, 1] + x[i, 2] * y[i, 2]
+            _nesterov_todd(x, y, mu[i], shift / rho[i], i, beta, w, lam, extra)
+        mean = total / max(able, 1)
+        if not factorise_inplace(
+            indptr, indices, data, extra, order, upper_start, upper, lower_start, lower,
+            U, L, inverse, work,
+        ):  # fmt: skip
+            return count
+        sigma = length = 0.0
+        for phase in range(2):
+            keep = 1.0 - sigma
+            for i in range(nc):
+                if rho[i] <= 0.0:
+                    continue
+                l0, l1, l2 = lam[i, 0], lam[i, 1], lam[i, 2]
+                c0 = sigma * mean - (l0 * l0 + l1 * l1 + l2 * l2)
+                c1, c2 = -2.0 * l0 * l1, -2.0 * l0 * l2
+                if phase == 1:
+                    _scale(beta[i], w[i], dx[i], fa)
+                    _unscale(beta[i], w[i], dy[i], fb)
+                    c0 -= fa[0] * fb[0] + fa[1] * fb[1] + fa[2] * fb[2]
+                    c1 -= fa[0] * fb[1] + fb[0] * fa[1]
+                    c2 -= fa[0] * fb[2] + fb[0] * fa[2]
+                t = math.sqrt(l1 * l1 + l2 * l2)
+                p[0] = (l0 * c0 - l1 * c1 - l2 * c2) / ((l0 - t) * (l0 + t))
+                p[1], p[2] = (c1 - l1 * p[0]) / l0, (c2 - l2 * p[0]) / l0
+                _scale(beta[i], w[i], p, fa)
+                rhs[i, 0] = fa[0] + keep * residual[i, 0]
+                if mu[i] > 0.0:
+                    rhs[i, 0] *= mu[i]
+                    rhs[i, 1] = fa[1] + keep * residual[i, 1]
+                    rhs[i, 2] = fa[2] + keep * residual[i, 2]
+            solve_inplace(order, upper_start, upper, lower_start, lower, U, L, inverse, rhs, dr)
+            velocity_inplace(indptr, indices, data, zero, dr, du)
+            for i in range(nc):
+                if rho[i] <= 0.0:
+                    continue
+                scale = mu[i] if mu[i] > 0.0 else 1.0
+                dx[i, 0] = scale * dr[i, 0]
+                dy[i, 0] = du[i, 0] / scale - keep * residual[i, 0]
+                for a in range(1, 3):
+                    if mu[i] > 0.0:
+                        dx[i, a], dy[i, a] = dr[i, a], du[i, a] - keep * residual[i, a]
+            length = min(_room(x, dx, rho), _room(y, dy, rho))
+            if not length > 0.0:
+                return count
+            length = min(1.0, length * (1.0 if phase == 0 else BOUNDARY))
+            if phase == 0:
+                left = 0.0
+                for i in range(nc):
+                    if rho[i] > 0.0:
+                        for a in range(3):
+                            end = x[i, a] + length * dx[i, a]
+                            left += end * (y[i, a] + length * dy[i, a])
+                sigma = min(max(left / total, 0.0), 1.0) ** 3
+        short = short + 1 if length < SHORT else 0
+        if short > STALLED:
+            return count
+        for i in range(nc):
+            if rho[i] > 0.0:
+                for a in range(3):
+                    x[i, a] += length * dx[i, a]
+                    y[i, a] += length * dy[i, a]
+                    r[i, a] = x[i, a]
+                r[i, 0] /= mu[i] if mu[i] > 0.0 else 1.0
+    return steps
+
+
+@dataclass(frozen=True)
+class InteriorPoint:
+    """Interior point on the convex relaxation, then sweeps; for piles at rest (Coulomb).
+
+    An iterate is a relaxation solved for the s of the best reaction so far, or accelerated
+    Gauss-Seidel sweeps from there.
+    """
+
+    form: ClassVar[Form] = Form.DELASSUS
+    steps: int = 60  # of one relaxation at most
+    shift: float = 1e-10  # added to the Newton matrix, relative to |W_ii|: W is often singular
+    sweeps: int = 200  # after each relaxation; 0: none
+
+    def __post_init__(self) -> None:
+        check_options(self)
+        check_at_least(1, steps=self.steps)
+        check_at_least(0, sweeps=self.sweeps)
+        check_positive(shift=self.shift)
+
+    def iterates(
+        self, problem: FrictionProblem, start: Iterate, target: Target
+    ) -> Iterator[Iterate]:
+        """Relaxations and sweeps in turn, for ever; UnsupportedForm under Tresca's law."""
+        slip = np.zeros(problem.contacts)
+        if start.r.any():
+            slip = sliding_speed(problem, start.r)
+        yield from self.relaxations(Workspace.of(problem), slip, target)
+
+    def relaxations(self, work: Workspace, slip: Array, target: Target) -> Iterator[Iterate]:
+        """The same from frozen |u_T|, (nc,), with the symbolic factor at hand."""
+        problem = work.problem
+        d, goal = problem.dimension, target.tolerance * problem.q_norm
+        data = sweep_data(problem, order=SweepOrder.APPROACH)
+        while True:
+            count, r = self.relax(work, slip, goal, target.deadline)
+            yield Iterate(r[:, :d].copy(), iterations=count, stage=STAGE)
+            slip = sliding_speed(problem, r[:, :d])
+            if self.sweeps:
+                memory = Acceleration(data, r, DEPTH)
+                count = memory.sweep(self.sweeps, watch_for(goal))
+                yield Iterate(
+                    memory.r[:, :d].copy(), iterations=count, stage=f"sweeps after {STAGE}"
+                )
+
+    def relax(
+        self, work: Workspace, slip: Array, goal: float, deadline: Deadline = NEVER
+    ) -> tuple[int, Array]:
+        """(steps, r) of the relaxation with frozen |u_T|, (nc,); goal: error, unit of u."""
+        indptr, indices, data, q, mu, _, rho = work.problem.kernel_data
+        size = work.problem.q_norm / math.sqrt(max(work.problem.contacts, 1))
+        x, y = np.zeros_like(q), np.zeros_like(q)
+        x[:, 0], y[:, 0] = size * rho, size
+        r = x / np.where(mu > 0, mu, 1.0)[:, None]
+        steps = relax_inplace(
+            indptr, indices, data, q, mu, rho, *work.symbolic.arrays,
+            r, x, y, np.where(mu > 0, slip, 0.0), self.shift, goal,
+            work.affordable(self.steps, deadline),
+        )  # fmt: skip
+        return max(steps, 1), r
+
+
+def sliding_speed(problem: FrictionProblem, r: Array) -> Array:
+    """|u_T|, (nc,), of reactions (nc, d)."""
+    return np.linalg.norm(problem.velocity(r)[0][:, 1:], axis=1)
+
+
+__all__ = ["InteriorPoint", "relax_inplace", "sliding_speed"]

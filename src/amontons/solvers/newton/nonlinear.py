@@ -1,0 +1,306 @@
+"""Semismooth Newton with line search and load steps, for problems without one stiffness.
+
+The problem is F(v) = 0, piecewise smooth, with a linearisation at every admissible state; see
+`model.large_deformation`.  It is tried at full load at once; where that fails the load grows in
+steps from a state that is known, each begun by a tangent predictor,
+
+    dF/dv dv = -(F(v) + dF/dload dload),
+
+which also moves the prescribed displacements: cells would be inverted by moving these alone.
+Where Newton's method fails from there, it starts from the solution of the tangent problem with
+contact: many contacts that close at once find their statuses together.  Bodies whose cells can
+be inverted begin with it, as nothing else keeps them from passing through their obstacles.
+
+Line search: halving until |F| falls below the largest of the last few values; states with
+inverted cells are never accepted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ...core.errors import InvertedCells, SingularOperator, UnsupportedForm
+from ...core.options import check_options
+from ...linear import Direct, LinearSolver
+from ...problem.friction import Form, FrictionProblem
+from ..auto.hybrid import Auto
+from ..contract import Breakdown, Iterate, Patience, Target, check_at_least, check_positive
+
+Array = NDArray[np.float64]
+MEMORY = 5  # values of |F| of which the largest counts in the line search
+ENOUGH = 1e-4  # least relative decrease of |F| over a full step
+LOOSE = 1e-5  # error, unit-free, at which a load step is good enough to go on
+REPEATED = 1e-12  # relative difference of |F| below which steps go round in circles
+JUMP = "; if the body jumps there, crossing=PathCrossing() of this solver follows it (2D)"
+STATUSES = 1e-8  # error of a tangent problem with contact
+CONTACT_STEPS = 300  # iterates in which it has to be reached
+EASY = 8  # Newton steps up to which the next load step may be longer
+
+
+class Linear(Protocol):
+    """F and its derivatives at one state."""
+
+    residual: Array
+    matrix: sparse.csc_array
+
+
+class NonlinearProblem(Protocol):
+    """What the method asks for; states v (n,), residuals (n,)."""
+
+    def residual(self, v: Array) -> Array:
+        """F(v); raises InvertedCells where it is not defined."""
+        ...
+
+    def linearisation(self, v: Array, pieces: Any = None) -> Linear:
+        """F and its derivatives, of the active pieces or of given ones."""
+        ...
+
+    def reactions(self, v: Array) -> Array:
+        """Contact forces (nc, d)."""
+        ...
+
+    def error(self, r: Array, v: Array) -> float:
+        """The judge's error."""
+        ...
+
+    def at_share(self, share: float) -> NonlinearProblem:
+        """The problem at a share of the load between the known state and the whole load."""
+        ...
+
+    def predicted(self, share: float, goal: float, v: Array) -> tuple[Linear, Array]:
+        """The linearisation at a share, and the first-order change of F, (n,), to another."""
+        ...
+
+    def towards(self, share: float, goal: float, v: Array) -> FrictionProblem:
+        """The tangent problem with contact at a share, under the load of another."""
+        ...
+
+    def closed_pieces(self, v: Array) -> list[Any]:
+        """Pieces with ever more contacts closed, for states at which nothing holds a body."""
+        ...
+
+    @property
+    def meets_first(self) -> bool:
+        """True where load steps begin with the tangent problem with contact."""
+        ...
+
+    @property
+    def known_state(self) -> Array:
+        """The state at share 0."""
+        ...
+
+
+class Crossing(Protocol):
+    """Leads on from where load steps end."""
+
+    def across(self, problem: Any, share: float, v: Array, target: Target) -> tuple[Array, str]:
+        """(state at the whole load, what happened on the way); Breakdown where it can not."""
+        ...
+
+
+@dataclass(frozen=True)
+class NonlinearNewton:
+    """The method for large deformations."""
+
+    halvings: int = 7  # of a Newton step in the line search
+    patience: int = 12  # Newton steps without halving the residual before the load step is cut
+    smallest_share: float = 1e-4  # of the load in one load step
+    linear: LinearSolver = Direct()
+    crossing: Crossing | None = None  # what leads on where load steps end, see `PathCrossing`
+
+    form: ClassVar[Form] = Form.GLOBAL
+
+    def __post_init__(self) -> None:
+        check_options(self)
+        check_at_least(0, halvings=self.halvings)
+        check_at_least(1, patience=self.patience)
+        check_positive(smallest_share=self.smallest_share)
+
+    def iterates(
+        self, problem: NonlinearProblem, start: Iterate, target: Target
+    ) -> Iterator[Iterate]:
+        """Newton steps at full load from a given v, else load steps from the known state.
+
+        Only states better than all before are shown to the driver.
+        """
+        shown = _Shown()
+        if start.v is not None:
+            try:
+                yield from shown.best(self._newton(problem, start.v, target))
+            except (_Failed, InvertedCells):
+                pass  # the start was no help
+        share, step, reason = 0.0, 1.0, ""
+        v = problem.known_state
+        while True:
+            if step < self.smallest_share:
+                if self.crossing is not None:
+                    v, told = self.crossing.across(problem, share, v, target)
+                    yield from shown.best(self._newton(problem, v, target), told)
+                hint = "" if self.crossing is not None else JUMP
+                raise Breakdown(
+                    f"no equilibrium found beyond {share:.4g} of the load: {reason}{hint}"
+                )
+            goal = min(1.0, share + step)
+            both = (self._predict, self._predict_contact)
+            for predict in both[::-1] if problem.meets_first else both:
+                try:
+                    first = predict(problem, share, goal, v, target)
+                    if goal == 1.0:
+                        yield from shown.best(self._newton(problem, first, target))
+                    v, steps = self._equilibrium(problem.at_share(goal), first, target)
+                    break
+                except (_Failed, InvertedCells) as failure:
+                    reason = str(failure)
+            else:
+                step /= 4 if share == 0 and step == 1.0 else 2
+                continue
+            shown.waiting += steps
+            share = goal
+            step *= 2 if steps <= EASY else 1
+
+    def _predict(
+        self, problem: NonlinearProblem, share: float, goal: float, v: Array, target: Target
+    ) -> Array:
+        """The tangent predictor from a state at one share of the load to another."""
+        try:
+            here, change = problem.predicted(share, goal, v)
+            now = problem.at_share(share)
+            return v + self._solve(now, v, here, here.residual + change)
+        except (InvertedCells, SingularOperator) as reason:
+            raise _Failed(str(reason)) from reason
+
+    def _predict_contact(
+        self, problem: NonlinearProblem, share: float, goal: float, v: Array, target: Target
+    ) -> Array:
+        """The solution of the tangent problem with contact: its statuses are right together.
+
+        Newton's steps change them one after another, and may go round in circles where many
+        contacts close at once.
+        """
+        tangent = problem.towards(share, goal, v)
+        start = Iterate(np.zeros((tangent.contacts, tangent.dimension)))
+        try:
+            for iterate in islice(Auto().iterates(tangent, start, target), CONTACT_STEPS):
+                state = iterate.v if iterate.v is not None else tangent.velocity(iterate.r)[1]
+                if tangent.error(iterate.r, state) <= STATUSES and state is not None:
+                    return state
+                if target.seconds_left <= 0:
+                    break
+        except (Breakdown, SingularOperator) as reason:
+            raise _Failed(str(reason)) from reason
+        raise _Failed("the tangent problem with contact was not solved")
+
+    def _equilibrium(
+        self, problem: NonlinearProblem, v: Array, target: Target
+    ) -> tuple[Array, int]:
+        """(v, Newton steps) at a load between, found loosely."""
+        steps = 0
+        found = self._newton(problem, v, target)
+        while problem.error(problem.reactions(v), v) > LOOSE:
+            v, steps = next(found)[0], steps + 1
+        return v, steps
+
+    def _newton(
+        self, problem: NonlinearProblem, v: Array, target: Target
+    ) -> Iterator[tuple[Array, Array, float]]:
+        """(v, r, |F| one step before) of Newton steps; _Failed when they lead nowhere."""
+        sizes: list[float] = []
+        patience = Patience(self.patience)
+        while target.seconds_left > 0:
+            try:
+                here = problem.linearisation(v)
+                F = here.residual
+                size = float(np.linalg.norm(F))
+                again = any(abs(size - old) <= REPEATED * size for old in sizes)
+                sizes.append(size)
+                if again or patience.over(size):
+                    self._stop(problem, v)
+                step = self._solve(problem, v, here, F)
+            except SingularOperator as reason:
+                raise _Failed(str(reason)) from reason
+            v = v + self._length(problem, v, step, sizes) * step
+            yield v, problem.reactions(v), size
+        raise Breakdown("out of time between two load steps")
+
+    @staticmethod
+    def _stop(problem: NonlinearProblem, v: Array) -> None:
+        """Raise _Failed, or Breakdown where the state is right up to rounding."""
+        reason = "Newton's steps no longer reduce the residual"
+        if problem.error(problem.reactions(v), v) <= LOOSE:
+            raise Breakdown(reason)
+        raise _Failed(reason)
+
+    def _solve(self, problem: NonlinearProblem, v: Array, here: Linear, F: Array) -> Array:
+        """-dF/dv^-1 F; with more contacts closed where open ones leave a body loose."""
+        try:
+            return self.linear.factor(here.matrix).solve(-F)
+        except SingularOperator:
+            for pieces in problem.closed_pieces(v):
+                closed = problem.linearisation(v, pieces)
+                try:
+                    factor = self.linear.factor(closed.matrix)
+                except SingularOperator:
+                    continue
+                return factor.solve(-F)
+            raise
+
+    def _length(
+        self, problem: NonlinearProblem, v: Array, step: Array, sizes: list[float]
+    ) -> float:
+        """The part of a Newton step to take; the best of all tried where none is enough."""
+        allowed = max(sizes[-MEMORY:])
+        best, found = np.inf, 0.0
+        for k in range(self.halvings + 1):
+            length = 0.5**k
+            try:
+                size = float(np.linalg.norm(problem.residual(v + length * step)))
+            except InvertedCells:
+                continue
+            if size <= (1 - ENOUGH * length) * allowed:
+                return length
+            if size < best:
+                best, found = size, length
+        if not np.isfinite(best):
+            raise _Failed("every step inverts cells")
+        return found
+
+
+class _Failed(Exception):
+    """Newton's method does not converge at this load."""
+
+
+@dataclass
+class _Shown:
+    """Lets pass what is better than all before, and counts what it keeps back."""
+
+    size: float = np.inf
+    waiting: int = 0
+
+    def best(
+        self, steps: Iterator[tuple[Array, Array, float]], told: str = ""
+    ) -> Iterator[Iterate]:
+        """The iterates whose |F| is the least so far."""
+        for v, r, size in steps:
+            self.waiting += 1
+            if size < self.size:
+                yield Iterate(r, v, self.waiting, self.waiting, told)
+                self.size, self.waiting = size, 0
+
+
+def nonlinear_solver(solver: object) -> NonlinearNewton:
+    """The method for large deformations: the given one if it can, NonlinearNewton for Auto."""
+    if solver is None or isinstance(solver, Auto):
+        return NonlinearNewton()
+    if not isinstance(solver, NonlinearNewton):
+        raise UnsupportedForm(
+            f"{type(solver).__name__} solves one linear problem with contact; large "
+            "deformations need NonlinearNewton"
+        )
+    return solver

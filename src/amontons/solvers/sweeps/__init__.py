@@ -1,0 +1,1 @@
+"""Contact after contact: Gauss-Seidel and Jacobi."""

@@ -1,0 +1,343 @@
+"""Compiled Gauss-Seidel sweeps: the order of the contacts, Anderson acceleration, the judging.
+
+A sweep solves one contact after another given all others,
+
+    r_i <- r_i + relaxation (solution of contact i - r_i),
+
+and reports |W_ii (r_i' - r_i)| over all contacts, the *change*, unit of u.  The error is about
+a constant times the change, so the judge, which costs half a sweep, is asked only when the
+change has fallen to where the last answer promises success (the idea of [ABD] eq. (14)).
+
+Order.   Sweeps converge in fewer steps when contacts that approach fast come first, as impacts
+travel outward from them; contacts that approach alike (the corners of one face, a layer at
+rest) are spread by the golden ratio, so that neighbours do not follow one another.  Measured
+on real problems that takes 0.5 to 1.3 times the sweeps of the stored order, 0.85 on average.
+
+[ABD] see `gauss_seidel`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import uint64
+from numpy.typing import NDArray
+
+from ...core.compiled import njit
+from ...problem.friction import FrictionProblem
+from ...problem.judge.measures import natural_error
+from ...problem.law.one_contact import solve_contact, solve_eliminated
+from .local_contact import (
+    CLOSE,
+    EXACT_FLOPS,
+    PROJECTIONS,
+    STEPS,
+    LocalSolver,
+    newton_contact,
+    projection_contact,
+)
+
+Array = NDArray[np.float64]
+EXACT, NEWTON = int(LocalSolver.EXACT), int(LocalSolver.NEWTON)
+GOLDEN = 0.6180339887498949
+SLOWEST = 1e-9  # approach, relative to the fastest, below which contacts count as alike
+FIRST_JUDGED = 10.0  # change, in goals, at which the judge is asked first: sweeps may be quick
+SAFETY = 0.95  # of the change at which the judge is asked again
+SHIFT = 1e-13  # of the least-squares equations of Anderson acceleration, relative
+BLOCK_FLOPS, CONTACT_FLOPS = 18, 16  # of a sweep: per block of W, per contact besides
+LEAST = 1e-3  # factor by which that change falls at most from one judgement to the next
+
+
+class SweepOrder(Enum):
+    """In which order a sweep visits the contacts."""
+
+    STORED = "stored"  # as the problem has them
+    APPROACH = "approach"  # the fastest approaching first, see the module's text
+
+
+class Sweep(NamedTuple):
+    """What compiled sweeps read; arrays as in `FrictionProblem.kernel_data` and `BlockRows`."""
+
+    indptr: Any
+    indices: Any
+    data: Any
+    q: Any
+    coefficient: Any
+    tresca: bool
+    rho: Any
+    diagonal: Any
+    eliminated: Any
+    order: Any  # (nc,) contacts in the order of visits
+    local: int
+    relaxation: float
+    close: float  # relative change at which iterations on one contact end
+    steps: int  # of them at most
+    work: Any  # (1,) floating point operations of iterations on single contacts, added up
+
+
+def sweep_data(
+    problem: FrictionProblem,
+    local: LocalSolver = LocalSolver.EXACT,
+    relaxation: float = 1.0,
+    order: SweepOrder = SweepOrder.STORED,
+    *,
+    close: float = CLOSE,
+    steps: int | None = None,
+) -> Sweep:
+    """Sweeps of a problem in Delassus form."""
+    if steps is None:
+        steps = PROJECTIONS if local is LocalSolver.PROJECTION else STEPS
+    b = problem.blocks
+    _, _, _, q, coefficient, tresca, rho = problem.kernel_data
+    visits = _by_approach(q) if order is SweepOrder.APPROACH else np.arange(len(q))
+    return Sweep(
+        b.indptr, b.indices, b.data, q, coefficient, tresca, rho, b.diagonal, b.eliminated,
+        visits, int(local), float(relaxation), float(close), int(steps), np.zeros(1),
+    )  # fmt: skip
+
+
+def sweep_flops(s: Sweep, sweeps: int, local: float) -> float:
+    """Floating point operations of some sweeps, `local` being what they added to s.work.
+
+    A block of W takes nine products and nine sums; then there are the solution of each contact
+    and what tells its change.
+    """
+    nc = len(s.order)
+    own = CONTACT_FLOPS + (EXACT_FLOPS if s.local == EXACT else 0.0)
+    return sweeps * (BLOCK_FLOPS * (len(s.indices) - nc) + own * nc) + local
+
+
+@njit(cache=True, error_model="numpy")
+def _by_approach(q):
+    """Contacts by octaves of -q_N, the largest first, spread by the golden ratio in each."""
+    nc = len(q)
+    fastest = 0.0
+    for i in range(nc):
+        fastest = max(fastest, -q[i, 0])
+    key = np.empty(nc)
+    for i in range(nc):
+        approach = max(-q[i, 0], SLOWEST * fastest)
+        octave = math.floor(math.log2(fastest / approach)) if approach > 0.0 else 0.0
+        key[i] = octave + (i * GOLDEN) % 1.0
+    return np.argsort(key)
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def sweep_inplace(s, backward, r):
+    """One sweep over all contacts on r (nc, 3); returns the change."""
+    nc = len(s.order)
+    change = 0.0
+    for step in range(nc):
+        i = uint64(s.order[nc - 1 - step if backward else step])
+        b0, b1, b2 = s.q[i, 0], s.q[i, 1], s.q[i, 2]
+        for k in range(uint64(s.indptr[i]), uint64(s.indptr[i + uint64(1)])):
+            j = uint64(s.indices[k])  # unsigned: no test for negative indices in the loop
+            if j == i:
+                continue
+            r0, r1, r2 = r[j, 0], r[j, 1], r[j, 2]
+            b0 += s.data[k, 0, 0] * r0 + s.data[k, 0, 1] * r1 + s.data[k, 0, 2] * r2
+            b1 += s.data[k, 1, 0] * r0 + s.data[k, 1, 1] * r1 + s.data[k, 1, 2] * r2
+            b2 += s.data[k, 2, 0] * r0 + s.data[k, 2, 1] * r1 + s.data[k, 2, 2] * r2
+        c, r0, r1, r2 = s.coefficient[i], r[i, 0], r[i, 1], r[i, 2]
+        A, e = s.data[uint64(s.diagonal[i])], s.eliminated[i]
+        if s.local == EXACT:
+            if s.tresca:
+                x0, x1, x2, _ = solve_contact(A, b0, b1, b2, c, True, r1, r2)
+            else:
+                x0, x1, x2 = solve_eliminated(e, A, b0, b1, b2, c, r1, r2)
+        elif s.local == NEWTON:
+            x0, x1, x2 = newton_contact(
+                A, b0, b1, b2, c, r0, r1, r2, s.close, s.steps, s.work
+            )
+        else:
+            x0, x1, x2 = projection_contact(
+                A, b0, b1, b2, c, r0, r1, r2, s.close, s.steps, s.work
+            )
+        d0, d1, d2 = x0 - r0, x1 - r1, x2 - r2
+        w = s.relaxation if x0 > 0.0 else 1.0  # open at once: else r fades into denormals
+        r[i, 0], r[i, 1], r[i, 2] = r0 + w * d0, r1 + w * d1, r2 + w * d2
+        change += e[16] * (d0 * d0 + d1 * d1 + d2 * d2)
+    return math.sqrt(change)
+
+
+@njit(cache=True, error_model="numpy")
+def _content(s, r, change, watch):
+    """True when the error is at most watch[0]; see `watch_for`."""
+    if not change <= watch[1]:
+        return False
+    error = natural_error(s.indptr, s.indices, s.data, s.q, s.coefficient, s.tresca, s.rho, r)
+    if error <= watch[0]:
+        watch[2] = error
+        return True
+    watch[1] = change * max(min(SAFETY * watch[0] / error, 0.8), LEAST)
+    return False
+
+
+@njit(cache=True, error_model="numpy")
+def sweeps_inplace(s, r, sweeps, watch):
+    """Up to `sweeps` sweeps, fewer when the judge is content; returns how many.
+
+    watch: see `watch_for`.
+    """
+    for k in range(sweeps):
+        if _content(s, r, sweep_inplace(s, False, r), watch):
+            return k + 1
+    return sweeps
+
+
+@njit(cache=True, error_model="numpy")
+def sweeps_until_inplace(s, r, before, sweeps, tau):
+    """Up to `sweeps` sweeps, fewer when [ABD] eq. (14) holds; returns (sweeps done, left side).
+
+    before (nc, 3) is working memory.
+    """
+    change = math.inf
+    for k in range(sweeps):
+        before[:, :] = r
+        sweep_inplace(s, False, r)
+        moved = size = 0.0
+        for i in range(len(r)):
+            for j in range(3):
+                moved += (r[i, j] - before[i, j]) ** 2
+                size += r[i, j] ** 2
+        change = math.sqrt(moved / size) if size > 0.0 else math.sqrt(moved)
+        if change < tau or moved == 0.0:
+            return k + 1, change
+    return sweeps, change
+
+
+@njit(cache=True, error_model="numpy")
+def _least_squares(gram, target, k, factor, weights):
+    """Solve (gram + tiny I) w = target for the leading k unknowns by L D L^T.
+
+    A direction that depends on earlier ones gets the weight zero; factor is working memory.
+    Returns False when all of gram is zero.
+    """
+    largest = 0.0
+    for i in range(k):
+        largest = max(largest, gram[i, i])
+    for i in range(k):
+        for j in range(i):
+            t = gram[i, j]
+            for l in range(j):
+                t -= factor[i, l] * factor[j, l] * factor[l, l]
+            factor[i, j] = t / factor[j, j]
+        pivot = gram[i, i] + SHIFT * largest
+        for l in range(i):
+            pivot -= factor[i, l] * factor[i, l] * factor[l, l]
+        factor[i, i] = pivot if pivot > 0.01 * SHIFT * largest else 1e300
+    for i in range(k):
+        t = target[i]
+        for l in range(i):
+            t -= factor[i, l] * weights[l]
+        weights[i] = t
+    for i in range(k - 1, -1, -1):
+        t = weights[i] / factor[i, i]
+        for l in range(i + 1, k):
+            t -= factor[l, i] * weights[l]
+        weights[i] = t
+    return largest > 0.0
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+def _dot(a, b):
+    """a . b; summed in any order, so that it is vectorised."""
+    total = 0.0
+    for i in range(len(a)):
+        total += a[i] * b[i]
+    return total
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def anderson_inplace(s, r, x, history, gram, count, sweeps, watch):  # noqa: PLR0913
+    """Accelerated sweeps; r ends as the last plain sweep.  Returns sweeps done.
+
+    x (nc, 3) is the next point to sweep from and history (2, depth + 1, 3 nc) holds differences
+    of G(r) and of the residual f = G(r) - r, the last row of each the values themselves; gram
+    (depth + 1, depth) the products of the differences of f, and with f in the last row;
+    count (2,) how many are stored and whether there are values.  So a call goes on where the
+    last one ended.  The history is dropped when the residual doubles; `watch` as above.
+    """
+    depth = history.shape[1] - 1
+    m = history.shape[2]
+    steps, slopes = history[0], history[1]
+    image, residual, target = steps[depth], slopes[depth], gram[depth]
+    weights, factor = np.zeros(depth), np.zeros((depth, depth))
+    g, xf = r.reshape(m), x.reshape(m)
+    for k in range(sweeps):
+        r[:, :] = x
+        if _content(s, r, sweep_inplace(s, False, r), watch):
+            x[:, :] = r
+            return k + 1
+        size = old_size = 0.0
+        for i in range(m):
+            size += (g[i] - xf[i]) ** 2
+            old_size += residual[i] ** 2
+        if count[1] == 0 or size > 4.0 * old_size:
+            count[0] = 0
+            for i in range(m):
+                residual[i] = g[i] - xf[i]
+        else:
+            slot = count[0] % depth
+            count[0] += 1
+            step, slope = steps[slot], slopes[slot]
+            for i in range(m):
+                f = g[i] - xf[i]
+                step[i], slope[i] = g[i] - image[i], f - residual[i]
+                residual[i] = f
+            for a in range(min(count[0], depth)):
+                product = _dot(slopes[a], residual)
+                # slope = f - f_old: its products are differences of those with f
+                gram[a, slot] = gram[slot, a] = product - target[a]
+                target[a] = product
+            gram[slot, slot] = _dot(slope, slope)
+        count[1] = 1
+        filled = min(count[0], depth)
+        image[:] = g
+        xf[:] = g
+        if filled > 0 and _least_squares(gram, target, filled, factor, weights):
+            for a in range(filled):
+                w, step = weights[a], steps[a]
+                for i in range(m):
+                    xf[i] -= w * step[i]
+    return sweeps
+
+
+def watch_for(goal: float) -> Array:
+    """When sweeps ask the judge: [goal, change, error], all unit of u; goal = 0: never.
+
+    The error is formed when a sweep changes less than `change`, which adapts; once it is at
+    most `goal` the sweeps end, and `error` has it, infinite until then.
+    """
+    return np.array([goal, FIRST_JUDGED * goal, math.inf])
+
+
+@dataclass(eq=False)
+class Acceleration:
+    """Anderson's memory between two calls: see `anderson_inplace`."""
+
+    data: Sweep
+    r: Array  # the last plain sweep, (nc, 3)
+    depth: int
+
+    def __post_init__(self) -> None:
+        self.x = self.r.copy()
+        self.r = self.r.copy()
+        self.history = np.empty((2, self.depth + 1, self.r.size))
+        self.gram = np.zeros((self.depth + 1, self.depth))
+        self.count = np.zeros(2, dtype=np.int64)
+
+    @property
+    def flops(self) -> float:
+        """Floating point operations of a sweep beyond the sweep itself."""
+        return self.r.size * (8.0 + 4.0 * self.depth) + self.depth**3 / 3
+
+    def sweep(self, sweeps: int, watch: Array) -> int:
+        """Go on for `sweeps` sweeps or until the judge is content; sweeps done."""
+        return anderson_inplace(
+            self.data, self.r, self.x, self.history, self.gram, self.count, sweeps, watch
+        )

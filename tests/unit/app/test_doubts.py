@@ -1,0 +1,131 @@
+"""Warnings about models: each where it is due, and nowhere else."""
+
+import numpy as np
+import pytest
+
+import amontons as am
+
+STEEL = am.LinearElastic(young=200.0, poisson=0.3)
+
+
+def names(solution):
+    return [warning.name for warning in solution.warnings]
+
+
+def block(value=0.0, loads=(), *, gap=0.0, **options):
+    """A block above a floor, held at its top."""
+    return am.Model(
+        [am.Body(am.box((2, 1), cells=(4, 2)), STEEL)],
+        [am.Fix("top", value)],
+        [am.Contact("bottom", am.Plane((0, 1), point=(0, -gap)), mu=0.3)],
+        loads,
+        **options,
+    )
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        block(),
+        block(gap=0.1),
+        block(lambda x: (0.0, 0.0)),
+        block((0, None), [am.Traction("left", (0, 0)), am.BodyForce(np.zeros(2))]),
+        block((0, -0.1), load_factor=0.0),
+    ],
+)
+def test_a_model_without_load_says_so(model):
+    solution = am.solve(model)
+    assert names(solution) == ["no-load"]
+    assert "no-load" in str(solution)
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        block((0, -0.1)),
+        block((0, 0.1)),  # lifted: open by its load
+        block(gap=-0.01),  # an overlap is a load
+        block(0, [am.Traction("left", (0, -1))]),
+        block(0, [am.BodyForce((0, -1))]),
+    ],
+)
+def test_a_load_is_no_doubt(model):
+    assert names(am.solve(model)) == []
+
+
+def test_steps_before_the_load_begins_are_no_doubt():
+    model = block((0, lambda x, t: -max(t - 0.6, 0.0)))
+    assert [names(step) for step in am.evolve(model, am.QuasiStatic(0.5), until=1)] == [[], []]
+    quiet = list(am.evolve(block(), am.QuasiStatic(0.5), until=1))
+    assert [names(step) for step in quiet] == [["no-load"], ["no-load"]]
+
+
+# ------------------------------------------------------------------ volumetric locking
+def rubber(law, cells, kind=None, order=1, press=0.02):
+    """A block between a bonded and a rubbing side."""
+    size, down = ((2, 1), (0, -1)) if len(cells) == 2 else ((2, 2, 1), (0, 0, -1))
+    move = tuple(press * x for x in down)
+    return am.Model(
+        [am.Body(am.box(size, cells=cells, kind=kind), law, order=order)],
+        [am.Fix("top", move)],
+        [am.Contact("bottom", am.Plane([-x for x in down]), mu=0.5)],
+    )
+
+
+def estimated(solution):
+    """The factor of the warning."""
+    (warning,) = solution.warnings
+    assert warning.name == "volumetric-locking"
+    assert "order=2" in warning.message
+    return float(warning.message.split("about ")[1].split(" times")[0])
+
+
+@pytest.mark.parametrize(
+    ("cells", "kind", "poisson"),
+    [((8, 4), "quad", 0.499), ((8, 4), "quad", 0.4999), ((16, 8), "tri", 0.499),
+     ((4, 4, 2), "hex", 0.49), ((4, 4, 2), "tet", 0.499)],
+)  # fmt: skip
+def test_locking_is_told_with_its_size(cells, kind, poisson):
+    law = am.LinearElastic(1.0, poisson)
+    solution = am.solve(rubber(law, cells, kind))
+    fine = am.solve(rubber(law, (16, 8) if len(cells) == 2 else (6, 6, 3), order=2))
+    assert fine.warnings == ()
+    factor = solution.resultant[-1] / fine.resultant[-1]
+    assert estimated(solution) == pytest.approx(factor, rel=0.15)
+
+
+@pytest.mark.parametrize("law", [am.NeoHookean, am.CiarletGeymonat])
+def test_locking_at_finite_strains(law):
+    coarse = am.solve(rubber(law(1.0, 0.499), (8, 4), press=0.1))
+    fine = am.solve(rubber(law(1.0, 0.499), (8, 4), order=2, press=0.1))
+    assert fine.warnings == ()
+    factor = coarse.resultant[-1] / fine.resultant[-1]
+    assert estimated(coarse) == pytest.approx(factor, rel=0.3)
+
+
+@pytest.mark.parametrize(
+    ("law", "cells"),
+    [
+        (am.LinearElastic(1.0, 0.4999, plane="stress"), (8, 4)),
+        (am.LinearElastic(1.0, 0.3), (2, 1)),
+        (am.LinearElastic(1.0, 0.49), (32, 16)),  # 3 % too stiff
+    ],
+)
+def test_what_does_not_lock(law, cells):
+    assert am.solve(rubber(law, cells)).warnings == ()
+
+
+def test_the_region_that_locks_is_named():
+    """One region of one body of two."""
+    mesh = am.box((2, 1), cells=(4, 2))
+    half = am.Cells("quad", mesh.cells[0].nodes[:4], "seal")
+    rest = am.Cells("quad", mesh.cells[0].nodes[4:], "frame")
+    mesh = am.Mesh(mesh.points, (half, rest), mesh.surfaces)
+    laws = {"seal": am.LinearElastic(1.0, 0.4999), "frame": am.LinearElastic(1.0, 0.3)}
+    model = am.Model(
+        [am.Body(mesh, laws, name="ring")],
+        [am.Fix("top", (0, -0.1))],
+        [am.Contact("bottom", am.Plane((0, 1)), mu=0.5)],
+    )
+    (warning,) = am.solve(model).warnings
+    assert "region 'seal' of body 'ring'" in warning.message

@@ -1,0 +1,115 @@
+"""Where kernels are kept: never in the package, and without any place only for one process."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import amontons
+from amontons.core import compiled
+
+PACKAGE = Path(amontons.__file__).parent
+CALL = """
+import numpy as np
+from amontons.core import compiled
+from amontons.solvers.sweeps.kernels import _dot
+_dot(np.ones(2), np.ones(2))
+print(compiled._folder())
+"""
+
+
+def kept(tmp_path, code=CALL, **variables):
+    """The folder of a fresh process, and what is in it when the process has ended."""
+    known = {k: v for k, v in os.environ.items()
+             if k not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}  # fmt: skip
+    scratch = tmp_path / "scratch"
+    scratch.mkdir(exist_ok=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True,
+        env={**known, "TMPDIR": str(scratch), **{k: str(v) for k, v in variables.items()}},
+    )  # fmt: skip
+    assert done.stderr == ""
+    assert not list(scratch.iterdir())
+    folder = Path(done.stdout.strip())
+    return folder, list(folder.rglob("*.nbi")) if folder.exists() else []
+
+
+def test_kernels_are_kept_in_the_cache_of_the_user_and_not_in_the_package(tmp_path):
+    before = set(PACKAGE.rglob("*.nb?"))
+    folder, files = kept(tmp_path, HOME=tmp_path, XDG_CACHE_HOME="not/absolute")
+    if sys.platform == "linux":
+        assert folder.parent == tmp_path / ".cache" / "amontons"
+    assert files
+    assert set(PACKAGE.rglob("*.nb?")) == before
+
+
+@pytest.mark.parametrize("name", ["NUMBA_CACHE_DIR", "XDG_CACHE_HOME"])
+def test_the_user_says_where(tmp_path, name):
+    if name == "XDG_CACHE_HOME" and sys.platform != "linux":
+        pytest.skip("a variable of Linux")
+    folder, files = kept(tmp_path, **{name: tmp_path / "there"})
+    assert (tmp_path / "there") in folder.parents
+    assert files
+
+
+@pytest.mark.parametrize("variables", [
+    {"HOME": "/dev/null"}, {"NUMBA_CACHE_DIR": "/dev/null/x"}, {"XDG_CACHE_HOME": "/dev/null"},
+])  # fmt: skip
+def test_without_a_place_kernels_last_as_long_as_their_process(tmp_path, variables):
+    folder, files = kept(tmp_path, **variables)
+    assert not files
+    assert not folder.exists()
+    assert folder.parent == tmp_path / "scratch"
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
+def test_a_forked_process_leaves_the_kernels_of_its_parent(tmp_path):
+    code = CALL.replace("print(", """
+import os, sys
+if os.fork() == 0:
+    sys.exit()
+os.wait()
+assert os.path.isdir(compiled._folder())
+print(""")  # fmt: skip
+    kept(tmp_path, code, HOME="/dev/null")
+
+
+def test_folders_of_other_users_are_not_trusted(tmp_path, monkeypatch):
+    if not hasattr(os, "getuid"):
+        pytest.skip("no users of that kind")
+    monkeypatch.setattr(os, "getuid", lambda: tmp_path.stat().st_uid + 1)
+    monkeypatch.setattr(compiled, "ROOT", -1)
+    with pytest.raises(PermissionError, match="another user"):
+        compiled._made(tmp_path / "kernels")
+
+
+def test_a_change_of_any_kernel_makes_a_new_folder(tmp_path, monkeypatch):
+    monkeypatch.setattr(compiled, "PACKAGE", tmp_path)
+    first, second = tmp_path / "a.py", tmp_path / "b.py"
+    first.write_text("@njit(cache=True)\ndef f(): g()\n")
+    second.write_text("@njit(cache=True)\ndef g(): 1\n")
+    before = compiled._digest()
+    (tmp_path / "c.py").write_text("no kernels here")
+    assert compiled._digest() == before
+    second.write_text("@njit(cache=True)\ndef g(): 2\n")
+    assert compiled._digest() != before
+
+
+def test_kernels_that_nobody_uses_go_after_a_while(tmp_path):
+    old, new = tmp_path / "kernels-old", tmp_path / "kernels-new"
+    for folder in (old, new):
+        folder.mkdir()
+    os.utime(old, (0, 0))
+    compiled._forget_old(tmp_path)
+    assert not old.exists()
+    assert new.exists()
+
+
+def test_numba_itself_is_left_as_it_was():
+    from numba.core import config
+
+    before = config.CACHE_DIR
+    compiled.njit(cache=True)(lambda x: x)
+    assert before == config.CACHE_DIR
