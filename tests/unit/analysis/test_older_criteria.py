@@ -7,6 +7,7 @@ from scipy.optimize import minimize_scalar
 import amontons as am
 from amontons.analysis.certificates.energy_bound import energy_bound
 from amontons.analysis.certificates.older_criteria import critical_discs
+from amontons.core.clock import Deadline
 from amontons.core.errors import InvalidInput, UnsupportedForm
 from amontons.mechanics.ready.gallery import box_tower
 from amontons.mechanics.ready.hild import hild_triangle
@@ -193,7 +194,7 @@ def test_without_coupling_only_the_printed_number_is_finite():
 
 def test_limits_and_bad_input():
     three = spatial(random_delassus(0, 3))
-    stopped = am.p_matrix_friction(three, time_limit=1e-3)
+    stopped = am.p_matrix_friction(three, time_limit=Deadline.counted(1e-3))
     assert stopped.reason == "time is up" and stopped.lower <= stopped.upper
     v = np.array([1.0, 0.3, -1.0])
     singular = am.p_matrix_friction(spatial(np.eye(3) - np.outer(v, v) / (v @ v)))

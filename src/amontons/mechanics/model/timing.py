@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from dataclasses import dataclass, is_dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
+
+from ...core.expressions import Expression
 
 
 @dataclass(frozen=True)
@@ -29,7 +31,7 @@ def is_timed(value: Any) -> bool:
         return any(is_timed(entry) for entry in value)
     if isinstance(value, AtTime):
         return True
-    if _is_expression(value):
+    if isinstance(value, Expression):
         return "t" in value.names
     return callable(value) and _takes_time(value)
 
@@ -40,7 +42,7 @@ def at_time(value: Any, t: float) -> Any:
         return [at_time(entry, t) for entry in value]
     if not is_timed(value):
         return value
-    if _is_expression(value):
+    if isinstance(value, Expression):
         return replace(value, time=float(t))
     function = value.function if isinstance(value, AtTime) else value
     return AtTime(function, float(t))
@@ -62,12 +64,9 @@ def _is_raw(value: Any) -> bool:
     """True where a function of (x, t) has not been given its time."""
     if isinstance(value, list | tuple):
         return any(_is_raw(entry) for entry in value)
-    return is_timed(value) and not isinstance(value, AtTime) and not _is_expression(value)
+    return is_timed(value) and not isinstance(value, AtTime | Expression)
 
 
-def _is_expression(value: Any) -> bool:
-    """An amontons.expressions.Expression, which lies above this layer: known by its fields."""
-    return is_dataclass(value) and hasattr(value, "names") and hasattr(value, "time")
 
 
 def _takes_time(function: Any) -> bool:
