@@ -99,9 +99,9 @@ def within_siconos(
     """The methods of the paper in Siconos from r = 0; `missing` as in `measure`."""
     target = out / f"{SICONOS_SETS[name]}.json"
     record: dict = {"machine": machine, "limit": limit, "runs": {}}
-    if missing and load(target).get("limit") == limit:
-        record["runs"] = load(target)["runs"]
-        record["newton_flops"] = load(target).get("newton_flops", {})
+    known = load(target)
+    if missing and known.get("limit") == limit:
+        record = known | {"machine": machine}
     steps = record.setdefault("newton_flops", {})
     for path in paths:
         if path.stem not in record["runs"].get("siconos", {}):

@@ -241,11 +241,23 @@ def _comparison(
     """(P-matrix threshold, full contact threshold), None where they would take too long."""
     p_matrix = None
     if pieces.contacts <= COMPARED:
-        threshold = Threshold(found.upper, found.states, found.null)
-        exact_threshold(pieces, threshold, deadline, pieces.allowed(tangent=True))
+        threshold = p_matrix_threshold(pieces, deadline, found)
         p_matrix = threshold.upper if threshold.proved else None
     full = full_contact_threshold(pieces, deadline)
     return p_matrix, full.upper if full is not None and full.proved else None
+
+
+def p_matrix_threshold(
+    pieces: Pieces, deadline: Deadline, known: Threshold | None = None
+) -> Threshold:
+    """Smallest t at which a pattern is singular, also one with only its tangent closed.
+
+    known: an upper bound with its pattern, to begin with.
+    """
+    begin = known or Threshold()
+    threshold = Threshold(begin.upper, begin.states, begin.null)
+    exact_threshold(pieces, threshold, deadline, pieces.allowed(tangent=True))
+    return threshold
 
 
 def full_contact_threshold(pieces: Pieces, deadline: Deadline = NEVER) -> Threshold | None:

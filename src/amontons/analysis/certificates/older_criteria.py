@@ -50,9 +50,10 @@ from .critical_friction import (
     FULL_CONTACT,
     full_contact_difference,
     full_contact_threshold,
+    p_matrix_threshold,
 )
 from .disc_criteria import Criterion, Found, disc_threshold
-from .exact_threshold import CLOSE, LARGEST, Threshold, exact_threshold
+from .exact_threshold import CLOSE, LARGEST, Threshold
 from .status_pieces import REAL, Pieces, reacting
 
 Array = NDArray[np.float64]
@@ -238,8 +239,7 @@ def _nothing_reacts() -> Found:
 
 
 def _p_matrix_planar(pieces: Pieces, deadline: Deadline) -> Found:
-    threshold = Threshold()
-    exact_threshold(pieces, threshold, deadline, pieces.allowed(tangent=True))
+    threshold = p_matrix_threshold(pieces, deadline)
     return _of(threshold, threshold.null)
 
 
