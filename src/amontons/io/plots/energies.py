@@ -63,7 +63,8 @@ def energy_figure(
     if gained.any():
         whole = f"{np.abs(put_in).max():.2g} {units.energy}".rstrip()
         told = f"Contact creates energy: at most {largest} in a step,\nof {whole} put in so far"
-    right.set(xlabel=with_unit("time", units.time), yscale="log",
+    shown = (work < 0).any() or (defect > 0).any()  # a log axis needs something to show
+    right.set(xlabel=with_unit("time", units.time), yscale="log" if shown else "linear",
               ylabel=with_unit("work in a step", units.energy),
               title=told,
               xlim=left.get_xlim())  # fmt: skip
