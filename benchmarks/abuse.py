@@ -36,7 +36,7 @@ import amontons as am
 from amontons.app.api import solve_any_form
 from amontons.core.errors import AmontonsError
 from amontons.problem.friction import Form, FrictionProblem
-from amontons.problem.law.cones import Tresca
+from amontons.problem.law import Tresca
 from amontons.problem.solution import FrictionSolution
 
 NOTE = """\

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from amontons.problem.friction import FrictionProblem
-from amontons.problem.law.cones import Coulomb, Law, Tresca
+from amontons.problem.law import Coulomb, Law, Tresca
 
 Array = NDArray[np.float64]
 Random = np.random.Generator

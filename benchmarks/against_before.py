@@ -1,12 +1,12 @@
 """This version against an earlier one: CPU seconds of the same solves, in turns, one thread.
 
     git worktree add ../before COMMIT
-    python benchmarks/against_before.py ../before/src [--runs 15]
+    python benchmarks/against_before.py ../before/src [--runs 15] [--page redesign.md]
 
 Each run is a process of its own for each version, one after the other, so that a busy machine
 slows both; the median of the ratios counts, beside their quartiles.  A process solves every
 problem once to compile and to warm up, then again until WORTH seconds are spent, and reports
-CPU seconds per solve.  Writes results/against_before.md.
+CPU seconds per solve.  Writes results/against_before.md, or another page.
 """
 
 from __future__ import annotations
@@ -49,7 +49,8 @@ def timed(solve):
 def work(folder):
     """Names and CPU seconds of all solves of this process, one line each."""
     import amontons as am
-    from amontons.solvers.driver import drive
+
+    drive = am.drive  # wherever a version keeps it
 
     def cube(cells):
         body = am.Body(am.box((1, 1, 1), cells=(cells,) * 3), am.LinearElastic(200, 0.3))
@@ -98,7 +99,7 @@ def page(pairs, options):
     lines = [
         "# This version against the one before", "",
         "Regenerate: `python benchmarks/against_before.py BEFORE/src --runs "
-        f"{options.runs}` (before: {options.name}).", "",
+        f"{options.runs} --page {options.page}` (before: {options.name}).", "",
         f"{machine}; one thread. CPU seconds, {len(pairs)} pairs of processes in turns: "
         "median (lower and upper quartile) of the ratios. Of all files: the geometric mean in "
         "a pair.",
@@ -155,6 +156,7 @@ def main():
     parser.add_argument("before", nargs="?", type=Path, help="source folder of the other one")
     parser.add_argument("--runs", type=int, default=15)
     parser.add_argument("--name", default="the version before", help="of the other one")
+    parser.add_argument("--page", default="against_before.md", help="file in results/")
     parser.add_argument("--folder", type=Path, default=shared / "data/fclib")
     parser.add_argument("--work", type=Path, help=argparse.SUPPRESS)
     options = parser.parse_args()
@@ -169,7 +171,7 @@ def main():
         found = {source: measured(source, options.folder) for source in order}
         pairs.append((found[sources[0]], found[sources[1]]))
         print(f"{k + 1} of {options.runs}", flush=True)
-        (HERE / "results/against_before.md").write_text(page(pairs, options))
+        (HERE / "results" / options.page).write_text(page(pairs, options))
     return None
 
 

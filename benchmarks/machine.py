@@ -5,7 +5,7 @@ import platform
 from importlib.metadata import version
 from pathlib import Path
 
-PACKAGES = ("amontons", "numpy", "scipy", "numba", "rslab", "ngsolve")
+PACKAGES = ("amontons", "numpy", "scipy", "numba", "rslab")
 
 
 def describe() -> dict[str, str]:

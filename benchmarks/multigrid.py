@@ -110,7 +110,7 @@ def cube_row(level, repeats, algebraic=False):
     model = cube(level)
     problem = model.assemble()
     if algebraic:
-        problem = replace(problem, levels=(), guess=None, _shared={})
+        problem = replace(problem.fresh(), levels=(), guess=None)
     row = {"level": level, "unknowns": problem.unknowns, "contacts": problem.contacts}
     for tolerance in TOLERANCES:
         seconds, solution = contact(problem, tolerance, repeats)
@@ -154,7 +154,7 @@ def clamped(problem):
 
 def two_bodies_row(model, repeats):
     """Two bodies against a linear solve of both, contact faces clamped or free."""
-    problem = replace(model.assemble(), _shared={})
+    problem = model.assemble().fresh()
     apart = linear(problem, problem.levels, repeats)
     held = clamped(problem)
     reference = linear(held, held.levels, repeats)

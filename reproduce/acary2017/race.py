@@ -17,7 +17,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -98,8 +98,8 @@ def one_run(
         seconds = now - began - watched
         # the sum of the paper's (13), by the compiled judge with rho = 1
         r = spatial(iterate.r)
-        indptr, indices, data, q, mu, tresca, _ = condensed.kernel_data
-        natural = natural_error(indptr, indices, data, q, mu, tresca, ones, r)
+        indptr, indices, data, q, kind, parameters, _ = condensed.kernel_data
+        natural = natural_error(indptr, indices, data, q, kind, parameters, ones, r)
         natural /= condensed.q_norm
         rows.append((seconds, step.iteration, step.flops, step.error, natural))
         done = max(step.error, natural) <= TOLERANCES[-1]
@@ -135,7 +135,7 @@ def one_run(
 
 def fresh(problem: am.FrictionProblem) -> am.FrictionProblem:
     """The problem as read: nothing factored; W is in blocks, as after reading."""
-    fresh = replace(problem, _shared={})
+    fresh = problem.fresh()
     if fresh.form is am.Form.DELASSUS:
         _ = fresh.kernel_data
     return fresh

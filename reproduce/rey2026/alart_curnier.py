@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 
 import amontons as am
 from amontons.analysis import Ended, RunLimits
-from amontons.problem.law.cones import augmented_reaction, augmented_reaction_jacobian
 
 from .triangle import SAME, Cell, Triangle, tally, triangle_of
 
@@ -144,10 +143,10 @@ class AtPoints:
         G = weighted @ spread
         inside = spread - self.eta * (spread @ compliance)  # dx / dlambda
         slope = np.einsum(
-            "qij,qjk->qik", augmented_reaction_jacobian(x, law),
+            "qij,qjk->qik", law.augmented_reaction_jacobian(x),
             inside.reshape(-1, 2, len(unknown)),
         )  # fmt: skip
-        residual = G @ unknown - weighted @ augmented_reaction(x, law).ravel()
+        residual = G @ unknown - weighted @ law.augmented_reaction(x).ravel()
         return residual, G - weighted @ slope.reshape(spread.shape)
 
 

@@ -126,7 +126,7 @@ def readings(paper: Mapping, draws: int, seed: int) -> Iterator[dict]:
 
 def meshes(draws: int, seed: int) -> Iterator[dict]:
     """Primal-dual at mu = 3.5 on three meshes: lambda_min, and free ends over alpha_0."""
-    for n_c in (12, 25, 50):
+    for n_c in (7, 25, 50):
         triangle = triangle_of(n_c, 3.5)
         least = float(np.linalg.eigvalsh(triangle.problem.M.toarray())[0])
         free: list[int] = []

@@ -13,11 +13,11 @@ __version__ = "0.1.0"
 _HOME = {
     "core.errors": ("AmontonsError", "FileFormatError", "Interrupted", "InvalidInput",
                     "InvertedCells", "MissingDependency", "NotConverged", "NotWritten",
-                    "SingularOperator", "TimeUp", "UnsupportedForm"),
-    "problem.law.cones": ("Coulomb", "Tresca"),
+                    "SingularOperator", "TimeUp", "UnsupportedForm", "UnsupportedLaw"),
+    "problem.law": ("CappedCoulomb", "Cohesive", "Compliant", "Coulomb", "Mixed", "Orthotropic",
+                    "Tresca"),
     "problem.judge.measures": ("Criterion",),
-    "linear": ("AlgebraicMultigrid", "ConjugateGradient", "Direct", "GeometricMultigrid",
-               "Petsc"),
+    "linear": ("Direct", "GeometricMultigrid", "Petsc"),
     "problem.friction": ("Form", "FrictionProblem"),
     "problem.solution": ("ContactStatus", "Convergence", "FrictionSolution", "Outcome"),
     "solvers": ("AcceleratedGradient", "ActiveSet", "AlartCurnier", "Armijo", "Auto", "Batch",
@@ -40,9 +40,10 @@ _HOME = {
     "io.case": ("read_case",),
     "app.model_solution": ("ModelSolution",),
     "core.warned": ("ResultWarning",),
-    "app.api": ("all_solutions", "basins", "critical_friction", "diagram", "existence",
-                "first_order", "follow", "full_contact_friction", "multistart",
-                "p_matrix_friction", "solve", "uniqueness"),
+    "app.api": ("solve",),
+    "app.questions": ("all_solutions", "basins", "critical_friction", "diagram", "existence",
+                      "first_order", "follow", "full_contact_friction", "multistart",
+                      "p_matrix_friction", "uniqueness"),
     "analysis": ("BasinMethod", "BasinRun", "Basins", "Branch", "Claim", "ContactRates",
                  "Continuation", "CriterionFriction", "CriticalFriction", "Diagram", "Event",
                  "EventKind", "Existence", "FirstOrder", "IndexSets", "MidpointRule", "Opening",
@@ -56,6 +57,11 @@ _HOME = {
                         "Fix", "LinearElastic", "Model", "NeoHookean", "Pressure", "Rigid",
                         "Traction", "distributed"),
 }  # fmt: skip
+_GONE = {
+    "AlgebraicMultigrid": "GeometricMultigrid(levels=()), whose levels are then algebraic ones",
+    "ConjugateGradient": "GeometricMultigrid(levels=()): conjugate gradients with algebraic "
+    "levels, in a third of the time",
+}
 _MODULE = {name: module for module, names in _HOME.items() for name in names}
 
 __all__ = sorted(_MODULE)
@@ -64,6 +70,10 @@ __all__ = sorted(_MODULE)
 def __getattr__(name: str) -> Any:
     if name in _MODULE:
         return getattr(importlib.import_module(f".{_MODULE[name]}", __name__), name)
+    if name in _GONE:
+        from .core.errors import InvalidInput
+
+        raise InvalidInput(f"{name}: no longer there, use {_GONE[name]}")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

@@ -1,5 +1,6 @@
 """`amontons` and `python -m amontons` are the command line."""
 
+import os
 import signal
 import sys
 
@@ -20,4 +21,6 @@ def run() -> None:
 
 
 if __name__ == "__main__":
+    if not sys.flags.safe_path and os.path.abspath(sys.path[0]) == os.getcwd():
+        del sys.path[0]  # `python -m` adds the current folder: cases may name modules
     run()

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from amontons.app.cli import main
 
 ROOT = Path(__file__).parents[2]
-PAGES = ("README.md", "docs/tutorial.md")
+PAGES = ("README.md", "docs/tutorial.md", "docs/extending.md")
 
 
 def blocks(language):

@@ -91,13 +91,15 @@ class Faults:
                 raise OSError(self.number, os.strerror(self.number))
             if name == "write":
                 rest = (self._fitting(rest[0]),)
-            done = call(first, *rest, **named)
+            try:
+                done = call(first, *rest, **named)
+            finally:
+                if hit and self.kind is Kind.EXIT_AFTER:  # also after one that failed by itself
+                    os._exit(EXIT)
             if name == "open":
                 self._open.add(done)
             if name == "close":
                 self._open.discard(first)
-            if hit and self.kind is Kind.EXIT_AFTER:
-                os._exit(EXIT)
             return done
 
         return watched

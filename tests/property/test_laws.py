@@ -5,8 +5,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from amontons.problem.law.cones import Coulomb, Tresca
-from amontons.problem.law.one_contact import OPEN, SLIP, STICK, solve_one
+from amontons.problem.law import Coulomb, Tresca
+from amontons.problem.law.single import solve_one
+from amontons.problem.law.states import OPEN, SLIP, STICK
 
 entry = st.floats(-3, 3).map(lambda x: round(x, 9))  # squares must not underflow
 matrix = arrays(float, (3, 3), elements=entry)
@@ -38,7 +39,7 @@ def test_coulomb(root, b, mu):
 @given(matrix, vector, number)
 def test_tresca(root, b, bound):
     A = definite(root)
-    r, u, _ = solve_one(A, b, bound, tresca=True)
+    r, u, _ = solve_one(A, b, Tresca([bound]))
     rho = np.array([1 / np.linalg.norm(A, 2)])
     residual = Tresca([bound]).natural_map(r[None], u[None], rho)
     size = np.linalg.norm(r) + rho[0] * np.linalg.norm(b)

@@ -8,7 +8,7 @@ from amontons.app.api import solve_any_form
 from amontons.core.errors import UnsupportedForm
 from amontons.problem.friction import FrictionProblem
 from amontons.problem.judge.measures import Measure
-from amontons.problem.law.cones import Tresca
+from amontons.problem.law import Tresca
 from amontons.problem.settling import settle, settled
 from amontons.problem.status import ContactStatus, classify
 from amontons.solvers import METHODS

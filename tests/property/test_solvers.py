@@ -6,7 +6,7 @@ import pytest
 from amontons.core.errors import UnsupportedForm
 from amontons.mechanics.ready import gallery
 from amontons.problem.friction import Form, FrictionProblem
-from amontons.problem.law.cones import Tresca
+from amontons.problem.law import Tresca
 from amontons.problem.solution import Outcome
 from amontons.solvers import METHODS, GaussSeidel
 from amontons.solvers.contract import Iterate

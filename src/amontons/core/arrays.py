@@ -8,6 +8,7 @@ code sees them, which takes their indices on trust.
 from __future__ import annotations
 
 from numbers import Number
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,13 +17,14 @@ from scipy import sparse
 from .errors import InvalidInput, shown
 
 Array = NDArray[np.float64]
+AnyArray = TypeVar("AnyArray", bound=NDArray[Any])
 Matrix = sparse.csr_array | sparse.csc_array | Array
 LARGEST = 1e100  # entry in any unit: squares must stay finite, and 1 / LARGEST positive
 WHOLE = 2.0**53  # up to which floats hold every whole number
 WORDS = {"b": "truth values", "U": "texts", "S": "bytes", "M": "dates", "m": "lengths of time"}
 
 
-def expect_shape(name: str, found: tuple[int, ...], expected: tuple[int, ...]) -> None:
+def expect_shape(name: str, found: tuple[int, ...] | None, expected: tuple[int, ...]) -> None:
     """Raises InvalidInput where the two differ."""
     if found != expected:
         raise InvalidInput(f"{name}: expected shape {expected}, got {found}")
@@ -43,7 +45,7 @@ def real(name: str, values: object) -> Array:
         raise InvalidInput(f"{name}: expected an array of numbers ({error})") from error
 
 
-def _unmasked(name: str, values: object) -> NDArray:
+def _unmasked(name: str, values: Any) -> NDArray:
     """The data of a masked array without masked entries."""
     masked = int(np.ma.count_masked(values))
     if masked:
@@ -147,14 +149,15 @@ def sparse_matrix(name: str, matrix: Matrix) -> sparse.csc_array:
         raise InvalidInput(
             f"{name}[{row}, {column}]: expected a finite number, got {out.data[bad[0]]}"
         )
-    _squarable(name, out.data)
+    _squarable(name, np.asarray(out.data, dtype=float))
     return locked(out)
 
 
-def compressed(name: str, matrix: sparse.sparray | sparse.spmatrix) -> Matrix:
+def compressed(name: str, matrix: Any) -> Any:
     """A sparse matrix of any format by rows or columns, every index and entry checked.
 
-    The matrix itself where it is stored so: nothing is copied, nothing changed.
+    matrix: a sparse array or matrix of scipy.  The matrix itself where it is stored so:
+    nothing is copied, nothing changed.
     """
     if len(matrix.shape) != 2:
         raise InvalidInput(f"{name}: expected a matrix, got shape {matrix.shape}")
@@ -174,7 +177,7 @@ def compressed(name: str, matrix: sparse.sparray | sparse.spmatrix) -> Matrix:
         raise InvalidInput(f"{name}: not a valid sparse matrix: {error}") from error
 
 
-def _check_rows_of_lists(name: str, matrix: sparse.lil_array) -> None:
+def _check_rows_of_lists(name: str, matrix: Any) -> None:
     """Raise InvalidInput where a row of a lil matrix has not one column per value."""
     if matrix.rows.shape != matrix.data.shape or len(matrix.rows) != matrix.shape[0]:
         raise InvalidInput(f"{name}: not a valid sparse matrix: lists of other rows")
@@ -186,7 +189,7 @@ def _check_rows_of_lists(name: str, matrix: sparse.lil_array) -> None:
             )
 
 
-def _check_triplets(name: str, matrix: sparse.coo_array) -> None:
+def _check_triplets(name: str, matrix: Any) -> None:
     """Raise InvalidInput for a row or column that the matrix has not."""
     for index, size, word in zip(matrix.coords, matrix.shape, ("row", "column"), strict=True):
         if index.shape != matrix.data.shape:
@@ -194,7 +197,7 @@ def _check_triplets(name: str, matrix: sparse.coo_array) -> None:
         _check_indices(name, index, size, word)
 
 
-def _check_compressed(name: str, matrix: Matrix | sparse.bsr_array) -> None:
+def _check_compressed(name: str, matrix: Any) -> None:
     """Raise InvalidInput for rows, columns or blocks whose indices lead out of the arrays."""
     by_rows = matrix.format != "csc"
     _check_values(name, matrix.data)
@@ -243,10 +246,16 @@ def _check_indices(name: str, index: object, size: int, word: str) -> None:
         )
 
 
+def read_only(array: AnyArray) -> AnyArray:
+    """The same array, which nobody can write to."""
+    array.flags.writeable = False
+    return array
+
+
 def locked(matrix):
     """The same sparse matrix with read-only arrays, so that sharing it is safe."""
     for array in (matrix.data, matrix.indices, matrix.indptr):
-        array.flags.writeable = False
+        read_only(array)
     return matrix
 
 

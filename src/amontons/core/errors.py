@@ -1,18 +1,50 @@
-"""Exceptions that a user meets; each message names what was expected and what was found."""
+"""Exceptions that a user meets; each message names what was expected and what was found.
+
+An error may carry the address of its culprit, ("contacts", 0, "mu"), which a reader of files
+turns into the words of its format.  Nothing is ever decided by the words of a message.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
+
+Address = tuple[str | int, ...]
 
 LONGEST = 1000  # letters of a message; what a user gave may be longer than any screen
 LONGEST_VALUE = 120  # letters of one value in it
 
 
 class AmontonsError(Exception):
-    """Root of all errors raised on purpose by amontons; a message has an end, always."""
+    """Root of all errors raised on purpose by amontons; a message has an end, always.
 
-    def __init__(self, message: object = "") -> None:
-        super().__init__(clipped(str(message), LONGEST))
+    at: the address of what is wrong, () where nobody knows.  name: what messages call it in
+    front of the text, by default the address in words; "" where the text itself says it.
+    text: the message without that name, for who names the place in other words.
+    """
+
+    def __init__(self, text: object = "", at: Address = (), name: str | None = None) -> None:
+        before = dotted(at) if name is None else name
+        super().__init__(clipped(f"{before}: {text}" if before else str(text), LONGEST))
+        self.text = clipped(str(text), LONGEST)
+        self.at = at
+
+
+def dotted(at: Address) -> str:
+    """An address in words: ("contacts", 0, "mu") is contacts[0].mu."""
+    words = (f"[{part}]" if isinstance(part, int) else f".{part}" for part in at)
+    return "".join(words).removeprefix(".")
+
+
+@contextmanager
+def within(*place: str | int) -> Iterator[None]:
+    """Put a place before the address of errors that leave the block; () adds nothing."""
+    try:
+        yield
+    except AmontonsError as error:
+        error.at = (*place, *error.at)
+        raise
 
 
 def clipped(text: str, longest: int) -> str:
@@ -42,6 +74,10 @@ class NotWritten(InvalidInput):
 
 class UnsupportedForm(AmontonsError, TypeError):
     """The solver needs the other form of the problem; the message names those that fit."""
+
+
+class UnsupportedLaw(UnsupportedForm):
+    """A solver or a question is not made for the friction law; the message says for which."""
 
 
 class SingularOperator(AmontonsError, ArithmeticError):

@@ -7,7 +7,7 @@ of it.  There the signal is sent again a moment later, until it meets a better p
 
 from __future__ import annotations
 
-import _signal  # those of `signal` make enums of all numbers: 10 µs each, in every solve
+import _signal  # type: ignore  # those of `signal` make enums of all numbers: 10 µs each, in every solve
 import signal
 import sys
 import threading
@@ -55,7 +55,7 @@ class Watching:
 
 def hold() -> bool:
     """Let Ctrl-C wait until `release`; False where it is nothing to us or already watched."""
-    return _take(_again)
+    return _take(again)
 
 
 def release() -> None:
@@ -76,14 +76,14 @@ def _take(handler: Callable[[int, FrameType | None], None]) -> bool:
 def _handle(root: FrameType, number: int, frame: FrameType | None) -> None:
     if not is_busy(frame, root):
         raise KeyboardInterrupt
-    _again(number, frame)
+    again(number)
 
 
-def _again(number: int, frame: FrameType | None) -> None:
+def again(number: int, frame: FrameType | None = None) -> None:
     """Send the signal once more in a moment."""
-    again = threading.Timer(AGAIN, signal.raise_signal, (number,))
-    again.daemon = True
-    again.start()
+    timer = threading.Timer(AGAIN, signal.raise_signal, (number,))
+    timer.daemon = True
+    timer.start()
 
 
 def is_busy(frame: FrameType | None, root: FrameType | None = None) -> bool:

@@ -35,9 +35,10 @@ def check_options(part: Any) -> None:
         taken = _taken(value, hint)
         if taken is NOTHING:
             wanted = _wanted(hint, kind, name)
-            raise InvalidInput(
-                f"{name}: expected {wanted}, got {shown(value)} (field of {kind.__name__})"
-            )
+            text = f"expected {wanted}, got {shown(value)}"
+            error = InvalidInput(f"{text} (field of {kind.__name__})", (name,))
+            error.text = text  # keys of files and the command line say of which part
+            raise error
         if taken is not value:
             object.__setattr__(part, name, taken)  # frozen, and not yet shown to anybody
 

@@ -80,9 +80,8 @@ def load_start(path: str | os.PathLike[str]) -> Iterate:
 
 
 def _start_in_hdf5(path: Path, file: h5py.File) -> Iterate:
-    found = {
-        name: file[name][()] for name in ("r", "v") if isinstance(file.get(name), h5py.Dataset)
-    }
+    nodes = ((name, file.get(name)) for name in ("r", "v"))
+    found = {name: node[()] for name, node in nodes if isinstance(node, h5py.Dataset)}
     return _start_of(path, found)
 
 
@@ -168,7 +167,7 @@ def _read(
 def _state(path: Path, file: h5py.File) -> State:
     if GROUP not in file:
         raise FileFormatError(f"{path}: /{GROUP}: missing group")
-    group = file[GROUP]
+    group: Any = file[GROUP]
     values = {name: np.asarray(group[name][()], dtype=float) for name in ARRAYS}
     for name, dimensions in ARRAYS.items():
         if values[name].ndim != dimensions:
@@ -186,7 +185,7 @@ def _checkpoint(path: Path, file: h5py.File) -> Checkpoint:
             f"{path}: /{RUN}: missing group: this is a state alone, without the table and the "
             "case of its run; evolve(..., start=load_state(...)) goes on from it"
         )
-    group = file[RUN]
+    group: Any = file[RUN]
     case = group["case"][()].tobytes().decode()
     found = Checkpoint(state, json.loads(case), group["table"][()], group["pictures"][()])
     if group["digest"][()].tobytes() != _digest(found, case):
@@ -221,8 +220,9 @@ def export_fclib(
     for step in steps:
         wanted = chosen is None or any(step.state.index in part for part in chosen)
         if wanted and step.problem.contacts:
+            problem: Any = step.problem  # another form is refused
             write_fclib(
-                step.problem, folder / f"{name}-{step.state.index:05d}.hdf5",
+                problem, folder / f"{name}-{step.state.index:05d}.hdf5",
                 solution=step.solution, title=f"{step.problem.name or name}, t = {step.time:g}",
             )  # fmt: skip
         yield step
@@ -241,7 +241,8 @@ def steps_of(text: str) -> list[range]:
         last, every = last or first, every or (1 if match and match[3] is None else 0)
         if not 1 <= first <= last or every < 1:
             raise InvalidInput(
-                f"steps: expected 7, 1-40 or 50-500:10, with commas between them, got {word!r}"
+                f"expected 7, 1-40 or 50-500:10, with commas between them, got {word!r}",
+                ("steps",),
             )
         found.append(range(first, last + 1, every))
     return found

@@ -8,7 +8,8 @@ import os
 import platform
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from enum import Enum
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 SCHEMA = "amontons/solution/1"
-LIBRARIES = ("amontons", "numpy", "scipy", "numba", "ngsolve")
+LIBRARIES = ("amontons", "numpy", "scipy", "numba", "netgen-mesher")  # Netgen: CAD
 MOST_SETS = 12  # changes of sets that a summary shows; solution.json has all
 FIGURES = (".png", ".svg", ".pdf")
 
@@ -47,7 +48,6 @@ class Output:
     title: str = ""
     method: str = ""  # as on the command line; empty: the name of the solver's class
     assemble_seconds: float = 0.0
-    assemble_compiling: float = 0.0  # seconds of compiling that are in no other number
     from_fclib: bool = False
     uniqueness: dict[str, Any] | None = None  # what is known about other solutions
     warnings: tuple[ResultWarning, ...] = ()
@@ -137,7 +137,9 @@ def summary(output: Output) -> dict[str, Any]:
         "outcome": record.outcome.name.lower(),
         "advice": record.advice,
         "detail": record.detail,
-        "method": output.method or _method_name(record.solver),
+        "stopped_by": _word(record.stopped_by),
+        "obstruction": _word(record.obstruction),
+        "method": output.method or method_name(record.solver),
         "error": record.error,
         "contact_error": record.contact_error,
         "weakest": record.weakest,
@@ -153,7 +155,7 @@ def summary(output: Output) -> dict[str, Any]:
             "setup": setup,  # factorisation and all else before the first judgement
             "solve": record.seconds - setup,
             "total": output.assemble_seconds + record.seconds,  # without compiling
-            "compiling": output.assemble_compiling + record.compiling,
+            "compiling": record.compiling,
         },
         "dimension": problem.dimension,
         "unknowns": problem.unknowns,
@@ -197,7 +199,7 @@ def _sets_in_words(record: Convergence) -> str:
     )
 
 
-def _method_name(solver: str) -> str:
+def method_name(solver: str) -> str:
     """Name on the command line of a solver's class, the class itself if it has none."""
     return next((name for name, kind in METHODS.items() if kind.__name__ == solver), solver)
 
@@ -224,6 +226,10 @@ def finite(value: Any) -> Any:
     return value
 
 
+def _word(member: Enum | None) -> str | None:
+    return None if member is None else member.name.lower()
+
+
 def to_json(data: Any) -> str:
     """JSON text, strict: no NaN."""
     return json.dumps(finite(data), indent=2, allow_nan=False) + "\n"
@@ -236,10 +242,13 @@ def write_json(output: Output, path: Path) -> None:
 
 def describe(output: Output) -> str:
     """What a person wants to know, in a few lines."""
-    text = str(output.solution)
+    text, record = output.solution.headline, output.solution.convergence
     if output.model is not None and not output.solution.problem.name:
         text = f"{output.title or 'model'}: {text.partition(': ')[2]}"
-    lines = [text]
+    if output.method:  # on the command line, methods have other names
+        solver, detail = method_name(record.solver), method_name(record.detail)
+        record = replace(record, solver=solver, detail=detail)
+    lines = [text, str(record)]
     if output.solution.convergence.stamp:
         lines.append("NOT CONVERGED: what follows is no solution")
     sets = _sets_in_words(output.solution.convergence)
@@ -277,7 +286,7 @@ def write_h5(output: Output, path: Path) -> None:
 
     def fill(file: File) -> None:
         if output.from_fclib:
-            put_fclib(file, found.problem, solution=found)
+            put_fclib(file, found.problem, solution=found)  # type: ignore[arg-type]
         put_arrays(file, {k: a for k, a in arrays.items() if a is not None}, notes)
 
     put(path, hdf5_bytes(fill))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,8 +61,8 @@ def _stress(body: Body, moved: Array) -> Array:
     """Stress (cells, 3, 3) at displacements (nodes, d); 0 in a rigid body, nobody knows it."""
     if isinstance(body.material, Rigid):
         return np.zeros((body.mesh.cell_count, 3, 3))
-    large = is_hyperelastic(body.material)
-    return (cauchy_stress if large else cell_stress)(body.mesh, body.material, moved)
+    stress: Any = cauchy_stress if is_hyperelastic(body.material) else cell_stress
+    return stress(body.mesh, body.material, moved)
 
 
 def _contact_fields(

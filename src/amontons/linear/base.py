@@ -17,9 +17,9 @@ Array = NDArray[np.float64]
 def check_stopping(tolerance: float, max_iterations: int) -> None:
     """Raise InvalidInput for options of an iterative solver that can not be meant."""
     if not 0 < tolerance < 1:
-        raise InvalidInput(f"tolerance: expected between 0 and 1, got {tolerance}")
+        raise InvalidInput(f"expected between 0 and 1, got {tolerance}", ("tolerance",))
     if max_iterations < 1:
-        raise InvalidInput(f"max_iterations: expected at least 1, got {max_iterations}")
+        raise InvalidInput(f"expected at least 1, got {max_iterations}", ("max_iterations",))
 
 
 def by_columns(solve: Callable[[Array], Array], b: Array) -> Array:

@@ -68,7 +68,8 @@ class BlockRows:
 def block_rows(W: sparse.csr_array | Array, d: int) -> BlockRows:
     """Block rows of a Delassus matrix W, (nc d, nc d), dense or sparse; d = 2 or 3."""
     nc = W.shape[0] // d
-    rows, columns, tiles = _sparse_tiles(W, d) if sparse.issparse(W) else _dense_tiles(W, nc, d)
+    dense = isinstance(W, np.ndarray)
+    rows, columns, tiles = _dense_tiles(W, nc, d) if dense else _sparse_tiles(W, d)
     absent = np.setdiff1d(np.arange(nc), rows[rows == columns])
     rows = np.concatenate([rows, absent])
     columns = np.concatenate([columns, absent])
@@ -125,7 +126,7 @@ def _sparse_tiles(W: sparse.csr_array, d: int) -> tuple[NDArray, NDArray, Array]
     """Block row, block column and values (k, d, d) of the stored blocks."""
     blocks = sparse.csr_array(W).tobsr((d, d))
     rows = np.repeat(np.arange(len(blocks.indptr) - 1), np.diff(blocks.indptr))
-    return rows, blocks.indices.astype(np.int64), blocks.data
+    return rows, blocks.indices.astype(np.int64), np.asarray(blocks.data, dtype=float)
 
 
 def _dense_tiles(W: Array, nc: int, d: int) -> tuple[NDArray, NDArray, Array]:
@@ -151,3 +152,14 @@ def spatial(x: Array) -> Array:
     out = np.zeros((len(x), 3))
     out[:, : x.shape[1]] = x
     return out
+
+
+def kernel_rows(r: Array) -> Array:
+    """r as kernels take it, (nc, 3); the same array where it is so already."""
+    return r if r.shape[1] == 3 and r.flags.c_contiguous else spatial(r)
+
+
+def inverse_norms(blocks: Array) -> Array:
+    """1 / |A|_2 of blocks A, (nc, d, d); 0 where A is 0."""
+    size = np.linalg.norm(blocks, 2, axis=(1, 2))
+    return np.where(size > 0, 1 / np.where(size > 0, size, 1.0), 0.0)

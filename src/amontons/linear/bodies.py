@@ -37,9 +37,12 @@ class Bodies:
     matrices: list[sparse.csc_array]
 
     @classmethod
-    def of(cls, matrix: sparse.csc_array) -> Bodies:
-        """The bodies of a square matrix."""
-        count, label = connected_components(matrix, directed=False)
+    def of(cls, matrix: sparse.csc_array, body: NDArray[np.integer] | None = None) -> Bodies:
+        """The bodies of a square matrix (n, n); body (n,): their numbers, if known."""
+        if body is None:
+            count, label = connected_components(matrix, directed=False)
+        else:
+            count, label = _by_first(body)
         if count == 1:
             return cls([np.arange(matrix.shape[0])[None]], [matrix])
         order = np.argsort(label, kind="stable")
@@ -115,6 +118,14 @@ class BodyFactor:
     def solve(self, b: Array) -> Array:
         """The solution x of A x = b, shape of b."""
         return self.apply(b)
+
+
+def _by_first(body: NDArray[np.integer]) -> tuple[int, Index]:
+    """How many different numbers (n,) there are, and these renumbered as they first appear."""
+    _, first, label = np.unique(body, return_index=True, return_inverse=True)
+    rank = np.empty(len(first), dtype=np.int64)
+    rank[np.argsort(first)] = np.arange(len(first))
+    return len(first), rank[label]
 
 
 def _equal(A: sparse.csc_array, B: sparse.csc_array) -> bool:

@@ -102,7 +102,8 @@ class Direct:
     def __post_init__(self) -> None:
         check_options(self)
         if self.threads < 0:
-            raise InvalidInput(f"threads: expected 0 (automatic) or more, got {self.threads}")
+            text = f"expected 0 (automatic) or more, got {self.threads}"
+            raise InvalidInput(text, ("threads",))
         if self.backend is not None and not self.backend.installed:
             raise MissingDependency(
                 f"linear solver {self.backend.name}: package {self.backend.value!r} is not "
@@ -201,7 +202,7 @@ def checked(matrix: sparse.csc_array, solve: Solve) -> Solve:
     """
     x = np.cos(np.arange(matrix.shape[0]))
     b = matrix @ x
-    scale = max((np.abs(matrix) @ np.abs(x)).max(initial=0.0), np.finfo(float).tiny)
+    scale = max((abs(matrix) @ np.abs(x)).max(initial=0.0), np.finfo(float).tiny)
 
     def residual_of(found: Array) -> float:
         return float(np.abs(matrix @ found - b).max(initial=0.0) / scale)
@@ -317,7 +318,7 @@ def _cancelled_by_ctrl_c(run: Callable[[], Any], cancel: Callable[[], None]) -> 
 
 
 def _pardiso(matrix: sparse.csc_array, threads: int) -> tuple[Solve, float | None]:
-    import pypardiso
+    import pypardiso  # pyright: ignore[reportMissingImports]
 
     solver = pypardiso.PyPardisoSolver()
     # without this every further solver searches the disk for the library, a tenth of a second
@@ -334,7 +335,7 @@ def _mumps(matrix: sparse.csc_array, threads: int) -> tuple[Solve, float | None]
     ordering = "amd" if matrix.shape[0] <= QUICK_ORDER else "auto"
     context.factor(sparse.csc_matrix(matrix), ordering=ordering)
     flops = float(context.factor_stats.flops)
-    return lambda b: context.solve(np.array(b, dtype=float)), flops
+    return lambda b: np.asarray(context.solve(np.array(b, dtype=float))), flops
 
 
 def _superlu(matrix: sparse.csc_array, threads: int) -> tuple[Solve, float | None]:

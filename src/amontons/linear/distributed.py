@@ -200,7 +200,8 @@ class DistributedMatrix:
     @property
     def shape(self) -> tuple[int, int]:
         """(n, n)."""
-        return (len(self.free),) * 2
+        n = len(self.free)
+        return n, n
 
     def __matmul__(self, v: Array) -> Array:
         whole = np.zeros(self.share.size)

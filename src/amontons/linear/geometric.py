@@ -36,7 +36,7 @@ class GeometricMultigrid:
         check_options(self)
         check_stopping(self.tolerance, self.max_iterations)
         if self.dimension not in (2, 3):
-            raise InvalidInput(f"dimension: expected 2 or 3, got {self.dimension}")
+            raise InvalidInput(f"expected 2 or 3, got {self.dimension}", ("dimension",))
 
     def factor(
         self, matrix: sparse.csc_array, near_nullspace: Array | None = None
@@ -56,15 +56,22 @@ class GeometricMultigrid:
 
 
 def prepared(
-    matrix: sparse.csc_array, levels: Levels, modes: Array | None, dimension: int
+    matrix: sparse.csc_array,
+    levels: Levels,
+    modes: Array | None,
+    dimension: int,
+    *,
+    component: NDArray[np.int64] | None = None,
 ) -> Hierarchy | None:
     """All levels of a matrix (n, n); None where its unknowns do not come in nodes.
 
-    modes (n, k): rigid modes, translations first; without them n is a multiple of dimension.
+    component (n,): directions of unknowns, node by node; else guessed of rigid modes (n, k),
+    translations first, or of an n that is a multiple of dimension.
     """
     if isinstance(matrix, GridMatrix):
         return matrix.hierarchy
-    component = components(modes, matrix.shape[0], dimension)
+    if component is None:
+        component = components(modes, matrix.shape[0], dimension)
     if component is None:
         return None
     nodes = Nodes.of(component)
@@ -88,7 +95,6 @@ class MultigridFactor:
 
     def _solve_one(self, b: Array) -> Array:
         most = self.options.max_iterations
-        self.hierarchy.reclaim()
         x, count = self.hierarchy.solve(0, self.nodes.spread(b), self.options.tolerance, most)
         self.iterations += min(count, most)
         if count > most or not np.isfinite(x).all():

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..core.compiled import njit
 from .node_blocks import NodeBlocks, block_inverse
+from .work import Work
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -44,6 +45,7 @@ class GridBlocks:
         diagonal = self.stencils[:, :, :, 1, 1, 1].reshape(27, 3, 3)
         self.inverses = block_inverse(diagonal, np.abs(diagonal).max(axis=(1, 2)))
         self._terms = _terms(self.stencils)
+        self._work = Work(self.nodes)
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -72,14 +74,14 @@ class GridBlocks:
     # ------------------------------------------------------------------ smoothing
     def smooth(self, b: Array, x: Array, held: NDArray[np.bool_], backward: bool) -> None:
         """Two Chebyshev steps on A x = b that leave the nodes held as they are."""
-        d, other = self._work
+        d, other = self._work.x, self._work.b
         first, keep, second = self._chebyshev
         self._pass(x, b, d, other, 0.0, first, 2, held)
         self._pass(other, b, d, x, keep, second, 2, held)
 
     def first_smooth(self, b: Array, x: Array, r: Array) -> None:
         """The same from x = 0, and r = b - A x."""
-        d, other = self._work
+        d, other = self._work.x, self._work.b
         first, keep, second = self._chebyshev
         _scaled(self.shape, self.inverses, self.used, b, d, first)
         other[:] = d
@@ -89,10 +91,6 @@ class GridBlocks:
     @cached_property
     def _free(self) -> NDArray[np.bool_]:
         return np.zeros(self.nodes, dtype=bool)
-
-    @cached_property
-    def _work(self) -> tuple[Array, Array]:
-        return np.zeros((self.nodes, 3)), np.zeros((self.nodes, 3))
 
     @cached_property
     def _chebyshev(self) -> tuple[float, float, float]:
@@ -138,7 +136,7 @@ class GridBlocks:
         there = np.stack([z, y, x], axis=1)[:, None] + offsets
         inside = ((there >= 0) & (there < self.shape)).all(axis=2)
         there = there[inside]
-        indices = np.ravel_multi_index(tuple(there.T), self.shape)
+        indices = np.asarray(np.ravel_multi_index(tuple(there.T), self.shape), dtype=np.int64)
         indptr = np.concatenate([[0], np.cumsum(inside.sum(axis=1))])
         data = np.ascontiguousarray(whole[inside])
         owner = np.repeat(node, np.diff(indptr))

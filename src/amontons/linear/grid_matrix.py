@@ -39,7 +39,8 @@ class GridMatrix:
     @property
     def shape(self) -> tuple[int, int]:
         """(n, n)."""
-        return (len(self.nodes.place),) * 2
+        n = len(self.nodes.place)
+        return n, n
 
     def __matmul__(self, v: Array) -> Array:
         out = np.empty((self.nodes.count, 3))

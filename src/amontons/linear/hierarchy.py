@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,7 +13,9 @@ from scipy.sparse import linalg as sparse_linalg
 
 from .grid import GridBlocks
 from .node_blocks import DEAD, NodeBlocks
+from .patched import PatchedBlocks, Rows
 from .transfer import Transfer
+from .work import Work
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -100,14 +103,19 @@ def transfers(
 class Level:
     """One level: its matrix and the transfer to the next coarser one (None: the coarsest)."""
 
-    A: NodeBlocks | GridBlocks
+    A: NodeBlocks | GridBlocks | PatchedBlocks
     P: Transfer | None = None
-    x: Array = field(init=False)
-    b: Array = field(init=False)
-    r: Array = field(init=False)
+    work: Work = field(init=False)
+    free: NDArray[np.bool_] = field(init=False)  # no node is held
 
     def __post_init__(self) -> None:
-        self.x, self.b, self.r = (np.zeros((self.A.nodes, 3)) for _ in range(3))
+        self.work, self.free = Work(self.A.nodes), np.zeros(self.A.nodes, dtype=bool)
+
+    def patched(self, A: PatchedBlocks) -> Level:
+        """The same with some rows of a solve's own."""
+        out = copy(self)
+        out.A = A
+        return out
 
 
 @dataclass(eq=False)
@@ -115,15 +123,13 @@ class Hierarchy:
     """All levels, finest first, and the inverse of the coarsest matrix.
 
     geometric: number of levels that come from the given prolongations, the finest included.
-    owner may change coarse matrices for its purpose; undo then makes them those of A again.
+    Nothing of it changes after it was made, so any number of solves share it.
     """
 
     levels: list[Level]
     geometric: int
     nodes: Nodes
     coarse_inverse: Array = field(init=False)
-    owner: object = None
-    undo: Callable[[], None] | None = None
     coarse_size: Array | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
@@ -152,35 +158,39 @@ class Hierarchy:
         """The same for transfers between nodes."""
         levels = [Level(A)]
         for P in given:
-            finest = levels[-1].A
-            if finest.nodes <= 8:
+            if A.nodes <= 8:
                 break
             levels[-1].P = P
-            if isinstance(finest, GridBlocks):
-                levels.append(Level(finest.coarse(P.coarse_used)))
-            else:
-                levels.append(Level(P.galerkin(finest)))
+            A = A.coarse(P.coarse_used) if isinstance(A, GridBlocks) else P.galerkin(A)
+            levels.append(Level(A))
         geometric = len(levels)
-        if levels[-1].A.nodes > COARSEST:
-            candidates = _coarse_modes(levels, nodes, modes)
-            for P in algebraic(levels[-1].A, candidates):
+        if A.nodes > COARSEST:
+            assert isinstance(A, NodeBlocks)
+            for P in algebraic(A, _coarse_modes(levels, nodes, modes)):
                 levels[-1].P = P
-                levels.append(Level(P.galerkin(levels[-1].A)))
+                A = P.galerkin(A)
+                levels.append(Level(A))
         return cls(levels, geometric, nodes)
 
     def invert_coarsest(self) -> None:
         """The inverse of the coarsest matrix, a pseudo-inverse where it is singular."""
         A = self.levels[-1].A
-        diagonal = A.data[A.diagonal()]
+        A = A.merged() if isinstance(A, PatchedBlocks) else A
+        diagonal = A.diagonal_blocks
         if self.coarse_size is None:
-            self.coarse_size = np.abs(diagonal).max(axis=(1, 2), initial=0.0)
+            self.coarse_size = np.asarray(np.abs(diagonal).max(axis=(1, 2), initial=0.0))
         self.coarse_inverse = inverse_at_rest(A.dense(), diagonal, self.coarse_size)
 
-    def reclaim(self) -> None:
-        """Take the coarse matrices back from their owner, as those of A."""
-        if self.undo is not None:
-            self.undo()
-        self.owner = self.undo = None
+    def patched(self, rows: Sequence[Rows]) -> Hierarchy:
+        """The same with rows of a solve's own on every coarse level."""
+        out = copy(self)
+        coarse = zip(self.levels[1:], rows, strict=True)
+        own = [
+            level.patched(PatchedBlocks(level.A, own))  # type: ignore[arg-type]  # stored ones
+            for level, own in coarse
+        ]
+        out.levels = [self.levels[0], *own]
+        return out
 
     def solve(self, k: int, b: Array, tolerance: float, most: int) -> tuple[Array, int]:
         """(x, iterations) of CG on level k for A x = b with one cycle as preconditioner.
@@ -206,7 +216,6 @@ class Hierarchy:
 
     def estimate(self, b: Array, size: int) -> Array:
         """x of A x = b, (nodes, 3), from the first level of at most `size` nodes alone."""
-        self.reclaim()
         k, loads = 0, [b]
         while self.levels[k].A.nodes > size and self.levels[k].P is not None:
             coarse = np.zeros((self.levels[k + 1].A.nodes, 3))
@@ -227,11 +236,12 @@ class Hierarchy:
             x[:] = (self.coarse_inverse @ b.reshape(-1)).reshape(-1, 3)
             return
         A, coarse = level.A, self.levels[k + 1]
-        A.first_smooth(b, x, level.r)
-        level.P.restrict(level.r, coarse.b)
-        self.cycle(k + 1, coarse.b, coarse.x)
-        level.P.add(coarse.x, x)
-        A.smooth(b, x, _nothing(A.nodes), True)
+        r, below = level.work.r, coarse.work
+        A.first_smooth(b, x, r)
+        level.P.restrict(r, below.b)
+        self.cycle(k + 1, below.b, below.x)
+        level.P.add(below.x, x)
+        A.smooth(b, x, level.free, True)
 
 
 def inverse_at_rest(A: Array, diagonal: Array, size: Array) -> Array:
@@ -248,21 +258,11 @@ def inverse_at_rest(A: Array, diagonal: Array, size: Array) -> Array:
     whole[k, :, k, :] += size[:, None, None] * ((left * dead[:, None, :]) @ right)
     whole = whole.reshape(A.shape)
     try:
-        out = np.linalg.inv(whole)
+        out: Array = np.linalg.inv(whole).astype(float, copy=False)
     except np.linalg.LinAlgError:
-        return np.linalg.pinv(A, rcond=SMALL)
+        return _pseudo_inverse(A)
     regular = np.abs(out).max() * np.abs(whole).max() * SMALL < 1
-    return out if regular else np.linalg.pinv(A, rcond=SMALL)
-
-
-_FREE: dict[int, NDArray[np.bool_]] = {}
-
-
-def _nothing(n: int) -> NDArray[np.bool_]:
-    """A mask that holds no node, kept by size."""
-    if n not in _FREE:
-        _FREE[n] = np.zeros(n, dtype=bool)
-    return _FREE[n]
+    return out if regular else _pseudo_inverse(A)
 
 
 def _coarse_modes(levels: list[Level], nodes: Nodes, modes: Array | None) -> Array:
@@ -278,6 +278,10 @@ def _coarse_modes(levels: list[Level], nodes: Nodes, modes: Array | None) -> Arr
         normal = sparse.csc_array(P.T @ P + 1e-14 * sparse.eye_array(P.shape[1]))
         values = sparse_linalg.splu(normal).solve(P.T @ values)
     return values
+
+
+def _pseudo_inverse(A: Array) -> Array:
+    return np.linalg.pinv(A, rcond=SMALL).astype(float, copy=False)
 
 
 def algebraic(A: NodeBlocks, modes: Array) -> list[Transfer]:

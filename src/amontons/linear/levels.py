@@ -73,12 +73,14 @@ def free_levels(
 
 def _nodal(bodies: Sequence[Levels], sizes: list[int], depth: int) -> sparse.csr_array:
     """Level `depth` of all bodies; sizes: their numbers of nodes there, then on the next."""
-    parts = [
-        levels[depth] if depth < len(levels) else sparse.eye_array(size, format="csr")
+    parts: list[sparse.csr_array] = [
+        levels[depth] if depth < len(levels) else sparse.csr_array(sparse.eye_array(size))
         for levels, size in zip(bodies, sizes, strict=True)
     ]
     sizes[:] = [part.shape[1] for part in parts]
-    return parts[0] if len(parts) == 1 else sparse.block_diag(parts, format="csr")
+    if len(parts) == 1:
+        return parts[0]
+    return sparse.csr_array(sparse.block_diag(parts, format="csr"))
 
 
 def continued(

@@ -94,7 +94,8 @@ class Fronts:
         where nothing couples.  Raises SingularOperator when a pivot block can not be inverted.
         """
         waiting: list[list[tuple[int, Array]]] = [[] for _ in self.order]
-        pivots, right, left = ([None] * len(self.order) for _ in range(3))
+        pivots: list[NDArray] = [np.empty(0)] * len(self.order)
+        right, left = pivots.copy(), pivots.copy()
         for g in self.order:
             border, k = self.borders[g], int(self.sizes[g])
             whole = np.concatenate([self.rows[g], self.border_rows[g]])

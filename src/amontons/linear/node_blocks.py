@@ -18,6 +18,7 @@ from ..core.compiled import njit
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+Integers = NDArray[np.integer]
 DEAD = 1e-10  # directions of a diagonal block weaker than this, relative to their size, rest
 
 
@@ -34,7 +35,7 @@ class NodeBlocks:
     inverse: Array
 
     @classmethod
-    def of(cls, indptr: Index, indices: Index, data: Array) -> NodeBlocks:
+    def of(cls, indptr: Integers, indices: Integers, data: Array) -> NodeBlocks:
         """With the diagonal blocks inverted."""
         matrix = cls(
             indptr.astype(np.int32), indices.astype(np.int32), data, np.empty((0, 3, 3))
@@ -60,12 +61,17 @@ class NodeBlocks:
             shape = (3 * nodes, 3 * nodes)
             tiles = sparse.coo_array((values, (rows, columns)), shape=shape).tobsr((3, 3))
         tiles = with_diagonal(tiles)
-        return cls.of(tiles.indptr, tiles.indices, tiles.data)
+        return cls.of(tiles.indptr, tiles.indices, np.asarray(tiles.data, dtype=float))
 
     @property
     def nodes(self) -> int:
         """Number of block rows."""
         return len(self.indptr) - 1
+
+    @property
+    def diagonal_blocks(self) -> Array:
+        """Diagonal blocks, (nodes, 3, 3)."""
+        return self.data[self.diagonal()]
 
     def diagonal(self) -> Index:
         """Places of the diagonal blocks in data, (nodes,)."""

@@ -103,7 +103,7 @@ def check_converged(ksp: Any, options: Petsc) -> None:
 def mpi() -> Any:
     """The module mpi4py.MPI."""
     try:
-        from mpi4py import MPI
+        from mpi4py import MPI  # pyright: ignore[reportMissingImports]
     except (ImportError, RuntimeError) as error:  # RuntimeError: no MPI library
         raise _missing(error) from error
     return MPI
@@ -113,10 +113,10 @@ def petsc() -> Any:
     """The module petsc4py.PETSc, after a check that it lives in the same MPI as mpi4py."""
     MPI = mpi()
     try:
-        import petsc4py
+        import petsc4py  # pyright: ignore[reportMissingImports]
 
         petsc4py.init([])
-        from petsc4py import PETSc
+        from petsc4py import PETSc  # pyright: ignore[reportMissingImports]
     except ImportError as error:
         raise _missing(error) from error
     if PETSc.COMM_WORLD.getSize() != MPI.COMM_WORLD.Get_size():

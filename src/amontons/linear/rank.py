@@ -109,7 +109,7 @@ def _peeled(A: sparse.csr_array) -> tuple[int, sparse.csr_array]:
 
 def _components(A: sparse.csr_array) -> list[tuple[Index, Index]]:
     """Rows and columns of the parts of A that do not touch, those without entries left out."""
-    n, m = A.shape
+    n = A.shape[0]
     graph = sparse.block_array([[None, A], [A.T, None]], format="csr") if A.nnz else None
     if graph is None:
         return []
@@ -125,7 +125,7 @@ def _components(A: sparse.csr_array) -> list[tuple[Index, Index]]:
 
 def _rank_of_part(A: sparse.csr_array, deadline: Deadline) -> tuple[int, int]:
     """(rank, least rank) of one part."""
-    n, m = A.shape
+    n, m = A.shape[0], A.shape[1]
     small, large = min(n, m), max(n, m)
     if small <= DENSE:
         deadline.pay(2.0 * small * small * large + 10.0 * small**3)

@@ -40,7 +40,9 @@ def block_diagonal_inverse(matrix: sparse.csc_array) -> sparse.csc_array | None:
     return sparse.csc_array((data, (rows, columns)), shape=(n, n))
 
 
-def diagonal_blocks_inverse(matrix: sparse.csc_array, size: int) -> sparse.bsr_array:
+def diagonal_blocks_inverse(
+    matrix: sparse.csc_array | sparse.csr_array, size: int
+) -> sparse.bsr_array:
     """Inverse of the size x size diagonal blocks, pseudo-inverse where one is singular."""
     n = matrix.shape[0]
     count = n // size

@@ -51,7 +51,7 @@ class Transfer:
             tiles.indptr.astype(np.int32),
             tiles.indices.astype(np.int32),
             weights if scalar else np.empty(0),
-            empty if scalar else np.ascontiguousarray(tiles.data),
+            empty if scalar else np.ascontiguousarray(tiles.data, dtype=float),
             np.asarray(idle, dtype=np.int64),
             np.asarray(coarse_idle, dtype=np.int64),
             tiles.shape[1] // 3,
@@ -63,7 +63,7 @@ class Transfer:
         return cls(
             level.indptr.astype(np.int32, copy=False),
             level.indices.astype(np.int32, copy=False),
-            level.data,
+            np.asarray(level.data, dtype=float),
             np.empty((0, 3, 3)),
             idle,
             coarse_idle,
@@ -93,7 +93,7 @@ class Transfer:
     def matrix(self) -> sparse.csr_array:
         """As a matrix of scalars, (3 fine, 3 coarse)."""
         if not len(self.blocks):
-            return sparse.kron(self.scalar(), sparse.eye_array(3), format="csr")
+            return sparse.csr_array(sparse.kron(self.scalar(), sparse.eye_array(3)))
         shape = (3 * self.fine, 3 * self.coarse)
         return sparse.bsr_array((self.blocks, self.indices, self.indptr), shape=shape).tocsr()
 
@@ -137,7 +137,7 @@ def _galerkin_blocks(P: Transfer, A: NodeBlocks) -> NodeBlocks:
     matrix = sparse.bsr_array((A.data, A.indices, A.indptr), shape=(3 * A.nodes, 3 * A.nodes))
     coarse = (tiles.T.tobsr((3, 3)) @ (matrix @ tiles)).tobsr((3, 3))
     coarse = with_diagonal(coarse)
-    data = coarse.data
+    data = np.asarray(coarse.data, dtype=float)
     _set_idle(coarse.indptr, coarse.indices, data, _mask(P.coarse_idle, P.coarse))
     return NodeBlocks.of(coarse.indptr, coarse.indices, data)
 

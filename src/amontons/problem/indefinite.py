@@ -13,14 +13,19 @@ may still be there.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import eigh_tridiagonal
 
-from .friction import Form, FrictionProblem
+from ..core.arrays import Matrix
 from .judge.measures import Measure
+from .solution import Obstruction
+
+if TYPE_CHECKING:
+    from .equations import Equations
 
 Array = NDArray[np.float64]
 ROUNDING = 1e-8  # negative values of this size, relative to the matrix or block, are none
@@ -56,7 +61,7 @@ class NegativeDirection:
         )
 
 
-def negative_direction(problem: FrictionProblem) -> NegativeDirection | None:
+def negative_direction(problem: Equations) -> NegativeDirection | None:
     """The direction in which W, or M of the global form, is negative; None if none was found.
 
     Takes some products with the matrix; None also where that would take long.
@@ -64,7 +69,7 @@ def negative_direction(problem: FrictionProblem) -> NegativeDirection | None:
     if problem.measure is Measure.EXACT:
         local = problem.condensed()
         found = negative_contact(local) or _of_whole(local)
-        if found is not None or problem.form is Form.DELASSUS:
+        if found is not None or not problem.has_v:
             return found
     M = problem.M
     if not sparse.issparse(M) or M.nnz > ENTRIES:
@@ -76,7 +81,7 @@ def negative_direction(problem: FrictionProblem) -> NegativeDirection | None:
     return _found("M", sparse.csr_array(M), np.arange(M.shape[0]))
 
 
-def negative_contact(problem: FrictionProblem) -> NegativeDirection | None:
+def negative_contact(problem: Equations) -> NegativeDirection | None:
     """The same of the contacts alone, the blocks on the diagonal of W (Delassus form)."""
     d = problem.dimension
     blocks = problem.blocks.diagonal_blocks[:, :d, :d]
@@ -92,48 +97,43 @@ def negative_contact(problem: FrictionProblem) -> NegativeDirection | None:
     return NegativeDirection("W", float(values[at, 0]), (at,), tuple(map(float, vector)))
 
 
-def gains_energy(problem: object) -> bool:
+def gains_energy(problem: Equations) -> bool:
     """True where a contact alone gains energy by its reactions: methods go round there.
 
     Looks at problems whose W is there to judge, and at no others.
     """
-    if not isinstance(problem, FrictionProblem) or problem.measure is not Measure.EXACT:
+    if problem.measure is not Measure.EXACT:
         return False
     return negative_contact(problem.condensed()) is not None
 
 
-def with_obstruction(problem: object, u: Array, detail: str) -> str:
-    """The detail of a failure, with what in the problem itself may be the reason.
+def obstruction(problem: Equations, u: Array) -> tuple[Obstruction | None, str]:
+    """What in the problem itself may be the reason of a failure, and the same in words.
 
     u (nc, d): velocities of the best state that is known.
     """
-    if not isinstance(problem, FrictionProblem):
-        return detail
-    return "; ".join(text for text in (detail, _obstruction(problem, u)) if text)
-
-
-def _obstruction(problem: FrictionProblem, u: Array) -> str:
     fixed = np.flatnonzero((problem.rho == 0) & (u[:, 0] < 0))
     if fixed.size:
         at = int(fixed[u[fixed, 0].argmin()])
-        return (
+        return Obstruction.UNREACTING, (
             f"contact {at} can not react, its own block of W is 0, and closes with "
             f"u_N = {u[at, 0]:.3g}"
         )
     found = negative_direction(problem)
-    return "" if found is None else str(found)
+    return (None, "") if found is None else (Obstruction.INDEFINITE, str(found))
 
 
-def _of_whole(problem: FrictionProblem) -> NegativeDirection | None:
+def _of_whole(problem: Equations) -> NegativeDirection | None:
     W = problem.W
-    entries = W.nnz if sparse.issparse(W) else W.size  # type: ignore[union-attr]
+    assert W is not None
+    entries = W.nnz if sparse.issparse(W) else W.size
     if entries > ENTRIES:
         return None
     m = problem.contacts * problem.dimension
     return _found("W", W, np.arange(m) // problem.dimension)
 
 
-def _found(name: str, A: Array | sparse.csr_array, owner: NDArray) -> NegativeDirection | None:
+def _found(name: str, A: Matrix, owner: NDArray) -> NegativeDirection | None:
     """From the Ritz vector of the smallest Ritz value of the symmetric part of A (m, m)."""
     m = A.shape[0]
     if not m:

@@ -1,9 +1,8 @@
 """What load and friction do not change: M and H, and what is prepared of them, each once.
 
 Variants of a problem (another load, other friction, the steps of an evolution) hold the same
-matrices.  What is made of them, a factor of M above all, stands in a dictionary that all
-variants share, together with the matrices it was made of: where a variant has another M or H,
-it is made again.
+matrices.  What is made of them, a factor of M above all, all variants share (`Prepared`): where
+a variant has another M or H, it is made again.
 
 W = H^T M^-1 H is formed here too, and it is decided when that is the best to solve with.
 """
@@ -13,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,21 +20,24 @@ from scipy import sparse
 
 from ..core.clock import NEVER, Deadline
 from ..core.errors import InvalidInput
-from ..linear import ConjugateGradient, Direct, Factor, GeometricMultigrid, LinearSolver
+from ..core.prepared import Prepared
+from ..linear import Direct, Factor, GeometricMultigrid
+from ..linear.base import stored
 from ..linear.blocks import BlockRows
 from ..linear.bodies import Bodies, BodyFactor
 from ..linear.dense import DENSE_LIMIT
 from ..linear.distributed import DistributedMatrix
-from ..linear.geometric import prepared
+from ..linear.geometric import MultigridFactor, prepared
 from ..linear.grid_matrix import GridMatrix
 from ..linear.hierarchy import Hierarchy
 from ..linear.levels import Levels
 from ..linear.loose_modes import loose_modes
 from ..linear.small_blocks import block_diagonal_inverse, diagonal_blocks_inverse
 from .condensation import SOLVE_COLUMNS, Condensation
+from .structure import Structure
 
 Array = NDArray[np.float64]
-Shared = dict[str, tuple[tuple, Any]]  # by name: the matrices it was made of, and what was made
+T = TypeVar("T")
 OPERATORS = (GridMatrix, DistributedMatrix)  # which M may be instead of a stored matrix
 DIRECT_LIMIT = 600_000  # unknowns of a mesh whose factor takes some 10 GB
 EXACT_WORK = 2e6  # n * nc * d up to which forming W costs nothing that matters
@@ -43,82 +45,76 @@ LARGE_BODY = 10_000  # unknowns of a body with levels from which multigrid is th
 CHEAP = 2.0  # work of W, relative to that of a compressed W, which is full and not exact
 
 
-def made_once(shared: Shared, name: str, sources: tuple, make: Callable[[], Any]) -> Any:
-    """What `make` gives, made once for all that share it and hold the same source matrices."""
-    entry = shared.get(name)
-    if entry is None or any(a is not b for a, b in zip(entry[0], sources, strict=True)):
-        entry = shared[name] = (sources, make())
-    return entry[1]
-
-
 @dataclass(frozen=True, eq=False)
 class GlobalMatrices:
-    """M (n, n), H (n, nc d), the rigid modes (n, k) and the levels of a `FrictionProblem`."""
+    """M (n, n), H (n, nc d), rigid modes (n, k), levels, structure of a `FrictionProblem`."""
 
     M: sparse.csc_array
     H: sparse.csc_array
     dimension: int
     near_nullspace: Array | None
     levels: Levels
-    shared: Shared
+    structure: Structure | None
+    shared: Prepared
 
     @property
     def contacts(self) -> int:
         """Number of contacts nc."""
         return self.H.shape[1] // self.dimension
 
-    def _kept(self, name: str, make: Callable[[], Any]) -> Any:
+    def _of_M(self, make: Callable[..., T], *arguments: object) -> T:
         """What is made of M alone."""
-        return made_once(self.shared, name, (self.M,), make)
+        return self.shared.once(make, (self.M,), *arguments)
 
-    def _kept_of_both(self, name: str, make: Callable[[], Any]) -> Any:
+    def _of_both(self, make: Callable[..., T], *arguments: object) -> T:
         """What is made of M and H."""
-        return made_once(self.shared, name, (self.M, self.H), make)
+        return self.shared.once(make, (self.M, self.H), *arguments)
 
     # ---------------------------------------------------------------- M
     def stored(self) -> sparse.csc_array:
         """M as a stored matrix where it is the operator of a grid."""
-        return self._kept("stored", self.M.tocsc)
+        return self._of_M(stored, self.M)
 
     def stored_levels(self) -> Levels:
         """The levels that such an operator has for itself."""
-        return self._kept("stored levels", self.M.free_levels)  # type: ignore[attr-defined]
+        return self._of_M(GridMatrix.free_levels, self.M)
 
     @cached_property
     def bodies(self) -> Bodies:
         """The blocks into which M falls apart."""
-        return self._kept("bodies", lambda: Bodies.of(self.M))
+        return self._of_M(GlobalMatrices._bodies, self)
+
+    def _bodies(self) -> Bodies:
+        return Bodies.of(self.M, None if self.structure is None else self.structure.body)
 
     @cached_property
     def small_blocks(self) -> sparse.csc_array | None:
         """M^-1 when M is block diagonal with small blocks (rigid bodies), else None."""
         if isinstance(self.M, OPERATORS):
             return None
-        return self._kept("inverse", lambda: block_diagonal_inverse(self.M))
+        return self._of_M(block_diagonal_inverse, self.M)
 
     def factor(self) -> Factor:
         """M prepared for solves, see `FrictionProblem.factor`."""
-        return self._kept("factor", self._factor)
+        return self._of_M(GlobalMatrices._factor, self)
 
     def _factor(self) -> Factor:
-        M, modes = self.M, self.near_nullspace
+        M = self.M
         if isinstance(M, GridMatrix):
             return GeometricMultigrid().factor(M)  # type: ignore[arg-type]
         if isinstance(M, DistributedMatrix):
             return M.factor()
         bodies = self.bodies
-        iterative = bodies.largest > DIRECT_LIMIT and modes is not None
-        if bodies.count > 1 and not iterative:
-            return bodies.factor(M)
-        solver: LinearSolver = ConjugateGradient() if iterative else Direct()
-        return solver.factor(M, modes)
+        if bodies.largest > DIRECT_LIMIT and self.near_nullspace is not None:
+            hierarchy = self.hierarchy
+            if hierarchy is not None:
+                return MultigridFactor(hierarchy, hierarchy.nodes, GeometricMultigrid())
+        return bodies.factor(M) if bodies.count > 1 else Direct().factor(M)
 
     @property
     def loose_modes(self) -> Array:
         """Rigid modes that M does not resist, orthonormal columns (n, k), see `linear`."""
-        return self._kept(
-            "loose modes", lambda: loose_modes(self.M, self.bodies, self.near_nullspace)
-        )
+        return self._of_M(loose_modes, self.M, self.bodies, self.near_nullspace)
 
     def solve(self, b: Array) -> Array:
         """M^-1 b, b of shape (n,) or (n, k)."""
@@ -128,30 +124,31 @@ class GlobalMatrices:
     @property
     def hierarchy(self) -> Hierarchy | None:
         """Multigrid levels of M; None where the unknowns do not come in nodes."""
-        return self._kept(
-            "hierarchy",
-            lambda: prepared(self.M, self.levels, self.near_nullspace, self.dimension),
+        return self._of_M(GlobalMatrices._hierarchy, self)
+
+    def _hierarchy(self) -> Hierarchy | None:
+        component = None if self.structure is None else self.structure.component
+        return prepared(
+            self.M, self.levels, self.near_nullspace, self.dimension, component=component
         )
 
     # ---------------------------------------------------------------- W
     @property
     def condensation(self) -> Condensation:
         """W body by body."""
-        return self._kept_of_both(
-            "condensation", lambda: Condensation(self.bodies, self.H, self.dimension)
-        )
+        return self._of_both(Condensation, self.bodies, self.H, self.dimension)
 
     @property
     def condensing_is_cheap(self) -> bool:
         """True when W is the best to solve with, see `FrictionProblem.condensing_is_cheap`."""
-        return self._kept_of_both("cheap", self._condensing_is_cheap)
+        return self._of_both(GlobalMatrices._condensing_is_cheap, self)
 
     def _condensing_is_cheap(self) -> bool:
         if isinstance(self.M, OPERATORS):
             return False
         if self.small_blocks is not None:
             return True
-        n, m = self.H.shape
+        n, m = self.H.shape  # type: ignore[misc]  # scipy: may be None
         if n * m <= EXACT_WORK:
             return True
         if self.levels and self.bodies.largest >= LARGE_BODY:
@@ -203,7 +200,7 @@ class GlobalMatrices:
     @property
     def local_stiffness(self) -> Array:
         """H_i^T D^-1 H_i, (nc, d, d), D the block diagonal of M: a cheap stand-in for W_ii."""
-        return self._kept_of_both("local stiffness", self._local_stiffness)
+        return self._of_both(GlobalMatrices._local_stiffness, self)
 
     def _local_stiffness(self) -> Array:
         M, d, n = self.M, self.dimension, self.H.shape[0]
@@ -219,3 +216,8 @@ class GlobalMatrices:
         own = rows == full.indices
         out[rows[own]] = full.data[own]
         return out
+
+
+def entry_sizes(M: Any, H: Any) -> tuple[Any, Any]:
+    """|M| and |H|, entry by entry."""
+    return abs(M), abs(H)

@@ -6,7 +6,7 @@ local frames, weights omega (areas), rho = omega kappa and reactions r in the un
     t = S^T v + s,   u = H^T v + w,   x = omega t - rho u,   r = P(x),
     F(v) = M v - f - H r - S (theta / kappa) (omega t - r) = 0.
 
-P is Alart and Curnier's projection (`cones.augmented_reaction`).  In the letters of the design,
+P is Alart and Curnier's projection (`Law.augmented_reaction`).  In the letters of the design,
 K v + A^T P(B v + c) = f with B = omega S^T - rho H^T, A^T = S theta / kappa - H and
 K = M - S (theta omega / kappa) S^T.
 
@@ -32,16 +32,21 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..core.arrays import expect_shape
-from ..core.clock import NEVER, Deadline
-from ..core.errors import SingularOperator, UnsupportedForm
+from ..core.errors import SingularOperator
 from ..linear import Direct, Factor, LinearSolver
-from .friction import Form, FrictionProblem
+from .friction import FrictionProblem
 from .judge import measures as judge
-from .judge.measures import Measure, Weakest
-from .law.cones import Law, Tresca, augmented_reaction, augmented_reaction_jacobian
+from .judge.measures import Measure
+from .law import Law
+from .protocol import Form, Problem, Start, checked_motion
+from .settling import Accepted, Motion
 
 Array = NDArray[np.float64]
 EPSILON = judge.EPSILON
+NO_MULTIPLIERS = (
+    "Nitsche's method has no contact multipliers, only displacements: solve takes it (auto or "
+    'semismooth-newton); for anything else give the contacts method="nodal" or "mortar"'
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +116,7 @@ class NitscheMatrices:
 
 
 @dataclass(frozen=True, eq=False)
-class NitscheProblem:
+class NitscheProblem(Problem):
     """Find v, (n,), with F(v) = 0.
 
     f (n,), force; at v = 0 w (q, d), local displacement with the gap, and t0 (q, d), traction;
@@ -127,6 +132,7 @@ class NitscheProblem:
 
     form = Form.NITSCHE
     measure = Measure.NITSCHE
+    unfit = NO_MULTIPLIERS
 
     @property
     def contacts(self) -> int:
@@ -162,21 +168,10 @@ class NitscheProblem:
         m, d = self.matrices, self.dimension
         root = np.sqrt(m.weights)
         H = sparse.csc_array(m.H @ sparse.diags_array(np.repeat(root, d)))
-        coefficient = self.law.coefficient
-        if isinstance(self.law, Tresca):  # a force becomes force / sqrt(omega), and root is > 0
-            coefficient = coefficient / root
-        law = type(self.law)(coefficient)
+        law = self.law.scaled(1 / root)  # a force becomes force / sqrt(omega), and root is > 0
         return FrictionProblem.from_global(
             m.M, H, self.f, root[:, None] * self.w, law, name=self.name
         )
-
-    def assembled(self) -> NitscheProblem:
-        """Itself: M is always stored."""
-        return self
-
-    def condensed(self, deadline: Deadline = NEVER) -> NitscheProblem:
-        """Raises UnsupportedForm: there are no multipliers to condense to."""
-        raise UnsupportedForm(NO_MULTIPLIERS)
 
     # ---------------------------------------------------------------- the equation
     def local_velocity(self, v: Array) -> Array:
@@ -194,7 +189,7 @@ class NitscheProblem:
 
     def reaction(self, v: Array) -> Array:
         """r = P(x), (q, d), force."""
-        return augmented_reaction(self.augmented(v), self.law)
+        return self.law.augmented_reaction(self.augmented(v))
 
     def residual(self, v: Array) -> Array:
         """F(v), (n,), force."""
@@ -212,14 +207,15 @@ class NitscheProblem:
     def tangent(self, v: Array) -> sparse.csc_array:
         """One element of the generalised Jacobian of F, (n, n); unsymmetric."""
         m, d = self.matrices, self.dimension
-        blocks = augmented_reaction_jacobian(self.augmented(v), self.law)
+        blocks = self.law.augmented_reaction_jacobian(self.augmented(v))
         index = np.arange(self.contacts + 1)
         size = (self.contacts * d,) * 2
         D = sparse.bsr_array((blocks, index[:-1], index), shape=size)
         return sparse.csc_array(m.K - m.minus_A @ (sparse.csr_array(D) @ m.B))
 
-    def lawful(self, v: Array) -> Array:
+    def lawful(self, u: Array, v: Array | None) -> Array:
         """The displacement u + (r - omega t) / rho, (q, d), with which r obeys its law."""
+        assert v is not None
         return (self.reaction(v) - self.augmented(v)) / self.rho[:, None]
 
     # ---------------------------------------------------------------- judging
@@ -256,13 +252,11 @@ class NitscheProblem:
         error = judge.ratio(size, self.scale)
         return error if np.isfinite(error) else np.inf
 
-    def weakest(self, r: Array, v: Array | None = None) -> Weakest | None:
-        """None: r obeys the law at every point by construction, all error is in the balance."""
-        return None
-
-    def certain_error(self, r: Array, v: Array | None = None) -> float:
-        """The error, or what rounding may hide in it where that is more."""
-        return max(self.error(r, v), self.rounding(r))
+    def accepted(
+        self, r: Array, v: Array | None, error: float, tolerance: float
+    ) -> Accepted:
+        """As it is: r obeys the law at every point, all error is in the balance."""
+        return Accepted(r, v, error)
 
     def rounding(self, r: Array) -> float:
         """What rounding of huge reactions may hide in `error`."""
@@ -282,9 +276,19 @@ class NitscheProblem:
         springs = (self.rho[:, None] * self.w).ravel()
         return m.bonded.solve(self.f - m.H @ springs)
 
-    def velocity(self, r: Array) -> tuple[Array, Array]:
-        """(u, v) at the guess: reactions alone tell no displacements here."""
-        return self.local_velocity(self.guess), self.guess
+    def start(self, given: Start | None = None) -> Motion:
+        """(r, v) at the displacements that are given, or at the guess.
+
+        The reactions of a start may be those of another method.
+        """
+        free = given is None or given.v is None
+        v = self.guess if free else checked_motion(given.v, self.unknowns)
+        return self.reaction(v), v
+
+    def motion(self, r: Array, v: Array | None = None) -> Motion:
+        """(u, v), at the guess without v: reactions alone tell no displacements here."""
+        v = self.guess if v is None else v
+        return self.local_velocity(v), v
 
     def newton_step(self, v: Array, linear: LinearSolver) -> Array:
         """-(dF/dv)^-1 F, (n,); -G^-1 F where that is singular: a loose body in the air."""
@@ -293,8 +297,3 @@ class NitscheProblem:
         except SingularOperator:
             return self.matrices.G.solve(-self.residual(v))
 
-
-NO_MULTIPLIERS = (
-    "Nitsche's method has no contact multipliers, only displacements: solve takes it (auto or "
-    'semismooth-newton); for anything else give the contacts method="nodal" or "mortar"'
-)

@@ -25,6 +25,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from .friction import Form, FrictionProblem
+from .structure import Structure
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -78,7 +79,7 @@ def one_sided(problem: FrictionProblem) -> OneSided | None:
     """
     if problem.form is not Form.GLOBAL:
         return None
-    basis = problem.kept("one sided", lambda: _basis(problem))
+    basis = problem.kept(_basis)
     if basis is None:
         return None
     M, H, dofs, frames, coupling = basis
@@ -98,12 +99,23 @@ def one_sided(problem: FrictionProblem) -> OneSided | None:
 
 
 def _basis(problem: FrictionProblem) -> tuple | None:
-    """(T' M T, T' H, dofs, frames, S C or None), or None where H has not the structure."""
+    """(T' M T, T' H, dofs, frames, S C or None), or None where H has not the structure.
+
+    The slaves are those of the model; where they do not do, or are not known, they are looked
+    for in H: of equal meshes either side will do.
+    """
+    found = None
+    if problem.structure is not None:
+        found = _basis_of(problem, problem.structure)
+    return found if found is not None else _basis_of(problem, None)
+
+
+def _basis_of(problem: FrictionProblem, structure: Structure | None) -> tuple | None:
     M, d, nc = problem.M, problem.dimension, problem.contacts
     assert M is not None and problem.H is not None
     H = sparse.csr_array(problem.H, copy=True)
     H.eliminate_zeros()
-    dofs, frames = slave_dofs(M, H, d)
+    dofs, frames = slave_dofs(M, H, d, structure)
     own = np.zeros(H.shape[0])
     own[dofs[dofs != HELD]] = 1.0
     others = sparse.csr_array(sparse.diags_array(1 - own) @ H)
@@ -132,15 +144,21 @@ def _basis(problem: FrictionProblem) -> tuple | None:
     return Mhat, Hhat, dofs, frames, coupling
 
 
-def slave_dofs(M: sparse.csc_array, H: sparse.csr_array, d: int) -> tuple[Index, Array]:
+def slave_dofs(
+    M: sparse.csc_array, H: sparse.csr_array, d: int, structure: Structure | None = None
+) -> tuple[Index, Array]:
     """(dofs (nc, d), frames (nc, d, d)) of the slave of every contact, found in the rows of H.
 
     Those of a slave act on its contact alone and are orthonormal; slots without one are -1,
-    with a column of zeros.  Where both sides qualify, the body that does so more often wins.
+    with a column of zeros.  Where both sides qualify and no structure tells the slave, the body
+    that does so more often wins.
     """
     nc = H.shape[1] // d
     row, contact, vector = _rows_of_one_contact(H, d)
-    if np.bincount(contact, minlength=1).max() > d:
+    if structure is not None:
+        slave = structure.node[row] == structure.slave[contact]
+        row, contact, vector = row[slave], contact[slave], vector[slave]
+    elif np.bincount(contact, minlength=1).max() > d:
         order = np.argsort(_preference(M, H, d, row, contact), kind="stable")
         row, contact, vector = row[order], contact[order], vector[order]
     dofs = np.full((nc, d), HELD, dtype=np.int64)

@@ -3,8 +3,8 @@
 A method stops within the tolerance of a solution, and may leave some 1e-9 of the load on a
 contact whose motion says that it is open.  Then an area counted where r_N > 0 is not the area
 of the contacts that are closed.  So an open contact carries nothing here, exactly (under
-Tresca's law no r_N, and no shear above its bound).  That changes r within the error that was
-judged; the driver judges it again.
+Tresca's law no r_N, and no shear above its bound; with cohesion its tension).  That changes r
+within the error that was judged; the driver judges it again.
 
 Closed contacts keep what was found: to cut their shear to what friction allows would move, by
 as little, gaps that a linear solve has closed to rounding; steps in time take them for open.
@@ -13,18 +13,19 @@ as little, gaps that a linear solve has closed to rounding; steps in time take t
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..core.compiled import njit
-from ..core.errors import SingularOperator
 from ..linear.blocks import spatial
-from .friction import FrictionProblem
 from .judge.contacts import settled_contact
 from .judge.measures import Weakest
-from .law.cones import Law, Tresca
+from .law import Law
+
+if TYPE_CHECKING:
+    from .friction import FrictionProblem
 
 Array = NDArray[np.float64]
 Motion = tuple[Array, Array | None]  # u (nc, d), and v (n,) where there is one
@@ -42,45 +43,47 @@ class Settled(NamedTuple):
     changed: bool
 
 
+class Accepted(NamedTuple):
+    """A state whose error will do, and what else is asked of it.
+
+    r, v, error: as they were, or with reactions that keep to their statuses.  weakest: None
+    where contacts are not looked at one by one, or where the error of the new r will not do.
+    motion, settled: None where they have not been found on the way.
+    """
+
+    r: Array
+    v: Array | None
+    error: float
+    weakest: Weakest | None = None
+    motion: Motion | None = None
+    settled: Settled | None = None
+
+
 def settle(law: Law, rho: Array, r: Array, u: Array) -> Settled:
     """The status of every contact at r, u (nc, d), as by `classify`, and r that keeps to it.
 
     rho (nc,): unit of r / u, 0 where a contact can not react.
     """
     status, sliding = np.empty((2, len(r)), np.int8)
-    rows, kept = spatial(r), np.empty((len(r), 3))
-    changed = _settle(
-        rows, spatial(u), rho, law.coefficient, isinstance(law, Tresca), kept, status, sliding
-    )
-    out = np.ascontiguousarray(kept[:, : r.shape[1]]) if changed else r
+    rows, moved = spatial(law.pressed(r)), spatial(law.stretched(u, r))
+    kept = np.empty((len(r), 3))
+    changed = _settle(rows, moved, rho, law.kind, law.parameters, kept, status, sliding)
+    out = law.released(np.ascontiguousarray(kept[:, : r.shape[1]])) if changed else r
     return Settled(out, status, sliding.view(np.bool_), changed)
 
 
-def motion(problem: FrictionProblem, r: Array, v: Array | None = None) -> Motion:
-    """(u, v) of a state whose v is given, else of its reactions; v = 0 where M is singular."""
-    if v is not None:
-        return problem.local_velocity(v), v
-    try:
-        return problem.velocity(r)
-    except SingularOperator:  # and no solver has found another v
-        return at_rest(problem)
-
-
-def at_rest(problem: FrictionProblem) -> Motion:
-    """(u, v) of v = 0."""
-    v = np.zeros(problem.unknowns)
-    return problem.local_velocity(v), v
-
-
-def settled_exactly(
-    problem: FrictionProblem, r: Array
-) -> tuple[Array, Settled, float, Weakest]:
-    """(u, `settled`, exact error, weakest contact) in the Delassus form."""
+def accepted_exactly(
+    problem: FrictionProblem, r: Array, v: Array | None, error: float, tolerance: float
+) -> Accepted:
+    """What `Problem.accepted` says by the exact measure, in the Delassus form."""
     d, found = r.shape[1], r
     while (at := problem.assessed(found)).changed:
         found = np.ascontiguousarray(at.kept[:, :d])
     told = Settled(found, at.status, at.sliding, found is not r)
-    return at.u[:, :d], told, at.error, at.weakest
+    if told.changed:  # its motion is found again
+        v, error = None, at.error
+    weakest = at.weakest if error <= tolerance else None
+    return Accepted(found, v, error, weakest, (at.u[:, :d], None), told)
 
 
 def settled(
@@ -100,12 +103,12 @@ def settled(
 
 
 @njit(cache=True, error_model="numpy")
-def _settle(r, u, rho, coefficient, tresca, kept, status, sliding):  # noqa: PLR0913
+def _settle(r, u, rho, kind, parameters, kept, status, sliding):  # noqa: PLR0913
     """Fill kept (nc, 3), status and sliding (nc,); True where kept is not r."""
     changed = False
     for i in range(len(r)):
         state, slides, normal, shear = settled_contact(
-            r[i, 0], r[i, 1], r[i, 2], u[i, 0], u[i, 1], u[i, 2], rho[i], coefficient[i], tresca
+            r[i, 0], r[i, 1], r[i, 2], u[i, 0], u[i, 1], u[i, 2], rho[i], kind[i], parameters[i]
         )
         status[i], sliding[i] = state, slides
         for k in range(3):
@@ -114,6 +117,4 @@ def _settle(r, u, rho, coefficient, tresca, kept, status, sliding):  # noqa: PLR
     return changed
 
 
-__all__ = [
-    "Motion", "Settled", "at_rest", "motion", "settle", "settled", "settled_exactly",
-]  # fmt: skip
+__all__ = ["Accepted", "Motion", "Settled", "accepted_exactly", "settle", "settled"]

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from ..core.errors import SingularOperator
 from ..core.warned import ResultWarning
-from .friction import FrictionProblem
 from .judge import measures as judge
 from .judge.measures import Measure
-from .law.cones import Law
-from .nitsche import NitscheProblem
+from .law import Law
+from .law.states import ContactStatus
+from .protocol import Problem
 from .settling import Settled
-from .status import ActiveSets, ContactStatus, classify, margins
+from .status import ActiveSets, classify, margins
 
 Array = NDArray[np.float64]
 TELLING = 0.1  # seconds of compiling from which the record says so
@@ -54,6 +54,25 @@ class Outcome(Enum):
         return self.value
 
 
+class StoppedBy(Enum):
+    """Who ended a solve with the outcome STOPPED."""
+
+    USER = "by the user"  # Ctrl-C
+    CALLBACK = "by the callback"
+    RULE = "by its own rule"  # a stopping rule that belongs to the method
+
+
+class Obstruction(Enum):
+    """What in the problem itself keeps methods from a solution; the value is advice."""
+
+    NO_SOLUTION = "Hold what gives way by a support, or change loads or friction."
+    INDEFINITE = (
+        "No body stores negative energy: check the signs and the order of the rows of the "
+        "matrices."
+    )
+    UNREACTING = "No reaction can open that contact: check its rows of H or W, and its gap."
+
+
 class Step(NamedTuple):
     """One line of the history: what the driver saw after an iterate."""
 
@@ -84,6 +103,8 @@ class Convergence:
     weakest: int | None = None  # that contact; None where all obey their laws exactly
     compiling: float = 0.0  # seconds of preparing compiled code, which no other time holds
     flops: float | None = None  # floating point operations, judgements among them; see docs
+    stopped_by: StoppedBy | None = None  # of the outcome STOPPED
+    obstruction: Obstruction | None = None  # what was found of one where a solve failed
 
     @property
     def sets_settled(self) -> int | None:
@@ -94,20 +115,13 @@ class Convergence:
     @property
     def by_user(self) -> bool:
         """True where Ctrl-C ended the solve."""
-        return self.outcome is Outcome.STOPPED and self.detail == "by the user"
+        return self.stopped_by is StoppedBy.USER
 
     @property
     def advice(self) -> str:
-        """What the user can do about it, knowing the detail and what was tried."""
-        if "there is no solution" in self.detail:
-            return "Hold what gives way by a support, or change loads or friction."
-        if " is indefinite: " in self.detail:
-            return (
-                "No body stores negative energy: check the signs and the order of the rows of "
-                "the matrices."
-            )
-        if " can not react, " in self.detail:
-            return "No reaction can open that contact: check its rows of H or W, and its gap."
+        """What the user can do about it, knowing what was found and what was tried."""
+        if self.obstruction is not None:
+            return self.obstruction.value
         if self.outcome is Outcome.STAGNATED and self.solver == "Auto":
             return "The error no longer falls: loosen the tolerance, or check the problem."
         return self.outcome.advice
@@ -150,7 +164,7 @@ class FrictionSolution:
     told in the form in which it was solved, so that another form does not tell others.
     """
 
-    problem: FrictionProblem | NitscheProblem
+    problem: Problem
     r: Array
     u: Array
     v: Array | None
@@ -164,9 +178,7 @@ class FrictionSolution:
         if self.settled is not None:
             status = self.settled.status
             return status, self.settled.sliding, margins(problem, self.r, self.u, status)
-        if isinstance(problem, NitscheProblem):  # its r obeys the law with this displacement
-            return classify(problem, self.r, problem.lawful(self.v))
-        return classify(problem, self.r, self.u)
+        return classify(problem, self.r, problem.lawful(self.u, self.v))
 
     @property
     def status(self) -> NDArray[np.int8]:
@@ -226,7 +238,7 @@ class FrictionSolution:
 
     def _published(self, measure: Callable[[Array, Array, Array, Law], float]) -> float | None:
         p = self.problem
-        if isinstance(p, NitscheProblem) or not self.convergence.history:
+        if not p.has_q or not self.convergence.history:
             return None
         try:
             q = p.free_velocity
@@ -244,10 +256,15 @@ class FrictionSolution:
         """Largest excess of |r_T| over its bound, unit of r."""
         return judge.max_cone_violation(self.r, self.problem.law)
 
-    def __str__(self) -> str:
+    @property
+    def headline(self) -> str:
+        """The problem and its numbers of contacts by status, in words."""
         c = self.counts
         name = self.problem.name or "friction problem"
         return (
             f"{name}: {self.problem.contacts} contacts in {self.problem.dimension}D: "
-            f"{c['open']} open, {c['slip']} slip, {c['stick']} stick\n{self.convergence}"
+            f"{c['open']} open, {c['slip']} slip, {c['stick']} stick"
         )
+
+    def __str__(self) -> str:
+        return f"{self.headline}\n{self.convergence}"

@@ -3,24 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .friction import FrictionProblem
-from .nitsche import NitscheProblem
+from .law.states import ContactStatus
+from .protocol import Problem
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-
-
-class ContactStatus(IntEnum):
-    """State of one contact; the numbers are those in files."""
-
-    OPEN = 0
-    SLIP = 1
-    STICK = 2
 
 
 @dataclass(frozen=True)
@@ -51,7 +42,7 @@ class ActiveSets:
 
 
 def classify(
-    problem: FrictionProblem | NitscheProblem, r: Array, u: Array
+    problem: Problem, r: Array, u: Array
 ) -> tuple[NDArray[np.int8], NDArray[np.bool_], Array]:
     """(status, sliding, margin), each (nc,), of reactions r and velocities u, (nc, d).
 
@@ -60,11 +51,11 @@ def classify(
 
     margin is the distance to the nearest change of status, in the unit of r_N: rho u_N for an
     open contact, the smaller of r_N and the slack of the friction bound for a sticking one, the
-    smaller of r_N and rho |u_T| for a slipping one.
+    smaller of r_N and rho |u_T| for a slipping one; r_N counts from its largest tension.
     """
     closed, sliding = problem.law.regions(r, u, problem.rho)
     closed = closed & (
-        r[:, 0] > 0
+        r[:, 0] + problem.law.cohesion > 0
     )  # of an unconverged state: without force there is no contact
     status = np.where(
         closed, np.where(sliding, ContactStatus.SLIP, ContactStatus.STICK), ContactStatus.OPEN
@@ -73,13 +64,14 @@ def classify(
 
 
 def margins(
-    problem: FrictionProblem | NitscheProblem, r: Array, u: Array, status: NDArray[np.int8]
+    problem: Problem, r: Array, u: Array, status: NDArray[np.int8]
 ) -> Array:
     """The margins of `classify` for given statuses, (nc,), unit of r_N."""
-    slack = problem.law.bound(r) - np.linalg.norm(r[:, 1:], axis=1)
+    pressure = r[:, 0] + problem.law.cohesion
+    slack = problem.law.bound(r) - np.linalg.norm(r[:, 1:], axis=1)  # along r_T
     slide = problem.rho * np.linalg.norm(u[:, 1:], axis=1)
     stick = status == ContactStatus.STICK
-    closed = np.minimum(r[:, 0], np.where(stick, slack, slide))
+    closed = np.minimum(pressure, np.where(stick, slack, slide))
     return np.maximum(
         np.where(status == ContactStatus.OPEN, problem.rho * u[:, 0], closed), 0.0
     )

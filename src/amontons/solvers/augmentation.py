@@ -24,6 +24,7 @@ Control 60 (2015), whose optimal step for a quadratic problem this is.
 from __future__ import annotations
 
 from enum import Enum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,8 +73,8 @@ def augmentation(problem: FrictionProblem, strategy: RhoStrategy, factor: float)
         smallest = problem.rho[able].min() if able.any() else 1.0
         return np.full(problem.contacts, factor * smallest)
     blocks = own_blocks(problem)
-    able = blocks.any(axis=(1, 2))
-    blocks = np.where(able[:, None, None], blocks, np.eye(problem.dimension))
+    able = np.any(blocks, axis=(1, 2), keepdims=True)
+    blocks = np.where(able, blocks, np.eye(problem.dimension))
     if strategy is RhoStrategy.SPECTRAL:
         largest, smallest = _singular_values(blocks)
         return factor / np.sqrt(smallest * largest)
@@ -96,5 +97,5 @@ def _split(blocks: Array, condition: bool) -> Array:
 
 def _singular_values(blocks: Array) -> tuple[Array, Array]:
     """Largest and smallest singular value, (nc,) each, no further apart than a condition."""
-    values = np.linalg.svd(blocks, compute_uv=False)
+    values: Any = np.linalg.svd(blocks, compute_uv=False)
     return values[:, 0], np.maximum(values[:, -1], values[:, 0] / LARGEST_CONDITION)

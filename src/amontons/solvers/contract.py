@@ -1,22 +1,25 @@
 """The contract of a solver: a frozen dataclass whose one method yields iterates.
 
-A solver never stops itself and never judges itself; the driver in `driver.py` does both.  What
-a published stopping rule asks for it tells in `Iterate.ends`.
+A solver never stops itself and never judges itself; the driver in `driver.py` does both, and
+sends its judgement into the generator: a solver that wants to know reads `judged = yield
+iterate`.  What a published stopping rule asks for it tells in `Iterate.ends`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..core.clock import NEVER, Deadline
-from ..core.errors import InvalidInput
+from ..core.errors import InvalidInput, UnsupportedForm
 from ..problem.friction import Form, FrictionProblem
-from ..problem.judge.measures import Criterion, published_natural_error
+from ..problem.judge.measures import Criterion
+from ..problem.nitsche import NitscheProblem
+from ..problem.protocol import Problem
 from ..problem.status import ActiveSets
 
 Array = NDArray[np.float64]
@@ -44,6 +47,49 @@ class Iterate:
     flops: float | None = None  # floating point operations since the last; None: not counted
 
 
+class Judgement(NamedTuple):
+    """What the driver tells a solver of the iterate that it has just handed out.
+
+    error: by the criterion of the target; contact_error: of the weakest contact on its own
+    scale, None while the error alone will not do; deadline: at which the driver will stop.
+    """
+
+    error: float
+    contact_error: float | None = None
+    deadline: Deadline = NEVER
+
+    @property
+    def seconds_left(self) -> float:
+        """Time until the deadline, 0 when it has passed."""
+        return self.deadline.left
+
+
+Iterates = Generator[Iterate, Judgement | None, None]
+
+
+def sent(iterates: Iterator[Iterate], judgement: Judgement | None) -> Iterate | None:
+    """The next iterate of a solver that is told of its last one; None at the end.
+
+    judgement: None for the first.  An iterator that is no generator is not told.
+    """
+    send = getattr(iterates, "send", None)
+    try:
+        return next(iterates) if send is None else send(judgement)
+    except StopIteration:
+        return None
+
+
+def first_of(
+    iterates: Iterator[Iterate], count: float = np.inf
+) -> Generator[Iterate, Judgement | None, Iterate | None]:
+    """The first `count` iterates of a solver, told what is sent; returns the last of them."""
+    last, judged = None, None
+    while count > 0 and (iterate := sent(iterates, judged)) is not None:
+        judged = yield iterate
+        last, count = iterate, count - 1
+    return last
+
+
 @dataclass(frozen=True)
 class Target:
     """What the driver will ask for: a hint for stages that run inside one compiled call."""
@@ -51,17 +97,22 @@ class Target:
     tolerance: float
     deadline: Deadline = NEVER  # at which the driver will stop
     criterion: Criterion = Criterion.JUDGE  # what the tolerance is for
+    start_error: float = np.inf  # of the start, infinite where its motion is not known
 
     @property
     def seconds_left(self) -> float:
         """Time until the deadline, 0 when it has passed."""
         return self.deadline.left
 
-    def error(self, problem: FrictionProblem, iterate: Iterate) -> float:
-        """The error that the driver will see."""
+    def error(
+        self, problem: Problem, iterate: Iterate, judged: Judgement | None = None
+    ) -> float:
+        """The error that the driver sees: what it has told, evaluated where nobody told."""
+        if judged is not None:
+            return judged.error
         if self.criterion is Criterion.JUDGE:
             return problem.error(iterate.r, iterate.v)
-        return natural_error_of(problem, iterate.r, iterate.v)
+        return problem.natural_error(iterate.r, iterate.v)
 
 
 @dataclass
@@ -86,41 +137,64 @@ class Patience:
         return self.waited > self.most
 
 
-def natural_error_of(problem: FrictionProblem, r: Array, v: Array | None = None) -> float:
-    """[ABD] eq. (13) of reactions r, (nc, d), with v, (n,), if it is known."""
-    if v is not None and problem.form is Form.GLOBAL:
-        u = problem.local_velocity(v)
-    else:
-        u = problem.velocity(r)[0]
-    return published_natural_error(r, u, problem.free_velocity, problem.law)
-
-
 class Solver(Protocol):
     """Options as fields; `iterates` yields until the driver stops asking.
 
-    A solver with a class variable matrix_free = True also takes problems whose M is an operator
-    (`GridMatrix`); for others the driver assembles it.  One with nitsche = True also takes a
-    `NitscheProblem`, where v alone is unknown and r follows from it.
+    It is a generator, which is sent a `Judgement` of each iterate, or a plain iterator.  Class
+    variables say what it takes, see `Takes`.
     """
 
-    form: ClassVar[Form]
-
-    def iterates(
-        self, problem: FrictionProblem, start: Iterate, target: Target
-    ) -> Iterator[Iterate]:
+    def iterates(self, problem: Any, start: Iterate, target: Target) -> Iterator[Iterate]:
         """Iterates from `start`; raises Breakdown with a reason when there is no next one."""
         ...
+
+
+class Takes(NamedTuple):
+    """What a solver takes: class variables of these names, or the defaults here.
+
+    solves: types of problems, of one's own too; FrictionProblem by default, and NitscheProblem
+    of a solver with nitsche = True.  form: which one of a FrictionProblem.  matrix_free: True
+    where its M may be an operator (`GridMatrix`); else the driver assembles it.  needs_cone:
+    True where it takes Coulomb's law alone, not all laws of `problem.law`; changes of variables
+    are none of a solver's business, see `solvers.changed_law`.
+    """
+
+    solves: tuple[type, ...] = (FrictionProblem,)
+    form: Form = Form.ANY
+    matrix_free: bool = False
+    needs_cone: bool = False
+
+
+def taken_by(solver: Any) -> Takes:
+    """What a solver, or a class of solvers, takes."""
+    solves = getattr(solver, "solves", None)
+    if solves is None:
+        also = (NitscheProblem,) if getattr(solver, "nitsche", False) else ()
+        solves = (FrictionProblem, *also)
+    return Takes(
+        solves,
+        getattr(solver, "form", Form.ANY),
+        getattr(solver, "matrix_free", False),
+        getattr(solver, "needs_cone", False),
+    )
+
+
+def check_solves(solver: Any, kind: type[Problem]) -> None:
+    """Raise UnsupportedForm where a solver does not take problems of that class."""
+    if not issubclass(kind, taken_by(solver).solves):
+        why = getattr(kind, "unfit", f"expected a discrete problem, got a {kind.__name__}")
+        raise UnsupportedForm(why, ("solver",), type(solver).__name__)
 
 
 def check_positive(**fields: float) -> None:
     """Raise InvalidInput for the first option that is not a positive finite number."""
     for name, value in fields.items():
         if not (value > 0 and np.isfinite(value)):
-            raise InvalidInput(f"{name}: expected a positive number, got {value}")
+            raise InvalidInput(f"expected a positive number, got {value}", (name,))
 
 
 def check_at_least(minimum: int, **fields: int) -> None:
     """Raise InvalidInput for the first option below `minimum`."""
     for name, value in fields.items():
         if value < minimum:
-            raise InvalidInput(f"{name}: expected at least {minimum}, got {value}")
+            raise InvalidInput(f"expected at least {minimum}, got {value}", (name,))

@@ -16,17 +16,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.clock import Deadline, TimeLimit, compiling, deadline_of, now
-from ..core.errors import InvalidInput, SingularOperator, TimeUp, UnsupportedForm, shown
+from ..core.errors import (
+    InvalidInput,
+    SingularOperator,
+    TimeUp,
+    UnsupportedForm,
+    UnsupportedLaw,
+    shown,
+)
 from ..core.interrupts import Watching
-from ..problem.friction import Form, FrictionProblem
-from ..problem.indefinite import gains_energy, with_obstruction
 from ..problem.judge.measures import Criterion, Measure
-from ..problem.nitsche import NO_MULTIPLIERS, NitscheProblem
-from ..problem.settling import at_rest, motion
-from ..problem.solution import Convergence, FrictionSolution, Outcome, Step
+from ..problem.law import Coulomb
+from ..problem.protocol import Problem
+from ..problem.solution import Convergence, FrictionSolution, Outcome, Step, StoppedBy
 from . import Auto
-from .contract import Breakdown, Iterate, Solver, Target
-from .first_iterate import as_it_is, first_iterate, no_reactions, own_motion, with_motion
+from .changed_law import pressed_start, released, released_callback
+from .contract import Breakdown, Iterate, Solver, Target, check_solves, sent, taken_by
+from .first_iterate import as_it_is, first_iterate, own_motion, with_motion
 from .judging import BLUR, PATIENCE, Taken, Watch
 
 Array = NDArray[np.float64]
@@ -35,11 +41,12 @@ CONTENT = 5  # iterates with which a solver is content before its goal is tighte
 QUICK = 300  # contacts up to which one iterate is no time to press Ctrl-C
 EARLY = 100  # iterates after which a problem that no method is made for is given up
 GAVE_UP = (Outcome.STAGNATED, Outcome.BREAKDOWN, Outcome.CYCLED, Outcome.NON_FINITE)
+NUMBERS = int | float | np.number
 TIGHTEST = 1e-300  # smallest goal: contacts far smaller than others need tiny sums
 
 
 def drive(
-    problem: FrictionProblem | NitscheProblem,
+    problem: Problem,
     solver: Solver | None = None,
     *,
     tolerance: float = 1e-8,
@@ -50,6 +57,7 @@ def drive(
     callback: Callback | None = None,
     criterion: Criterion = Criterion.JUDGE,
     patience: int | None = PATIENCE,
+    condense: bool = False,
 ) -> FrictionSolution:
     """Run a solver until the judge is content or a limit is met; never raises for a failure.
 
@@ -61,18 +69,21 @@ def drive(
     callback(step, iterate) is called after every iterate; returning True stops.  criterion:
     what the tolerance is for, the unit-free judge or a published error.  patience: iterates
     without progress after which a solve counts as stagnated; None to let time decide, as in a
-    race of methods.  Ctrl-C gives the outcome STOPPED with the best iterate.  Raises
-    UnsupportedForm when the solver needs the other form.
+    race of methods.  condense: form the Delassus form for a solver that needs it; the answer
+    is one of the given problem.  Ctrl-C gives the outcome STOPPED with the best iterate.
+    Raises UnsupportedForm when the solver needs another problem or, unless that is condensed,
+    another form; UnsupportedLaw when it needs another law.
     """
     given = _Options(
-        tolerance, contact_tolerance, max_iterations, time_limit, callback, criterion, patience
-    )
+        tolerance, contact_tolerance, max_iterations, time_limit, callback, criterion, patience,
+        condense,
+    )  # fmt: skip
     return _drive(problem, solver, given, start, own_motion)
 
 
 def drive_from(
     start: Iterate,
-    problem: FrictionProblem | NitscheProblem,
+    problem: Problem,
     solver: Solver | None = None,
     *,
     tolerance: float = 1e-8,
@@ -101,6 +112,7 @@ class _Options(NamedTuple):
     callback: Callback | None
     criterion: Criterion = Criterion.JUDGE
     patience: int | None = PATIENCE
+    condense: bool = False
 
     def check(self) -> None:
         """Raise InvalidInput for what is no option."""
@@ -116,7 +128,7 @@ class _Options(NamedTuple):
 
 
 def _drive(
-    problem: FrictionProblem | NitscheProblem,
+    problem: Problem,
     solver: Solver | None,
     given: _Options,
     start: Iterate | FrictionSolution | None,
@@ -124,39 +136,54 @@ def _drive(
 ) -> FrictionSolution:
     """The solve; `taken` makes of an iterate what is judged of it."""
     solver = solver if solver is not None else Auto()
+    if isinstance(solver, Auto):
+        solver = solver.choice(problem)
     given.check()
+    if problem.plain is not problem:
+        asked = given._replace(callback=released_callback(problem, given.callback))
+        begin = pressed_start(problem, start)
+        return released(problem, _drive(problem.plain, solver, asked, begin, taken))
     deadline = deadline_of(given.time_limit)
     _check_stop(problem, given.criterion, given.patience)
-    _check_solver(problem, solver)
-    if not getattr(solver, "matrix_free", False):
-        problem = problem.assembled()
+    _check_solver(solver)
     watch = Watch(
         problem, given.tolerance, given.of_contacts, given.criterion, given.patience, taken
     )
-    begin, limit = first_iterate(problem, start), given.max_iterations or np.inf
-    target = Target(given.tolerance, deadline, given.criterion)
-    with Watching(later=problem.contacts <= QUICK) as watching:
-        outcome, detail = _run(watching, watch, solver, begin, target, limit, given.callback)
-    return _finish(watch, outcome, detail, solver)
+    try:
+        fit = watch.problem = _fit(problem, solver, deadline if given.condense else None)
+    except TimeUp:
+        return _finish(watch, problem, Outcome.TIME_LIMIT, "", solver)
+    begin, limit = first_iterate(fit, start), given.max_iterations or np.inf
+    with Watching(later=fit.contacts <= QUICK) as watching:
+        outcome, detail = _run(watching, watch, solver, begin, deadline, limit, given.callback)
+    whole = fit if fit.has_v is problem.has_v else problem
+    return _finish(watch, whole, outcome, detail, solver)
 
 
-def _check_solver(problem: FrictionProblem | NitscheProblem, solver: Solver) -> None:
-    """Raise InvalidInput for what is no solver, UnsupportedForm for one of another form."""
+def _check_solver(solver: Solver) -> None:
+    """Raise InvalidInput for what is no solver."""
     if isinstance(solver, type) or not hasattr(solver, "iterates"):
         raise InvalidInput(
             f"solver: expected an instance such as GaussSeidel(), got {solver!r}"
         )
-    if problem.form is Form.NITSCHE:
-        if not getattr(solver, "nitsche", False):
-            raise UnsupportedForm(f"{type(solver).__name__}: {NO_MULTIPLIERS}")
-    elif solver.form is not Form.ANY and solver.form is not problem.form:
-        problem_form = problem.form.value
-        condense = solver.form is Form.DELASSUS
-        hint = "problem.condensed()" if condense else "Auto or a solver of the local form"
+
+
+def _fit(problem: Problem, solver: Solver, deadline: Deadline | None) -> Problem:
+    """The problem as the solver takes it; raises UnsupportedForm where it does not."""
+    takes = taken_by(solver)
+    if not isinstance(problem, takes.solves):
+        check_solves(solver, type(problem))
+    if takes.needs_cone and not isinstance(problem.law, Coulomb):
+        raise UnsupportedLaw(
+            f"{type(solver).__name__} needs Coulomb's cone, the problem has "
+            f"{problem.law.name}; use Auto, SemismoothNewton or GaussSeidel", ("solver",), "",
+        )  # fmt: skip
+    try:
+        return problem.in_form(takes.form, not takes.matrix_free, deadline)
+    except UnsupportedForm as reason:
         raise UnsupportedForm(
-            f"{type(solver).__name__} needs the {solver.form.value} form, the problem is "
-            f"{problem_form}; use {hint}"
-        )
+            f"{type(solver).__name__} {reason.text}", ("solver",), ""
+        ) from None
 
 
 def _run(
@@ -164,21 +191,25 @@ def _run(
     watch: Watch,
     solver: Solver,
     start: Iterate,
-    target: Target,
+    deadline: Deadline,
     limit: float,
     callback: Callback | None,
 ) -> tuple[Outcome, str]:
     """Start the solver, and again with a tighter goal while only contacts are not settled."""
     try:
-        _prepare(watch.problem, target.deadline)
+        watch.problem.prepare(deadline)
         watch.judge(with_motion(watch.problem, start))
         if watch.converged:
             return Outcome.CONVERGED, ""
+        known = start.v is not None or watch.problem.measure is Measure.EXACT
+        error = watch.error if known else np.inf
+        target = Target(watch.tolerance, deadline, watch.criterion, error)
         ended: tuple[Outcome, str] | None = (Outcome.STAGNATED, "")
         while target.tolerance >= TIGHTEST:
             if watch.weak or ended is None:
                 goal = watch.tighter(target.tolerance)
-                start, target = watch.best or start, replace(target, tolerance=goal)
+                start = watch.best or start
+                target = replace(target, tolerance=goal, start_error=watch.error)
                 watch.content = 0
             ended = _once(watching, watch, solver, start, target, limit, callback)
             if ended is not None:
@@ -187,7 +218,7 @@ def _run(
     except TimeUp:
         outcome, detail = Outcome.TIME_LIMIT, ""
     except KeyboardInterrupt:
-        return Outcome.STOPPED, "by the user"
+        return _stopped(watch, StoppedBy.USER)
     if outcome is Outcome.CONVERGED:
         return outcome, detail
     if watch.weak and outcome in GAVE_UP:
@@ -210,19 +241,21 @@ def _once(
     A method with a stopping rule of its own (`Iterate.ends`) is not stopped before that holds.
     """
     try:
-        each = _operations(watch.problem) if target.deadline.work is not None else 0.0
-        for iterate in solver.iterates(watch.problem, start, target):
+        each = watch.problem.operations if target.deadline.work is not None else 0.0
+        iterates, judged = iter(solver.iterates(watch.problem, start, target)), None
+        while (iterate := sent(iterates, judged)) is not None:
             target.deadline.spend(iterate.iterations * each)
             step = watch.judge(iterate)
-            if not watch.converged:
+            converged = watch.converged
+            if not converged:
                 watching.begin()
             stop = callback is not None and callback(step, iterate)
-            if watch.converged and iterate.ends != "":
+            if converged and iterate.ends != "":
                 return Outcome.CONVERGED, iterate.stage or iterate.ends or ""
             if iterate.ends:
-                return Outcome.STOPPED, f"by its own rule: {iterate.ends}"
+                return _stopped(watch, StoppedBy.RULE, f": {iterate.ends}")
             if stop:
-                return Outcome.STOPPED, "by the callback"
+                return _stopped(watch, StoppedBy.CALLBACK)
             if not np.isfinite(step.error):
                 return Outcome.NON_FINITE, ""
             if watch.iterations >= limit:
@@ -233,12 +266,13 @@ def _once(
                 return None
             if _content_too_early(watch, iterate, target):
                 return None
-            if len(watch.history) == EARLY and gains_energy(watch.problem):
+            if len(watch.history) == EARLY and watch.problem.gains_energy:
                 return Outcome.BREAKDOWN, "stopped early"
             if watch.cycled(iterate, step.error):
                 return Outcome.CYCLED, ""
             if watch.stagnated:
                 return Outcome.STAGNATED, ""
+            judged = watch.judgement(step, target.deadline)
         if watch.content:
             return None
         return Outcome.STAGNATED, "the method has nothing left to try"
@@ -253,6 +287,12 @@ def _once(
         return Outcome.NON_FINITE, str(reason)
 
 
+def _stopped(watch: Watch, by: StoppedBy, why: str = "") -> tuple[Outcome, str]:
+    """The end on request, noted with who asked for it."""
+    watch.stopped_by = by
+    return Outcome.STOPPED, f"{by.value}{why}"
+
+
 def _content_too_early(watch: Watch, iterate: Iterate, target: Target) -> bool:
     """True where a solver is content by the judge's error, but the criterion is another one.
 
@@ -265,25 +305,31 @@ def _content_too_early(watch: Watch, iterate: Iterate, target: Target) -> bool:
     return watch.content > CONTENT
 
 
-def _finish(watch: Watch, outcome: Outcome, detail: str, solver: Solver) -> FrictionSolution:
-    problem = watch.problem
-    best = watch.best if watch.best is not None else Iterate(no_reactions(problem))
-    measure = problem.measure if watch.best is not None else Measure.EXACT
+def _finish(
+    watch: Watch, whole: Problem, outcome: Outcome, detail: str, solver: Solver
+) -> FrictionSolution:
+    """The record and the best state; whole: the problem that was given, perhaps condensed."""
+    problem, told, best = watch.problem, watch.told, watch.best
+    measure = problem.measure if best is not None else Measure.EXACT
     natural = watch.criterion is Criterion.NATURAL
-    told = None if watch.told is None else watch.told[1]
-    if watch.told is not None and problem.form is Form.DELASSUS:
-        u, v = watch.told[0]
-    elif watch.best is None and problem.form is Form.GLOBAL:
-        u, v = at_rest(problem)  # stopped in the first factorisation: do not start it again
+    if told is not None and told.motion is not None and whole is problem and not problem.has_v:
+        of, r, (u, v) = whole, told.r, told.motion
+    elif best is None:  # stopped in the first factorisation: do not start it again
+        r = whole.start()[0]
+        of, u, v = whole.recover(r, np.zeros(whole.unknowns) if whole.has_v else None)
     else:
-        u, v = motion(problem, best.r, best.v if measure is not Measure.EXACT else None)
+        r = best.r
+        given = best.v if measure is not Measure.EXACT and problem.has_v else None
+        of, u, v = whole.recover(r, given)
     error, weakest = watch.error, watch.weakest
-    if weakest is None and watch.best is not None and not natural:
+    if weakest is None and best is not None and not natural:
         weakest = problem.weakest(best.r, best.v)
         if weakest is not None and weakest.hidden > BLUR * error:
             error = max(error, problem.certain_error(best.r, best.v))
-    if outcome not in (Outcome.CONVERGED, Outcome.STOPPED) and watch.best is not None:
-        detail = with_obstruction(problem, u, detail)
+    found = None
+    if outcome not in (Outcome.CONVERGED, Outcome.STOPPED) and best is not None:
+        found, text = problem.obstruction(u)
+        detail = "; ".join(part for part in (detail, text) if part)
     seconds = now() - watch.started
     record = Convergence(
         outcome,
@@ -301,34 +347,21 @@ def _finish(watch: Watch, outcome: Outcome, detail: str, solver: Solver) -> Fric
         weakest=None if weakest is None else weakest.contact,
         compiling=compiling() - watch.compiled,
         flops=watch.flops,
+        stopped_by=watch.stopped_by,
+        obstruction=found,
     )
-    return FrictionSolution(problem, best.r, u, v, record, settled=told)
-
-
-def _prepare(problem: FrictionProblem | NitscheProblem, deadline: Deadline) -> None:
-    """Form W where it judges, as far as time allows; raises TimeUp."""
-    if isinstance(problem, FrictionProblem):
-        problem.prepare(deadline)
-
-
-def _operations(problem: FrictionProblem | NitscheProblem) -> float:
-    """Of an iteration, roughly: some products with W, or a solve with M.
-
-    No Newton step, but those are few.
-    """
-    if problem.form is Form.DELASSUS:
-        return 100.0 * problem.blocks.data.size  # type: ignore[union-attr]
-    return 1000.0 * problem.unknowns
+    settled = None if told is None else told.settled
+    return FrictionSolution(of, r, u, v, record, settled=settled)
 
 
 def _check_stop(
-    problem: FrictionProblem | NitscheProblem, criterion: Criterion, patience: int | None
+    problem: Problem, criterion: Criterion, patience: int | None
 ) -> None:
     """Raise InvalidInput for what is no criterion or no number of iterates."""
     if not isinstance(criterion, Criterion):
         words = ", ".join(f"Criterion.{member.name}" for member in Criterion)
         raise InvalidInput(f"criterion: expected one of {words}, got {shown(criterion)}")
-    if criterion is not Criterion.JUDGE and not isinstance(problem, FrictionProblem):
+    if criterion is not Criterion.JUDGE and not problem.has_q:
         raise UnsupportedForm(
             f"criterion {criterion.value}: |F_nat(r)| / |q| needs a problem in r, with a q"
         )
@@ -340,7 +373,7 @@ def _check_stop(
 
 
 def _check_number(name: str, value: object) -> None:
-    if not isinstance(value, int | float | np.number) or isinstance(value, bool):
+    if not isinstance(value, NUMBERS) or isinstance(value, bool):
         raise InvalidInput(f"{name}: expected a number, got {shown(value)}")
     if isinstance(value, int) and value.bit_length() > 1000:  # more than a float can hold
         raise InvalidInput(f"{name}: expected a number that floats can hold, got a larger one")

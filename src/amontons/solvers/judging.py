@@ -8,18 +8,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.clock import compiling, now
-from ..problem.friction import FrictionProblem
-from ..problem.judge.measures import EPSILON, Criterion, Measure, Weakest
-from ..problem.law.cones import Coulomb
-from ..problem.nitsche import NitscheProblem
-from ..problem.settling import Motion, Settled, motion, settled, settled_exactly
-from ..problem.solution import Step
-from .contract import Iterate, natural_error_of
+from ..core.clock import Deadline, compiling, now
+from ..problem.judge.measures import EPSILON, Criterion, Weakest
+from ..problem.law.law import MU
+from ..problem.protocol import Problem
+from ..problem.settling import Accepted
+from ..problem.solution import Step, StoppedBy
+from .contract import Iterate, Judgement
 from .first_iterate import own_motion
 
 Array = NDArray[np.float64]
-Taken = Callable[[FrictionProblem | NitscheProblem, Iterate], Iterate]
+Taken = Callable[[Problem, Iterate], Iterate]
 MEMORY = 64  # iterates among which a repetition counts as a cycle
 AT_REST = 1e-10  # relative change of r below which an iterate has not moved
 PATIENCE = 500  # iterates without any progress before a solve counts as stagnated
@@ -33,7 +32,7 @@ TIGHTER = 0.3  # goal of a second start, relative to what would just do
 class Watch:
     """The driver's memory of one solve."""
 
-    problem: FrictionProblem | NitscheProblem
+    problem: Problem
     tolerance: float
     contact_tolerance: float
     criterion: Criterion = Criterion.JUDGE
@@ -42,9 +41,10 @@ class Watch:
     started: float = field(default_factory=now)
     compiled: float = field(default_factory=compiling)  # until then
     best: Iterate | None = None
-    told: tuple[Motion, Settled] | None = None  # of the best iterate where it is good enough
+    told: Accepted | None = None  # of the best iterate where it is good enough
     error: float = np.inf
     weakest: Weakest | None = None  # contact of the best iterate, once its error will do
+    last: Weakest | None = None  # that of the last iterate
     iterations: int = 0
     linear_iterations: int = 0
     flops: float | None = 0.0  # None from the first iterate on that does not count its own
@@ -53,16 +53,20 @@ class Watch:
     content: int = 0  # iterates in a row that the judge would take, but not the criterion
     blurred: int = 0  # iterates whose error rounding hides
     mark: tuple[int, float] = (0, np.inf)  # iterate and error of the last real progress
+    stopped_by: StoppedBy | None = None  # who has asked for the end
 
     def judge(self, iterate: Iterate) -> Step:
         """Judge an iterate and remember it if it is the best."""
         iterate = self.taken(self.problem, iterate)
         if self.criterion is Criterion.NATURAL:
-            error = natural_error_of(self.problem, iterate.r, iterate.v)  # type: ignore[arg-type]
+            error = self.problem.natural_error(iterate.r, iterate.v)
             return self._noted(iterate, error, None, None)
         error, weakest, told = self.problem.error(iterate.r, iterate.v), None, None
         if error <= self.tolerance:
-            iterate, error, weakest, told = self._settled(iterate, error)
+            told = self.problem.accepted(iterate.r, iterate.v, error, self.tolerance)
+            error, weakest = told.error, told.weakest
+            if told.r is not iterate.r:
+                iterate = replace(iterate, r=told.r, v=told.v)
         if weakest is not None and weakest.hidden > BLUR * self.tolerance:
             error = self.problem.certain_error(iterate.r, iterate.v)
             if error > self.tolerance:
@@ -70,33 +74,9 @@ class Watch:
                 self.blurred += 1
         return self._noted(iterate, error, weakest, told)
 
-    def _settled(
-        self, iterate: Iterate, error: float
-    ) -> tuple[Iterate, float, Weakest | None, tuple[Motion, Settled] | None]:
-        """An iterate whose error will do, with reactions that keep to their statuses."""
-        problem = self.problem
-        if isinstance(problem, NitscheProblem):
-            return iterate, error, problem.weakest(iterate.r, iterate.v), None
-        if problem.measure is Measure.EXACT:
-            u, told, own, weakest = settled_exactly(problem.condensed(), iterate.r)
-            if told.changed:  # its motion is found again
-                iterate, error = replace(iterate, r=told.r, v=None), own
-            weakest = weakest if error <= self.tolerance else None
-            return iterate, error, weakest, ((u, None), told)
-        v = iterate.v
-        moved, told = settled(
-            problem.law, problem.rho, iterate.r, lambda r: motion(problem, r, v)
-        )
-        if told.r is not iterate.r:
-            iterate = replace(iterate, r=told.r)
-            error = problem.error(iterate.r, v)
-        if error > self.tolerance:
-            return iterate, error, None, (moved, told)
-        return iterate, error, problem.weakest(iterate.r, v), (moved, told)
-
     def _noted(
         self, iterate: Iterate, error: float, weakest: Weakest | None,
-        told: tuple[Motion, Settled] | None,
+        told: Accepted | None,
     ) -> Step:  # fmt: skip
         """The line of the history about an iterate that has been judged."""
         self.iterations += iterate.iterations
@@ -107,6 +87,7 @@ class Watch:
             self.iterations, error, self.linear_iterations, seconds, iterate.sets, self.flops
         )
         self.history.append(step)
+        self.last = weakest
         if self.best is None or self._better(error, weakest):
             self.best, self.error, self.weakest = iterate, error, weakest
             self.told = told
@@ -114,13 +95,15 @@ class Watch:
             self.mark = (len(self.history), error)
         return step
 
+    def judgement(self, step: Step, deadline: Deadline) -> Judgement:
+        """What a solver is told of its last iterate."""
+        return Judgement(step.error, None if self.last is None else self.last.error, deadline)
+
     def _counted(self, iterate: Iterate) -> float | None:
         """Floating point operations so far, judgements among them; None if not counted."""
         if self.flops is None or (iterate.flops is None and iterate.iterations):
             return None
-        p = self.problem
-        judged = p.judge_flops if isinstance(p, FrictionProblem) else 0.0
-        return self.flops + (iterate.flops or 0.0) + judged
+        return self.flops + (iterate.flops or 0.0) + self.problem.judge_flops
 
     def _better(self, error: float, weakest: Weakest | None) -> bool:
         """True for an error below the best; of those that will do, for the better contacts."""
@@ -146,8 +129,7 @@ class Watch:
             return ""
         if self.best is not None and not self.converged:
             hidden = self.problem.rounding(self.best.r)
-            law = self.problem.law
-            mu = law.mu.max(initial=0.0) if isinstance(law, Coulomb) else 0.0
+            mu = self.problem.law.parameters[:, MU].max(initial=0.0)
             if mu * EPSILON > self.tolerance:
                 return (
                     f"rounding of the slip, times friction of {mu:.0e}, is above the "
@@ -179,7 +161,11 @@ class Watch:
 
         One that hardly moves does not come back: its method may wait for something else.
         """
-        same = [self._repeats(iterate, error, *old) for old in self.seen]
+        near = 1e-12 * error
+        same = [
+            not abs(old_error - error) > near and self._repeats(iterate, old)
+            for old_error, old in self.seen
+        ]
         self.seen.append((error, iterate.r))
         del self.seen[:-MEMORY]
         if not any(same) or same[-1]:
@@ -188,9 +174,7 @@ class Watch:
         return bool(moved > AT_REST * np.abs(iterate.r).max(initial=0.0))
 
     @staticmethod
-    def _repeats(iterate: Iterate, error: float, old_error: float, old: Array) -> bool:
-        if abs(old_error - error) > 1e-12 * error:
-            return False
+    def _repeats(iterate: Iterate, old: Array) -> bool:
         size = np.abs(iterate.r).max(initial=0.0)
         return bool(np.abs(old - iterate.r).max(initial=0.0) <= 1e-13 * size)
 

@@ -2,6 +2,7 @@
 
 import json
 from fractions import Fraction
+from itertools import product
 
 import numpy as np
 import pytest
@@ -12,7 +13,9 @@ from amontons.analysis.certificates.critical_friction import critical_friction
 from amontons.analysis.certificates.determinant_search import NEGATIVE, POSITIVE, UNKNOWN
 from amontons.analysis.certificates.energy_bound import energy_bound
 from amontons.analysis.certificates.exact_threshold import first_failure
+from amontons.analysis.certificates.status_pieces import Pieces
 from amontons.analysis.multipliers.rounding import determinant_sign, is_positive_definite
+from amontons.analysis.statuses import FREE, MINUS, PLUS, STICK
 from amontons.core.errors import InvalidInput, UnsupportedForm
 from amontons.mechanics.ready.gallery import box_tower, one_contact_2d
 from amontons.mechanics.ready.hild import hild_triangle, mesh_of_triangle
@@ -163,6 +166,17 @@ def test_contacts_that_can_not_react_are_left_out():
     found = critical_friction(am.FrictionProblem.from_delassus(W, np.ones((2, 2)), [1.0, 0.5]))
     assert found.upper == pytest.approx(2.5)  # t 0.5 = 1.25
     assert found.witness.pattern == "f-"
+
+
+def test_a_contact_without_friction_does_not_stick():
+    # if it could, a pattern would be singular at half of this friction
+    A = np.random.default_rng(1).standard_normal((4, 5))
+    problem = am.FrictionProblem.from_delassus(A @ A.T / 4, np.ones((2, 2)), [1.0, 0.0])
+    pieces = Pieces.of(problem)
+    patterns = product((FREE, PLUS, MINUS, STICK), (FREE, PLUS))
+    found = [pieces.threshold(np.array(states)) for states in patterns]
+    least = min(answer[0] for answer in found if answer is not None)
+    assert critical_friction(problem).upper == pytest.approx(least)
 
 
 def test_singular_w_has_no_safe_friction():

@@ -120,16 +120,16 @@ def test_the_checker_refuses_wrong_proofs():
 
 
 def test_no_proof_for_one_solution_of_several():
+    from amontons.analysis.scaled import Scaled
     from amontons.analysis.solutions.discs.multipliers import BoxProblem
-    from amontons.analysis.solutions.newton_batch import Stack
-
+    
     W, q, mu = random_problem_3d(12)
     problem = am.FrictionProblem.from_delassus(W, q, mu)
-    stack = Stack.of(problem)
+    scaled = Scaled.of(problem)
     solutions = am.multistart(problem, starts=200).solutions
     assert len(solutions) == 9
     for solution in solutions[:2]:
-        answer = BoxProblem(stack, [Region()] * 2, solution.r / stack.to_r).solve()
+        answer = BoxProblem(scaled, [Region()] * 2, solution.r / scaled.to_r).solve()
         assert answer.proof is None
 
 

@@ -13,10 +13,9 @@ from click.testing import CliRunner
 
 import amontons as am
 from amontons.analysis.certificates.uniqueness import Verdict
-from amontons.analysis.multipliers.scales import load_shares, resolves
+from amontons.analysis.scaled import Scaled
 from amontons.analysis.solutions.existence import exist
 from amontons.analysis.solutions.multistart import Finder
-from amontons.analysis.solutions.newton_batch import Stack
 from amontons.app.cli import main
 from amontons.core.errors import AmontonsError
 from amontons.mechanics.ready.gallery import one_contact_2d
@@ -90,6 +89,16 @@ def test_the_load_of_a_contact_is_what_is_left_of_its_terms():
     assert load_shares(lone, np.array([[1.0, 0.0], [0.0, 0.0]]))[0][1] == np.inf
 
 
+def load_shares(problem, r):
+    scaled = Scaled.of(problem)
+    return scaled.load_shares(r / scaled.to_r)
+
+
+def resolves(problem, r):
+    scaled = Scaled.of(problem)
+    return scaled.resolves(r / scaled.to_r)
+
+
 def test_a_border_that_hides_no_other_solution_is_one():
     # r_T = mu r_N and u_T = 0 up to rounding: stick and slip, both with positive determinants
     W = np.array([[2.0, 0.3], [0.3, 1.0]])
@@ -114,9 +123,9 @@ def test_a_fold_is_not_called_one_solution():
 
 def test_orientations_that_do_not_add_up_are_told(monkeypatch):
     monkeypatch.setattr(Finder, "_connected", lambda *_: False)
-    finder = Finder(Stack.of(one_contact_2d(2.0)), np.random.default_rng(0), 1e-8)
+    finder = Finder(Scaled.of(one_contact_2d(2.0)), np.random.default_rng(0), 1e-8)
     for solution in am.all_solutions(one_contact_2d(2.0)).solutions[:2]:
-        finder.add(solution.r / finder.stack.to_r)
+        finder.add(solution.r / finder.scaled.to_r)
     assert finder.lacks_one
     assert "one is missing" in finder.reason(2)
 

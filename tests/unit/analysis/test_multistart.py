@@ -5,8 +5,9 @@ import pytest
 from brute_force_3d import random_problem_3d, solutions_by_brute_force
 
 import amontons as am
+from amontons.analysis.scaled import Scaled
 from amontons.analysis.solutions.multistart import multistart
-from amontons.analysis.solutions.newton_batch import Stack, deflation
+from amontons.analysis.solutions.newton_batch import deflation
 from amontons.mechanics.ready.gallery import one_contact_2d, random_delassus
 from amontons.mechanics.ready.hild import hild_triangle
 
@@ -135,10 +136,10 @@ def test_a_deflated_step_turns_away_from_a_known_solution():
 
 def test_a_scaled_problem_gives_velocities_in_its_units():
     problem = random_delassus(3, 4, 3)
-    stack = Stack.of(problem)
+    scaled = Scaled.of(problem)
     r = np.random.default_rng(0).standard_normal((4, 3))
-    u = stack.velocity(r[None])[0] * stack.to_u
-    assert u == pytest.approx(problem.velocity(r * stack.to_r)[0])
+    u = scaled.velocity(r[None])[0] * scaled.to_u
+    assert u == pytest.approx(problem.velocity(r * scaled.to_r)[0])
 
 
 def test_the_same_seed_gives_the_same_list():

@@ -156,15 +156,17 @@ PARTS = {  # what is added to the case, and the key that the message must name
     "supports clash": ('[[fix]]\non = "left"\nvalue = [0, 0.5]', "fix[1].value"),
     "all fixed": ('[[fix]]\non = "bottom"\nvalue = [0, 0]', "contact"),
     "traction": ('[[traction]]\non = "left"\nvalue = [0, "log(x - 1)"]', "traction[0].value"),
+    "no large deformation": ('[[traction]]\non = "left"\nvalue = [0, 1]\n'
+                             'configuration = "current"', "traction[0].configuration"),
     "second force": ("[[body_force]]\nvalue = [0, 1]\n[[body_force]]\nvalue = [0, '1/y']",
                      "body_force[1].value"),
     "force region": ('[[body_force]]\nvalue = [0, 1]\nregion = "foo"', "body_force[0].region"),
     "second friction": ('[[contact]]\nslave = "right"\nfriction = { coulomb = "0.5 - y" }\n'
                         "obstacle = { plane = { point = [2, 0], normal = [-1, 0] } }",
                         "contact[1].friction.coulomb"),
-    "second law": ('[[contact]]\nslave = "right"\nfriction = { tresca = 1 }\n'
+    "second law": ('[[contact]]\nslave = "right"\nfriction = { tresca = 1, cap = 2 }\n'
                    "obstacle = { plane = { point = [2, 0], normal = [-1, 0] } }",
-                   "contact[1].friction"),
+                   "contact[1].friction.cap"),
     "pushed": ('[[contact]]\nslave = "right"\nfriction = { coulomb = 1 }\n'
                "obstacle = { plane = { point = [1, 0], normal = [-1, 0] } }", "contact[1]"),
 }  # fmt: skip

@@ -174,6 +174,16 @@ def test_broken_walls_are_refused(setting, words, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+def test_an_error_in_a_later_step_names_its_key(tmp_path):
+    (tmp_path / "case.toml").write_text(
+        BLOCK.replace("-0.02*min(1, 2*t)", "-0.02 + 0*log(0.6 - t)")
+    )
+    result = run(tmp_path / "case.toml", "-o", tmp_path / "out")
+    assert result.exit_code == 2, result.output
+    assert "case.toml: fix[0].value: " in result.stderr
+    assert (tmp_path / "out" / "state.h5").exists()  # of the step before
+
+
 def test_run_needs_an_evolution_and_a_state(tmp_path):
     case = tmp_path / "case.toml"
     case.write_text(BLOCK.split("[evolution]")[0])

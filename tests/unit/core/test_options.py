@@ -11,7 +11,7 @@ import amontons as am
 from amontons import linear, solvers
 from amontons.core.errors import InvalidInput
 from amontons.core.options import alternatives, hints_of, is_enum, members_of, words
-from amontons.io.case.settings import in_words, make_solver
+from amontons.io.case.settings import make_solver
 from amontons.solvers import METHODS
 from amontons.solvers.contract import Iterate, Target
 
@@ -150,7 +150,11 @@ def test_a_word_is_the_algorithm_it_names():
     assert counts[0] == counts[1] < counts[2]
 
 
-def test_messages_speak_the_words_of_the_command_line():
-    with pytest.raises(InvalidInput) as caught:
+def test_messages_name_the_class_in_python_and_the_key_elsewhere():
+    words = r"^bound: .*got 'wrong' \(field of ActiveSet\)$"
+    with pytest.raises(InvalidInput, match=words) as caught:
         am.ActiveSet(bound="wrong")
-    assert in_words(str(caught.value)).endswith("got 'wrong' (field of active-set)")
+    assert caught.value.at == ("bound",)
+    with pytest.raises(InvalidInput, match=r"^solver\.bound: .*got 'wrong'$") as caught:
+        make_solver("active-set", {"bound": "wrong"})
+    assert caught.value.at == ("solver", "bound")

@@ -14,7 +14,7 @@ from amontons.mechanics.ready.gallery import (
     sphere_packing,
 )
 from amontons.problem.friction import Form, FrictionProblem
-from amontons.problem.law.cones import Tresca
+from amontons.problem.law import Tresca
 from amontons.solvers.driver import drive
 
 PROBLEMS = {

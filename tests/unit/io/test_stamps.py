@@ -14,12 +14,14 @@ from amontons.io.plots import (
     branch_figure,
     convergence_figure,
     energy_figure,
+    picture,
     series_figure,
     solutions_figure,
     status_figure,
     step_figure,
 )
 from amontons.mechanics.ready import gallery
+from amontons.mechanics.steps import Energies
 
 WORDS = "NOT CONVERGED"
 
@@ -106,6 +108,13 @@ def test_pictures_of_steps():
     stamp = failed.solution.convergence.stamp
     assert WORDS in words_of(energy_figure([1.0], [step.energies], note=stamp))
     assert WORDS not in words_of(energy_figure([1.0], [step.energies]))
+
+
+@pytest.mark.parametrize(("contact", "scale"), [(0.0, "linear"), (-1.0, "log")])
+def test_energies_without_any_work_are_drawn_without_a_warning(contact, scale):
+    figure = energy_figure([0.5], [Energies(contact=contact, loads=-contact)])
+    assert len(picture(figure)) > 1000
+    assert figure.axes[1].get_yscale() == scale
 
 
 def test_a_branch_that_is_cut_off():

@@ -116,9 +116,8 @@ def test_contact_needs_no_more_than_products_solves_and_some_rows(solver, monkey
     share = played(model, 0, 1, monkeypatch)
     K = Stored(share, np.arange(share.size), am.Petsc())
     twin = replace(model)
-    twin._shared["all"] = discretise(
-        model.bodies, model.supports, model.loads, model.contacts, K
-    )
+    parts = discretise(model.bodies, model.supports, model.loads, model.contacts, K)
+    twin._shared.put(discretise, (), parts)
     found = am.drive(twin.assemble(), solver, tolerance=1e-9)
     expected = am.drive(model.assemble(), tolerance=1e-9)
     assert found.converged

@@ -7,7 +7,7 @@ import pytest
 from scipy import sparse
 
 from amontons.core.errors import InvalidInput, MissingDependency, SingularOperator
-from amontons.linear import AlgebraicMultigrid, ConjugateGradient, Direct, direct
+from amontons.linear import Direct, GeometricMultigrid, direct
 from amontons.linear.direct import Backend
 from amontons.linear.small_blocks import LARGEST_BLOCK, block_diagonal_inverse
 
@@ -181,9 +181,9 @@ def test_direct_leaves_its_argument_alone():
 
 
 @pytest.mark.parametrize("with_modes", [False, True])
-def test_conjugate_gradients_with_algebraic_multigrid(with_modes):
+def test_conjugate_gradients_with_algebraic_levels(with_modes):
     A, modes = grid_elasticity(24)
-    solver = ConjugateGradient(AlgebraicMultigrid(block_size=2))
+    solver = GeometricMultigrid(dimension=2)
     factor = solver.factor(A, modes if with_modes else None)
     b = np.random.default_rng(1).standard_normal((A.shape[0], 2))
     x = factor.solve(b)
@@ -195,7 +195,7 @@ def test_conjugate_gradients_with_algebraic_multigrid(with_modes):
 
 def test_conjugate_gradients_say_when_they_fail():
     A, modes = grid_elasticity(12)
-    factor = ConjugateGradient(AlgebraicMultigrid(2), max_iterations=1).factor(A, modes)
+    factor = GeometricMultigrid(dimension=2, max_iterations=1).factor(A, modes)
     with pytest.raises(SingularOperator, match="1 iterations"):
         factor.solve(np.ones(A.shape[0]))
 
@@ -203,9 +203,9 @@ def test_conjugate_gradients_say_when_they_fail():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: ConjugateGradient(tolerance=0.0), "tolerance"),
-        (lambda: ConjugateGradient(max_iterations=0), "max_iterations"),
-        (lambda: AlgebraicMultigrid(block_size=0), "block_size"),
+        (lambda: GeometricMultigrid(tolerance=0.0), "tolerance"),
+        (lambda: GeometricMultigrid(max_iterations=0), "max_iterations"),
+        (lambda: GeometricMultigrid(dimension=1), "dimension"),
     ],
 )
 def test_options_are_checked(make, message):

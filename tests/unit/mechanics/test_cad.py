@@ -7,12 +7,16 @@ import sys
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from netgen.occ import Box, Compound, Cylinder, Glue, MoveTo, Sphere, X, Y, Z
 
 import amontons as am
 from amontons.app.cli import main
 from amontons.core.errors import FileFormatError, InvalidInput
 from amontons.mechanics.meshes.surfaces import facet_areas, nodal_normals
+
+occ = pytest.importorskip("netgen.occ")
+Box, Compound, Cylinder, Glue, MoveTo, Sphere, X, Y, Z = (
+    occ.Box, occ.Compound, occ.Cylinder, occ.Glue, occ.MoveTo, occ.Sphere, occ.X, occ.Y, occ.Z
+)
 
 CASE = """
 [mesh]

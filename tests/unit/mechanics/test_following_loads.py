@@ -6,7 +6,6 @@ from scipy.optimize import brentq
 from tangent_checker import checked_tangents
 
 import amontons as am
-from amontons.io.case.blame import key_of
 from amontons.mechanics.meshes import second_order
 from amontons.mechanics.model.large_deformation import large_deformation
 from amontons.mechanics.model.nodal_forces import NodalForces, nodal_forces
@@ -274,10 +273,10 @@ def test_case_files(tmp_path):
         with pytest.raises(am.AmontonsError, match=words):
             am.solve(am.read_case(path).model)
     path.write_text(CASE.replace("0.02 + 0.01*x", "1/(x-1)"))
-    broken = am.read_case(path).model
+    broken = am.read_case(path)
     with pytest.raises(am.InvalidInput) as reason:
-        am.solve(broken)
-    assert key_of(broken, reason.value) == "pressure[0].value"
+        am.solve(broken.model)
+    assert broken.key_of(reason.value.at) == "pressure[0].value"
 
 
 def test_what_can_not_be_is_said():

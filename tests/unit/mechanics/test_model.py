@@ -312,8 +312,7 @@ MESH2 = am.box((2, 1), (4, 2))
         ({"contacts": [am.Contact("bottom", FLOOR2, mu="much")]}, "expected numbers"),
         ({"contacts": [am.Contact("bottom", FLOOR2, mu=lambda x: x[0])]}, r"x\[:, 0\]"),
         ({"contacts": [am.Contact("bottom", FLOOR2, tresca=np.inf)]}, "finite"),
-        ({"contacts": [am.Contact("bottom", FLOOR2, mu=1),
-                       am.Contact("left", FLOOR2, tresca=1)]}, "one friction law"),
+        ({"contacts": [am.Contact("bottom", FLOOR2, mu=1, cap=np.inf)]}, "finite"),
         ({"load_factor": np.inf}, "load_factor"),
     ],
 )  # fmt: skip
@@ -330,6 +329,10 @@ def test_bad_models_are_rejected(change, words):
     [
         (lambda: am.Contact("bottom", FLOOR2), "either mu or tresca"),
         (lambda: am.Contact("bottom", FLOOR2, mu=1, tresca=1), "either mu or tresca"),
+        (lambda: am.Contact("bottom", FLOOR2, tresca=1, cap=1), "cap goes with mu"),
+        (lambda: am.Contact("bottom", FLOOR2, mu=1, law=am.Coulomb(1)), "got both"),
+        (lambda: am.Contact("bottom", FLOOR2, law=0.3), "law: expected Coulomb"),
+        (lambda: am.Contact("bottom", FLOOR2, mu=1, cohesion=-1), "cohesion on 'bottom'"),
         (lambda: am.Contact("bottom", mu=1), "obstacle or a master"),
         (lambda: am.Contact("bottom", "floor", mu=1), "Plane, Sphere or LevelSet"),
         (lambda: am.Contact("bottom", am.Plane, mu=1), "Plane, Sphere or LevelSet"),

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from amontons.core.errors import InvalidInput
+from amontons.problem.law import Coulomb, Tresca
 from amontons.problem.law.cones import (
-    Coulomb,
-    Tresca,
     natural_map,
     project_cone,
     project_cone_jacobian,

@@ -9,6 +9,8 @@ from amontons.linear.bodies import Bodies, BodyFactor
 from amontons.linear.multifrontal import Fronts
 from amontons.problem import matrices as global_matrices
 from amontons.problem.condensation import Condensation
+from amontons.solvers.auto import stages
+from amontons.solvers.auto import state as portfolio_state
 from amontons.solvers.contract import Iterate
 from amontons.solvers.newton import inexact
 from amontons.solvers.newton.joints import Joints
@@ -172,7 +174,7 @@ def test_joints_solve_the_newton_equation(wall):
     W = local.W.toarray()
     K = (B @ W.reshape(-1, 3, len(W))).reshape(W.shape)
     K += np.asarray(sparse.block_diag(list(A)).todense())
-    joints.kept = None  # of another law
+    joints.memory.kept = None  # of another law
     for scale in (1.0, 1e9):
         b = scale * random.standard_normal(local.q.shape)
         dr, count = joints.solve(A, B, b, 1e-4)
@@ -196,7 +198,7 @@ def test_inexact_newton_finds_the_solution_and_keeps_its_factor(wall):
     assert found.converged
     assert found.convergence.linear_iterations > 0
     np.testing.assert_allclose(found.r, exact.r, atol=1e-6 * abs(exact.r).max())
-    kept = Joints.of(local).kept
+    kept = Joints.of(local).memory.kept
     near = am.drive(local, am.InexactNewton(), tolerance=1e-10, start=Iterate(1.001 * exact.r))
     assert near.converged
     assert near.convergence.iterations <= 4
@@ -219,8 +221,8 @@ def test_parts_use_the_factor_of_the_whole(wall):
 def test_auto_takes_newton_on_walls(dim, work, name, monkeypatch):
     """Inexact, or exact where an LU in blocks is little work."""
     problem = one_step(dim, rows=4)
-    monkeypatch.setattr(inexact, "EXACT_WORK", work)
-    monkeypatch.setattr(inexact, "CHUNK", 5)  # sweeps alone would do on a wall so small
+    monkeypatch.setattr(portfolio_state, "EXACT_WORK", work)
+    monkeypatch.setattr(stages, "CHUNK", 5)  # sweeps alone would do on a wall so small
     monkeypatch.setattr(Joints, "newton_cost", lambda self, digits: 0.0)
     solution = am.drive(problem, tolerance=1e-9)
     assert solution.converged
@@ -229,7 +231,7 @@ def test_auto_takes_newton_on_walls(dim, work, name, monkeypatch):
 
 def test_where_newton_stalls_the_portfolio_goes_on(wall, monkeypatch):
     monkeypatch.setattr(Joints, "newton_cost", lambda self, digits: 0.0)
-    monkeypatch.setattr(inexact, "EXACT_WORK", 0)
+    monkeypatch.setattr(portfolio_state, "EXACT_WORK", 0)
     monkeypatch.setattr(inexact.InexactNewton, "iterates", lambda *_: iter(()))
     solution = am.drive(wall, tolerance=1e-8)
     assert solution.converged

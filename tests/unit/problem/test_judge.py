@@ -8,7 +8,7 @@ from amontons.core.errors import InvalidInput, UnsupportedForm
 from amontons.problem.friction import FrictionProblem
 from amontons.problem.judge import measures as judge
 from amontons.problem.judge.measures import Measure, scaled_residual
-from amontons.problem.law.cones import Coulomb, Tresca
+from amontons.problem.law import Coulomb, Tresca
 from amontons.solvers import GaussSeidel, Iterate
 from amontons.solvers.driver import drive, drive_from
 

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from amontons.problem.law.one_contact import OPEN, SLIP, STICK, solve_contact, solve_one
+from amontons.problem.law import Coulomb, Tresca
+from amontons.problem.law.single import solve_contact, solve_one
+from amontons.problem.law.states import OPEN, SLIP, STICK
 
 CASES = 10_000
 RELATIVE = 1e-10  # accepted violation of the law, relative to |b|
@@ -28,9 +30,11 @@ def random_contacts(seed, d, *, twist=0.0, cases=CASES):
 def run(A, b, coefficient, tresca=False, guess=None):
     """Reactions (cases, 3) and states (cases,) of the compiled solver."""
     guess = np.zeros((len(A), 2)) if guess is None else guess
-    found = np.array(
-        [solve_contact(A[k], *b[k], coefficient[k], tresca, *guess[k]) for k in range(len(A))]
-    )
+    law = (Tresca if tresca else Coulomb)(coefficient)
+    found = np.array([
+        solve_contact(A[k], *b[k], law.kind[k], law.parameters[k], *guess[k])
+        for k in range(len(A))
+    ])
     return found[:, :3], found[:, 3].astype(int)
 
 
@@ -320,7 +324,7 @@ def test_tresca(d):
 
 
 def test_tresca_of_an_open_contact_still_rubs():
-    r, u, state = solve_one(np.eye(3), [1.0, 3.0, 0.0], 2.0, tresca=True)
+    r, u, state = solve_one(np.eye(3), [1.0, 3.0, 0.0], Tresca([2.0]))
     assert state == OPEN
     np.testing.assert_allclose(r, [0, -2, 0])
     np.testing.assert_allclose(u, [1, 1, 0])
@@ -334,7 +338,7 @@ def test_tresca_without_a_bound_is_frictionless():
 
 
 def test_tresca_nothing_moves():
-    r, u, state = solve_one(np.diag([1.0, 0, 0]), [-1.0, 0, 0], 0.3, tresca=True)
+    r, u, state = solve_one(np.diag([1.0, 0, 0]), [-1.0, 0, 0], Tresca([0.3]))
     assert state == STICK
     np.testing.assert_allclose(r, [1, 0, 0])
     assert not u.any()

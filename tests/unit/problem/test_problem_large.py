@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import amontons as am
-from amontons.linear.krylov import KrylovFactor
+from amontons.linear.geometric import MultigridFactor
 from amontons.problem import matrices as global_matrices
 from amontons.solvers.driver import drive
 
@@ -25,7 +25,7 @@ def test_iterative_factor_gives_the_same_solution(model, monkeypatch):
     monkeypatch.setattr(global_matrices, "EXACT_WORK", 0)
     model = am.Model(model.bodies, model.supports, model.contacts)
     iterative = drive(model.assemble(), tolerance=1e-7)
-    assert isinstance(iterative.problem.factor(), KrylovFactor)
+    assert isinstance(iterative.problem.factor(), MultigridFactor)
     assert iterative.converged
     assert iterative.pattern == direct.pattern
     np.testing.assert_allclose(iterative.r, direct.r, atol=1e-5 * np.abs(direct.r).max())

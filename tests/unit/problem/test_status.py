@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from amontons.problem.friction import FrictionProblem
-from amontons.problem.law.cones import Tresca
+from amontons.problem.law import Tresca
 from amontons.problem.status import ContactStatus, classify
 from amontons.solvers import GaussSeidel
 from amontons.solvers.contract import Iterate

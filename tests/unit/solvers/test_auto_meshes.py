@@ -49,3 +49,17 @@ def test_another_method_follows_a_breakdown(problem, monkeypatch):
     assert solution.converged
     assert solution.convergence.detail != "contact multigrid"
     assert np.abs(solution.r - expected.r).max() < 1e-5 * np.abs(expected.r).max()
+
+
+def test_an_iterate_is_judged_once(problem, monkeypatch):
+    """`Auto` reads what the driver says of its iterates and evaluates nothing again."""
+    judged, error = [], type(problem).error
+
+    def counted(self, r, v=None):
+        if self is problem:
+            judged.append(r)
+        return error(self, r, v)
+
+    monkeypatch.setattr(type(problem), "error", counted)
+    found = drive(problem, tolerance=1e-30, max_iterations=20)
+    assert len(judged) == len(found.convergence.history) > 2

@@ -13,7 +13,7 @@ import amontons as am
 from amontons.core.errors import InvalidInput, UnsupportedForm
 from amontons.problem.friction import Form, FrictionProblem
 from amontons.problem.solution import Outcome
-from amontons.solvers import GaussSeidel
+from amontons.solvers import GaussSeidel, Hybrid
 from amontons.solvers.contract import Breakdown, Iterate
 from amontons.solvers.driver import PATIENCE, drive
 
@@ -249,3 +249,87 @@ def test_a_stale_v_of_the_start_is_not_returned():
     again = drive(problem, start=Iterate(solved.r.copy(), np.full(3, 7.0)))
     assert again.convergence.iterations == 0
     np.testing.assert_allclose(again.v, solved.v, atol=1e-12)
+
+
+@dataclass(frozen=True)
+class Listening:
+    """Yields r_N = 1 + offset for every offset and keeps what it is told of each."""
+
+    form: ClassVar[Form] = Form.DELASSUS
+    offsets: list = field(default_factory=list)
+    told: list = field(default_factory=list)
+
+    def iterates(self, problem, start, target):
+        for offset in self.offsets:
+            self.told.append((yield Iterate(SOLUTION + [[offset, 0, 0]])))
+
+
+@dataclass(frozen=True)
+class Plain:
+    """The same as an iterator that can not be told, or as a list."""
+
+    form: ClassVar[Form] = Form.DELASSUS
+    kind: type = iter
+
+    def iterates(self, problem, start, target):
+        return self.kind(Iterate(SOLUTION + [[offset, 0, 0]]) for offset in (0.5, 0.1, 0.0))
+
+
+def test_a_solver_is_told_of_every_iterate():
+    solver = Listening([0.5, 0.1, 1e-9, 0.2, 0.0])
+    found = drive(PROBLEM, solver, contact_tolerance=1e-12, time_limit=60)
+    history = found.convergence.history
+    assert [told.error for told in solver.told[:2]] == [step.error for step in history[1:3]]
+    assert all(told.contact_error is None for told in solver.told[:2])
+    assert all(0 < told.seconds_left <= 60 for told in solver.told)
+
+
+def test_a_solver_is_told_of_its_weakest_contact():
+    """A method with a rule of its own is asked on where the sum alone will do."""
+
+    @dataclass(frozen=True)
+    class Ruled(Listening):
+        def iterates(self, problem, start, target):
+            for offset in self.offsets:
+                near = Iterate(SOLUTION + [[offset, 0, 0]], ends="")
+                self.told.append((yield near))
+
+    solver = Ruled([0.5, 1e-9, 0.0])
+    drive(PROBLEM, solver, contact_tolerance=1e-12)
+    assert solver.told[0].contact_error is None
+    assert solver.told[1].error < 1e-8
+    assert 1e-12 < solver.told[1].contact_error < 1e-8
+
+
+@pytest.mark.parametrize("kind", [iter, list, tuple])
+@pytest.mark.parametrize("wrap", [False, True])
+def test_plain_iterators_work(kind, wrap):
+    solver = Hybrid(first=Plain(kind), main=Plain(kind)) if wrap else Plain(kind)
+    record = drive(PROBLEM, solver).convergence
+    assert record.outcome is Outcome.CONVERGED
+    assert record.iterations == (4 if wrap else 3)
+
+
+def test_the_parts_of_a_hybrid_are_told():
+    first, main = Listening([0.5, 0.4, 0.3]), Listening([0.2, 0.1, 0.0])
+    solver = Hybrid(first=first, main=main, iterates_of_first=2)
+    history = drive(PROBLEM, solver).convergence.history
+    assert [step.error for step in history[1:]] == [
+        PROBLEM.error(SOLUTION + [[offset, 0, 0]]) for offset in (0.5, 0.4, 0.2, 0.1, 0.0)
+    ]
+    assert [told.error for told in first.told] == [history[1].error]
+    assert [told.error for told in main.told] == [history[3].error, history[4].error]
+
+
+def test_the_main_part_of_a_hybrid_starts_where_the_first_ends():
+    starts = []
+
+    @dataclass(frozen=True)
+    class Noting(Listening):
+        def iterates(self, problem, start, target):
+            starts.append(start.r[0, 0])
+            yield from super().iterates(problem, start, target)
+
+    drive(PROBLEM, Hybrid(first=Listening([0.5, 0.3]), main=Noting([0.0]), iterates_of_first=2))
+    drive(PROBLEM, Hybrid(first=Listening([]), main=Noting([0.0])))
+    np.testing.assert_allclose(starts, [1.3, 0.0])

@@ -7,7 +7,7 @@ import pytest
 
 import amontons as am
 from amontons.mechanics.ready.gallery import random_delassus
-from amontons.problem.friction import JUDGE_FLOPS
+from amontons.problem.equations import JUDGE_FLOPS
 from amontons.solvers.contract import Iterate, Target
 from amontons.solvers.sweeps import kernels as sweeps
 from amontons.solvers.sweeps import local_contact

@@ -7,8 +7,8 @@ import amontons as am
 from amontons.core.errors import InvalidInput
 from amontons.mechanics.ready.gallery import random_delassus
 from amontons.problem.friction import FrictionProblem
-from amontons.problem.law.cones import Coulomb, Tresca
-from amontons.problem.law.one_contact import solve_one
+from amontons.problem.law import Coulomb, Tresca
+from amontons.problem.law.single import solve_one
 from amontons.solvers import GaussSeidel
 from amontons.solvers.contract import Iterate, Target
 from amontons.solvers.driver import drive
@@ -34,8 +34,7 @@ def sweep(problem, r):
         others[i] = 0
         b = np.zeros(3)
         b[:d] = problem.W[own] @ others.ravel() + problem.q[i]
-        tresca = isinstance(problem.law, Tresca)
-        r[i] = solve_one(A, b, problem.law.coefficient[i], tresca)[0][:d]
+        r[i] = solve_one(A, b, problem.law.at(np.array([i])))[0][:d]
     return r
 
 

@@ -7,6 +7,7 @@ from scipy import sparse
 import amontons as am
 from amontons.core.errors import InvalidInput, UnsupportedForm
 from amontons.mechanics.ready import gallery
+from amontons.problem.law import Coulomb, Tresca
 from amontons.problem.law.cones import project_cone, project_disk
 from amontons.solvers import Iterate, Target
 from amontons.solvers.gradient.accelerated import projected_step
@@ -39,7 +40,8 @@ def test_projected_step_is_the_projection_of_cones(d, tresca):
     else:
         x[:, 0] -= alpha * bound * np.linalg.norm(u[:, 1:], axis=1)
         expected = project_cone(x, bound)
-    found = projected_step(r, alpha, ahead, u, bound, tresca)
+    law = (Tresca if tresca else Coulomb)(bound)
+    found = projected_step(r, alpha, ahead, u, law.kind, law.parameters)
     assert found == pytest.approx(expected, abs=1e-14)
 
 

@@ -12,7 +12,7 @@ from amontons.linear import Direct
 from amontons.mechanics.ready import gallery
 from amontons.problem.friction import FrictionProblem
 from amontons.problem.judge import measures as judge
-from amontons.problem.law.cones import Coulomb, Tresca
+from amontons.problem.law import Coulomb, Tresca
 from amontons.solvers.augmentation import LARGEST_CONDITION, RhoStrategy, augmentation
 from amontons.solvers.contract import Iterate, Target
 from amontons.solvers.driver import drive
@@ -279,6 +279,13 @@ def test_contacts_without_bound_have_a_regular_row(function):
     np.testing.assert_array_equal(B[0], np.zeros((3, 3)))
     np.testing.assert_array_equal(A[1], np.diag([0, 1, 1]))  # closed without friction
     np.testing.assert_array_equal(B[1], np.diag([1, 0, 0]))
+
+
+def test_jean_moreau_knows_at_no_pressure_that_friction_comes_with_it():
+    r, u = np.zeros((1, 3)), np.array([[-1.0, 0.0, -2.0]])
+    _, A, _ = JeanMoreau().linearise(r, u, Coulomb(np.array([0.5])), np.ones(1))
+    np.testing.assert_allclose(A[0, 1:, 0], [0.0, -0.5])
+    np.testing.assert_array_equal(A[0, 1:, 1:], np.eye(2))
 
 
 def test_all_open_in_one_step_whatever_W():

@@ -18,10 +18,10 @@ from ...core.arrays import real
 from ...core.clock import Deadline
 from ...core.errors import InvalidInput, shown
 from ...problem.friction import Form, FrictionProblem
-from ...problem.nitsche import NitscheProblem
+from ...problem.protocol import Problem
 from ...problem.solution import FrictionSolution, Outcome
 from ...solvers import METHODS, Iterate
-from ...solvers.contract import Solver
+from ...solvers.contract import Solver, taken_by
 from ...solvers.driver import drive_from
 
 Array = NDArray[np.float64]
@@ -59,10 +59,25 @@ class Ended:
 class Runs(Protocol):
     """A method that can be studied."""
 
-    label: str  # one for each variant
-    method: str  # the same for all variants of one method
-    parameters: Mapping[str, Any]
-    within: float | None  # how near a solution is told by, where it is another than of others
+    @property
+    def label(self) -> str:
+        """One for each variant."""
+        ...
+
+    @property
+    def method(self) -> str:
+        """The same for all variants of one method."""
+        ...
+
+    @property
+    def parameters(self) -> Mapping[str, Any]:
+        """Values by name."""
+        ...
+
+    @property
+    def within(self) -> float | None:
+        """How near a solution is told by, where it is another than of others."""
+        ...
 
     def run(self, problem: FrictionProblem, start: Iterate, limits: RunLimits) -> Ended:
         """What becomes of a start."""
@@ -82,7 +97,7 @@ class BasinMethod:
     solver: Solver
     name: str = ""
     parameters: Mapping[str, Any] = field(default_factory=dict)
-    problem: FrictionProblem | NitscheProblem | None = None
+    problem: Problem | None = None
     reactions: ArrayLike | None = None
     within: float | None = None
 
@@ -108,7 +123,7 @@ class BasinMethod:
     def run(self, problem: FrictionProblem, start: Iterate, limits: RunLimits) -> Ended:
         """What becomes of a start."""
         own = self.problem if self.problem is not None else problem
-        if isinstance(own, FrictionProblem) and self.solver.form is Form.DELASSUS:
+        if isinstance(own, FrictionProblem) and taken_by(self.solver).form is Form.DELASSUS:
             own = own.condensed(limits.deadline)
         last: list[Iterate] = []
         found = drive_from(
@@ -120,20 +135,21 @@ class BasinMethod:
         return self._ended(problem, own, found, state)
 
     def _start(
-        self, problem: FrictionProblem, own: FrictionProblem | NitscheProblem, start: Iterate
+        self, problem: FrictionProblem, own: Problem, start: Iterate
     ) -> Iterate:
         """The start in the problem in which the method runs."""
         r, v = start.r, start.v
         if self.reactions is not None:
-            back = np.linalg.lstsq(real("reactions", self.reactions), r.ravel(), rcond=None)[0]
+            columns = real("reactions", self.reactions)
+            back: Any = np.linalg.lstsq(columns, r.ravel(), rcond=None)[0]
             r = back.reshape(own.contacts, -1)
         elif r.shape != (own.contacts, own.dimension):
             r = np.zeros((own.contacts, own.dimension))  # other points: only v leads there
             v = problem.velocity(start.r)[1] if v is None else v
-        return Iterate(r, v if own.form is not Form.DELASSUS else None)
+        return Iterate(r, v if own.has_v else None)
 
     def _ended(
-        self, problem: FrictionProblem, own: FrictionProblem | NitscheProblem,
+        self, problem: FrictionProblem, own: Problem,
         found: FrictionSolution, state: FrictionSolution | Iterate,
     ) -> Ended:  # fmt: skip
         r: Array | None = state.r
@@ -141,7 +157,7 @@ class BasinMethod:
             r = (real("reactions", self.reactions) @ state.r.ravel()).reshape(
                 problem.contacts, problem.dimension
             )
-        elif own.contacts != problem.contacts or own.form is Form.NITSCHE:
+        elif own.contacts != problem.contacts or not isinstance(own, FrictionProblem):
             r = None
         v = state.v if problem.form is Form.GLOBAL else None
         record = found.convergence

@@ -31,7 +31,7 @@ from scipy.sparse import linalg as sparse_linalg
 from ...core.arrays import real
 from ...core.errors import InvalidInput, UnsupportedForm, shown
 from ...problem.friction import Form, FrictionProblem
-from ...problem.law.cones import Tresca
+from ...problem.law import Tresca
 from ...solvers import Iterate
 from ...solvers.first_iterate import first_iterate
 from .solutions import KnownSolution

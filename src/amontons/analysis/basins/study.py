@@ -167,7 +167,7 @@ class StudyOptions:
             value, least = getattr(self, name), 0 if name == "seed" else 1
             whole = isinstance(value, int) and not isinstance(value, bool)
             if not (value is None and name == "max_iterations") and not (
-                whole and value >= least
+                whole and value is not None and value >= least
             ):
                 raise InvalidInput(f"{name}: expected a whole number >= {least}, got {value!r}")
         for name in ("tolerance", "within"):

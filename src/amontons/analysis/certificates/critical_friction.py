@@ -19,14 +19,17 @@ static and discrete friction problems", in [Rey] section 5.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.clock import NEVER, Deadline, TimeLimit, deadline_of, now
-from ...core.errors import InvalidInput, TimeUp
+from ...core.errors import InvalidInput, TimeUp, UnsupportedForm
 from ...problem.friction import FrictionProblem
-from .determinant_search import NEGATIVE, POSITIVE, STICK, STOPPED, UNKNOWN
+from ..scaled import Scaled
+from ..statuses import STICK
+from .determinant_search import NEGATIVE, POSITIVE, STOPPED, UNKNOWN
 from .energy_bound import energy_bound
 from .exact_threshold import LARGEST, Threshold, exact_threshold, search_windows
 from .friction_branching import Branching, Leaf
@@ -92,7 +95,7 @@ class CriticalFriction:
 
 
 def critical_friction(
-    problem: FrictionProblem, *, gap: float = 1e-2, time_limit: TimeLimit = None,
+    problem: FrictionProblem | Scaled, *, gap: float = 1e-2, time_limit: TimeLimit = None,
     first: float | None = None,
 ) -> CriticalFriction:  # fmt: skip
     """Bounds on the friction below which every load has exactly one solution.
@@ -103,6 +106,8 @@ def critical_friction(
     Tresca's law.
     """
     deadline = deadline_of(time_limit, SECONDS)
+    if problem.dimension != 2:
+        raise UnsupportedForm("critical friction: expected a 2D problem, this one is 3D")
     if not 0 < gap < 1:
         raise InvalidInput(f"gap: expected a number between 0 and 1, got {gap!r}")
     began = now()
@@ -270,7 +275,7 @@ def full_contact_threshold(pieces: Pieces, deadline: Deadline = NEVER) -> Thresh
     if pieces.contacts > FULL_CONTACT or np.linalg.cond(pieces.W) > 1e12:
         return None
     swap = np.arange(2 * pieces.contacts).reshape(-1, 2)[:, ::-1].ravel()
-    K = np.linalg.inv(pieces.W).T[np.ix_(swap, swap)]
+    K: Any = np.linalg.inv(pieces.W).T[np.ix_(swap, swap)]
     dual = Pieces(K, pieces.shape, pieces.scale, pieces.places, pieces.total)
     allowed = dual.allowed()
     allowed[:, STICK] = False

@@ -20,8 +20,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.compiled import njit
+from ..statuses import FREE, MINUS, PLUS, STICK, TANGENT
 
-FREE, SLIP_PLUS, SLIP_MINUS, STICK, TANGENT = range(5)
 POSITIVE, NEGATIVE, UNKNOWN, STOPPED = 1, -1, 0, 2
 EPSILON = float(np.finfo(float).eps)
 ROOM = 1.0 + 1e-9  # rounding within the bounds themselves
@@ -96,9 +96,9 @@ def _state_sign(S, B, state, m):
     """Sign of the pivot of the first contact in a state."""
     if state == FREE:
         return POSITIVE
-    if state == SLIP_PLUS:
+    if state == PLUS:
         return _slip_sign(S, B, m)
-    if state == SLIP_MINUS:
+    if state == MINUS:
         return _slip_sign(S, B, -m)
     if state == STICK:
         return _stick_sign(S, B)
@@ -119,7 +119,7 @@ def _enter_inplace(S, B, size, state, m, T, C, X, Y):
         _eliminate_inplace(S, B, size, 0, 0.0, T, C)
         _eliminate_inplace(T, C, size, 1, 0.0, X, Y)
     else:
-        _eliminate_inplace(S, B, size, 0, m if state == SLIP_PLUS else -m, X, Y)
+        _eliminate_inplace(S, B, size, 0, m if state == PLUS else -m, X, Y)
     for i in range(size - 2):
         for j in range(size - 2):
             T[i, j], C[i, j] = X[i + 2, j + 2], Y[i + 2, j + 2]
@@ -131,9 +131,10 @@ def search_inplace(m, allowed, S, B, work, turn, states, level, budget):
 
     S, B (n + 1, 2 n, 2 n): Schur complements and error bounds of all levels, S[0] = W given.
     work (2, 2 n, 2 n).  m (n,): friction.  allowed (n, 5): states that a contact may have.
-    turn (n,): next state to try, states (n,): the pattern so far.  NEGATIVE, UNKNOWN: the pivot
-    of the last state of `states[: level + 1]` is not positive, or not known to be.  STOPPED:
-    more than `budget` pivots were looked at, call again to go on.  POSITIVE: there is none.
+    turn (n,): next state to try, states (n,): the pattern so far.
+    NEGATIVE, UNKNOWN: the pivot of the last state of `states[: level + 1]` is not positive, or
+    not known to be.  STOPPED: more than `budget` pivots were looked at, call again to go on.
+    POSITIVE: there is none.
     """
     n = len(m)
     seen = 0

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.clock import NEVER, Deadline
+from ..statuses import FREE, States
 from . import determinant_search as search
-from .determinant_search import FREE, NEGATIVE, POSITIVE, STOPPED, UNKNOWN
-from .status_pieces import Pieces, States
+from .determinant_search import NEGATIVE, POSITIVE, STOPPED, UNKNOWN
+from .status_pieces import Pieces
 
 Array = NDArray[np.float64]
 LARGEST = 1e4  # friction up to which a threshold is looked for

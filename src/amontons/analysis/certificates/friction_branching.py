@@ -16,10 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.clock import Deadline
-from .determinant_search import FREE, POSITIVE, SLIP_MINUS, SLIP_PLUS, STICK, STOPPED, eliminate
+from ..statuses import FREE, States
+from .determinant_search import POSITIVE, STOPPED, eliminate
 from .exact_threshold import first_failure
-from .pair_multipliers import FEW, PairMultipliers, find_pair_multipliers, proves
-from .status_pieces import Pieces, States
+from .pair_multipliers import FEW, STATES, PairMultipliers, find_pair_multipliers, proves
+from .status_pieces import Pieces
 
 Array = NDArray[np.float64]
 Places = NDArray[np.int64]
@@ -156,13 +157,14 @@ class Branching:
         self, rest: Rest, p: int, order: NDArray[np.int64]
     ) -> Iterator[tuple[int, int, Rest]]:
         """(state, sign of its pivot, what is then left) for the contact at place p."""
+        assert rest.undecided is not None
         k = len(rest.contacts)
-        first = np.concatenate([[p], np.delete(np.arange(k), p)])
+        first = np.concatenate([[p], np.delete(np.arange(k), p)]).astype(np.int64)
         rows = (2 * first[:, None] + [0, 1]).ravel()
-        S, rounding = rest.S[np.ix_(rows, rows)], rest.rounding[np.ix_(rows, rows)]
+        S, rounding = rest.S[rows[:, None], rows], rest.rounding[rows[:, None], rows]
         contact = int(rest.contacts[p])
         others = np.delete(rest.contacts, p)
-        for state in np.array([FREE, SLIP_PLUS, SLIP_MINUS, STICK])[order]:
+        for state in np.array(STATES)[order]:
             if self.allowed[contact, state]:
                 self.deadline.spend(50.0 * (2 * k) ** 2)
                 sign, T, C = eliminate(S, rounding, state, self.m[contact])

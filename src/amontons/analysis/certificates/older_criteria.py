@@ -54,7 +54,7 @@ from .critical_friction import (
 )
 from .disc_criteria import Criterion, Found, disc_threshold
 from .exact_threshold import CLOSE, LARGEST, Threshold
-from .status_pieces import REAL, Pieces, reacting
+from .status_pieces import REAL, Pieces
 
 Array = NDArray[np.float64]
 Ask = Callable[[Array, Array, float, Deadline], Found]
@@ -152,8 +152,9 @@ def _spatial(
     if problem.dimension != 3:
         raise UnsupportedForm("critical friction: expected a 3D problem, this one is 2D")
     _check_size(problem, most)
+    part = None
     try:
-        part = reacting(problem, deadline)
+        part = Pieces.of(problem, deadline)
         W = part.W
         if W.size and not np.linalg.cond(W) < SINGULAR:
             found = Found(reason="W is singular: reactions are not unique without friction too")
@@ -163,7 +164,9 @@ def _spatial(
             found = ask(W, part.shape, gap, deadline)
     except TimeUp as reason:
         found = Found(reason=str(reason))
-    difference = None if found.difference is None else part.reaction(found.difference)
+    difference = None
+    if part is not None and found.difference is not None:
+        difference = part.reaction(found.difference)
     return CriterionFriction(found.lower, found.upper, difference, found.examined,
                              now() - began, found.reason)  # fmt: skip
 
@@ -223,12 +226,15 @@ def _planar(
     """All determinants, as `critical_friction` has them."""
     deadline, began = deadline_of(time_limit, SECONDS), now()
     _check_size(problem, most)
+    pieces = None
     try:
         pieces = Pieces.of(problem, deadline)
         found = ask(pieces, deadline) if pieces.contacts else _nothing_reacts()
     except TimeUp as reason:
         found = Found(reason=str(reason))
-    difference = None if found.difference is None else pieces.reaction(found.difference)
+    difference = None
+    if pieces is not None and found.difference is not None:
+        difference = pieces.reaction(found.difference)
     return CriterionFriction(found.lower, found.upper, difference, found.examined,
                              now() - began, found.reason)  # fmt: skip
 

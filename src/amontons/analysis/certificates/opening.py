@@ -48,7 +48,7 @@ from ...core.errors import InvalidInput, SingularOperator, TimeUp
 from ...linear.dense import dense
 from ...problem.friction import Form, FrictionProblem
 from ...problem.indefinite import negative_direction
-from ...problem.law.cones import Coulomb
+from ...problem.law import Coulomb, Tresca
 from .opening_program import Cones, iterates
 
 Array = NDArray[np.float64]
@@ -124,6 +124,8 @@ def _undecided(reason: str) -> Opening:
 def _assess(problem: FrictionProblem, deadline: Deadline) -> Opening:
     if not problem.contacts:
         return Opening(Existence.ASSURED, "There is no contact.")
+    if not isinstance(problem.law, Coulomb | Tresca):
+        return _undecided(f"Nothing is proved here of {problem.law.name}.")
     doubt = _unfit(problem)
     system = _System.of(problem, deadline)
     if system is None:
@@ -139,6 +141,7 @@ def _unfit(problem: FrictionProblem) -> str:
     """Why the theorem says nothing of this M or W, "" if it does."""
     A = problem.M if problem.form is Form.GLOBAL else problem.W
     name = "M" if problem.form is Form.GLOBAL else "W"
+    assert A is not None
     size = abs(A).max() if sparse.issparse(A) or isinstance(A, np.ndarray) else 0.0
     if size and abs(A - A.T).max() > SYMMETRIC * size:
         return f"{name} is not symmetric, and the theorem needs that"
@@ -181,7 +184,7 @@ class _System:
     def of(cls, problem: FrictionProblem, deadline: Deadline) -> _System | None:
         """None where W is not positive semidefinite."""
         is_coulomb = isinstance(problem.law, Coulomb)
-        mu = problem.law.coefficient if is_coulomb else np.zeros(problem.contacts)
+        mu = problem.law.mu if is_coulomb else np.zeros(problem.contacts)
         if problem.form is Form.GLOBAL:
             assert problem.H is not None and problem.w is not None
             return cls(sparse.csc_array(problem.H), problem.w, mu)

@@ -164,7 +164,7 @@ def iterates(
 
     e (m,): positive along the axes of some cones, else zero.  Raises TimeUp.
     """
-    n, m = matrix.shape
+    n, m = matrix.shape  # type: ignore[misc]  # scipy: may be None
     is_full = matrix.nnz > FULL * n * m and n <= DENSE
     A = matrix.toarray() if is_full else matrix
     unit = cones.identity(m)
@@ -184,6 +184,7 @@ def iterates(
         off, miss, left = A.T @ z - lam * e - y, A @ x - z, 1.0 - float(e @ x)
         mean = float(x @ y) / cones.count
         sigma, corrector, length = 0.0, np.zeros(m), 0.0
+        dx, dy, dz, d_lam = x, y, z, lam
         for phase in range(2):
             keep = 1.0 - sigma
             goal = sigma * mean * unit - cones.product(lamda, lamda) - corrector
@@ -222,7 +223,7 @@ def _factor(N: sparse.csr_array | Array) -> Solve | None:
 
 def _cost(A: sparse.csr_array, is_full: bool) -> float:
     """Operations of a step, roughly."""
-    n, m = A.shape
+    n, m = A.shape  # type: ignore[misc]  # scipy: may be None
     dense = float(n) ** 3 / 3
     product = 2.0 * n * n * m if is_full else 40.0 * A.nnz
     return product + (dense if n <= DENSE else min(dense, 30.0 * float(n) ** 2))

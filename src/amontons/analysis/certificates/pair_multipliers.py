@@ -38,10 +38,11 @@ from ..multipliers.lmi import (
     slacks_are_positive,
 )
 from ..multipliers.rounding import EPSILON, is_positive_definite
+from ..statuses import FREE, MINUS, PLUS, STICK
 
 Array = NDArray[np.float64]
 Pairs = NDArray[np.int64]
-STATES = 4  # free, slip+, slip-, stick, as in determinant_search
+STATES = (FREE, PLUS, MINUS, STICK)  # in this order
 HOPELESS = 3e-3  # eigenvalue of M below which the search ends, the mean of all being 1
 ORIENTED = (1, -1, -1)  # sign of det(-stick Q b) for b = free, slip+, slip- in `state_planes`
 FEW = 16  # contacts that are all paired
@@ -74,7 +75,7 @@ class PairMultipliers:
 
 def state_planes(m: Array) -> Array:
     """Planes of z in the states free, slip+, slip-, stick of every contact, (k, 4, 4, 2)."""
-    planes = np.zeros((len(m), STATES, 4, 2))
+    planes = np.zeros((len(m), len(STATES), 4, 2))
     planes[:, 0, 2, 0] = planes[:, 0, 3, 1] = 1.0
     planes[:, 1:3, 0, 0] = planes[:, 1:3, 3, 1] = 1.0
     planes[:, 1, 1, 0], planes[:, 2, 1, 0] = m, -m
@@ -108,8 +109,8 @@ def pair_family(pairs: Pairs, m: Array) -> Family:
     planes = state_planes(m)
     owner = np.arange(len(pairs))
     slacks = []
-    for a in range(STATES):
-        for b in range(STATES):
+    for a in range(len(STATES)):
+        for b in range(len(STATES)):
             G = np.zeros((len(pairs), 8, 4))
             G[:, :4, :2], G[:, 4:, 2:] = planes[pairs[:, 0], a], planes[pairs[:, 1], b]
             slacks.append(Slacks(owner, restricted(G)))
@@ -120,7 +121,7 @@ def single_family(singles: NDArray[np.int64], m: Array) -> Family:
     """The matrix inequalities -W_p > 0 on all states of single contacts."""
     planes = state_planes(m)
     owner = np.arange(len(singles))
-    slacks = tuple(Slacks(owner, restricted(planes[singles, a])) for a in range(STATES))
+    slacks = tuple(Slacks(owner, restricted(planes[singles, a])) for a in range(len(STATES)))
     return Family(single_rows(singles), slacks, np.zeros(0))
 
 
@@ -156,7 +157,7 @@ def find_pair_multipliers(
     answer = find_multipliers(_stacked(T, S @ T), families, accept=accept,
                               time_limit=time_limit, smallest=HOPELESS)  # fmt: skip
     if answer.outcome is LmiOutcome.FOUND:
-        return multipliers(answer.W), np.zeros((k, STATES))
+        return multipliers(answer.W), np.zeros((k, len(STATES)))
     return None, _weights(answer, pairs, singles, k)
 
 
@@ -227,13 +228,13 @@ def _weights(
     answer: Multipliers, pairs: Pairs, singles: NDArray[np.int64], contacts: int
 ) -> Array:
     """Traces of the dual moments by contact and state, (k, 4)."""
-    weights = np.zeros((contacts, STATES))
+    weights = np.zeros((contacts, len(STATES)))
     moments = list(answer.moments[1:])
     if not moments:  # no time for a single step
         return weights
     if len(pairs):
-        for a in range(STATES):
-            for b in range(STATES):
+        for a in range(len(STATES)):
+            for b in range(len(STATES)):
                 diagonal = np.diagonal(moments.pop(0), axis1=1, axis2=2)
                 np.add.at(weights[:, a], pairs[:, 0], diagonal[:, :2].sum(axis=1))
                 np.add.at(weights[:, b], pairs[:, 1], diagonal[:, 2:].sum(axis=1))

@@ -14,31 +14,28 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.clock import NEVER, Deadline
-from ...core.errors import InvalidInput, UnsupportedForm
-from ...linear.dense import dense
+from ...core.errors import InvalidInput
 from ...problem.friction import FrictionProblem
 from ..multipliers.rounding import EPSILON, determinant_sign
-from .determinant_search import FREE, SLIP_MINUS, SLIP_PLUS, STICK, TANGENT
+from ..scaled import Scaled
+from ..statuses import FREE, MINUS, PLUS, STICK, TANGENT, States, word
 
 Array = NDArray[np.float64]
-States = NDArray[np.int64]
-LETTERS = np.array(["f", "+", "-", "s", "t"])
 REAL = 1e-7  # imaginary part of an eigenvalue that counts as real, relative
 
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """W (2 k, 2 k) and the shape (k,) of friction of the contacts that react.
+    """W (d k, d k) and the shape (k,) of friction of the contacts that react.
 
-    scale (2 k,): powers of two, reactions are r scale and velocities u / scale here, so that
+    scale (d k,): powers of two, reactions are r scale and velocities u / scale here, so that
     the diagonal blocks have size one and W is still exact.  places (k,): the contacts in the
-    problem, which has `total`.
+    problem, which has `total`.  In 3D there are no linear pieces; the rest is as in 2D.
     """
 
     W: Array
@@ -48,11 +45,14 @@ class Pieces:
     total: int
 
     @classmethod
-    def of(cls, problem: FrictionProblem, deadline: Deadline = NEVER) -> Pieces:
-        """The pieces of a 2D Coulomb problem; raises UnsupportedForm for any other."""
-        if problem.dimension != 2:
-            raise UnsupportedForm("critical friction: expected a 2D problem, this one is 3D")
-        return cls(*reacting(problem, deadline))
+    def of(cls, problem: FrictionProblem | Scaled, deadline: Deadline = NEVER) -> Pieces:
+        """The contacts of a Coulomb problem that react; the global form is condensed."""
+        scaled = Scaled.of(problem, deadline)
+        d, places = scaled.dimension, np.flatnonzero(scaled.reacts)
+        rows = (d * places[:, None] + np.arange(d)).ravel()
+        root = np.sqrt(scaled.to_u / scaled.to_r)[places, 0].repeat(d)
+        shape = friction_shape(scaled.mu)[places]
+        return cls(scaled.W[np.ix_(rows, rows)], shape, root, places, scaled.contacts)
 
     @cached_property
     def contacts(self) -> int:
@@ -73,10 +73,9 @@ class Pieces:
 
     def allowed(self, *, tangent: bool = False) -> NDArray[np.bool_]:
         """States that a contact may have, (k, 5); without friction it can not stick."""
-        states = np.zeros((self.contacts, 5), dtype=bool)
-        states[:, [SLIP_PLUS, SLIP_MINUS, STICK]] = True
-        states[:, FREE], states[:, TANGENT] = True, tangent
-        states[self.shape == 0] = [True, True, False, False, tangent]
+        states = np.ones((self.contacts, 5), dtype=bool)
+        states[:, TANGENT] = tangent
+        states[np.ix_(self.shape == 0, [STICK, MINUS])] = False
         return states
 
     # ---------------------------------------------------------------- one pattern
@@ -89,8 +88,8 @@ class Pieces:
 
     def slipping(self, states: States) -> tuple[NDArray[np.int64], Array]:
         """Slipping contacts, and their m for t = 1."""
-        slip = np.flatnonzero((states == SLIP_PLUS) | (states == SLIP_MINUS))
-        return slip, np.where(states[slip] == SLIP_PLUS, 1.0, -1.0) * self.shape[slip]
+        slip = np.flatnonzero((states == PLUS) | (states == MINUS))
+        return slip, np.where(states[slip] == PLUS, 1.0, -1.0) * self.shape[slip]
 
     def matrix(self, states: States, t: float) -> Array:
         """E W R of a pattern at friction t shape."""
@@ -148,24 +147,9 @@ class Pieces:
     # ---------------------------------------------------------------- in words
     def word(self, states: States) -> str:
         """The pattern of all contacts of the problem; those that can not react are free."""
-        letters = np.full(self.total, "f")
-        letters[self.places] = LETTERS[states]
-        return "".join(letters)
-
-    def reaction(self, r: Array) -> Array:
-        """r (nc, 2) in the units of the problem, the largest entry being 1."""
-        part = Reacting(self.W, self.shape, self.scale, self.places, self.total)
-        return part.reaction(r)
-
-
-class Reacting(NamedTuple):
-    """W (k d, k d), shape (k,) and scale (k d,) of the contacts that react, see `Pieces`."""
-
-    W: Array
-    shape: Array
-    scale: Array
-    places: NDArray[np.int64]
-    total: int
+        whole = np.full(self.total, FREE)
+        whole[self.places] = states
+        return word(whole)
 
     def reaction(self, r: Array) -> Array:
         """r (nc, d) in the units of the problem, the largest entry being 1."""
@@ -173,21 +157,6 @@ class Reacting(NamedTuple):
         whole = np.zeros((self.total, d))
         whole[self.places] = (r.ravel() / self.scale).reshape(-1, d)
         return whole / max(np.abs(whole).max(initial=0.0), np.finfo(float).tiny)
-
-
-def reacting(problem: FrictionProblem, deadline: Deadline = NEVER) -> Reacting:
-    """The contacts of a Coulomb problem that react; the global form is condensed."""
-    mu = problem.mu
-    local = problem.condensed(deadline)
-    nc, d = local.contacts, local.dimension
-    W = dense(local.W, 4)
-    own = np.arange(nc)
-    size = np.linalg.norm(W.reshape(nc, d, nc, d)[own, :, own], 2, axis=(1, 2))
-    places = np.flatnonzero(size > 0)
-    root = np.exp2(np.round(np.log2(size[places]) / 2)).repeat(d)
-    rows = (d * places[:, None] + np.arange(d)).ravel()
-    return Reacting(W[np.ix_(rows, rows)] / root / root[:, None], friction_shape(mu)[places],
-                    root, places, nc)  # fmt: skip
 
 
 def friction_shape(mu: Array) -> Array:

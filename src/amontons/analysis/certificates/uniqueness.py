@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +18,14 @@ from ...core.clock import Deadline, TimeLimit, deadline_of, now
 from ...core.errors import InvalidInput, SingularOperator, TimeUp
 from ...linear.dense import dense
 from ...problem.friction import FrictionProblem
-from ...problem.law.cones import Tresca
+from ...problem.law import Coulomb, Law, Tresca
+from ...problem.law.law import MU
 from ...problem.solution import FrictionSolution
 from ...solvers.driver import drive
-from ..multipliers.scales import UNRESOLVED, contact_sizes, resolves
+from ..scaled import COPIES, UNRESOLVED, Scaled
 from ..solutions.discs.search import enumerate_discs
 from ..solutions.enumerate import PieceSolution, Solutions, enumerate_solutions
+from ..tolerances import SAME
 from .critical_friction import CriticalFriction, Witness, critical_friction
 from .energy_bound import energy_bound
 from .one_load.answer import LoadCertificate, LoadOutcome
@@ -38,10 +41,7 @@ SECONDS = 60.0  # whose work a verdict without a time limit may take
 QUICK_SECONDS = 1.0  # the same of a quick one
 ABOVE = 1e-9  # relative, at which a friction is proved to be safe
 BOUNDS = 0.5  # part of the time for the bounds on the critical friction
-COPIES = 6  # of a dense W that the questions hold at a time
-SAME = 1e-6  # penetration of a contact that can not react, relative to the load
-STILL = 1e-10  # of W dr relative to its terms, which counts as no other motion
-KNOWN = 1e-7  # to which solutions are known that a certificate found, scaled
+PENETRATES = 1e-6  # gap of a contact that can not react, relative to the load
 SAME_MOTION = " Reactions differ, the motion is the same."
 
 
@@ -107,29 +107,33 @@ class Uniqueness:
 
 def assess(
     problem: FrictionProblem, solution: FrictionSolution | None = None, *,
-    time_limit: TimeLimit = None,
+    time_limit: TimeLimit = None, held: str = "a body",
 ) -> Uniqueness:  # fmt: skip
     """The verdict on a problem; the global form is condensed.
 
     solution: one that was found; by default the problem is solved.  time_limit: seconds;
-    without it operations are counted, as many as take about SECONDS.
+    without it operations are counted, as many as take about SECONDS.  held: the bodies that
+    contact alone may hold, for the reason.
     """
     deadline = deadline_of(time_limit, SECONDS)
     began = now()
     try:
         local = problem.condensed(deadline)
-        dense(local.W, COPIES)
+        coulomb = isinstance(problem.law, Coulomb)
+        given = Scaled.of(local, deadline) if coulomb else dense(local.W, COPIES)
     except (SingularOperator, InvalidInput, TimeUp) as error:
         no_w = isinstance(error, SingularOperator)
-        reason = "Contact alone holds a body, so there is no W" if no_w else str(error)
+        reason = f"Contact alone holds {held}, so there is no W" if no_w else str(error)
         return _without_verdict(problem, _sentence(reason), began)
     if _blocked(local):
         return _without_solution(local, began)
     if isinstance(problem.law, Tresca):
-        return _given_friction(local, began, deadline)
-    verdict = _every_load(local, deadline.share(BOUNDS))
+        return _given_friction(cast(Array, given), local.contacts, began, deadline)
+    if not isinstance(given, Scaled):
+        return _without_verdict(local, _not_known(problem.law), began)
+    verdict = _every_load(given, deadline.share(BOUNDS))
     if verdict.verdict is Verdict.UNDECIDED:
-        verdict = _this_load(local, solution, verdict, deadline)
+        verdict = _this_load(given, solution, verdict, deadline)
     return _finished(verdict, began)
 
 
@@ -151,10 +155,13 @@ def quick_verdict(problem: FrictionProblem) -> Uniqueness | None:
     if _blocked(local):
         return _without_solution(local, began)
     if isinstance(problem.law, Tresca):
-        return _given_friction(local, began, deadline)
-    verdict = _by_energy(local, deadline)
+        return _given_friction(dense(local.W), local.contacts, began, deadline)
+    if not isinstance(problem.law, Coulomb):
+        return None
+    scaled = Scaled.of(local)
+    verdict = _by_energy(scaled, deadline)
     if verdict.verdict is Verdict.UNDECIDED and _is_small(local):
-        verdict = _by_bounds(verdict, critical_friction(local, time_limit=deadline))
+        verdict = _by_bounds(verdict, critical_friction(scaled, time_limit=deadline))
     return _finished(verdict, began)
 
 
@@ -174,7 +181,11 @@ def _blocked(local: FrictionProblem) -> bool:
     """True where a contact penetrates that can not react; rounding of a gap does not count."""
     assert local.q is not None
     reacts = local.rho > 0
-    return bool((local.q[~reacts, 0] < -SAME * local.q_norm).any())
+    return bool((local.q[~reacts, 0] < -PENETRATES * local.q_norm).any())
+
+
+def _not_known(law: Law) -> str:
+    return f"Nothing is proved here of {law.name}, only of Coulomb's and of Tresca's."
 
 
 def _without_solution(local: FrictionProblem, began: float) -> Uniqueness:
@@ -183,16 +194,16 @@ def _without_solution(local: FrictionProblem, began: float) -> Uniqueness:
 
 
 def _without_verdict(problem: FrictionProblem, reason: str, began: float) -> Uniqueness:
-    friction = 0.0 if isinstance(problem.law, Tresca) else problem.mu.max(initial=0.0)
+    friction = problem.law.parameters[:, MU].max(initial=0.0)
     return Uniqueness(Verdict.UNDECIDED, float(friction), 0.0, np.inf, "none", reason,
                       seconds=now() - began)  # fmt: skip
 
 
 # ------------------------------------------------------------------- every load
-def _given_friction(local: FrictionProblem, began: float, deadline: Deadline) -> Uniqueness:
+def _given_friction(W: Array, nc: int, began: float, deadline: Deadline) -> Uniqueness:
     """Tresca's law is monotone: one solution where W is definite."""
-    bound, late = _energy(local, np.ones(local.contacts), deadline)
-    definite = local.contacts == 0 or bound > 0
+    bound, late = _energy(W, np.ones(nc), deadline)
+    definite = nc == 0 or bound > 0
     verdict = Verdict.UNIQUE_EVERY_LOAD if definite else Verdict.UNDECIDED
     reason = "W is singular: reactions may not be unique."
     if definite:
@@ -203,19 +214,19 @@ def _given_friction(local: FrictionProblem, began: float, deadline: Deadline) ->
                       seconds=now() - began)  # fmt: skip
 
 
-def _energy(local: FrictionProblem, shape: Array, deadline: Deadline) -> tuple[float, str]:
+def _energy(W: Array, shape: Array, deadline: Deadline) -> tuple[float, str]:
     """(bound of `energy_bound`, empty or why there was no time for one)."""
     try:
-        return energy_bound(dense(local.W), shape, deadline)[0], ""
+        return energy_bound(W, shape, deadline)[0], ""
     except TimeUp as reason:
         return 0.0, f"No bound on the friction is known: {reason}."
 
 
-def _by_energy(local: FrictionProblem, deadline: Deadline) -> Uniqueness:
+def _by_energy(scaled: Scaled, deadline: Deadline) -> Uniqueness:
     """The verdict of the cheapest bound."""
-    friction = float(local.mu.max(initial=0.0))
-    lower, late = _energy(local, friction_shape(local.mu), deadline)
-    if friction < lower or local.contacts == 0:
+    friction = float(scaled.mu.max(initial=0.0))
+    lower, late = _energy(scaled.given, friction_shape(scaled.mu), deadline)
+    if friction < lower or scaled.contacts == 0:
         reason = _is_below(friction, lower)
         return Uniqueness(Verdict.UNIQUE_EVERY_LOAD, friction, lower, np.inf, "energy", reason)
     reason = (
@@ -226,13 +237,13 @@ def _by_energy(local: FrictionProblem, deadline: Deadline) -> Uniqueness:
     return Uniqueness(Verdict.UNDECIDED, friction, lower, np.inf, "energy", reason)
 
 
-def _every_load(local: FrictionProblem, deadline: Deadline) -> Uniqueness:
+def _every_load(scaled: Scaled, deadline: Deadline) -> Uniqueness:
     """The verdict of the bounds on the critical friction."""
-    cheap = _by_energy(local, deadline)
-    if local.dimension != 2 or not local.contacts or deadline.passed:
+    cheap = _by_energy(scaled, deadline)
+    if scaled.dimension != 2 or not scaled.contacts or deadline.passed:
         return cheap
     above = cheap.friction * (1 + ABOVE)  # safe up to there means safe at the friction itself
-    bounds = critical_friction(local, time_limit=deadline, first=above)
+    bounds = critical_friction(scaled, time_limit=deadline, first=above)
     return _by_bounds(cheap, bounds)
 
 
@@ -256,13 +267,14 @@ def _by_bounds(cheap: Uniqueness, bounds: CriticalFriction) -> Uniqueness:
 
 # --------------------------------------------------------------------- this load
 def _this_load(
-    local: FrictionProblem, solution: FrictionSolution | None, verdict: Uniqueness,
+    scaled: Scaled, solution: FrictionSolution | None, verdict: Uniqueness,
     deadline: Deadline,
 ) -> Uniqueness:  # fmt: skip
     """All solutions where they can be enumerated, else the certificate about one."""
+    local = scaled.problem
     if local.dimension == 2 and local.contacts <= ENUMERATED and local.q_norm > 0:
-        listed = enumerate_solutions(local, time_limit=deadline.share(0.5))
-        answer = _by_list(local, solution, replace(verdict, solution=solution), listed)
+        listed = enumerate_solutions(scaled, time_limit=deadline.share(0.5))
+        answer = _by_list(scaled, solution, replace(verdict, solution=solution), listed)
         if answer is not None:
             return answer
     given = solution is not None
@@ -276,21 +288,21 @@ def _this_load(
         reason = "Without load r = 0 is a solution; others were not looked for."
         return replace(verdict, reason=f"{verdict.reason} {reason}")
     try:
-        found = certify_load(local, solution, time_limit=deadline)
+        found = certify_load(scaled, solution, time_limit=deadline)
     except InvalidInput as reason:
         why = f"No certificate: {reason}." if given else "The solution is too rough to certify."
         return replace(verdict, reason=f"{verdict.reason} {why}")
-    if found.outcome is LoadOutcome.CERTIFIED and not resolves(local, solution.r):
+    if found.outcome is LoadOutcome.CERTIFIED and not scaled.resolves(solution.r / scaled.to_r):
         return replace(verdict, reason=f"{verdict.reason} {_sentence(UNRESOLVED)}")
     if found.outcome is LoadOutcome.CERTIFIED:
         verdict = replace(verdict, certificate=found)
         return _alone(verdict, _sentence(found.reason), found.distance)
     if found.outcome is LoadOutcome.REFUTED:
-        return _refuted(verdict, local, found)
+        return _refuted(verdict, scaled, found)
     unsettled = found.reason != UNRESOLVED and not deadline.passed
     if local.dimension == 3 and local.contacts <= REGIONS and unsettled:
         answer = _by_list(
-            local, solution, verdict, enumerate_discs(local, time_limit=deadline)
+            scaled, solution, verdict, enumerate_discs(scaled, time_limit=deadline)
         )
         if answer is not None:
             return answer
@@ -298,7 +310,7 @@ def _this_load(
 
 
 def _by_list(
-    local: FrictionProblem, solution: FrictionSolution | None, verdict: Uniqueness,
+    scaled: Scaled, solution: FrictionSolution | None, verdict: Uniqueness,
     found: Solutions,
 ) -> Uniqueness | None:  # fmt: skip
     """The verdict of a list of solutions, None where it settles nothing."""
@@ -308,7 +320,7 @@ def _by_list(
     if found.complete and not found.solutions:
         return replace(verdict, reason="There is no solution: all patterns are excluded.")
     if found.at_least > 1:
-        return _several(verdict, local, found, solution)
+        return _several(verdict, scaled, found, solution)
     if found.complete:  # but the degree of a solution leaves open how many it stands for
         words = ", ".join("=".join((s.pattern, *s.touching[:3])) for s in found.solutions[:5])
         reason = f"Rounding of W, q and mu decides whether there is more than one of: {words}."
@@ -319,14 +331,14 @@ def _by_list(
 
 
 def _several(
-    verdict: Uniqueness, local: FrictionProblem, found: Solutions,
+    verdict: Uniqueness, scaled: Scaled, found: Solutions,
     solution: FrictionSolution | None,
 ) -> Uniqueness:  # fmt: skip
     """NOT_UNIQUE by a list of solutions."""
     s = [entry for entry in found.solutions if entry.at_least]
     sets = [entry for entry in s if entry.freedom]
     first = s[0] if solution is None else solution
-    size = np.sqrt(contact_sizes(dense(local.W), local.contacts)[0])[:, None]
+    size = np.sqrt(scaled.size)[:, None] / scaled.to_r
     far = max(s, key=lambda x: float(np.linalg.norm(size * (x.r - first.r))))
     count = "A set of solutions was found" if sets else f"{len(s)} solutions were found"
     words = [entry.pattern for entry in s]
@@ -336,7 +348,7 @@ def _several(
     reason = f"{count}: {', '.join(words[:5])}."
     alike = len(s) > 1 or bool(sets)
     alike = alike and all(entry.still for entry in sets)
-    if alike and all(same_motion(local, entry.r - s[0].r) for entry in s[1:]):
+    if alike and all(scaled.rests(entry.r - s[0].r) for entry in s[1:]):
         reason += SAME_MOTION
     return _two(verdict, sets[0] if sets else far, reason, found.resolution)
 
@@ -359,29 +371,16 @@ def _alone(verdict: Uniqueness, reason: str, resolution: float) -> Uniqueness:
                    resolution=resolution)  # fmt: skip
 
 
-def same_motion(local: FrictionProblem, dr: Array) -> bool:
-    """True where reactions that differ by dr (nc, d) move nothing, as far as rounding tells.
-
-    W dr is compared with sqrt|W_ii| sum_j sqrt|W_jj| |dr_j|, so that it does not matter how
-    small dr is: solutions of different status that are near to each other do not pass.
-    """
-    W = dense(local.W)
-    root = np.sqrt(contact_sizes(W, local.contacts)[0])
-    terms = root * (root @ np.abs(dr).sum(axis=1))
-    motion = np.abs((W @ dr.ravel()).reshape(dr.shape)).max(axis=1, initial=0.0)
-    return bool((motion <= STILL * terms).all())
-
-
 def _refuted(
-    verdict: Uniqueness, local: FrictionProblem, found: LoadCertificate
+    verdict: Uniqueness, scaled: Scaled, found: LoadCertificate
 ) -> Uniqueness:
     """NOT_UNIQUE by a second solution."""
     other = found.other
     assert other is not None
     reason = _sentence(found.reason)
-    if same_motion(local, other.r - found.r0):
+    if scaled.rests(other.r - found.r0):
         reason += SAME_MOTION
-    return _two(verdict, other, reason, KNOWN)
+    return _two(verdict, other, reason, SAME)
 
 
 # ----------------------------------------------------------------------- helpers

@@ -120,7 +120,7 @@ def energy_rows(W: Array) -> Array:
     Only the symmetric part of W (2 nc, 2 nc) makes energy; LinAlgError unless it is definite.
     """
     L = np.linalg.cholesky((W + W.T) / 2)
-    r = linalg.solve_triangular(L, np.eye(len(W)), lower=True, trans="T")
+    r = linalg.solve_triangular(L, np.eye(len(W)), lower=True, trans=1)
     Z = np.empty((len(W) // 2, 4, len(W)))
     Z[:, :2], Z[:, 2:] = r.reshape(-1, 2, len(W)), (W @ r).reshape(-1, 2, len(W))
     return Z.reshape(-1, len(W))

@@ -86,7 +86,7 @@ def determinant_sign(matrix: Array, rounding: Array | float = 0.0) -> int:
     k = len(matrix)
     if not k:
         return 1
-    order, lower, upper = lu(matrix, p_indices=True)
+    order, lower, upper = lu(matrix, p_indices=True)  # type: ignore[misc]  # 2 with permute_l
     p = np.argsort(order)  # matrix[p] = lower upper
     if not (np.isfinite(upper).all() and (np.diag(upper) != 0).all()):
         return 0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,9 +43,9 @@ def on_path(
         at, start = start.parameter if at is None else at, start.state
         known = True
     else:
-        known = isinstance(problem, PathProblem) and np.ndim(start) == 1
+        known = isinstance(problem, PathProblem) and np.ndim(cast(Any, start)) == 1
     if start is None and at is None and isinstance(getattr(problem, "start", None), np.ndarray):
-        at, start = getattr(problem, "start_at", interval[0]), problem.start  # type: ignore
+        at, start = getattr(problem, "start_at", interval[0]), problem.start
     p = interval[0] if at is None else checks.checked_value("at", at, interval)
     if not isinstance(problem, PathProblem):
         path = timed(path_of(problem, parameter, interval, base), limits.deadline)
@@ -57,6 +57,7 @@ def on_path(
     if start is None and not own:
         raise InvalidInput("start: a PathProblem needs the unknowns of a solution at `at`")
     if start is None:
+        assert isinstance(path, FrictionPath | LoadPath)
         y = first_state(path, p)
     else:
         y = real("start", start).ravel() if known else state_of(path, start)

@@ -79,7 +79,7 @@ class Border:
         return Knot(h, spot, margins, slopes, rate)
 
     def _margins(self, y: Array, p: float) -> Array:
-        return self.problem.margins(self.curve.piece, y, p)  # type: ignore[attr-defined]
+        return self.problem.margins(self.curve.piece, y, p)
 
 
 def _basis(t: Array | float) -> tuple[Array | float, ...]:

@@ -23,7 +23,7 @@ def checked_interval(interval: Any) -> tuple[float, float]:
     try:
         low, high = interval
     except (TypeError, ValueError):
-        low = high = None
+        low = high = np.nan
     if not (is_number(low) and is_number(high) and -np.inf < low < high < np.inf):
         raise InvalidInput(f"interval: expected two numbers a < b, got {interval!r}")
     return float(low), float(high)

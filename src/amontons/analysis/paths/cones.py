@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
+from ..tolerances import SAME, SLACK
+
 Array = NDArray[np.float64]
-ZERO = 1e-9  # of conditions on directions of length 1
-SAME = 1e-7  # distance of two edges that count as one
 CORNERS = 20_000  # combinations of conditions that are looked at
 
 
@@ -37,21 +37,21 @@ class TangentCone:
 def edges_and_lines(G: Array) -> tuple[Array, Array]:
     """(edges (k, n), lines (m, n)) of { c : G c >= 0 }, rows of length 1; G (conditions, n)."""
     size = np.linalg.norm(G, axis=1)
-    G = G[size > ZERO] / size[size > ZERO, None]
+    G = G[size > SLACK] / size[size > SLACK, None]
     n = G.shape[1]
     if not len(G):
         return np.zeros((0, n)), np.eye(n)
-    lines = linalg.null_space(G, rcond=ZERO).T
-    across = linalg.orth(G.T, rcond=ZERO)  # the cone holds no line in this space
+    lines = linalg.null_space(G, rcond=SLACK).T
+    across = linalg.orth(G.T, rcond=SLACK)  # the cone holds no line in this space
     H = G @ across
     kept: list[Array] = []
     for rows in islice(combinations(range(len(H)), H.shape[1] - 1), CORNERS):
-        null = linalg.null_space(H[list(rows)], rcond=ZERO) if rows else np.eye(H.shape[1])
+        null = linalg.null_space(H[list(rows)], rcond=SLACK) if rows else np.eye(H.shape[1])
         if null.shape[1] != 1:
             continue
         for edge in (null[:, 0], -null[:, 0]):
             new = all(np.linalg.norm(edge - other) > SAME for other in kept)
-            if new and (H @ edge >= -ZERO).all():
+            if new and (H @ edge >= -SLACK).all():
                 kept.append(edge)
     edges = np.array(kept) @ across.T if kept else np.zeros((0, n))
     return edges, lines

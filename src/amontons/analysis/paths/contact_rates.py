@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -251,5 +251,5 @@ class _System:
             raise SingularOperator(
                 "rates: the contacts inside of their pieces can not be eliminated"
             )
-        found = np.linalg.solve(self.L, np.column_stack([self.R, self.e]))
+        found: Any = np.linalg.solve(self.L, np.column_stack([self.R, self.e]))
         return found[:, :-1], found[:, -1]

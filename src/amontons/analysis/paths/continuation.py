@@ -83,7 +83,7 @@ class Continuation:
         }
         for name, (holds, wanted) in checks.items():
             if not holds:
-                raise InvalidInput(f"{name}: expected {wanted}, got {getattr(self, name)}")
+                raise InvalidInput(f"expected {wanted}, got {getattr(self, name)}", (name,))
 
     @property
     def tolerances(self) -> Tolerances:

@@ -72,13 +72,13 @@ class Curve:
         """H, (n,)."""
         if self.piece is None:
             return self.problem.residual(y, p)
-        return self.problem.residual_of(self.piece, y, p)  # type: ignore[attr-defined]
+        return self.problem.residual_of(self.piece, y, p)
 
     def jacobian(self, y: Array, p: float) -> tuple[Matrix, Array]:
         """Its derivatives by y and p."""
         if self.piece is None:
             return self.problem.jacobian(y, p)
-        return self.problem.jacobian_of(self.piece, y, p)  # type: ignore[attr-defined]
+        return self.problem.jacobian_of(self.piece, y, p)
 
     def product(self, ay: Array, ap: float, by: Array, bp: float) -> float:
         """The weighted product."""

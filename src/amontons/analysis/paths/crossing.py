@@ -56,6 +56,7 @@ def crossing(
     start = np.append(near.y, near.p)
     try:
         plane = _Plane(curve, start, np.append(near.ty, near.tp), tolerances)
+        second = np.zeros((2, 2))
         for _ in range(ROUNDS):
             gradient, second = plane.derivatives()
             if _flat(second):
@@ -93,7 +94,7 @@ class _Plane:
         self.frame = np.array([t, n])
         self.factor = _framed(A, self.b, np.append(curve.weight * n[:-1], n[-1]))
 
-    def solved(self, place: Array) -> tuple[Array, float]:
+    def solved(self, place: NDArray[np.floating]) -> tuple[Array, float]:
         """(point, beta) over (a, c) = place; raises LinAlgError without convergence."""
         x, height = self.x + place @ self.frame, 0.0
         for _ in range(SOLVES):
@@ -104,7 +105,7 @@ class _Plane:
                 return x, height
         raise np.linalg.LinAlgError("no height over this place")
 
-    def point(self, place: Array) -> Array:
+    def point(self, place: NDArray[np.floating]) -> Array:
         """The point over a place."""
         return self.solved(place)[0]
 

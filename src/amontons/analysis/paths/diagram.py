@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ...core.clock import Deadline, now
 from ...core.errors import SingularOperator, TimeUp, UnsupportedForm
+from ..tolerances import SAME
 from .continuation import Continuation
 from .following import Limits, follow_path, track_both
 from .friction_path import FrictionPath
@@ -20,7 +21,6 @@ from .straight import leaving
 from .tangents import Tangent
 
 Array = NDArray[np.float64]
-NEAR = 1e-7  # scaled distance of a solution to a branch that goes through it
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ class Diagram:
         found: list[Array] = []
         for branch in self.branches:
             for y in branch.at(parameter):
-                if not any(same(y, other, NEAR) for other in found):
+                if not any(same(y, other, SAME) for other in found):
                     found.append(y)
         return found
 
@@ -153,7 +153,7 @@ def _found_again(
 
 def _on_branches(branches: list[Branch], y: Array, p: float, deadline: Deadline) -> bool:
     return any(
-        same(y, other, NEAR)
+        same(y, other, SAME)
         for branch in branches
         for other in (*_ends(branch, p), *branch.at(p, deadline))
     )

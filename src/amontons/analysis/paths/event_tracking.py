@@ -96,7 +96,8 @@ class Line:
     def renew(self) -> None:
         """The inverse from scratch; raises SingularOperator where there is none."""
         try:
-            self.inverse = np.linalg.inv(np.vstack([self.driver, self._matrix(self.rows)]))
+            matrix = np.vstack([self.driver, self._matrix(self.rows)])
+            self.inverse: Array = np.linalg.inv(matrix)  # type: ignore[assignment]  # float64
         except np.linalg.LinAlgError as reason:
             raise SingularOperator(
                 f"{''.join(self.letters)}: the equations of this piece are singular, its "
@@ -107,7 +108,8 @@ class Line:
     def point(self) -> tuple[Array, float, Array]:
         """(y, p, u) where the driver has its present level, refined once."""
         right = np.concatenate([[self.level], -self.path.q0[self.rows]])
-        z = self.inverse @ right
+        z: Array = self.inverse @ right
+        worst = np.inf
         for _ in range(2):
             y, p = self.state(z)
             u = self.path.W @ y + self.path.free(p)
@@ -373,7 +375,7 @@ class _Walk:
         """The tangent that keeps the orientation and turns least."""
 
         def rank(t: Tangent) -> tuple[bool, float]:
-            cosine = self.weight * (t.direction @ self.dy) + t.rate * self.dp
+            cosine = self.weight * float(t.direction @ self.dy) + t.rate * self.dp
             return self._orientation(str(t.piece), t.rate) != came, -cosine
 
         return min(others, key=rank)

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from ...core.errors import NotConverged, SingularOperator
+from ..tolerances import SINGULAR
 from .cones import TangentCone, edges_and_lines, unit_rows
 from .contact_rates import contact_rates
 from .corrector import determinant_sign
@@ -35,7 +36,6 @@ from .tangents import inward as inside
 
 Array = NDArray[np.float64]
 Sets = list[tuple[tuple[str, ...], tuple[Array, ...]]]
-SINGULAR = 1e-10  # singular value, relative to the largest, that counts as zero
 BORDERS = 4  # near a point up to which all pieces are looked at one by one
 SMALL = (1e-3, 1e-5, 1e-7)  # changes of the parameter that tell where a curve goes
 NODES = 50_000  # patterns that such a search looks at
@@ -45,7 +45,7 @@ COMBINATIONS = 20_000  # pieces at a point up to which all are looked at
 
 def first_order(
     problem: PathProblem, y: Array, p: float, *, tolerance: float = 1e-9,
-    pieces: Sequence[Hashable] | None = None,
+    pieces: Sequence[Any] | None = None,
 ) -> FirstOrder:  # fmt: skip
     """All one-sided tangents at a solution (y, p).
 
@@ -57,12 +57,12 @@ def first_order(
     if pieces is None:
         if _many_meet(problem, y, p, tolerance):
             return _by_small_steps(problem, y, p, tolerance, "many pieces meet at this point")
-        pieces = problem.pieces(y, p, tolerance)  # type: ignore[attr-defined]
+        pieces = problem.pieces(y, p, tolerance)
     weight = weight_of(problem, len(y))
     found: list[Tangent] = []
     cones: list[TangentCone] = []
     for piece in pieces:
-        lines = kernel(*problem.jacobian_of(piece, y, p), weight)  # type: ignore[attr-defined]
+        lines = kernel(*problem.jacobian_of(piece, y, p), weight)
         if lines.shape[1] != 1:
             cone = _cone(problem, piece, y, p, lines, tolerance)
             cones += [cone] if cone is not None else []
@@ -123,8 +123,8 @@ def _by_small_steps(
             end = _solution_near(problem, y, p + sense * step)
             if end is None:
                 continue
-            piece = problem.piece(end, p + sense * step)
-            lines = kernel(*problem.jacobian_of(piece, y, p), weight)  # type: ignore[attr-defined]
+            piece: Any = problem.piece(end, p + sense * step)
+            lines = kernel(*problem.jacobian_of(piece, y, p), weight)
             if lines.shape[1] != 1:
                 continue
             line = lines[:, 0] * (sense if lines[-1, 0] > 0 else -sense)

@@ -1,7 +1,8 @@
 """A friction problem with a parameter, as a path problem: load or friction changes with p.
 
-Unknowns are the scaled reactions y = r sqrt|W_ii| / unit, so that y, u and p have size one in
-any units; with W and q scaled likewise, u = W y + q0 + p q1 and z = y - u,
+Unknowns are the scaled reactions y = r sqrt|W_ii| / unit, with powers of two for these
+factors, so that y, u and p have a size near one in any units; with W and q scaled likewise,
+u = W y + q0 + p q1 and z = y - u,
 
     normal:      y_N - max(z_N, 0) = 0
     tangential:  y_T - P(z_T) = 0,   P the projection onto |x| <= mu max(z_N, 0)
@@ -25,12 +26,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.clock import NEVER, Deadline, now
-from ...core.errors import InvalidInput, UnsupportedForm
+from ...core.errors import InvalidInput, UnsupportedLaw
 from ...linear.dense import dense
 from ...problem.friction import Form, FrictionProblem
-from ...problem.law.cones import Coulomb, Tresca
+from ...problem.law import Coulomb, Tresca
 from ...problem.settling import settled
 from ...problem.solution import FrictionSolution
+from ..scaled import power_of_two, scaled_blocks
+from ..tolerances import SLACK
 from .index_sets import IndexSets, index_sets
 from .path import judged
 
@@ -39,7 +42,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-BORDER = 1e-9  # scaled distance to a border that counts as none
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +68,10 @@ class FrictionPath:
             )
         if type(a.law) is not type(b.law):
             raise InvalidInput("end: expected the friction law of start, got the other one")
+        if not isinstance(a.law, Coulomb | Tresca):
+            raise UnsupportedLaw(
+                f"path: expected Coulomb or Tresca friction, got {a.law.name}"
+            )
         pairs = ((a.M, b.M), (a.H, b.H)) if a.form is Form.GLOBAL else ((a.W, b.W),)
         if not all(_equal(x, y) for x, y in pairs):
             raise InvalidInput("end: expected the same matrices as start; loads may differ")
@@ -75,7 +81,7 @@ class FrictionPath:
     def friction(cls, problem: FrictionProblem) -> FrictionPath:
         """mu(p) = p shape, shape being the coefficients of the problem over the largest."""
         if not isinstance(problem.law, Coulomb):
-            raise UnsupportedForm("friction: expected Coulomb's law, this is Tresca's")
+            raise UnsupportedLaw(f"friction: expected Coulomb's, this is {problem.law.name}")
         largest = float(problem.mu.max(initial=0.0))
         shape = problem.mu / largest if largest > 0 else np.ones(problem.contacts)
         return cls(problem.with_mu(0.0), problem.with_mu(shape), "friction")
@@ -119,24 +125,21 @@ class FrictionPath:
     @cached_property
     def _scaled(self) -> tuple[Array, Array, Array, Array]:
         a = self.start.condensed(self.deadline)
-        nc, d = a.contacts, a.dimension
-        W = dense(a.W, 4)
-        own = np.arange(nc)
-        size = np.linalg.norm(W.reshape(nc, d, nc, d)[own, :, own], 2, axis=(1, 2))
-        root = np.repeat(np.sqrt(np.where(size > 0, size, 1.0)), d)
+        W, root, _ = scaled_blocks(dense(a.W, 4), a.contacts)
+        root = root.repeat(a.dimension)
         q0, q1 = (np.asarray(x.condensed().q).ravel() / root for x in (self.start, self.end))
-        return W / root / root[:, None], q0, q1 - q0, root
+        return W, q0, q1 - q0, root
 
     @cached_property
     def unit(self) -> float:
-        """Size of scaled q over the first unit of the parameter; what y = 1 stands for."""
+        """Size of scaled q over the first unit of the parameter, a power of two: y = 1."""
         _, q0, q1, _ = self._scaled
         size = float(max(np.linalg.norm(q0), np.linalg.norm(q1)))
-        return size if size > 0 else 1.0
+        return float(power_of_two(size)) if size > 0 else 1.0
 
     @cached_property
     def W(self) -> Array:
-        """Scaled W, (m, m): every contact's block has norm 1."""
+        """Scaled W, (m, m): the block of every contact has a norm near 1."""
         return self._scaled[0]
 
     @cached_property
@@ -324,7 +327,7 @@ class FrictionPath:
             out.append(apart * ("f" in normal) + closed)
         return out
 
-    def index_sets(self, y: Array, p: float, tolerance: float = BORDER) -> IndexSets:
+    def index_sets(self, y: Array, p: float, tolerance: float = SLACK) -> IndexSets:
         """The sets of [LR] (25)."""
         _, z_N, z_T = self._trial(y, p)
         size, bound = np.linalg.norm(z_T, axis=1), self._radius(z_N, p)

@@ -25,23 +25,23 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...core.clock import NEVER, Deadline, now
-from ...core.errors import InvertedCells, NotConverged, UnsupportedForm
-from ...mechanics.contact.current import BACK, OPEN, SLIP, STICK, Pieces
+from ...core.errors import InvertedCells, NotConverged, UnsupportedForm, UnsupportedLaw
+from ...mechanics.contact.current import BACK, Pieces
 from ...mechanics.model import Model
 from ...mechanics.model.large_deformation import LargeDeformation, large_step
 from ...mechanics.model.nodal_forces import NodalForces
 from ...mechanics.steps.system import Motion
-from ...problem.law.cones import Coulomb
+from ...problem.law import Coulomb
+from ...problem.law.states import OPEN, SLIP, STICK
 from ...problem.settling import settle
 from ...problem.solution import ContactStatus, FrictionSolution, Outcome
 from ...solvers.driver import drive
-from ...solvers.newton.nonlinear import NonlinearNewton
 from .index_sets import IndexSets, index_sets
 from .path import SOLVED, judged
 
 Array = NDArray[np.float64]
 BORDER = 1e-9  # distance to a border, in units of force, that counts as none
-LETTERS = np.array(["f", "s", "+", "-"])  # of OPEN, STICK, SLIP, BACK as in `pattern`
+LETTERS = np.array(["f", "+", "s", "-"])  # of OPEN, SLIP, STICK, BACK as in `pattern`
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class LoadPath:
 
     def __post_init__(self) -> None:
         if not isinstance(self.step.law, Coulomb):
-            raise UnsupportedForm("path: expected Coulomb friction, this model has Tresca's")
+            raise UnsupportedLaw(f"path: expected Coulomb friction, got {self.step.law.name}")
         if self.step.dimension != 2:
             raise UnsupportedForm("path: expected a model in 2D, this one is in 3D")
         if self.drift is None:
@@ -154,7 +154,7 @@ class LoadPath:
             point.margins(np.full(self.step.contacts, kind)) / self.unit for kind in kinds
         ]
         fits = np.stack([margin.min(axis=1) >= -tolerance for margin in margins])
-        fits[point.pieces, np.arange(fits.shape[1])] = True
+        fits |= point.pieces == kinds[:, None]
         return [self._name(np.array(s)) for s in product(*(kinds[own] for own in fits.T))]
 
     def margins(self, piece: Hashable, y: Array, p: float) -> Array:
@@ -178,7 +178,7 @@ class LoadPath:
 
     @staticmethod
     def _states(piece: Any) -> NDArray[np.int8]:
-        return np.array(["fs+-".index(letter) for letter in piece], dtype=np.int8)
+        return np.array(["f+s-".index(letter) for letter in piece], dtype=np.int8)
 
     # ---------------------------------------------------------------- solutions
     def solution(self, y: Array, p: float) -> FrictionSolution:
@@ -188,17 +188,15 @@ class LoadPath:
         told = settle(problem.law, problem.rho, problem.reactions(y), u)
         error = problem.error(told.r, y)
         record = judged(error, problem.measure, now() - began)
-        found = FrictionSolution(problem, told.r, u, np.array(y), record, settled=told)  # type: ignore[arg-type]
-        return problem.solved(found)
+        tangent = problem.recover(told.r, y)[0]
+        return FrictionSolution(tangent, told.r, u, np.array(y), record, settled=told)
 
     def found_at(self, p: float) -> Array:
         """A solution (n,) at a share of the load, by Newton's method with load steps.
 
         Raises NotConverged where it finds none.
         """
-        found = drive(
-            self.at(p), NonlinearNewton(), tolerance=SOLVED, time_limit=self.deadline
-        )  # type: ignore[arg-type]
+        found = drive(self.at(p), tolerance=SOLVED, time_limit=self.deadline)
         if found.convergence.outcome is not Outcome.CONVERGED:
             raise NotConverged(f"start: no solution at {p:g}: {found.convergence}", found)
         assert found.v is not None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,7 +73,8 @@ def _in_time(motion: Motion, interval: tuple[float, float]) -> FrictionPath:
     )
     whole = motion.parts
     before = np.zeros((len(whole.gap), whole.carried.shape[1] - 1))
-    first, last = (motion.body.increment(*end, before) for end in ends)
+    steps = (motion.body.increment(*end, before) for end in ends)
+    first, last = (cast(FrictionProblem, step) for step in steps)
     path = _between(first, last)
     return _between(path.at(-a / (b - a)), path.at((1 - a) / (b - a)))
 

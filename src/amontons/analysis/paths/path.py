@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ...core.arrays import Matrix
 from ...core.clock import NEVER, Deadline
 from ...problem.judge.measures import Measure
 from ...problem.solution import Convergence, Outcome, Step
@@ -30,7 +31,6 @@ from .events import Event, EventKind, Point, Stop
 Array = NDArray[np.float64]
 ROUNDING = 1e-12  # of a parameter, relative to one and itself
 SOLVED = 1e-8  # error by the judge below which a point counts as a solution
-Matrix = Array | sparse.sparray
 
 
 def judged(error: float, measure: Measure, seconds: float) -> Convergence:
@@ -262,7 +262,7 @@ def timed(problem: Any, deadline: Deadline) -> Any:
 def solve_linear(matrix: Matrix, right: Array) -> Array:
     """The solution of a dense or sparse system, raises LinAlgError where there is none."""
     if isinstance(matrix, np.ndarray):
-        return np.linalg.solve(matrix, right)
+        return np.linalg.solve(matrix, right)  # type: ignore[return-value]  # of float64
     from scipy.sparse.linalg import splu
 
     try:

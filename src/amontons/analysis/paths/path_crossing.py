@@ -137,6 +137,7 @@ class PathCrossing:
         """(state at share 1, folds on the way) along the path from a solution."""
         way, onward = way_of(path, self.options), self._onward(path, y, share)
         folds: list[float] = []
+        followed = share
         walk = way.steps(path, y, share, onward, (-self.back, 1.0))
         for count, (point, event) in enumerate(walk):
             if event is not None and event.kind is EventKind.FOLD:
@@ -148,11 +149,10 @@ class PathCrossing:
                     f"the path of the load ends at {point.parameter:.4g} of it: "
                     f"{event.stop.advice}"
                 )
+            followed = point.parameter
             if count >= self.max_points or deadline.passed:
                 break
-        raise Breakdown(
-            f"the path of the load was followed to {point.parameter:.4g} of it only"
-        )
+        raise Breakdown(f"the path of the load was followed to {followed:.4g} of it only")
 
 
 def _start(path: FrictionPath | LoadPath, y: Array) -> Array:
@@ -165,6 +165,7 @@ def _start(path: FrictionPath | LoadPath, y: Array) -> Array:
 
 def _on_path(path: LoadPath, v: Array, share: float) -> tuple[Array, float]:
     """A solution at or just before a share: load steps end loosely, maybe behind the fold."""
+    reason: InvalidInput | None = None
     for back in (0.0, *BEFORE):
         try:
             return polished(path, v, share - back), share - back

@@ -15,14 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.clock import NEVER, Deadline
-from ..solutions import pattern_search as search
 from ..solutions.pattern_leaves import NODE, leaves_of
+from ..statuses import FREE, MINUS, PLUS, STICK, States, word
+from ..tolerances import SLACK
 
 Array = NDArray[np.float64]
-States = NDArray[np.int8]
 REACH = 1e6  # bound of x where none is known, in the size of c and D
-SLACK = 1e-9  # violation of a condition that counts as none
-SAME = 1e-8  # distance of two solutions that count as one
+COINCIDE = 1e-8  # distance at which a list of all has patterns that share a solution once
 SINGULAR = 1e-11  # of a system, relative
 
 
@@ -66,7 +65,7 @@ def rate_solutions(
             x, free = tree.solved(states)
             if free:
                 sets.append(tree.word(states))
-            elif x is not None and all(np.abs(x - z).max() > SAME for z, _ in found):
+            elif x is not None and all(np.abs(x - z).max() > COINCIDE for z, _ in found):
                 found.append((x, tree.word(states)))
         deadline.spend(NODE * more * len(tree.rhs) ** 2)
         if not done and (examined >= nodes or deadline.passed):
@@ -163,14 +162,14 @@ class _Tree:
         rows: list[int] = []
         columns: list[Array] = []
         for k, state in enumerate(states):
-            if state == search.OPEN:
+            if state == FREE:
                 continue
             rows.append(k)
-            if state == search.STICK:
+            if state == STICK:
                 rows.append(k + len(self.mu))
                 columns += [self.G[:, 2 * k], self.G[:, 2 * k + 1]]
             else:
-                columns.append(self.G[:, 2 * k + (state == search.SLIP_MINUS)])
+                columns.append(self.G[:, 2 * k + (state == MINUS)])
         return rows, np.array(columns).T
 
     def _holds(self, states: States, x: Array) -> bool:
@@ -182,19 +181,13 @@ class _Tree:
         at_rest = np.arange(self.pairs, n)
         t = at_rest + len(self.mu)
         room = self.mu * x[at_rest] - np.abs(x[t])
-        slips = np.isin(states[at_rest], [search.SLIP_PLUS, search.SLIP_MINUS])
-        sign = np.where(states[at_rest] == search.SLIP_PLUS, 1.0, -1.0)
+        slips = np.isin(states[at_rest], [PLUS, MINUS])
+        sign = np.where(states[at_rest] == PLUS, 1.0, -1.0)
         against = np.where(slips, sign * y[t], 0.0)
         worst = min(least, room.min(initial=0.0), -against.max(initial=0.0))
         return worst >= -SLACK * size
 
     def word(self, states: States) -> str:
         """One letter per block."""
-        out = []
-        for k, state in enumerate(states):
-            if k < self.pairs:
-                out.append("o" if state == search.OPEN else "c")
-            else:
-                out.append({search.OPEN: "f", search.STICK: "s", search.SLIP_PLUS: "+",
-                            search.SLIP_MINUS: "-"}.get(int(state), "+"))  # fmt: skip
-        return "".join(out)
+        pairs = "".join("o" if state == FREE else "c" for state in states[: self.pairs])
+        return pairs + word(states[self.pairs :])

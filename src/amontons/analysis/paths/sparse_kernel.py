@@ -27,7 +27,8 @@ def sparse_kernel(J: sparse.sparray, Jp: Array, weight: float, singular: float) 
     may then be larger still.
     """
     root = np.sqrt(weight)
-    A = _scaled(sparse.hstack([sparse.csr_array(J) / root, sparse.csr_array(Jp[:, None])]))
+    whole: Any = sparse.hstack([sparse.csr_array(J) / root, sparse.csr_array(Jp[:, None])])
+    A = _scaled(whole)
     random = np.random.default_rng(0)
     found = _line(A, random)
     if found is None:

@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 from ...core.errors import InvalidInput, SingularOperator
 from ...problem.friction import FrictionProblem
+from ..tolerances import SLACK
 from .event_tracking import track
 from .friction_path import FrictionPath
 from .path import PathProblem, Stop, corrected, timed
 from .straight import leaving
 
 Array = NDArray[np.float64]
-ON_CURVE = 1e-9  # scaled residual of a state that counts as a solution
 
 
 def exact_state(path: FrictionPath, p: float) -> Array:
@@ -23,12 +23,13 @@ def exact_state(path: FrictionPath, p: float) -> Array:
     ends before it comes down (W is not positive definite).
     """
     problem = path.at(p).condensed(path.deadline)
-    q = np.asarray(problem.q)
+    W, q = problem.W, np.asarray(problem.q)
+    assert W is not None
     size = float(np.abs(path.free(p)).max(initial=0)) or 1.0
     lift = np.zeros_like(q)
     lift[:, 0] = (2 * size * path.to_u.reshape(q.shape))[:, 0]
-    lifted = FrictionProblem.from_delassus(problem.W, q + lift, problem.mu)
-    down = FrictionPath(lifted, FrictionProblem.from_delassus(problem.W, q, problem.mu))
+    lifted = FrictionProblem.from_delassus(W, q + lift, problem.mu)
+    down = FrictionPath(lifted, FrictionProblem.from_delassus(W, q, problem.mu))
     down = timed(down, path.deadline)
     tangent = next(t for t in leaving(down, np.zeros(q.size), 0.0).tangents if t.rate > 0)
     *_, (point, event) = track(down, np.zeros(q.size), 0.0, tangent, (-1.0, 1.0))
@@ -47,7 +48,7 @@ def polished(path: PathProblem, y: Array, p: float) -> Array:
     Raises InvalidInput where the state is no solution to within some per mille.
     """
     found = corrected(path, y, p)
-    if found is None and np.abs(path.residual(y, p)).max(initial=0) <= ON_CURVE:
+    if found is None and np.abs(path.residual(y, p)).max(initial=0) <= SLACK:
         return y
     if found is None or np.abs(found - y).max(initial=0) > 1e-3 * max(1.0, np.abs(y).max()):
         rest = float(np.abs(path.residual(y, p)).max(initial=0))

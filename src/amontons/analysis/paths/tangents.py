@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..tolerances import SAME
 from .cones import TangentCone
 from .path import weight_of
 from .touching import ahead, one_curve, stays_inside
 
 Array = NDArray[np.float64]
 INWARD = 1e-9  # rate, of a direction of length 1, below which a condition does not change
-SAME = 1e-7  # distance of two directions of length 1 that count as one
 
 
 @dataclass(frozen=True, eq=False)

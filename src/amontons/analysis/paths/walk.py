@@ -194,7 +194,8 @@ class Walk(ABC):
                 return self.spot
             if value(whole) >= 0:
                 return None
-            return at(float(brentq(value, 0.0, whole, xtol=1e-14, rtol=1e-14)))
+            zero: Any = brentq(value, 0.0, whole, xtol=1e-14, rtol=np.float64(1e-14))
+            return at(float(zero))
         except ArithmeticError:
             return None
 

@@ -32,7 +32,7 @@ class WalkByPieces(Walk):
         return Curve(self.problem, n, self.piece)
 
     def _margins(self, spot: Spot) -> Array:
-        return self.problem.margins(self.piece, spot.y, spot.p)  # type: ignore[attr-defined]
+        return self.problem.margins(self.piece, spot.y, spot.p)
 
     def _leaves(self, spot: Spot) -> bool:
         return bool((self._margins(spot) < -self.options.border * LOCATED).any())
@@ -102,7 +102,7 @@ class WalkByPieces(Walk):
     def _apart(self, system: FirstOrder, tolerance: float) -> float:
         """The largest margin that counts as zero, among those of pieces with a tangent."""
         s = self.spot
-        margins = [np.abs(self.problem.margins(t.piece, s.y, s.p)) for t in system.tangents]  # type: ignore[attr-defined]
+        margins = [np.abs(self.problem.margins(t.piece, s.y, s.p)) for t in system.tangents]
         return max((float(m[m <= tolerance].max(initial=0.0)) for m in margins), default=0.0)
 
     def _straightest(self, others: list[Tangent]) -> Tangent:
@@ -116,5 +116,5 @@ class WalkByPieces(Walk):
 
     def _orientation(self, piece: Any, rate: float) -> int:
         """Of the curve on a piece: its sign stays where the curve passes a kink."""
-        J, _ = self.problem.jacobian_of(piece, self.spot.y, self.spot.p)  # type: ignore[attr-defined]
+        J, _ = self.problem.jacobian_of(piece, self.spot.y, self.spot.p)
         return self._sense(rate) * determinant_sign(J)

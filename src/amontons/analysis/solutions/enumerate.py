@@ -23,20 +23,18 @@ from numpy.typing import NDArray
 from ...core.clock import Deadline, TimeLimit, deadline_of, now
 from ...core.errors import InvalidInput, TimeUp, UnsupportedForm
 from ...problem.friction import FrictionProblem
-from ..multipliers.scales import RESOLVED, UNRESOLVED, load_shares
-from . import pattern_search as search
+from ..scaled import UNRESOLVED, Scaled
+from ..statuses import STICK, word
+from ..tolerances import DATA, RESOLVED, SLACK, SOLVED
 from .local_degree import UNKNOWN, Degree, degree
 from .pattern_leaves import NODE, Cut, leaves_of
-from .piece_solution import DATA, Existence, PieceAnswer, examined
-from .scaled_problem import REACH, SLACK, ScaledProblem, States
+from .piece_solution import Existence, PieceAnswer, examined
+from .plane_problem import REACH, PlaneProblem
 
 if TYPE_CHECKING:
     from .discs.proof import DiscProof
 
 Array = NDArray[np.float64]
-LETTERS = {search.OPEN_OR_CLOSED: ".", search.CLOSED: "c", search.OPEN: "f",
-           search.STICK: "s", search.SLIP_PLUS: "+", search.SLIP_MINUS: "-",
-           search.FRICTIONLESS: "+"}  # fmt: skip
 LEAF = 2e6  # the same of a complete one, besides its linear system
 CONTACTS = 200  # up to which the dictionaries of all levels need less than 0.6 GB
 
@@ -140,8 +138,8 @@ class Solutions:
 
 
 def enumerate_solutions(
-    problem: FrictionProblem, *, time_limit: TimeLimit = None, tolerance: float = 1e-8,
-    keep_proof: bool = False,
+    problem: FrictionProblem | Scaled, *, time_limit: TimeLimit = None,
+    tolerance: float = SOLVED, keep_proof: bool = False,
 ) -> Solutions:  # fmt: skip
     """All solutions of a 2D Coulomb problem; the global form is condensed.
 
@@ -157,18 +155,14 @@ def enumerate_solutions(
             f"contacts: expected at most {CONTACTS}, got {problem.contacts}; the search grows "
             "exponentially, take a coarser mesh"
         )
-    _ = problem.mu
     began = now()
     try:
-        local = problem.condensed(deadline)
+        scaled = Scaled.of(problem, deadline)
     except TimeUp as reason:
-        return Solutions((), False, str(reason), 0, now() - began)
-    if local.q_norm == 0:
-        r = np.zeros((local.contacts, 2))
-        rest = PieceSolution("f" * local.contacts, (), r, r.copy(), 0.0, 1, 0.0)
-        reason = "q is zero: only r = 0 can be judged, others were not looked for"
-        return Solutions((rest,), local.contacts == 0, reason, 0, 0.0)
-    piece = ScaledProblem(local)
+        return nothing_found(reason, began)
+    if not scaled.q.any():
+        return without_load(scaled)
+    piece = PlaneProblem(scaled)
     cuts: list[Cut] | None = [] if keep_proof else None
     found, undecided, examined, stopped = _collect(piece, deadline, tolerance, cuts)
     entries = list(_merged(piece, found))
@@ -188,11 +182,11 @@ def enumerate_solutions(
 
 
 def _doubt(
-    piece: ScaledProblem, solutions: Sequence[PieceSolution], degrees: Sequence[int | None]
+    piece: PlaneProblem, solutions: Sequence[PieceSolution], degrees: Sequence[int | None]
 ) -> str | None:
     """What speaks against a list that has everything that the search left."""
     for solution in solutions:
-        share, terms = load_shares(piece.problem, solution.r)
+        share, terms = piece.scaled.load_shares(solution.r / piece.scaled.to_r)
         little, rests = share < RESOLVED, share <= DATA * terms
         if (little & ~(rests & (solution.sole or solution.freedom > 0))).any():
             return UNRESOLVED
@@ -210,9 +204,22 @@ def missing(total: int, expected: int = 1) -> str | None:
     return f"orientations add up to {total}, not {expected}: one is missing or too many"
 
 
+def nothing_found(reason: TimeUp, began: float) -> Solutions:
+    """The empty list of a search that was stopped before it began."""
+    return Solutions((), False, str(reason), 0, now() - began)
+
+
+def without_load(scaled: Scaled) -> Solutions:
+    """What can be said where q is zero, or without contacts."""
+    r = np.zeros(scaled.shape)
+    rest = PieceSolution("f" * len(r), (), r, r.copy(), 0.0, 1, 0.0)
+    reason = "q is zero: only r = 0 can be judged, others were not looked for"
+    return Solutions((rest,), not len(r), reason, 0, 0.0)
+
+
 # ------------------------------------------------------------------- the search
 def _collect(
-    piece: ScaledProblem,
+    piece: PlaneProblem,
     deadline: Deadline,
     tolerance: float,
     cuts: list[Cut] | None,
@@ -221,7 +228,7 @@ def _collect(
     found: list[PieceAnswer] = []
     undecided = nodes = 0
     node, leaf = NODE * (2.0 * piece.contacts) ** 2, LEAF + 10.0 * (2.0 * piece.contacts) ** 3
-    box = piece.box
+    box, problem = piece.box, piece.scaled.problem
     search_space = (box.A, box.spread, box.c, (box.low, box.high), piece.reacts, piece.mu > 0)
     for leaves, more, done in leaves_of(*search_space, cuts):
         nodes += more
@@ -234,7 +241,7 @@ def _collect(
             if answer.existence is Existence.UNKNOWN:
                 undecided += 1
             elif answer.existence is not Existence.NONE:
-                error = piece.problem.error((answer.r * piece.to_r).reshape(-1, 2))
+                error = problem.error(answer.r.reshape(-1, 2) * piece.scaled.to_r)
                 if error <= tolerance:
                     found.append(answer)
                 else:
@@ -245,7 +252,7 @@ def _collect(
 
 
 def _merged(
-    piece: ScaledProblem, found: list[PieceAnswer]
+    piece: PlaneProblem, found: list[PieceAnswer]
 ) -> Iterator[tuple[PieceSolution, int | None]]:
     """Solutions with their degrees: sets first, then isolated ones that are not in them.
 
@@ -266,7 +273,7 @@ def _merged(
         yield _entry(piece, group, known, max(largest, 1.0)), known.value
 
 
-def _disjoint(piece: ScaledProblem, groups: list[list[PieceAnswer]]) -> list[Degree]:
+def _disjoint(piece: PlaneProblem, groups: list[list[PieceAnswer]]) -> list[Degree]:
     """Degrees of groups, those put together whose pieces are partly the same.
 
     A solution on a piece that two of them have would count twice.
@@ -292,10 +299,10 @@ def _sharing(degrees: Sequence[Degree]) -> tuple[int, int] | None:
 def _rank(answer: PieceAnswer) -> tuple[int, bool, int]:
     """Sets first, then what is sure, then what sticks most."""
     near = answer.existence is Existence.NEAR
-    return -answer.freedom, near, -int((answer.states == search.STICK).sum())
+    return -answer.freedom, near, -int((answer.states == STICK).sum())
 
 
-def _belongs(piece: ScaledProblem, item: PieceAnswer, group: list[PieceAnswer]) -> bool:
+def _belongs(piece: PlaneProblem, item: PieceAnswer, group: list[PieceAnswer]) -> bool:
     """True where a solution can not be told from one of a group, or lies in its set."""
     first = group[0]
     if first.freedom > item.freedom:
@@ -313,31 +320,29 @@ def _belongs(piece: ScaledProblem, item: PieceAnswer, group: list[PieceAnswer]) 
 
 
 def _entry(
-    piece: ScaledProblem, group: list[PieceAnswer], known: Degree, largest: float
+    piece: PlaneProblem, group: list[PieceAnswer], known: Degree, largest: float
 ) -> PieceSolution:
     """What a group of answers stands for."""
     first, value = group[0], known.value or 0
     least = max(abs(value), sum(a.exists for a in group), 2 if first.freedom else 0)
     apart = max(float((np.abs(a.r - first.r) + a.off_r).max(initial=0.0))
                 for a in group if not a.freedom or a is first)  # fmt: skip
-    reaction = (first.r * piece.to_r).reshape(-1, 2)
-    velocity = np.array(piece.problem.velocity(reaction)[0])
-    error = piece.problem.error(reaction)
-    energy = float(first.r @ piece.W @ first.r) / 2 * piece.unit**2
+    problem, to_r = piece.scaled.problem, piece.scaled.to_r
+    reaction = first.r.reshape(-1, 2) * to_r
+    velocity = np.array(problem.velocity(reaction)[0])
+    error = problem.error(reaction)
+    unit = float(to_r[0, 0] * piece.scaled.to_u[0, 0])
+    energy = float(first.r @ piece.W @ first.r) / 2 * unit
     return PieceSolution(
-        _word(first.states), tuple(_word(a.states) for a in group[1:]), reaction, velocity,
+        word(first.states), tuple(word(a.states) for a in group[1:]), reaction, velocity,
         error, value, energy, first.freedom, known.sole, least, apart / largest, first.still,
     )  # fmt: skip
 
 
-def _proof(piece: ScaledProblem, cuts: list[Cut] | None) -> Proof | None:
+def _proof(piece: PlaneProblem, cuts: list[Cut] | None) -> Proof | None:
     """What the search left, in the units of the problem."""
     if cuts is None:
         return None
     rows = [y / piece.box.to_u for _, y in cuts]
     multipliers = np.array(rows).reshape(-1, piece.contacts, 2)
-    return Proof(tuple(_word(states) for states, _ in cuts), multipliers)
-
-
-def _word(states: States) -> str:
-    return "".join(LETTERS[int(state)] for state in states)
+    return Proof(tuple(word(states) for states, _ in cuts), multipliers)

@@ -19,87 +19,85 @@ from numpy.typing import NDArray
 
 from ...core.clock import NEVER, Deadline
 from ...problem.friction import FrictionProblem
-from . import pattern_search as search
-from .multistart import certain_error, described, statuses
-from .newton_batch import FREE, SLIP, STICK, Stack
+from ..scaled import Scaled
+from ..statuses import FREE, FRICTIONLESS, SLIP, STICK, states_of
+from ..tolerances import BELONGS, SEGMENT
+from .multistart import described, statuses
+from .newton_batch import jacobian, polished
 from .piece_solution import examined
-from .scaled_problem import ScaledProblem
+from .plane_problem import PlaneProblem
 
 Array = NDArray[np.float64]
-STATES = {"f": search.OPEN, "s": search.STICK, "+": search.SLIP_PLUS, "-": search.SLIP_MINUS}
 WORDS = 8  # patterns of one solution that are tried
-NEAR = 1e-6  # scaled distance of a solution from the reactions that it belongs to
 SAFE = 0.1  # of beta K eta
 ROUNDING = 1e-14  # of equations, scaled
 WORK = 10.0  # operations of a proof per cube of the reactions
 LITTLE = 5e8  # operations that are always done: some ten milliseconds
-EXACT = 1e-12  # error of solutions that fill a segment
 
 
 def exist(
-    local: FrictionProblem, reactions: Sequence[Array], deadline: Deadline = NEVER
+    problem: FrictionProblem | Scaled, reactions: Sequence[Array], deadline: Deadline = NEVER
 ) -> bool:
     """True where each of some reactions (nc, d) surely belongs to a solution nearby.
 
     Also where they all are solutions within rounding, and everything between them.  False too
     where a proof would take longer than there is time; small ones are always looked at.
     """
-    if takes_too_long(local, len(reactions), deadline):
+    scaled = Scaled.of(problem)
+    if takes_too_long(scaled, len(reactions), deadline):
         return False
-    deadline.spend(_work(local, len(reactions)))
-    stack = Stack.of(local)
+    deadline.spend(_work(scaled, len(reactions)))
     pairs = [(reactions[0], r) for r in reactions[1:]]
-    if pairs and all(_on_segment(stack, *pair) for pair in pairs):
+    if pairs and all(_on_segment(scaled, *pair) for pair in pairs):
         return True
-    if local.dimension == 3:
-        return all(_newton_converges(stack, r / stack.to_r) for r in reactions)
-    scaled = ScaledProblem(local)
-    return all(_on_its_piece(stack, scaled, r / stack.to_r) for r in reactions)
+    if scaled.shape[1] == 3:
+        return all(_newton_converges(scaled, r / scaled.to_r) for r in reactions)
+    plane = PlaneProblem(scaled)
+    return all(_on_its_piece(plane, r / scaled.to_r) for r in reactions)
 
 
-def takes_too_long(local: FrictionProblem, count: int, deadline: Deadline) -> bool:
+def takes_too_long(local: Scaled, count: int, deadline: Deadline) -> bool:
     """True where there is no time to prove that so many reactions belong to solutions."""
     work = _work(local, count)
     return work > LITTLE and not deadline.affords(work)
 
 
-def _work(local: FrictionProblem, count: int) -> float:
-    return WORK * count * float(local.unknowns) ** 3
+def _work(local: Scaled, count: int) -> float:
+    return WORK * count * float(local.q.size) ** 3
 
 
-def _on_segment(stack: Stack, r: Array, other: Array) -> bool:
+def _on_segment(scaled: Scaled, r: Array, other: Array) -> bool:
     points = (r + t * (other - r) for t in (0.0, 0.25, 0.5, 0.75, 1.0))
-    return all(certain_error(stack.problem, point) <= EXACT for point in points)
+    return all(scaled.problem.certain_error(point) <= SEGMENT for point in points)
 
 
-def _on_its_piece(stack: Stack, scaled: ScaledProblem, r: Array) -> bool:
+def _on_its_piece(plane: PlaneProblem, r: Array) -> bool:
     """2D: the solution of a pattern that r has is inside of the piece."""
-    entry = described(stack, r)
+    entry, mu = described(plane.scaled, r), plane.mu
     for word in (entry.pattern, *entry.touching)[:WORDS]:
-        states = np.array([STATES[letter] for letter in word], dtype=np.int8)
-        states[(stack.mu == 0) & (states != search.OPEN)] = search.FRICTIONLESS
-        answer = examined(scaled, states)
-        found = answer.r * scaled.to_r / stack.to_r.repeat(2)
-        near = np.abs(found - r.ravel()).max() <= NEAR * (1 + np.abs(r).max())
+        states = states_of(word)
+        states[(mu == 0) & (states != FREE)] = FRICTIONLESS
+        answer = examined(plane, states)
+        near = np.abs(answer.r - r.ravel()).max() <= BELONGS * (1 + np.abs(r).max())
         if near and (answer.exists or answer.freedom):
             return True
     return False
 
 
-def _newton_converges(stack: Stack, r: Array) -> bool:
+def _newton_converges(scaled: Scaled, r: Array) -> bool:
     """3D: the condition of Kantorovich, with statuses that do not change in the ball."""
     start = r
-    r, step = stack.polished(start)
-    if np.abs(r - start).max(initial=0.0) > NEAR * (1 + np.abs(start).max(initial=0.0)):
+    r, step = polished(scaled, start)
+    if np.abs(r - start).max(initial=0.0) > BELONGS * (1 + np.abs(start).max(initial=0.0)):
         return False
-    u, size = stack.velocity(r[None])[0], 1 + float(np.abs(r).max(initial=0.0))
-    values = np.linalg.svd(stack.jacobian(r), compute_uv=False)
+    u, size = scaled.velocity(r[None])[0], 1 + float(np.abs(r).max(initial=0.0))
+    values = np.linalg.svd(jacobian(scaled, r), compute_uv=False)
     if not len(values) or values[-1] == 0:
         return False
     beta = np.sqrt(len(values)) / values[-1]
-    eta = step + beta * ROUNDING * size * (1 + np.abs(stack.W).sum(axis=1).max())
-    states, mu = statuses(stack, r)[0], stack.mu
-    grows = 2 * (1 + np.abs(stack.W).sum(axis=1).max()) * (1 + mu)
+    eta = step + beta * ROUNDING * size * (1 + np.abs(scaled.W).sum(axis=1).max())
+    states, mu = statuses(scaled, r)[0], scaled.mu
+    grows = 2 * (1 + np.abs(scaled.W).sum(axis=1).max()) * (1 + mu)
     margin = np.where(states == FREE, u[:, 0], np.inf)
     stick = mu * r[:, 0] - np.linalg.norm(r[:, 1:], axis=1)
     margin = np.where(states == STICK, np.minimum(stick, r[:, 0]), margin)

@@ -29,16 +29,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from . import pattern_search as search
-from .piece_solution import DATA, Existence, PieceAnswer, PieceSystem, located
-from .scaled_problem import ScaledProblem, States
+from ..statuses import FREE, FRICTIONLESS, MINUS, PLUS, STICK, States
+from ..tolerances import DATA
+from .piece_solution import Existence, PieceAnswer, PieceSystem, located
+from .plane_problem import PlaneProblem
 
 Array = NDArray[np.float64]
 FANS = (  # statuses of a contact that together are a law
-    (search.OPEN,), (search.STICK,), (search.SLIP_PLUS,), (search.SLIP_MINUS,),
-    (search.OPEN, search.SLIP_PLUS), (search.OPEN, search.SLIP_MINUS),
-    (search.STICK, search.SLIP_PLUS), (search.STICK, search.SLIP_MINUS),
-    (search.OPEN, search.STICK, search.SLIP_PLUS, search.SLIP_MINUS),
+    (FREE,), (STICK,), (PLUS,), (MINUS,),
+    (FREE, PLUS), (FREE, MINUS),
+    (STICK, PLUS), (STICK, MINUS),
+    (FREE, STICK, PLUS, MINUS),
 )  # fmt: skip
 PIECES = 1024  # that may meet in a solution
 GENERIC = 1e-7  # a change of a slack that is too small to have a sign, relative
@@ -61,7 +62,7 @@ class Degree:
 UNKNOWN = Degree()
 
 
-def degree(scaled: ScaledProblem, group: Sequence[PieceAnswer]) -> Degree:
+def degree(plane: PlaneProblem, group: Sequence[PieceAnswer]) -> Degree:
     """That of answers that are one solution within rounding, in 2D."""
     first = group[0]
     if first.existence is Existence.SURE and len(group) == 1:
@@ -70,13 +71,13 @@ def degree(scaled: ScaledProblem, group: Sequence[PieceAnswer]) -> Degree:
         return UNKNOWN
     off_r = np.max([np.abs(g.r - first.r) + g.off_r for g in group], axis=0)
     off_u = np.max([np.abs(g.u - first.u) + g.off_u for g in group], axis=0)
-    choices = [_statuses(scaled, first, i, off_r, off_u) for i in range(scaled.contacts)]
+    choices = [_statuses(plane, first, i, off_r, off_u) for i in range(plane.contacts)]
     if math.prod(len(own) for own in choices) > PIECES:
         return UNKNOWN
     pieces = []
     for states in itertools.product(*choices):
         kept = [_kept(own, state) for own, state in zip(choices, states, strict=True)]
-        piece = _Cone.of(scaled, np.array(states, dtype=np.int8), np.concatenate(kept))
+        piece = _Cone.of(plane, np.array(states, dtype=np.int8), np.concatenate(kept))
         if piece is None:
             return UNKNOWN
         pieces.append(piece)
@@ -84,7 +85,7 @@ def degree(scaled: ScaledProblem, group: Sequence[PieceAnswer]) -> Degree:
     if any(tuple(g.states.tolist()) not in met for g in group):
         return UNKNOWN
     random = np.random.default_rng(0)
-    found = {_count(pieces, random.standard_normal(len(scaled.W))) for _ in range(TRIES)}
+    found = {_count(pieces, random.standard_normal(len(plane.W))) for _ in range(TRIES)}
     found -= {None}
     if len(found) != 1:
         return UNKNOWN
@@ -93,40 +94,40 @@ def degree(scaled: ScaledProblem, group: Sequence[PieceAnswer]) -> Degree:
 
 
 def _statuses(
-    scaled: ScaledProblem, at: PieceAnswer, i: int, off_r: Array, off_u: Array
+    plane: PlaneProblem, at: PieceAnswer, i: int, off_r: Array, off_u: Array
 ) -> list[int]:
     """Statuses that contact i has within the errors given."""
-    n, t, mu = 2 * i, 2 * i + 1, float(scaled.mu[i])
-    if not scaled.reacts[i]:
-        return [search.OPEN]
+    n, t, mu = 2 * i, 2 * i + 1, float(plane.mu[i])
+    if not plane.reacts[i]:
+        return [FREE]
     room = mu * off_r[n] + off_r[t]
     still_n, still_t = abs(at.u[n]) <= off_u[n], abs(at.u[t]) <= off_u[t]
     out = []
     if abs(at.r[n]) <= off_r[n] and abs(at.r[t]) <= off_r[t] and at.u[n] >= -off_u[n]:
-        out.append(search.OPEN)
+        out.append(FREE)
     if still_n and mu == 0:
-        out.append(search.FRICTIONLESS)
+        out.append(FRICTIONLESS)
     elif still_n:
         if still_t and abs(at.r[t]) <= mu * at.r[n] + room:
-            out.append(search.STICK)
+            out.append(STICK)
         if abs(at.r[t] - mu * at.r[n]) <= room and at.u[t] <= off_u[t]:
-            out.append(search.SLIP_PLUS)
+            out.append(PLUS)
         if abs(at.r[t] + mu * at.r[n]) <= room and at.u[t] >= -off_u[t]:
-            out.append(search.SLIP_MINUS)
+            out.append(MINUS)
     return out if mu == 0 or tuple(out) in FANS else list(FANS[-1])
 
 
 def _kept(statuses: Sequence[int], state: int) -> list[bool]:
     """Which inequalities of a state belong to the law that some statuses make.
 
-    In the order of `ScaledProblem.slack_matrices`.
+    In the order of `PlaneProblem.slack_matrices`.
     """
     whole, alone = len(statuses) == len(FANS[-1]), len(statuses) == 1
-    if state in (search.OPEN, search.FRICTIONLESS):
+    if state in (FREE, FRICTIONLESS):
         return [not alone]
-    if state == search.STICK:
-        return [whole or search.SLIP_PLUS in statuses, whole or search.SLIP_MINUS in statuses]
-    return [whole or search.OPEN in statuses, whole or search.STICK in statuses]
+    if state == STICK:
+        return [whole or PLUS in statuses, whole or MINUS in statuses]
+    return [whole or FREE in statuses, whole or STICK in statuses]
 
 
 class _Cone:
@@ -139,13 +140,13 @@ class _Cone:
 
     @classmethod
     def of(
-        cls, scaled: ScaledProblem, states: States, active: NDArray[np.bool_]
+        cls, plane: PlaneProblem, states: States, active: NDArray[np.bool_]
     ) -> _Cone | None:
         """The cone of a pattern with some of its inequalities.
 
         None where its determinant has no sure sign, or its solution may violate another one.
         """
-        system = PieceSystem.of(scaled, states)
+        system = PieceSystem.of(plane, states)
         found = system.inverse(DATA)
         if found is None:
             return None

@@ -22,25 +22,26 @@ from ...core.clock import NEVER, Deadline, TimeLimit, deadline_of, now
 from ...core.errors import InvalidInput, TimeUp
 from ...problem.friction import FrictionProblem
 from ...solvers.driver import drive
-from .enumerate import PieceSolution, Solutions
-from .newton_batch import FREE, SLIP, STICK, Stack
+from ..scaled import Scaled
+from ..statuses import FREE, SLIP, STICK, States
+from ..tolerances import BORDER, SAME, SINGULAR, SOLVED
+from .enumerate import PieceSolution, Solutions, nothing_found, without_load
+from .newton_batch import jacobian, linearise, newton, on_piece, solve_work, width
 
 Array = NDArray[np.float64]
 ROUND = 100  # starts between two looks at the clock and at the solutions known so far
 SOLVER = 10.0  # seconds for a solver, where Newton's method is dear; counted without a limit
 EXTRA = 3  # times the starts while a solution is known to be missing
-SAME = 1e-7  # scaled distance of two solutions that count as one
 FLAT = 1e-4  # of their distance: an error between two solutions that makes them connected
 ROUNDING = 1e-11  # scaled distance below which a difference of status counts as none
-BORDER = 1e-8  # scaled distance from a border of the law at which a solution has both patterns
-SINGULAR = 1e-10  # smallest singular value of a regular Jacobian, relative to the largest
 RANKED = 1000  # rows up to which the kernel of a Jacobian comes from its singular values
 WORDS = 64  # touching patterns that are listed
+KINDS = np.array([FREE, STICK, SLIP])  # of Newton's method
 
 
 def multistart(
     problem: FrictionProblem, *, starts: int = 1000, seed: int = 0,
-    time_limit: TimeLimit = None, tolerance: float = 1e-8,
+    time_limit: TimeLimit = None, tolerance: float = SOLVED,
 ) -> Solutions:  # fmt: skip
     """Solutions of a 2D or 3D Coulomb problem found from many starts; never complete.
 
@@ -51,15 +52,14 @@ def multistart(
     if not starts >= 1:
         raise InvalidInput(f"starts: expected at least 1, got {starts!r}")
     deadline = deadline_of(time_limit)
-    _ = problem.mu
     began = now()
     try:
-        local = problem.condensed(deadline)
+        scaled = Scaled.of(problem, deadline)
     except TimeUp as reason:
         return nothing_found(reason, began)
-    if local.q_norm == 0:
-        return without_load(local)
-    finder = Finder(Stack.of(local), np.random.default_rng(seed), tolerance)
+    if not scaled.q.any():
+        return without_load(scaled)
+    finder = Finder(scaled, np.random.default_rng(seed), tolerance)
     finder.begin(deadline)
     used = 0
     while used < starts or (finder.lacks_one and used < EXTRA * starts):
@@ -70,42 +70,29 @@ def multistart(
                      resolution=SAME)  # fmt: skip
 
 
-def nothing_found(reason: TimeUp, began: float) -> Solutions:
-    """The empty list of a search that was stopped before it began."""
-    return Solutions((), False, str(reason), 0, now() - began)
-
-
-def without_load(problem: FrictionProblem) -> Solutions:
-    """What can be said where q is zero, or without contacts."""
-    r = np.zeros((problem.contacts, problem.dimension))
-    rest = PieceSolution("f" * problem.contacts, (), r, r.copy(), 0.0, 1, 0.0)
-    reason = "q is zero: only r = 0 can be judged, others were not looked for"
-    return Solutions((rest,), problem.contacts == 0, reason, 0, 0.0)
-
-
 class Finder:
     """The solutions found so far, and where to look next."""
 
-    def __init__(self, stack: Stack, random: np.random.Generator, tolerance: float) -> None:
-        self.stack, self.random, self.tolerance = stack, random, tolerance
+    def __init__(self, scaled: Scaled, random: np.random.Generator, tolerance: float) -> None:
+        self.scaled, self.random, self.tolerance = scaled, random, tolerance
         self.found: list[Array] = []  # scaled reactions
         self.sign: list[int] = []  # orientations
 
     def begin(self, deadline: Deadline = NEVER) -> None:
         """What a solver finds, where Newton's method is dear."""
-        if self.stack.width <= ROUND:
+        if width(self.scaled) <= ROUND:
             own = Deadline.counted(SOLVER) if deadline == NEVER else deadline.within(SOLVER)
-            found = drive(self.stack.problem, tolerance=self.tolerance, time_limit=own)
-            self.add(found.r / self.stack.to_r)
+            found = drive(self.scaled.problem, tolerance=self.tolerance, time_limit=own)
+            self.add(found.r / self.scaled.to_r)
 
     def search(self, count: int, deadline: Deadline = NEVER) -> int:
         """Newton from `count` starts, until the deadline at most; returns count."""
         plain = self._starts(count, deadline)
-        for r in self.stack.newton(plain, self.random, deadline=deadline):
+        for r in newton(self.scaled, plain, self.random, deadline=deadline):
             self.add(r)
         if self.found:
             some, known = plain[: max(1, count // 4)], np.array(self.found)
-            for r in self.stack.newton(some, self.random, known, deadline):
+            for r in newton(self.scaled, some, self.random, known, deadline):
                 self.add(r)
         return count
 
@@ -114,7 +101,7 @@ class Finder:
         size = 1 + np.abs(r).max(initial=0.0)
         if any(self._same(r, other, size) for other in self.found):
             return False
-        if certain_error(self.stack.problem, r * self.stack.to_r) > self.tolerance:
+        if self.scaled.problem.certain_error(r * self.scaled.to_r) > self.tolerance:
             return False
         for k, other in enumerate(self.found):
             if self._connected(
@@ -123,7 +110,7 @@ class Finder:
                 self.found[k], self.sign[k] = (r + other) / 2, 0
                 return False
         self.found.append(r)
-        self.sign.append(orientation(self.stack, r)[0])
+        self.sign.append(orientation(self.scaled, r)[0])
         return True
 
     def _same(self, r: Array, other: Array, size: float) -> bool:
@@ -131,12 +118,12 @@ class Finder:
         apart = float(np.abs(r - other).max(initial=0.0))
         if apart > SAME * size or apart <= ROUNDING * size:
             return apart <= SAME * size
-        return bool((statuses(self.stack, r)[0] == statuses(self.stack, other)[0]).all())
+        return bool((statuses(self.scaled, r)[0] == statuses(self.scaled, other)[0]).all())
 
     def _connected(self, r: Array, other: Array) -> bool:
         """True where the segment between two solutions consists of solutions."""
         points = np.array([(1 - t) * r + t * other for t in (0.25, 0.5, 0.75)])
-        F = self.stack.linearise(points, np.ones(points.shape[:2]))[0]
+        F = linearise(self.scaled, points, np.ones(points.shape[:2]))[0]
         apart, size = np.abs(r - other).max(), 1 + np.abs(r).max()
         return bool(np.abs(F).max() <= min(BORDER * size, FLAT * apart))
 
@@ -169,56 +156,56 @@ class Finder:
 
     def _directions(self, count: int) -> Array:
         """Unit tangents, (count, nc, d - 1): in half of the starts about one for all."""
-        nc, d = self.stack.shape
+        nc, d = self.scaled.shape
         each = self.random.standard_normal((count, nc, d - 1))
         common = self.random.standard_normal((count, 1, d - 1))
         each += common * self.random.choice([0.0, 5.0], (count, 1, 1))
         return each / np.maximum(np.linalg.norm(each, axis=2, keepdims=True), 1e-300)
 
     def _solved(
-        self, states: NDArray[np.int64], direction: Array, deadline: Deadline
+        self, states: States, direction: Array, deadline: Deadline
     ) -> Array:
-        width, out = self.stack.width, [np.zeros((0, *self.stack.shape))]
-        for k in range(0, len(states), width):
+        most, out = width(self.scaled), [np.zeros((0, *self.scaled.shape))]
+        for k in range(0, len(states), most):
             if deadline.passed:
                 break
-            some = states[k : k + width]
-            deadline.spend(len(some) * self.stack.solve_work)
-            out.append(self.stack.on_piece(some, direction[k : k + width]))
+            some = states[k : k + most]
+            deadline.spend(len(some) * solve_work(self.scaled))
+            out.append(on_piece(self.scaled, some, direction[k : k + most]))
         return np.concatenate(out)
 
     def _patterns(self, count: int, deadline: Deadline) -> Array:
         """Points of random patterns, each with its own shares of the statuses."""
         shares = self.random.dirichlet([0.5, 0.5, 0.5], count)
-        chance = self.random.random((count, self.stack.shape[0]))
-        states = (chance[:, :, None] > shares.cumsum(axis=1)[:, None, :2]).sum(axis=2)
+        chance = self.random.random((count, self.scaled.shape[0]))
+        states = KINDS[(chance[:, :, None] > shares.cumsum(axis=1)[:, None, :2]).sum(axis=2)]
         return self._solved(states, self._directions(count), deadline)
 
     def _in_the_cone(self, count: int, deadline: Deadline) -> Array:
-        nc, d = self.stack.shape
+        nc, d = self.scaled.shape
         size = 10.0 ** self.random.uniform(-1.5, 1.5, (count, 1))
         normal = size * self.random.exponential(1.0, (count, nc))
         normal *= self.random.random((count, nc)) < self.random.random((count, 1))
         share = self.random.random((count, nc, 1)) ** 0.5
-        tangent = (self.stack.mu * normal)[:, :, None] * share * self._directions(count)
+        tangent = (self.scaled.mu * normal)[:, :, None] * share * self._directions(count)
         return np.concatenate([normal[:, :, None], tangent], axis=2)
 
     def _neighbours(self, count: int, deadline: Deadline) -> Array:
         """Points of patterns that differ in some contacts from that of a known solution."""
-        nc = self.stack.shape[0]
+        nc = self.scaled.shape[0]
         which = self.random.integers(len(self.found), size=count)
-        known = [statuses(self.stack, r) for r in self.found]
+        known = [statuses(self.scaled, r) for r in self.found]
         states = np.array([known[k][0] for k in which]).reshape(count, nc)
         direction = np.array([known[k][1] for k in which]).reshape(count, nc, -1)
         changed = self.random.integers(1, min(4, nc) + 1, (count, 1)) / nc
         changed = self.random.random((count, nc)) < changed
-        states = np.where(changed, self.random.integers(3, size=(count, nc)), states)
+        states = np.where(changed, KINDS[self.random.integers(3, size=(count, nc))], states)
         other = self._directions(count)
         return self._solved(states, np.where(changed[:, :, None], other, direction), deadline)
 
     def _between(self, count: int, deadline: Deadline) -> Array:
         """Points on the line through two known solutions, each contact for itself or all."""
-        nc, _ = self.stack.shape
+        nc, _ = self.scaled.shape
         pick = self.random.integers(len(self.found), size=(2, count))
         known = np.array(self.found)
         t = self.random.uniform(-0.3, 1.3, (count, 1, 1))
@@ -229,31 +216,31 @@ class Finder:
     # ---------------------------------------------------------------- results
     def solutions(self) -> Iterator[PieceSolution]:
         """One entry per solution, most sticking contacts first."""
-        entries = [described(self.stack, r) for r in self.found]
+        entries = [described(self.scaled, r) for r in self.found]
         yield from sorted(entries, key=lambda s: (-s.pattern.count("s"), s.pattern))
 
 
 # ------------------------------------------------------------- what a solution is
-def statuses(stack: Stack, r: Array) -> tuple[NDArray[np.int64], Array]:
+def statuses(scaled: Scaled, r: Array) -> tuple[States, Array]:
     """(status, (nc,), direction of slip, (nc, d - 1)) of one scaled solution."""
-    u = stack.velocity(r[None])[0]
-    bound = stack.mu * np.maximum(r[:, 0], 0)
+    u = scaled.velocity(r[None])[0]
+    bound = scaled.mu * np.maximum(r[:, 0], 0)
     reach = np.linalg.norm(r[:, 1:] - u[:, 1:], axis=1)
-    closed = (r[:, 0] > u[:, 0]) & stack.able
-    slip = closed & ((reach > bound) | (stack.mu == 0))
+    closed = (r[:, 0] > u[:, 0]) & scaled.reacts
+    slip = closed & ((reach > bound) | (scaled.mu == 0))
     states = np.where(slip, SLIP, np.where(closed, STICK, FREE))
     length = np.linalg.norm(u[:, 1:], axis=1, keepdims=True)
     direction = np.where(length > 0, u[:, 1:] / np.where(length > 0, length, 1), 0.0)
     return states, direction
 
 
-def orientation(stack: Stack, r: Array) -> tuple[int, int]:
+def orientation(scaled: Scaled, r: Array) -> tuple[int, int]:
     """(sign of the determinant of the generalised Jacobian or 0, dimension of its kernel).
 
     +1 without friction: there A + B W belongs to a symmetric positive definite problem.  By one
     LU where that is regular beyond doubt; the kernel of a large one is counted by its pivots.
     """
-    matrix = stack.jacobian(r)
+    matrix = jacobian(scaled, r)
     lu, swaps, _ = lapack.dgetrf(matrix)
     size = float(np.abs(matrix).sum(axis=0).max(initial=0.0))
     if len(matrix) and lapack.dgecon(lu, size)[0] > len(matrix) * SINGULAR:
@@ -268,21 +255,17 @@ def orientation(stack: Stack, r: Array) -> tuple[int, int]:
     return (0 if freedom else int(np.linalg.slogdet(matrix)[0])), freedom
 
 
-def certain_error(problem: FrictionProblem, r: Array) -> float:
-    """Error by the judge, or what rounding of huge reactions may hide of it, if more."""
-    return problem.certain_error(r)
-
-
-def described(stack: Stack, r: Array) -> PieceSolution:
+def described(scaled: Scaled, r: Array) -> PieceSolution:
     """A scaled solution as an entry of a list, in the units of the problem."""
-    u = stack.velocity(r[None])[0]
-    letters = [_letters(*contact) for contact in zip(r, u, stack.mu, stack.able, strict=True)]
+    u = scaled.velocity(r[None])[0]
+    each = zip(r, u, scaled.mu, scaled.reacts, strict=True)
+    letters = [_letters(*contact) for contact in each]
     words = ["".join(word) for word in itertools.islice(itertools.product(*letters), WORDS)]
-    sign, freedom = orientation(stack, r)
-    reaction = r * stack.to_r
-    velocity = np.array(stack.problem.velocity(reaction)[0])
-    energy = float((reaction * (u - stack.c) * stack.to_u).sum() / 2)
-    error = stack.problem.error(reaction)
+    sign, freedom = orientation(scaled, r)
+    reaction = r * scaled.to_r
+    velocity = np.array(scaled.problem.velocity(reaction)[0])
+    energy = float((reaction * (u - scaled.q) * scaled.to_u).sum() / 2)
+    error = scaled.problem.error(reaction)
     return PieceSolution(words[0], tuple(words[1:]), reaction, velocity, error, sign, energy,
                          freedom)  # fmt: skip
 

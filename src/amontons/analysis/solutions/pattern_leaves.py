@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from ..statuses import States
 from . import pattern_search as search
-from .scaled_problem import States
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

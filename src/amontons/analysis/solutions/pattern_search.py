@@ -17,17 +17,19 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.compiled import njit
+from ..statuses import ANY, CLOSED, FREE, FRICTIONLESS, PLUS, STICK
 
-FREE, POSITIVE, NEGATIVE, FIXED = 0, 1, 2, 3  # bounds of a variable, closed
-OPEN_OR_CLOSED, CLOSED, OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS = range(7)
+UNBOUND, POSITIVE, NEGATIVE, FIXED = 0, 1, 2, 3  # bounds of a variable, closed
 BOUNDS = np.array([  # a, b, u_N, u_T of a status
-    [POSITIVE, POSITIVE, POSITIVE, FREE],
-    [POSITIVE, POSITIVE, FIXED, FREE],
-    [FIXED, FIXED, POSITIVE, FREE],
-    [POSITIVE, POSITIVE, FIXED, FIXED],
-    [POSITIVE, FIXED, FIXED, NEGATIVE],
-    [FIXED, POSITIVE, FIXED, POSITIVE],
-    [POSITIVE, FIXED, FIXED, FREE],
+    [FIXED, FIXED, POSITIVE, UNBOUND],  # FREE
+    [POSITIVE, FIXED, FIXED, NEGATIVE],  # PLUS
+    [FIXED, POSITIVE, FIXED, POSITIVE],  # MINUS
+    [POSITIVE, POSITIVE, FIXED, FIXED],  # STICK
+    [UNBOUND, UNBOUND, UNBOUND, UNBOUND],  # no state of a contact here
+    [POSITIVE, FIXED, FIXED, UNBOUND],  # FRICTIONLESS
+    [UNBOUND, UNBOUND, UNBOUND, UNBOUND],
+    [POSITIVE, POSITIVE, FIXED, UNBOUND],  # CLOSED
+    [POSITIVE, POSITIVE, POSITIVE, UNBOUND],  # ANY
 ], dtype=np.int8)  # fmt: skip
 ZERO = 1e-10  # violation of a bound that counts as none, of variables of size 1
 PIVOT = 1e-9  # smallest entry that is divided by
@@ -129,7 +131,7 @@ def _entering(D, nonbasic, states, i, up, least_index):
         v = nonbasic[j]
         kind = BOUNDS[states[v // 4], v % 4]
         d = D[i, j] if up else -D[i, j]
-        helps = (kind == POSITIVE and d > 0) or (kind == NEGATIVE and d < 0) or kind == FREE
+        helps = (kind == POSITIVE and d > 0) or (kind == NEGATIVE and d < 0) or kind == UNBOUND
         if not helps or abs(d) <= PIVOT:
             continue
         if least_index:
@@ -230,11 +232,11 @@ def _most_violated(D, basic, states):
         x[basic[i]] = D[i, m]
     worst, where = -1.0, -1
     for p in range(n):
-        if states[p] > CLOSED:
+        if states[p] < CLOSED:
             continue
         a, b, un, ut = x[4 * p], x[4 * p + 1], x[4 * p + 2], x[4 * p + 3]
         slip = max(min(a, ut), min(b, -ut))
-        size = max(slip, min(a + b, un)) if states[p] == OPEN_OR_CLOSED else slip
+        size = max(slip, min(a + b, un)) if states[p] == ANY else slip
         if size > worst:
             worst, where = max(size, 0.0), p
     return where
@@ -243,13 +245,15 @@ def _most_violated(D, basic, states):
 @njit(cache=True)
 def _child(state, number, reacts, frictional):
     """State of a child, -1 when there is none of that number."""
-    if state == OPEN_OR_CLOSED:
+    if state == ANY:
         if number == 0:
-            return OPEN
+            return FREE
         if number == 1 and reacts:
             return CLOSED if frictional else FRICTIONLESS
         return -1
-    return STICK + number if number < 3 else -1
+    if state != CLOSED or number > 2:
+        return -1
+    return STICK if number == 0 else PLUS + number - 1
 
 
 def start_inplace(D, basic, nonbasic, states, A, c):
@@ -258,7 +262,7 @@ def start_inplace(D, basic, nonbasic, states, A, c):
     D[0, :, :m], D[0, :, m] = A, c
     reactions = np.array([4 * (k // 2) + k % 2 for k in range(m)], dtype=np.int64)
     basic[0], nonbasic[0] = reactions + 2, reactions
-    states[0] = OPEN_OR_CLOSED
+    states[0] = ANY
 
 
 @njit(cache=True)

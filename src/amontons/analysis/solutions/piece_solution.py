@@ -17,16 +17,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from ..multipliers.rounding import EPSILON, gamma
-from .scaled_problem import SLACK, ScaledProblem, States
+from ..statuses import States
+from ..tolerances import DATA, SLACK
+from .plane_problem import PlaneProblem
 
 Array = NDArray[np.float64]
-DATA = 1e-13  # relative error of W, q and mu at which solutions are told apart
 REGULAR = 0.5  # largest rho
 SINGULAR = 4 * EPSILON  # smallest singular value of a regular piece, per row and relative
 CONSISTENT = 1e-12  # what a singular system may miss, scaled
@@ -73,7 +75,7 @@ class PieceAnswer:
 class PieceSystem:
     """The matrices of one piece: r = R y, u = WR y + c, slacks P r + Q u, E = WR[rows]."""
 
-    scaled: ScaledProblem
+    plane: PlaneProblem
     states: States
     R: Array
     rows: NDArray[np.int64]
@@ -81,38 +83,38 @@ class PieceSystem:
     Q: Array
 
     @classmethod
-    def of(cls, scaled: ScaledProblem, states: States) -> PieceSystem:
+    def of(cls, plane: PlaneProblem, states: States) -> PieceSystem:
         """Those of a pattern."""
-        return cls(scaled, states, *scaled.system(states), *scaled.slack_matrices(states))
+        return cls(plane, states, *plane.system(states), *plane.slack_matrices(states))
 
     @property
     def L(self) -> Array:
         """Slacks as functions of y, (s, k)."""
-        return self.P @ self.R + self.Q @ (self.scaled.W @ self.R)
+        return self.P @ self.R + self.Q @ (self.plane.W @ self.R)
 
     @property
     def sign(self) -> int:
         """Of the determinant."""
-        E = (self.scaled.W @ self.R)[self.rows]
+        E = (self.plane.W @ self.R)[self.rows]
         return int(np.linalg.slogdet(E)[0]) if len(E) else 1
 
     def inverse(self, data: float) -> tuple[Array, float] | None:
         """(X, rho), None where the piece may be singular for data that are off so much."""
-        E = (self.scaled.W @ self.R)[self.rows]
+        E = (self.plane.W @ self.R)[self.rows]
         k = len(E)
         try:
-            X = np.linalg.inv(E)
+            X: Any = np.linalg.inv(E)
         except np.linalg.LinAlgError:
             return None
-        terms = np.abs(self.scaled.W)[self.rows] @ np.abs(self.R)
-        spread = (2 * data + gamma(k + len(self.scaled.W) + 4)) * (np.abs(X) @ terms)
+        terms = np.abs(self.plane.W)[self.rows] @ np.abs(self.R)
+        spread = (2 * data + gamma(k + len(self.plane.W) + 4)) * (np.abs(X) @ terms)
         rho = float((np.abs(X @ E - np.eye(k)) + spread).sum(axis=1).max(initial=0.0))
         return (X, rho) if rho < REGULAR else None
 
 
-def examined(scaled: ScaledProblem, states: States) -> PieceAnswer:
+def examined(plane: PlaneProblem, states: States) -> PieceAnswer:
     """What is known about the piece of a pattern."""
-    system = PieceSystem.of(scaled, states)
+    system = PieceSystem.of(plane, states)
     for data in (DATA, 0.0):
         found = system.inverse(data)
         if found is not None:
@@ -142,24 +144,24 @@ class Located:
 
 def located(system: PieceSystem, X: Array, rho: float, data: float) -> Located:
     """Where the equations of a regular piece hold, for data that are off so much."""
-    scaled, R, rows = system.scaled, system.R, system.rows
-    y = -(X @ scaled.c[rows])
+    plane, R, rows = system.plane, system.R, system.rows
+    y = -(X @ plane.c[rows])
     for _ in range(2):
         y = y - X @ _exact(system, y)[1][rows]
     r, u, slack = _exact(system, y)
     y_size = np.abs(R) @ np.abs(y)
-    terms = np.abs(scaled.W) @ y_size + np.abs(scaled.c)
-    fine = (2 * len(scaled.W) + 8) * float(np.finfo(np.longdouble).eps)
+    terms = np.abs(plane.W) @ y_size + np.abs(plane.c)
+    fine = (2 * len(plane.W) + 8) * float(np.finfo(np.longdouble).eps)
     error = np.abs(u[rows]) * (1 + EPSILON) + (fine + 2 * data) * terms[rows]
     lead = (np.abs(X) @ error) * (1 + gamma(len(y) + 4))
     rest = rho / (1 - rho) * float(lead.max(initial=0.0))
     size = np.abs(system.P) @ np.abs(R)
-    size = size + np.abs(system.Q) @ (np.abs(scaled.W) @ np.abs(R))
-    through = np.abs(system.L @ X) + gamma(2 * len(scaled.W) + 4) * (size @ np.abs(X))
+    size = size + np.abs(system.Q) @ (np.abs(plane.W) @ np.abs(R))
+    through = np.abs(system.L @ X) + gamma(2 * len(plane.W) + 4) * (size @ np.abs(X))
     off = through @ error + size.sum(axis=1) * rest + EPSILON * np.abs(slack)
     off += (2 * fine + 3 * data) * (np.abs(system.P) @ y_size + np.abs(system.Q) @ terms)
     off_r = np.abs(R) @ (lead + rest) + (data + 2 * EPSILON) * y_size
-    off_u = np.abs(scaled.W @ R) @ (lead + rest) + EPSILON * np.abs(u)
+    off_u = np.abs(plane.W @ R) @ (lead + rest) + EPSILON * np.abs(u)
     off_u += (fine + data + gamma(len(y) + 4) * rho) * terms
     return Located(r, u, slack, off_r, off_u, off)
 
@@ -181,7 +183,7 @@ def _exact(system: PieceSystem, y: Array) -> tuple[Array, Array, Array]:
     """(r, u, slacks) at y, each of them rounded once where the machine has a wider type."""
     wide = np.longdouble
     r = system.R.astype(wide) @ y.astype(wide)
-    u = system.scaled.W.astype(wide) @ r + system.scaled.c.astype(wide)
+    u = system.plane.W.astype(wide) @ r + system.plane.c.astype(wide)
     slack = system.P.astype(wide) @ r + system.Q.astype(wide) @ u
     return r.astype(float), u.astype(float), slack.astype(float)
 
@@ -189,12 +191,12 @@ def _exact(system: PieceSystem, y: Array) -> tuple[Array, Array, Array]:
 # ------------------------------------------------------------------ singular pieces
 def _singular(system: PieceSystem) -> PieceAnswer:
     """A set of solutions on a piece that is singular within rounding, or nothing known."""
-    scaled, R, rows = system.scaled, system.R, system.rows
-    none = np.zeros(len(scaled.W))
+    plane, R, rows = system.plane, system.R, system.rows
+    none = np.zeros(len(plane.W))
     unknown = PieceAnswer(system.states, Existence.UNKNOWN, none, none, none, none)
-    left, values, right = np.linalg.svd((scaled.W @ R)[rows])
+    left, values, right = np.linalg.svd((plane.W @ R)[rows])
     rank = int((values > SINGULAR * len(values) * max(values[0], 1.0)).sum())
-    c = scaled.c[rows]
+    c = plane.c[rows]
     if rank == len(rows) or np.abs(left[:, rank:].T @ c).max() > CONSISTENT:
         return unknown
     y = -right[:rank].T @ ((left[:, :rank].T @ c) / values[:rank])
@@ -202,10 +204,10 @@ def _singular(system: PieceSystem) -> PieceAnswer:
     if found is None:
         return unknown
     r, directions = found
-    motion, terms = scaled.W @ directions, np.abs(directions).sum(axis=0)
+    motion, terms = plane.W @ directions, np.abs(directions).sum(axis=0)
     off = np.full(len(r), SLACK) * max(1.0, float(np.abs(r).max(initial=0.0)))
     still = bool((np.abs(motion) <= STILL * terms).all())
-    u = scaled.W @ r + scaled.c
+    u = plane.W @ r + plane.c
     return PieceAnswer(system.states, Existence.NEAR, r, u, off, off,
                        freedom=directions.shape[1], still=still)  # fmt: skip
 
@@ -216,10 +218,10 @@ def _inside(system: PieceSystem, y: Array, kernel: Array) -> tuple[Array, Array]
     Homogeneous in (t, scale), so that one linear program finds every slack that can be
     positive; those that can not reduce the dimension.
     """
-    scaled = system.scaled
+    plane = system.plane
     k = kernel.shape[1]
     G = system.L @ kernel
-    g = system.L @ y + system.Q @ scaled.c
+    g = system.L @ y + system.Q @ plane.c
     left = np.hstack([-G, -g[:, None], np.eye(len(g))])
     bounds = [(None, None)] * k + [(1, None)] + [(0, 1)] * len(g)
     cost = np.concatenate([np.zeros(k + 1), -np.ones(len(g))])

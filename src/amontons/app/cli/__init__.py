@@ -45,8 +45,9 @@ Examples:
 )
 @click.argument("source")
 @click.option("--method", metavar="NAME",
-              help="Solver, such as auto or gauss-seidel, in place of that of the case and its "
-              "options; --set solver.… then sets options of this one.")  # fmt: skip
+              help="Solver, such as auto or gauss-seidel, or package.module:Class, in place of "
+              "that of the case and its options; --set solver.… then sets options of this one."
+              )  # fmt: skip
 @click.option("--tolerance", type=float, metavar="X", help="Unit-free error to reach. [1e-8]")
 @click.option("--contact-tolerance", type=float, metavar="X",
               help="Error of every contact on its own scale. [root of the tolerance]")

@@ -14,7 +14,7 @@ from ...core.errors import InvalidInput
 from ...io.case import make_solver, method_class
 from ...io.case.overrides import split_override
 from ...io.results import FIGURES, to_json, versions
-from .. import api
+from .. import questions
 from .contestants import Contestant, contestants
 from .group import INTERRUPTED, UNFINISHED
 from .sources import open_source
@@ -34,7 +34,7 @@ def run(  # noqa: PLR0913
     check_writable(picture, "--picture", FIGURES)
     opened = open_source(source, overrides)
     named, grid = _methods(methods), _grid(parameters)
-    found = api.basins(
+    found = questions.basins(
         opened.target_with(mu), named, grid, _starts(starts), draws=draws, seed=seed,
         tolerance=tolerance, within=within, max_iterations=max_iterations,
         run_limit=run_limit, time_limit=time_limit,
@@ -43,7 +43,7 @@ def run(  # noqa: PLR0913
     _progress_ends()
     if json_copy != "-" and not quiet:
         _show(opened.title, found)
-        say_when(opened.model)
+        say_when(opened.target)
     if json_copy is not None:
         deliver_json(to_json(record(found, opened.title)), json_copy)
     if picture is not None:

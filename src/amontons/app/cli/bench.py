@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import click
@@ -126,7 +126,7 @@ def _tolerance(text: str) -> float:
 
 def _fresh(problem: FrictionProblem) -> FrictionProblem:
     """The problem as read: nothing factored or condensed; W is in blocks, as after reading."""
-    fresh = replace(problem, _shared={})
+    fresh = problem.fresh()
     if fresh.form is Form.DELASSUS:
         _ = fresh.kernel_data
     return fresh
@@ -171,7 +171,7 @@ def _once(
         )  # fmt: skip
     except (UnsupportedForm, SingularOperator, InvalidInput) as reason:
         return math.inf, str(reason)
-    if found.convergence.outcome is Outcome.STOPPED:
+    if found.convergence.by_user:
         raise KeyboardInterrupt
     return now() - began, found.convergence
 

@@ -3,6 +3,7 @@
     METHOD                       auto
     METHOD:FIELD=VALUE,…         hybrid:first.batch=100,main.line_search=none
     NAME=METHOD:FIELD=VALUE,…    UPK=gauss-seidel:local=projection,local_steps=3
+    package.module:Class         a solver from outside, with options after another colon
 
 Fields and values as in `--set solver.FIELD=VALUE`.  A comma begins the next method unless what
 follows it is FIELD=VALUE; a name of one's own needs the colon.
@@ -17,6 +18,7 @@ from typing import Any
 from ...core.errors import InvalidInput
 from ...io.case.overrides import set_value, split_override
 from ...io.case.settings import GENERAL, Settings, make_solver
+from ...solvers import METHODS
 
 
 @dataclass(frozen=True)
@@ -72,8 +74,11 @@ def _split(text: str) -> list[list[str]]:
 
 def _read(words: list[str]) -> Contestant:
     """The method of its words; it is made once, so that all that is wrong shows."""
-    head, colon, first = words[0].partition(":")
+    head, _, first = words[0].partition(":")
     name, equals, method = head.rpartition("=")
+    kind, _, rest = first.partition(":")
+    if method not in METHODS and kind.isidentifier():
+        method, first = f"{method}:{kind}", rest
     options: dict[str, Any] = {}
     for text in [first] * bool(first.strip()) + words[1:]:
         try:

@@ -20,7 +20,9 @@ def run(source: str, target: str, form: str | None, overrides: Sequence[str]) ->
     """Read, condense if asked to, write."""
     check_writable(target, "target", SUFFIXES)
     opened = open_source(source, overrides)
-    if os.path.exists(target) and any(os.path.samefile(target, p) for p in opened.files):
+    if os.path.exists(target) and opened.path is not None and os.path.samefile(
+        target, opened.path
+    ):
         raise InvalidInput(f"{target}: this is the source; expected the name of another file")
     problem = opened.discrete()
     wanted = Form(form) if form is not None else problem.form

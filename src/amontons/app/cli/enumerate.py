@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis.solutions.enumerate import Solutions
+from ...io.readers import Case
 from ...io.results import FIGURES, to_json, versions
 from ...problem.friction import FrictionProblem
 from ...solvers import Iterate
 from ...solvers.driver import drive
-from ..api import all_solutions
-from .sources import Source, open_source
+from ..questions import all_solutions
+from .sources import open_source
 from .terminal import check_writable, deliver_json, say_when, shortened, show_table
 
 Array = NDArray[np.float64]
@@ -35,7 +36,7 @@ def run(
     found = all_solutions(opened.target_with(mu), time_limit=time_limit)
     if json_copy != "-":
         _show(opened.title, found)
-        say_when(opened.model)
+        say_when(opened.target)
     if json_copy is not None:
         deliver_json(to_json(record(found)), json_copy)
     if picture is not None:
@@ -62,14 +63,15 @@ def record(found: Solutions) -> dict[str, Any]:
 
 
 def draw(
-    opened: Source, problem: FrictionProblem, reactions: Sequence[Array], names: Sequence[str],
+    opened: Case, problem: FrictionProblem, reactions: Sequence[Array], names: Sequence[str],
     picture: str,
 ) -> None:  # fmt: skip
     """Solutions of a problem, given by their reactions, side by side."""
     from ...io.plots import save_figure, solutions_figure
 
     solutions = [drive(problem, start=Iterate(np.array(r))) for r in reactions]
-    figure = solutions_figure(solutions, names, title=opened.title, model=opened.model)
+    figure = solutions_figure(solutions, names, title=opened.title,
+                              model=opened.model if opened.has_model else None)  # fmt: skip
     save_figure(figure, picture)
 
 

@@ -12,7 +12,7 @@ from ...analysis.paths.path import Branch, Event, EventKind, Stop
 from ...core.errors import InvalidInput
 from ...core.files import made, write_bytes
 from ...io.results import to_json, versions
-from .. import api
+from .. import questions
 from .sources import open_source
 from .terminal import check_folder, check_writable, deliver_json, shortened, show_table
 
@@ -42,11 +42,12 @@ def run(
     limits: dict[str, Any] = {"max_points": max_points, "time_limit": time_limit,
                               "options": opened.settings.continuation()}  # fmt: skip
     if every:
-        found = api.diagram(target, name, (low, high), **limits)
+        found = questions.diagram(target, name, (low, high), **limits)
         branches, complete, reason = list(found), found.complete, found.reason
         at = found.at
     else:
-        branches, complete, reason = [api.follow(target, name, (low, high), **limits)], None, ""
+        branches = [questions.follow(target, name, (low, high), **limits)]
+        complete, reason = None, ""
     text = to_json(record(branches, parameter, (low, high), complete, reason, at))
     _write(place, text, branches, opened.title)
     if json_copy is not None:

@@ -16,9 +16,11 @@ from ...linear.dense import dense
 from ...linear.rank import matrix_rank, semidefinite_rank
 from ...problem.friction import Form, FrictionProblem
 from ...problem.indefinite import negative_direction
-from ...problem.law.cones import Tresca
+from ...problem.law import Law
 from ...problem.nitsche import NitscheProblem
+from ...problem.protocol import Problem
 from ...solvers import METHODS
+from ...solvers.contract import taken_by
 from .sources import open_source
 from .terminal import check_writable, deliver_json, show_table
 
@@ -51,7 +53,7 @@ def run(
         deliver_json(to_json(facts), json_copy)
 
 
-def describe(problem: FrictionProblem | NitscheProblem | LargeDeformation) -> dict[str, Any]:
+def describe(problem: Any) -> dict[str, Any]:
     """Facts about a problem by name; W is looked at only where it is cheap to form."""
     if isinstance(problem, NitscheProblem):
         return _describe_nitsche(problem)
@@ -66,14 +68,19 @@ def describe(problem: FrictionProblem | NitscheProblem | LargeDeformation) -> di
         assert problem.M is not None and problem.H is not None
         facts |= {"entries of M": problem.M.nnz, "entries of H": problem.H.nnz,
                   "asymmetry of M": _asymmetry(problem.M)}  # fmt: skip
-    coefficient = problem.law.coefficient
-    name = "friction bound" if isinstance(problem.law, Tresca) else "friction coefficient"
-    facts[name] = [float(coefficient.min(initial=math.inf)), float(coefficient.max(initial=0))]
+    facts |= _law_facts(problem.law)
     facts |= _delassus_facts(problem)
     facts |= _sign(problem)
     facts["scales (a guess)"] = _scales(problem)
     facts["methods that fit"] = fitting_methods(problem)
     return facts
+
+
+def _law_facts(law: Law) -> dict[str, list[float]]:
+    """Smallest and largest of each number of the law."""
+    if not len(law):
+        return {"friction coefficient": [math.inf, 0.0]}
+    return {name: [float(x.min()), float(x.max())] for name, x in law.facts.items()}
 
 
 def _ranks(problem: FrictionProblem, deadline: Deadline) -> dict[str, Any]:
@@ -87,7 +94,11 @@ def _ranks(problem: FrictionProblem, deadline: Deadline) -> dict[str, Any]:
     assert matrix is not None
     columns = matrix.shape[1]
     try:
-        rank = (matrix_rank if name == "H" else semidefinite_rank)(matrix, deadline)
+        if name == "H":
+            assert not isinstance(matrix, np.ndarray)  # H is stored with its zeros left out
+            rank = matrix_rank(matrix, deadline)
+        else:
+            rank = semidefinite_rank(matrix, deadline)
     except (TimeUp, InvalidInput) as error:
         return {f"rank of {name}": f"not computed: {error}"}
     found: dict[str, Any] = {}
@@ -111,30 +122,30 @@ def _existence(problem: FrictionProblem, deadline: Deadline) -> dict[str, Any]:
 def _describe_nitsche(problem: NitscheProblem) -> dict[str, Any]:
     """The facts that a problem without reactions has."""
     m = problem.matrices
-    name = "friction bound" if isinstance(problem.law, Tresca) else "friction coefficient"
-    ends = (problem.law.coefficient, m.kappa, m.kappa / m.stiffness)
-    friction, kappa, safety = ([float(x.min()), float(x.max())] for x in ends)
+    ends = (m.kappa, m.kappa / m.stiffness)
+    kappa, safety = ([float(x.min()), float(x.max())] for x in ends)
     return {
         "form": problem.form.value, "dimension": problem.dimension,
         "contacts": problem.contacts, "unknowns": problem.unknowns, "entries of M": m.M.nnz,
-        name: friction, "kappa": kappa, "kappa / stiffness of the cells": safety,
-        "methods that fit": [
-            name for name, kind in METHODS.items() if getattr(kind, "nitsche", False)
-        ],
+        **_law_facts(problem.law), "kappa": kappa, "kappa / stiffness of the cells": safety,
+        "methods that fit": _solving(NitscheProblem),
     }  # fmt: skip
 
 
 def _describe_large(problem: LargeDeformation) -> dict[str, Any]:
     """The facts that a nonlinear problem has."""
-    name = "friction bound" if isinstance(problem.law, Tresca) else "friction coefficient"
-    ends = (problem.law.coefficient, problem.rho)
-    friction, stiffness = ([float(x.min()), float(x.max())] for x in ends)
+    stiffness = [float(problem.rho.min()), float(problem.rho.max())]
     return {
         "form": "large deformation", "dimension": problem.dimension,
         "contacts": problem.contacts, "unknowns": problem.unknowns,
-        "entries of the tangent": problem.parts.taken.nnz, name: friction,
-        "stiffness at contacts": stiffness, "methods that fit": ["auto"],
+        "entries of the tangent": problem.parts.taken.nnz, **_law_facts(problem.law),
+        "stiffness at contacts": stiffness, "methods that fit": _solving(type(problem)),
     }  # fmt: skip
+
+
+def _solving(kind: type[Problem]) -> list[str]:
+    """Names of the methods for a type of problem."""
+    return [name for name, known in METHODS.items() if issubclass(kind, taken_by(known).solves)]
 
 
 def _delassus_facts(problem: FrictionProblem) -> dict[str, Any]:

@@ -14,15 +14,16 @@ import click
 from ...core.clock import Deadline, now
 from ...core.errors import FileFormatError, InvalidInput, NotConverged, NotWritten
 from ...core.files import make_folder, remove_empty
-from ...io.case import Case, Settings, identity, read_case
+from ...io.case import Settings, identity
 from ...io.checkpoint import export_fclib, steps_of
+from ...io.readers import Case
 from ...mechanics.steps import Energies, TimeStep, at_rest, evolve
 from ...mechanics.steps.stepping import at_end
 from ...problem.solution import Outcome
 from .doubts import Doubts
 from .locking import locked
 from .run_folder import BALANCE, PICTURES, WORKS, RunFolder, clear, continued
-from .sources import case_file, naming_keys, with_flags
+from .sources import open_source, with_flags
 from .stopping import Stopping
 from .terminal import check_folder, say_growth
 
@@ -71,16 +72,15 @@ def run(
         raise InvalidInput(f"--time-limit: expected seconds > 0, got {time_limit}")
     chosen = _chosen(export, export_steps)
     deadline = Deadline.after(time_limit)
-    path = case_file(case)
-    read = read_case(path, overrides)
+    read = open_source(case, overrides)
     if read.evolution is None:
         raise FileFormatError(
             f"{case}: evolution: missing, expected a table with kind, step, until; one state "
             f"without time is found by: amontons solve {case}"
         )
-    place = check_folder(f"{path.stem}-results" if folder is None else folder)
+    place = check_folder(f"{read.name}-results" if folder is None else folder)
     exported = None if export is None else check_folder(export, "--export-fclib")
-    with naming_keys(read.model, str(path)):
+    with read.naming_keys():
         _ = read.model.discretisation, read.model.law
     if not quiet:
         say_growth(read)
@@ -90,16 +90,16 @@ def run(
         for each in {p.resolve(): p for p in (place, exported) if p is not None}.values():
             stack.callback(remove_empty, make_folder(each))
             stack.enter_context(locked(each))
-            clear(each, path.stem)
+            clear(each, read.name)
         try:
             with stop.breaking():
                 results, steps = _prepared(asked, place, restart=restart)
         except KeyboardInterrupt:
             click.echo(f"{stop.word}.", err=True)
             return stop.code
-        with _saying_what_is_safe(results):
+        with _saying_what_is_safe(results), read.naming_keys():
             if exported is not None:
-                steps = export_fclib(steps, exported, path.stem, chosen)
+                steps = export_fclib(steps, exported, read.name, chosen)
             return _follow(steps, results, asked)
 
 
@@ -112,7 +112,7 @@ def _chosen(export: str | None, steps: str | None) -> list[range] | None:
     try:
         return steps_of(steps)
     except InvalidInput as reason:
-        raise InvalidInput(f"--export-{reason}") from None
+        raise InvalidInput(f"--export-steps: {reason.text}") from None
 
 
 def _prepared(

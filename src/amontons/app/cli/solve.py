@@ -3,29 +3,28 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import click
 
 from ...analysis.certificates.uniqueness import Uniqueness, assess, quick_verdict
-from ...core.clock import Deadline, TimeLimit, compiling, now
+from ...core.clock import Deadline, TimeLimit
 from ...core.errors import FileFormatError, InvalidInput, SingularOperator, UnsupportedForm
 from ...io import results as output
-from ...io.case import in_words
 from ...io.checkpoint import load_start
-from ...problem.friction import Form
+from ...io.readers import Case
+from ...problem.friction import FrictionProblem
 from ...problem.judge.measures import Criterion
-from ...problem.nitsche import NO_MULTIPLIERS
+from ...problem.nitsche import NitscheProblem
 from ...problem.solution import FrictionSolution, Outcome
 from ...solvers import Iterate
-from ...solvers.first_iterate import first_iterate
 from .. import api
 from ..model_solution import ModelSolution
 from .group import INTERRUPTED
-from .sources import Source, open_source, with_flags
+from .sources import open_source, with_flags
 from .terminal import check_folder, check_writable, say_when
 from .uniqueness import brief, describe, record
 
@@ -39,7 +38,7 @@ def run(
 ) -> int:  # fmt: skip
     """Solve and write; returns the exit code."""
     opened = open_source(source, overrides, method)
-    if opened.in_time:
+    if opened.evolution is not None:
         raise FileFormatError(
             f"{source}: a case in time, it has [evolution]; use: amontons run {source}"
         )
@@ -48,13 +47,10 @@ def run(
     )
     place = check_folder(f"{opened.name}-results" if folder is None else folder)
     check_writable(json_copy, "--json")
-    began, compiled = now(), compiling()
+    begin = None if start is None else _start(start, opened)
     deadline = Deadline.after(settings.time_limit)
-    begin = _start(start, opened.solvable())
-    assembled = now() - began if opened.model is not None else 0.0
-    compiled = compiling() - compiled
     silent = quiet or json_copy == "-"
-    try:
+    with _naming_culprits(source, opened, settings.method, start):
         found = api.solve_any_form(
             opened.target, settings.solver(), tolerance=settings.tolerance,
             contact_tolerance=settings.contact_tolerance,
@@ -62,10 +58,7 @@ def run(
             patience=patience or None, criterion=Criterion(criterion),
             callback=(lambda step, iterate: None) if silent else None, start=begin,
         )  # fmt: skip
-    except (UnsupportedForm, SingularOperator, InvalidInput) as reason:
-        text = f"{source}: --method {settings.method}: {in_words(str(reason))}"
-        raise type(reason)(text) from reason
-    result = _output(opened, found, settings.method, assembled, compiled)
+    result = _output(opened, found, settings.method)
     left = None if settings.time_limit is None else deadline
     verdict = _verdict(found, full_verdict, left)
     if verdict is not None:
@@ -79,31 +72,42 @@ def run(
     return _finish(found)
 
 
-def _start(file: str | None, problem: Any) -> Iterate | None:
-    """The start in the file of --start, fit for the problem."""
-    if file is None:
-        return None
+def _start(file: str, opened: Case) -> Iterate:
+    """The start in the file of --start."""
     try:
         found = load_start(file)
-        if problem.form is Form.NITSCHE and found.v is None:
-            raise InvalidInput("no v, and the method starts from displacements")
-        return first_iterate(problem, found)
-    except (FileFormatError, InvalidInput) as reason:
-        text = str(reason).removeprefix(f"{file}: ")
-        raise type(reason)(f"--start {file}: {text}") from None
+    except FileFormatError as reason:
+        raise FileFormatError(f"--start {reason}") from None
+    if opened.has_model and opened.model.kind is NitscheProblem and found.v is None:
+        raise InvalidInput(
+            f"--start {file}: no v, and the method starts from displacements"
+        )
+    return found
+
+
+@contextmanager
+def _naming_culprits(
+    source: str, opened: Case, method: str, start: str | None
+) -> Iterator[None]:
+    """Say which key, file or flag an error comes from."""
+    try:
+        yield
+    except (UnsupportedForm, SingularOperator, InvalidInput) as error:
+        where, key = f"{source}: --method {method}", opened.key_of(error.at)
+        if error.at[:1] == ("start",):
+            where = f"--start {start}"
+        elif key:
+            where = f"{opened.path}: {key}"
+        raise type(error)(f"{where}: {error.text}") from error
 
 
 def _output(
-    source: Source, found: FrictionSolution | ModelSolution, method: str, assembled: float,
-    compiled: float,
+    opened: Case, found: FrictionSolution | ModelSolution, method: str
 ) -> output.Output:
     if isinstance(found, ModelSolution):
-        return replace(
-            found.output, title=source.title, method=method, assemble_seconds=assembled,
-            assemble_compiling=compiled,
-        )  # fmt: skip
-    return output.Output(found, title=source.title, method=method,
-                         from_fclib=source.from_fclib, warnings=found.warnings)  # fmt: skip
+        return replace(found.output, title=opened.title, method=method)
+    return output.Output(found, title=opened.title, method=method, warnings=found.warnings,
+                         from_fclib=opened.path is not None)  # fmt: skip
 
 
 def _verdict(
@@ -114,15 +118,12 @@ def _verdict(
     None also for large deformations: that of the tangent problem would say little; and for
     Nitsche's method, which has no reactions to speak of.
     """
-    if isinstance(found, ModelSolution) and found.model.contacts[0].nitsche is not None:
+    if isinstance(found, ModelSolution) and found.model.kind is not FrictionProblem:
         if full:
-            raise UnsupportedForm(f"--uniqueness: {NO_MULTIPLIERS}")
-        return None
-    if isinstance(found, ModelSolution) and found.model.is_large:
-        if full:
-            raise UnsupportedForm("--uniqueness: there is no verdict on large deformations")
+            raise UnsupportedForm(f"--uniqueness: {found.model.kind.unfit}")
         return None
     solution = found.solution if isinstance(found, ModelSolution) else found
+    assert isinstance(solution.problem, FrictionProblem)
     if full:
         known = solution if solution.converged else None
         return assess(solution.problem, known, time_limit=time_limit)
@@ -132,9 +133,9 @@ def _verdict(
 def _report(
     result: output.Output, verdict: Uniqueness | None, full: bool, folder: Path
 ) -> None:
-    click.echo(in_words(output.describe(result)))
+    click.echo(output.describe(result))
     model = result.model
-    if model is None or not (model.is_large or model.contacts[0].nitsche is not None):
+    if model is None or model.kind is FrictionProblem:
         click.echo(describe(verdict) if full and verdict is not None else brief(verdict))
     say_when(model)
     click.echo(f"results in {folder}/")
@@ -147,7 +148,7 @@ def _finish(found: FrictionSolution | ModelSolution) -> int:
         return 0
     sys.stdout.flush()
     name = record.outcome.name.lower().replace("_", " ")
-    detail = f" ({in_words(record.detail)})" if record.detail else ""
+    detail = f" ({output.method_name(record.detail)})" if record.detail else ""
     click.echo(
         f"Not converged: {name}{detail}, {record.errors}. {record.advice}", err=True
     )

@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
+from ...core.interrupts import again, is_busy
+
 SIGNALS = {signal.SIGINT: "Interrupted", signal.SIGTERM: "Terminated"}
 BY_SIGNAL = 128  # plus its number: the exit code of a process that a signal has ended
 
@@ -16,9 +18,10 @@ BY_SIGNAL = 128  # plus its number: the exit code of a process that a signal has
 class Stopping:
     """Holds the handlers of both signals while its block runs.
 
-    A signal raises KeyboardInterrupt within `breaking`, and only there; elsewhere, and where
-    the exception is lost in a library, `received` remembers it.  A signal that the process was
-    started to ignore, as shells do for commands in the background, is still ignored.
+    A signal raises KeyboardInterrupt within `breaking`, and only there; where that would do
+    harm or be lost, in imports and compilers, it waits (`core.interrupts`), and elsewhere
+    `received` remembers it.  A signal that the process was started to ignore, as shells do for
+    commands in the background, is still ignored.
     """
 
     def __init__(self) -> None:
@@ -59,5 +62,7 @@ class Stopping:
 
     def _take(self, number: int, frame: FrameType | None) -> None:
         self.received = self.received or signal.Signals(number)
-        if self._breakable:
+        if self._breakable and is_busy(frame):
+            again(number)
+        elif self._breakable:
             raise KeyboardInterrupt

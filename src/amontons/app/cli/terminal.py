@@ -14,9 +14,10 @@ from rich.table import Table
 
 from ...core.errors import InvalidInput
 from ...core.files import write_bytes
+from ...problem.friction import FrictionProblem
 
 if TYPE_CHECKING:
-    from ...io.case import Case
+    from ...io.readers import Case
     from ...mechanics.model import Model
 
 
@@ -43,9 +44,9 @@ def shortened(pattern: str, letters: int = 60) -> str:
     return pattern if len(pattern) <= letters else f"{pattern[: letters - 1]}…"
 
 
-def say_when(model: Model | None) -> None:
+def say_when(model: Model | FrictionProblem | None) -> None:
     """Print at which time values of a model were taken that depend on it."""
-    if model is None:
+    if model is None or isinstance(model, FrictionProblem):
         return
     from ...mechanics.steps.timed import depends_on_time
 

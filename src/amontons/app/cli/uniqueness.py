@@ -12,7 +12,7 @@ from ...analysis.certificates.critical_friction import CriticalFriction
 from ...analysis.certificates.uniqueness import Uniqueness, Verdict
 from ...core.errors import InvalidInput
 from ...io.results import to_json, versions
-from ..api import uniqueness
+from ..questions import uniqueness
 from .sources import open_source
 from .terminal import check_writable, deliver_json, say_when, shortened
 
@@ -32,7 +32,7 @@ def run(
     found = uniqueness(opened.target_with(mu), time_limit=time_limit)
     if json_copy != "-":
         click.echo(f"{opened.title}\n{describe(found)}")
-        say_when(opened.model)
+        say_when(opened.target)
     if json_copy is not None:
         deliver_json(to_json(record(found)), json_copy)
     return UNSETTLED if found.verdict is Verdict.UNDECIDED else 0

@@ -3,10 +3,10 @@
 Values are data: numbers, or expressions of `amontons.expressions`.  Unknown keys are errors.
 """
 
-from .blame import key_of
-from .build import DATA, Case, example_file, read_case
+from ..readers import Case
+from .build import DATA, example_file, read_case
 from .identity import SOLVER, differences, identity
-from .settings import Settings, in_words, make_solver, method_class
+from .settings import Settings, make_solver, method_class
 
 __all__ = ["DATA", "SOLVER", "Case", "Settings", "differences", "example_file", "identity",
-           "in_words", "key_of", "make_solver", "method_class", "read_case"]  # fmt: skip
+           "make_solver", "method_class", "read_case"]  # fmt: skip

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ...core.arrays import LARGEST
 from ...core.errors import FileFormatError, shown
 from ...core.files import check_is_regular
-from .tables import Blame, Table
+from .tables import Table
 
 if TYPE_CHECKING:
     from ...mechanics.elements.rigid import Rigid
@@ -45,7 +45,7 @@ def read_mesh_table(table: Table, path: Path) -> Mesh:
     if math.prod(c + 1 for c in counts) > MAX_NODES:
         raise table.error("cells", f"expected at most {MAX_NODES} nodes, got {shown(cells)}; "
                           "build larger models in Python")  # fmt: skip
-    with Blame(table, ""):
+    with table.blamed():
         return box(size, counts, table.text("kind") if "kind" in table.data else None)
 
 
@@ -54,7 +54,7 @@ def _mesh_file(table: Table, path: Path) -> Mesh:
     from ...mechanics.meshes import refined
 
     table.only("file", "size", "order", "refine")
-    times = table.whole("refine", 0, minimum=0)
+    times = table.whole("refine", 0, minimum=0) or 0
     mesh = _read_file(table, path)
     if mesh.cell_count * 2 ** (mesh.dim * times) > MAX_NODES:
         raise table.error("refine", f"expected at most {MAX_NODES} cells, got {times}; "
@@ -76,17 +76,17 @@ def _read_file(table: Table, path: Path) -> Mesh:
     if not is_cad(name):
         if "size" in table.data:
             raise table.error("size", "only for CAD files, a mesh file has its cells")
-        with Blame(table, "file"):
+        with table.blamed("file"):
             return read_mesh(name)
     table.need("size", "the size of cells in mm, as a CAD file has no mesh")
     size = table.number("size")
     if size <= 0:
         raise table.error("size", f"expected a length > 0, got {size}")
-    with Blame(table, "file"):
+    with table.blamed("file"):
         return read_cad(name, size)
 
 
-def read_materials(table: Table, mesh: Mesh) -> Material | dict[str, Material]:
+def read_materials(table: Table, mesh: Mesh) -> Any:
     """One material for all, [material.default], and one per region named otherwise."""
     found = {region: read_material(table.table(region)) for region in table.data}
     if not found:
@@ -108,10 +108,10 @@ def read_material(table: Table) -> Material | Rigid:
     table.only("law", *LAWS[law])
     density = table.number("density") if "density" in table.data else None
     if law == "rigid":
-        with Blame(table, ""):
+        with table.blamed():
             return Rigid(density)
     young, poisson = table.number("young"), table.number("poisson")
-    with Blame(table, ""):
+    with table.blamed():
         if law == "neo-hookean":
             return NeoHookean(young, poisson)
         if law == "ciarlet-geymonat":

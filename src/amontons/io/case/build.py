@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,12 +13,14 @@ from typing import TYPE_CHECKING, Any
 from ...core.errors import FileFormatError, InvalidInput
 from ...core.expressions import nearest
 from ...core.files import check_is_regular
+from ..readers import Case
 from .bodies import read_material, read_materials, read_mesh_table
 from .contacts import read_contact, refuse_repeated
 from .evolution import Evolution, read_evolution, read_wall
+from .keys import key_of
 from .overrides import apply_overrides, check_depth
 from .settings import GENERAL, LIMITS, Settings, make_solver, method_class
-from .tables import Blame, Table
+from .tables import Table
 from .values import configuration, on_named, on_surface, pressure_on, vector
 
 if TYPE_CHECKING:
@@ -29,21 +31,6 @@ DATA = files("amontons") / "examples_data"
 LARGEST_FILE = 2**24  # bytes of a case file; meshes stand in files of their own
 TOP = ("title", "mesh", "wall", "material", "fix", "traction", "pressure", "body_force",
        "contact", "solver", "continuation", "evolution")  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
-class Case:
-    """A model, the settings of the [solver] table, a title, and how it goes on in time.
-
-    tables: what the file says, with overrides.
-    """
-
-    model: Model
-    settings: Settings
-    title: str
-    path: Path
-    evolution: Evolution | None = None
-    tables: dict[str, Any] = field(default_factory=dict)
 
 
 def read_case(
@@ -67,7 +54,8 @@ def read_case(
     title = top.text("title", path.stem if path.stem != "case" else path.parent.name)
     model = _wall_model(top, title) if "wall" in top.data else _model(top, path, title)
     settings = _settings(top)
-    return Case(model, settings, title, path, _evolution(top, settings), top.data)
+    return Case(model, settings, title, path, _evolution(top, settings), top.data,
+                key_of=partial(key_of, tables=top.data))  # fmt: skip
 
 
 def example_file(name: str) -> Path:
@@ -126,9 +114,9 @@ def _model(top: Table, path: Path, title: str) -> Model:
         raise top.error("contact", "missing, expected at least one table [[contact]]")
     contacts = [read_contact(table, mesh) for table in top.tables("contact")]
     refuse_repeated(top)
-    with Blame(top, "material"):
+    with top.blamed("material"):
         body = Body(mesh, material, order=order)
-    with Blame(top, "contact"):
+    with top.blamed("contact", partial(key_of, tables=top.data)):
         return Model([body], supports=fixes, contacts=contacts, loads=loads, name=title)
 
 
@@ -145,7 +133,7 @@ def _wall_model(top: Table, title: str) -> Model:
     table.only("default", "plate")
     table.need("default", "a table")
     materials = {name: read_material(table.table(name)) for name in table.data}
-    with Blame(top.table("wall"), ""):
+    with top.table("wall").blamed():
         wall = read_wall(top.table("wall"), materials)
     dim = len(wall.size)
     fixes = [on_named(Fix, part, dim, free=True) for part in top.tables("fix")]
@@ -153,14 +141,14 @@ def _wall_model(top: Table, title: str) -> Model:
     for part in top.tables("body_force"):
         part.only("value")
         loads.append(BodyForce(vector(part, "value", dim)))
-    with Blame(top, "wall"):
+    with top.blamed("wall", partial(key_of, tables=top.data)):
         return wall.model(fixes, loads, title)
 
 
 def _evolution(top: Table, settings: Settings) -> Evolution | None:
     if "evolution" not in top.data:
         return None
-    with Blame(top.table("evolution"), ""):
+    with top.table("evolution").blamed():
         return read_evolution(top.table("evolution"), settings.continuation())
 
 
@@ -189,13 +177,13 @@ def _settings(top: Table) -> Settings:
     if seconds is not None and not seconds > 0:
         raise table.error("time_limit", f"expected seconds > 0, got {seconds}")
     options = {key: value for key, value in table.data.items() if key not in GENERAL}
-    with Blame(table, "method"):
+    with table.blamed("method"):
         method_class(method)
-    with Blame(top, ""):  # its messages begin with solver.FIELD
+    with top.blamed():  # its addresses begin with solver
         make_solver(method, options)
     limit = next((value for value in limits if value is not None), None)
     paths = dict(top.table("continuation").data) if "continuation" in top.data else {}
     settings = Settings(method, tolerance, limit, seconds, options, single, paths)
-    with Blame(top, ""):
+    with top.blamed():
         settings.continuation()
     return settings

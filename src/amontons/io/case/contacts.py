@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ...core.expressions import Expression
-from .tables import Blame, Table
+from .tables import Table
 from .values import configuration, scalar
 
 if TYPE_CHECKING:
@@ -14,38 +14,67 @@ if TYPE_CHECKING:
     from ...mechanics.model import Contact
 
 LAWS = "a table, { coulomb = COEFFICIENT } or { tresca = STRESS }"
+NUMBERS = {"coulomb": "mu", "tresca": "tresca", "cap": "cap", "cohesion": "cohesion"}
 
 
 def read_contact(table: Table, mesh: Mesh) -> Contact:
     """The contact of a table [[contact]]."""
     from ...mechanics.model import Contact
 
-    table.only("slave", "obstacle", "master", "friction", "method", "configuration")
+    table.only("slave", "obstacle", "master", "friction", "method", "kinematics",
+               "configuration")  # fmt: skip
     method = _contact_method(table)
     slave = table.text("slave")
     for key in ("slave", "master"):
         if key in table.data:
-            with Blame(table, key):
+            with table.blamed(key):
                 mesh.surface(table.text(key))
     if ("obstacle" in table.data) == ("master" in table.data):
         raise table.error("", "expected either obstacle or master")
     friction = table.as_table("friction", table.need("friction", LAWS), LAWS)
-    friction.only("coulomb", "tresca")
-    if len(friction.data) != 1:
-        raise friction.error("", "expected either coulomb, a coefficient, or tresca, a stress")
-    key = next(iter(friction.data))
-    value = _steady(friction, key)
-    if isinstance(value, float) and value < 0:
-        raise friction.error(key, f"expected a number >= 0, got {value}")
-    mu, tresca = (value, None) if key == "coulomb" else (None, value)
-    with Blame(table, ""):
+    numbers = _friction(friction)
+    found = configuration(table)  # older words for kinematics
+    if "kinematics" in table.data:
+        found["kinematics"] = table.choice("kinematics", ("small", "finite"))
+    with table.blamed():
         if "master" in table.data:
             master = table.text("master")
-            return Contact(slave, master=master, mu=mu, tresca=tresca, method=method,
-                           **configuration(table))  # fmt: skip
+            return Contact(slave, master=master, **numbers, method=method, **found)
         obstacle = _obstacle(table.table("obstacle"), mesh.dim)
-        return Contact(slave, obstacle, mu=mu, tresca=tresca, method=method,
-                       **configuration(table))  # fmt: skip
+        return Contact(slave, obstacle, **numbers, method=method, **found)
+
+
+def _friction(table: Table) -> dict[str, Any]:
+    """The numbers of a law by the names that `Contact` has for them."""
+    table.only(*NUMBERS, "direction")
+    if ("coulomb" in table.data) == ("tresca" in table.data):
+        raise table.error("", "expected either coulomb, a coefficient, or tresca, a stress")
+    if "cap" in table.data and "tresca" in table.data:
+        raise table.error("cap", "a largest shear stress goes with coulomb; tresca is one")
+    numbers = _orthotropic(table)
+    done = {"coulomb", "direction"} if numbers else set()
+    for key in (key for key in table.data if key not in done):
+        value = numbers[NUMBERS[key]] = _steady(table, key)
+        if isinstance(value, float) and value < 0:
+            raise table.error(key, f"expected a number >= 0, got {value}")
+    return numbers
+
+
+def _orthotropic(table: Table) -> dict[str, Any]:
+    """The two coefficients and their direction, where coulomb is a list."""
+    given = table.data.get("coulomb")
+    if isinstance(given, list) != ("direction" in table.data):
+        raise table.error(
+            "direction" if "direction" in table.data else "coulomb",
+            "expected two coefficients with a direction, coulomb = [0.2, 0.4] and "
+            "direction = [1, 0, 0]: along it and across",
+        )
+    if not isinstance(given, list):
+        return {}
+    along, across = (float(mu) for mu in table.numbers("coulomb", (2,)))
+    if min(along, across) < 0:
+        raise table.error("coulomb", f"expected numbers >= 0, got {min(along, across)}")
+    return {"mu": along, "mu_across": across, "direction": table.numbers("direction", (3,))}
 
 
 def _steady(table: Table, key: str) -> float | Expression:
@@ -74,21 +103,14 @@ def _contact_method(table: Table) -> str | Nitsche | None:
     }
     if "points" in options.data:
         values["points"] = options.whole("points")
-    with Blame(options, ""):
+    with options.blamed():
         return Nitsche(**values)
 
 
 def refuse_repeated(top: Table) -> None:
-    """The same pair twice would share its load at random; two laws do not fit one problem."""
+    """The same pair twice would share its load at random."""
     seen: list[dict[str, Any]] = []
-    tables = top.tables("contact")
-    for table in tables:
-        law, first = (set(part.data["friction"]) for part in (table, tables[0]))
-        if law != first:
-            raise table.error(
-                "friction", f"expected {first.pop()} as in contact[0], one law for all, "
-                f"got {law.pop()}"
-            )  # fmt: skip
+    for table in top.tables("contact"):
         pair = {key: table.data.get(key) for key in ("slave", "obstacle", "master")}
         if pair in seen:
             raise table.error(
@@ -111,7 +133,7 @@ def _obstacle(table: Table, dim: int) -> Obstacle:
             raise table.error(kind, f"expected an expression in x, y, z, got {function}")
         return LevelSet(function)
     inner = table.table(kind)
-    with Blame(inner, ""):
+    with inner.blamed():
         if kind == "plane":
             inner.only("point", "normal")
             point = inner.numbers("point", (dim,)) if "point" in inner.data else None

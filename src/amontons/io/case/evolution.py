@@ -9,8 +9,6 @@ from .tables import Table
 
 if TYPE_CHECKING:
     from ...analysis.paths.continuation import Continuation
-    from ...mechanics.elements import LinearElastic
-    from ...mechanics.elements.rigid import Rigid
     from ...mechanics.ready.walls import Wall
     from ...mechanics.steps import MoreauJean, QuasiStatic
 
@@ -62,7 +60,7 @@ def _switch(table: Table, key: str) -> bool:
     return table.data[key]
 
 
-def read_wall(table: Table, materials: dict[str, LinearElastic | Rigid]) -> Wall:
+def read_wall(table: Table, materials: dict[str, Any]) -> Wall:
     """The wall of a table [wall]; materials: default and, for plate and base, plate."""
     from ...mechanics.ready.walls import Bond, Wall
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...mechanics.meshes import Mesh
-from .build import Case
+from ..readers import Case
 from .settings import Settings
 
 MESH = "the mesh"  # key of the digest of its numbers

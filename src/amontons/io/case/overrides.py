@@ -6,9 +6,11 @@ import copy
 import re
 import tomllib
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from ...core.errors import FileFormatError, InvalidInput
+from .settings import LIMITS, NUMBERS, Settings, method_class
 
 DEEPEST = 50  # tables in tables: further down Python itself gives up
 DIGITS = 9  # of an index
@@ -81,3 +83,40 @@ def set_value(data: dict[str, Any], path: list[str], value: Any, blame: str) -> 
             node[key] = value
         else:
             node = node.setdefault(key, {}) if isinstance(node, dict) else node[key]
+
+
+def override_settings(settings: Settings, overrides: Sequence[str]) -> Settings:
+    """Settings changed by `solver.field=value`; `make_solver` checks the fields.
+
+    By `continuation.field=value`, too.
+    """
+    for text in overrides:
+        path, value = split_override(text)
+        if path[0] == "continuation" and len(path) == 2:
+            paths = {**settings.along_paths, path[1]: value}
+            settings = replace(settings, along_paths=paths)
+            settings.continuation()
+            continue
+        named = path[1:2] and path[1] in (*LIMITS, *NUMBERS, "method")
+        if path[0] != "solver" or len(path) < 2 or (named and len(path) > 2):
+            raise InvalidInput(
+                f"--set {text}: expected solver.FIELD=VALUE or continuation.FIELD=VALUE, as "
+                "this is not a case file"
+            )
+        key = path[1]
+        if key in LIMITS:
+            if type(value) is not int or value < 1:
+                raise InvalidInput(f"--set {text}: expected a whole number >= 1")
+            settings = replace(settings, max_iterations=value)
+        elif key in NUMBERS:
+            if not isinstance(value, int | float) or isinstance(value, bool):
+                raise InvalidInput(f"--set {text}: expected a number")
+            settings = replace(settings, **{key: float(value)})
+        elif key == "method":
+            method_class(str(value))
+            settings = replace(settings, method=str(value))
+        else:
+            options = copy.deepcopy(settings.options)
+            set_value(options, path[1:], value, f"--set {text}")
+            settings = replace(settings, options=options)
+    return settings

@@ -13,18 +13,21 @@ import dataclasses
 import re
 import typing
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ... import linear, solvers
-from ...core.errors import InvalidInput
+from ...core.errors import Address, InvalidInput
 from ...core.expressions import nearest
 from ...core.options import alternatives, hints_of, is_enum, members_of, usual_part
+from ...core.plugins import installed, load, loaded
 from ...solvers import METHODS
 from ...solvers.contract import Solver
 
 if TYPE_CHECKING:
     from ...analysis.paths.continuation import Continuation
 
+GROUP = "amontons.solvers"  # of entry points
 LIMITS = ("max_iterations", "max_sweeps")  # one limit; the second in Gauss-Seidel's words
 
 NUMBERS = ("tolerance", "contact_tolerance", "time_limit")
@@ -54,14 +57,33 @@ class Settings:
             return None
         from ...analysis.paths.continuation import Continuation
 
-        return _made(Continuation, self.along_paths, "continuation")
+        return _made(Continuation, self.along_paths, ("continuation",))
 
 
 def method_class(method: str) -> type:
-    """The class behind a name in kebab-case."""
-    if method not in METHODS:
-        raise InvalidInput(f"unknown method '{method}'{nearest(method, METHODS)}")
-    return METHODS[method]
+    """The class behind a name in kebab-case, of ours or of an installed package.
+
+    Or behind "package.module:Class", whose module is imported.  Raises InvalidInput for what
+    can not be found, and for what is no solver.
+    """
+    if method in METHODS:
+        return METHODS[method]
+    if ":" in method:
+        return _checked(load(method), method)
+    others = installed(GROUP)
+    if method not in others:
+        raise InvalidInput(f"unknown method '{method}'{nearest(method, [*METHODS, *others])}")
+    return _checked(loaded(others[method]), method)
+
+
+def _checked(kind: Any, method: str) -> type:
+    """A class from outside that drivers can use: a dataclass with `form` and `iterates`."""
+    if not (isinstance(kind, type) and dataclasses.is_dataclass(kind)):
+        raise InvalidInput(f"'{method}': expected the class of a solver, a dataclass")
+    lacks = [name for name in ("form", "iterates") if not hasattr(kind, name)]
+    if lacks:
+        raise InvalidInput(f"'{method}': no solver, it has no {' and no '.join(lacks)}")
+    return kind
 
 
 def make_solver(method: str, options: dict[str, Any]) -> Solver:
@@ -70,29 +92,30 @@ def make_solver(method: str, options: dict[str, Any]) -> Solver:
     names = [f.name for f in dataclasses.fields(kind) if f.init]
     for name in options:
         if name not in names:
-            raise InvalidInput(f"solver.{name}: {_no_such_field(method, name, names)}")
-    return _made(kind, options, "solver")
+            raise InvalidInput(_no_such_field(method, name, names), ("solver", name))
+    return _made(kind, options, ("solver",))
 
 
-def _made(part: Any, options: dict[str, Any], where: str) -> Any:
-    """A dataclass, or a copy of an instance, with some fields set; `where` is its key."""
+def _made(part: Any, options: dict[str, Any], where: Address) -> Any:
+    """A dataclass, or a copy of an instance, with some fields set; `where` is its address."""
     kind = part if isinstance(part, type) else type(part)
     hints = hints_of(kind)
     values = {}
     for name, value in options.items():
-        key = f"{where}.{name}"
+        key = (*where, name)
         if name not in hints:
             hint = nearest(name, hints) if hints else ""
-            raise InvalidInput(f"{key}: {_kebab(kind.__name__)} has no such field{hint}")
+            raise InvalidInput(f"{_kebab(kind.__name__)} has no such field{hint}", key)
         default = usual_part(kind, name)
         if isinstance(value, dict) and "kind" not in value and default is not None:
             values[name] = _made(default, value, key)
         else:
             values[name] = _convert(key, value, hints[name])
+    make: Any = part if isinstance(part, type) else partial(dataclasses.replace, part)
     try:
-        return part(**values) if part is kind else dataclasses.replace(part, **values)
+        return make(**values)
     except InvalidInput as reason:
-        raise InvalidInput(f"{where}.{in_words(str(reason))}") from None
+        raise InvalidInput(reason.text, (*where, *reason.at)) from None
 
 
 def _no_such_field(method: str, name: str, names: list[str]) -> str:
@@ -107,17 +130,10 @@ def _no_such_field(method: str, name: str, names: list[str]) -> str:
     return text + (nearest(name, names) if names else "")
 
 
-def in_words(text: str) -> str:
-    """A message with the names of methods as on the command line."""
-    for name, kind in METHODS.items():
-        text = re.sub(rf"\b{kind.__name__}\b", name, text)
-    return text
-
-
-def _convert(name: str, value: Any, hint: Any) -> Any:
+def _convert(at: Address, value: Any, hint: Any) -> Any:
     """What a field gets for a text or a table; the field itself checks what remains.
 
-    name: its dotted key.  Texts are read as "none", numbers and truth values where the field
+    at: its address.  Texts are read as "none", numbers and truth values where the field
     takes such; words of enums are left to the field, see `amontons.options`.
     """
     hints = alternatives(hint)
@@ -125,9 +141,9 @@ def _convert(name: str, value: Any, hint: Any) -> Any:
     if type(None) in hints and value == "none":
         return None
     if parts and isinstance(value, str | dict):
-        return _component(name, value, parts[0])
+        return _component(at, value, parts[0])
     if parts or any(typing.get_origin(one) is tuple for one in hints):
-        raise InvalidInput(f"{name}: can not be set here, use the Python interface")
+        raise InvalidInput("can not be set here, use the Python interface", at)
     return _read(value, hints) if isinstance(value, str) else value
 
 
@@ -151,7 +167,7 @@ def _read(text: str, hints: tuple[Any, ...]) -> Any:
     return text
 
 
-def _component(name: str, value: str | dict[str, Any], protocol: type) -> Any:
+def _component(at: Address, value: str | dict[str, Any], protocol: type) -> Any:
     """A part of a solver by its class name in kebab-case, or by a table with that as kind."""
     wanted = members_of(protocol)
     fitting: dict[str, type] = {
@@ -163,13 +179,13 @@ def _component(name: str, value: str | dict[str, Any], protocol: type) -> Any:
     }
     options = dict(value) if isinstance(value, dict) else {"kind": value}
     if "kind" not in options and len(fitting) > 1:
-        raise InvalidInput(f"{name}.kind: missing, expected one of {', '.join(fitting)}")
+        raise InvalidInput(f"missing, expected one of {', '.join(fitting)}", (*at, "kind"))
     chosen = str(options.pop("kind", next(iter(fitting))))
     if chosen not in fitting and ALIASES.get(chosen) in fitting:
         chosen = ALIASES[chosen]
     if chosen not in fitting:
-        raise InvalidInput(f"{name}: unknown value '{chosen}'{nearest(chosen, fitting)}")
-    return _made(fitting[chosen], options, name)
+        raise InvalidInput(f"unknown value '{chosen}'{nearest(chosen, fitting)}", at)
+    return _made(fitting[chosen], options, at)
 
 
 def _kebab(name: str) -> str:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 from ...core.arrays import LARGEST
-from ...core.errors import FileFormatError, InvalidInput, MissingDependency, shown
+from ...core.errors import Address, FileFormatError, InvalidInput, dotted, shown
 from ...core.expressions import nearest
 
 LONGEST_TEXT = 500  # letters of a name or a title; expressions have a limit of their own
@@ -26,6 +27,21 @@ class Table:
         """A complaint about one key, or about the table itself when key is ""."""
         path = ".".join(part for part in (self.where, key) if part)
         return FileFormatError(": ".join(part for part in (self.file, path, message) if part))
+
+    @contextmanager
+    def blamed(
+        self, key: str = "", words: Callable[[Address], str] | None = None
+    ) -> Iterator[None]:
+        """Turn what the layers below refuse into a complaint about a key, and what is in it.
+
+        words: the key in this table of an address, which then takes the place of `key`.
+        """
+        try:
+            yield
+        except InvalidInput as error:
+            path = ".".join(part for part in (key, dotted(error.at)) if part)
+            path = path if words is None else words(error.at) or key
+            raise self.error(path, error.text) from error
 
     def only(self, *known: str) -> None:
         """Raise for the first key that is not known, naming the nearest."""
@@ -110,20 +126,3 @@ class Table:
         if not isinstance(values, list):
             raise self.error(key, f"expected an array of tables, written [[{key}]]")
         return [self.as_table(f"{key}[{k}]", value) for k, value in enumerate(values)]
-
-
-@dataclass(frozen=True)
-class Blame:
-    """Turns what the layers below reject into a complaint about a key of the file."""
-
-    table: Table
-    key: str
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: type | None, error: BaseException | None, trace: object) -> None:
-        if isinstance(error, FileFormatError | MissingDependency):
-            return
-        if isinstance(error, InvalidInput):
-            raise self.table.error(self.key, str(error)) from error

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core.errors import AmontonsError, InvalidInput, shown
 from ...core.expressions import Expression
-from .tables import Blame, Table
+from .tables import Table
 
 if TYPE_CHECKING:
     from ...mechanics.meshes import Mesh
@@ -19,7 +19,7 @@ def on_surface(
 ) -> Any:  # fmt: skip
     """A support or load of a table, on a surface that the mesh has; more: its other keys."""
     part = on_named(kind, table, mesh.dim, *more, free=free)
-    with Blame(table, "on"):
+    with table.blamed("on"):
         mesh.surface(part.on)
     return part
 
@@ -31,7 +31,7 @@ def on_named(kind: type, table: Table, dim: int, *more: str, free: bool = False)
     return kind(table.text("on"), value, **configuration(table))
 
 
-def configuration(table: Table) -> dict[str, str]:
+def configuration(table: Table) -> dict[str, Any]:
     """The key configuration, where it is given."""
     if "configuration" not in table.data:
         return {}
@@ -44,9 +44,10 @@ def pressure_on(table: Table, mesh: Mesh) -> Any:
 
     table.only("on", "value")
     name = table.text("on")
-    with Blame(table, "on"):
+    with table.blamed("on"):
         mesh.surface(name)
-    value = _entry(table, "value", table.need("value", "a number or an expression"), mesh.dim)
+    given = table.need("value", "a number or an expression")
+    value: Any = _entry(table, "value", given, mesh.dim)
     return Pressure(name, value)
 
 

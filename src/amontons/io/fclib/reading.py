@@ -57,7 +57,7 @@ def _read(source: Source) -> FclibProblem:
         where = f"{root}/vectors/mu"
         raise source.error(where, f"entry {bad[0]}: expected friction >= 0, got {mu[bad[0]]}")
     read = _read_local if form is Form.DELASSUS else _read_global
-    group = source.file[root]
+    group = source.group(root)
     return replace(
         read(source, root, d, mu), texts=_texts(source, root),
         stored_texts=_stored_texts(group), attributes=_attributes(group),
@@ -71,6 +71,10 @@ def _root(source: Source) -> str:
         raise FileFormatError(
             f"{source.path}: expected fclib_local or fclib_global, got both; "
             "split the file, it is not clear which problem is meant"
+        )
+    if not found and "schema" in source.file.attrs:  # written by us
+        raise FileFormatError(
+            f"{source.path}: the results of a model hold no problem to read; give the case file"
         )
     if not found:
         names = ", ".join(list(source.file)[:8]) or "nothing"

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...core.errors import InvalidInput, UnsupportedForm
+from ...core.errors import InvalidInput, UnsupportedForm, UnsupportedLaw
 from ...problem.friction import FrictionProblem
-from ...problem.nitsche import NO_MULTIPLIERS, NitscheProblem
+from ...problem.law import Coulomb
 from ...problem.solution import FrictionSolution
 from .memory import write_hdf5
 from .stored import GROUPS, FclibProblem, StoredMatrix, StoredText
@@ -30,8 +30,8 @@ def write_fclib(
     """Write a problem, in the form it has, and optionally its solution; nothing on failure.
 
     A problem from `read_fclib` keeps storage and texts of its file; an empty title or
-    description means the old text.  Raises UnsupportedForm for Tresca friction and for
-    Nitsche's method, which FCLib does not know.
+    description means the old text.  Raises UnsupportedLaw for laws other than
+    Coulomb's and UnsupportedForm for Nitsche's method, which FCLib does not know.
     """
     def fill(file: h5py.File) -> None:
         put_fclib(file, problem, solution=solution, title=title, description=description)
@@ -44,8 +44,13 @@ def put_fclib(
     title: str = "", description: str = "",
 ) -> None:  # fmt: skip
     """Put a problem into an empty file; raises like `write_fclib`."""
-    if isinstance(problem, NitscheProblem):
-        raise UnsupportedForm(f"fclib: {NO_MULTIPLIERS}")
+    if not isinstance(problem, FrictionProblem):
+        raise UnsupportedForm(f"fclib: {problem.unfit}")
+    if not isinstance(problem.law, Coulomb):
+        raise UnsupportedLaw(
+            f"fclib: stores a coefficient of Coulomb friction per contact, not "
+            f"{problem.law.name}"
+        )
     mu, problem = problem.mu, problem.assembled()
     if solution is not None and solution.r.shape != (problem.contacts, problem.dimension):
         raise InvalidInput(
@@ -62,10 +67,12 @@ def put_fclib(
     _put(vectors, "mu", mu)
     for name in ("M", "H", "W"):
         if getattr(problem, name) is not None:
-            _put_matrix(root.create_group(name), _storage(problem, name))
-            _put_attributes(root[name], problem)
-    _put_texts(root.create_group("info"), problem, title, description)
-    _put_attributes(root["info"], problem)
+            group = root.create_group(name)
+            _put_matrix(group, _storage(problem, name))
+            _put_attributes(group, problem)
+    info = root.create_group("info")
+    _put_texts(info, problem, title, description)
+    _put_attributes(info, problem)
     if solution is not None:
         _put_solution(file.create_group("solution"), solution)
 
@@ -101,7 +108,7 @@ def _storage(problem: FrictionProblem, name: str) -> StoredMatrix:
 
 
 def _put_matrix(group: h5py.Group, stored: StoredMatrix) -> None:
-    m, n = stored.matrix.shape
+    m, n = stored.matrix.shape  # type: ignore[misc]
     if max(m, n, stored.nzmax) > np.iinfo(np.int32).max:
         raise InvalidInput(
             f"{group.name}: {stored.nzmax} entries do not fit FCLib's 32-bit indices"

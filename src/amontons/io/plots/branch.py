@@ -31,7 +31,8 @@ def branch_figure(
     quantity: a function of one solution (one entry of `Branch.solutions`), by default the size
     of the reactions, or of the unknowns.  label: its name and unit.
     """
-    several = [branches] if hasattr(branches, "points") else list(branches)
+    given: Any = branches
+    several: list[Branch] = [given] if hasattr(given, "points") else list(given)
     figure = Figure(figsize=(6.4, 4.4), dpi=150, layout="constrained")
     axes = figure.subplots()
     for k, branch in enumerate(several):

@@ -46,7 +46,7 @@ def solutions_figure(
     drawn = model if model is not None and model.dimension == 2 else None
     height = PANEL * rows * (0.75 if drawn is None else _height(drawn))
     figure = Figure(figsize=(PANEL * columns, 1.4 + height), dpi=150, layout="constrained")
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    panels = list(figure.subplots(rows, columns, squeeze=False).ravel())
     note = ""
     if drawn is not None and shown:
         note = _bodies(panels, shown, drawn)
@@ -93,10 +93,12 @@ def _bodies(panels: Sequence[Axes], solutions: list[FrictionSolution], model: Mo
         for body, nodes in scene.sides:
             points = model.bodies[body].mesh.points
             moved = points + factor * field.displacement[body]
-            axes.add_collection(PolyCollection(points[nodes], facecolors="none", alpha=0.25,
-                                               edgecolors=INK, linewidths=0.3))  # fmt: skip
-            axes.add_collection(PolyCollection(moved[nodes], facecolors="#EAF1F6",
-                                               edgecolors=INK, linewidths=0.4))  # fmt: skip
+            before = PolyCollection(list(points[nodes]), facecolors="none", alpha=0.25,
+                                    edgecolors=INK, linewidths=0.3)  # fmt: skip
+            after = PolyCollection(list(moved[nodes]), facecolors="#EAF1F6", edgecolors=INK,
+                                   linewidths=0.4)  # fmt: skip
+            axes.add_collection(before)
+            axes.add_collection(after)
         length = ARROW * scene.size / force if force > 0 else 0.0
         _contacts(axes, field, solution, factor, length)
         axes.set(aspect="equal", xticks=[], yticks=[])

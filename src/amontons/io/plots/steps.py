@@ -96,7 +96,7 @@ def _draw_step(
     for body, nodes in scene.sides:
         axes.add_collection(
             PolyCollection(
-                moved[body][nodes], facecolors=STONE, edgecolors=EDGE, linewidths=0.4
+                list(moved[body][nodes]), facecolors=STONE, edgecolors=EDGE, linewidths=0.4
             )
         )
     _draw_joints(axes, scene, frame, moved)

@@ -1,7 +1,7 @@
-"""Contact of nodes with obstacles where the nodes are now: the law, and its exact derivative.
+"""Contact where the nodes are now: the law, and its exact derivative.
 
-Per contact, at position x with the normal n(x) and gap g(x) of its obstacle, lambda the force
-on the node in global axes, and s = x - x_before + drift the motion since the last step:
+Per contact, at position x with the normal n(x) and gap g(x) of its pair, lambda the force on
+the node in global axes, and s = x - x_before + drift the motion since the last step:
 
     y = lambda - rho s,   z_N = lambda . n - rho g,   z_T = (I - n n^T) y                   (1)
     law(lambda, x) = lambda - max(z_N, 0) n - P(z_T),   P: |.| <= mu max(z_N, 0) or a bound (2)
@@ -27,60 +27,49 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ...problem.law.cones import Coulomb, Law
-from .geometry import Obstacle, frames
+from ...problem.law import Law
+from ...problem.law.law import MU, TRESCA
+from ...problem.law.states import OPEN, SLIP, STICK
+from .current_pairs import Meetings, Pair
+from .geometry import frames
 
 Array = NDArray[np.float64]
 Pieces = NDArray[np.int8]
-OPEN, STICK, SLIP, BACK = 0, 1, 2, 3  # pieces of the law; BACK: slip against t, 2D only
+BACK = 3  # beside the statuses: slip against t, 2D only
 
 
 @dataclass(frozen=True, eq=False)
 class CurrentContact:
-    """Contacts of several obstacles: each meets `counts` nodes, one after another.
+    """The law of nc contacts, pair after pair.
 
     rho (nc,), force per length; free (nc, d), bool: components without a support.
     """
 
-    obstacles: Sequence[Obstacle]
-    counts: Sequence[int]
+    pairs: Sequence[Pair]
     law: Law
     rho: Array
     free: NDArray[np.bool_]
 
-    def _gathered(self, name: str, x: Array) -> Array:
-        """What the obstacles say at their nodes."""
-        parts = np.split(x, np.cumsum(self.counts)[:-1])
-        pairs = zip(self.obstacles, parts, strict=True)
-        return np.concatenate([getattr(obstacle, name)(part) for obstacle, part in pairs])
+    def meet(self, positions: Array) -> Meetings:
+        """Where the pairs meet at the positions (nodes, d) of all nodes."""
+        return Meetings([pair.at(positions) for pair in self.pairs])
 
-    def gap(self, x: Array) -> Array:
-        """Gaps at positions x (nc, d): (nc,)."""
-        return self._gathered("gap", x)
+    def local(
+        self, force: Array, motion: Array, meeting: Meetings
+    ) -> tuple[Array, Array, Array]:
+        """(r, u, frames): reactions and [gap, slip], (nc, d), in the frames (nc, d, d) there.
 
-    def normals(self, x: Array) -> Array:
-        """Normals at positions x (nc, d): (nc, d)."""
-        return self._gathered("normals", x)
-
-    def gap_slopes(self, x: Array) -> Array:
-        """Gradients of the gaps, (nc, d)."""
-        return self._gathered("gap_slopes", x)
-
-    def normal_slopes(self, x: Array) -> Array:
-        """Derivatives of the normals by position, (nc, d, d)."""
-        return self._gathered("normal_slopes", x)
-
-    def local(self, force: Array, motion: Array, x: Array) -> tuple[Array, Array, Array]:
-        """(r, u, frames): reactions and [gap, slip], (nc, d), in the frames (nc, d, d) at x."""
-        axes = frames(self.normals(x))
+        force lambda and motion s, (nc, d), in global axes.
+        """
+        axes = frames(meeting.normals)
         r = np.einsum("pkc,pc->pk", axes, force * self.free)
         u = np.einsum("pkc,pc->pk", axes, motion * self.free)
-        u[:, 0] = self.gap(x)
+        u[:, 0] = meeting.gap
         return r, u, axes
 
-    def at(self, force: Array, motion: Array, x: Array) -> ContactPoint:
-        """The law at forces lambda, motions s and positions x, all (nc, d)."""
-        return ContactPoint(self, force * self.free, motion * self.free, x)
+    def at(self, force: Array, motion: Array, meeting: Meetings) -> ContactPoint:
+        """The law at forces lambda and motions s, both (nc, d), where the pairs meet."""
+        return ContactPoint(self, force * self.free, motion * self.free, meeting)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,12 +79,12 @@ class ContactPoint:
     contact: CurrentContact
     force: Array
     motion: Array
-    x: Array
+    meeting: Meetings
 
-    @cached_property
+    @property
     def n(self) -> Array:
         """Normals, (nc, d)."""
-        return self.contact.normals(self.x)
+        return self.meeting.normals
 
     @cached_property
     def y(self) -> Array:
@@ -110,7 +99,7 @@ class ContactPoint:
     @cached_property
     def z_normal(self) -> Array:
         """z_N, (nc,): positive where closed."""
-        return (self.n * self.force).sum(axis=1) - self.contact.rho * self.contact.gap(self.x)
+        return (self.n * self.force).sum(axis=1) - self.contact.rho * self.meeting.gap
 
     @cached_property
     def z_tangent(self) -> Array:
@@ -123,10 +112,15 @@ class ContactPoint:
         return self._bound(self.z_normal > 0)
 
     def _bound(self, closed: NDArray[np.bool_]) -> Array:
+        law, z = self.contact.law, np.where(closed, self.z_normal, 0.0)
+        mu, bound = law.parameters.T
+        return np.where(law.given(z[:, None]), bound, mu * z)
+
+    @property
+    def _without(self) -> NDArray[np.bool_]:
+        """Contacts without friction, (nc,), that are not under Tresca's law."""
         law = self.contact.law
-        if isinstance(law, Coulomb):
-            return law.mu * np.where(closed, self.z_normal, 0.0)
-        return np.array(law.coefficient)
+        return (law.parameters[:, MU] == 0) & (law.kind != TRESCA)
 
     @cached_property
     def along(self) -> Array:
@@ -145,11 +139,10 @@ class ContactPoint:
         slide = np.abs(self.along) > self.bound
         out = np.where(slide, np.where(self.along < 0, BACK, SLIP), STICK)
         closed = self.z_normal > 0
-        if isinstance(self.contact.law, Coulomb):
-            out[self.contact.law.mu == 0] = SLIP
-            out[~closed] = OPEN
-        else:
-            out[~closed] += 4
+        out[self._without] = SLIP
+        alone = self.contact.law.kind == TRESCA
+        out[~closed & ~alone] = OPEN
+        out[~closed & alone] += 4
         return out.astype(np.int8)
 
     def residual(self, pieces: Pieces | None = None) -> Array:
@@ -171,7 +164,7 @@ class ContactPoint:
             slip = (sign * bound)[:, None] * _tangents(self.n)
         else:
             length = np.where(self.along > 0, self.along, 1.0)
-            slip = (np.where(kind >= SLIP, bound, 0.0) / length)[:, None] * self.z_tangent
+            slip = (np.where(_slides(kind), bound, 0.0) / length)[:, None] * self.z_tangent
         return self.force - normal - slip - (kind == STICK)[:, None] * self.z_tangent
 
     def margins(self, pieces: Pieces) -> Array:
@@ -186,11 +179,10 @@ class ContactPoint:
         borders = [bound - self.along, self.along - bound, -self.along - bound]
         ahead = np.select([kind == STICK, kind == SLIP, kind == BACK], borders, far)
         behind = np.where(kind == STICK, bound + self.along, far)
-        if isinstance(self.contact.law, Coulomb):
-            without = self.contact.law.mu == 0
-            other = without & ((kind == STICK) | (kind == BACK))  # pieces they do not have
-            ahead[without], behind[without] = np.inf, np.inf
-            ahead[other] = -np.inf
+        without = self._without
+        other = without & ((kind == STICK) | (kind == BACK))  # pieces they do not have
+        ahead[without], behind[without] = np.inf, np.inf
+        ahead[other] = -np.inf
         return np.stack([z, ahead, behind], axis=1)
 
     def derivatives(self, pieces: Pieces | None = None) -> tuple[Array, Array, Array]:
@@ -200,8 +192,7 @@ class ContactPoint:
         """
         pieces = self.pieces if pieces is None else pieces
         n, d = self.n, self.n.shape[1]
-        bend = self.contact.normal_slopes(self.x)
-        slope = self.contact.gap_slopes(self.x)
+        bend, slope = self.meeting.normal_slopes, self.meeting.gap_slopes
         closed = ((pieces > 0) & (pieces < 4)).astype(float)
         rho = self.contact.rho[:, None, None]
         eye = np.eye(d)
@@ -212,10 +203,9 @@ class ContactPoint:
         turned = -bend * self.y_normal[:, None, None]
         turned -= n[:, :, None] * np.einsum("pi,pij->pj", self.y, bend)[:, None, :]
         in_z, in_bound = self._friction(pieces)
-        if isinstance(self.contact.law, Coulomb):
-            in_bound = in_bound * (self.contact.law.mu * closed)[:, None]
-        else:
-            in_bound = np.zeros_like(in_bound)
+        law, z = self.contact.law, np.where(closed > 0, self.z_normal, 0.0)[:, None]
+        slope = np.where(law.given(z), 0.0, law.parameters[:, MU])
+        in_bound = in_bound * (slope * closed)[:, None]
         normal = closed[:, None] * n + in_bound  # of the force, per z_N
         by_force = eye - normal[:, :, None] * n[:, None, :] - in_z @ tangential
         by_x = -normal[:, :, None] * z_x[:, None, :] - in_z @ turned
@@ -230,7 +220,7 @@ class ContactPoint:
         """Derivatives of P by z_T, (nc, d, d), and by the bound, (nc, d)."""
         d, kind = self.n.shape[1], pieces % 4
         in_z = np.where((kind == STICK)[:, None, None], np.eye(d), 0.0)
-        slip = kind >= SLIP
+        slip = _slides(kind)
         if d == 2:
             sign = np.where(kind == SLIP, 1.0, -1.0)
             return in_z, np.where(slip, sign, 0.0)[:, None] * _tangents(self.n)
@@ -248,6 +238,11 @@ class ContactPoint:
         size = sign * self._bound((pieces > 0) & (pieces < 4))
         along = np.einsum("pi,pij->pj", _tangents(self.n), bend)
         return -size[:, None, None] * self.n[:, :, None] * along[:, None, :]
+
+
+def _slides(kind: Pieces) -> NDArray[np.bool_]:
+    """Pieces SLIP and BACK, (nc,)."""
+    return (kind == SLIP) | (kind == BACK)
 
 
 def _tangents(n: Array) -> Array:

@@ -46,19 +46,21 @@ class Plane:
     def __post_init__(self) -> None:
         normal = _vector("normal", self.normal)
         if not np.linalg.norm(normal) > 0:
-            raise InvalidInput(f"normal: expected a vector of length > 0, got {self.normal!r}")
+            text = f"expected a vector of length > 0, got {self.normal!r}"
+            raise InvalidInput(text, ("normal",))
         point = np.zeros(len(normal)) if self.point is None else _vector("point", self.point)
         if len(point) == 3 and len(normal) == 2 and point[2] == 0:
             point = point[:2]
         if point.shape != normal.shape:
-            raise InvalidInput(f"point: expected {len(normal)} numbers, got {self.point!r}")
+            text = f"expected {len(normal)} numbers, got {self.point!r}"
+            raise InvalidInput(text, ("point",))
         object.__setattr__(self, "normal", tuple((normal / np.linalg.norm(normal)).tolist()))
         object.__setattr__(self, "point", tuple(point.tolist()))
 
     def gap(self, points: Array) -> Array:
         """Distance in front of the plane, (n,)."""
         _same_dimension("plane", len(self.normal), points)
-        return (points - self.point) @ np.asarray(self.normal)
+        return (points - np.asarray(self.point)) @ np.asarray(self.normal)
 
     def normals(self, points: Array) -> Array:
         """The normal, once per point, (n, dim)."""
@@ -85,7 +87,8 @@ class Sphere:
         object.__setattr__(self, "center", tuple(_vector("center", self.center).tolist()))
         object.__setattr__(self, "radius", number("radius", self.radius))
         if not self.radius > 0:
-            raise InvalidInput(f"radius: expected a finite length > 0, got {self.radius!r}")
+            text = f"expected a finite length > 0, got {self.radius!r}"
+            raise InvalidInput(text, ("radius",))
 
     def gap(self, points: Array) -> Array:
         """Distance to the centre less the radius, (n,)."""
@@ -220,7 +223,7 @@ def frames(normals: Array) -> Array:
         return np.stack([normals, np.stack([normals[:, 1], -normals[:, 0]], axis=1)], axis=1)
     along_x = np.abs(normals[:, 0]) > 0.9
     axis = np.where(along_x[:, None], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
-    first = axis - (axis * normals).sum(axis=1, keepdims=True) * normals
+    first: Array = axis - (axis * normals).sum(axis=1, keepdims=True) * normals
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     return np.stack([normals, first, np.cross(normals, first)], axis=1)
 

@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...core.errors import InvalidInput
+from ...core.errors import within
 from ..meshes.cells import CELLS
 from ..meshes.facets import Facets
 from ..meshes.mesh import Mesh
@@ -73,8 +73,9 @@ def mortar_obstacle(
     n, dim = mesh.points.shape
     normals = np.zeros((n, dim))
     on = np.unique(slave.nodes)
-    normals[on] = obstacle.normals(mesh.points[on])
-    mass, moment = _against(slave, obstacle)
+    with within("obstacle"):
+        normals[on] = obstacle.normals(mesh.points[on])
+        mass, moment = _against(slave, obstacle)
     without = _held(normals, held, EXACT)
     average = _Average.of(slave, np.arange(len(slave.nodes)), mass, without)
     nodes = average.nodes
@@ -103,13 +104,13 @@ def mortar_contact(
     itself, and for facets without area.  Cost linear in the facets.
     """
     check_exterior(slave, surface)
-    check_exterior(master, master_surface)
+    check_exterior(master, master_surface, "master")
     check_different(slave, surface, master, master_surface)
     over = Surface.of(slave.points, slave.surface(surface), surface)
     under = Surface.of(master.points, master.surface(master_surface), master_surface)
     parts = in_front(over, under, master, joined=slave is master)
     if not len(parts.slave):
-        raise InvalidInput(not_facing(slave, surface, master, master_surface))
+        raise not_facing(slave, surface, master, master_surface)
     facets, of = np.unique(parts.slave, return_inverse=True)
     normals = -_normals(over, facets)
     mass = np.zeros((len(facets), MAX_NODES, MAX_NODES))
@@ -346,7 +347,7 @@ def _within(normals: Array, fixed: Mask) -> Array:
 # -------------------------------------------------------------------- sums over facets
 def _scatter(n: int, nodes: Index, values: Array) -> Array:
     """Sums (n,) of values (f, a) at nodes (f, a)."""
-    return np.bincount(nodes.ravel(), values.ravel(), minlength=n)
+    return np.bincount(nodes.ravel(), values.ravel(), minlength=n)  # type: ignore[return-value]  # numpy types only counts
 
 
 def _between(rows: Index, values: Array, columns: Index, shape: tuple) -> sparse.csr_array:

@@ -35,7 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...core.errors import InvalidInput
+from ...core.errors import InvalidInput, within
 from ..elements.elasticity import LinearElastic, Materials
 from ..elements.traces import (
     SurfacePoints,
@@ -76,18 +76,18 @@ class Nitsche:
 
     def __post_init__(self) -> None:
         for name in ("kappa", "scale"):
-            value = getattr(self, name)
-            if value is None and name == "kappa":
+            if name == "kappa" and self.kappa is None:
                 continue
+            value = getattr(self, name)
             if not (_is_number(value) and np.isfinite(value) and value > 0):
-                raise InvalidInput(f"{name}: expected a finite number > 0, got {value!r}")
+                raise InvalidInput(f"expected a finite number > 0, got {value!r}", (name,))
         if not (_is_number(self.theta) and -1 <= self.theta <= 1):
-            raise InvalidInput(f"theta: expected a number from -1 to 1, got {self.theta!r}")
+            text = f"expected a number from -1 to 1, got {self.theta!r}"
+            raise InvalidInput(text, ("theta",))
         whole = isinstance(self.points, int | np.integer) and not isinstance(self.points, bool)
         if not (whole and 1 <= self.points <= MOST_POINTS):
-            raise InvalidInput(
-                f"points: expected a whole number from 1 to {MOST_POINTS}, got {self.points!r}"
-            )
+            text = f"expected a whole number from 1 to {MOST_POINTS}, got {self.points!r}"
+            raise InvalidInput(text, ("points",))
 
 
 def _is_number(value: object) -> bool:
@@ -124,8 +124,9 @@ def nitsche_obstacle(
     check_exterior(mesh, surface)
     where = gauss_points(mesh, surface, options.points)
     at = surface_points(mesh, surface, material, where)
-    axes = frames(obstacle.normals(at.points))
-    return _rows(at, obstacle.gap(at.points), axes, mesh.points.size, options)
+    with within("obstacle"):
+        axes, gap = frames(obstacle.normals(at.points)), obstacle.gap(at.points)
+    return _rows(at, gap, axes, mesh.points.size, options)
 
 
 def nitsche_pair(  # noqa: PLR0913
@@ -139,13 +140,13 @@ def nitsche_pair(  # noqa: PLR0913
     surfaces for which the facets stand, see `curvature`.
     """
     check_exterior(slave, surface)
-    check_exterior(master, master_surface)
+    check_exterior(master, master_surface, "master")
     check_different(slave, surface, master, master_surface)
     over = Surface.of_corners(slave.points, slave.surface(surface), surface)
     under = Surface.of_corners(master.points, master.surface(master_surface), master_surface)
     met = in_front(over, under, master, joined=slave is master)
     if not len(met.slave):
-        raise InvalidInput(not_facing(slave, surface, master, master_surface))
+        raise not_facing(slave, surface, master, master_surface)
     points = (options.points + 1) // 2
     where, facet, opposite = points_on(over, under, met.slave, met.master, points)
     at = surface_points(slave, surface, material, where)

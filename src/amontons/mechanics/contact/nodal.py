@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...core.errors import InvalidInput
+from ...core.errors import InvalidInput, within
 from ..meshes.facets import inner_facets
 from ..meshes.mesh import Mesh
 from ..meshes.surfaces import nodal_weights
@@ -88,10 +88,10 @@ def nodal_contact(mesh: Mesh, surface: str, obstacle: Obstacle) -> ContactRows:
     check_exterior(mesh, surface)
     nodes, weights = contact_nodes(mesh, surface)
     points = mesh.points[nodes]
-    axes = frames(obstacle.normals(points))
-    size = len(mesh.points) * mesh.dim
-    H = contact_columns(nodes, axes, size)
-    return ContactRows(nodes, points, weights, obstacle.gap(points), axes, H)
+    with within("obstacle"):
+        axes, gap = frames(obstacle.normals(points)), obstacle.gap(points)
+    H = contact_columns(nodes, axes, len(mesh.points) * mesh.dim)
+    return ContactRows(nodes, points, weights, gap, axes, H)
 
 
 def contact_nodes(mesh: Mesh, surface: str) -> tuple[Index, Array]:
@@ -104,16 +104,16 @@ def contact_nodes(mesh: Mesh, surface: str) -> tuple[Index, Array]:
     return nodes, weights[nodes]
 
 
-def check_exterior(mesh: Mesh, surface: str) -> None:
-    """Raise InvalidInput when a facet of the surface lies between two cells."""
+def check_exterior(mesh: Mesh, surface: str, side: str = "slave") -> None:
+    """Raise InvalidInput, of a side of a contact, when a facet lies between two cells."""
     facets = mesh.surface(surface)
     total = sum(len(block.nodes) for block in facets)
     inner = inner_facets(mesh.cells, facets, len(mesh.points))
     if inner:
         raise InvalidInput(
-            f"surface {surface!r}: {inner} of its {total} facets lie between two cells, "
-            "contact needs an outer surface"
-        )
+            f"{inner} of its {total} facets lie between two cells, contact needs an outer "
+            "surface", (side,), f"surface {surface!r}",
+        )  # fmt: skip
 
 
 def contact_columns(nodes: Index, axes: Array, size: int) -> sparse.csc_array:

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 def inside(mesh: Mesh, points: Array) -> NDArray[np.bool_]:
     """Which points (k, dim) lie inside a mesh, (k,); k times its facets."""
     low, high = mesh.bounding_box()
-    out = ((points > low) & (points < high)).all(axis=1)
+    out = np.all((points > low) & (points < high), axis=1)
     for k in np.flatnonzero(out):
         out[k] = winding_number(mesh, points[k]) > 0.5
     return out
@@ -39,23 +39,27 @@ def check_different(slave: Mesh, surface: str, master: Mesh, master_surface: str
     )
     if both := len(one & other):
         raise InvalidInput(
-            f"contact of {surface!r} with {master_surface!r}: {both} facets are on both sides, "
-            "a surface can not be its own master; name the two sides as separate surfaces"
-        )
+            f"{both} facets are on both sides, a surface can not be its own master; name the "
+            "two sides as separate surfaces", ("master",),
+            f"contact of {surface!r} with {master_surface!r}",
+        )  # fmt: skip
 
 
-def not_facing(slave: Mesh, surface: str, master: Mesh, master_surface: str) -> str:
+def not_facing(
+    slave: Mesh, surface: str, master: Mesh, master_surface: str
+) -> InvalidInput:
     """What to tell the user when nothing of one surface lies in front of the other."""
     where = [
         f"{name!r} reaches from {_shown(x.min(axis=0))} to {_shown(x.max(axis=0))}"
         for mesh, name in ((slave, surface), (master, master_surface))
         for x in (mesh.points[mesh.surface_nodes(name)],)
     ]
-    return (
-        f"contact of {surface!r} with {master_surface!r}: no part of the slave has a master "
-        f"facet in front of it, along its outward normal; {', '.join(where)}: check the "
-        "positions, the units and which sides are named, or leave this contact out"
-    )
+    return InvalidInput(
+        "no part of the slave has a master facet in front of it, along its outward normal; "
+        f"{', '.join(where)}: check the positions, the units and which sides are named, or "
+        "leave this contact out", ("master",),
+        f"contact of {surface!r} with {master_surface!r}",
+    )  # fmt: skip
 
 
 def _shown(point: Array) -> str:

@@ -85,7 +85,7 @@ def pair_contact(
     points = slave.points[nodes]
     found = hit.found
     if not found.any():
-        raise InvalidInput(not_facing(slave, surface, master, master_surface))
+        raise not_facing(slave, surface, master, master_surface)
     points, normal = points[found], hit.normal[found]
     gap = np.einsum("ic,ic->i", points - hit.closest[found], normal)
     axes = frames(normal)
@@ -101,15 +101,15 @@ def meeting(
 ) -> tuple[Index, Array, Projection]:
     """Slave nodes (k,), their weights (k,), and the master facets that they meet, checked."""
     check_exterior(slave, surface)
-    check_exterior(master, master_surface)
+    check_exterior(master, master_surface, "master")
     check_different(slave, surface, master, master_surface)
     nodes, weights = contact_nodes(slave, surface)
     facets = master.surface(master_surface)
     if other := {block.kind for block in facets} - set(KINDS):
         raise InvalidInput(
-            f"master {master_surface!r}: expected facets of first order, got {other.pop()!r}; "
-            'take order = 1 and finer cells, or method="nitsche"'
-        )
+            f"expected facets of first order, got {other.pop()!r}; take order = 1 and finer "
+            'cells, or method="nitsche"', ("master",), f"master {master_surface!r}",
+        )  # fmt: skip
     points = slave.points[nodes]
     normals = nodal_normals(slave.points, slave.surface(surface))[nodes]
     own = nodes if slave is master else None

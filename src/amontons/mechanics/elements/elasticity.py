@@ -1,4 +1,4 @@
-"""Linear elasticity: materials, stiffness (by NGSolve), body forces, stresses.
+"""Linear elasticity: materials, stiffness, body forces, stresses.
 
 Small strains: sigma = lame_lambda tr(eps) I + 2 shear eps.  In 2D plane strain, or plane stress
 with lame_lambda replaced by 2 lame_lambda shear / (lame_lambda + 2 shear); unit thickness.
@@ -9,24 +9,51 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...core.arrays import number
-from ...core.errors import InvalidInput, MissingDependency
+from ...core.arrays import number, read_only
+from ...core.errors import InvalidInput
 from ..meshes.cells import CELLS
 from ..meshes.check import determinant
+from ..meshes.facets import Cells
+from ..meshes.linear_cells import Rule
 from ..meshes.mesh import Mesh, unknown
-from .nodal_basis import hierarchical_from_nodal
+from .cell_loops import stiffness_inplace
+from .pattern import node_pattern
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+class Isotropic:
+    """What follows from young and poisson at small strains."""
+
+    young: float
+    poisson: float
+
+    @property
+    def shear(self) -> float:
+        """Shear modulus, at finite strains that at F = I; unit of stress."""
+        return self.young / (2 * (1 + self.poisson))
+
+    def lame_lambda(self, dim: int = 3) -> float:
+        """First Lamé constant, at F = I, also of plane strain; unit of stress."""
+        return self.young * self.poisson / ((1 + self.poisson) * (1 - 2 * self.poisson))
+
+    def moduli(self, dim: int) -> Array:
+        """d stress_ik / d gradient_jl at [i, j, k, l], (dim, dim, dim, dim), unit of stress."""
+        eye, shear = np.eye(dim), self.shear
+        out = self.lame_lambda(dim) * np.einsum("ik,jl->ijkl", eye, eye)
+        out += shear * np.einsum("ij,kl->ijkl", eye, eye)
+        return out + shear * np.einsum("il,jk->ijkl", eye, eye)
 
 
 @dataclass(frozen=True)
-class LinearElastic:
+class LinearElastic(Isotropic):
     """Isotropic elasticity: young, unit of stress, > 0; -1 < poisson < 0.5.
 
     plane: "strain" or "stress", read in 2D only.  density: mass per volume (per area in 2D),
@@ -39,7 +66,8 @@ class LinearElastic:
     density: float | None = None
 
     def __post_init__(self) -> None:
-        number("young", self.young), number("poisson", self.poisson)
+        number("young", self.young)
+        number("poisson", self.poisson)
         if self.density is not None:
             number("density", self.density)
         if not self.young > 0:
@@ -59,25 +87,21 @@ class LinearElastic:
         if self.density is not None and not self.density > 0:
             raise InvalidInput(f"density: expected a finite number > 0, got {self.density!r}")
 
-    @property
-    def shear(self) -> float:
-        """Shear modulus, unit of stress."""
-        return self.young / (2 * (1 + self.poisson))
-
-    def lame_lambda(self, dim: int) -> float:
+    def lame_lambda(self, dim: int = 3) -> float:
         """First Lamé constant, in 2D that of the plane state; unit of stress."""
-        value = self.young * self.poisson / ((1 + self.poisson) * (1 - 2 * self.poisson))
+        value = super().lame_lambda(dim)
         if dim == 2 and self.plane == "stress":
             return 2 * value * self.shear / (value + 2 * self.shear)
         return value
 
 
 Materials = Mapping[str, LinearElastic]
+Law = TypeVar("Law")
 
 
 def materials_by_region(
-    mesh: Mesh, material: LinearElastic | Materials
-) -> dict[str, LinearElastic]:
+    mesh: Mesh, material: Law | Mapping[str, Law]
+) -> dict[str, Law]:
     """One material per region of the mesh; InvalidInput for missing or unknown ones."""
     if not isinstance(material, Mapping):
         return dict.fromkeys(mesh.regions, material)
@@ -90,62 +114,31 @@ def materials_by_region(
     return dict(material)
 
 
-def stiffness(mesh: Mesh, material: LinearElastic | Materials) -> sparse.bsr_array:
+def stiffness(
+    mesh: Mesh, material: Isotropic | Mapping[str, Isotropic]
+) -> sparse.bsr_array:
     """Stiffness matrix (n dim, n dim) in blocks of dim x dim, force per length.
 
-    Integrated exactly where the sides of quadrilaterals and hexahedra are parallel; otherwise
-    with mesh.order + 1 Gauss points per direction.
+    Exactly symmetric.  Integrated exactly where the sides of quadrilaterals and hexahedra are
+    parallel; otherwise with mesh.order + 1 Gauss points per direction.
     """
-    ng = _ngsolve()
     by_region = materials_by_region(mesh, material)
-    engine_mesh = _engine_mesh(mesh)
-    space = ng.H1(engine_mesh, order=mesh.order, dim=mesh.dim)
-    lame = engine_mesh.MaterialCF({k: m.lame_lambda(mesh.dim) for k, m in by_region.items()})
-    shear = engine_mesh.MaterialCF({k: m.shear for k, m in by_region.items()})
-    u, v = space.TnT()
-    strain = 0.5 * (ng.Grad(u) + ng.Grad(u).trans)
-    form = ng.BilinearForm(space)
-    form += (
-        2 * shear * ng.InnerProduct(strain, ng.Grad(v))
-        + lame * ng.Trace(ng.Grad(u)) * ng.Trace(ng.Grad(v))
-    ) * ng.dx
-    form.Assemble()
-    values, columns, pointers = (part.NumPy() for part in form.mat.CSR())
-    size, d = len(mesh.points) * mesh.dim, mesh.dim
-    blocks = values.reshape(-1, d, d).copy()  # the engine's memory dies with the form
-    matrix = sparse.bsr_array(
-        (blocks, columns.copy(), pointers.astype(np.int32)), shape=(size, size)
-    )
-    if mesh.order == 1:
-        return matrix
-    change = sparse.kron(hierarchical_from_nodal(ng, mesh, engine_mesh), np.eye(d), "csr")
-    return sparse.bsr_array(change.T @ matrix.tocsr() @ change, blocksize=(d, d))
+    pointers, columns = node_pattern(mesh.cells, len(mesh.points))
+    blocks = np.zeros((len(columns), mesh.dim, mesh.dim))
+    for cells in mesh.cells:
+        moduli = by_region[cells.region].moduli(mesh.dim)
+        geometry = geometry_of(mesh, cells, CELLS[cells.kind].stiffness)
+        stiffness_inplace(*geometry, moduli, pointers, columns, blocks, (1.0,) * mesh.dim)
+    return sparse.bsr_array((blocks, columns, pointers), shape=(mesh.points.size,) * 2)
 
 
-def _ngsolve() -> Any:
-    try:
-        import ngsolve
-    except ImportError as error:
-        raise MissingDependency(
-            f"finite elements need the package ngsolve: python -m pip install ngsolve ({error})"
-        ) from error
-    return ngsolve
+def geometry_of(mesh: Mesh, cells: Cells, rule: Rule) -> tuple[Array, Index, Array, Array]:
+    """What the loops over cells begin with: points, nodes, slopes and weights.
 
-
-def _engine_mesh(mesh: Mesh) -> Any:
-    """The NGSolve mesh with the same corners and regions, in the same order."""
-    ng = _ngsolve()
-    from netgen.meshing import Mesh as NetgenMesh
-
-    out = NetgenMesh(dim=mesh.dim)
-    tables = [(block, block.nodes[:, : CELLS[block.kind].corner_count]) for block in mesh.cells]
-    points = mesh.points[: 1 + max(int(nodes.max()) for _, nodes in tables)]
-    out.AddPoints(np.c_[points, np.zeros(len(points))][:, :3].copy())
-    index = {region: out.AddRegion(region, mesh.dim) for region in mesh.regions}
-    for block, table in tables:
-        nodes = np.ascontiguousarray(table, dtype=np.int32)
-        out.AddElements(dim=mesh.dim, index=index[block.region], data=nodes, base=0)
-    return ng.Mesh(out)
+    Of one type for all cells: another one would have the loops compiled again.
+    """
+    nodes = read_only(np.ascontiguousarray(cells.nodes).view())
+    return mesh.points, nodes, np.array(CELLS[cells.kind].gradient(rule[0]), order="C"), rule[1]
 
 
 def body_load(mesh: Mesh, force: Array, region: str | None = None) -> Array:
@@ -177,11 +170,8 @@ def cell_stress(mesh: Mesh, material: LinearElastic | Materials, displacement: A
     parts = []
     for block in mesh.cells:
         cell, law = CELLS[block.kind], by_region[block.region]
-        slopes = cell.gradient(cell.centre)
-        jac = cell.jacobians(mesh.points[block.nodes], cell.centre)
-        gradient = np.einsum("kac,ad->kcd", displacement[block.nodes], slopes) @ np.linalg.inv(
-            jac
-        )
+        slopes = cell.gradients(mesh.points[block.nodes], cell.centre)
+        gradient = np.einsum("kac,kad->kcd", displacement[block.nodes], slopes)
         strain = 0.5 * (gradient + gradient.swapaxes(1, 2))
         trace = np.trace(strain, axis1=1, axis2=2)
         lame = law.lame_lambda(mesh.dim) * trace

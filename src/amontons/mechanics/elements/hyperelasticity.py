@@ -1,7 +1,7 @@
 """Hyperelasticity at finite strains: laws, nodal forces and exact tangents on any mesh.
 
 Energies are per volume of the reference configuration, with F = I + grad u and C = F^T F; see
-`hyperelastic_cells` for the family of which both laws are members.  2D is plane strain, with
+`cell_loops` for the family of which both laws are members.  2D is plane strain, with
 unit thickness.  Both laws are linear elasticity with the same young and poisson at F = I.
 
 [C] P. G. Ciarlet, "Mathematical elasticity I", North-Holland 1988, section 4.10.
@@ -14,27 +14,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.special import roots_jacobi
 
 from ...core.errors import InvalidInput, InvertedCells
 from ..meshes.cells import CELLS, ReferenceCell
 from ..meshes.check import determinant
-from ..meshes.facets import Cells
+from ..meshes.linear_cells import Rule
 from ..meshes.mesh import Mesh
-from .elasticity import LinearElastic, materials_by_region
-from .hyperelastic_cells import energy_of, forces_inplace, tangent_inplace
+from .cell_loops import energy_of, forces_inplace, tangent_inplace
+from .elasticity import Isotropic, LinearElastic, geometry_of, materials_by_region
+from .pattern import node_pattern
 
 Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class NeoHookean:
+class NeoHookean(Isotropic):
     """Compressible neo-Hookean law: young, unit of stress, > 0; -1 < poisson < 0.5.
 
     W = shear / 2 (tr C - 3) - shear ln J + lame_lambda / 2 (ln J)^2, [BW] eq. (6.27).
@@ -47,22 +45,13 @@ class NeoHookean:
         LinearElastic(self.young, self.poisson)  # its checks
 
     @property
-    def shear(self) -> float:
-        """Shear modulus at F = I, unit of stress."""
-        return LinearElastic(self.young, self.poisson).shear
-
-    def lame_lambda(self, dim: int = 3) -> float:
-        """First Lamé constant at F = I, also of plane strain; unit of stress."""
-        return LinearElastic(self.young, self.poisson).lame_lambda(dim)
-
-    @property
     def coefficients(self) -> tuple[float, float, float, float, float]:
         """a, b, c, d, e of the family, unit of stress."""
         return self.shear / 2, 0.0, 0.0, self.shear, self.lame_lambda()
 
 
 @dataclass(frozen=True)
-class CiarletGeymonat:
+class CiarletGeymonat(Isotropic):
     """Ciarlet-Geymonat law: young, unit of stress, > 0; 0 < poisson < 0.5.
 
     W = a (tr C - 3) + b (tr cof C - 3) + c (J^2 - 1) - d ln J with b = shear / 2 - a,
@@ -110,15 +99,6 @@ class CiarletGeymonat:
         return max(0.0, self.shear / 2 - self.lame_lambda() / 4), self.shear / 2
 
     @property
-    def shear(self) -> float:
-        """Shear modulus at F = I, unit of stress."""
-        return LinearElastic(self.young, self.poisson).shear
-
-    def lame_lambda(self, dim: int = 3) -> float:
-        """First Lamé constant at F = I, also of plane strain; unit of stress."""
-        return LinearElastic(self.young, self.poisson).lame_lambda(dim)
-
-    @property
     def coefficients(self) -> tuple[float, float, float, float, float]:
         """a, b, c, d, e of the family, unit of stress."""
         a, half = float(self.a), self.shear / 2  # type: ignore[arg-type]
@@ -134,17 +114,6 @@ def is_hyperelastic(material: object) -> bool:
     if isinstance(material, Mapping):
         return any(isinstance(law, Hyperelastic) for law in material.values())
     return isinstance(material, Hyperelastic)
-
-
-@dataclass(frozen=True, eq=False)
-class _Block:
-    """Cells of one kind and region, ready for the compiled loops."""
-
-    nodes: Index
-    gradients: Array
-    volumes: Array
-    laws: Array
-    places: Index
 
 
 class HyperelasticBody:
@@ -164,21 +133,20 @@ class HyperelasticBody:
                     f"material of region {region!r}: expected NeoHookean or CiarletGeymonat "
                     f"as in the other regions, got {law!r}"
                 )
-        self.pointers, self.columns, places = node_pattern(mesh)
-        self.blocks = [
-            _block(mesh, cells, laws[cells.region].coefficients, place)  # type: ignore[attr-defined]
-            for cells, place in zip(mesh.cells, places, strict=True)
-        ]
+        self.pointers, self.columns = node_pattern(mesh.cells, len(mesh.points))
+        self._unit = (1.0,) * mesh.dim
+        self._blocks = [
+            (geometry_of(mesh, cells, _rule(CELLS[cells.kind])),
+             np.array(laws[cells.region].coefficients))  # type: ignore[attr-defined]
+            for cells in mesh.cells
+        ]  # fmt: skip
 
     def forces(self, u: Array) -> Array:
         """Nodal forces (n, dim) that hold the displacements u (n, dim): dE/du."""
         u = np.ascontiguousarray(u, dtype=float)
         out = np.zeros_like(u)
-        for block in self.blocks:
-            least = forces_inplace(
-                u, block.nodes, block.gradients, block.volumes, block.laws, out
-            )
-            _check(least)
+        for geometry, law in self._blocks:
+            _check(forces_inplace(u, *geometry, law, out, self._unit))
         return out
 
     def tangent(self, u: Array) -> tuple[Array, Array]:
@@ -186,20 +154,21 @@ class HyperelasticBody:
         u = np.ascontiguousarray(u, dtype=float)
         dim = u.shape[1]
         out, blocks = np.zeros_like(u), np.zeros((len(self.columns), dim, dim))
-        for block in self.blocks:
-            least = tangent_inplace(u, block.nodes, block.gradients, block.volumes, block.laws,
-                                    block.places, out, blocks)  # fmt: skip
-            _check(least)
+        for geometry, law in self._blocks:
+            _check(tangent_inplace(u, *geometry, law, self.pointers, self.columns, out, blocks,
+                                   self._unit))  # fmt: skip
         return out, blocks
 
     def unit_forces(self) -> Array:
         """Sizes of nodal forces (n,) where stresses are as large as moduli, for rounding."""
         out = np.zeros(len(self.mesh.points))
-        for block in self.blocks:
-            a, b, c, d, e = block.laws[0]
-            modulus = 2 * a + 4 * b + 4 * c + d + e
-            sizes = np.linalg.norm(block.gradients, axis=3) * block.volumes[:, :, None]
-            np.add.at(out, block.nodes, modulus * sizes.sum(axis=1))
+        for cells, (_, law) in zip(self.mesh.cells, self._blocks, strict=True):
+            cell, coordinates = CELLS[cells.kind], self.mesh.points[cells.nodes]
+            modulus = law @ [2, 4, 4, 1, 1]
+            for at, weight in zip(*_rule(cell), strict=True):
+                volume = weight * determinant(cell.jacobians(coordinates, at))
+                sizes = np.linalg.norm(cell.gradients(coordinates, at), axis=2)
+                np.add.at(out, cells.nodes, modulus * sizes * volume[:, None])
         return out
 
     def matrix(self, blocks: Array) -> sparse.bsr_array:
@@ -211,8 +180,8 @@ class HyperelasticBody:
         """Stored energy at displacements u (n, dim), unit of work; zero at rest."""
         u = np.ascontiguousarray(u, dtype=float)
         total = 0.0
-        for block in self.blocks:
-            part, least = energy_of(u, block.nodes, block.gradients, block.volumes, block.laws)
+        for geometry, law in self._blocks:
+            part, least = energy_of(u, *geometry, law, self._unit)
             _check(least)
             total += part
         return total
@@ -224,42 +193,9 @@ def _check(least: float) -> None:
         raise InvertedCells(f"cells are inverted: the least det F is {least:.3g}")
 
 
-def node_pattern(mesh: Mesh) -> tuple[NDArray[np.int32], NDArray[np.int32], list[Index]]:
-    """Row pointers, columns, and per block of cells the place of every pair of nodes."""
-    n = len(mesh.points)
-    keys = [cells.nodes[:, :, None] * n + cells.nodes[:, None, :] for cells in mesh.cells]
-    unique, inverse = np.unique(np.concatenate([k.ravel() for k in keys]), return_inverse=True)
-    pointers = np.searchsorted(unique // n, np.arange(n + 1)).astype(np.int32)
-    ends = np.cumsum([k.size for k in keys])[:-1]
-    parts = np.split(inverse.ravel(), ends)
-    places = [part.reshape(k.shape) for part, k in zip(parts, keys, strict=True)]
-    return pointers, (unique % n).astype(np.int32), places
-
-
-def _block(mesh: Mesh, cells: Cells, law: tuple[float, ...], places: Index) -> _Block:
-    """Gradients of the shape functions and volumes at the points of integration."""
-    cell = CELLS[cells.kind]
-    gradients, volumes = [], []
-    for at, weight in zip(*_rule(cell), strict=True):
-        jac = cell.jacobians(mesh.points[cells.nodes], at)
-        volumes.append(weight * determinant(jac))
-        gradients.append(cell.gradient(at) @ np.linalg.inv(jac))
-    laws = np.tile(np.asarray(law), (len(cells.nodes), 1))
-    arrays = (cells.nodes, np.stack(gradients, axis=1), np.stack(volumes, axis=1), laws, places)
-    return _Block(*(np.array(a, order="C") for a in arrays))  # one type for compiled loops
-
-
-def _rule(cell: ReferenceCell) -> tuple[Array, Array]:
-    """Points and weights: one point where F is constant, else enough to hold all modes."""
-    if cell.kind in ("tri", "tet"):
-        return cell.centre[None], np.array([cell.gauss[1].sum()])
-    if cell.kind != "pyramid":
-        return cell.gauss
-    flat = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3)
-    height, weights = roots_jacobi(2, 2, 0)  # the square of the distance from the apex
-    points = [((1 - h) * x, (1 - h) * y, h)
-              for h, x, y in product((1 + height) / 2, flat, flat)]  # fmt: skip
-    return np.array(points), np.repeat(weights / 8, 4) / 4
+def _rule(cell: ReferenceCell) -> Rule:
+    """First order: as the stiffness; second: more, the laws are no polynomials."""
+    return cell.stiffness if cell.order == 1 else cell.gauss
 
 
 def cauchy_stress(
@@ -273,8 +209,7 @@ def cauchy_stress(
     parts = []
     for cells in mesh.cells:
         cell = CELLS[cells.kind]
-        jac = cell.jacobians(mesh.points[cells.nodes], cell.centre)
-        slopes = cell.gradient(cell.centre) @ np.linalg.inv(jac)
+        slopes = cell.gradients(mesh.points[cells.nodes], cell.centre)
         F = np.tile(np.eye(3), (len(cells.nodes), 1, 1))
         F[:, : mesh.dim, : mesh.dim] += np.einsum(
             "kac,kad->kcd", displacement[cells.nodes], slopes

@@ -6,11 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from ..meshes.mesh import Mesh
 from .elasticity import LinearElastic, stiffness
-from .hyperelasticity import node_pattern
 
 Array = NDArray[np.float64]
 
@@ -20,23 +18,9 @@ class LinearBody:
 
     def __init__(self, mesh: Mesh, material: LinearElastic | Mapping[str, LinearElastic]):
         self.mesh = mesh
-        self.pointers, self.columns, _ = node_pattern(mesh)
-        K = stiffness(mesh, material).tocsr().tobsr((mesh.dim, mesh.dim))
-        K.sort_indices()
-        self._blocks = np.zeros((len(self.columns), mesh.dim, mesh.dim))
-        self._blocks[self._places(K)] = K.data
-        self._K = self.matrix(self._blocks)
-
-    def _places(self, K: sparse.bsr_array) -> NDArray[np.int64]:
-        """Where the blocks of K stand in the pattern of all pairs of nodes of a cell."""
-        n = len(self.mesh.points)
-        pattern = _keys(self.pointers, self.columns, n)
-        return np.searchsorted(pattern, _keys(K.indptr, K.indices, n))
-
-    def matrix(self, blocks: Array) -> sparse.bsr_array:
-        """The blocks of `tangent` as a matrix (n dim, n dim)."""
-        size = self.mesh.points.size
-        return sparse.bsr_array((blocks, self.columns, self.pointers), shape=(size, size))
+        self._K = K = stiffness(mesh, material)
+        self.pointers, self.columns, blocks = K.indptr, K.indices, K.data
+        self._blocks: Array = blocks  # type: ignore[assignment]  # scipy guesses any number
 
     def forces(self, u: Array) -> Array:
         """Nodal forces (n, dim) that hold the displacements u (n, dim)."""
@@ -55,10 +39,4 @@ class LinearBody:
         rows = np.repeat(np.arange(len(self.mesh.points)), np.diff(self.pointers))
         apart = np.linalg.norm(self.mesh.points[self.columns] - self.mesh.points[rows], axis=1)
         sizes = np.linalg.norm(self._blocks, axis=(1, 2)) * apart
-        return np.bincount(rows, sizes, minlength=len(self.mesh.points))
-
-
-def _keys(pointers: NDArray, columns: NDArray, n: int) -> NDArray[np.int64]:
-    """One ascending number per block."""
-    rows = np.repeat(np.arange(n, dtype=np.int64), np.diff(pointers))
-    return rows * n + columns
+        return np.bincount(rows, sizes, minlength=len(self.mesh.points))  # type: ignore[return-value]  # numpy types only counts

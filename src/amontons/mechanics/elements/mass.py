@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 def mass(mesh: Mesh, material: LinearElastic | Mapping[str, LinearElastic]) -> sparse.csr_array:
     """Consistent mass matrix (n dim, n dim): integrals of density N_a N_b."""
-    blocks = [np.zeros((3, 0))]
+    blocks: list[NDArray] = [np.zeros((3, 0))]
     for region, kind, nodes in ((b.region, b.kind, b.nodes) for b in mesh.cells):
         density = _density(materials_by_region(mesh, material)[region], region)
         cell = CELLS[kind]

@@ -140,7 +140,7 @@ def facet_traces(mesh: Mesh, surface: str, facet: Index, at: Array) -> tuple[Ind
     return nodes, shape
 
 
-def stacked(tables: list[Array]) -> Array:
+def stacked(tables: list[NDArray]) -> NDArray:
     """One table of several with different numbers of columns, padded with zeros."""
     width = max((table.shape[1] for table in tables if table.ndim > 1), default=0)
     return np.concatenate([

@@ -88,7 +88,7 @@ def _cubes(counts: tuple[int, ...]) -> Index:
     """Nodes of all quadrilaterals or hexahedra in VTK order, (k, 4 or 8)."""
     strides = np.cumprod([1, *(n + 1 for n in counts[:-1])])
     grids = np.meshgrid(*[np.arange(n) for n in counts], indexing="ij")
-    first = sum(g.ravel(order="F") * s for g, s in zip(grids, strides, strict=True))
+    first = np.asarray(sum(g.ravel("F") * s for g, s in zip(grids, strides, strict=True)))
     square = np.array([0, strides[0], strides[0] + strides[1], strides[1]])
     corner = square if len(counts) == 2 else np.concatenate([square, square + strides[2]])
     return first[:, None] + corner
@@ -136,7 +136,7 @@ def _neighbour(cells: int, step: int, halved: bool) -> sparse.csr_array:
 
 
 def _product(factors: list[sparse.csr_array]) -> sparse.csr_array:
-    return reduce(lambda a, b: sparse.kron(a, b, format="csr"), factors)
+    return reduce(lambda a, b: sparse.csr_array(sparse.kron(a, b, format="csr")), factors)
 
 
 def _sides(unit: Array, block: Cells, dim: int) -> dict[str, tuple[Facets, ...]]:

@@ -7,6 +7,7 @@ faces) that touch are glued: they share the nodes of their common face.
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import pickle
 import re
@@ -31,6 +32,7 @@ Index = NDArray[np.int64]
 MAX_CELLS = 10_000_000  # a typing error in the size must not run for days
 TOLERANCE = 1e-6  # OpenCascade's boxes are larger than the shape by some 1e-7
 COLOUR = re.compile(r"\x1b\[[0-9;]*m")
+NEEDS = "CAD needs the extra cad: python -m pip install 'amontons[cad]'"
 UNNAMED = ("", "default", "NONE")  # what Netgen and CAD programs write instead of no name
 
 
@@ -43,7 +45,7 @@ def read_cad(
     face1, face2, … in the order of the file, several solids without one solid1, solid2, …
     names renames some: {"face3": "bottom"}.  Lengths are millimetres: STEP and IGES files know
     their unit and are converted.  BREP files hold neither names nor a unit.  Small details get
-    smaller cells.
+    smaller cells.  Raises MissingDependency without the extra `cad`, Netgen.
     """
     name = os.fspath(path)
     if not is_cad(name):
@@ -53,6 +55,8 @@ def read_cad(
         )
     _check_size(size)
     file_head(Path(name))
+    if importlib.util.find_spec("netgen") is None:
+        raise MissingDependency(f"{name}: {NEEDS}")
     return _renamed(_read_apart(name, float(size)), names or {}, name)
 
 
@@ -130,9 +134,7 @@ def _occ() -> Any:
     try:
         import netgen.occ
     except ImportError as error:
-        raise MissingDependency(
-            f"CAD needs the package ngsolve: python -m pip install ngsolve ({error})"
-        ) from error
+        raise MissingDependency(f"{NEEDS} ({error})") from error
     return netgen.occ
 
 
@@ -192,7 +194,7 @@ def _by_name(index: Index, names: Sequence[str], word: str) -> dict[str, Index]:
     given = {name for name in names if name not in UNNAMED}
     rows: dict[str, list[Index]] = {}
     for k in np.unique(index):
-        name = names[k - 1] if k <= len(names) else ""
+        name = str(names[k - 1]) if k <= len(names) else ""
         if name in UNNAMED:
             name = f"{word}{k}"
             while name in given:

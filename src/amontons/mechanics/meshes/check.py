@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.arrays import integers
+from ...core.arrays import integers, read_only
 from ...core.errors import InvalidInput
 from .cells import CELLS, FIRST, ReferenceCell
 
@@ -59,10 +59,9 @@ def checked_cells(points: Array, kind: str, nodes: ArrayLike, region: str) -> In
     bad = np.flatnonzero(~turned & (low <= FLAT))
     if bad.size:
         raise InvalidInput(
-            _complaint(kind, region, table[bad[0]], points, int(bad.size), low[bad[0]])
+            _complaint(kind, region, table[bad[0]], points, int(bad.size), float(low[bad[0]]))
         )
-    table.flags.writeable = False
-    return table
+    return read_only(table)
 
 
 def check_repeated(points: Array, blocks: Sequence[Cells]) -> None:
@@ -88,7 +87,7 @@ def check_repeated(points: Array, blocks: Sequence[Cells]) -> None:
 
 
 def _check_straight(cell: ReferenceCell, coordinates: Array, region: str) -> None:
-    """Nodes between corners must be in the middle: the engine knows straight sides only."""
+    """Nodes between corners must be in the middle: contact and levels need straight sides."""
     first = cell.corner_count
     size = np.ptp(coordinates, axis=1).max(initial=0.0)
     for k, parents in enumerate(cell.parents):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.arrays import integers
+from ...core.arrays import integers, read_only
 from ...core.errors import InvalidInput
 from .cells import CELLS, FACET_KIND, FIRST
 
@@ -131,6 +131,4 @@ def _looked_up(nodes: ArrayLike, known: Index | None, name: str, points: Array) 
     if (row < 0).any():
         where = points[wanted[np.flatnonzero(row < 0)[0]]].mean(axis=0)
         raise InvalidInput(f"surface {name!r}: the facet near {where} is no side of a cell")
-    out = known[row]
-    out.flags.writeable = False
-    return out
+    return read_only(known[row])

@@ -69,6 +69,7 @@ class Lines:
                 raise ValueError
         except (ValueError, OverflowError):
             self._find_bad(first, rows, columns, expected, kind)
+            raise
         self.at = first + rows
         return out.reshape(rows, columns)
 

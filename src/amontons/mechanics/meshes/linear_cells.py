@@ -9,12 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import roots_jacobi
 
 Array = NDArray[np.float64]
 Facets = tuple[tuple[int, ...], ...]
+Rule = tuple[Array, Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +26,8 @@ class ReferenceCell:
 
     corners (nodes, dim); facets: local nodes of every side, right-hand rule outwards;
     shape(x) and gradient(x) at reference points (…, dim): (…, nodes) and (…, nodes, dim);
-    gauss: points (k, dim) and weights (k,), exact for the integrals of shape functions.
+    gauss: points (k, dim) and weights (k,), exact for the integrals of shape functions;
+    stiffness: the same for products of two gradients, exact where the Jacobian is constant.
     parents: of every node that is no corner, the corners that it is the middle of.
     """
 
@@ -33,7 +37,8 @@ class ReferenceCell:
     facets: Facets
     shape: Callable[[Array], Array]
     gradient: Callable[[Array], Array]
-    gauss: tuple[Array, Array]
+    gauss: Rule
+    stiffness: Rule
     parents: tuple[tuple[int, ...], ...] = ()
 
     @property
@@ -60,6 +65,10 @@ class ReferenceCell:
         """Slopes of x (k, nodes, space) at one reference point or one each, (k, space, dim)."""
         return np.einsum("kas,ad->ksd" if point.ndim == 1 else "kas,kad->ksd",
                          coordinates, self.gradient(point))  # fmt: skip
+
+    def gradients(self, coordinates: Array, point: Array) -> Array:
+        """Gradients in space of the shape functions at one reference point, (k, nodes, dim)."""
+        return self.gradient(point) @ np.linalg.inv(self.jacobians(coordinates, point))
 
 
 def _simplex(dim: int) -> tuple[Array, Callable, Callable]:
@@ -140,6 +149,8 @@ _A, _B = (5 - np.sqrt(5)) / 20, (5 + 3 * np.sqrt(5)) / 20
 _TET = (np.vstack([np.full(3, _A), _A + (_B - _A) * np.eye(3)]), np.full(4, 1 / 24))
 _WEDGE = (np.array([[*p, z] for p in _TRI[0] for z in _TWO]), np.full(6, 1 / 12))
 _PYRAMID = (np.array([[0.375, 0.375, 0.25]]), np.full(1, 1 / 3))
+_ONE_IN_TRI = (np.full((1, 2), 1 / 3), np.array([1 / 2]))
+_ONE_IN_TET = (np.full((1, 3), 1 / 4), np.array([1 / 6]))
 _SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
 _CUBE = np.vstack([np.c_[_SQUARE, np.zeros(4)], np.c_[_SQUARE, np.ones(4)]])
 
@@ -159,25 +170,36 @@ _QUAD_FACETS = ((0, 1), (1, 2), (2, 3), (3, 0))
 _TET_FACETS = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
 
 
+def _in_pyramid() -> Rule:
+    """Two points per direction: one could not hold all modes."""
+    height, weights = roots_jacobi(2, 2, 0)  # the square of the distance from the apex
+    points = [((1 - h) * x, (1 - h) * y, h)
+              for h, x, y in product((1 + height) / 2, _TWO, _TWO)]  # fmt: skip
+    return np.array(points), np.repeat(weights / 8, 4) / 4
+
+
 def _cell(
     kind: str,
     facets: Facets,
     parts: tuple[Array, Callable, Callable],
-    gauss: tuple[Array, Array],
+    gauss: Rule,
+    stiffness: Rule | None = None,
 ) -> ReferenceCell:
-    corners, shape, gradient = parts
-    return ReferenceCell(kind, corners.shape[1], corners, facets, shape, gradient, gauss)
+    """stiffness: by default the points of `gauss`."""
+    corners, *functions = parts
+    rules = (gauss, stiffness or gauss)
+    return ReferenceCell(kind, corners.shape[1], corners, facets, *functions, *rules)
 
 
 LINEAR = {
     cell.kind: cell
     for cell in (
         _cell("line", ((0,), (1,)), _tensor(np.array([[0], [1]])), _LINE),
-        _cell("tri", _TRI_FACETS, _simplex(2), _TRI),
+        _cell("tri", _TRI_FACETS, _simplex(2), _TRI, _ONE_IN_TRI),
         _cell("quad", _QUAD_FACETS, _tensor(_SQUARE), _QUAD),
-        _cell("tet", _TET_FACETS, _simplex(3), _TET),
+        _cell("tet", _TET_FACETS, _simplex(3), _TET, _ONE_IN_TET),
         _cell("hex", _HEX_FACETS, _tensor(_CUBE), _HEX),
         _cell("wedge", _WEDGE_FACETS, _wedge(), _WEDGE),
-        _cell("pyramid", _PYRAMID_FACETS, _pyramid(), _PYRAMID),
+        _cell("pyramid", _PYRAMID_FACETS, _pyramid(), _PYRAMID, _in_pyramid()),
     )
 }

@@ -79,4 +79,5 @@ def with_middles(
         mean = (np.full(keys.size, 1 / size), keys.ravel(), start)
         rows.append(sparse.csr_array(mean, shape=(len(keys), count)))
         total += len(keys)
-    return sparse.vstack(rows, format="csr"), [np.hstack(parts) for parts in tables]
+    means = sparse.csr_array(sparse.vstack(rows, format="csr"))
+    return means, [np.hstack(parts) for parts in tables]

@@ -52,7 +52,7 @@ def _nodes_of_cells(mesh: Mesh) -> sparse.csr_array:
         starts = np.arange(0, count * size + 1, size)
         entries = (np.ones(count * size), block.nodes.ravel(), starts)
         tables.append(sparse.csr_array(entries, shape=(count, len(mesh.points))))
-    return sparse.vstack(tables, format="csr")
+    return sparse.csr_array(sparse.vstack(tables, format="csr"))
 
 
 def extract(mesh: Mesh, wanted: NDArray[np.bool_]) -> tuple[Mesh, Index]:
@@ -73,7 +73,7 @@ def extract(mesh: Mesh, wanted: NDArray[np.bool_]) -> tuple[Mesh, Index]:
 
 def _pymetis() -> Any:
     try:
-        import pymetis
+        import pymetis  # pyright: ignore[reportMissingImports]
     except ImportError as error:
         raise MissingDependency(
             "cutting a mesh into parts needs the package pymetis: "

@@ -7,13 +7,13 @@ are straight: every node sits at the mean of its parents, the corners that it li
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import roots_jacobi
 
-from .linear_cells import LINEAR, ReferenceCell
+from .linear_cells import LINEAR, ReferenceCell, Rule
 
 Array = NDArray[np.float64]
 Parents = tuple[tuple[int, ...], ...]
@@ -70,6 +70,20 @@ def gauss(dim: int, simplex: bool, count: int = 3) -> tuple[Array, Array]:
     return np.array(points), np.array(weights)
 
 
+def _in_tet() -> Rule:
+    """14 points, exact to degree 5: N. J. Walkington, CMU report 00-CNA-023 (2000)."""
+    corner = [(0.31088591926330060980, 0.11268792571801585080),
+              (0.092735250310891226402, 0.073493043116361949544)]  # fmt: skip
+    edge, weight = 0.045503704125649649492, 0.042546020777081466438
+    barycentric = [np.full((4, 4), a) + (1 - 4 * a) * np.eye(4) for a, _ in corner]
+    barycentric.append(np.array([
+        [edge if k in pair else 0.5 - edge for k in range(4)]
+        for pair in combinations(range(4), 2)
+    ]))  # fmt: skip
+    weights = np.repeat([w for _, w in corner] + [weight], [4, 4, 6])
+    return np.vstack(barycentric)[:, 1:], weights / weights.sum() / 6
+
+
 def _cell(kind: str) -> ReferenceCell:
     first, parents = LINEAR[FIRST[kind]], PARENTS[kind]
     middles = [first.corners[list(p)].mean(axis=0) for p in parents]
@@ -77,8 +91,9 @@ def _cell(kind: str) -> ReferenceCell:
     simplex = FIRST[kind] in ("tri", "tet")
     shape, gradient = _lagrange(nodes, simplex)
     facets = tuple(_facet(facet, parents, len(first.corners)) for facet in first.facets)
-    return ReferenceCell(kind, first.dim, nodes, facets, shape, gradient,
-                         gauss(first.dim, simplex), parents)  # fmt: skip
+    rule = _in_tet() if kind == "tet10" else gauss(first.dim, simplex)
+    return ReferenceCell(kind, first.dim, nodes, facets, shape, gradient, rule,
+                         first.gauss if simplex else rule, parents)  # fmt: skip
 
 
 def _facet(corners: tuple[int, ...], parents: Parents, first: int) -> tuple[int, ...]:

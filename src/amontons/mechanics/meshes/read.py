@@ -106,7 +106,7 @@ def _raw(mesh: Any) -> RawMesh:
     blocks = []
     for k, block in enumerate(mesh.cells):
         nodes = np.asarray(block.data, dtype=np.int64)
-        kind = KINDS.get(block.type, block.type)
+        kind = str(KINDS.get(block.type, block.type))
         groups = _groups(mesh, k, block.type, len(nodes))
         for key in dict.fromkeys(groups):
             rows = [row for row, found in enumerate(groups) if found == key]

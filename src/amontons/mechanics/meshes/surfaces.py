@@ -1,4 +1,4 @@
-"""Integrals over surfaces and averaged normals, all from facets: no NGSolve here."""
+"""Integrals over surfaces and averaged normals, all from facets."""
 
 from __future__ import annotations
 
@@ -33,10 +33,11 @@ def outward(jac: Array) -> Array:
 
 def facet_areas(points: Array, facets: Facets) -> Array:
     """Area (length in 2D) of every facet, (k,)."""
-    return sum(
+    gauss = zip(*CELLS[facets.kind].gauss, strict=True)
+    return np.asarray(sum(
         weight * np.linalg.norm(facet_normals(points, facets, at), axis=1)
-        for at, weight in zip(*CELLS[facets.kind].gauss, strict=True)
-    )
+        for at, weight in gauss
+    ))  # fmt: skip
 
 
 def nodal_weights(points: Array, surface: tuple[Facets, ...]) -> Array:

@@ -7,6 +7,7 @@ import os
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,7 @@ CELL_TYPES = {
 def write_meshes(
     path: Path,
     meshes: list[Mesh],
-    point_data: dict[str, NDArray],
+    point_data: dict[str, Any],
     cell_data: dict[str, NDArray],
     field_data: Mapping[str, float] | None = None,
     remark: str = "",
@@ -39,7 +40,7 @@ def write_meshes(
     import meshio
 
     starts = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
-    cells = [
+    cells: list[Any] = [
         (CELL_TYPES[block.kind], block.nodes + start)
         for mesh, start in zip(meshes, starts, strict=False)
         for block in mesh.cells
@@ -47,7 +48,7 @@ def write_meshes(
     ends = np.cumsum([len(nodes) for _, nodes in cells])[:-1]
     points = np.zeros((starts[-1], 3))
     points[:, : meshes[0].dim] = np.concatenate([mesh.points for mesh in meshes])
-    split = {name: np.split(values, ends) for name, values in cell_data.items()}
+    split: Any = {name: np.split(values, ends) for name, values in cell_data.items()}
     whole = meshio.Mesh(points, cells, point_data=point_data, cell_data=split)
     if path.suffix != ".vtu":
         whole.write(path)

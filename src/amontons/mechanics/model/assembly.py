@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...core.errors import InvalidInput
+from ...core.errors import InvalidInput, within
 from ...linear.distributed import DistributedMatrix
 from ...linear.grid_matrix import GridMatrix
 from ...linear.levels import Levels, continued, free_levels
+from ...problem.structure import Structure
 from ..elements.elasticity import LinearElastic, stiffness
 from ..elements.rigid import Rigid
 from ..meshes.box import box
@@ -95,7 +98,9 @@ class Discretisation:
     @property
     def stored_stiffness(self) -> sparse.csr_array:
         """K with its entries, also where it is an operator."""
-        return sparse.csr_array(self.K.tocsc()) if isinstance(self.K, GridMatrix) else self.K
+        if isinstance(self.K, GridMatrix):
+            return sparse.csr_array(self.K.tocsc())
+        return self.K  # type: ignore[return-value]  # not asked for by several processes
 
     @property
     def near_nullspace(self) -> Array | None:
@@ -103,6 +108,18 @@ class Discretisation:
         if self.rigid is not None:
             return None
         return near_nullspace(self.parts, self.free, self.dofs)
+
+    @cached_property
+    def structure(self) -> Structure | None:
+        """Nodes and bodies of the unknowns, slaves of the contacts; None with rigid bodies."""
+        if self.rigid is not None:
+            return None
+        d = self.carried.shape[1]
+        piece = np.empty(self.dofs // d, dtype=np.int32)
+        for k, part in enumerate(self.parts):
+            piece[part.dofs[::d] // d] = k
+        slave = [self.offsets[p.body] // d + p.rows.nodes for p in self.placed]
+        return Structure(self.free, d, piece, np.concatenate(slave))
 
     # ------------------------------------------------------------------ unknowns
     @property
@@ -127,7 +144,7 @@ class Discretisation:
             return self.rigid.matrix(whole)
         return sparse.csc_array(whole[self.free][:, self.free])
 
-    def with_driven(self, force: Array, M: sparse.csc_array, prescribed: Array) -> Array:
+    def with_driven(self, force: Array, M: Any, prescribed: Array) -> Array:
         """Forces (n,) with those that give driven unknowns of M their prescribed values."""
         if self.rigid is None:
             return force
@@ -156,13 +173,13 @@ class Discretisation:
 
 
 def discretise(
-    bodies: tuple[Body, ...],
-    supports: tuple[Fix, ...],
-    loads: tuple[Load, ...],
-    contacts: tuple[Contact, ...],
-    K: DistributedMatrix | None = None,
+    bodies: Sequence[Body],
+    supports: Sequence[Fix],
+    loads: Sequence[Load],
+    contacts: Sequence[Contact],
+    given_K: DistributedMatrix | None = None,
 ) -> Discretisation:
-    """Assemble everything that depends on neither friction nor load factor; K if not given."""
+    """Assemble everything that depends on neither friction nor load factor; K unless given."""
     offsets = np.cumsum([0, *(body.mesh.points.size for body in bodies)])
     given = Prescribed.of(bodies, supports, offsets)
     is_fixed = given.is_fixed
@@ -170,29 +187,32 @@ def discretise(
     fixed = np.flatnonzero(is_fixed)
     free = np.flatnonzero(~is_fixed) if rigid is None else rigid.free
     if not (free.size if rigid is None else (~rigid.driven).any()):
-        raise InvalidInput("supports: every degree of freedom is fixed, nothing left to solve")
-    if K is None:
-        K = _stiffness(bodies)
+        text = "every degree of freedom is fixed, nothing left to solve"
+        raise InvalidInput(text, ("supports",))
+    K = _stiffness(bodies) if given_K is None else given_K
     prescribed = np.where(is_fixed, given.values, 0.0)
     if rigid is not None:
         prescribed = rigid.completed(prescribed)
-    placed = tuple(place(bodies, contact, given, offsets) for contact in contacts)
+    placed = _placed(bodies, contacts, given, offsets)
     _check_once(bodies, contacts, placed)
-    whole_H = sparse.hstack([p.H for p in placed], format="csc")
+    whole_H = sparse.csc_array(sparse.hstack([p.H for p in placed], format="csc"))
     if not whole_H.shape[1]:
-        for held in (p.held for p in placed if p.held is not None):
-            check_outside(held, held.left(prescribed), bodies, supports, offsets, "")
-        raise InvalidInput(
-            "contacts: every slave node is fixed by a support, no contact is left"
-        )
+        for k, held in enumerate(p.held for p in placed):
+            with within("contacts", k):
+                if held is not None:
+                    check_outside(held, held.left(prescribed), bodies, supports, offsets, "")
+        text = "every slave node is fixed by a support, no contact is left"
+        raise InvalidInput(text, ("contacts",))
     load = external_load(bodies, loads, offsets)
     d = bodies[0].mesh.dim
     if rigid is not None:
+        assert not isinstance(K, GridMatrix | DistributedMatrix)  # of bodies that all deform
         M, H = rigid.matrix(K), sparse.csc_array(rigid.spread.T @ whole_H)
         force = rigid.spread.T @ (load - K @ prescribed)
         load = np.where(rigid.driven, M.diagonal() * rigid.driven_values(prescribed), force)
     else:
-        M = sparse.csc_array(K[free][:, free]) if sparse.issparse(K) else K.on(free)
+        operator = isinstance(K, GridMatrix | DistributedMatrix)
+        M = K.on(free) if operator else sparse.csc_array(K[free][:, free])
         H = sparse.csc_array(whole_H.tocsr()[free])
         load = (load - K @ prescribed)[free]
     return Discretisation(
@@ -216,6 +236,17 @@ def discretise(
     )  # fmt: skip
 
 
+def _placed(
+    bodies: Sequence[Body], contacts: Sequence[Contact], given: Prescribed, offsets: Index
+) -> tuple[Placed, ...]:
+    """All contacts; errors tell which one could not be placed."""
+    found = []
+    for k, contact in enumerate(contacts):
+        with within("contacts", k):
+            found.append(place(bodies, contact, given, offsets))
+    return tuple(found)
+
+
 def _local(
     H: sparse.csc_array, sizes: sparse.csc_array, displacement: Array, d: int
 ) -> Array:  # fmt: skip
@@ -228,13 +259,15 @@ def _local(
     return out.reshape(-1, d)
 
 
-def _stiffness(bodies: tuple[Body, ...]) -> sparse.csr_array | GridMatrix:
+def _stiffness(bodies: Sequence[Body]) -> sparse.csr_array | GridMatrix:
     """Of all bodies: stored, or an operator for one large box."""
     grid = _grid(bodies)
     if grid is not None:
         return grid
     parts = [_stiffness_of(body) for body in bodies]
-    return parts[0] if len(parts) == 1 else sparse.block_diag(parts, format="csr")
+    if len(parts) == 1:
+        return parts[0]
+    return sparse.csr_array(sparse.block_diag(parts, format="csr"))
 
 
 def _stiffness_of(body: Body) -> sparse.csr_array:
@@ -244,29 +277,31 @@ def _stiffness_of(body: Body) -> sparse.csr_array:
     return stiffness(body.mesh, body.material).tocsr()
 
 
-def _grid(bodies: tuple[Body, ...]) -> GridMatrix | None:
+def _grid(bodies: Sequence[Body]) -> GridMatrix | None:
     """The stiffness as an operator for one large box of equal hexahedra, of one material."""
     body, mesh = bodies[0], bodies[0].mesh
-    uniform = len(mesh.cells) == 1 and isinstance(body.material, LinearElastic)
-    if len(bodies) > 1 or not uniform or mesh.grid is None or mesh.cells[0].kind != "hex":
+    if not isinstance(body.material, LinearElastic) or len(mesh.cells) != 1:
+        return None
+    if len(bodies) > 1 or mesh.grid is None or mesh.cells[0].kind != "hex":
         return None
     if mesh.points.size < GRID_FROM or not mesh.levels:
         return None
     if mesh.levels[0].shape[1] != np.prod([n // 2 + 1 for n in mesh.grid]):
         return None  # stretched cells, coarsened in some directions only
     low, high = mesh.bounding_box()
-    cell = box((high - low) / mesh.grid, cells=1)
+    cell = box(tuple((high - low) / mesh.grid), cells=1)
     dofs = (cell.cells[0].nodes[0][:, None] * 3 + np.arange(3)).ravel()
     element = stiffness(cell, body.material).toarray()[np.ix_(dofs, dofs)]
-    return GridMatrix(mesh.grid, element, np.arange(mesh.points.size), mesh.levels)
+    return GridMatrix(mesh.grid, element, np.arange(mesh.points.size), mesh.levels)  # type: ignore[arg-type]
 
 
 def _check_once(
-    bodies: tuple[Body, ...], contacts: tuple[Contact, ...], placed: tuple[Placed, ...]
+    bodies: Sequence[Body], contacts: Sequence[Contact], placed: tuple[Placed, ...]
 ) -> None:
     """A pair given twice, also with exchanged sides, would share its load at random."""
     seen: dict[tuple, list[Placed]] = {}
-    for contact, found in zip(contacts, placed, strict=True):
+    for k, (contact, found) in enumerate(zip(contacts, placed, strict=True)):
+        at, what = ("contacts", k), f"contact on {contact.slave!r}"
         slave = locate(bodies, contact.slave)
         if contact.master is None:
             pair, again = (slave, repr(contact.obstacle)), "with the same obstacle"
@@ -275,15 +310,15 @@ def _check_once(
             pair, again = (slave, master), f"with {contact.master!r}"
             if (master, slave) in seen and contact.where is None:
                 raise InvalidInput(
-                    f"contact on {contact.slave!r}: the contact {again} is there already, with "
-                    "slave and master exchanged; expected every pair once"
-                )
+                    f"the contact {again} is there already, with slave and master exchanged; "
+                    "expected every pair once", at, what,
+                )  # fmt: skip
         for other in seen.setdefault(pair, []):
             if both := len(_rows_of(other.rows.points) & _rows_of(found.rows.points)):
                 raise InvalidInput(
-                    f"contact on {contact.slave!r}: {both} of its points have a contact "
-                    f"{again} already; expected every pair once"
-                )
+                    f"{both} of its points have a contact {again} already; expected every "
+                    "pair once", at, what,
+                )  # fmt: skip
         seen[pair].append(found)
 
 

@@ -7,18 +7,22 @@ For a rigid motion a of the bodies that supports leave loose, balance wants
 while r_i . u_i >= 0 for all r_i in the cone of Coulomb where u_iN >= mu_i |u_iT| (Farkas).  A
 motion that opens all contacts so far, or slides by less, and on which the load works is a proof
 that there is no solution.  It comes from a linear program, |u_iT| enclosed by a polygon from
-outside: what it finds is a proof, what it does not find may still be none.  Under Tresca's law
-u_iN >= 0, and the work of all bounds g_i |u_iT| is subtracted.
+outside: what it finds is a proof, what it does not find may still be none.  Where friction
+has a largest value, under Tresca's law or a cap, u_iN >= 0, and the work of all bounds
+g_i |u_iT| is subtracted; that of cohesion is in the load (`FrictionProblem.plain`).
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.optimize import linprog
 
-from ...problem.law.cones import Coulomb, Law
+from ...problem.law import Law
+from ...problem.law.law import BOUND, COULOMB, MU
 from .assembly import Discretisation
 from .rigid import NAMES, Piece, rigid_motions
 
@@ -30,29 +34,44 @@ NAMED = 5  # bodies at most
 SMALL = 1e-6  # parts of a motion, relative to the largest, that are rounding
 
 
+@dataclass(frozen=True)
+class Imbalance:
+    """The loose bodies that contact may not hold, in words, and whether that is proved."""
+
+    reason: str
+    is_proved: bool = False
+
+    def __str__(self) -> str:
+        return self.reason
+
+
 def imbalance(
     parts: Discretisation, loose: list[tuple[Piece, Array]], law: Law, load: Array
-) -> str:
-    """Names the loose bodies that contact can not hold under the load (n,); "" without any.
+) -> Imbalance | None:
+    """What contact has to hold under the load (n,), and whether it can; None for no body.
 
     loose: pieces with the rigid modes that supports leave free, as from `loose_modes`.
     """
     if not loose:
-        return ""
+        return None
     motion, of = rigid_motions(loose, parts.dofs)
     moved = parts.gathered(motion)
     size = float(np.abs(load) @ np.abs(moved).max(axis=1))
     found = None
-    if size > 0 and len(law.coefficient) <= MOST:
+    if size > 0 and len(law) <= MOST:
         found = _escape(parts.whole_H.T @ motion, load @ moved / size, law, size)
     if found is None:
-        return f"contact and friction alone hold {in_words(loose)}: perhaps they do not suffice"
+        return Imbalance(
+            f"contact and friction alone hold {in_words(loose)}: perhaps they do not suffice"
+        )
     texts = [
         f"body {piece.name!r} gives way by {_motion_in_words(basis @ found[of == k])}"
         for k, (piece, basis) in enumerate(loose)
         if np.abs(found[of == k]).max() > SMALL * np.abs(found).max()
     ]
-    return "there is no solution, no contact forces balance the loads: " + "; ".join(texts)
+    return Imbalance(
+        "there is no solution, no contact forces balance the loads: " + "; ".join(texts), True
+    )
 
 
 def in_words(loose: list[tuple[Piece, Array]]) -> str:
@@ -74,16 +93,18 @@ def _escape(local: Array, power: Array, law: Law, size: float) -> Array | None:
 
     local (nc d, k): displacements of the contacts; power (k,): work of the load over size.
     """
-    nc, k = len(law.coefficient), len(power)
+    nc, k = len(law), len(power)
     d = len(local) // nc
     angle = 2 * np.pi * np.arange(CORNERS) / CORNERS
     sides = np.array([[1.0], [-1.0]])
     if d == 3:
         sides = np.stack([np.cos(angle), np.sin(angle)], axis=1) / np.cos(np.pi / CORNERS)
     u = local.reshape(nc, d, k)
-    coulomb = isinstance(law, Coulomb)
-    slack = sparse.diags_array(law.coefficient if coulomb else np.zeros(nc))
-    lost = np.zeros(nc) if coulomb else law.coefficient / size
+    if law.stretch is not None:  # r.u >= 0 for all r is u_N >= mu |u_T'|
+        u = np.concatenate([u[:, :1], np.einsum("cij,cjk->cik", law.stretch, u[:, 1:])], axis=1)
+    coulomb, parameters = law.kind == COULOMB, law.parameters
+    slack = sparse.diags_array(np.where(coulomb, parameters[:, MU], 0.0))
+    lost = np.where(coulomb, 0.0, parameters[:, BOUND]) / size
     # unknowns: motion = a - b with a, b >= 0 as its size is minimised, and t >= |u_T|
     rows = [sparse.hstack([_both(-u[:, 0]), slack])]  # mu t <= u_N
     for side in sides:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...core.clock import NEVER, Deadline
 from ...core.errors import SingularOperator
 from ...problem.friction import FrictionProblem
-from ...problem.solution import FrictionSolution, Outcome
+from ...problem.solution import FrictionSolution, Obstruction, Outcome
 
 if TYPE_CHECKING:
     from .model import Model
@@ -31,8 +31,12 @@ def with_diagnosis(
     record = found.convergence
     if record.outcome in (Outcome.CONVERGED, Outcome.STOPPED):
         return found
-    detail = "; ".join(text for text in (record.detail, model.imbalance(load)) if text)
-    return replace(found, convergence=replace(record, detail=detail))
+    reason = model.imbalance(load)
+    if reason is None:
+        return found
+    detail = "; ".join(text for text in (record.detail, reason.reason) if text)
+    known = Obstruction.NO_SOLUTION if reason.is_proved else record.obstruction
+    return replace(found, convergence=replace(record, detail=detail, obstruction=known))
 
 
 def check_has_W(
@@ -53,6 +57,6 @@ def check_has_W(
     if not names:
         return
     reason = problem.imbalance()
-    if "there is no solution" in reason:  # at the whole load
+    if reason is not None and reason.is_proved:  # at the whole load
         raise SingularOperator(f"{verb}: {reason}")
     raise SingularOperator(f"{verb}: contact alone holds {names}, {NO_W}{STEPS}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,7 +48,7 @@ class ContactFields:
 
 
 def recover_fields(
-    bodies: tuple[Body, ...],
+    bodies: Sequence[Body],
     surfaces: tuple[tuple[int, str], ...],
     parts: Discretisation,
     solution: FrictionSolution,
@@ -81,7 +82,7 @@ def recover_fields(
 
 
 def _by_body(
-    bodies: tuple[Body, ...], parts: Discretisation, v: Array, factor: float
+    bodies: Sequence[Body], parts: Discretisation, v: Array, factor: float
 ) -> tuple[Array, ...]:
     whole = parts.spread(v, factor * parts.prescribed)
     pairs = zip(parts.offsets[:-1], parts.offsets[1:], strict=True)

@@ -71,7 +71,7 @@ class HeldNodes:
 
 
 def check_outside(
-    held: HeldNodes, gap: Array, bodies: tuple[Body, ...], supports: Sequence[Fix],
+    held: HeldNodes, gap: Array, bodies: Sequence[Body], supports: Sequence[Fix],
     offsets: Index, when: str,
 ) -> None:  # fmt: skip
     """Raise InvalidInput where supports alone push a node of gap (k,) into the other side.
@@ -89,7 +89,7 @@ def check_outside(
     )
 
 
-def _names(dof: int, bodies: tuple[Body, ...], supports: Sequence[Fix], offsets: Index) -> str:
+def _names(dof: int, bodies: Sequence[Body], supports: Sequence[Fix], offsets: Index) -> str:
     """The supports on whose surface a node lies, by its first dof."""
     body = int(np.searchsorted(offsets, dof, side="right")) - 1
     mesh = bodies[body].mesh

@@ -30,13 +30,14 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...core.errors import InvertedCells
-from ...problem.friction import Form, FrictionProblem
+from ...problem.friction import FrictionProblem
 from ...problem.judge import measures as judge
 from ...problem.judge.measures import Measure, Weakest
-from ...problem.law.cones import Law
-from ...problem.solution import FrictionSolution
+from ...problem.law import Law
+from ...problem.protocol import Problem
+from ...solvers.newton.nonlinear import NonlinearProblem
 from ..contact.current import STICK, ContactPoint, Pieces
-from ..contact.nodal import contact_columns
+from ..contact.current_pairs import Meetings
 from ..elements.linear_body import LinearBody
 from .nodal_forces import NodalForces, nodal_forces
 from .nonlinear_parts import NonlinearParts, nonlinear_parts
@@ -49,7 +50,7 @@ TOUCHING = 1e-9  # gaps up to this part of the size count as closed where nothin
 
 
 @dataclass(frozen=True, eq=False)
-class LargeDeformation:
+class LargeDeformation(NonlinearProblem):
     """One static problem, or one step, of large deformations.
 
     load, prescribed (dofs,): nodal forces, also as an array of dead ones, and values on the
@@ -71,21 +72,20 @@ class LargeDeformation:
         object.__setattr__(self, "load", NodalForces.of(self.load))
 
     # ---------------------------------------------------------------- sizes
-    form = Form.GLOBAL
     measure = Measure.RESIDUAL
 
     @property
-    def law(self) -> Law:
+    def law(self) -> Law:  # type: ignore[override]  # read only
         """Friction law of all contacts."""
         return self.parts.contact.law
 
     @property
-    def rho(self) -> Array:
+    def rho(self) -> Array:  # type: ignore[override]  # read only
         """Augmentation parameter, (nc,), force per length."""
         return self.parts.contact.rho
 
     @property
-    def unknowns(self) -> int:
+    def unknowns(self) -> int:  # type: ignore[override]  # read only
         """Free dofs n."""
         return len(self.parts.free)
 
@@ -95,7 +95,7 @@ class LargeDeformation:
         return len(self.parts.at)
 
     @property
-    def dimension(self) -> int:
+    def dimension(self) -> int:  # type: ignore[override]  # read only
         """2 or 3."""
         return self.parts.dimension
 
@@ -106,15 +106,13 @@ class LargeDeformation:
         out[self.parts.free] = v
         return out.reshape(self.parts.X.shape)
 
-    def _moved(self, u: Array) -> tuple[Array, Array]:
-        """Positions of the contacts and their motion since the last step, (nc, d)."""
-        at = u.ravel()[self.parts.at]
-        return self.parts.points + at, at - self.before + self.drift
+    def _meeting(self, u: Array) -> tuple[Array, Meetings]:
+        """Motions of the contacts since the last step, (nc, d), and where they meet now."""
+        return u.ravel()[self.parts.at] - self.before + self.drift, self.parts.meet(u)
 
     def _point(self, u: Array, rest: Array) -> ContactPoint:
         """The law at displacements u (nodes, d), where the bodies need `rest` (dofs,)."""
-        x, motion = self._moved(u)
-        return self.parts.contact.at(rest[self.parts.at], motion, x)
+        return self.parts.contact.at(rest[self.parts.at], *self._meeting(u))
 
     def _needed(self, u: Array) -> Array:
         """f_int - f (dofs,) at displacements u (nodes, d)."""
@@ -147,7 +145,9 @@ class LargeDeformation:
         """dF/dv, (n, n), of the active piece of the law or of the given one, (nc,)."""
         return self.linearisation(v, pieces).matrix
 
-    def linearisation(self, v: Array, pieces: Pieces | None = None) -> Linearisation:
+    def linearisation(  # type: ignore[override]  # a cached matrix serves as well
+        self, v: Array, pieces: Pieces | None = None
+    ) -> Linearisation:
         """F and its derivatives at a state."""
         u = self.displacement(v)
         rest, blocks = self._needed_slopes(u)
@@ -159,14 +159,6 @@ class LargeDeformation:
         return self.contact_point(v).pieces
 
     # ---------------------------------------------------------------- what the driver asks
-    @property
-    def guess(self) -> None:
-        """No better first state is known than `known_state`."""
-
-    def assembled(self) -> LargeDeformation:
-        """Itself."""
-        return self
-
     def reactions(self, v: Array) -> Array:
         """Contact forces r (nc, d) in the frames at the state v."""
         return self._local(v)[0]
@@ -175,13 +167,17 @@ class LargeDeformation:
         """r, u, frames of `CurrentContact.local`, and f_int - f (dofs,)."""
         u = self.displacement(v)
         rest = self._needed(u)
-        x, motion = self._moved(u)
-        return *self.parts.contact.local(rest[self.parts.at], motion, x), rest
+        return *self.parts.contact.local(rest[self.parts.at], *self._meeting(u)), rest
 
     def local_velocity(self, v: Array) -> Array:
         """u = [gap, slip since the last step], (nc, d), in the frames at the state v."""
-        x, motion = self._moved(self.displacement(v))
-        return self.parts.contact.local(np.zeros_like(x), motion, x)[1]
+        motion, meeting = self._meeting(self.displacement(v))
+        return self.parts.contact.local(np.zeros_like(motion), motion, meeting)[1]
+
+    def motion(self, r: Array, v: Array | None = None) -> tuple[Array, Array]:
+        """([gap, slip], v) at the state v, without one at 0."""
+        v = np.zeros(self.unknowns) if v is None else v
+        return self.local_velocity(v), v
 
     def error(self, r: Array, v: Array | None = None) -> float:
         """The residual measure of `judge` at reactions r and state v; infinite if inverted.
@@ -221,14 +217,6 @@ class LargeDeformation:
         own = np.linalg.norm(u, axis=1) + np.linalg.norm(r / self.rho[:, None], axis=1)
         return judge.weakest_of(r, u, self.law, self.rho, own + self.parts.resolved[1])
 
-    def certain_error(self, r: Array, v: Array | None = None) -> float:
-        """The error, or what rounding may hide in it where that is more."""
-        return max(self.error(r, v), self.rounding(r))
-
-    def rounding(self, r: Array) -> float:
-        """What rounding alone may hide in `error`: its scales take care of that."""
-        return 0.0
-
     # ---------------------------------------------------------------- load steps
     @property
     def known_state(self) -> Array:
@@ -251,7 +239,9 @@ class LargeDeformation:
             prescribed=prescribed + share * (self.prescribed - prescribed),
         )
 
-    def predicted(self, share: float, goal: float, v: Array) -> tuple[Linearisation, Array]:
+    def predicted(  # type: ignore[override]  # as above
+        self, share: float, goal: float, v: Array
+    ) -> tuple[Linearisation, Array]:
         """The linearisation at a share, and the first-order change of F, (n,), to another."""
         now, then = self.at_share(share), self.at_share(goal)
         here = now.linearisation(v)
@@ -265,7 +255,7 @@ class LargeDeformation:
         displaced = now.displacement(v)
         _, blocks = now._needed_slopes(displaced)
         force = (then.load - now.load).at(displaced) - self.parts.matrix(blocks) @ moved
-        normals = self.parts.contact.normals(now._moved(displaced)[0])
+        normals = self.parts.meet(displaced).normals
         w = np.array(tangent.w)
         w[:, 0] += (normals * moved[self.parts.at]).sum(axis=1)
         return replace(tangent, f=tangent.f + force[self.parts.free], w=w)
@@ -273,21 +263,21 @@ class LargeDeformation:
     def closed_pieces(self, v: Array) -> list[Pieces]:
         """The active pieces with touching contacts stuck, then with all of them stuck."""
         point = self.contact_point(v)
-        gap = self.parts.contact.gap(point.x)
         size = np.ptp(self.parts.X, axis=0).max()
+        gap = point.meeting.gap
         return [
             np.where((point.pieces % 4 == 0) & (gap <= limit), STICK, point.pieces)
             for limit in (TOUCHING * size, np.inf)
         ]
 
     # ---------------------------------------------------------------- results
-    def solved(self, found: FrictionSolution) -> FrictionSolution:
-        """The same solution, of the tangent problem at its state unless cells are inverted."""
-        assert found.v is not None
+    def recover(self, r: Array, v: Array | None = None) -> tuple[Problem, Array, Array]:
+        """A solution is one of the tangent problem at its state unless cells are inverted."""
+        u, v = self.motion(r, v)
         try:
-            return replace(found, problem=self.linearised(found.v))
+            return self.linearised(v), u, v
         except InvertedCells:
-            return found
+            return self, u, v
 
     def linearised(self, v: Array) -> FrictionProblem:
         """The tangent problem at v: same reactions, gaps and slips there, frames of there."""
@@ -295,10 +285,9 @@ class LargeDeformation:
         moved = self.displacement(v)
         _, blocks = self._needed_slopes(moved)
         r, u, axes, rest = self._local(v)
-        bend = parts.contact.normal_slopes(self._moved(moved)[0])
-        blocks[parts.diagonal] -= _turned(axes, r, bend)
-        nodes = parts.at[:, 0] // self.dimension
-        H = sparse.csc_array(contact_columns(nodes, axes, parts.X.size).tocsr()[parts.free])
+        meeting = parts.meet(moved)
+        blocks[parts.diagonal] -= _turned(axes, r, meeting.normal_slopes)
+        H = sparse.csc_array(meeting.columns(axes, len(parts.X)).tocsr()[parts.free])
         M = parts.on_free(blocks)
         load, length = self._sizes(v, r, u, rest)
         w = u - (H.T @ v).reshape(u.shape)

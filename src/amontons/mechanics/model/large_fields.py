@@ -41,8 +41,7 @@ def large_fields(
     """Fields of displacements (dofs,); r and u = [gap, slip] (nc, d) in the frames there."""
     parts = nonlinear_parts(model)
     rows = [placed.rows for placed in model.discretisation.placed]
-    at = parts.points + displacement[parts.at]
-    axes = frames(parts.contact.normals(at))
+    axes = frames(parts.meet(displacement.reshape(parts.X.shape)).normals)
     weights = np.concatenate([row.weights for row in rows])
     force = np.einsum("pkc,pk->pc", axes, r)
     traction = r / weights[:, None]

@@ -5,34 +5,38 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...core.errors import InvalidInput, UnsupportedForm
+from ...core.errors import InvalidInput, UnsupportedForm, UnsupportedLaw, within
+from ...core.prepared import Prepared
 from ...linear import Direct
 from ...linear.grid_matrix import GridMatrix
 from ...problem.friction import FrictionProblem
-from ...problem.law.cones import Coulomb, Law, Tresca
-from ...problem.nitsche import NO_MULTIPLIERS, NitscheProblem
+from ...problem.law import Law
+from ...problem.nitsche import NitscheProblem
+from ...problem.protocol import Problem
 from ...problem.solution import FrictionSolution
-from ..contact import ContactRows
 from ..elements.hyperelasticity import is_hyperelastic
 from .assembly import Discretisation, discretise, locate
-from .balance import imbalance, in_words
+from .balance import Imbalance, imbalance, in_words
 from .fields import ContactFields, recover_fields
 from .held import check_outside
 from .large_deformation import LargeDeformation, large_deformation
 from .large_fields import recover_large
+from .laws import law_of, rubs
 from .nitsche import nitsche_matrices, nitsche_problem
 from .nodal_forces import follows
-from .parts import CURRENT, REFERENCE, Body, BodyForce, Contact, Fix, Load, Pressure
+from .parts import FINITE, SMALL, Body, BodyForce, Contact, Fix, Load, Pressure
 from .rigid import Piece, check_held, loose_modes
-from .values import ScalarValue, is_number, scalar_at
+from .values import ScalarValue, is_number
 
 Array = NDArray[np.float64]
+SURFACES = {  # the fields of a model's parts that name one
+    "supports": ("on",), "contacts": ("slave", "master"), "loads": ("on",),
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,37 +54,43 @@ class Model:
     loads: Sequence[Load] = ()
     load_factor: float = 1.0
     name: str = ""
-    _shared: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
+    _shared: Prepared = field(default_factory=Prepared, init=False, repr=False)
 
     def __post_init__(self) -> None:
         for name, kind in (("bodies", Body), ("supports", Fix), ("contacts", Contact),
                            ("loads", Load)):  # fmt: skip
             object.__setattr__(self, name, _tuple_of(name, getattr(self, name), kind))
         if not self.bodies:
-            raise InvalidInput("bodies: expected at least one, got none")
+            raise InvalidInput("expected at least one, got none", ("bodies",))
         if not self.contacts:
-            raise InvalidInput("contacts: expected at least one, got none")
+            raise InvalidInput("expected at least one, got none", ("contacts",))
         dims = {body.mesh.dim for body in self.bodies}
         if len(dims) > 1:
-            raise InvalidInput("bodies: expected all in 2D or all in 3D, got both")
-        laws = {contact.friction for contact in self.contacts}
-        if len(laws) > 1:
-            raise InvalidInput("contacts: expected one friction law, got both mu and tresca")
+            raise InvalidInput("expected all in 2D or all in 3D, got both", ("bodies",))
         if len({contact.nitsche is None for contact in self.contacts}) > 1:
             raise InvalidInput(
-                "contacts: expected Nitsche's method in all of them or in none, got both"
+                "expected Nitsche's method in all of them or in none, got both", ("contacts",)
             )
         self._check_configurations()
         if not (is_number(self.load_factor) and np.isfinite(self.load_factor)):
             raise InvalidInput(
-                f"load_factor: expected a finite number, got {self.load_factor!r}"
+                f"expected a finite number, got {self.load_factor!r}", ("load_factor",)
             )
         object.__setattr__(self, "bodies", _named(self.bodies))
-        for name in _surfaces(*self.supports, *self.contacts, *self.loads):
-            if not isinstance(name, str):
-                raise InvalidInput(f"surface: expected a name, got {name!r}")
-            k, surface = locate(self.bodies, name)
-            self.bodies[k].mesh.surface(surface)
+        for part, fields in SURFACES.items():
+            for k, item in enumerate(getattr(self, part)):
+                for name in (name for name in fields if hasattr(item, name)):
+                    with within(part, k, name):
+                        self._check_surface(getattr(item, name), optional=name == "master")
+
+    def _check_surface(self, name: object, *, optional: bool) -> None:
+        """Raise InvalidInput for a surface that no body has, or more than one."""
+        if name is None and optional:
+            return
+        if not isinstance(name, str):
+            raise InvalidInput(f"surface: expected a name, got {name!r}")
+        k, surface = locate(self.bodies, name)
+        self.bodies[k].mesh.surface(surface)
 
     @property
     def dimension(self) -> int:
@@ -94,42 +104,72 @@ class Model:
         So it is with hyperelastic laws, whose strains are finite, and where contacts ask for
         it; linear elastic bodies keep their small strains.
         """
-        return self._is_hyperelastic or any(c.configuration == CURRENT for c in self.contacts)
+        return self._is_hyperelastic or any(c.kinematics == FINITE for c in self.contacts)
 
     @property
     def _is_hyperelastic(self) -> bool:
         return any(is_hyperelastic(body.material) for body in self.bodies)
 
+    @property
+    def kind(self) -> type[Problem]:
+        """The class of the `discrete_problem`."""
+        if self.is_large:
+            return LargeDeformation
+        return FrictionProblem if self.contacts[0].nitsche is None else NitscheProblem
+
     def _check_configurations(self) -> None:
-        """Contacts of one configuration, one that the bodies can have, and loads that fit."""
-        for contact in self.contacts if self.is_large else ():
-            if contact.configuration == REFERENCE and self._is_hyperelastic:
+        """Contacts of one kinematics, one that the bodies can have, and loads that fit."""
+        for k, contact in enumerate(self.contacts):
+            self._check_orthotropy(k, contact)
+        for k, contact in enumerate(self.contacts if self.is_large else ()):
+            at = ("contacts", k, "kinematics")
+            if contact.cohesion is not None:
+                raise UnsupportedLaw(
+                    "cohesion needs small strains and contact in the reference configuration",
+                    ("contacts", k, "cohesion"), f"contact on {contact.slave!r}",
+                )  # fmt: skip
+            if contact.kinematics == SMALL and self._is_hyperelastic:
                 raise InvalidInput(
-                    f"contact on {contact.slave!r}: hyperelastic laws have contact in the "
-                    "current configuration; leave configuration out"
-                )
-            if contact.configuration != CURRENT and not self._is_hyperelastic:
+                    "hyperelastic laws have contact in the current configuration, "
+                    "kinematics='finite', as by default; got 'small'",
+                    at, f"contact on {contact.slave!r}",
+                )  # fmt: skip
+            if contact.kinematics != FINITE and not self._is_hyperelastic:
                 raise InvalidInput(
-                    "contacts: expected one configuration for all of them, got both "
-                    "'reference' and 'current'"
-                )
-        for load in self.loads:
+                    "expected one kinematics for all of them, got both 'small' and 'finite'",
+                    at, "contacts",
+                )  # fmt: skip
+        for k, load in enumerate(self.loads):
             if follows(load) and not (self.is_large or isinstance(load, Pressure)):
                 is_body = isinstance(load, BodyForce)
                 what = "body force" if is_body else f"traction on {load.on!r}"
                 raise InvalidInput(
-                    f"{what}: configuration 'current' needs large deformations: hyperelastic "
-                    "laws, or contacts with configuration='current'"
-                )
+                    "configuration 'current' needs large deformations: hyperelastic laws, or "
+                    "contacts with kinematics='finite'", ("loads", k, "configuration"), what,
+                )  # fmt: skip
+
+    def _check_orthotropy(self, k: int, contact: Contact) -> None:
+        """What orthotropic friction needs."""
+        at, where = ("contacts", k, "mu_across"), f"contact on {contact.slave!r}"
+        if contact.mu_across is None:
+            return
+        if self.dimension == 2:
+            raise InvalidInput(
+                "in 2D there is one direction to slide along; expected one coefficient",
+                at, where,
+            )  # fmt: skip
+        if self.is_large or contact.nitsche is not None:
+            raise UnsupportedLaw(
+                "orthotropic friction needs contact forces, method 'nodal' or 'mortar', and "
+                "small strains with contact in the reference configuration", at, where,
+            )  # fmt: skip
 
     @property
     def discretisation(self) -> Discretisation:
         """Matrices at load factor 1, assembled once and shared by variants of this model."""
-        if "all" not in self._shared:
-            self._shared["all"] = discretise(
-                self.bodies, self.supports, self.loads, self.contacts
-            )
-        return self._shared["all"]
+        return self._shared.once(
+            discretise, (), self.bodies, self.supports, self.loads, self.contacts
+        )
 
     def assemble(self) -> FrictionProblem:
         """The discrete problem in global form, made once.
@@ -140,11 +180,11 @@ class Model:
         UnsupportedForm with Nitsche's method, which has no reactions for unknowns.
         """
         problem = self._problem
-        if isinstance(problem, NitscheProblem):
-            raise UnsupportedForm(NO_MULTIPLIERS)
+        if not isinstance(problem, FrictionProblem):
+            raise UnsupportedForm(problem.unfit)
         return problem
 
-    def discrete_problem(self) -> FrictionProblem | NitscheProblem | LargeDeformation:
+    def discrete_problem(self) -> Problem:
         """What `solve` solves: as `assemble`, with Nitsche's method a NitscheProblem.
 
         With contact in the current configuration a LargeDeformation.
@@ -157,7 +197,7 @@ class Model:
             raise UnsupportedForm(
                 "model: hyperelastic laws and contact in the current configuration have no one "
                 "linear problem; use solve(model), whose solution.problem is the tangent one, "
-                "or LinearElastic and contact in the reference configuration"
+                "or LinearElastic and contact of small kinematics"
             )
         parts = self.discretisation
         w = self.load_factor * parts.carried
@@ -172,10 +212,13 @@ class Model:
         prescribed (dofs,): displacements on the fixed dofs, else zero; when: for the message.
         """
         parts = self.discretisation
-        for held in (placed.held for placed in parts.placed if placed.held is not None):
+        for k, held in enumerate(placed.held for placed in parts.placed):
+            if held is None:
+                continue
             gap = (held.left_where_moved(prescribed, parts.is_fixed) if self.is_large
                    else held.left(prescribed))  # fmt: skip
-            check_outside(held, gap, self.bodies, self.supports, parts.offsets, when)
+            with within("contacts", k):
+                check_outside(held, gap, self.bodies, self.supports, parts.offsets, when)
 
     def increment(
         self, load: Array, prescribed: Array, before: Array
@@ -205,46 +248,31 @@ class Model:
         if self.contacts[0].nitsche is not None:
             if parts.rigid is not None:
                 raise UnsupportedForm(
-                    "model: Nitsche's method takes the place of reactions by stresses, and a "
-                    "rigid body has none; use nodal or mortar contact"
-                )
-            if "nitsche" not in self._shared:
-                self._shared["nitsche"] = nitsche_matrices(parts, not loose)
-            matrices = self._shared["nitsche"]
+                    "Nitsche's method takes the place of reactions by stresses, and a rigid "
+                    "body has none; use nodal or mortar contact", ("contacts", 0, "method"),
+                    "model",
+                )  # fmt: skip
+            matrices = self._shared.once(nitsche_matrices, (), parts, not loose)
             return nitsche_problem(parts, matrices, f, w, prescribed, law, self.name)
         guess, size = parts.continued(prescribed), None
         if loose:
             guess, size = _bonded(parts, f, w)
         base = FrictionProblem.from_global(
-            parts.M, parts.H, f, w, law, near_nullspace=parts.near_nullspace,
+            parts.M,  # type: ignore[arg-type]  # operators as well
+            parts.H, f, w, law, near_nullspace=parts.near_nullspace,
             levels=parts.levels, guess=guess, name=self.name,
-            load_scale=_load_size(parts, f, w), u_scale=size,
+            load_scale=_load_size(parts, f, w), u_scale=size, structure=parts.structure,
         )  # fmt: skip
-        first = self._shared.setdefault("problem", base)
+        first = self._shared.once(_first, (), base)
         return replace(base, M=first.M, H=first.H, _shared=first._shared)  # one factor for all
 
     @cached_property
     def law(self) -> Law:
-        """Friction law of all contacts: Coulomb's coefficients, or bounds in the unit of r."""
-        values = []
-        for contact, placed in zip(self.contacts, self.discretisation.placed, strict=True):
-            name = contact.friction
-            given = scalar_at(
-                getattr(contact, name), placed.all_points, f"{name} on {contact.slave!r}",
-                each="slave node" if contact.nitsche is None else "Gauss point",
-            )  # fmt: skip
-            values.append(given[placed.kept])
-            if name == "tresca" and callable(contact.tresca):
-                values[-1] = _mean_bound(contact, placed.rows)
-        both = np.concatenate(values)
-        if self.contacts[0].friction == "mu":
-            return Coulomb(both)
-        return Tresca(
-            both * np.concatenate([p.rows.weights for p in self.discretisation.placed])
-        )
+        """Laws of all contacts one after another, their stresses as forces in the unit of r."""
+        return law_of(self.contacts, self.discretisation)
 
-    def imbalance(self, load: Array | None = None) -> str:
-        """Which bodies contact alone holds, and whether it can, in words; "" if supports do.
+    def imbalance(self, load: Array | None = None) -> Imbalance | None:
+        """Which bodies contact alone holds, and whether it can; None if supports hold all.
 
         load (n,): forces on the free dofs, by default those of the model.  In large
         deformations, where normals change, nothing is proved.
@@ -252,6 +280,10 @@ class Model:
         parts = self.discretisation
         given = self.load_factor * parts.load if load is None else load
         force = np.zeros_like(parts.load) if self.is_large else given
+        if self.law.cohesion.any():  # as `FrictionProblem.plain` has it
+            tension = np.zeros_like(parts.carried)
+            tension[:, 0] = self.law.cohesion
+            force = force - parts.H @ tension.ravel()
         return imbalance(parts, self._loose(parts), self.law, force)
 
     @property
@@ -270,7 +302,7 @@ class Model:
     def _loose_but_held(self, parts: Discretisation, law: Law) -> bool:
         """True when contact alone holds a body; raises SingularOperator when nothing does."""
         acting = np.ones(parts.carried.shape, dtype=bool)
-        acting[:, 1:] = (law.coefficient > 0)[:, None]
+        acting[:, 1:] = rubs(law)[:, None]
         loose = self._loose(parts)
         check_held(loose, parts.whole_H, parts.dofs, acting.ravel())
         return bool(loose)
@@ -282,7 +314,10 @@ class Model:
     def with_mu(self, mu: ScalarValue) -> Model:
         """The same model with Coulomb friction mu in all its contacts."""
         return self._variant(
-            contacts=tuple(replace(c, mu=mu, tresca=None) for c in self.contacts)
+            contacts=tuple(
+                replace(c, mu=mu, tresca=None, mu_across=None, direction=None, angle=None)
+                for c in self.contacts
+            )
         )
 
     def with_load(self, factor: float) -> Model:
@@ -308,22 +343,9 @@ class Model:
         )
 
 
-def _mean_bound(contact: Contact, rows: ContactRows) -> Array:
-    """A bound given as a function, averaged as the gap is; dual functions may be negative."""
-    given, what = contact.tresca, f"tresca on {contact.slave!r}"
-    assert given is not None
-    return np.maximum(rows.mean(lambda x: scalar_at(given, x, what)), 0.0)
-
-
-def _surfaces(*parts: Fix | Load | Contact) -> list[str]:
-    """Names of all surfaces that parts of a model refer to."""
-    names: list[str] = []
-    for part in parts:
-        if isinstance(part, Contact):
-            names += [part.slave] if part.master is None else [part.slave, part.master]
-        elif not isinstance(part, BodyForce):
-            names.append(part.on)
-    return names
+def _first(problem: FrictionProblem) -> FrictionProblem:
+    """The first problem of a model: others take its matrices, and what is made of them."""
+    return problem
 
 
 def _load_size(parts: Discretisation, f: Array, w: Array) -> float:
@@ -365,7 +387,7 @@ def _tuple_of(name: str, values: object, kind: object) -> tuple:
     return items
 
 
-def _named(bodies: tuple[Body, ...]) -> tuple[Body, ...]:
+def _named(bodies: Sequence[Body]) -> tuple[Body, ...]:
     """Bodies with distinct names: "body", or "body 1", "body 2", … where none is given."""
     several = len(bodies) > 1
     out = tuple(

@@ -9,7 +9,7 @@ from scipy import sparse
 from ...core.errors import UnsupportedForm
 from ...linear.distributed import DistributedMatrix
 from ...linear.grid_matrix import GridMatrix
-from ...problem.law.cones import Law
+from ...problem.law import Law
 from ...problem.nitsche import NitscheMatrices, NitscheProblem
 from .assembly import Discretisation
 

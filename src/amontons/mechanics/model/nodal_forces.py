@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.errors import within
 from ..elements.moved_loads import Pair, pressure_forces, traction_forces, volume_forces
 from .parts import CURRENT, BodyForce, Load, Pressure, Traction
 from .supports import external_load, locate
@@ -136,19 +137,20 @@ def follows(load: Load) -> bool:
     return isinstance(load, Pressure) or load.configuration == CURRENT
 
 
-def nodal_forces(model: Model, loads: Sequence[Load]) -> NodalForces:
-    """Of some loads of a model, each with its value at one time."""
-    dead = tuple(load for load in loads if not follows(load))
+def nodal_forces(model: Model, loads: Sequence[Load | None]) -> NodalForces:
+    """Of the loads of a model, each with its value at one time; None: left out."""
+    moving = [load is not None and follows(load) for load in loads]
+    dead = [None if moves else load for load, moves in zip(loads, moving, strict=True)]
     offsets = model.discretisation.offsets
     terms = [
-        (1.0, follower) for load in loads if follows(load)
-        for follower in _followers(model, load)
+        (1.0, follower) for at, load in enumerate(loads) if load is not None and moving[at]
+        for follower in _followers(model, load, at)
     ]  # fmt: skip
     return NodalForces(external_load(model.bodies, dead, offsets), tuple(terms))
 
 
-def _followers(model: Model, load: Load) -> list[Follower]:
-    """A load on all kinds of facets or cells that it acts on."""
+def _followers(model: Model, load: Load, at: int) -> list[Follower]:
+    """A load, the one of number `at`, on all kinds of facets or cells that it acts on."""
     X = np.concatenate([body.mesh.points for body in model.bodies])
     starts = model.discretisation.offsets[:-1] // model.dimension
     if isinstance(load, BodyForce):
@@ -165,12 +167,15 @@ def _followers(model: Model, load: Load) -> list[Follower]:
         word = "pressure" if isinstance(load, Pressure) else "traction"
         what = f"{word} on {load.on!r}"
         kernel = traction_forces if isinstance(load, Traction) else pressure_forces
-    value_at = component_at if isinstance(load, Pressure) else vector_at
-    return [
-        Follower(kind, nodes, X, kernel, lambda x: value_at(load.value, x, what),
-                 _is_uniform(load.value))
-        for kind, nodes in blocks
-    ]  # fmt: skip
+
+    def density(x: Array) -> Array:
+        with within("loads", at, "value"):
+            if isinstance(load, Pressure):
+                return component_at(load.value, x, what)
+            return vector_at(load.value, x, what)
+
+    uniform = _is_uniform(load.value)
+    return [Follower(kind, nodes, X, kernel, density, uniform) for kind, nodes in blocks]
 
 
 def _is_uniform(value: Any) -> bool:

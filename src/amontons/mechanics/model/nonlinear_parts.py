@@ -17,10 +17,11 @@ from scipy import sparse
 
 from ...core.errors import UnsupportedForm
 from ..contact.current import CurrentContact
+from ..contact.current_pairs import Meetings, ObstaclePair
 from ..elements.hyperelasticity import HyperelasticBody, is_hyperelastic
 from ..elements.linear_body import LinearBody
 from ..elements.rigid import Rigid
-from .parts import CURRENT
+from .parts import FINITE
 
 if TYPE_CHECKING:
     from .model import Model
@@ -71,6 +72,10 @@ class NonlinearParts:
         """2 or 3."""
         return self.X.shape[1]
 
+    def meet(self, u: Array) -> Meetings:
+        """Where the contact pairs meet at displacements u (nodes, d)."""
+        return self.contact.meet(self.X + u)
+
     def forces(self, u: Array) -> Array:
         """Nodal forces of the bodies (dofs,) at displacements u (nodes, d)."""
         parts = zip(self.bodies, np.split(u, self.ends), strict=True)
@@ -108,7 +113,8 @@ class NonlinearParts:
     def on_free(self, blocks: Array) -> sparse.csc_array:
         """Node blocks as the matrix (n, n) of the free dofs."""
         t = self.taken
-        return sparse.csc_array((blocks.ravel()[t.data], t.indices, t.indptr), shape=t.shape)
+        values = blocks.ravel()[np.asarray(t.data, dtype=np.int64)]
+        return sparse.csc_array((values, t.indices, t.indptr), shape=t.shape)
 
 
 def nonlinear_parts(model: Model) -> NonlinearParts:
@@ -116,9 +122,7 @@ def nonlinear_parts(model: Model) -> NonlinearParts:
 
     Raises UnsupportedForm for what finite strains do not have.
     """
-    if "nonlinear" not in model._shared:
-        model._shared["nonlinear"] = _nonlinear_parts(model)
-    parts = model._shared["nonlinear"]
+    parts = model._shared.once(_nonlinear_parts, (), model)
     return replace(parts, contact=replace(parts.contact, law=model.law))
 
 
@@ -133,7 +137,8 @@ def _nonlinear_parts(model: Model) -> NonlinearParts:
     )
     X = np.concatenate([body.mesh.points for body in model.bodies])
     d = X.shape[1]
-    nodes = np.concatenate([p.rows.nodes + linear.offsets[p.body] // d for p in linear.placed])
+    slaves = [p.rows.nodes + linear.offsets[p.body] // d for p in linear.placed]
+    nodes = np.concatenate(slaves)
     _check_single(nodes)
     at = nodes[:, None] * d + np.arange(d)
     is_free = np.zeros(linear.dofs, dtype=bool)
@@ -147,54 +152,64 @@ def _nonlinear_parts(model: Model) -> NonlinearParts:
     taken.sort_indices()
     taken.data -= 1
     contact = CurrentContact(
-        [c.obstacle for c in model.contacts],  # type: ignore[misc]
-        [len(p.rows.nodes) for p in linear.placed],
+        [ObstaclePair(c.obstacle, part)  # type: ignore[arg-type]
+         for c, part in zip(model.contacts, slaves, strict=True)],
         model.law,
         _stiffness_at(linear.stored_stiffness, at),
         is_free[at],
-    )
+    )  # fmt: skip
     return NonlinearParts(bodies, X, linear.offsets[1:-1] // d, linear.free, contact, at,
                           contact_of[rows], np.flatnonzero(rows == columns)[nodes],
                           columns, pointers, sparse.csc_array(taken))  # fmt: skip
 
 
 def _check_supported(model: Model) -> None:
-    asked = all(contact.configuration == CURRENT for contact in model.contacts)
-    for body in model.bodies:
+    asked = all(contact.kinematics == FINITE for contact in model.contacts)
+    for k, body in enumerate(model.bodies):
+        at, what = ("bodies", k, "material"), f"body {body.name!r}"
         if isinstance(body.material, Rigid):
             raise UnsupportedForm(
-                f"body {body.name!r} is rigid, and contact in the current configuration needs "
-                "bodies that deform"
-            )
+                f"{what} is rigid, and contact of finite kinematics needs bodies that deform",
+                at, "",
+            )  # fmt: skip
         if not (asked or is_hyperelastic(body.material)):
             raise UnsupportedForm(
-                f"body {body.name!r}: others have hyperelastic laws and this one is linear "
-                "elastic; give all of them NeoHookean or CiarletGeymonat, or say that it keeps "
-                "small strains by configuration='current' of the contacts"
-            )
-    for contact in model.contacts:
-        if contact.obstacle is None or contact.method != "nodal":
+                "others have hyperelastic laws and this one is linear elastic; give all of "
+                "them NeoHookean or CiarletGeymonat, or say that it keeps small strains by "
+                "kinematics='finite' of the contacts", at, what,
+            )  # fmt: skip
+    for k, contact in enumerate(model.contacts):
+        what = f"contact on {contact.slave!r}"
+        if contact.obstacle is None:
             raise UnsupportedForm(
-                f"contact on {contact.slave!r}: large deformations have nodal contact with an "
-                "obstacle only; use method='nodal' and no master"
-            )
+                "finite kinematics has nodal contact with an obstacle only, not between two "
+                f"bodies that deform; got the master {contact.master!r}; use an obstacle and "
+                "no master, or LinearElastic and kinematics='small'",
+                ("contacts", k, "kinematics"), what,
+            )  # fmt: skip
+        if contact.method != "nodal":
+            raise UnsupportedForm(
+                "finite kinematics has nodal contact with an obstacle only; use method='nodal'",
+                ("contacts", k, "method"), what,
+            )  # fmt: skip
         for name in ("gap_slopes", "normal_slopes"):
             if not hasattr(contact.obstacle, name):
                 raise UnsupportedForm(
-                    f"obstacle: large deformations need its method {name}, as Plane, Sphere "
-                    f"and LevelSet have it; got {contact.obstacle!r}"
-                )
+                    f"large deformations need its method {name}, as Plane, Sphere and "
+                    f"LevelSet have it; got {contact.obstacle!r}",
+                    ("contacts", k, "obstacle"), "obstacle",
+                )  # fmt: skip
 
 
 def _check_single(nodes: Index) -> None:
     if len(np.unique(nodes)) < len(nodes):
         raise UnsupportedForm(
-            "contacts: a node meets two obstacles, large deformations allow one; join both "
-            "into one LevelSet, or leave the node out of one of them (where)"
-        )
+            "a node meets two obstacles, large deformations allow one; join both into one "
+            "LevelSet, or leave the node out of one of them (where)", ("contacts",),
+        )  # fmt: skip
 
 
-def _pattern(bodies: Sequence[HyperelasticBody]) -> tuple[Index, Index]:
+def _pattern(bodies: Sequence[HyperelasticBody | LinearBody]) -> tuple[Index, Index]:
     """Rows and columns (nodes) of all blocks."""
     rows, columns, start = [], [], 0
     for body in bodies:
@@ -214,8 +229,6 @@ def _matrix(blocks: NDArray, columns: Index, pointers: Index) -> sparse.bsr_arra
 def _stiffness_at(K: sparse.csr_array, at: Index) -> Array:
     """Least stiffness of every contact's node with all others held, (nc,), at rest."""
     nc, d = at.shape
-    part = K.tocsr()[at.ravel()][:, at.ravel()].tocsr()
-    blocks = np.array([
-        part[i * d : (i + 1) * d, i * d : (i + 1) * d].toarray() for i in range(nc)
-    ]).reshape(nc, d, d)  # fmt: skip
-    return 1.0 / np.linalg.norm(np.linalg.inv(blocks), 2, axis=(1, 2))
+    part = K.tocsr()[at.ravel()][:, at.ravel()].tobsr((d, d))
+    own = part.indices == np.repeat(np.arange(nc), np.diff(part.indptr))
+    return 1.0 / np.linalg.norm(np.linalg.inv(part.data[own]), 2, axis=(1, 2))

@@ -7,14 +7,15 @@ Surfaces are named as in the mesh; "body.surface" where several bodies know the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import InitVar, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.arrays import number
+from ...core.arrays import number, real
 from ...core.errors import InvalidInput, shown
+from ...problem.law import CappedCoulomb, Cohesive, Coulomb, Law, Orthotropic, Tresca
 from ..contact import Nitsche, Obstacle
 from ..elements.elasticity import LinearElastic, materials_by_region
 from ..elements.hyperelasticity import CiarletGeymonat, NeoHookean
@@ -27,6 +28,7 @@ Array = NDArray[np.float64]
 Material = LinearElastic | NeoHookean | CiarletGeymonat
 METHODS = ("nodal", "mortar", "nitsche")  # "dual-mortar" is another name of the second
 REFERENCE, CURRENT = CONFIGURATIONS = ("reference", "current")
+SMALL, FINITE = KINEMATICS = ("small", "finite")
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,11 +160,18 @@ class Contact:
 
     Either mu, the coefficient of Coulomb friction, or tresca, the largest shear traction (a
     stress): a number, one number per slave node, or a function of points (n, dim) -> (n,).
-    The bound of a contact is a force, the area of the node times the value at the node; with
-    mortar times the mean of the function with the dual function of the node, if that is > 0.
+    With mu also cap, the largest shear traction whatever the pressure; with both cohesion, the
+    largest tensile traction, which acts where the sides touch in the undeformed state and is
+    not lost when they part (`problem.law.cohesive`).  Stresses become forces, the area of the
+    node times the value at the node; with mortar times the mean of the function with the dual
+    function of the node, if that is > 0.  law: the same numbers as a value, CappedCoulomb(mu,
+    cap), Cohesive(Coulomb(mu), cohesion), …, each one number or one per slave node.
+    mu_across: orthotropic friction (`problem.law.orthotropic`), mu along `direction`, a vector
+    in global axes seen in the tangent plane of each contact, mu_across across it; in 3D.
     where: a function of points (n, dim) -> (n,) bool that tells which slave nodes take part.
-    configuration: where gap and normal are taken, "reference" or "current", where the nodes are
-    now (nodal, obstacles only); by default "current" with hyperelastic laws.
+    kinematics: "small", gap and normal are those of the undeformed bodies, or "finite", those
+    where the nodes are now (nodal, obstacles only); by default "finite" with hyperelastic laws.
+    configuration: the same in older words, "reference" or "current".
     """
 
     slave: str
@@ -172,11 +181,19 @@ class Contact:
     master: str | None = None
     method: str | Nitsche | None = None
     where: Callable[[Array], NDArray[np.bool_]] | None = None
-    configuration: str | None = None
+    configuration: InitVar[str | None] = None
+    kinematics: str | None = None
+    cap: ScalarValue | None = None
+    cohesion: ScalarValue | None = None
+    law: InitVar[Law | None] = None
+    mu_across: ScalarValue | None = None
+    direction: Sequence[float] | None = None
+    angle: ScalarValue | None = None  # of the direction, from t1 to t2 of the contact frame
 
-    def __post_init__(self) -> None:
-        if self.configuration is not None:
-            check_configuration(self.configuration)
+    def __post_init__(self, configuration: str | None, law: Law | None) -> None:
+        self._check_kinematics(configuration)
+        if law is not None:
+            self._take(law)
         if (self.mu is None) == (self.tresca is None):
             raise InvalidInput(
                 f"contact on {self.slave!r}: expected either mu or tresca (mu=0: no friction)"
@@ -189,7 +206,11 @@ class Contact:
             raise InvalidInput(f"method: expected a text, got {shown(self.method)}")
         if self.method is None:
             object.__setattr__(self, "method", "nodal" if self.master is None else "mortar")
-        check_scalar(getattr(self, self.friction), f"{self.friction} on {self.slave!r}")
+        if self.cap is not None and self.mu is None:
+            raise InvalidInput(f"contact on {self.slave!r}: cap goes with mu, not with tresca")
+        self._check_directions()
+        for name, value in self.numbers.items():
+            check_scalar(value, f"{name} on {self.slave!r}")
         if self.method == "dual-mortar":
             object.__setattr__(self, "method", "mortar")
         if self.method == "nitsche":
@@ -210,12 +231,79 @@ class Contact:
                 f"obstacle: expected a Plane, Sphere or LevelSet, got {self.obstacle!r}"
             )
 
+    def _check_directions(self) -> None:
+        given = (self.direction is not None) + (self.angle is not None)
+        if given != (self.mu_across is not None):
+            raise InvalidInput(
+                f"contact on {self.slave!r}: mu_across, the coefficient across a direction, "
+                "and that direction go together"
+            )
+        if self.mu_across is None:
+            return
+        if self.mu is None or self.cap is not None:
+            raise InvalidInput(
+                f"contact on {self.slave!r}: mu_across goes with mu, and neither with tresca "
+                "nor with cap"
+            )
+        if self.direction is not None:
+            vector = real("direction", self.direction)
+            if vector.shape != (3,) or not np.isfinite(vector).all() or not vector.any():
+                raise InvalidInput(
+                    "direction: expected three numbers in global axes, not all zero, got "
+                    f"{shown(self.direction)}"
+                )
+
+    def _check_kinematics(self, configuration: str | None) -> None:
+        if self.kinematics not in (None, *KINEMATICS):
+            raise InvalidInput(
+                f"kinematics: expected one of {', '.join(KINEMATICS)}, got "
+                f"{shown(self.kinematics)}"
+            )
+        if configuration is None:
+            return
+        check_configuration(configuration)
+        said = KINEMATICS[CONFIGURATIONS.index(configuration)]
+        if self.kinematics not in (None, said):
+            raise InvalidInput(
+                f"contact on {self.slave!r}: kinematics {self.kinematics!r} and configuration "
+                f"{configuration!r} contradict each other; expected kinematics alone"
+            )
+        object.__setattr__(self, "kinematics", said)
+
     @property
     def nitsche(self) -> Nitsche | None:
         """Options of Nitsche's method, None for the others."""
         return self.method if isinstance(self.method, Nitsche) else None
 
     @property
-    def friction(self) -> str:
-        """Name of the law: "mu" or "tresca"."""
-        return "mu" if self.mu is not None else "tresca"
+    def numbers(self) -> dict[str, ScalarValue]:
+        """What the law is given by: mu or tresca, mu_across, angle, cap, cohesion."""
+        names = ("mu", "mu_across", "angle", "tresca", "cap", "cohesion")
+        named = {name: getattr(self, name) for name in names}
+        return {name: value for name, value in named.items() if value is not None}
+
+    def _take(self, law: Law) -> None:
+        """Set the numbers of a law; raises InvalidInput for one that has no such numbers."""
+        if self.numbers:
+            raise InvalidInput(
+                f"contact on {self.slave!r}: expected law or its numbers, got both"
+            )
+        inner = law.law if isinstance(law, Cohesive) else law
+        if isinstance(inner, Coulomb):
+            values = {"mu": inner.mu}
+        elif isinstance(inner, Tresca):
+            values = {"tresca": inner.limit}
+        elif isinstance(inner, CappedCoulomb):
+            values = {"mu": inner.mu, "cap": inner.cap}
+        elif isinstance(inner, Orthotropic):
+            values = {"mu": inner.mu1, "mu_across": inner.mu2, "angle": inner.angle}
+        else:
+            raise InvalidInput(
+                "law: expected Coulomb, Tresca, CappedCoulomb or Orthotropic, with or without "
+                f"cohesion, got {shown(law)}"
+            )
+        if inner is not law:
+            values["cohesion"] = law.cohesion
+        for name, value in values.items():
+            one = len(value) == 1
+            object.__setattr__(self, name, float(value[0]) if one else value)

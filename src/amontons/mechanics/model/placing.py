@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,7 +83,7 @@ class Placed:
 
 
 def place(
-    bodies: tuple[Body, ...], contact: Contact, given: Prescribed, offsets: Index
+    bodies: Sequence[Body], contact: Contact, given: Prescribed, offsets: Index
 ) -> Placed:
     """Contacts of one pair without those whose normal the supports prescribe."""
     k = locate(bodies, contact.slave)[0]
@@ -103,7 +105,7 @@ def _has_held_normal(H: sparse.csc_array, d: int, is_fixed: Mask) -> Mask:
 
 
 def _held_nodes(
-    bodies: tuple[Body, ...], contact: Contact, is_fixed: Mask, offsets: Index
+    bodies: Sequence[Body], contact: Contact, is_fixed: Mask, offsets: Index
 ) -> HeldNodes | None:
     """Slave nodes that take part and can not move along the normal, whatever the method."""
     k, surface = locate(bodies, contact.slave)
@@ -131,7 +133,7 @@ def _held_nodes(
     return HeldNodes.of(contact, rows.at(held), columns, first, size)
 
 
-def _sides(bodies: tuple[Body, ...], contact: Contact) -> tuple[Mesh, str, Mesh, str] | None:
+def _sides(bodies: Sequence[Body], contact: Contact) -> tuple[Mesh, str, Mesh, str] | None:
     """Mesh and surface of slave and master."""
     if contact.master is None:
         return None
@@ -140,7 +142,7 @@ def _sides(bodies: tuple[Body, ...], contact: Contact) -> tuple[Mesh, str, Mesh,
 
 
 def _met(
-    bodies: tuple[Body, ...], contact: Contact, given: Prescribed, offsets: Index
+    bodies: Sequence[Body], contact: Contact, given: Prescribed, offsets: Index
 ) -> tuple[ContactRows, sparse.csc_array, NDArray[np.bool_], Array, NitscheTerms | None]:
     """Contacts of one pair, H in the dofs of the model, which of all points meet, and terms."""
     if contact.nitsche is not None:
@@ -172,7 +174,7 @@ def _met(
 
 
 def _met_by_nitsche(
-    bodies: tuple[Body, ...], contact: Contact, options: Nitsche, offsets: Index
+    bodies: Sequence[Body], contact: Contact, options: Nitsche, offsets: Index
 ) -> tuple[ContactRows, sparse.csc_array, NDArray[np.bool_], Array, NitscheTerms | None]:
     """The same for the Gauss points of Nitsche's method."""
     k, surface = locate(bodies, contact.slave)
@@ -185,16 +187,17 @@ def _met_by_nitsche(
             f"contact on {contact.slave!r}: Nitsche's method takes the stress from "
             'LinearElastic; use method="nodal"'
         )
+    material = cast("LinearElastic | Mapping[str, LinearElastic]", body.material)  # as checked
     if contact.obstacle is not None:
         rows, terms = nitsche_obstacle(
-            body.mesh, surface, contact.obstacle, body.material, options
+            body.mesh, surface, contact.obstacle, material, options
         )
         H = _shifted(rows.H, first, size)
     else:
         assert contact.master is not None
         j, other = locate(bodies, contact.master)
         rows, terms, on_master = nitsche_pair(
-            body.mesh, surface, bodies[j].mesh, other, body.material, options
+            body.mesh, surface, bodies[j].mesh, other, material, options
         )
         H = _shifted(rows.H, first, size) + _shifted(on_master, int(offsets[j]), size)
     terms = replace(terms, traction=_shifted(terms.traction, first, size))

@@ -3,13 +3,13 @@
     mpirun -n 4 python script.py
 
 Every process makes the model (its arrays, not its matrices) and calls `distributed`.  METIS
-cuts the cells of all bodies into one part per process; each assembles its part by NGSolve,
+cuts the cells of all bodies into one part per process; each assembles its part,
 PETSc solves with the sum.  Contact is found and solved on the first process.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -56,7 +56,7 @@ def distributed(
         twin = replace(model)
         parts = discretise(twin.bodies, twin.supports, twin.loads, twin.contacts, K)
         _check_held(parts)
-        twin._shared["all"] = parts
+        twin._shared.put(discretise, (), parts)
         return work(twin)
 
     return share.lead(lead)
@@ -73,7 +73,7 @@ def _check_held(parts: Discretisation) -> None:
         )
 
 
-def _share(bodies: tuple[Body, ...], comm: Any) -> Share:
+def _share(bodies: Sequence[Body], comm: Any) -> Share:
     """The part of this process, assembled."""
     labels = comm.bcast(partition([body.mesh for body in bodies], comm.size))
     dim = bodies[0].mesh.dim
@@ -86,7 +86,8 @@ def _share(bodies: tuple[Body, ...], comm: Any) -> Share:
         if mine.any():
             mesh, used = extract(body.mesh, mine)
             material = body.material
-            if not hasattr(material, "young"):
+            assert not isinstance(material, Rigid)
+            if isinstance(material, Mapping):
                 material = {region: material[region] for region in mesh.regions}
             parts.append(stiffness(mesh, material).tocsr())
             nodes.append(offset + used)

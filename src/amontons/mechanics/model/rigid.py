@@ -91,7 +91,7 @@ def rigid_modes(points: Array) -> Array:
     if dim == 2:
         columns.append(np.stack([-x[:, 1], x[:, 0]], axis=1))
     else:
-        columns += [np.cross(axis, x) for axis in np.eye(3)]
+        columns += [np.cross(axis, x).astype(float, copy=False) for axis in np.eye(3)]
     return np.stack([column.ravel() for column in columns], axis=1)
 
 
@@ -124,8 +124,9 @@ def check_held(
         if np.abs(modes).max(initial=0.0) > 1e-6:
             texts.append(f"body {piece.name!r} is free to move: {describe(modes)}")
     raise SingularOperator(
-        "; ".join(texts) + "; hold it with a support (Fix), friction or another contact"
-    )
+        "; ".join(texts) + "; hold it with a support (Fix), friction or another contact",
+        ("supports",), "",
+    )  # fmt: skip
 
 
 def rigid_motions(loose: list[tuple[Piece, Array]], dofs: int) -> tuple[Array, Index]:

@@ -11,6 +11,7 @@ value, which no contact force changes.  So a rigid body has 6 unknowns whatever 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -70,9 +71,9 @@ class _Held:
         missed = self.modes[self.at - self.dofs[0]] @ found - given
         if np.abs(missed).max(initial=0.0) > RIGIDLY * np.abs(given).max(initial=0.0):
             raise InvalidInput(
-                f"supports: body {self.name!r} is rigid, and what they prescribe on it is no "
-                "small rigid motion"
-            )
+                f"body {self.name!r} is rigid, and what they prescribe on it is no small "
+                "rigid motion", ("supports",),
+            )  # fmt: skip
         return found
 
 
@@ -90,7 +91,7 @@ class RigidBodies:
 
     @classmethod
     def of(
-        cls, bodies: tuple[Body, ...], offsets: Index, is_fixed: Mask
+        cls, bodies: Sequence[Body], offsets: Index, is_fixed: Mask
     ) -> RigidBodies | None:
         """None where all bodies deform."""
         held = tuple(
@@ -105,7 +106,7 @@ class RigidBodies:
         for one in held:
             moves[one.dofs] = False
         free = np.flatnonzero(moves)
-        blocks = [sparse.csc_array(sparse.eye_array(total, format="csc")[:, free])]
+        blocks = [sparse.csc_array(sparse.csc_array(sparse.eye_array(total))[:, free])]
         for one in held:
             k, size = one.modes.shape
             rows, columns = np.repeat(one.dofs, size), np.tile(np.arange(size), k)

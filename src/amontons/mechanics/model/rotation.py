@@ -56,7 +56,7 @@ class _Fit:
         count, d = len(self.names), displacement.shape[1]
         parts = (displacement[:, :, None] * self.weights[:, None, :]).reshape(-1, d * d)
         sums = [np.bincount(self.piece, column, minlength=count) for column in parts.T]
-        return np.stack(sums, axis=1).reshape(count, d, d)
+        return np.stack(sums, axis=1).reshape(count, d, d)  # type: ignore[return-value]  # numpy types only counts
 
 
 def angles(gradients: Array) -> Array:
@@ -89,10 +89,8 @@ def large_rotation(model: Model, fields: ContactFields) -> list[ResultWarning]:
     displacement = np.concatenate(fields.displacement)
     if not np.isfinite(displacement).all():
         return []
-    if "rotation" not in model._shared:
-        points = np.concatenate([body.mesh.points for body in model.bodies])
-        model._shared["rotation"] = _Fit.of(model.discretisation.parts, points)
-    fit: _Fit = model._shared["rotation"]
+    points = np.concatenate([body.mesh.points for body in model.bodies])
+    fit = model._shared.once(_Fit.of, (), model.discretisation.parts, points)
     turned = angles(fit.gradients(displacement))
     turned[_finite_strains(model)] = 0.0
     far = np.flatnonzero(turned > LIMIT)

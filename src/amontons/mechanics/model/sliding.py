@@ -206,6 +206,6 @@ def _told_of_curvature(
     return (
         f"contact on {contact.slave!r}: contacts slid by up to {length:.3g} along a curved "
         f"obstacle, {what}; gaps and normals are those of the start: move the mesh to where it "
-        "slides and solve again, or take configuration='current' of the contact (or a "
+        "slides and solve again, or take kinematics='finite' of the contact (or a "
         "hyperelastic law), which is found where the nodes are"
     )

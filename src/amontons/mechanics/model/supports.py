@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.errors import InvalidInput
+from ...core.errors import InvalidInput, within
 from ..elements.elasticity import body_load
 from ..elements.moved_loads import pressure_forces
 from ..meshes.mesh import Mesh, unknown
@@ -33,7 +34,7 @@ class Prescribed:
 
     @classmethod
     def of(
-        cls, bodies: tuple[Body, ...], supports: tuple[Fix, ...], offsets: Index
+        cls, bodies: Sequence[Body], supports: Sequence[Fix], offsets: Index
     ) -> Prescribed:
         """Of all supports of a model, those of (x, t) at t = 0 unless they have a time."""
         values = prescribed_values(bodies, supports, offsets)
@@ -47,12 +48,11 @@ class Prescribed:
 
     def by_body(self, offsets: Index, dim: int) -> tuple[list[NDArray[np.bool_]], list[Array]]:
         """Which components are prescribed, and lasting values: of every body (nodes, dim)."""
-        split = [np.split(a, offsets[1:-1]) for a in (self.is_fixed, self.lasting)]
-        held, values = ([a.reshape(-1, dim) for a in parts] for parts in split)
-        return held, values
+        held = np.split(self.is_fixed.reshape(-1, dim), offsets[1:-1] // dim)
+        return held, np.split(self.lasting.reshape(-1, dim), offsets[1:-1] // dim)
 
 
-def locate(bodies: tuple[Body, ...], on: str) -> tuple[int, str]:
+def locate(bodies: Sequence[Body], on: str) -> tuple[int, str]:
     """(body, surface) of a name "surface" or "body.surface"."""
     found = [k for k, body in enumerate(bodies) if on in body.mesh.surfaces]
     if len(found) == 1:
@@ -71,24 +71,24 @@ def locate(bodies: tuple[Body, ...], on: str) -> tuple[int, str]:
 
 
 def prescribed_values(
-    bodies: tuple[Body, ...], supports: tuple[Fix, ...], offsets: Index
+    bodies: Sequence[Body], supports: Sequence[Fix], offsets: Index
 ) -> Array:
     """Prescribed displacement of every dof, NaN where it is free, (dofs,)."""
     values = np.full(int(offsets[-1]), np.nan)
-    for support in supports:
+    for at, support in enumerate(supports):
         k, surface = locate(bodies, support.on)
         mesh = bodies[k].mesh
-        nodes = mesh.surface(surface) and mesh.surface_nodes(surface)
-        given = vector_at(
-            support.value, mesh.points[nodes], f"fix on {support.on!r}", free=True
-        )
+        nodes = mesh.surface_nodes(surface)
         dofs = offsets[k] + nodes[:, None] * mesh.dim + np.arange(mesh.dim)
-        _check_agreement(values[dofs], given, mesh.points[nodes], support.on)
+        what = f"fix on {support.on!r}"
+        with within("supports", at, "value"):
+            given = vector_at(support.value, mesh.points[nodes], what, free=True)
+            _check_agreement(values[dofs], given, mesh.points[nodes], what)
         values[dofs] = np.where(np.isnan(given), values[dofs], given)
     return values
 
 
-def _check_agreement(old: Array, new: Array, points: Array, on: str) -> None:
+def _check_agreement(old: Array, new: Array, points: Array, what: str) -> None:
     """Two supports may meet at a node only if they say the same."""
     with np.errstate(invalid="ignore"):
         size = np.nanmax(np.abs(np.concatenate([old.ravel(), new.ravel(), [0.0]])))
@@ -96,23 +96,29 @@ def _check_agreement(old: Array, new: Array, points: Array, on: str) -> None:
     if len(clash):
         node, axis = clash[0]
         raise InvalidInput(
-            f"fix on {on!r}: component {axis} at {points[node]} is {new[node, axis]}, but "
+            f"{what}: component {axis} at {points[node]} is {new[node, axis]}, but "
             f"another support prescribes {old[node, axis]} there"
         )
 
 
 def external_load(
-    bodies: tuple[Body, ...], loads: tuple[Load, ...], offsets: Index
+    bodies: Sequence[Body], loads: Sequence[Load | None], offsets: Index
 ) -> Array:
-    """Nodal forces of loads on the undeformed bodies, (dofs,)."""
+    """Nodal forces of loads on the undeformed bodies, (dofs,).
+
+    None stands for a load of the model that is left out, so that others keep their address.
+    """
     out = np.zeros(int(offsets[-1]))
-    for load in loads:
-        if isinstance(load, BodyForce):
-            _add_body_force(out, bodies, load, offsets)
-            continue
-        k, surface = locate(bodies, load.on)
-        forces = _pressed if isinstance(load, Pressure) else _drawn
-        out[offsets[k] : offsets[k + 1]] += forces(bodies[k].mesh, surface, load).ravel()
+    for at, load in enumerate(loads):
+        with within("loads", at):
+            if isinstance(load, BodyForce):
+                _add_body_force(out, bodies, load, offsets)
+            elif load is not None:
+                k, surface = locate(bodies, load.on)
+                mesh = bodies[k].mesh
+                part = (_pressed(mesh, surface, load) if isinstance(load, Pressure)
+                        else _drawn(mesh, surface, load))  # fmt: skip
+                out[offsets[k] : offsets[k + 1]] += part.ravel()
     return out
 
 
@@ -120,7 +126,9 @@ def _drawn(mesh: Mesh, surface: str, load: Traction) -> Array:
     """Nodal forces (n, dim) of a traction."""
     facets, nodes = mesh.surface(surface), mesh.surface_nodes(surface)
     traction = np.zeros_like(mesh.points)
-    traction[nodes] = vector_at(load.value, mesh.points[nodes], f"traction on {load.on!r}")
+    with within("value"):
+        what = f"traction on {load.on!r}"
+        traction[nodes] = vector_at(load.value, mesh.points[nodes], what)
     return surface_load(mesh.points, facets, traction)
 
 
@@ -128,9 +136,9 @@ def _pressed(mesh: Mesh, surface: str, load: Pressure) -> Array:
     """Nodal forces (n, dim) of a pressure."""
     out, nodes = np.zeros_like(mesh.points), mesh.surface_nodes(surface)
     density = np.zeros(len(out))
-    density[nodes] = component_at(
-        load.value, mesh.points[nodes], f"pressure on {load.on!r}"
-    )  # fmt: skip
+    with within("value"):
+        what = f"pressure on {load.on!r}"
+        density[nodes] = component_at(load.value, mesh.points[nodes], what)
     for facets in mesh.surface(surface):
         x = mesh.points[facets.nodes]
         forces, _ = pressure_forces(facets.kind, x, density[facets.nodes], np.zeros_like(x))
@@ -139,13 +147,15 @@ def _pressed(mesh: Mesh, surface: str, load: Pressure) -> Array:
 
 
 def _add_body_force(
-    out: Array, bodies: tuple[Body, ...], load: BodyForce, offsets: Index
+    out: Array, bodies: Sequence[Body], load: BodyForce, offsets: Index
 ) -> None:
     regions = {region for body in bodies for region in body.mesh.regions}
     if load.region is not None and load.region not in regions:
-        raise InvalidInput("body force: " + unknown("region", load.region, regions))
+        text = unknown("region", load.region, regions)
+        raise InvalidInput(text, ("region",), "body force")
     for k, body in enumerate(bodies):
         if load.region is None or load.region in body.mesh.regions:
-            force = vector_at(load.value, body.mesh.points, "body force")
+            with within("value"):
+                force = vector_at(load.value, body.mesh.points, "body force")
             part = body_load(body.mesh, force, load.region)
             out[offsets[k] : offsets[k + 1]] += part.ravel()

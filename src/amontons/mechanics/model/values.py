@@ -13,7 +13,8 @@ from .timing import steady_value
 
 Array = NDArray[np.float64]
 Component = float | Callable[..., float] | None
-VectorValue = float | Sequence[Component] | Callable[..., Sequence[float | None]]
+Vector = Sequence[float | None] | Array
+VectorValue = float | Sequence[Component] | Callable[..., Vector]
 ScalarValue = ArrayLike | Callable[[Array], ArrayLike]
 
 

@@ -76,7 +76,7 @@ def cylinder_on_half_plane(
 
     distance = x[:, None] - x[None, :]
     compliance = 2 / (np.pi * h) * (integral(distance + h / 2) - integral(distance - h / 2))
-    W = np.kron(compliance, np.eye(2))
+    W: Array = np.kron(compliance, np.eye(2)).astype(float, copy=False)
     q = np.column_stack([x**2 / 2 - approach, np.full(strips, shift)])
     return FrictionProblem.from_delassus(W, q, np.full(strips, mu), name="cylinder")
 

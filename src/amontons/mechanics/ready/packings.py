@@ -124,9 +124,10 @@ class SpherePacking:
         apart = c[slave[free]] - c[master[free]]
         normal[free] = apart / np.linalg.norm(apart, axis=1, keepdims=True)
         helper = np.eye(3)[np.abs(normal).argmin(axis=1)]
-        first = np.cross(normal, helper)
+        first = np.cross(normal, helper).astype(float, copy=False)
         first /= np.linalg.norm(first, axis=1, keepdims=True)
-        return np.stack([normal, first, np.cross(normal, first)], axis=1)
+        second = np.cross(normal, first).astype(float, copy=False)
+        return np.stack([normal, first, second], axis=1)
 
     @property
     def masses(self) -> Array:
@@ -217,7 +218,7 @@ class _Pile:
                     f"{self.packing.edge:g}, got {self.packing.count}: no pocket is left"
                 )
             _, _, place = heapq.heappop(self.pockets[kind])
-            self._place_if_free(place, self.sizes[kind])
+            self._place_if_free(place, float(self.sizes[kind]))
 
     def _place_if_free(self, place: Array, r: float) -> None:
         near = self._near(place, 2 * self.cell)
@@ -246,12 +247,12 @@ class _Pile:
     def _free(self, places: Array, r: float, near: Index) -> NDArray[np.bool_]:
         """Whether spheres of radius r at places (k, 3) overlap none of `near` nor a plane."""
         slack = OVERLAP * self.packing.radius
-        free = (places @ self.normals.T - self.offsets >= r - slack).all(axis=1)
+        free = np.all(places @ self.normals.T - self.offsets >= r - slack, axis=1)
         if len(near):
             centres = np.array([self.centres[k] for k in near])
             reach = np.array([self.radii[k] for k in near]) + r - slack
             distance = np.linalg.norm(places[:, None] - centres, axis=2)
-            free &= (distance >= reach).all(axis=1)
+            free &= np.all(distance >= reach, axis=1)
         return free
 
     def _pockets_at(self, number: int, near: Index, r: float) -> Array:

@@ -62,11 +62,9 @@ class LargeSlowModel:
         if self.crossing is not None:
             drift = (time - state.time) * at_contacts(self.motion.body, state.velocity)
             arrive = partial(self.crossing.along, problem, drift, limit)
-        found, passage = taken(
-            lambda start: solve(problem, start, None),  # type: ignore[arg-type]
-            arrive, state.force, (state.time, time),
-        )  # fmt: skip
-        solution = problem.solved(found)
+        solution, passage = taken(
+            lambda start: solve(problem, start, None), arrive, state.force, (state.time, time)
+        )
         assert solution.v is not None
         q1 = problem.displacement(solution.v).ravel()
         axes = frames(problem.contact_point(solution.v).n)
@@ -110,10 +108,9 @@ class LargeSlowModel:
     def _forces(self, q: Array, load: NodalForces, r: Array) -> Forces:
         """All forces at displacements q (dofs,); r (nc, d): in the frames there."""
         parts = nonlinear_parts(self.motion.body)
-        axes = frames(parts.contact.normals(parts.points + q[parts.at]))
-        pushed = np.zeros_like(q)
-        pushed[parts.at] = np.einsum("pkc,pk->pc", axes, r)
         moved = q.reshape(parts.X.shape)
+        meeting = parts.meet(moved)
+        pushed = meeting.columns(frames(meeting.normals), len(moved)) @ r.ravel()
         return Forces(parts.forces(moved), load.at(moved), pushed, parts.energy(moved))
 
 

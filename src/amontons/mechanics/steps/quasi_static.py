@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 from ...core.clock import NEVER, Deadline
 from ...core.errors import InvalidInput, UnsupportedForm
 from ...problem.friction import FrictionProblem
-from ...problem.nitsche import NO_MULTIPLIERS
+from ...problem.nitsche import NitscheProblem
 from ...problem.solution import FrictionSolution
 from ..model import Model
 from ..model.diagnosis import with_diagnosis
@@ -52,7 +53,7 @@ class QuasiStatic:
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.step) and self.step > 0):
-            raise InvalidInput(f"step: expected a number > 0, got {self.step!r}")
+            raise InvalidInput(f"expected a number > 0, got {self.step!r}", ("step",))
         if self.crossing is not None and not hasattr(self.crossing, "between"):
             raise InvalidInput(
                 f"crossing: expected PathCrossing() or None, got {self.crossing!r}"
@@ -60,8 +61,8 @@ class QuasiStatic:
 
     def prepare(self, model: Model, tolerance: float) -> SlowModel | LargeSlowModel:
         """The matrices of all steps; equilibrium at the end never creates energy."""
-        if self.crossing is not None and model.contacts[0].nitsche is not None:
-            raise UnsupportedForm(f"crossing: {NO_MULTIPLIERS}")
+        if self.crossing is not None and model.kind is NitscheProblem:
+            raise UnsupportedForm(f"crossing: {model.kind.unfit}")
         kind = LargeSlowModel if model.is_large else SlowModel
         return kind(model, self.crossing)
 
@@ -88,8 +89,8 @@ class SlowModel:
         problem = self.motion.body.increment(load, prescribed, state.slip)
         arrive = None
         if self.crossing is not None:
-            before = self._before(state, time)
-            arrive = partial(self.crossing.between, before, problem, state.force, limit)
+            steps: Any = self._before(state, time), problem  # the path refuses Nitsche's form
+            arrive = partial(self.crossing.between, *steps, state.force, limit)
         solution, passage = taken(
             lambda start: solve(problem, start, None), arrive, state.force, (state.time, time)
         )
@@ -106,7 +107,7 @@ class SlowModel:
         return TimeStep(self.motion.body, new, solution, active, energies, parts.gap + u[:, 0],
                         passage=passage)  # fmt: skip
 
-    def _before(self, state: State, time: float) -> FrictionProblem:
+    def _before(self, state: State, time: float) -> FrictionProblem | NitscheProblem:
         """The problem that the last state solves, slipping as it did: p = 0 of `passage`.
 
         Its load is what the state balances, so that also a state at rest solves it.

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...core.arrays import finite, integers, number
 from ...core.errors import InvalidInput, shown
 from ...core.warned import ResultWarning
-from ...problem.friction import FrictionProblem
+from ...problem.protocol import Problem
 from ...problem.solution import ContactStatus, FrictionSolution
 from ..contact import forces
 from ..model import ContactFields, Fix, Model
@@ -85,7 +85,7 @@ class TimeStep:
         return self.state.time
 
     @property
-    def problem(self) -> FrictionProblem:
+    def problem(self) -> Problem:
         """The discrete problem: velocities and impulses in dynamics."""
         return self.solution.problem
 

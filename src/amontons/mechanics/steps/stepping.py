@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -11,11 +12,9 @@ from ...core.clock import NEVER, Deadline, check_seconds
 from ...core.errors import Interrupted, InvalidInput, NotConverged
 from ...problem.friction import Form, FrictionProblem
 from ...problem.solution import FrictionSolution
-from ...solvers.contract import Iterate, Solver, check_at_least
+from ...solvers.contract import Iterate, Solver, check_at_least, check_solves, taken_by
 from ...solvers.driver import drive
-from ...solvers.newton.nonlinear import nonlinear_solver
 from ..model import Model
-from .large_steps import LargeSlowModel
 from .moreau_jean import Local, MoreauJean
 from .quasi_static import QuasiStatic
 from .state import State, TimeStep, at_rest
@@ -58,8 +57,8 @@ def evolve(
     if max_iterations is not None:
         check_at_least(1, max_iterations=max_iterations)
     prepared = method.prepare(model, tolerance)
-    if isinstance(prepared, LargeSlowModel):
-        solver = nonlinear_solver(solver)  # type: ignore[assignment]
+    if solver is not None:
+        check_solves(solver, model.kind)
     state = start if start is not None else at_rest(model)
     _check(state, prepared.motion, method.step, until)
     state = prepared.begin(state)
@@ -75,9 +74,9 @@ def evolve(
         limit = deadline if time_limit is None else deadline.within(time_limit)
 
         def solve(
-            problem: FrictionProblem, first: Iterate, local: Local | None
+            problem: Any, first: Iterate, local: Local | None
         ) -> FrictionSolution:
-            if local is None or getattr(solver, "form", None) is Form.GLOBAL:
+            if local is None or taken_by(solver).form is Form.GLOBAL:
                 solution = solved(problem, first, limit)
             else:
                 found = solved(local(problem), first, limit)

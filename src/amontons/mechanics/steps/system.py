@@ -53,15 +53,15 @@ class Motion:
         """True when a load or a support depends on time."""
         return depends_on_time(self.model)
 
-    def _of(self, loads: tuple[Load, ...]) -> Any:
-        """Nodal forces of some loads: (dofs,), in large deformations as `NodalForces`."""
+    def _of(self, loads: list[Load | None]) -> Any:
+        """Nodal forces of loads, None: of none; (dofs,), or `NodalForces` if `is_large`."""
         if self.model.is_large:
             return nodal_forces(self.body, loads)
         return external_load(self.model.bodies, loads, self.parts.offsets)
 
     @cached_property
     def _steady_load(self) -> Any:
-        return self._of(tuple(p for p in self.model.loads if not is_timed(p.value)))
+        return self._of([None if is_timed(p.value) else p for p in self.model.loads])
 
     @cached_property
     def _supports_move(self) -> bool:
@@ -69,8 +69,8 @@ class Motion:
 
     def load(self, t: float) -> Any:
         """Nodal forces at time t: (dofs,), in large deformations as `NodalForces`."""
-        moving = tuple(part_at(p, t) for p in self.model.loads if is_timed(p.value))
-        if not moving:
+        moving = [part_at(p, t) if is_timed(p.value) else None for p in self.model.loads]
+        if not any(moving):
             return self._steady_load
         if t not in self._loads:
             forces = self._of(moving)  # type: ignore[arg-type]
@@ -145,7 +145,7 @@ class Motion:
         values = prescribed_values(self.model.bodies, supports, self.parts.offsets)
         changed = np.flatnonzero(np.isnan(values) == self.parts.is_fixed)
         if changed.size:
-            raise InvalidInput(self._comes_or_goes(int(changed[0]), t))
+            raise InvalidInput(self._comes_or_goes(int(changed[0]), t), ("supports",), "")
         return self.parts.completed(np.where(self.parts.is_fixed, values, 0.0))
 
     def _comes_or_goes(self, dof: int, t: float) -> str:
@@ -179,7 +179,7 @@ class Inertia:
     C: sparse.csr_array = field(init=False)
 
     def __post_init__(self) -> None:
-        blocks = [mass(body.mesh, body.material) for body in self.model.bodies]
+        blocks = [mass(b.mesh, b.material) for b in self.model.bodies]  # type: ignore[arg-type]
         M = sparse.csr_array(sparse.block_diag(blocks, format="csr"))
         M = lumped(M) if self.is_lumped else M
         K = self.model.discretisation.stored_stiffness

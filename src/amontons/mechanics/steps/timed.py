@@ -31,15 +31,17 @@ def steady(model: Model) -> Model:
     """
     if not depends_on_time(model):
         return model
-    if "steady" not in model._shared:
-        found = replace(
-            model,
-            supports=[part_at(part, 0.0) for part in model.supports],
-            loads=[part_at(part, 0.0) for part in model.loads],
-        )
-        found._shared["steady"] = found
-        model._shared["steady"] = found
-    return model._shared["steady"]
+    return model._shared.once(_steady, (), model)
+
+
+def _steady(model: Model) -> Model:
+    found = replace(
+        model,
+        supports=[part_at(part, 0.0) for part in model.supports],
+        loads=[part_at(part, 0.0) for part in model.loads],
+    )
+    found._shared.put(_steady, (), found)
+    return found
 
 
 def growth_in_words(model: Model) -> str:

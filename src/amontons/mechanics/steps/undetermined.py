@@ -14,8 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...problem.law.cones import Coulomb
-from ...problem.nitsche import NitscheProblem
+from ...problem.friction import FrictionProblem
 from ...problem.solution import ContactStatus, FrictionSolution
 
 Array = NDArray[np.float64]
@@ -24,7 +23,7 @@ Array = NDArray[np.float64]
 def carried_on(found: FrictionSolution, before: Array) -> FrictionSolution:
     """The solution whose undetermined reactions are those of before, (nc, d)."""
     problem = found.problem
-    if isinstance(problem, NitscheProblem) or problem.H is None:
+    if not isinstance(problem, FrictionProblem) or problem.H is None:
         return found
     felt = np.asarray(abs(problem.H).sum(axis=0)).reshape(found.r.shape) > 0
     free = ~felt[:, 1:] & (found.u[:, 1:] == 0)
@@ -33,8 +32,7 @@ def carried_on(found: FrictionSolution, before: Array) -> FrictionSolution:
         return found
     shear = np.where(free, 0.0, found.r[:, 1:])
     wanted = np.where(free, before[:, 1:], 0.0)
-    law = problem.law
-    bound = law.coefficient * (found.r[:, 0] if isinstance(law, Coulomb) else 1.0)
+    bound = problem.law.bound(found.r * np.eye(found.r.shape[1])[0])  # in all directions
     room = np.sqrt(np.maximum(bound**2 - (shear**2).sum(axis=1), 0.0))
     size = np.linalg.norm(wanted, axis=1)
     share = np.minimum(1.0, room / np.where(size > 0, size, 1.0))

@@ -15,15 +15,16 @@ from numba import uint64
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
+from ..law.law import BOUND, MU, TRESCA, given
+from ..law.states import OPEN, SLIP, STICK
 from .measures import EPSILON, PENETRATION, Weakest, contact_residual, hidden_square, ratio
 
 Array = NDArray[np.float64]
-OPEN, SLIP, STICK = 0, 1, 2  # the numbers of `status.ContactStatus`
 LARGER = 1.0 + 4.0 * EPSILON  # than its bound, more than rounding explains
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def settled_contact(r0, r1, r2, u0, u1, u2, rho, coefficient, tresca):  # noqa: PLR0913
+def settled_contact(r0, r1, r2, u0, u1, u2, rho, kind, p):  # noqa: PLR0913
     """(status, does the law let it slide?, share of r_N and of r_T that it keeps) of a contact.
 
     A closed one keeps all, an open one nothing; under Tresca's law the shear up to its bound.
@@ -31,16 +32,19 @@ def settled_contact(r0, r1, r2, u0, u1, u2, rho, coefficient, tresca):  # noqa: 
     slip = math.sqrt(u1 * u1 + u2 * u2)
     x1, x2 = r1 - rho * u1, r2 - rho * u2
     x, shear = math.sqrt(x1 * x1 + x2 * x2), math.sqrt(r1 * r1 + r2 * r2)
-    if tresca:
+    if given(kind, p, r0):
         closed = r0 - rho * u0 > 0.0
-        slides = x > coefficient
+        slides = x > p[BOUND]
+        if kind != TRESCA:
+            slides = slides and closed
     else:
+        coefficient = p[MU]
         normal = r0 - rho * (u0 + coefficient * slip)
         closed = coefficient * x > -normal
         slides = closed and not (x <= coefficient * normal and coefficient > 0.0)
     if closed and r0 > 0.0:
         return (SLIP if slides else STICK), slides, 1.0, 1.0
-    bound = coefficient if tresca else 0.0
+    bound = p[BOUND] if kind == TRESCA else 0.0
     return OPEN, slides, 0.0, (bound / shear if shear > bound * LARGER else 1.0)
 
 
@@ -60,7 +64,7 @@ def _pushes(indptr, indices, data, r, i):
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def assess(  # noqa: PLR0913
-    indptr, indices, data, q, coefficient, tresca, rho, r, floor, u, kept, status, sliding
+    indptr, indices, data, q, kind, parameters, rho, r, floor, u, kept, status, sliding
 ):
     """(error, largest contactwise error, its contact or -1, hidden, changed).
 
@@ -70,7 +74,7 @@ def assess(  # noqa: PLR0913
     not r.
     """
     total, worst, contact, hidden, changed = 0.0, 0.0, -1, 0.0, False
-    for i in range(len(coefficient)):
+    for i in range(len(kind)):
         u0, u1, u2 = q[i, 0], q[i, 1], q[i, 2]
         scale = floor[i] + math.sqrt(u0 * u0 + u1 * u1 + u2 * u2)
         for k in range(uint64(indptr[i]), uint64(indptr[i + 1])):
@@ -80,11 +84,12 @@ def assess(  # noqa: PLR0913
             u1 += data[k, 1, 0] * r0 + data[k, 1, 1] * r1 + data[k, 1, 2] * r2
             u2 += data[k, 2, 0] * r0 + data[k, 2, 1] * r1 + data[k, 2, 2] * r2
         u[i, 0], u[i, 1], u[i, 2] = u0, u1, u2
-        r0, r1, r2, mu = r[i, 0], r[i, 1], r[i, 2], coefficient[i]
+        r0, r1, r2, p = r[i, 0], r[i, 1], r[i, 2], parameters[i]
         if rho[i] > 0.0:
-            e0, e1, e2 = contact_residual(r0, r1, r2, u0, u1, u2, rho[i], mu, tresca)
+            e0, e1, e2 = contact_residual(r0, r1, r2, u0, u1, u2, rho[i], kind[i], p)
             size = max(math.sqrt(e0 * e0 + e1 * e1 + e2 * e2), -PENETRATION * u0)
-            hidden += hidden_square(r0, r1, r2, rho[i], mu, tresca)
+            fixed = given(kind[i], p, r0)
+            hidden += hidden_square(r0, r1, r2, rho[i], 0.0 if fixed else p[MU])
         elif r0 != 0.0 or r1 != 0.0 or r2 != 0.0:
             size = math.inf
         else:
@@ -95,7 +100,7 @@ def assess(  # noqa: PLR0913
             if not size <= worst * scale:
                 worst, contact = (size / scale if scale > 0.0 else math.inf), i
         state, slides, normal, shear = settled_contact(
-            r0, r1, r2, u0, u1, u2, rho[i], mu, tresca
+            r0, r1, r2, u0, u1, u2, rho[i], kind[i], p
         )
         status[i], sliding[i] = state, slides
         kept[i, 0], kept[i, 1], kept[i, 2] = normal * r0, shear * r1, shear * r2

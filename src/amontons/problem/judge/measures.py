@@ -32,7 +32,7 @@ At r = 0 the map of a penetrating contact is |u_N| / sqrt(1 + mu^2) only, and wo
 changes nothing up to mu = 1.7.  A contact with W_ii = 0 can not react: r_i = 0 and u_N >= 0
 are checked instead.
 `natural_error` is compiled because a whole solve of a small problem takes 0.1 ms; its NumPy
-twin is `cones.natural_map`, and the tests compare the two.
+twin is `Law.natural_map`, and the tests compare the two.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ from numba import uint64
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
-from ..law.cones import Law
+from ..law.law import BOUND, MU, Law, given
 
 Array = NDArray[np.float64]
 EPSILON = float(np.finfo(float).eps)
@@ -88,14 +88,16 @@ class Weakest(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def contact_residual(r0, r1, r2, u0, u1, u2, rho, coefficient, tresca):  # noqa: PLR0913
-    """(r - P(r - rho û)) / rho of one 3D contact, unit of u; scalars in, three scalars out."""
+def contact_residual(r0, r1, r2, u0, u1, u2, rho, kind, p):  # noqa: PLR0913
+    """(r - P(r - rho û)) / rho of one 3D contact of a kind with parameters p, unit of u."""
+    fixed = given(kind, p, r0)
+    coefficient = p[BOUND] if fixed else p[MU]
     slip = math.sqrt(u1 * u1 + u2 * u2)
-    x0 = r0 - rho * (u0 if tresca else u0 + coefficient * slip)
+    x0 = r0 - rho * (u0 if fixed else u0 + coefficient * slip)
     x1 = r1 - rho * u1
     x2 = r2 - rho * u2
     t = math.sqrt(x1 * x1 + x2 * x2)
-    if tresca:
+    if fixed:
         p0 = max(x0, 0.0)
         scale = 1.0 if t <= coefficient else coefficient / t
     elif coefficient * t <= -x0:
@@ -117,14 +119,14 @@ def _all_zero(r):
 
 
 @njit(cache=True, error_model="numpy")
-def _error_at_rest(q, coefficient, tresca, rho):
+def _error_at_rest(q, kind, parameters, rho):
     """`natural_error` of r = 0, where every cold start is judged: no product with W."""
     total = 0.0
     for i in range(len(q)):
         e0 = e1 = e2 = 0.0
         if rho[i] > 0.0:
             e0, e1, e2 = contact_residual(
-                0.0, 0.0, 0.0, q[i, 0], q[i, 1], q[i, 2], rho[i], coefficient[i], tresca
+                0.0, 0.0, 0.0, q[i, 0], q[i, 1], q[i, 2], rho[i], kind[i], parameters[i]
             )
         scale = PENETRATION if rho[i] > 0.0 else 1.0
         total += max(e0 * e0 + e1 * e1 + e2 * e2, (scale * min(q[i, 0], 0.0)) ** 2)
@@ -132,16 +134,16 @@ def _error_at_rest(q, coefficient, tresca, rho):
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
-def natural_error(indptr, indices, data, q, coefficient, tresca, rho, r):
+def natural_error(indptr, indices, data, q, kind, parameters, rho, r):
     """Euclidean norm of the scaled natural map, unit of u, with u = W r + q formed here.
 
-    Rows of 3x3 blocks; q, r (nc, 3); rho (nc,), 0 where a contact can not react.  Not a number
-    in r gives infinity, never a small error.
+    Rows of 3x3 blocks; q, r (nc, 3); kind and parameters of the law (`law.law`); rho (nc,), 0
+    where a contact can not react.  Not a number in r gives infinity, never a small error.
     """
     if _all_zero(r):
-        return _error_at_rest(q, coefficient, tresca, rho)
+        return _error_at_rest(q, kind, parameters, rho)
     total = 0.0
-    for i in range(len(coefficient)):
+    for i in range(len(kind)):
         u0, u1, u2 = q[i, 0], q[i, 1], q[i, 2]
         for k in range(uint64(indptr[i]), uint64(indptr[i + 1])):
             j = uint64(indices[k])  # unsigned: no test for negative indices in the loop
@@ -151,7 +153,7 @@ def natural_error(indptr, indices, data, q, coefficient, tresca, rho, r):
             u2 += data[k, 2, 0] * r0 + data[k, 2, 1] * r1 + data[k, 2, 2] * r2
         if rho[i] > 0.0:
             e0, e1, e2 = contact_residual(
-                r[i, 0], r[i, 1], r[i, 2], u0, u1, u2, rho[i], coefficient[i], tresca
+                r[i, 0], r[i, 1], r[i, 2], u0, u1, u2, rho[i], kind[i], parameters[i]
             )
             total += max(e0 * e0 + e1 * e1 + e2 * e2, (PENETRATION * min(u0, 0.0)) ** 2)
         elif u0 < 0.0:
@@ -162,18 +164,21 @@ def natural_error(indptr, indices, data, q, coefficient, tresca, rho, r):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def hidden_square(r0, r1, r2, rho, coefficient, tresca):  # noqa: PLR0913
-    """|r / rho|^2 of a contact, times mu^2 where it sticks with mu > 1; unit of u squared."""
+def hidden_square(r0, r1, r2, rho, mu):  # noqa: PLR0913
+    """|r / rho|^2 of a contact, times mu^2 where it sticks with mu > 1; unit of u squared.
+
+    mu = 0 where its bound does not follow r_N.
+    """
     tangential = r1 * r1 + r2 * r2
     size = (r0 * r0 + tangential) / (rho * rho)
-    if not tresca and coefficient > 1.0:
-        if math.sqrt(tangential) < STUCK * coefficient * r0:
-            size *= coefficient * coefficient
+    if mu > 1.0:
+        if math.sqrt(tangential) < STUCK * mu * r0:
+            size *= mu * mu
     return size
 
 
 @njit(cache=True, error_model="numpy")
-def rounding_error(coefficient, tresca, rho, r):
+def rounding_error(kind, parameters, rho, r):
     """What rounding may hide in the velocities that reactions make, unit of u.
 
     eps |r / rho|: huge reactions that cancel, as of a body between two closing walls, swallow
@@ -183,7 +188,9 @@ def rounding_error(coefficient, tresca, rho, r):
     total = 0.0
     for i in range(len(rho)):
         if rho[i] > 0.0:
-            total += hidden_square(r[i, 0], r[i, 1], r[i, 2], rho[i], coefficient[i], tresca)
+            fixed = given(kind[i], parameters[i], r[i, 0])
+            mu = 0.0 if fixed else parameters[i, MU]
+            total += hidden_square(r[i, 0], r[i, 1], r[i, 2], rho[i], mu)
     return EPSILON * math.sqrt(total)
 
 
@@ -210,7 +217,7 @@ def residual_sizes(r: Array, u: Array, law: Law, rho: Array) -> Array:
     """The scaled natural map of each contact, (nc,), unit of u; infinite as `natural_error`."""
     index = np.flatnonzero(rho > 0)
     inner = law.at(index).natural_map(r[index], u[index], rho[index]) / rho[index, None]
-    size = np.maximum(-u[:, 0], 0.0)
+    size = np.maximum(-law.stretched(u, r)[:, 0], 0.0)
     size[index] = np.maximum(np.linalg.norm(inner, axis=1), PENETRATION * size[index])
     size[(rho <= 0) & r.any(axis=1)] = math.inf
     return size
@@ -251,9 +258,8 @@ def max_penetration(u: Array) -> float:
 
 
 def max_cone_violation(r: Array, law: Law) -> float:
-    """Largest excess of |r_T| over its bound, or tension -r_N; unit of r."""
-    excess = np.linalg.norm(r[:, 1:], axis=1) - law.bound(r)
-    return float(max(excess.max(initial=0.0), -r[:, 0].min(initial=0.0), 0.0))
+    """Largest excess of |r_T| over its bound, or of tension -r_N over cohesion; unit of r."""
+    return float(law.excess(r).max(initial=0.0))
 
 
 __all__ = [

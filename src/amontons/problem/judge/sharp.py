@@ -16,6 +16,7 @@ import math
 import numpy as np
 
 from ...core.compiled import njit
+from ..law.law import BOUND, MU, given
 from .measures import EPSILON, PENETRATION, contact_residual
 
 SPLIT = 134217729.0  # 2^27 + 1: halves a double into two numbers of 26 bits
@@ -43,14 +44,14 @@ def _product(a, b):
 
 
 @njit(cache=True, error_model="numpy")
-def sharp_error(indptr, indices, data, q, coefficient, tresca, rho, r):
+def sharp_error(indptr, indices, data, q, kind, parameters, rho, r):
     """`measures.natural_error`, and what rounding may still hide in it, unit of u.
 
     Infinite where products overflow.
     """
     total = hidden = 0.0
     u, lost = np.empty(3), np.empty(3)
-    for i in range(len(coefficient)):
+    for i in range(len(kind)):
         for a in range(3):
             u[a], lost[a] = q[i, a], 0.0
         for k in range(indptr[i], indptr[i + 1]):
@@ -68,14 +69,15 @@ def sharp_error(indptr, indices, data, q, coefficient, tresca, rho, r):
             total += min(u[0], 0.0) ** 2
             continue
         slip = math.sqrt(u[1] ** 2 + u[2] ** 2)
-        normal = u[0] if tresca else u[0] + coefficient[i] * slip
+        fixed, p = given(kind[i], parameters[i], r[i, 0]), parameters[i]
+        normal = u[0] if fixed else u[0] + p[MU] * slip
         x0, x1, x2 = r[i, 0] - rho[i] * normal, r[i, 1] - rho[i] * u[1], r[i, 2] - rho[i] * u[2]
-        bound = coefficient[i] if tresca else coefficient[i] * x0
+        bound = p[BOUND] if fixed else p[MU] * x0
         if x0 > 0.0 and math.sqrt(x1 * x1 + x2 * x2) < bound:
             size = normal * normal + u[1] ** 2 + u[2] ** 2
         else:
             e0, e1, e2 = contact_residual(
-                r[i, 0], r[i, 1], r[i, 2], u[0], u[1], u[2], rho[i], coefficient[i], tresca
+                r[i, 0], r[i, 1], r[i, 2], u[0], u[1], u[2], rho[i], kind[i], p
             )
             size = e0 * e0 + e1 * e1 + e2 * e2
             hidden += (r[i, 0] ** 2 + r[i, 1] ** 2 + r[i, 2] ** 2) / rho[i] ** 2

@@ -1,1 +1,13 @@
-"""Laws of friction: cones, projections, a single contact."""
+"""Laws of friction, one file each: what `law` says a law is, a single contact, statuses."""
+
+from .capped import CappedCoulomb
+from .cohesive import Cohesive
+from .compliant import Compliant
+from .coulomb import Coulomb
+from .law import Kind, Law
+from .mixed import Mixed, joined
+from .orthotropic import Orthotropic
+from .tresca import Tresca
+
+__all__ = ["CappedCoulomb", "Cohesive", "Compliant", "Coulomb", "Kind", "Law", "Mixed",
+           "Orthotropic", "Tresca", "joined"]

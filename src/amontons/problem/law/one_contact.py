@@ -27,8 +27,8 @@ import math
 import numpy as np
 
 from ...core.compiled import njit
+from .states import OPEN, SLIP, STICK
 
-OPEN, SLIP, STICK = 0, 1, 2
 NEWTON_STEPS = 12
 NEAR_STEPS = 8  # from the last direction of a sweep, before the careful search
 ANGLES = 16  # intervals of the circle searched when Newton fails: roots are at most four
@@ -302,19 +302,3 @@ def solve_tresca(A, b0, b1, b2, bound, g1, g2):  # noqa: PLR0913
         b1 - k1 * b0, b2 - k2 * b0, bound, r1, r2,
     )  # fmt: skip
     return max(-(b0 + A[0, 1] * r1 + A[0, 2] * r2) / a, 0.0), r1, r2, state
-
-
-@njit(cache=True, error_model="numpy")
-def solve_contact(A, b0, b1, b2, coefficient, tresca, g1, g2):  # noqa: PLR0913
-    """(r_N, r_T1, r_T2, state) of one contact under either law."""
-    if tresca:
-        return solve_tresca(A, b0, b1, b2, coefficient, g1, g2)
-    return solve_coulomb(A, b0, b1, b2, coefficient, g1, g2)
-
-
-def solve_one(A, b, coefficient: float, tresca: bool = False):
-    """(r, u, state) of one contact given as arrays A (3, 3), b (3,); for tests and teaching."""
-    A, b = np.ascontiguousarray(A, dtype=float), np.asarray(b, dtype=float)
-    *r, state = solve_contact(A, b[0], b[1], b[2], float(coefficient), tresca, 0.0, 0.0)
-    r = np.array(r)
-    return r, A @ r + b, state

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import SingularOperator
+from ...problem.law import Law
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -160,11 +161,15 @@ def conditions(r: Array, u: Array, g: Array, first: bool, settings: Settings) ->
     return Conditions(G_r, G_u, b, normal, tangential, alpha, beta)
 
 
-def newton_conditions(r: Array, u: Array, mu: Array, settings: Settings) -> Conditions:
-    """The full Newton step of [HSW] section 7, (7.2) and (7.3): the bound moves with r_N."""
+def newton_conditions(r: Array, u: Array, law: Law, settings: Settings) -> Conditions:
+    """The full Newton step of [HSW] section 7, (7.2) and (7.3): the bound moves with r_N.
+
+    With its slope mu of Coulomb's law, 0 at a cap; not for bounds of open contacts.
+    """
     pressure = r[:, 0] - settings.c_normal * u[:, 0]
-    normal = pressure > 0
-    lam, slip, g = -r[:, 1:], u[:, 1:], mu * np.maximum(pressure, 0)
+    normal, pressed = pressure > 0, pressure[:, None]
+    lam, slip, g, mu = -r[:, 1:], u[:, 1:], law.bound(pressed), law.bound_slope(pressed)
+    moving = mu * np.maximum(pressure, 0)  # the part of g that moves with r_N: all or nothing
     s = lam + settings.c_tangential[:, None] * slip
     tangential = ~normal | (np.linalg.norm(s, axis=1) >= g)
     G_r, G_u, b = _rows(r.shape, normal, tangential)
@@ -173,12 +178,12 @@ def newton_conditions(r: Array, u: Array, mu: Array, settings: Settings) -> Cond
     if settings.function is FrictionFunction.QUOTIENT:
         k = k[:0]
     G_r[k, 1:, 0] = (mu[k] / g[k])[:, None] * slip[k]
-    b[k, 1:] = slip[k]
+    b[k, 1:] = (moving[k] / g[k])[:, None] * slip[k]
     k = np.flatnonzero(normal & tangential & (g > 0))  # (7.3)
     part = settings.sliding(lam, slip, g, k)
     G_u[k, 1:, 1:] = part.L
     G_r[k, 1:, 0] = mu[k, None] * part.v
-    b[k, 1:] = part.rhs + g[k, None] * part.v
+    b[k, 1:] = part.rhs + moving[k, None] * part.v
     alpha[k], beta[k] = part.alpha, part.beta
     return Conditions(G_r, G_u, b, normal, tangential, alpha, beta)
 

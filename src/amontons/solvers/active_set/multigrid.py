@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,7 @@ from scipy import sparse
 
 from ...core.errors import InvalidInput
 from ...core.options import check_options
-from ...linear.hierarchy import SMALL, Hierarchy, Nodes, components
+from ...linear.hierarchy import SMALL, Hierarchy, Nodes
 from ...linear.node_blocks import NodeBlocks, block_inverse, residual, sweep
 from ...linear.transfer import Transfer
 from ...problem.one_sided import HELD, OneSided
@@ -94,14 +95,16 @@ class Contacts:
 
 
 class ContactCycles:
-    """The linear problem of one step after another, and multigrid cycles for it."""
+    """The linear problem of one step after another, and multigrid cycles for it.
 
-    def __init__(self, basis: OneSided, d: int, modes: Array | None) -> None:
-        """modes (n, k): rigid modes of the bodies in the usual basis; they tell components."""
-        component = components(modes, basis.M.shape[0], d)
+    All solves of a problem share it: `set` and the cycles that follow need `lock`.
+    """
+
+    def __init__(self, basis: OneSided, component: Index | None) -> None:
+        """component (n,): directions of the unknowns, node by node."""
         if component is None:
             raise InvalidInput("near_nullspace: multigrid needs translations among its columns")
-        self.option = MultigridCycle()
+        self.lock = Lock()
         self.nodes = Nodes.of(component)
         place = None if self.nodes.plain else self.nodes.place
         A = NodeBlocks.from_sparse(basis.M, place, self.nodes.count)
@@ -152,7 +155,7 @@ class ContactCycles:
     # ------------------------------------------------------------------ coarse levels
     def _prepare_galerkin(self) -> None:
         """What the difference of the coarse matrices is made of: P and M on contact rows."""
-        self.prolongations = [_matrix(level.P) for level in self.levels[:-1]]
+        self.prolongations = [_matrix(level.P) for level in self.levels if level.P is not None]
         if not self.prolongations:
             return
         A, nodes = self.levels[0].A, self.contacts.node
@@ -183,43 +186,43 @@ class ContactCycles:
             if k:
                 P = self.prolongations[k]
                 delta = sparse.csr_array(P.T @ (delta @ P))
+            assert isinstance(level.A, NodeBlocks)
             _add_blocks(level.A, self.plain[k], delta)
         self.coarse_inverse = np.linalg.pinv(self.levels[-1].A.dense(), rcond=SMALL)
 
     # ------------------------------------------------------------------ cycles
-    def cycle(self, x: Array) -> float:
+    def cycle(self, x: Array, option: MultigridCycle) -> float:
         """One cycle in place on x, (nodes, 3); returns the residual after it over that of 0."""
-        shape = self.option.shape
-        self._visit(0, self.b, x, shape)
+        self._visit(0, self.b, x, option.shape, option.smoothing)
         return self.residual(x)
 
     def residual(self, x: Array) -> float:
         """|b - A x| / |b| of the linear problem."""
-        level = self.levels[0]
-        A = level.A
-        residual(A.indptr, A.indices, A.data, x, self.b, level.r)
-        return float(np.linalg.norm(level.r) / max(np.linalg.norm(self.b), 1e-300))
+        A, r = self.levels[0].A, self.levels[0].work.r
+        residual(A.indptr, A.indices, A.data, x, self.b, r)
+        return float(np.linalg.norm(r) / max(np.linalg.norm(self.b), 1e-300))
 
-    def _visit(self, k: int, b: Array, x: Array, shape: CycleShape) -> None:
+    def _visit(self, k: int, b: Array, x: Array, shape: CycleShape, sweeps: int) -> None:
         level = self.levels[k]
         if level.P is None:
             x[:] = (self.coarse_inverse @ b.reshape(-1)).reshape(-1, 3)
             return
-        self._smooth(level.A, b, x)
-        coarse, A = self.levels[k + 1], level.A
-        residual(A.indptr, A.indices, A.data, x, b, level.r)
-        self._keep_free(k, level.r)
-        level.P.restrict(level.r, coarse.b)
-        coarse.x[:] = 0.0
-        self._visit(k + 1, coarse.b, coarse.x, shape)
+        A, r, coarse, below = level.A, level.work.r, self.levels[k + 1], self.levels[k + 1].work
+        assert isinstance(A, NodeBlocks)
+        self._smooth(A, b, x, sweeps)
+        residual(A.indptr, A.indices, A.data, x, b, r)
+        self._keep_free(k, r)
+        level.P.restrict(r, below.b)
+        below.x[:] = 0.0
+        self._visit(k + 1, below.b, below.x, shape, sweeps)
         if shape is not CycleShape.V and coarse.P is not None:
             again = CycleShape.W if shape is CycleShape.W else CycleShape.V
-            self._visit(k + 1, coarse.b, coarse.x, again)
-        level.r[:] = 0.0
-        level.P.add(coarse.x, level.r)
-        self._keep_free(k, level.r)
-        x += level.r
-        self._smooth(level.A, b, x)
+            self._visit(k + 1, below.b, below.x, again, sweeps)
+        r[:] = 0.0
+        level.P.add(below.x, r)
+        self._keep_free(k, r)
+        x += r
+        self._smooth(A, b, x, sweeps)
 
     def _keep_free(self, k: int, values: Array) -> None:
         """On the finest level, leave out the Dirichlet directions of the contact nodes."""
@@ -227,9 +230,9 @@ class ContactCycles:
             node = self.contacts.node
             values[node] -= np.einsum("kij,kj->ki", self.projection, values[node])
 
-    def _smooth(self, A: NodeBlocks, b: Array, x: Array) -> None:
+    def _smooth(self, A: NodeBlocks, b: Array, x: Array, sweeps: int) -> None:
         held = self.none_held[: A.nodes]
-        for _ in range(self.option.smoothing):
+        for _ in range(sweeps):
             sweep(A.indptr, A.indices, A.data, A.inverse, b, x, held, False)
             sweep(A.indptr, A.indices, A.data, A.inverse, b, x, held, True)
 

@@ -10,7 +10,8 @@ from scipy import sparse
 
 from ...linear.levels import fine_unknown
 from ...problem.friction import FrictionProblem
-from ...problem.law.cones import Law, Tresca
+from ...problem.law import Law
+from ...problem.law.law import BOUND
 from ...problem.one_sided import HELD, one_sided
 from ..contract import Iterate
 
@@ -115,6 +116,7 @@ def coarser(fine: FrictionProblem) -> Coarser | None:
         FrictionProblem.from_global(
             P.T @ fine.M @ P, P.T @ H, P.T @ rest, w, _law(fine.law, contacts, weights),
             near_nullspace=None if modes is None else modes[own], levels=fine.levels[1:],
+            structure=fine.structure and fine.structure.at(contacts, own),
         ),
         guess=None if fine.guess is None else fine.guess[own],
     )  # fmt: skip
@@ -126,4 +128,5 @@ def coarser(fine: FrictionProblem) -> Coarser | None:
 
 
 def _law(law: Law, contacts: Index, weights: sparse.csr_array) -> Law:
-    return Tresca(weights.T @ law.limit) if isinstance(law, Tresca) else law.at(contacts)
+    bounds = law.parameters[:, BOUND]
+    return law.at(contacts).with_bounds(weights.T @ np.where(np.isfinite(bounds), bounds, 0.0))

@@ -23,7 +23,8 @@ from ...core.errors import InvalidInput, SingularOperator
 from ...core.options import check_options
 from ...linear import Direct, LinearSolver
 from ...problem.friction import Form, FrictionProblem
-from ...problem.law.cones import Coulomb, Law
+from ...problem.law import Law
+from ...problem.law.law import TRESCA
 from ...problem.one_sided import one_sided
 from ...problem.status import ActiveSets
 from ..augmentation import own_blocks
@@ -80,7 +81,9 @@ class ActiveSetIterate(Iterate):
 
 @dataclass(frozen=True)
 class ActiveSet:
-    """Primal-dual active set method (PDAS), exact or inexact, for Tresca and Coulomb friction.
+    """Primal-dual active set method (PDAS), exact or inexact, for all laws of friction.
+
+    With Tresca's law at some contacts and another at others the bound is updated in every step.
 
     c_normal, c_tangential: parameters of the complementarity functions (3.1) and (4.1), unit of
     r / u; None takes the stiffness of each contact alone (diagonal of M in the local basis).
@@ -120,11 +123,12 @@ class ActiveSet:
             if getattr(self, name) is not None:
                 check_at_least(1, **{name: getattr(self, name)})
         if self.multigrid is None and self.cycles is not None:
-            raise InvalidInput("cycles: expected None without multigrid, which makes them")
+            raise InvalidInput("expected None without multigrid, which makes them", ("cycles",))
         if self.multigrid is not None and self.bound is FrictionBound.NEWTON:
             raise InvalidInput(
-                "bound: expected fixed-point with multigrid, whose coarse levels do not know "
-                "how the bound of the Newton method couples the normal with the tangents"
+                "expected fixed-point with multigrid, whose coarse levels do not know "
+                "how the bound of the Newton method couples the normal with the tangents",
+                ("bound",),
             )
 
     def iterates(
@@ -138,7 +142,7 @@ class ActiveSet:
         state = system.state(start)
         bound = _Bound(self, problem, state)
         settings = self._settings(problem)
-        driven = driven_directions(problem).any(axis=1)
+        driven = np.any(driven_directions(problem), axis=1)
         first, change = not start.r.any(), np.inf
         while self.change is None or not (bound.compares and change < self.change):
             g = bound.update(state)
@@ -155,7 +159,7 @@ class ActiveSet:
                 raise Breakdown("a step is not finite")
             change = bound.change(new)
             last, sets = sets, np.concatenate([given.normal, given.tangential])
-            kept = kept + 1 if np.array_equal(last, sets) else 0
+            kept = kept + 1 if last is not None and np.array_equal(last, sets) else 0
             yield ActiveSetIterate(
                 new.r, system.displacement(new), linear_iterations=new.linear_iterations,
                 normal=given.normal, tangential=given.tangential, change=change,
@@ -194,9 +198,9 @@ class ActiveSet:
     def _conditions(
         self, problem: FrictionProblem, state: State, g: Array, first: bool, settings: Settings
     ) -> Conditions:
-        if isinstance(problem.law, Coulomb) and self.bound is FrictionBound.NEWTON:
-            if not first:
-                return newton_conditions(state.r, state.u, problem.law.mu, settings)
+        follows = self.bound is FrictionBound.NEWTON and not (problem.law.kind == TRESCA).any()
+        if follows and not first:
+            return newton_conditions(state.r, state.u, problem.law, settings)
         return conditions(state.r, state.u, g, first, settings)
 
     def _settings(self, problem: FrictionProblem) -> Settings:
@@ -235,7 +239,8 @@ class _Bound:
 
     def __init__(self, solver: ActiveSet, problem: FrictionProblem, state: State) -> None:
         self.law, self.period, self.gap = problem.law, solver.bound_steps, problem.w
-        self.lags = isinstance(self.law, Coulomb) and solver.bound is FrictionBound.FIXED_POINT
+        is_given = (self.law.kind == TRESCA).all()
+        self.lags = not is_given and solver.bound is FrictionBound.FIXED_POINT
         self.norm = solver.change_norm
         self.g, self.state, self.last = problem.law.bound(state.r), state, state
         self.step, self.updates, self.settled = 0, 0, False
@@ -264,6 +269,7 @@ class _Bound:
         self.last = new
         if self.norm is ChangeNorm.ALL:
             return float(np.linalg.norm(new.v - self.state.v)) / size
+        assert self.gap is not None
         size = max(float(np.linalg.norm(new.u - self.gap)), TINY)
         return float(np.linalg.norm(new.u - self.state.u)) / size
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +11,9 @@ from scipy import sparse
 
 from ...core.errors import SingularOperator
 from ...linear import LinearSolver
+from ...linear.hierarchy import components
 from ...problem.friction import FrictionProblem
-from ...problem.one_sided import HELD, OneSided
+from ...problem.one_sided import HELD, OneSided, one_sided
 from ..augmentation import own_blocks
 from ..contract import Breakdown, Iterate
 from ..driven import able_directions, driven_directions
@@ -75,7 +76,7 @@ class Saddle:
         rows_r = given.G_r * scale[:, :, None] * able + (~able) * np.eye(d)
         b = (given.b * scale - np.einsum("kij,kj->ki", rows_u, p.w)) * able[:, :, 0]
         G_u, G_r = _block_diagonal(rows_u), _block_diagonal(rows_r)
-        matrix = sparse.block_array([[p.M, -p.H], [G_u @ p.H.T, G_r]], format="csc")
+        matrix: Any = sparse.block_array([[p.M, -p.H], [G_u @ p.H.T, G_r]], format="csc")
         x = self.linear.factor(matrix).solve(np.concatenate([p.f, b.ravel()]))
         v, r = x[: p.unknowns], x[p.unknowns :].reshape(nc, d)
         return State(r, p.local_velocity(v), v, 1)
@@ -99,13 +100,8 @@ class Cycles:
         option: MultigridCycle,
         cycles: int | None,
     ) -> None:
-        self.problem, self.basis, self.cycles = problem, basis, cycles
-
-        def make() -> ContactCycles:
-            return ContactCycles(basis, problem.dimension, problem.near_nullspace)
-
-        self.tool = problem.kept("active set cycles", make)
-        self.tool.option = option
+        self.problem, self.basis, self.option, self.cycles = problem, basis, option, cycles
+        self.tool = problem.kept(_contact_cycles)
         used = basis.dofs != HELD
         self.slots = np.where(used, basis.dofs, 0)
         self.frames = basis.frames * used[:, None, :]
@@ -117,28 +113,44 @@ class Cycles:
         return State(given.r, given.u, self.basis.from_displacement(given.v))
 
     def step(self, given: Conditions, state: State) -> State:
-        """m cycles, or as many as an exact solution needs."""
+        """m cycles, or as many as an exact solution needs; one step of one solve at a time."""
+        with self.tool.lock:
+            v, count = self._solve(given, state)
+        force = (self.rows @ v).reshape(self.slots.shape) - self.basis.f[self.slots]
+        r = np.einsum("kij,kj->ki", self.frames, force)
+        u = np.einsum("kij,kj->ki", self.frames, v[self.slots]) + self.problem.w
+        return State(r, u, v, count)
+
+    def _solve(self, given: Conditions, state: State) -> tuple[Array, int]:
+        """v in the one-sided basis, and cycles."""
         tool, w = self.tool, self.problem.w
         assert w is not None
         tool.set(given, self.basis.f, w)
         x = tool.nodes.spread(state.v)
         size, count = tool.residual(x), 0
         while count < (self.cycles or MOST_CYCLES):
-            size = tool.cycle(x)
+            size = tool.cycle(x, self.option)
             count += 1
             if not np.isfinite(size):
                 raise Breakdown("the multigrid cycles diverge")
             if self.cycles is None and size <= EXACT:
                 break
-        v = tool.nodes.gather(x)
-        force = (self.rows @ v).reshape(self.slots.shape) - self.basis.f[self.slots]
-        r = np.einsum("kij,kj->ki", self.frames, force)
-        u = np.einsum("kij,kj->ki", self.frames, v[self.slots]) + w
-        return State(r, u, v, count)
+        return tool.nodes.gather(x), count
 
     def displacement(self, state: State) -> Array:
         """v from the one-sided basis."""
         return self.basis.to_displacement(state.v)
+
+
+def _contact_cycles(problem: FrictionProblem) -> ContactCycles:
+    """Prepared of M and H, which have a one-sided basis."""
+    basis = one_sided(problem)
+    assert basis is not None
+    known = problem.structure
+    if known is not None:
+        return ContactCycles(basis, known.component)
+    modes, n, d = problem.near_nullspace, problem.unknowns, problem.dimension
+    return ContactCycles(basis, components(modes, n, d))
 
 
 def first_state(problem: FrictionProblem, start: Iterate) -> State:

@@ -26,7 +26,6 @@ corrections stall, Z gets more columns.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -42,7 +41,7 @@ from ...linear.dense import DENSE_LIMIT
 from ...linear.distributed import DistributedMatrix
 from ...problem.condensation import SOLVE_COLUMNS
 from ...problem.friction import Form, FrictionProblem
-from ..contract import Breakdown, Iterate, Target, check_at_least, check_positive
+from ..contract import Breakdown, Iterate, Iterates, Target, check_at_least, check_positive
 from .portfolio import Portfolio
 
 Array = NDArray[np.float64]
@@ -69,7 +68,7 @@ class CompressedDelassus:
 
     def iterates(
         self, problem: FrictionProblem, start: Iterate, target: Target
-    ) -> Iterator[Iterate]:
+    ) -> Iterates:
         """Corrections from `start`; raises Breakdown when M is unsymmetric or W too large."""
         _check_fits(problem)
         far = _FarField.of(problem, self, target.deadline)
@@ -87,8 +86,8 @@ class CompressedDelassus:
             found = _contact_solve(compressed.with_load(moved), r, local)
             v_found = problem.velocity(found)[1]
             assert v_found is not None
-            error = problem.error(found, v_found)
-            yield Iterate(found, v_found, linear_iterations=1, stage=f"rank {far.rank}")
+            next_one = Iterate(found, v_found, linear_iterations=1, stage=f"rank {far.rank}")
+            error = target.error(problem, next_one, (yield next_one))
             mark, waited = (error, 0) if error < 0.3 * mark else (mark, waited + 1)
             if waited == 4 and far.rank < self.max_rank:
                 far.extend()
@@ -111,13 +110,12 @@ def _check_fits(problem: FrictionProblem) -> None:
 
 def _contact_solve(problem: FrictionProblem, r: Array, target: Target) -> Array:
     """Reaction of the contact problem with the compressed W."""
-    found = r
-    if problem.error(r) <= target.tolerance:
-        return r
-    for iterate in Portfolio(problem, target, spatial(r)).stages():
-        found = iterate.r
-        if problem.error(found) <= target.tolerance or target.seconds_left <= 0:
+    found, stages = r, Portfolio(problem, target, spatial(r)).stages()
+    while problem.error(found) > target.tolerance and not target.deadline.passed:
+        iterate = next(stages, None)
+        if iterate is None:
             break
+        found = iterate.r
     return found
 
 

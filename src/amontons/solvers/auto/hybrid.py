@@ -13,6 +13,7 @@
     global form, M singular         semismooth Newton with a factor of the whole system;
                                     on a mesh `ContactMultigrid`; Newton on the natural map
     Nitsche's method                Newton, then proximal points (`newton.nitsche`)
+    large deformations              `NonlinearNewton`
 
 A mesh is what has levels or rigid modes (`FrictionProblem.levels`, `near_nullspace`).
 
@@ -27,7 +28,7 @@ When is W cheap (`GlobalMatrices.condensing_is_cheap`; it then also judges)?
                                     no; never where a body of LARGE_BODY unknowns has levels
 
 Whether to sweep or to take Newton steps is decided while solving, from the measured rate of the
-sweeps and operation counts of Newton (`Joints.newton_cost`, `Portfolio.costs`).
+sweeps and operation counts of Newton (`Joints.newton_cost`, `State.step_cost`).
 
 [ABD] V. Acary, M. Brémond, F. Dubois, CSMA 2017 (see `sweeps.gauss_seidel`).
 """
@@ -36,10 +37,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from itertools import islice
-from typing import ClassVar
-
-import numpy as np
+from typing import ClassVar, NamedTuple
 
 from ...core.errors import InvalidInput, SingularOperator
 from ...core.options import check_options
@@ -47,16 +45,28 @@ from ...linear import Direct
 from ...linear.blocks import spatial
 from ...linear.distributed import DistributedMatrix
 from ...problem.friction import Form, FrictionProblem
-from ...problem.judge.measures import Measure
 from ...problem.nitsche import NitscheProblem
-from ..contract import Breakdown, Iterate, Patience, Solver, Target, check_at_least
+from ...problem.protocol import Problem
+from ..contract import (
+    Breakdown,
+    Iterate,
+    Iterates,
+    Patience,
+    Solver,
+    Target,
+    check_at_least,
+    first_of,
+    sent,
+    taken_by,
+)
 from ..multigrid.cycles import ContactMultigrid
 from ..newton.functions import NaturalMap
-from ..newton.inexact import DeformablePortfolio
 from ..newton.nitsche import robust_iterates
+from ..newton.nonlinear import NonlinearNewton, NonlinearProblem
 from ..newton.semismooth import SemismoothNewton
 from ..sweeps.gauss_seidel import GaussSeidel
 from .compressed import CompressedDelassus
+from .portfolio import FIRST, JOINTS, Portfolio
 
 MESH = 3_000  # unknowns of a mesh from which multigrid beats a factorisation
 STALLED = 20  # iterates without halving the error after which Auto changes the method
@@ -77,78 +87,94 @@ class Hybrid:
 
     def iterates(
         self, problem: FrictionProblem, start: Iterate, target: Target
-    ) -> Iterator[Iterate]:
+    ) -> Iterates:
         """Iterates of `first`, then of `main`; condensed where one of them needs it."""
-        for iterate in islice(_run(self.first, problem, start, target), self.iterates_of_first):
-            start = iterate
-            yield iterate
-        yield from _run(self.main, problem, start, target)
+        first = _run(self.first, problem, start, target)
+        last = yield from first_of(first, self.iterates_of_first)
+        yield from first_of(_run(self.main, problem, last or start, target))
 
 
 def _run(
     solver: Solver, problem: FrictionProblem, start: Iterate, target: Target
 ) -> Iterator[Iterate]:
     """Iterates of a solver, on the condensed problem if it needs the Delassus form."""
-    if solver.form is Form.DELASSUS:
+    form = taken_by(solver).form
+    if form is Form.DELASSUS:
         problem = problem.condensed(target.deadline)
-    elif solver.form is Form.GLOBAL and problem.form is Form.DELASSUS:
+    elif form is Form.GLOBAL and problem.form is Form.DELASSUS:
         raise InvalidInput(f"{type(solver).__name__}: the problem has no global form")
-    return solver.iterates(problem, start, target)
+    return iter(solver.iterates(problem, start, target))
+
+
+class _Known(NamedTuple):
+    """An iterate and its error."""
+
+    iterate: Iterate
+    error: float
 
 
 @dataclass(frozen=True)
 class Auto:
     """Tries, watches the error, switches; see the table of this module."""
 
+    solves: ClassVar[tuple[type, ...]] = (FrictionProblem, NitscheProblem, NonlinearProblem)
     form: ClassVar[Form] = Form.ANY
     matrix_free: ClassVar[bool] = True
-    nitsche: ClassVar[bool] = True
+
+    def choice(self, problem: Problem) -> Auto | NonlinearNewton:
+        """The method of a problem that one alone solves, else itself."""
+        if isinstance(problem, FrictionProblem) or not isinstance(problem, NonlinearProblem):
+            return self
+        return NonlinearNewton()
 
     def iterates(
-        self, problem: FrictionProblem, start: Iterate, target: Target
-    ) -> Iterator[Iterate]:
+        self, problem: FrictionProblem | NitscheProblem, start: Iterate, target: Target
+    ) -> Iterates:
         """Iterates of one method after another, until nothing is left to try."""
-        if isinstance(problem, NitscheProblem):
+        if not isinstance(problem, FrictionProblem):
             yield from robust_iterates(problem, start, target)
             return
         if problem.contacts == 0:
             return
-        best = [start]
+        best = [_Known(start, target.start_error)]
         if _worth_multigrid(problem):
-            yield from _watched(ContactMultigrid(), problem, start, target, best)
+            yield from _watched(ContactMultigrid(), problem, best[0], target, best)
         problem = problem.assembled()
         if problem.form is Form.GLOBAL and not _regular(problem):
             yield from _held_by_contact(problem, start, target, best)
         elif problem.condensing_is_cheap:
-            yield from DeformablePortfolio(
-                problem.condensed(target.deadline), target, spatial(start.r)
-            ).stages()
+            yield from _stages(problem.condensed(target.deadline), start, target)
         else:
             yield from self._on_meshes(problem, target, best)
 
     def _on_meshes(
-        self, problem: FrictionProblem, target: Target, best: list[Iterate]
-    ) -> Iterator[Iterate]:
+        self, problem: FrictionProblem, target: Target, best: list[_Known]
+    ) -> Iterates:
         for solver in (CompressedDelassus(), SemismoothNewton()):
             yield from _watched(solver, problem, best[0], target, best)
         try:
             condensed = problem.condensed(target.deadline)
         except InvalidInput as reason:
             raise Breakdown(str(reason)) from reason
-        yield from DeformablePortfolio(condensed, target, spatial(best[0].r)).stages()
+        yield from _stages(condensed, best[0].iterate, target)
+
+
+def _stages(problem: FrictionProblem, start: Iterate, target: Target) -> Iterator[Iterate]:
+    return Portfolio(problem, target, spatial(start.r), JOINTS + FIRST).stages()
 
 
 def _held_by_contact(
-    problem: FrictionProblem, start: Iterate, target: Target, best: list[Iterate]
-) -> Iterator[Iterate]:
+    problem: FrictionProblem, start: Iterate, target: Target, best: list[_Known]
+) -> Iterates:
     """Newton on the whole system, M being singular; then multigrid, and Newton from there.
 
     Where contact just holds a body its branches may leave no stiffness against sliding.
     """
     whole = SemismoothNewton(linear=Direct())
-    yield from _watched(whole, problem, start, target, best)
+    begin = _Known(start, target.start_error)
+    yield from _watched(whole, problem, begin, target, best)
     if _is_mesh(problem):
-        yield from _watched(ContactMultigrid(), problem, start, target, best)
+        yield from _watched(ContactMultigrid(), problem, begin, target, best)
     natural = replace(whole, function=NaturalMap())
     yield from _watched(natural, problem, best[0], target, best)
 
@@ -178,22 +204,20 @@ def _regular(problem: FrictionProblem) -> bool:
 def _watched(
     solver: Solver,
     problem: FrictionProblem,
-    start: Iterate,
+    start: _Known,
     target: Target,
-    best: list[Iterate],
-) -> Iterator[Iterate]:
-    """Iterates of a solver until it breaks down or stalls; best[0] becomes the best of them."""
-    known = start.v is not None or problem.measure is Measure.EXACT
-    error = problem.error(start.r, start.v) if known else np.inf  # v would cost a linear solve
-    patience = Patience(STALLED, mark=error)
+    best: list[_Known],
+) -> Iterates:
+    """Iterates of a solver until it breaks down or stalls; best[0] becomes the best so far."""
+    patience = Patience(STALLED, mark=start.error)
+    iterates, judged = solver.iterates(problem, start.iterate, target), None
     try:
-        for iterate in solver.iterates(problem, start, target):
-            new = problem.error(iterate.r, iterate.v)
-            if new < error:
-                error, best[0] = new, iterate
-            stalled = patience.over(error)
-            yield iterate
-            if stalled:
+        while (iterate := sent(iterates, judged)) is not None:
+            judged = yield iterate
+            error = target.error(problem, iterate, judged)
+            if error < best[0].error:
+                best[0] = _Known(iterate, error)
+            if patience.over(error):
                 return
     except (Breakdown, SingularOperator):
         return

@@ -46,7 +46,9 @@ from numpy.typing import NDArray
 from ...core.compiled import njit
 from ...core.options import check_options
 from ...problem.friction import Form, FrictionProblem
-from ...problem.law.cones import Coulomb, Law, Tresca, with_de_saxce
+from ...problem.law import Law
+from ...problem.law.cones import with_de_saxce
+from ...problem.law.law import BOUND, MU, given
 from ..contract import Iterate, Target, check_at_least, check_positive
 from .motion import in_identity, in_stiffness
 
@@ -99,31 +101,30 @@ class AcceleratedGradient:
         metric = in_stiffness if self.metric is Metric.STIFFNESS else in_identity
         motion = metric(problem)
         law, restart = problem.law, self.restart is Restart.ADAPTIVE
-        coefficient, tresca = law.coefficient, isinstance(law, Tresca)
         norm = self.alpha * motion.gamma_squared
         weight, first = self.alpha * motion.weight, 1 / norm if norm > 0 else 1.0
         r = np.where((weight > 0)[:, None], start.r, 0.0)  # who can not react keeps r = 0
-        x = motion.start(r, start.v)
+        x = x_last = motion.start(r, start.v)
         u = ahead = motion.u(x)
         alpha, beta = weight, first
         while True:
             for _ in range(self.batch):
                 r_last, x_last, u_last = r, x, u
-                r = projected_step(r, alpha, ahead, u, coefficient, tresca)
+                r = projected_step(r, alpha, ahead, u, law.kind, law.parameters)
                 load = motion.load(r)
                 x = motion.step(x, load, beta)
                 u = motion.u(x)
                 theta = 1 / math.sqrt(1 + motion.omega * beta)
                 ahead, alpha, beta = u + theta * (u - u_last), alpha / theta, theta * beta
                 dr = r - r_last  # r at rest: short steps would keep v from following it
-                if restart and (not dr.any() or _climbs(motion.response(load), law, dr)):
+                if restart and (not dr.any() or _climbs(motion.response(load), law, r, dr)):
                     ahead, alpha, beta = u, weight, first
             change = motion.size(x - x_last)
             yield GradientIterate(r, motion.v(x), self.batch, change=change)
 
 
 @njit(cache=True, error_model="numpy")
-def projected_step(r, alpha, ahead, u, coefficient, tresca):  # noqa: PLR0913
+def projected_step(r, alpha, ahead, u, kind, parameters):  # noqa: PLR0913
     """P(r - alpha (û + mu |u_T| n)) of r, ahead = û and u, all (nc, d); alpha (nc,)."""
     out = np.empty_like(r)
     nc, d = r.shape
@@ -133,10 +134,12 @@ def projected_step(r, alpha, ahead, u, coefficient, tresca):  # noqa: PLR0913
             slip += u[i, k] * u[i, k]
             out[i, k] = r[i, k] - alpha[i] * ahead[i, k]
             pull += out[i, k] * out[i, k]
-        slip, pull, mu = math.sqrt(slip), math.sqrt(pull), coefficient[i]
-        normal = r[i, 0] - alpha[i] * (ahead[i, 0] + (0.0 if tresca else mu * slip))
+        fixed = given(kind[i], parameters[i], r[i, 0])
+        mu = parameters[i, BOUND] if fixed else parameters[i, MU]
+        slip, pull = math.sqrt(slip), math.sqrt(pull)
+        normal = r[i, 0] - alpha[i] * (ahead[i, 0] + (0.0 if fixed else mu * slip))
         scale = 1.0
-        if tresca:
+        if fixed:
             normal = max(normal, 0.0)
             scale = mu / pull if pull > mu else 1.0
         elif mu * pull <= -normal:
@@ -150,6 +153,7 @@ def projected_step(r, alpha, ahead, u, coefficient, tresca):  # noqa: PLR0913
     return out
 
 
-def _climbs(u: Array, law: Law, dr: Array) -> bool:
-    """Whether a step dr went against the gradient u + mu |u_T| n."""
-    return np.vdot(with_de_saxce(u, law.mu) if isinstance(law, Coulomb) else u, dr) > 0
+def _climbs(u: Array, law: Law, r: Array, dr: Array) -> bool:
+    """Whether a step dr went against the gradient u + mu |u_T| n at r."""
+    mu = np.where(law.given(r), 0.0, law.parameters[:, MU])
+    return bool(np.vdot(with_de_saxce(u, mu), dr) > 0)

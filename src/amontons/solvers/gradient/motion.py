@@ -36,16 +36,8 @@ class Motion(Protocol):
 
     problem: FrictionProblem
     omega: float
-
-    @property
-    def weight(self) -> Array:
-        """alpha of each contact relative to the option, (nc,)."""
-        ...
-
-    @property
-    def gamma_squared(self) -> float:
-        """Square of the norm of H^T between the metrics of v and of r weighted so."""
-        ...
+    weight: Array  # (nc,): alpha of each contact relative to the option
+    gamma_squared: float  # square of the norm of H^T between the metrics of v and of r so
 
     def start(self, r: Array, v: Array | None) -> Array:
         """x of v, or in equilibrium with r where there is none."""
@@ -92,7 +84,7 @@ def in_identity(problem: FrictionProblem) -> Motion:
 
 
 @dataclass(frozen=True, eq=False)
-class _Local:
+class _Local(Motion):
     """Metric M in the Delassus form: x is u, flat."""
 
     problem: FrictionProblem
@@ -161,7 +153,7 @@ class _Stiffness(_Local):
 
 
 @dataclass(frozen=True, eq=False)
-class _Identity:
+class _Identity(Motion):
     """Metric 1: x is v, a factor of 1 + beta M in each step."""
 
     problem: FrictionProblem
@@ -196,6 +188,7 @@ class _Identity:
         return self.problem.f + self.problem.H @ r.ravel()
 
     def step(self, x: Array, load: Array, beta: float) -> Array:
+        assert self.problem.M is not None
         matrix = beta * self.problem.M + sparse.eye_array(x.size, format="csc")
         return Direct().factor(sparse.csc_array(matrix)).solve(x + beta * load)
 
@@ -212,14 +205,18 @@ class _Identity:
         return float(np.linalg.norm(x))
 
 
+def _modes(problem: FrictionProblem) -> tuple[Array, Array]:
+    """Eigenvalues and eigenvectors of M."""
+    assert problem.M is not None
+    return np.linalg.eigh(dense(problem.M, 2, "M"))
+
+
 class _Modes(_Identity):
     """Metric 1 with the modes of M: x are their amplitudes, and a step is a product with H."""
 
     @cached_property
     def _modes(self) -> tuple[Array, Array]:
-        M = self.problem.M
-        assert M is not None
-        return self.problem.kept("modes", lambda: np.linalg.eigh(dense(M, 2, "M")))
+        return self.problem.kept(_modes)
 
     @cached_property
     def _directions(self) -> Array:
@@ -230,6 +227,7 @@ class _Modes(_Identity):
     @cached_property
     def _steady(self) -> Array:
         """V^T f, (n,)."""
+        assert self.problem.f is not None
         return self._modes[1].T @ self.problem.f
 
     @cached_property
@@ -269,6 +267,7 @@ def _largest(product: Callable[[Array], Array], size: int) -> float:
     operator = sparse_linalg.LinearOperator((size, size), matvec=product, dtype=float)
     start = np.random.default_rng(0).standard_normal(size)
     values = sparse_linalg.eigsh(
-        operator, k=1, v0=start, tol=NORM_ERROR, return_eigenvectors=False
-    )
+        operator, k=1, v0=start, return_eigenvectors=False,
+        tol=NORM_ERROR,  # type: ignore[arg-type]  # scipy: tol=0 reads as an int
+    )  # fmt: skip
     return SAFETY * float(values[0])

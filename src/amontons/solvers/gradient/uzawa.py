@@ -40,7 +40,8 @@ from ...core.errors import InvalidInput, SingularOperator
 from ...core.options import check_options
 from ...linear import Direct, LinearSolver
 from ...problem.friction import Form, FrictionProblem
-from ...problem.law.cones import Coulomb, Law, project_disk, project_disk_jacobian
+from ...problem.law import Law
+from ...problem.law.cones import project_disk, project_disk_jacobian
 from ..augmentation import RhoStrategy, augmentation
 from ..contract import Breakdown, Iterate, Target, check_at_least, check_positive
 from ..newton.functions import columns
@@ -84,7 +85,7 @@ class Uzawa:
         check_options(self)
         check_positive(rho=self.rho)
         if not 1 <= self.growth < np.inf:
-            raise InvalidInput(f"growth: expected a number >= 1, got {self.growth}")
+            raise InvalidInput(f"expected a number >= 1, got {self.growth}", ("growth",))
         if self.newton_tolerance is not None:
             check_positive(newton_tolerance=self.newton_tolerance)
         check_at_least(1, newton_steps=self.newton_steps)
@@ -128,6 +129,7 @@ class Uzawa:
         Where time is up, what they have reached.
         """
         values: list[float] = []
+        p, count = multiplier, 0
         for count in range(self.newton_steps + 1):
             p, B = springs.reaction(multiplier, state.u)
             values.append(system.residual(state, p))
@@ -186,8 +188,7 @@ class _Springs:
         in_t, in_radius = project_disk_jacobian(x[:, 1:], radius)
         slope = np.zeros((*x.shape, x.shape[1]))
         slope[:, 0, 0], slope[:, 1:, 1:] = closed, in_t
-        if isinstance(self.law, Coulomb):
-            slope[:, 1:, 0] = in_radius * (self.law.mu * closed)[:, None]
+        slope[:, 1:, 0] = in_radius * self.law.bound_slope(x)[:, None]
         return self.admissible(p), slope * np.where(self.able, self.rho, 0.0)[:, None, :]
 
 

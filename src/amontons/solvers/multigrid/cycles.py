@@ -39,9 +39,18 @@ from numpy.typing import NDArray
 from ...core.errors import UnsupportedForm
 from ...core.options import check_options
 from ...linear.grid import GridBlocks
+from ...linear.hierarchy import Hierarchy
 from ...problem.friction import Form, FrictionProblem
 from ..anderson import Anderson
-from ..contract import Breakdown, Iterate, Patience, Target, check_at_least, check_positive
+from ..contract import (
+    Breakdown,
+    Iterate,
+    Iterates,
+    Patience,
+    Target,
+    check_at_least,
+    check_positive,
+)
 from .levels import ContactLevels
 from .nodes import ContactNodes
 
@@ -50,7 +59,7 @@ MANY = 0.01  # share of contacts that change their state above which Anderson fo
 GROWTH = 1e3  # of the error over the best one that counts as divergence
 GRID_DEPTH = 3  # past cycles to mix at most where M is not stored
 SLOW = 0.5  # fall of the error in a cycle above which, while states change, steps are limited
-CLOSE = 0.9  # share of the tolerance at which an iterate is handed to the judge
+CLOSE = 0.9  # share of the error that should do at which an iterate is handed out
 
 
 @dataclass(frozen=True)
@@ -82,34 +91,39 @@ class ContactMultigrid:
 
     def iterates(
         self, problem: FrictionProblem, start: Iterate, target: Target
-    ) -> Iterator[Iterate]:
+    ) -> Iterates:
         """States of the finest level, when they seem good enough and every `report` cycles."""
         if problem.form is not Form.GLOBAL:
             raise UnsupportedForm("ContactMultigrid: the problem has no global form")
         if not problem.contacts:
             return
         levels = ContactLevels.of(problem)
-        run = _Run(levels, self, levels.finest(problem), 0)
+        tangent = levels.truncation.tangent()
+        run = _Run(levels, tangent, self, levels.finest(problem), 0)
         x = levels.start(problem, start)
         if self.nested and start.v is None:
-            self._nested_start(levels, problem, x)
+            self._nested_start(levels, tangent, problem, x)
         goal, since = CLOSE * target.tolerance, 0
         for error in run.cycles(x):
             since += 1
             ready = error <= goal
-            if ready or since >= self.report or target.deadline.passed:
-                yield Iterate(
-                    run.contacts.r[:, : problem.dimension].copy(),
-                    levels.displacement(x),
-                    iterations=since,
-                    linear_iterations=since,
-                    stage="contact multigrid",
-                )
-                since = 0
-            if ready:
-                goal *= 0.3  # the judge was not content
+            if not (ready or since >= self.report or target.deadline.passed):
+                continue
+            iterate = Iterate(
+                run.contacts.r[:, : problem.dimension].copy(),
+                levels.displacement(x),
+                iterations=since,
+                linear_iterations=since,
+                stage="contact multigrid",
+            )
+            judged, since = (yield iterate), 0
+            if ready:  # the error that would have been small enough
+                told = target.error(problem, iterate, judged)
+                goal = CLOSE * error * min(target.tolerance / told, 1.0) if told > 0 else 0.0
 
-    def _nested_start(self, levels: ContactLevels, problem: FrictionProblem, x: Array) -> None:
+    def _nested_start(
+        self, levels: ContactLevels, tangent: Hierarchy, problem: FrictionProblem, x: Array
+    ) -> None:
         """Add to x what the coarser levels find, from the coarsest one up."""
         coarse = levels.coarse_problems(problem, x)
         correction: Array | None = None
@@ -117,8 +131,9 @@ class ContactMultigrid:
             contacts, f = coarse[k - 1]
             y = np.zeros_like(f)
             if correction is not None:
-                levels.hierarchy.levels[k].P.add(correction, y)  # type: ignore[union-attr]
-            run = _Run(levels, self, (contacts, f, *levels.coarse_scales(k, f, problem)), k)
+                levels.hierarchy.levels[k].P.add(correction, y)
+            given = (contacts, f, *levels.coarse_scales(k, f, problem))
+            run = _Run(levels, tangent, self, given, k)
             try:
                 for error in run.cycles(y):
                     if error <= self.coarse_tolerance:
@@ -127,23 +142,26 @@ class ContactMultigrid:
                 pass
             correction = y
         if correction is not None:
-            levels.hierarchy.levels[0].P.add(correction, x)  # type: ignore[union-attr]
+            levels.hierarchy.levels[0].P.add(correction, x)
 
 
 class _Run:
-    """Cycles on level k as the finest one, for given contacts, load (nodes, 3) and scales."""
+    """Cycles on level k as the finest one, for given contacts, load (nodes, 3) and scales.
+
+    tangent: the levels of this solve, which the runs of its nested start use before.
+    """
 
     def __init__(
         self,
         levels: ContactLevels,
+        tangent: Hierarchy,
         options: ContactMultigrid,
         given: tuple[ContactNodes, Array, float, float],
         k: int,
     ) -> None:
-        self.levels, self.options, self.k = levels, options, k
+        self.levels, self.tangent, self.options, self.k = levels, tangent, options, k
         self.contacts, self.f, self.load, self.length = given
-        self.hierarchy = levels.hierarchy
-        self.level = self.hierarchy.levels[k]
+        self.level = levels.hierarchy.levels[k]
         self.held = np.zeros(self.level.A.nodes, dtype=bool)
         self.held[self.contacts.node] = True
         self.change: Array | None = None
@@ -161,7 +179,6 @@ class _Run:
         before = np.empty_like(x)
         best = at_update = last = np.inf
         patience = Patience(self.options.patience)
-        self.levels.take(self)
         while True:
             before[:] = x
             self.smooth(x, backward=False)
@@ -194,7 +211,7 @@ class _Run:
         self.level.A.smooth(self.f, x, self.held, backward)
 
     def error(self, x: Array) -> float:
-        """What the judge will say, from the residual of x, which is kept."""
+        """The residual measure of `judge`, from the residual of x, which is kept."""
         self.level.A.residual(x, self.f, self.r)
         law = self.contacts.natural_map(x, self.r)
         kept = self.r[self.contacts.node]
@@ -208,24 +225,24 @@ class _Run:
         self.frozen = frozen
         contacts = self.contacts.frozen() if frozen else self.contacts
         self.change = self.levels.truncation.change(self.k, contacts, *contacts.tangent())
-        self.levels.truncation.install(self.k, self.change)
+        self.levels.truncation.install(self.tangent, self.k, self.change)
         self.states = self.contacts.state.copy()
         self.updates += 1
 
     def correct(self, x: Array, contacts: ContactNodes | None = None) -> None:
         """x += V P (one V-cycle) on the rows of the tangent; exactly on the coarsest level."""
-        self.levels.take(self)
         contacts = contacts or self.contacts
         V, W, _ = contacts.tangent()  # the slip of now, or the solution would not rest
         contacts.combine(W, self.r)
         P = self.level.P
         before = x[contacts.node]
         if P is None:
+            assert self.change is not None
             x += self.levels.truncation.solve(self.k, self.change, self.r)
         else:
-            coarse = self.hierarchy.levels[self.k + 1]
+            coarse = self.tangent.levels[self.k + 1].work
             P.restrict(self.r, coarse.b)
-            self.hierarchy.cycle(self.k + 1, coarse.b, coarse.x)
+            self.tangent.cycle(self.k + 1, coarse.b, coarse.x)
             P.add(coarse.x, x)
         contacts.limit(V, before, x)
 

@@ -11,9 +11,10 @@ from scipy import sparse
 from ...linear.blocks import spatial
 from ...linear.hierarchy import Hierarchy, Level, Nodes
 from ...linear.node_blocks import NodeBlocks
+from ...linear.patched import PatchedBlocks
 from ...linear.transfer import Transfer
 from ...problem.friction import FrictionProblem
-from ...problem.law.cones import Law, Tresca
+from ...problem.law.law import BOUND
 from ...problem.one_sided import OneSided, one_sided
 from ..contract import Breakdown, Iterate
 from .nodes import ContactNodes
@@ -43,12 +44,13 @@ class ContactLevels:
     @classmethod
     def of(cls, problem: FrictionProblem) -> ContactLevels:
         """Prepared once for all variants; raises Breakdown where the structure is missing."""
-        return problem.kept("contact multigrid", lambda: _prepare(problem))
+        return problem.kept(_prepare)
 
     # ------------------------------------------------------------------ the finest level
     def finest(self, problem: FrictionProblem) -> tuple[ContactNodes, Array, float, float]:
         """Contacts under the problem's law, load (nodes, 3), sizes of load and of u."""
-        contacts = _under(self.contacts, problem.law, spatial(problem.w), problem.rho)
+        assert problem.w is not None and problem.f is not None
+        contacts = self.contacts.under(problem.law, spatial(problem.w), problem.rho)
         f = self.nodes.spread(self.basis.to_load(problem.f))
         load, length = problem.scales
         return contacts, f, max(load, TINY), max(length, TINY)
@@ -74,15 +76,16 @@ class ContactLevels:
         """
         if not self.coarse:
             return []
+        assert problem.w is not None and problem.f is not None
         levels = self.hierarchy.levels
         f = self.nodes.spread(self.basis.to_load(problem.f))
         product = np.empty_like(f)
-        self.hierarchy.reclaim()
         levels[0].A.times(x, product)
         f -= product
         w = spatial(problem.w) + np.einsum("kai,ka->ki", self.contacts.H, x[self.contacts.node])
         bound = np.zeros(levels[0].A.nodes)
-        bound[self.contacts.node] = problem.law.coefficient
+        bound[self.contacts.node] = problem.law.parameters[:, BOUND]
+        bound[~np.isfinite(bound)] = 0.0
         out = []
         for k, (kept, contacts) in enumerate(self.coarse):
             P = levels[k].P
@@ -90,10 +93,8 @@ class ContactLevels:
             restricted = np.zeros((P.coarse, 3))
             P.restrict(f, restricted)
             bound = P.scalar().T @ bound
-            law = problem.law.at(kept)
-            if isinstance(law, Tresca):
-                law = Tresca(bound[contacts.node])
-            out.append((_under(contacts, law, w[kept], contacts.rho), restricted))
+            law = problem.law.at(kept).with_bounds(bound[contacts.node])
+            out.append((contacts.under(law, w[kept], contacts.rho), restricted))
             f = restricted
         return out
 
@@ -104,32 +105,20 @@ class ContactLevels:
         size = float(np.linalg.norm(f))
         return max(size if size > 0 else load, TINY), max(length * np.sqrt(share), TINY)
 
-    def take(self, run) -> None:
-        """Let the coarse matrices hold the tangent of this run."""
-        if self.hierarchy.owner is run:
-            return
-        self.hierarchy.reclaim()
-        if run.change is not None:
-            self.truncation.install(run.k, run.change)
-        self.hierarchy.owner, self.hierarchy.undo = run, self.truncation.restore
-
-
-def _under(contacts: ContactNodes, law: Law, w: Array, rho: Array) -> ContactNodes:
-    """The contacts with a law and gaps, without states."""
-    return contacts.with_law(w, law.coefficient, isinstance(law, Tresca), rho)
-
 
 def _prepare(problem: FrictionProblem) -> ContactLevels:
     basis = one_sided(problem)
     if basis is None:
-        raise Breakdown("contact multigrid: a contact has no slave node of its own")
+        raise Breakdown(
+            "contact multigrid: a contact has no slave node of its own, or an orthotropic law"
+        )
     hierarchy = problem.hierarchy
     if hierarchy is None:
         raise Breakdown("contact multigrid: the unknowns do not come in nodes")
-    hierarchy.reclaim()
     if basis.coupling is not None:
         hierarchy = _in_basis(hierarchy, basis)
     A = hierarchy.levels[0].A
+    assert not isinstance(A, PatchedBlocks)
     contacts = ContactNodes.of(basis, hierarchy.nodes, A)
     if contacts is None:
         raise Breakdown("contact multigrid: the contacts do not sit on nodes of their own")
@@ -150,9 +139,10 @@ def _in_basis(hierarchy: Hierarchy, basis: OneSided) -> Hierarchy:
     """
     nodes = hierarchy.nodes
     place = None if nodes.plain else nodes.place
-    levels = [Level(NodeBlocks.from_sparse(basis.M, place, nodes.count))]
+    A = NodeBlocks.from_sparse(basis.M, place, nodes.count)
+    levels = [Level(A)]
     size = 3 * nodes.count
-    C = basis.coupling.tocoo()  # type: ignore[union-attr]
+    C = basis.coupling.tocoo()
     entries = (C.data, (nodes.place[C.coords[0]], nodes.place[C.coords[1]]))
     coupling = sparse.coo_array(entries, shape=(size, size)).tocsr()
     for k, old in enumerate(hierarchy.levels[1:]):
@@ -161,7 +151,8 @@ def _in_basis(hierarchy: Hierarchy, basis: OneSided) -> Hierarchy:
         if coupling.nnz:
             P, coupling = _between_bases(P, coupling, geometric=k + 1 < hierarchy.geometric)
         levels[-1].P = P
-        levels.append(Level(P.galerkin(levels[-1].A), old.P))
+        A = P.galerkin(A)
+        levels.append(Level(A, old.P))
     return Hierarchy(levels, hierarchy.geometric, nodes)
 
 
@@ -213,7 +204,7 @@ def _coarse_contacts(
     kept = np.arange(len(contacts.node))
     for k in range(1, hierarchy.geometric):
         P, A = hierarchy.levels[k - 1].P, hierarchy.levels[k].A
-        assert P is not None
+        assert P is not None and not isinstance(A, PatchedBlocks)
         if len(P.blocks):
             break
         parent = _parent(P, contacts.node)
@@ -226,7 +217,7 @@ def _coarse_contacts(
     return out
 
 
-def _parent(P: Transfer, node: Index) -> Index:
+def _parent(P: Transfer, node: NDArray[np.integer]) -> Index:
     """The coarse node that a fine node is, -1 where it is none."""
     first = P.indptr[node]
     single = np.diff(P.indptr)[node] == 1

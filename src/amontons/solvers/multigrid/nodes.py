@@ -16,9 +16,11 @@ The tangent at the states found, in the displacements of the node, n and T the c
                                                                              T (1 - t t^T) T^T
     open, Tresca slip    1              1                                    the same
     open, Tresca stick   n n^T          n n^T                                0
+    closed, slip, given  1 - n n^T      V                                    the same
 
 t: direction of slip as a vector of the node.  The test space of Coulomb slip holds all
-directions in which a force r_N (n - mu t) does no work.  Under Tresca's law W = V.
+directions in which a force r_N (n - mu t) does no work.  Where the bound is given, under
+Tresca's law and at a cap (`Law.given`), W = V.
 
 A tangent that a support drives (`driven`) has no column in H and no row in W; its part of r
 moves nothing and is the friction that the law gives for u.
@@ -27,6 +29,7 @@ moves nothing and is the friction that the law gives for u.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numba import uint64
@@ -37,21 +40,23 @@ from ...linear.grid import GridBlocks
 from ...linear.hierarchy import Nodes
 from ...linear.node_blocks import NodeBlocks, row_product
 from ...problem.judge.measures import contact_residual
-from ...problem.law.one_contact import OPEN, SLIP, solve_contact
+from ...problem.law import Law, Tresca
+from ...problem.law.law import BOUND, MU, TRESCA, given
+from ...problem.law.single import solve_contact
+from ...problem.law.states import OPEN, SLIP, STICK
 from ...problem.one_sided import HELD, OneSided
 from ..driven import moves
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-FREE, SLIDING, STUCK = 0, 1, 2  # of the tangential motion
-CLOSED = 3  # is added to it: a state is one number from 0 to 5
+CLOSED = 3  # is added to the status of the tangential motion: a state is from 0 to 5
 HALVINGS = 10  # of the interval of a step length
 STIFF = 1e3  # L stays below this multiple of the node's own stiffness
 
 
 @dataclass(eq=False)
 class ContactNodes:
-    """Contacts at nodes: node (nc,), H (nc, 3, 3), w (nc, 3), coefficient (nc,), Tresca or not.
+    """Contacts at nodes: node (nc,), H (nc, 3, 3), w (nc, 3), and their law.
 
     inverse, compliance, to_reaction (nc, 3, 3): A_pp^-1, H^T A_pp^-1 H and H^-1; rho (nc,): of
     the judge; rows: of the matrix, see `NodeBlocks.entries`.  State of the iteration: r, u
@@ -66,8 +71,7 @@ class ContactNodes:
     rho: Array
     rows: tuple[Index, Index, NDArray[np.int32], Array]
     w: Array = field(default_factory=lambda: np.zeros((0, 3)))
-    coefficient: Array = field(default_factory=lambda: np.zeros(0))
-    tresca: bool = False
+    law: Law = field(default_factory=lambda: Tresca(np.zeros(0)))
     driven: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 3), dtype=bool))
     r: Array = field(init=False)
     u: Array = field(init=False)
@@ -85,23 +89,24 @@ class ContactNodes:
         size = np.linalg.norm(compliance, 2, axis=(1, 2)) if len(node) else np.zeros(0)
         k, i = np.nonzero(np.abs(H).max(axis=1, initial=0.0) == 0)  # the second tangent in 2D
         compliance[k, i, i] = 1.0
-        rows = A.entries(node)
-        return cls(node, H, inverse, compliance, np.linalg.pinv(H), 1 / size, rows)
+        back: Any = np.linalg.pinv(H)
+        return cls(node, H, inverse, compliance, back, 1 / size, A.entries(node))
 
-    def at(self, chosen: NDArray[np.bool_], node: Index, A: NodeBlocks) -> ContactNodes:
+    def at(
+        self, chosen: NDArray[np.bool_], node: Index, A: NodeBlocks | GridBlocks
+    ) -> ContactNodes:
         """Some of the contacts at nodes (k,) of another level."""
         return ContactNodes.at_nodes(node, self.H[chosen], A)
 
-    def with_law(self, w: Array, coefficient: Array, tresca: bool, rho: Array) -> ContactNodes:
-        """The contacts under a law, without states."""
+    def under(self, law: Law, w: Array, rho: Array) -> ContactNodes:
+        """The contacts with a law and gaps, without states."""
         driven = (np.abs(self.H).max(axis=1, initial=0.0) == 0) & moves(w)
         compliance = self.compliance
         if driven.any():
             compliance = compliance.copy()
             k, i = np.nonzero(driven)
             compliance[k, i, i] = 0.0
-        return replace(self, w=w, coefficient=coefficient, tresca=tresca, rho=rho,
-                       driven=driven, compliance=compliance)  # fmt: skip
+        return replace(self, w=w, law=law, rho=rho, driven=driven, compliance=compliance)
 
     @classmethod
     def of(
@@ -124,7 +129,8 @@ class ContactNodes:
         """Solve every contact once in turn; r, u and state are those of these solves."""
         _sweep(
             *self.rows, self.node, self.H, self.inverse, self.compliance,
-            self.w, self.coefficient, self.tresca, f, x, self.r, self.u, self.state, backward,
+            self.w, self.law.kind, self.law.parameters, f, x, self.r, self.u, self.state,
+            backward,
         )  # fmt: skip
 
     def natural_map(self, x: Array, residual: Array) -> float:
@@ -133,7 +139,7 @@ class ContactNodes:
         r and u are set; unlike in `sweep` they are those of one state x.
         """
         return _natural_map(
-            self.node, self.H, self.to_reaction, self.w, self.coefficient, self.tresca,
+            self.node, self.H, self.to_reaction, self.w, self.law.kind, self.law.parameters,
             self.rho, self.driven, x, residual, self.r, self.u,
         )  # fmt: skip
 
@@ -141,7 +147,7 @@ class ContactNodes:
         """V, W and L, each (nc, 3, 3), at the present states."""
         V, W, L = (np.empty_like(self.H) for _ in range(3))
         size = STIFF / np.abs(self.inverse).max(axis=(1, 2))
-        _tangent(self.H, self.coefficient, self.tresca, self.r, self.u, self.state, size,
+        _tangent(self.H, self.law.kind, self.law.parameters, self.r, self.u, self.state, size,
                  V, W, L)  # fmt: skip
         return V, W, L
 
@@ -151,12 +157,10 @@ class ContactNodes:
         x[self.node] = before + np.einsum("kab,kb->ka", V, moved)
 
     def frozen(self) -> ContactNodes:
-        """The same states under Tresca's law with the present bounds of Coulomb's."""
-        if self.tresca:
+        """The same states under Tresca's law with the present bounds."""
+        if isinstance(self.law, Tresca):
             return self
-        out = replace(
-            self, coefficient=self.coefficient * np.maximum(self.r[:, 0], 0.0), tresca=True
-        )
+        out = replace(self, law=Tresca(self.law.bound(self.r)))
         out.r, out.u, out.state = self.r, self.u, self.state
         return out
 
@@ -172,12 +176,13 @@ class ContactNodes:
         E'(a) = a stiffness - force + sum of bound |u_T + a d_T|'; under Tresca's law.
         """
         d = np.einsum("cai,ca->ci", self.H[:, :, 1:], step[self.node])
+        bound = self.law.bound(self.r)
 
         def slope(a: float) -> float:
             u = self.u[:, 1:] + a * d
             size = np.linalg.norm(u, axis=1)
             work = np.einsum("ci,ci->c", u, d) / np.where(size > 0, size, 1.0)
-            return a * stiffness - force + float(self.coefficient @ work)
+            return a * stiffness - force + float(bound @ work)
 
         if slope(1.0) <= 0:
             return 1.0
@@ -189,12 +194,12 @@ class ContactNodes:
 
     def combine(self, W: Array, residual: Array) -> None:
         """The rows of contacts become W^T of (law's force - force), in place."""
-        _combine(self.node, self.H, self.coefficient, self.tresca, self.u, self.state, W,
-                 residual)  # fmt: skip
+        _combine(self.node, self.H, self.law.kind, self.law.parameters, self.r, self.u,
+                 self.state, W, residual)  # fmt: skip
 
 
 @njit(cache=True, error_model="numpy")
-def _sweep(first, last, indices, data, node, H, inverse, compliance, w, coefficient, tresca,
+def _sweep(first, last, indices, data, node, H, inverse, compliance, w, kind, parameters,
            f, x, r, u, state, backward):  # noqa: PLR0913 # fmt: skip
     y, b = np.empty(3), np.empty(3)
     for step in range(len(node)):
@@ -208,10 +213,10 @@ def _sweep(first, last, indices, data, node, H, inverse, compliance, w, coeffici
             )
         for i in range(3):
             b[i] = w[c, i] + H[c, 0, i] * y[0] + H[c, 1, i] * y[1] + H[c, 2, i] * y[2]
-        r0, r1, r2, kind = solve_contact(
-            compliance[c], b[0], b[1], b[2], coefficient[c], tresca, r[c, 1], r[c, 2]
+        r0, r1, r2, status = solve_contact(
+            compliance[c], b[0], b[1], b[2], kind[c], parameters[c], r[c, 1], r[c, 2]
         )
-        state[c] = _code(kind, r1, r2, coefficient[c], tresca)
+        state[c] = _code(status, r1, r2, kind[c], parameters[c, BOUND])
         r[c, 0], r[c, 1], r[c, 2] = r0, r1, r2
         g0 = H[c, 0, 0] * r0 + H[c, 0, 1] * r1 + H[c, 0, 2] * r2
         g1 = H[c, 1, 0] * r0 + H[c, 1, 1] * r1 + H[c, 1, 2] * r2
@@ -226,17 +231,19 @@ def _sweep(first, last, indices, data, node, H, inverse, compliance, w, coeffici
 
 
 @njit(cache=True, error_model="numpy")
-def _code(kind, r1, r2, coefficient, tresca):
+def _code(status, r1, r2, kind, bound):
     """The state as one number."""
-    if kind != OPEN:
-        return CLOSED + (SLIDING if kind == SLIP else STUCK)
-    if not tresca or coefficient == 0.0:
-        return FREE
-    return SLIDING if r1 * r1 + r2 * r2 >= 0.999999 * coefficient * coefficient else STUCK
+    if status != OPEN:
+        return CLOSED + status
+    if kind != TRESCA or bound == 0.0:
+        return OPEN
+    return SLIP if r1 * r1 + r2 * r2 >= 0.999999 * bound * bound else STICK
 
 
 @njit(cache=True, error_model="numpy")
-def _natural_map(node, H, to_reaction, w, coefficient, tresca, rho, driven, x, residual, r, u):  # noqa: PLR0913
+def _natural_map(  # noqa: PLR0913
+    node, H, to_reaction, w, kind, parameters, rho, driven, x, residual, r, u
+):
     total = 0.0
     for c in range(len(node)):
         p = node[c]
@@ -249,15 +256,17 @@ def _natural_map(node, H, to_reaction, w, coefficient, tresca, rho, driven, x, r
             u[c, i] = s
             r[c, i] = force
         if driven[c, 1] or driven[c, 2]:
-            bound = coefficient[c] if tresca else coefficient[c] * max(r[c, 0], 0.0)
+            bound = parameters[c, MU] * max(r[c, 0], 0.0)
+            if given(kind[c], parameters[c], r[c, 0]):
+                bound = parameters[c, BOUND]
             slip = np.sqrt(u[c, 1] ** 2 + u[c, 2] ** 2)
             for i in range(1, 3):
                 if driven[c, i] and slip > 0.0:
                     r[c, i] = -bound * u[c, i] / slip
         if rho[c] > 0.0:
             e0, e1, e2 = contact_residual(
-                r[c, 0], r[c, 1], r[c, 2], u[c, 0], u[c, 1], u[c, 2], rho[c], coefficient[c],
-                tresca,
+                r[c, 0], r[c, 1], r[c, 2], u[c, 0], u[c, 1], u[c, 2], rho[c], kind[c],
+                parameters[c],
             )  # fmt: skip
             total += max(e0 * e0 + e1 * e1 + e2 * e2, 0.25 * min(u[c, 0], 0.0) ** 2)
     return np.sqrt(total)
@@ -277,7 +286,7 @@ def _slip_vector(H, u):
 
 
 @njit(cache=True, error_model="numpy")
-def _tangent(H, coefficient, tresca, r, u, state, size, V, W, L):  # noqa: PLR0913
+def _tangent(H, kind, parameters, r, u, state, size, V, W, L):  # noqa: PLR0913
     V[:], W[:], L[:] = 0.0, 0.0, 0.0
     n = np.empty(3)
     for c in range(len(H)):
@@ -288,23 +297,24 @@ def _tangent(H, coefficient, tresca, r, u, state, size, V, W, L):  # noqa: PLR09
         for a in range(3):
             for b in range(3):
                 one = 1.0 if a == b else 0.0
-                if motion == STUCK:
+                if motion == STICK:
                     V[c, a, b] = 0.0 if closed else n[a] * n[b]
                 else:
                     V[c, a, b] = one - n[a] * n[b] if closed else one
                 W[c, a, b] = V[c, a, b]
-        if motion != SLIDING:
+        if motion != SLIP:
             continue
         t, t1, t2, slip = _slip_vector(H[c], u[c])
-        bound = coefficient[c] if tresca else coefficient[c] * r[c, 0]
+        fixed, mu = given(kind[c], parameters[c], r[c, 0]), parameters[c, MU]
+        bound = parameters[c, BOUND] if fixed else mu * r[c, 0]
         if slip == 0.0 or not bound > 0.0:
             continue
-        if not tresca:
-            along = length - coefficient[c] * (t[0] * n[0] + t[1] * n[1] + t[2] * n[2])
+        if not fixed:
+            along = length - mu * (t[0] * n[0] + t[1] * n[1] + t[2] * n[2])
             for b in range(3):
                 tv = t[0] * V[c, 0, b] + t[1] * V[c, 1, b] + t[2] * V[c, 2, b]
                 for a in range(3):
-                    W[c, a, b] += n[a] * coefficient[c] * tv / along
+                    W[c, a, b] += n[a] * mu * tv / along
         curvature = min(bound / slip, size[c])
         for a in range(3):
             across = -t2 * H[c, a, 1] + t1 * H[c, a, 2]
@@ -313,16 +323,17 @@ def _tangent(H, coefficient, tresca, r, u, state, size, V, W, L):  # noqa: PLR09
 
 
 @njit(cache=True, error_model="numpy")
-def _combine(node, H, coefficient, tresca, u, state, W, residual):  # noqa: PLR0913
+def _combine(node, H, kind, parameters, r, u, state, W, residual):  # noqa: PLR0913
     for c in range(len(node)):
-        if state[c] == FREE:
+        if state[c] == OPEN:
             continue
         p = node[c]
         g0, g1, g2 = residual[p, 0], residual[p, 1], residual[p, 2]
-        if tresca and state[c] % CLOSED == SLIDING:
+        if state[c] % CLOSED == SLIP and given(kind[c], parameters[c], r[c, 0]):
             t, _, _, _ = _slip_vector(H[c], u[c])
-            g0 -= coefficient[c] * t[0]
-            g1 -= coefficient[c] * t[1]
-            g2 -= coefficient[c] * t[2]
+            bound = parameters[c, BOUND]
+            g0 -= bound * t[0]
+            g1 -= bound * t[1]
+            g2 -= bound * t[2]
         for a in range(3):
             residual[p, a] = W[c, 0, a] * g0 + W[c, 1, a] * g1 + W[c, 2, a] * g2

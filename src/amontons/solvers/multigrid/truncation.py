@@ -5,13 +5,15 @@ has entries only in rows and columns of contact nodes, the coarse matrices are
 
     A_k' = A_k + D_k,    D_k = P^T D_(k-1) P,
 
-so that an update touches the entries near the surface and nothing else.  Directions that the
-contacts hold altogether have neither row nor column left; they rest.
+so that an update touches the entries near the surface and nothing else: every solve has a copy
+of these rows, the others are those of the linear problem.  Directions that the contacts hold
+altogether have neither row nor column left; they rest.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numba import uint64
@@ -21,6 +23,7 @@ from ...core.compiled import njit
 from ...linear.grid import GridBlocks
 from ...linear.hierarchy import Hierarchy, inverse_at_rest
 from ...linear.node_blocks import NodeBlocks, block_inverse
+from ...linear.patched import PatchedBlocks, Rows
 from ...linear.transfer import Transfer
 from ..contract import Breakdown
 from .nodes import ContactNodes
@@ -34,8 +37,8 @@ class Near:
     """Entries of one level that the contacts change, m of them.
 
     slots (m,): their places in the data of A; row, column (m,); base (m, 3, 3): without
-    contacts; own (k,): which entries are diagonal blocks, base_inverse and size: of these;
-    row_idle, column_idle (m, 3): padding.
+    contacts; own (k,): which entries are diagonal blocks, size (k,): of these; row_idle,
+    column_idle (m, 3): padding; rows: those of A, places (m,): of the entries among theirs.
     """
 
     slots: Index
@@ -43,10 +46,11 @@ class Near:
     column: Index
     base: Array
     own: Index
-    base_inverse: Array
     size: Array
     row_idle: NDArray[np.bool_]
     column_idle: NDArray[np.bool_]
+    rows: Rows | None = None
+    places: Index | None = None
 
     @classmethod
     def of(cls, A: NodeBlocks, slots: Index, idle: NDArray[np.bool_]) -> Near:
@@ -56,8 +60,9 @@ class Near:
         own = np.flatnonzero(row == column)
         base = A.data[slots]
         size = np.abs(base[own]).max(axis=(1, 2), initial=0.0)
-        return cls(slots, row, column, base, own, A.inverse[row[own]], size, idle[row],
-                   idle[column])  # fmt: skip
+        rows = Rows.of(A, np.unique(row))
+        places = np.searchsorted(rows.slots, slots)
+        return cls(slots, row, column, base, own, size, idle[row], idle[column], rows, places)
 
     @classmethod
     def of_grid(cls, A: GridBlocks, nodes: Index, idle: NDArray[np.bool_]) -> Near:
@@ -73,18 +78,14 @@ class Near:
         )
         order = np.lexsort((column, row))
         row, column, none = row[order], column[order], np.empty(0, dtype=np.int64)
-        return cls(none, row, column, whole[order], none, none, none, idle[row], idle[column])
+        return cls(none, row, column, whole[order], none, np.empty(0), idle[row], idle[column])
 
-    def restore(self, A: NodeBlocks) -> None:
-        """The matrix without contacts."""
-        A.data[self.slots] = self.base
-        A.inverse[self.row[self.own]] = self.base_inverse
-
-    def put(self, A: NodeBlocks, change: Array) -> None:
+    def put(self, A: PatchedBlocks, change: Array) -> None:
         """The matrix with a change (m, 3, 3) of these entries."""
         changed = self.base + change
-        A.data[self.slots] = changed
-        A.inverse[self.row[self.own]] = block_inverse(changed[self.own], self.size)
+        A.data[self.places] = changed
+        own = A.rows.number[self.row[self.own]]
+        A.inverse[own] = block_inverse(changed[self.own], self.size)
 
     def mask(self, change: Array) -> None:
         """Leave out padding."""
@@ -98,27 +99,28 @@ class Truncation:
 
     def __init__(self, hierarchy: Hierarchy, contacts: list[Index]) -> None:
         self.hierarchy = hierarchy
-        self.coarse_inverse = hierarchy.coarse_inverse  # without contacts
         self.near: list[Near] = []
         self.products: list[Product] = []
-        slots = np.empty(0, dtype=np.int64)
+        slots: NDArray[Any] = np.empty(0, dtype=np.int64)
         for k, level in enumerate(hierarchy.levels):
-            grid = isinstance(level.A, GridBlocks)
-            if k < len(contacts) and not grid:
-                slots = np.union1d(slots, _touching(level.A, contacts[k]))
+            A = level.A
+            assert not isinstance(A, PatchedBlocks)
+            if k < len(contacts) and isinstance(A, NodeBlocks):
+                slots = np.union1d(slots, _touching(A, contacts[k]))
             idle = np.zeros(3 * level.A.nodes, dtype=bool)
             if level.P is not None:
                 idle[level.P.idle] = True
             elif k:
-                idle[hierarchy.levels[k - 1].P.coarse_idle] = True  # type: ignore[union-attr]
+                idle[hierarchy.levels[k - 1].P.coarse_idle] = True
             idle = idle.reshape(-1, 3)
-            if grid:
-                near = Near.of_grid(level.A, contacts[k], idle)
+            if isinstance(A, GridBlocks):
+                near = Near.of_grid(A, contacts[k], idle)
             else:
-                near = Near.of(level.A, slots, idle)
+                near = Near.of(A, slots, idle)
             self.near.append(near)
             if level.P is not None:
                 coarse = hierarchy.levels[k + 1].A
+                assert isinstance(coarse, NodeBlocks)
                 self.products.append(Product.of(level.P, near, coarse))
                 slots = np.unique(self.products[-1].target)
         for k, product in enumerate(self.products):
@@ -135,36 +137,35 @@ class Truncation:
         near.mask(out)
         return out
 
-    def install(self, k: int, change: Array) -> None:
+    def tangent(self) -> Hierarchy:
+        """Levels of one solve, without contacts so far."""
+        return self.hierarchy.patched([near.rows for near in self.near[1:]])  # type: ignore[misc]
+
+    def install(self, tangent: Hierarchy, k: int, change: Array) -> None:
         """Coarse levels below k for a change on level k, which itself stays as it is."""
-        levels = self.hierarchy.levels
+        levels = tangent.levels
         for j in range(k, len(levels) - 1):
             coarse = np.zeros_like(self.near[j + 1].base)
             P, product = levels[j].P, self.products[j]
             assert P is not None
             product.apply(P, self.near[j], change, coarse)
             self.near[j + 1].mask(coarse)
-            self.near[j + 1].put(levels[j + 1].A, coarse)
+            self.near[j + 1].put(levels[j + 1].A, coarse)  # type: ignore[arg-type]
             change = coarse
-        self.hierarchy.invert_coarsest()
+        if k < len(levels) - 1:
+            tangent.invert_coarsest()
 
     def solve(self, k: int, change: Array, b: Array) -> Array:
         """The solution of the tangent on level k, the coarsest one; b (nodes, 3)."""
         A, near = self.hierarchy.levels[k].A, self.near[k]
         matrix = A.dense().reshape(A.nodes, 3, A.nodes, 3)
-        np.add.at(matrix, (near.row, slice(None), near.column), change)
+        place: Any = near.row, slice(None), near.column
+        np.add.at(matrix, place, change)
         whole = matrix.reshape(3 * A.nodes, 3 * A.nodes)
-        size = np.abs(A.data[A.diagonal()]).max(axis=(1, 2))
+        size = np.abs(A.diagonal_blocks).max(axis=(1, 2))
         index = np.arange(A.nodes)
         inverse = inverse_at_rest(whole, matrix[index, :, index, :], size)
         return (inverse @ b.reshape(-1)).reshape(b.shape)
-
-    def restore(self) -> None:
-        """All levels without contacts; the finest is never changed."""
-        for near, level in zip(self.near[1:], self.hierarchy.levels[1:], strict=True):
-            if isinstance(level.A, NodeBlocks):
-                near.restore(level.A)
-        self.hierarchy.coarse_inverse = self.coarse_inverse
 
 
 def _touching(A: NodeBlocks, nodes: Index) -> Index:

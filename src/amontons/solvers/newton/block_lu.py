@@ -38,7 +38,7 @@ class Symbolic:
     @classmethod
     def of(cls, problem: FrictionProblem) -> Symbolic:
         """Order and fill of W, analysed once for all variants of a problem."""
-        return problem.kept("symbolic", lambda: analyse(problem.blocks))
+        return problem.kept(_analyse)
 
     @property
     def arrays(self) -> tuple[Any, ...]:
@@ -54,6 +54,10 @@ class Symbolic:
     def fill(self) -> int:
         """Blocks stored in L and U together, without the diagonal."""
         return 2 * len(self.upper)
+
+
+def _analyse(problem: FrictionProblem) -> Symbolic:
+    return analyse(problem.blocks)
 
 
 def analyse(blocks: BlockRows) -> Symbolic:

@@ -16,7 +16,8 @@ the cone, x + t e and y + t e with t -> 0, which replaces the ratio along (1, -s
 at x = y = 0 it is (1 - 1/sqrt 2) I.  Each is an element of the generalised Jacobian.
 
 A contact without friction has the scalar function of (r_N, rho u_N) and the rows F_T = r_T;
-under Tresca's law F_T is that of the disc, as in `functions`.  One rho per contact.
+under Tresca's law F_T is that of the disc, as in `functions`; under others F is Alart and
+Curnier's.  One rho per contact.
 
 [FLT] M. Fukushima, Z.-Q. Luo, P. Tseng, "Smoothing functions for second-order-cone
 complementarity problems", SIAM J. Optim. 12 (2002).
@@ -30,8 +31,10 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...problem.law.cones import Law, Tresca, project_disk, project_disk_jacobian, with_de_saxce
-from .functions import Linearised, one_per_contact
+from ...problem.law import Law
+from ...problem.law.cones import project_disk, project_disk_jacobian, with_de_saxce
+from ...problem.law.law import BOUND, COULOMB, MU, TRESCA
+from .functions import AlartCurnier, Linearised, one_per_contact
 
 Array = NDArray[np.float64]
 KINK = 1e-15  # root of l_1, relative to that of l_2, at which it counts as zero
@@ -50,12 +53,12 @@ class FischerBurmeister:
     def linearise(self, r: Array, u: Array, law: Law, rho: Array) -> Linearised:
         """(F, A, B) at (r, u)."""
         rho = one_per_contact(rho)
-        if isinstance(law, Tresca):
-            return _with_bound(r, u, rho, law.limit)
-        F, A, B = _with_bound(r, u, rho, np.zeros(len(r)))
-        cone = np.flatnonzero(law.mu > 0)
-        mu, each = law.mu[cone], rho[cone]
-        F[cone], A[cone], B[cone] = _on_cone(r[cone], u[cone], mu, each)
+        mu, bound = law.parameters[:, MU], law.parameters[:, BOUND]
+        F, A, B = _with_bound(r, u, rho, np.where(law.kind == TRESCA, bound, 0.0))
+        cone = np.flatnonzero((law.kind == COULOMB) & (mu > 0))
+        F[cone], A[cone], B[cone] = _on_cone(r[cone], u[cone], mu[cone], rho[cone])
+        k = np.flatnonzero((law.kind != COULOMB) & (law.kind != TRESCA))
+        F[k], A[k], B[k] = AlartCurnier().linearise(r[k], u[k], law.at(k), rho[k])
         return F, A, B
 
 

@@ -11,8 +11,8 @@ and `fischer_burmeister` in a module of its own,
 
 with x_N = r_N - rho_N u_N and x_T = r_T - rho_T u_T: rho is (nc,), or (nc, 2) with columns
 rho_N and rho_T.  The natural map takes one rho per contact only: with two, x would have to be
-projected in another norm than Euclid's for F to vanish exactly at a solution.  Under Tresca's
-law the radius is the given bound and all three are the same function.
+projected in another norm than Euclid's for F to vanish exactly at a solution.  Under other laws
+the radius is that of the law (`Law.bound`), and the natural map is Alart and Curnier's.
 
 Jacobians are chosen regular where the law leaves a choice: a contact without friction bound
 (open, or mu = 0) has the tangential row F_T = r_T, whatever u_T.
@@ -29,15 +29,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InvalidInput
+from ...problem.law import Coulomb, Law
 from ...problem.law.cones import (
-    Law,
-    Tresca,
     project_cone,
     project_cone_jacobian,
     project_disk,
     project_disk_jacobian,
     with_de_saxce,
 )
+from ...problem.law.law import MU
 
 Array = NDArray[np.float64]
 Linearised = tuple[Array, Array, Array]
@@ -113,18 +113,20 @@ class AlartCurnier:
         return _disk_linearised(r, u, rho, *self._radius(r, u, law, rho))
 
     def _radius(self, r: Array, u: Array, law: Law, rho: Array) -> tuple[Array, Array, Array]:
-        zero = np.zeros(len(r))
-        if isinstance(law, Tresca):
-            return law.limit, zero, zero
         normal = columns(rho, 2)[:, 0]
-        x = r[:, 0] - normal * u[:, 0]
-        slope = np.where(x > 0, law.mu, 0.0)
-        return law.mu * np.maximum(x, 0), slope, -normal * slope
+        x = (r[:, 0] - normal * u[:, 0])[:, None]
+        slope = law.bound_slope(x)
+        return law.bound(x), slope, -normal * slope
 
 
 @dataclass(frozen=True)
 class JeanMoreau:
-    """Friction bound from the reaction r_N^+ itself."""
+    """Friction bound from the reaction r_N^+ itself.
+
+    At r_N = 0, where all open contacts are, the element of the Jacobian is that of pressed
+    ones, slope mu: with slope 0 no Newton step knows that friction comes with pressure, and
+    where much slides full steps go round.
+    """
 
     def residual(self, r: Array, u: Array, law: Law, rho: Array) -> Array:
         """F, (nc, d), unit of r."""
@@ -132,9 +134,9 @@ class JeanMoreau:
 
     def linearise(self, r: Array, u: Array, law: Law, rho: Array) -> Linearised:
         """(F, A, B) at (r, u)."""
-        zero = np.zeros(len(r))
-        slope = zero if isinstance(law, Tresca) else np.where(r[:, 0] > 0, law.mu, 0.0)
-        return _disk_linearised(r, u, rho, law.bound(r), slope, zero)
+        touching = (r[:, 0] == 0) & ~law.given(r)
+        slope = np.where(touching, law.parameters[:, MU], law.bound_slope(r))
+        return _disk_linearised(r, u, rho, law.bound(r), slope, np.zeros(len(r)))
 
 
 @dataclass(frozen=True)
@@ -145,12 +147,14 @@ class NaturalMap:
 
     def residual(self, r: Array, u: Array, law: Law, rho: Array) -> Array:
         """F, (nc, d), unit of r."""
+        if not isinstance(law, Coulomb):
+            return AlartCurnier().residual(r, u, law, one_per_contact(rho))
         return law.natural_map(r, u, one_per_contact(rho))
 
     def linearise(self, r: Array, u: Array, law: Law, rho: Array) -> Linearised:
         """(F, A, B) at (r, u)."""
         one_per_contact(rho)
-        if isinstance(law, Tresca):
+        if not isinstance(law, Coulomb):
             return AlartCurnier().linearise(r, u, law, rho)
         d = r.shape[1]
         slip = np.linalg.norm(u[:, 1:], axis=1)

@@ -5,44 +5,25 @@ an earlier problem with the same W (`joints`): near the solution few contacts ch
 status.  The law, line search and convergence are those of `SemismoothNewton`, at a fraction of
 its factors.
 
-`DeformablePortfolio` is what `Auto` runs on such W:
-
-    accelerated sweeps    while they promise an end before Newton would be there
-    inexact Newton        with full steps until it stalls: from the start, from where it takes
-                          fewer steps than from a swept point; from the best point; from the
-                          start with a line search.  Exact where an LU in blocks is quick
-    the usual portfolio   then
-
 [EW] S. Eisenstat, H. Walker (see `newton`).
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.errors import SingularOperator
-from ...linear.blocks import spatial
 from ...problem.friction import Form, FrictionProblem
-from ..auto.portfolio import DEPTH, Portfolio
-from ..contract import Breakdown, Iterate, Patience
-from ..sweeps.kernels import Acceleration, watch_for
+from ..contract import Iterate
 from .functions import Linearised
 from .joints import Joints
-from .line_search import FullStep
-from .semismooth import Condensed, Linearisation, SemismoothNewton, State
+from .semismooth import Linearisation, SemismoothNewton, State
 
 Array = NDArray[np.float64]
 LOOSEST, TIGHTEST = 1e-3, 1e-4  # relative tolerance of GMRES: looser ones misled cold starts
-CHUNK, LOOK = 40, 0.1  # sweeps between two looks at their rate: number, part of Newton's cost
-SLOWER = 1.5  # sweeps get slower than their first rate promises
-EXACT_WORK = 1e6  # products of blocks in an LU up to which an exact step costs no more
-STALLED = 8  # Newton steps without halving the error after which it is left
 
 
 @dataclass(frozen=True)
@@ -85,59 +66,10 @@ class _Preconditioned:
         F[self.contacts, :d] = linearised[0]
         A[self.contacts, :d, :d], B[self.contacts, :d, :d] = linearised[1], linearised[2]
         tolerance = float(np.clip(forcing, TIGHTEST, LOOSEST))
-        before = self.joints.flops
+        before = self.joints.memory.flops
         dr, count = self.joints.solve(A, B, -F, tolerance)
         dr = dr[self.contacts, :d]
         assert self.problem.W is not None
         du = (self.problem.W @ dr.ravel()).reshape(dr.shape)
-        flops = self.joints.flops - before + 2.0 * self.problem.blocks.data.size
+        flops = self.joints.memory.flops - before + 2.0 * self.problem.blocks.data.size
         return State(dr, du, flops=flops), count
-
-
-@dataclass(eq=False)
-class DeformablePortfolio(Portfolio):
-    """`Portfolio` with the stages above before its own."""
-
-    def stages(self) -> Iterator[Iterate]:
-        """All stages in the order of the module's text."""
-        whole, _ = self.problem.whole
-        joints = Joints.of(whole)
-        if joints is not None:
-            yield from self._sweeps_before(joints)
-            kind = InexactNewton
-            if Condensed.in_blocks(self.problem, EXACT_WORK):
-                kind = SemismoothNewton
-            full = kind(line_search=FullStep())
-            yield from self._inexact(full, self.start)
-            yield from self._inexact(full, self.r)
-            yield from self._inexact(kind(), self.start)
-        yield from super().stages()
-
-    def _sweeps_before(self, joints: Joints) -> Iterator[Iterate]:
-        """Accelerated sweeps until they have cost, or promise to cost, more than Newton."""
-        cost = self.accelerated_cost
-        memory, watch = Acceleration(self.data, self.r, DEPTH), watch_for(self.goal)
-        spent, last = 0.0, self.error
-        while True:
-            newton = joints.newton_cost(math.log10(max(min(self.error / self.goal, 1e12), 1.0)))
-            count = memory.sweep(int(np.clip(LOOK * newton / cost, 5, CHUNK)), watch)
-            yield self._offer(memory.r.copy(), count, "Anderson Gauss-Seidel", watch[2])
-            spent += cost * count
-            promise = cost * self._sweeps_left(last, count)
-            last = self.latest
-            if spent + SLOWER * promise > newton:
-                return
-
-    def _inexact(self, solver: SemismoothNewton, r: Array) -> Iterator[Iterate]:
-        """Newton from r until it stalls."""
-        name = "inexact Newton" if isinstance(solver, InexactNewton) else "semismooth Newton"
-        start = Iterate(r[:, : self.problem.dimension].copy())
-        patience = Patience(STALLED)
-        try:
-            for iterate in solver.iterates(self.problem, start, self.target):
-                found = self._offer(spatial(iterate.r), 1, name)
-                yield replace(found, linear_iterations=iterate.linear_iterations)
-                if patience.over(self.latest):
-                    return
-        except (Breakdown, SingularOperator):
-            return

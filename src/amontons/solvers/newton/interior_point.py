@@ -40,6 +40,7 @@ from ...core.options import check_options
 from ...linear.blocks import velocity_inplace
 from ...problem.friction import Form, FrictionProblem
 from ...problem.judge.measures import natural_error
+from ...problem.law.law import MU
 from ..contract import Iterate, Target, check_at_least, check_positive
 from ..sweeps.kernels import Acceleration, SweepOrder, sweep_data, watch_for
 from .block_lu import factorise_inplace, solve_inplace
@@ -123,7 +124,8 @@ def _nesterov_todd(x, y, mu, shift, i, beta, w, lam, extra):
 
 @njit(cache=True, error_model="numpy")
 def relax_inplace(  # noqa: PLR0913
-    indptr, indices, data, q, mu, rho, order, upper_start, upper, lower_start, lower,
+    indptr, indices, data, q, kind, parameters, rho, order, upper_start, upper, lower_start,
+    lower,
     r, x, y, s, shift, goal, steps,
 ):  # fmt: skip
     """Predictor-corrector steps on (r, x, y) with s frozen; x and y inside the cones on entry.
@@ -131,6 +133,7 @@ def relax_inplace(  # noqa: PLR0913
     shift: added to the diagonal, relative to |W_ii|; goal: error, unit of u, at which to stop.
     Returns steps done; r is the last iterate, and finite.
     """
+    mu = parameters[:, MU].copy()
     nc = len(mu)
     extra, inverse, work = np.zeros((nc, 3, 3)), np.empty((nc, 3, 3)), np.zeros((nc, 3, 3))
     U, L = np.empty((len(upper), 3, 3)), np.empty((len(upper), 3, 3))
@@ -155,7 +158,7 @@ def relax_inplace(  # noqa: PLR0913
             for a in range(3):
                 gap += max(x[i, a] * y[i, a], 0.0) / rho[i]
                 away += residual[i, a] ** 2
-        error = natural_error(indptr, indices, data, q, mu, False, rho, r)
+        error = natural_error(indptr, indices, data, q, kind, parameters, rho, r)
         if error <= goal or math.sqrt(away + gap) <= max(ENOUGH * error, 0.1 * goal):
             return count
         total = 0.0
@@ -241,6 +244,7 @@ class InteriorPoint:
     """
 
     form: ClassVar[Form] = Form.DELASSUS
+    needs_cone: ClassVar[bool] = True
     steps: int = 60  # of one relaxation at most
     shift: float = 1e-10  # added to the Newton matrix, relative to |W_ii|: W is often singular
     sweeps: int = 200  # after each relaxation; 0: none
@@ -254,7 +258,7 @@ class InteriorPoint:
     def iterates(
         self, problem: FrictionProblem, start: Iterate, target: Target
     ) -> Iterator[Iterate]:
-        """Relaxations and sweeps in turn, for ever; UnsupportedForm under Tresca's law."""
+        """Relaxations and sweeps in turn, for ever; UnsupportedLaw unless it is Coulomb's."""
         slip = np.zeros(problem.contacts)
         if start.r.any():
             slip = sliding_speed(problem, start.r)
@@ -280,13 +284,14 @@ class InteriorPoint:
         self, work: Workspace, slip: Array, goal: float, deadline: Deadline = NEVER
     ) -> tuple[int, Array]:
         """(steps, r) of the relaxation with frozen |u_T|, (nc,); goal: error, unit of u."""
-        indptr, indices, data, q, mu, _, rho = work.problem.kernel_data
+        indptr, indices, data, q, kind, parameters, rho = work.problem.kernel_data
+        mu = work.problem.mu
         size = work.problem.q_norm / math.sqrt(max(work.problem.contacts, 1))
         x, y = np.zeros_like(q), np.zeros_like(q)
         x[:, 0], y[:, 0] = size * rho, size
         r = x / np.where(mu > 0, mu, 1.0)[:, None]
         steps = relax_inplace(
-            indptr, indices, data, q, mu, rho, *work.symbolic.arrays,
+            indptr, indices, data, q, kind, parameters, rho, *work.symbolic.arrays,
             r, x, y, np.where(mu > 0, slip, 0.0), self.shift, goal,
             work.affordable(self.steps, deadline),
         )  # fmt: skip

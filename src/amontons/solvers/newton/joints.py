@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from threading import local
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,9 +39,20 @@ SINGLE = 2e-6  # relative tolerance below which single precision can not go
 FLOP, ENTRY = 0.04, 0.25
 
 
+class Memory(local):
+    """The LU that solves leave to those that follow in the same thread, and what they took."""
+
+    kept: FrontLU | None = None
+    spent: float = 0.0  # on GMRES since that factor, nanoseconds
+    flops: float = 0.0  # floating point operations of all solves so far
+
+    def __reduce__(self) -> tuple:
+        return Memory, ()
+
+
 @dataclass(eq=False)
 class Joints:
-    """W in strips by groups, and the preconditioner kept between solves.
+    """W in strips by groups, and the preconditioner kept from one solve to the next.
 
     contacts: (nc,) in the order of the groups; strips (3 k, 3 m) with their column groups.
     """
@@ -50,9 +62,7 @@ class Joints:
     columns: list[list[int]]  # groups that a group is coupled with, itself among them
     strips: list[Single] | list[Array]
     fronts: Fronts
-    kept: FrontLU | None = None
-    spent: float = 0.0  # on GMRES since the last factor, nanoseconds
-    flops: float = 0.0  # floating point operations of all solves so far
+    memory: Memory = field(default_factory=Memory, init=False)
     unknowns: Index = field(init=False)
 
     def __post_init__(self) -> None:
@@ -67,12 +77,12 @@ class Joints:
     @classmethod
     def of(cls, problem: FrictionProblem) -> Joints | None:
         """The joints of a problem in Delassus form; None where groups are too small."""
-        return problem.kept("joints", lambda: cls._make(problem.blocks, np.float32))
+        return problem.kept(_single)
 
     @classmethod
     def exact(cls, problem: FrictionProblem) -> Joints | None:
         """The same with W in double precision."""
-        return problem.kept("exact joints", lambda: cls._make(problem.blocks, np.float64))
+        return problem.kept(_double)
 
     @classmethod
     def _make(cls, blocks: BlockRows, precision: type) -> Joints | None:
@@ -122,7 +132,7 @@ class Joints:
         flat = (b / size).astype(np.float32).ravel()[self.unknowns]
         x, total = np.zeros_like(flat), 0
         patience = int(np.clip(WORTH * self.factor_cost / self.product_cost, PATIENCE, KRYLOV))
-        if self.kept is not None and self.spent <= self.factor_cost:
+        if self.memory.kept is not None and self.memory.spent <= self.factor_cost:
             x, total, done = self._gmres(law, flat, tolerance, patience)
             if done:
                 return self._in_order(size, x, b.shape), total
@@ -138,7 +148,7 @@ class Joints:
         self, law: _Scaled, b: Single, tolerance: float, limit: int
     ) -> tuple[Single, int, bool]:
         """x with |(A + B W) x - b| <= tolerance |b|, iterations, and whether it holds."""
-        kept, count = self.kept, 0
+        kept, count = self.memory.kept, 0
         assert kept is not None
 
         def operator(y: Single) -> Single:
@@ -150,8 +160,8 @@ class Joints:
         y, failed = sparse_linalg.gmres(
             matrix, b, rtol=max(tolerance, SINGLE), atol=0.0, restart=limit, maxiter=1
         )
-        self.spent += count * self.product_cost
-        self.flops += count * 2 * self._entries + 2.0 * count**2 * b.size
+        self.memory.spent += count * self.product_cost
+        self.memory.flops += count * 2 * self._entries + 2.0 * count**2 * b.size
         return kept.solve(y), count, not failed
 
     def _in_order(self, size: float, x: Single, shape: tuple[int, ...]) -> Array:
@@ -162,13 +172,13 @@ class Joints:
 
     def newton_cost(self, digits: float) -> float:
         """Nanoseconds that Newton takes for some digits, by what it took on walls."""
-        factors = 1.0 if self.kept is None else 0.5
+        factors = 1.0 if self.memory.kept is None else 0.5
         return factors * self.factor_cost + (20 + 10 * digits) * self.product_cost
 
     def renew(self, law: _Scaled) -> None:
         """Factorise A + B W of now."""
-        self.kept, self.spent = self.fronts.factor(law.front), 0.0
-        self.flops += self.fronts.flops + 5.0 * sum(strip.size for strip in self.strips)
+        self.memory.kept, self.memory.spent = self.fronts.factor(law.front), 0.0
+        self.memory.flops += self.fronts.flops + 5.0 * sum(strip.size for strip in self.strips)
 
     @property
     def factor_cost(self) -> float:
@@ -238,6 +248,14 @@ class SomeJoints:
     def flops(self) -> float:
         """Floating point operations of forming the rows: five per entry."""
         return 5.0 * sum(part.size for rows in self.rows for part in rows.values())
+
+
+def _single(problem: FrictionProblem) -> Joints | None:
+    return Joints._make(problem.blocks, np.float32)
+
+
+def _double(problem: FrictionProblem) -> Joints | None:
+    return Joints._make(problem.blocks, np.float64)
 
 
 def _groups(blocks: BlockRows) -> Index:

@@ -42,7 +42,7 @@ def _check_share(**fields: float) -> None:
     """Raise InvalidInput for the first option that is not between 0 and 1."""
     for name, value in fields.items():
         if not 0 < value < 1:
-            raise InvalidInput(f"{name}: expected a number between 0 and 1, got {value}")
+            raise InvalidInput(f"expected a number between 0 and 1, got {value}", (name,))
 
 
 def _halved(merit: Merit, ceiling: float, halvings: int, decrease: float) -> float:
@@ -113,7 +113,8 @@ class GoldsteinPrice:
         check_at_least(1, trials=self.trials)
         _check_share(least=self.least, most=self.most)
         if not self.least < self.most:
-            raise InvalidInput(f"least: expected below most = {self.most}, got {self.least}")
+            text = f"expected below most = {self.most}, got {self.least}"
+            raise InvalidInput(text, ("least",))
 
     def length(self, merit: Merit, values: Sequence[float]) -> float:
         """[GP] step length, found by bisection from 1."""

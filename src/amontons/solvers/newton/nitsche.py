@@ -18,7 +18,7 @@ contact problems in elasticity", Comput. Methods Appl. Mech. Eng. 256 (2013).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ from scipy import sparse
 from ...core.errors import SingularOperator
 from ...linear import Direct, LinearSolver
 from ...problem.nitsche import NitscheProblem
-from ..contract import Breakdown, Iterate, Patience, Target
+from ..contract import Breakdown, Iterate, Iterates, Judgement, Patience, Target
 from .line_search import Armijo, LineSearch
 
 Array = NDArray[np.float64]
@@ -71,30 +71,29 @@ def _next(
 
 def robust_iterates(
     problem: NitscheProblem, start: Iterate, target: Target
-) -> Iterator[Iterate]:
+) -> Iterates:
     """What Auto does: Newton with a line search, and proximal points where that stalls."""
-    best = [start]
-    yield from _while_falling(problem, newton_iterates(problem, start, Armijo(), None), best)
-    yield from proximal_iterates(problem, best[0])
+    best = yield from _while_falling(problem, start, target)
+    yield from proximal_iterates(problem, best)
 
 
 def _while_falling(
-    problem: NitscheProblem, iterates: Iterator[Iterate], best: list[Iterate]
-) -> Iterator[Iterate]:
-    """Iterates from best[0] as long as the residual falls; best[0] becomes the best."""
-    error = problem.error(best[0].r, best[0].v)
+    problem: NitscheProblem, start: Iterate, target: Target
+) -> Generator[Iterate, Judgement | None, Iterate]:
+    """Newton steps from the start as long as the residual falls; returns the best iterate."""
+    best, error = start, target.start_error
     patience, seen = Patience(STALLED, mark=error), [error]
     try:
-        for iterate in iterates:
-            new = problem.error(iterate.r, iterate.v)
+        for iterate in newton_iterates(problem, start, Armijo(), None):
+            new = target.error(problem, iterate, (yield iterate))
             if new < error:
-                error, best[0] = new, iterate
+                best, error = iterate, new
             if np.abs(np.array(seen) - new).min() <= REPEATED * new or patience.over(new):
-                return
+                break
             seen.append(new)
-            yield iterate
     except Breakdown:
-        return
+        pass
+    return best
 
 
 def proximal_iterates(problem: NitscheProblem, start: Iterate) -> Iterator[Iterate]:

@@ -19,19 +19,28 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import islice
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...core.errors import InvertedCells, SingularOperator, UnsupportedForm
+from ...core.errors import InvertedCells, SingularOperator
 from ...core.options import check_options
 from ...linear import Direct, LinearSolver
-from ...problem.friction import Form, FrictionProblem
-from ..auto.hybrid import Auto
-from ..contract import Breakdown, Iterate, Patience, Target, check_at_least, check_positive
+from ...problem.friction import FrictionProblem
+from ...problem.protocol import Problem
+from ..contract import (
+    Breakdown,
+    Iterate,
+    Judgement,
+    Patience,
+    Target,
+    check_at_least,
+    check_positive,
+    first_of,
+    sent,
+)
 
 Array = NDArray[np.float64]
 MEMORY = 5  # values of |F| of which the largest counts in the line search
@@ -51,8 +60,13 @@ class Linear(Protocol):
     matrix: sparse.csc_array
 
 
-class NonlinearProblem(Protocol):
-    """What the method asks for; states v (n,), residuals (n,)."""
+class NonlinearProblem(Problem):
+    """What the method asks for besides `Problem`; states v (n,), residuals (n,)."""
+
+    unfit = (
+        "large deformations are no linear problem with contact: NonlinearNewton solves them, "
+        "which auto takes"
+    )
 
     def residual(self, v: Array) -> Array:
         """F(v); raises InvertedCells where it is not defined."""
@@ -64,10 +78,6 @@ class NonlinearProblem(Protocol):
 
     def reactions(self, v: Array) -> Array:
         """Contact forces (nc, d)."""
-        ...
-
-    def error(self, r: Array, v: Array) -> float:
-        """The judge's error."""
         ...
 
     def at_share(self, share: float) -> NonlinearProblem:
@@ -115,7 +125,7 @@ class NonlinearNewton:
     linear: LinearSolver = Direct()
     crossing: Crossing | None = None  # what leads on where load steps end, see `PathCrossing`
 
-    form: ClassVar[Form] = Form.GLOBAL
+    solves: ClassVar[tuple[type, ...]] = (NonlinearProblem,)
 
     def __post_init__(self) -> None:
         check_options(self)
@@ -184,15 +194,21 @@ class NonlinearNewton:
         Newton's steps change them one after another, and may go round in circles where many
         contacts close at once.
         """
+        from ..auto.hybrid import Auto  # which takes this method, too
+
         tangent = problem.towards(share, goal, v)
         start = Iterate(np.zeros((tangent.contacts, tangent.dimension)))
         try:
-            for iterate in islice(Auto().iterates(tangent, start, target), CONTACT_STEPS):
+            iterates = first_of(Auto().iterates(tangent, start, target), CONTACT_STEPS)
+            iterate = sent(iterates, None)
+            while iterate is not None:
                 state = iterate.v if iterate.v is not None else tangent.velocity(iterate.r)[1]
-                if tangent.error(iterate.r, state) <= STATUSES and state is not None:
+                error = tangent.error(iterate.r, state)
+                if error <= STATUSES and state is not None:
                     return state
-                if target.seconds_left <= 0:
+                if target.deadline.passed:
                     break
+                iterate = sent(iterates, Judgement(error, None, target.deadline))
         except (Breakdown, SingularOperator) as reason:
             raise _Failed(str(reason)) from reason
         raise _Failed("the tangent problem with contact was not solved")
@@ -292,15 +308,3 @@ class _Shown:
             if size < self.size:
                 yield Iterate(r, v, self.waiting, self.waiting, told)
                 self.size, self.waiting = size, 0
-
-
-def nonlinear_solver(solver: object) -> NonlinearNewton:
-    """The method for large deformations: the given one if it can, NonlinearNewton for Auto."""
-    if solver is None or isinstance(solver, Auto):
-        return NonlinearNewton()
-    if not isinstance(solver, NonlinearNewton):
-        raise UnsupportedForm(
-            f"{type(solver).__name__} solves one linear problem with contact; large "
-            "deformations need NonlinearNewton"
-        )
-    return solver

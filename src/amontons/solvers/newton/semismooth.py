@@ -27,7 +27,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,6 +66,7 @@ class SemismoothNewton:
     Coulomb's cone is that of one norm; Alart-Curnier and Jean-Moreau take rho_N and rho_T.
     """
 
+    solves: ClassVar[tuple[type, ...]] = (FrictionProblem, NitscheProblem)
     form: ClassVar[Form] = Form.ANY
     function: ComplementarityFunction = field(default_factory=AlartCurnier)
     linear: LinearSolver | None = None
@@ -73,16 +74,14 @@ class SemismoothNewton:
     rho: float = 1.0  # augmentation parameter relative to what the strategy gives
     rho_strategy: RhoStrategy = RhoStrategy.PER_CONTACT
 
-    nitsche: ClassVar[bool] = True
-
     def __post_init__(self) -> None:
         check_options(self)
         check_positive(rho=self.rho)
         if self.rho_strategy.splits and getattr(self.function, "one_rho", False):
             raise InvalidInput(
-                f"rho_strategy: {_words(self.function)} works on the whole cone and needs one "
+                f"{_words(self.function)} works on the whole cone and needs one "
                 f"rho per contact, got {self.rho_strategy.value}; use per-contact or spectral, "
-                "or the function AlartCurnier or JeanMoreau"
+                "or the function AlartCurnier or JeanMoreau", ("rho_strategy",),
             )
 
     def iterates(
@@ -155,7 +154,7 @@ class _Residual:
     ) -> None:
         self.function, self.law, self.rho = function, problem.law, rho
         driven = driven_directions(problem)
-        self.able, self.driven = able_directions(problem) | driven, driven.any(axis=1)
+        self.able, self.driven = able_directions(problem) | driven, np.any(driven, axis=1)
         self.now, self.evaluations = rho, 0
         self.rows = columns(rho, problem.dimension)
         self.blocked = (~self.able)[:, :, None] * np.eye(problem.dimension)
@@ -225,7 +224,8 @@ class Augmented:
         p = self.problem
         assert p.M is not None and p.H is not None and p.f is not None and state.v is not None
         coupling = block_diagonal(B) @ p.H.T
-        matrix = sparse.block_array([[p.M, -p.H], [coupling, block_diagonal(A)]], format="csc")
+        rows = [[p.M, -p.H], [coupling, block_diagonal(A)]]
+        matrix: Any = sparse.block_array(rows, format="csc")
         balance = p.f + p.H @ state.r.ravel() - p.M @ state.v
         factor = self.linear.factor(matrix)
         solution = factor.solve(np.concatenate([balance, -F.ravel()]))

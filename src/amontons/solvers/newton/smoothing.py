@@ -34,12 +34,13 @@ from numpy.typing import NDArray
 
 from ...core.clock import NEVER, Deadline
 from ...core.compiled import njit
-from ...core.errors import InvalidInput, UnsupportedForm
+from ...core.errors import InvalidInput, UnsupportedLaw
 from ...core.options import check_options
 from ...linear.blocks import spatial
 from ...problem.friction import Form, FrictionProblem
 from ...problem.judge.measures import PENETRATION, contact_residual, natural_error
-from ...problem.law.cones import Tresca
+from ...problem.law import Coulomb
+from ...problem.law.law import MU
 from ..contract import Breakdown, Iterate, Target, check_at_least, check_positive
 from ..sweeps.kernels import sweep_data, sweep_inplace
 from .block_lu import Symbolic, factorise_inplace, solve_inplace
@@ -154,21 +155,23 @@ def _product(indptr, indices, data, prox, x, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _law_error(r, u, mu, rho):
+def _law_error(r, u, kind, parameters, rho):
     """|(r - P(r - rho û)) / rho|, the judge's formula with u given."""
     total = 0.0
-    for i in range(len(mu)):
+    for i in range(len(kind)):
         if rho[i] > 0.0:
             e0, e1, e2 = contact_residual(
-                r[i, 0], r[i, 1], r[i, 2], u[i, 0], u[i, 1], u[i, 2], rho[i], mu[i], False
-            )
+                r[i, 0], r[i, 1], r[i, 2], u[i, 0], u[i, 1], u[i, 2], rho[i], kind[i],
+                parameters[i],
+            )  # fmt: skip
             total += max(e0 * e0 + e1 * e1 + e2 * e2, (PENETRATION * min(u[i, 0], 0.0)) ** 2)
     return math.sqrt(total)
 
 
 @njit(cache=True, error_model="numpy")
 def newton_inplace(  # noqa: PLR0913
-    indptr, indices, data, q, mu, rho, order, upper_start, upper, lower_start, lower,
+    indptr, indices, data, q, kind, parameters, rho, order, upper_start, upper, lower_start,
+    lower,
     prox, center, x, r, sigma, shift, tracking, shrink, goal, steps, patience,
 ):  # fmt: skip
     """At most `steps` Newton steps on x; r ends as the best iterate by the law's own residual.
@@ -177,6 +180,7 @@ def newton_inplace(  # noqa: PLR0913
     prox (nc,), center (nc, 3): proximal term.
     Returns (steps done, best residual, sigma); a negative count says that a factor broke down.
     """
+    mu = parameters[:, MU].copy()
     nc = len(mu)
     extra = np.empty((nc, 3, 3))
     U, L = np.empty((len(upper), 3, 3)), np.empty((len(upper), 3, 3))
@@ -188,7 +192,7 @@ def newton_inplace(  # noqa: PLR0913
     for i in range(nc):
         for a in range(3):
             u[i, a] += q[i, a] - prox[i] * center[i, a]
-    best = _law_error(x, u, mu, rho)
+    best = _law_error(x, u, kind, parameters, rho)
     count = last_gain = 0
     milestone = best
     root = math.sqrt(nc)
@@ -223,7 +227,7 @@ def newton_inplace(  # noqa: PLR0913
             return -count, best, sigma
         x[:, :] = trial
         u[:, :] = trial_u
-        residual = _law_error(x, u, mu, rho)
+        residual = _law_error(x, u, kind, parameters, rho)
         if residual < best:
             best = residual
             r[:, :] = x
@@ -244,6 +248,7 @@ class SmoothingNewton:
     """Smoothing Newton on the Delassus form, for Coulomb friction."""
 
     form: ClassVar[Form] = Form.DELASSUS
+    needs_cone: ClassVar[bool] = True
     sigma: float = 0.1  # first smoothing velocity, relative to |q| / sqrt(nc)
     shift: float = 1e-8  # added to the Newton matrix, relative to |W_ii|: W is often singular
     tracking: float = 0.3  # sigma shrinks when |F_sigma / rho| <= tracking sigma sqrt(nc)
@@ -254,7 +259,7 @@ class SmoothingNewton:
         check_options(self)
         check_positive(sigma=self.sigma, shift=self.shift, tracking=self.tracking)
         if not 0 < self.shrink < 1:
-            raise InvalidInput(f"shrink: expected between 0 and 1, got {self.shrink}")
+            raise InvalidInput(f"expected between 0 and 1, got {self.shrink}", ("shrink",))
         check_at_least(1, batch=self.batch)
 
     def iterates(
@@ -280,11 +285,11 @@ class Workspace:
 
     @classmethod
     def of(cls, problem: FrictionProblem) -> Workspace:
-        """Order and analyse W once; raises UnsupportedForm under Tresca's law."""
-        if isinstance(problem.law, Tresca):
-            raise UnsupportedForm(
-                "smoothing Newton and interior point need Coulomb friction, not Tresca's; use "
-                "SemismoothNewton or GaussSeidel"
+        """Order and analyse W once; raises UnsupportedLaw unless the law is Coulomb's."""
+        if not isinstance(problem.law, Coulomb):
+            raise UnsupportedLaw(
+                "smoothing Newton and interior point need Coulomb's cone, not "
+                f"{problem.law.name}; use SemismoothNewton or GaussSeidel"
             )
         return cls(problem, Symbolic.of(problem))
 
@@ -306,11 +311,11 @@ class Workspace:
 
         alpha, relative to |W_ii|, is the weight of the proximal term about `center`.
         """
-        indptr, indices, data, q, mu, _, rho = self.problem.kernel_data
+        indptr, indices, data, q, kind, parameters, rho = self.problem.kernel_data
         prox = np.where(rho > 0, alpha / np.where(rho > 0, rho, 1.0), 0.0)
         best = np.empty_like(x)
         count, residual, sigma = newton_inplace(
-            indptr, indices, data, q, mu, rho, *self.symbolic.arrays,
+            indptr, indices, data, q, kind, parameters, rho, *self.symbolic.arrays,
             prox, x.copy() if center is None else center, x, best, sigma,
             options.shift, options.tracking, options.shrink, goal, steps, patience,
         )  # fmt: skip
@@ -337,6 +342,7 @@ class ProximalPoint:
     """
 
     form: ClassVar[Form] = Form.DELASSUS
+    needs_cone: ClassVar[bool] = True
     inner: SmoothingNewton = field(default_factory=SmoothingNewton)
     alpha: float = 1e-2  # first proximal weight, relative to |W_ii|
     alpha_min: float = 1e-5

@@ -25,7 +25,7 @@ contact frottant dans les systèmes de multi-corps flexibles", CSMA 2017.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from functools import partial
@@ -34,12 +34,12 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.errors import InvalidInput, UnsupportedForm
+from ...core.errors import InvalidInput, UnsupportedLaw
 from ...core.options import check_options
 from ...linear.blocks import spatial
 from ...problem.friction import Form, FrictionProblem
-from ...problem.law.cones import Tresca
-from ..contract import Iterate, Target, check_at_least
+from ...problem.law import Coulomb
+from ..contract import Iterate, Iterates, Target, check_at_least
 from .kernels import (
     Acceleration,
     Sweep,
@@ -86,12 +86,13 @@ class GaussSeidel:
         check_at_least(0, anderson_depth=self.anderson_depth)
         self._check_local()
         if not 0 < self.relaxation < 2:
-            raise InvalidInput(f"relaxation: expected between 0 and 2, got {self.relaxation}")
+            text = f"expected between 0 and 2, got {self.relaxation}"
+            raise InvalidInput(text, ("relaxation",))
         if not isinstance(self.batch, Batch):
             check_at_least(1, batch=self.batch)
         elif self.anderson_depth:
             raise InvalidInput(
-                "batch: ADAPTIVE compares plain sweeps, with anderson_depth give a number"
+                "ADAPTIVE compares plain sweeps, with anderson_depth give a number", ("batch",)
             )
 
     def _check_local(self) -> None:
@@ -110,11 +111,11 @@ class GaussSeidel:
 
     def iterates(
         self, problem: FrictionProblem, start: Iterate, target: Target
-    ) -> Iterator[Iterate]:
+    ) -> Iterates:
         """Sweeps from `start`, for ever."""
         d = problem.dimension
-        if isinstance(problem.law, Tresca) and self.local is not LocalSolver.EXACT:
-            raise UnsupportedForm(f"local={self.local.name}: needs Coulomb friction; use EXACT")
+        if not isinstance(problem.law, Coulomb) and self.local is not LocalSolver.EXACT:
+            raise UnsupportedLaw(f"local={self.local.name}: needs Coulomb friction; use EXACT")
         data = sweep_data(
             problem, self.local, self.relaxation, self.order,
             close=CLOSE if self.local_tolerance is None else self.local_tolerance,
@@ -149,7 +150,7 @@ def _counted(
 
 def _adaptive(
     problem: FrictionProblem, data: Sweep, r: Array, target: Target
-) -> Iterator[Iterate]:
+) -> Iterates:
     """Sweeps from r, an iterate where [ABD] eq. (14) holds or after LONGEST of them."""
     before, d = np.empty_like(r), problem.dimension
     sweeps, tau = FIRST, target.tolerance
@@ -158,8 +159,7 @@ def _adaptive(
         (done, change), flops = _counted(data, run)
         flops += CHANGE_FLOPS * done * r.size
         iterate = Iterate(r[:, :d].copy(), iterations=done, flops=flops)
-        error = target.error(problem, iterate)
-        yield iterate  # whoever asks for more was not content
+        error = target.error(problem, iterate, (yield iterate))
         if 0 < error < math.inf:
             tau = change * min(target.tolerance / error, 0.5)
         sweeps = LONGEST

@@ -29,7 +29,7 @@ from ...core.compiled import njit
 from ...core.options import check_options
 from ...linear.blocks import spatial
 from ...problem.friction import Form, FrictionProblem
-from ...problem.law.one_contact import solve_contact
+from ...problem.law.single import solve_contact
 from ..contract import Iterate, Target, check_at_least, check_positive
 from .local_contact import EXACT_FLOPS
 
@@ -58,7 +58,7 @@ class Jacobi:
         """Iterations from `start`, for ever."""
         d, r = problem.dimension, spatial(start.r)
         factor = safe_stiffening(problem) if self.stiffening is None else self.stiffening
-        indptr, indices, data, q, coefficient, tresca, _ = problem.kernel_data
+        indptr, indices, data, q, kind, parameters, _ = problem.kernel_data
         blocks = problem.blocks
         own = factor * blocks.diagonal_blocks
         each = BLOCK_FLOPS * len(indices) + (CONTACT_FLOPS + EXACT_FLOPS) * len(q)
@@ -67,14 +67,14 @@ class Jacobi:
         if self.stiffening is None:
             flops += POWER_STEPS * BLOCK_FLOPS * len(indices)
         while True:
-            jacobi_inplace(indptr, indices, data, q, coefficient, tresca, own, r, u, self.batch)
+            jacobi_inplace(indptr, indices, data, q, kind, parameters, own, r, u, self.batch)
             yield Iterate(r[:, :d].copy(), iterations=self.batch, flops=flops)
             flops = float(each * self.batch)
 
 
 def safe_stiffening(problem: FrictionProblem) -> float:
     """The largest eigenvalue of D^-1/2 W D^-1/2, at least 1, of a problem in Delassus form."""
-    return problem.kept("stiffening", lambda: _largest(problem))
+    return problem.kept(_largest)
 
 
 def _largest(problem: FrictionProblem) -> float:
@@ -112,7 +112,7 @@ def _inverse_root(blocks: Array) -> Array:
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def jacobi_inplace(
-    indptr: Any, indices: Any, data: Any, q: Any, coefficient: Any, tresca: bool, own: Any,
+    indptr: Any, indices: Any, data: Any, q: Any, kind: Any, parameters: Any, own: Any,
     r: Any, u: Any, iterations: int,
 ) -> None:  # fmt: skip
     """Iterations on r (nc, 3); own (nc, 3, 3) are the stiffened L W_ii, u (nc, 3) memory."""
@@ -132,5 +132,5 @@ def jacobi_inplace(
             b0 = u[i, 0] - A[0, 0] * r0 - A[0, 1] * r1 - A[0, 2] * r2
             b1 = u[i, 1] - A[1, 0] * r0 - A[1, 1] * r1 - A[1, 2] * r2
             b2 = u[i, 2] - A[2, 0] * r0 - A[2, 1] * r1 - A[2, 2] * r2
-            x0, x1, x2, _ = solve_contact(A, b0, b1, b2, coefficient[i], tresca, r1, r2)
+            x0, x1, x2, _ = solve_contact(A, b0, b1, b2, kind[i], parameters[i], r1, r2)
             r[i, 0], r[i, 1], r[i, 2] = x0, x1, x2

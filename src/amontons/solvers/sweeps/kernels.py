@@ -30,7 +30,9 @@ from numpy.typing import NDArray
 from ...core.compiled import njit
 from ...problem.friction import FrictionProblem
 from ...problem.judge.measures import natural_error
-from ...problem.law.one_contact import solve_contact, solve_eliminated
+from ...problem.law.law import COULOMB, MU
+from ...problem.law.one_contact import solve_eliminated
+from ...problem.law.single import solve_contact
 from .local_contact import (
     CLOSE,
     EXACT_FLOPS,
@@ -66,8 +68,8 @@ class Sweep(NamedTuple):
     indices: Any
     data: Any
     q: Any
-    coefficient: Any
-    tresca: bool
+    kind: Any
+    parameters: Any
     rho: Any
     diagonal: Any
     eliminated: Any
@@ -92,10 +94,10 @@ def sweep_data(
     if steps is None:
         steps = PROJECTIONS if local is LocalSolver.PROJECTION else STEPS
     b = problem.blocks
-    _, _, _, q, coefficient, tresca, rho = problem.kernel_data
+    _, _, _, q, kind, parameters, rho = problem.kernel_data
     visits = _by_approach(q) if order is SweepOrder.APPROACH else np.arange(len(q))
     return Sweep(
-        b.indptr, b.indices, b.data, q, coefficient, tresca, rho, b.diagonal, b.eliminated,
+        b.indptr, b.indices, b.data, q, kind, parameters, rho, b.diagonal, b.eliminated,
         visits, int(local), float(relaxation), float(close), int(steps), np.zeros(1),
     )  # fmt: skip
 
@@ -142,20 +144,22 @@ def sweep_inplace(s, backward, r):
             b0 += s.data[k, 0, 0] * r0 + s.data[k, 0, 1] * r1 + s.data[k, 0, 2] * r2
             b1 += s.data[k, 1, 0] * r0 + s.data[k, 1, 1] * r1 + s.data[k, 1, 2] * r2
             b2 += s.data[k, 2, 0] * r0 + s.data[k, 2, 1] * r1 + s.data[k, 2, 2] * r2
-        c, r0, r1, r2 = s.coefficient[i], r[i, 0], r[i, 1], r[i, 2]
+        mu, r0, r1, r2 = s.parameters[i, MU], r[i, 0], r[i, 1], r[i, 2]
         A, e = s.data[uint64(s.diagonal[i])], s.eliminated[i]
         if s.local == EXACT:
-            if s.tresca:
-                x0, x1, x2, _ = solve_contact(A, b0, b1, b2, c, True, r1, r2)
+            if s.kind[i] == COULOMB:
+                x0, x1, x2 = solve_eliminated(e, A, b0, b1, b2, mu, r1, r2)
             else:
-                x0, x1, x2 = solve_eliminated(e, A, b0, b1, b2, c, r1, r2)
+                x0, x1, x2, _ = solve_contact(
+                    A, b0, b1, b2, s.kind[i], s.parameters[i], r1, r2
+                )
         elif s.local == NEWTON:
             x0, x1, x2 = newton_contact(
-                A, b0, b1, b2, c, r0, r1, r2, s.close, s.steps, s.work
+                A, b0, b1, b2, mu, r0, r1, r2, s.close, s.steps, s.work
             )
         else:
             x0, x1, x2 = projection_contact(
-                A, b0, b1, b2, c, r0, r1, r2, s.close, s.steps, s.work
+                A, b0, b1, b2, mu, r0, r1, r2, s.close, s.steps, s.work
             )
         d0, d1, d2 = x0 - r0, x1 - r1, x2 - r2
         w = s.relaxation if x0 > 0.0 else 1.0  # open at once: else r fades into denormals
@@ -169,7 +173,7 @@ def _content(s, r, change, watch):
     """True when the error is at most watch[0]; see `watch_for`."""
     if not change <= watch[1]:
         return False
-    error = natural_error(s.indptr, s.indices, s.data, s.q, s.coefficient, s.tresca, s.rho, r)
+    error = natural_error(s.indptr, s.indices, s.data, s.q, s.kind, s.parameters, s.rho, r)
     if error <= watch[0]:
         watch[2] = error
         return True

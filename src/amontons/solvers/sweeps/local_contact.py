@@ -23,7 +23,7 @@ from enum import IntEnum
 import numpy as np
 
 from ...core.compiled import njit
-from ...problem.law.one_contact import solve_contact
+from ...problem.law.one_contact import solve_coulomb
 
 STEPS = 20  # Newton steps before the exact solution takes over
 PROJECTIONS = 100
@@ -108,7 +108,7 @@ def newton_contact(A, b0, b1, b2, mu, r0, r1, r2, close, steps, work):  # noqa: 
             r1 -= _determinant(J, 2, F) / det
             r2 -= _determinant(J, 3, F) / det
     work[0] += EXACT_FLOPS
-    x0, x1, x2, _ = solve_contact(A, b0, b1, b2, mu, False, g1, g2)
+    x0, x1, x2, _ = solve_coulomb(A, b0, b1, b2, mu, g1, g2)
     return x0, x1, x2
 
 
@@ -146,7 +146,8 @@ def projection_contact(A, b0, b1, b2, mu, r0, r1, r2, close, steps, work):  # no
     rho = 1.0 / size
     for _ in range(steps):
         u0, u1, u2 = _modified_velocity(A, b0, b1, b2, mu, r0, r1, r2)
-        ratio = 0.0
+        ratio = moved = 0.0
+        p0, p1, p2 = r0, r1, r2
         work[0] += VELOCITY_FLOPS
         for _ in range(30):
             work[0] += PROJECTION_FLOPS

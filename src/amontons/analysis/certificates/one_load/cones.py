@@ -7,12 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...scaled import Scaled
+from ...solutions.groups import Form, Group, group_of
+from ...statuses import ANY, CLOSED, FREE, MINUS, PLUS, SLIP, STICK, States
 from .known import Known
-from .problem import FREE, MINUS, PLUS, STICK, LoadProblem, States
 
 Array = NDArray[np.float64]
 NONE, PLANE, WEDGE, TRIPLE, LINE, SPACE = range(6)  # kinds of cones, see `Cones`
+PAIRS = ((), (), ((0, 1),), ((0, 1), (0, 2), (1, 2)), ((1, 2),), ())  # by kind, see `Form`
 FLAT = 1e-4  # angle of the third generator with the plane of the others that is too small
+ALLOWED = np.zeros((9, 4), dtype=bool)  # statuses of a state
+ALLOWED[:4] = np.eye(4, dtype=bool)
+ALLOWED[ANY], ALLOWED[CLOSED, PLUS:], ALLOWED[SLIP, [PLUS, MINUS]] = True, True, True
 SLIGHT = 1e-4  # friction below which a stick cone counts as the half plane r_N >= 0
 
 
@@ -29,7 +35,16 @@ class Cones:
     G: Array
 
 
-def cones_about(local: LoadProblem, branch: States, known: Known) -> Cones:
+def allowed(mu: Array, branch: States) -> NDArray[np.bool_]:
+    """(nc, 4): statuses of every contact."""
+    out = ALLOWED[branch].copy()
+    smooth = mu == 0
+    out[smooth, PLUS] |= out[smooth, STICK] | out[smooth, MINUS]
+    out[smooth, STICK] = out[smooth, MINUS] = False
+    return out
+
+
+def cones_about(local: Scaled, branch: States, known: Known) -> Cones:
     """cone(C_s - z) of all statuses of a branch that holds the known solution; k = 4."""
     G, z = _pieces(local.mu, 4), known.z
     length = np.linalg.norm(z, axis=1)
@@ -44,7 +59,7 @@ def cones_about(local: LoadProblem, branch: States, known: Known) -> Cones:
         ahead = (z[:, 0] > 0) | (sign * z[:, 3] < 0)
         kind[inside, status] = np.where(ahead, PLANE, WEDGE)[inside]
     kind[smooth, PLUS] = np.where(z[:, 2] == 0, PLANE, LINE)[smooth]
-    kind[~local.allowed(branch)] = NONE
+    kind[~allowed(local.mu, branch)] = NONE
     _widen_inplace(kind, G)
     _half_planes_inplace(kind, mu)
     return Cones(kind, G)
@@ -71,14 +86,14 @@ def _widen_inplace(kind: NDArray[np.int8], G: Array) -> None:
         kind[contact, status] = (TRIPLE, LINE, SPACE)[int(both.sum())]
 
 
-def cones_with_apex(local: LoadProblem, branch: States) -> Cones:
+def cones_with_apex(local: Scaled, branch: States) -> Cones:
     """{(z, tau): tau >= 0, z in tau C_s} and limits, of all statuses of a branch; k = 5."""
     G = _pieces(local.mu, 5)
     G[:, :, 4, 2] = 1.0
     kind = np.full((local.contacts, 4), TRIPLE, dtype=np.int8)
     kind[:, FREE] = LINE
     kind[local.mu == 0, PLUS] = LINE
-    kind[~local.allowed(branch)] = NONE
+    kind[~allowed(local.mu, branch)] = NONE
     _half_planes_inplace(kind, local.mu)
     return Cones(kind, G)
 
@@ -106,3 +121,20 @@ def _pieces(mu: Array, k: int) -> Array:
     G[PLUS, smooth] = 0.0
     G[PLUS, smooth, 3, 0] = G[PLUS, smooth, 0, 1] = 1.0
     return G
+
+
+def groups(cones: Cones, coordinates: list[tuple[int, ...]]) -> list[Group]:
+    """Contacts with cones of equal kinds and coordinates together."""
+    nc, apex = len(cones.kind), cones.G.shape[2] == 5
+    code = np.array([sum(1 << c for c in own) for own in coordinates])
+    _, group = np.unique(np.column_stack([code, cones.kind]), axis=0, return_inverse=True)
+    group, out = np.ravel(group), []
+    for g in range(group.max() + 1):
+        index = np.flatnonzero(group == g)
+        own = (*coordinates[index[0]], 4) if apex else coordinates[index[0]]
+        G = cones.G[:, index][:, :, list(own)]
+        forms = [Form(G[status][:, :, :2] if kind in (PLANE, WEDGE) else G[status], PAIRS[kind])
+                 for status, kind in enumerate(cones.kind[index[0]].tolist())
+                 if kind != NONE]  # fmt: skip
+        out.append(group_of(index, own, forms, (nc, 2), turn=True))
+    return out

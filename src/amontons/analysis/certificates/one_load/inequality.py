@@ -9,11 +9,13 @@ from numpy.typing import NDArray
 
 from ....core.clock import Deadline
 from ...multipliers.lmi import SMALLEST, LmiOutcome, find_multipliers, slacks_are_positive
-from .cones import cones_about, cones_with_apex
-from .groups import groups, whole
+from ...scaled import Scaled
+from ...solutions.branch_proof import BranchProof, prove
+from ...solutions.branches import coordinates, energy_basis
+from ...solutions.groups import whole
+from ...statuses import ANY, CLOSED, FREE, MINUS, PLUS, SLIP, STICK, States
+from .cones import cones_about, cones_with_apex, groups
 from .known import Known
-from .problem import UNDECIDED, LoadProblem, States, energy_basis
-from .proof import BranchProof, prove
 from .reduction import shared_multipliers
 
 Array = NDArray[np.float64]
@@ -22,11 +24,24 @@ LARGEST = 600  # contacts up to which each can have a multiplier of its own: mem
 LARGE = 150  # contacts from which few different multipliers are tried first
 
 
-def too_many(local: LoadProblem) -> str:
+def too_many(local: Scaled) -> str:
     """Why contacts can not have a multiplier each, empty where they can."""
     if local.contacts <= LARGEST:
         return ""
     return f"no shared multipliers, and more than {LARGEST} contacts for own ones"
+
+
+def children(mu: Array, branch: States, contact: int) -> tuple[States, ...]:
+    """The branches into which one contact divides a branch, none when it is decided."""
+    parts = {ANY: (FREE, CLOSED), CLOSED: (STICK, SLIP), SLIP: (PLUS, MINUS)}
+    if mu[contact] == 0:
+        parts = {ANY: (FREE, PLUS)}
+    out = []
+    for state in parts.get(int(branch[contact]), ()):
+        child = branch.copy()
+        child[contact] = state
+        out.append(child)
+    return tuple(out)
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,10 +52,10 @@ class Failure:
     direction: Array
     score: Array  # (nc,): z^T W z of the best multipliers
 
-    def contact(self, local: LoadProblem) -> int:
+    def contact(self, local: Scaled) -> int:
         """The contact to be divided: undecided, and with the largest score; -1 for none."""
         for p in np.argsort(-self.score):
-            if local.children(self.branch, int(p)):
+            if children(local.mu, self.branch, int(p)):
                 return int(p)
         return -1
 
@@ -48,20 +63,21 @@ class Failure:
 class Inequality:
     """The matrix inequality of a branch, about a known solution in it or without one."""
 
-    def __init__(self, local: LoadProblem, branch: States, known: Known | None) -> None:
+    def __init__(self, local: Scaled, branch: States, known: Known | None) -> None:
         self.local, self.branch, self.known = local, branch, known
         apex = known is None
         if known is None:
             self.cones = cones_with_apex(local, branch)
         else:
             self.cones = cones_about(local, branch, known)
-        self.groups = groups(self.cones, local.coordinates(branch))
-        self.Z, _ = energy_basis(local, branch, apex)
+        self.groups = groups(self.cones, coordinates(local, branch))
+        self.off = None if known is None else known.off
+        self.Z = energy_basis(local, branch, apex)
 
     @property
     def divisible(self) -> bool:
         """True where some contact is not decided yet."""
-        return bool((self.branch >= UNDECIDED).any())
+        return bool((self.branch >= SLIP).any())
 
     @property
     def large(self) -> bool:
@@ -69,14 +85,14 @@ class Inequality:
         return (
             self.local.contacts >= LARGE
             and self.known is not None
-            and bool((self.branch == UNDECIDED).all())
+            and bool((self.branch == ANY).all())
         )
 
     def solve(self, near: float, deadline: Deadline) -> BranchProof | Failure:
         """Its proof with a distance <= near, or where it fails."""
         if not self.Z.shape[1]:  # nothing moves: any multipliers will do
             W = self._whole_identity()
-            proof = prove(self.local, self.branch, W, self.known)
+            proof = prove(self.local, self.branch, W, self.off)
             able = proof is not None and proof.distance <= near
             return proof if able and proof else self._failure(np.zeros(0), W)
         proofs: list[BranchProof] = []
@@ -85,7 +101,7 @@ class Inequality:
             own = tuple(e * g.factors for e, g in zip(extras, self.groups, strict=True))
             if not slacks_are_positive([g.family for g in self.groups], W, own):
                 return False
-            proof = prove(self.local, self.branch, self._whole(W), self.known)
+            proof = prove(self.local, self.branch, self._whole(W), self.off)
             if proof is None or proof.distance > near:
                 return False
             proofs.append(proof)

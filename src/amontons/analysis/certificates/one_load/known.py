@@ -9,14 +9,15 @@ from numpy.typing import NDArray
 
 from ....core.errors import InvalidInput
 from ....problem.friction import FrictionProblem
-from ...solutions.newton_batch import Stack
-from .problem import FREE, MINUS, PLUS, STICK, LoadProblem, States
+from ...scaled import Scaled
+from ...solutions.branches import reactions, zero_velocities
+from ...solutions.newton_batch import newton
+from ...statuses import FREE, MINUS, PLUS, STICK
+from ...tolerances import REFINED, SLACK
 
 Array = NDArray[np.float64]
-SNAP = 1e-9  # scaled distance from a border of the law that counts as none
 NEAR = 1e-6  # of the size of reactions: what is known less well proves nothing of use
 GOOD = 1e-12  # by which a solution in scaled variables may miss the law
-SAME_SOLUTION = 1e-4  # scaled distance that refining a solution may move it
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,38 +39,39 @@ class Known:
         return bool(self.touches.any(axis=1).all())
 
 
-def known_solution(local: LoadProblem, r: Array) -> Known:
-    """Scaled reactions (2 nc,) put on the law: what misses a border by SNAP lies on it."""
+def known_solution(local: Scaled, r: Array) -> Known:
+    """Scaled reactions (2 nc,) put on the law: what misses a border by SLACK lies on it."""
     mu = local.mu
     normal, tangent = r.reshape(-1, 2).T.copy()
-    u = (local.W @ r + local.q).reshape(-1, 2)
-    closed = (normal > SNAP) & local.reacts
+    u = (local.W @ r).reshape(-1, 2) + local.q
+    closed = (normal > SLACK) & local.reacts
     bound = mu * normal
-    slip = closed & ((np.abs(u[:, 1]) > SNAP) | (mu == 0))
-    border = closed & (np.abs(tangent) >= bound - SNAP)
+    slip = closed & ((np.abs(u[:, 1]) > SLACK) | (mu == 0))
+    border = closed & (np.abs(tangent) >= bound - SLACK)
     slope = np.where(slip, -np.sign(u[:, 1]), np.sign(tangent))
     tangent = np.where(slip | border, slope * bound, tangent)
     r = np.where(closed, np.stack([normal, tangent]), 0.0).T.ravel()
     u, rounding = _velocity(local, r)
     z = np.hstack([r.reshape(-1, 2), u.reshape(-1, 2)])
-    z[:, 2] = np.where(closed | (z[:, 2] <= SNAP), 0.0, z[:, 2])
+    z[:, 2] = np.where(closed | (z[:, 2] <= SLACK), 0.0, z[:, 2])
     z[closed & ~slip, 3] = 0.0
     off = np.abs(u - z[:, 2:].ravel()) + rounding
     return Known(r, z, off, _touches(local, z))
 
 
-def _velocity(local: LoadProblem, r: Array) -> tuple[Array, Array]:
+def _velocity(local: Scaled, r: Array) -> tuple[Array, Array]:
     """(W r + q, bound of its error): summed in extended precision where the machine has one."""
+    q = local.q.ravel()
     if not r.any():
-        return local.q.copy(), np.zeros(len(r))
+        return q.copy(), np.zeros(len(r))
     wide = np.longdouble
-    u = np.asarray(local.W.astype(wide) @ r.astype(wide) + local.q, dtype=float)
-    size = np.abs(local.W) @ np.abs(r) + np.abs(local.q)
+    u = np.asarray(local.W.astype(wide) @ r.astype(wide) + q, dtype=float)
+    size = np.abs(local.W) @ np.abs(r) + np.abs(q)
     rounding = (len(r) + 4) * float(np.finfo(wide).eps) * size + np.finfo(float).eps * np.abs(u)
     return u, rounding
 
 
-def _touches(local: LoadProblem, z: Array) -> NDArray[np.bool_]:
+def _touches(local: Scaled, z: Array) -> NDArray[np.bool_]:
     """(nc, 4): statuses whose cone holds the rows of z, which obey the law exactly."""
     mu, none = local.mu, (z[:, :2] == 0).all(axis=1)
     still = (z[:, 2:] == 0).all(axis=1)
@@ -82,12 +84,7 @@ def _touches(local: LoadProblem, z: Array) -> NDArray[np.bool_]:
     return out
 
 
-def contains(local: LoadProblem, branch: States, known: Known) -> bool:
-    """True when a branch has a known solution."""
-    return bool((local.allowed(branch) & known.touches).any(axis=1).all())
-
-
-def refined(local: LoadProblem, r: Array) -> Known:
+def refined(local: Scaled, r: Array) -> Known:
     """The solution next to scaled reactions (2 nc,), on its piece or by Newton's method.
 
     Raises InvalidInput where there is none.
@@ -98,33 +95,33 @@ def refined(local: LoadProblem, r: Array) -> Known:
             return best
         for other in improve(local, best.r if best.valid else r):
             known = known_solution(local, other)
-            near = np.abs(known.r - r).max() <= SAME_SOLUTION * (1 + np.abs(r).max())
+            near = np.abs(known.r - r).max() <= REFINED * (1 + np.abs(r).max())
             better = not best.valid or known.off.max() < best.off.max()
             if near and known.valid and better:
                 best = known
     if not best.valid or best.off.max(initial=0.0) > NEAR:
-        raise not_a_solution(local.problem, (r * local.to_r).reshape(-1, 2))
+        raise not_a_solution(local.problem, r.reshape(-1, 2) * local.to_r)
     return best
 
 
-def _on_piece(local: LoadProblem, r: Array) -> list[Array]:
+def _on_piece(local: Scaled, r: Array) -> list[Array]:
     """The reactions that the statuses of a solution determine."""
     known = known_solution(local, r)
-    branch = np.argmax(known.touches, axis=1).astype(np.int8)
-    R, rows = local.reactions(branch), local.zero_velocities(branch)
+    order = np.array([FREE, STICK, PLUS, MINUS])
+    branch = order[np.argmax(known.touches[:, order], axis=1)]
+    R, rows = reactions(local, branch), zero_velocities(local, branch)
     if not known.valid or not len(rows):
         return []
     try:
-        y = np.linalg.solve((R.T @ local.W[rows].T).T, -local.q[rows])
+        y = np.linalg.solve((R.T @ local.W[rows].T).T, -local.q.ravel()[rows])
     except np.linalg.LinAlgError:
         return []
     return [np.asarray(R @ y)]
 
 
-def _by_newton(local: LoadProblem, r: Array) -> list[Array]:
+def _by_newton(local: Scaled, r: Array) -> list[Array]:
     """Where semismooth Newton steps lead."""
-    stack = Stack.of(local.problem)
-    reached = stack.newton(r.reshape(1, -1, 2), np.random.default_rng(0))
+    reached = newton(local, r.reshape(1, -1, 2), np.random.default_rng(0))
     return [found.ravel() for found in reached]
 
 

@@ -19,9 +19,11 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 from ....core.clock import Deadline
 from ...multipliers.lmi import Accept, LmiOutcome, find_multipliers
 from ...multipliers.program import Family
-from .groups import Group, whole
-from .problem import LoadProblem, States
-from .proof import diagonal_parts
+from ...scaled import Scaled
+from ...solutions.branch_proof import diagonal_parts
+from ...solutions.branches import reactions
+from ...solutions.groups import Group, whole
+from ...statuses import States
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -33,7 +35,7 @@ MARGIN = 0.2  # part of the largest possible eigenvalue of M that multipliers mu
 
 
 def shared_multipliers(
-    local: LoadProblem, branch: States, groups: list[Group], accept: Accept, *,
+    local: Scaled, branch: States, groups: list[Group], accept: Accept, *,
     deadline: Deadline,
 ) -> bool:  # fmt: skip
     """True when multipliers of a branch without vanishing velocities were accepted."""
@@ -42,7 +44,7 @@ def shared_multipliers(
         return False
     deadline.spend(4 * n**3)
     signs, families = _shared(local, groups)
-    R = local.reactions(branch)
+    R = reactions(local, branch)
     WR = np.asarray((R.T @ local.W.T).T)
     energy = R.T @ WR
     try:
@@ -55,7 +57,7 @@ def shared_multipliers(
             return False
         deadline.spend(ROUND_WORK * n**2)
         basis = linalg.solve_triangular(L, linalg.qr(L.T @ V, mode="economic")[0],
-                                        lower=True, trans="T")  # fmt: skip
+                                        lower=True, trans=1)  # fmt: skip
         Z = _rows(R, WR, basis)
         last: list[tuple[tuple[Array, ...], tuple[Array, ...]]] = []
 
@@ -75,7 +77,7 @@ def shared_multipliers(
     return False
 
 
-def _shared(local: LoadProblem, groups: list[Group]) -> tuple[Array, list[Family]]:
+def _shared(local: Scaled, groups: list[Group]) -> tuple[Array, list[Family]]:
     """(sign of every contact in alternating reactions, families that share multipliers)."""
     nc = local.contacts
     blocks = local.W.reshape(nc, 2, nc, 2)
@@ -147,10 +149,10 @@ def _failing(
     R: sparse.csr_array, WR: Array, L: Array, groups: list[Group], W: tuple[Array, ...]
 ) -> Array:
     """Directions y in which y M y is negative, most relative to the energy."""
-    rr, ru, uu = diagonal_parts(whole(groups, W, R.shape[0] // 2))
+    rr, ru, uu = diagonal_parts(whole(groups, W, R.shape[0] // 2, 4))
 
     def product(x: Array) -> Array:
-        y = linalg.solve_triangular(L, x, lower=True, trans="T", check_finite=False)
+        y = linalg.solve_triangular(L, x, lower=True, trans=1, check_finite=False)
         r, u = R @ y, WR @ y
         out = R.T @ (rr @ r + ru @ u) + WR.T @ (ru.T @ r + uu @ u)
         return linalg.solve_triangular(L, out, lower=True, check_finite=False)
@@ -160,8 +162,9 @@ def _failing(
     start = np.cos(np.arange(n) + 0.5)
     count = min(DIRECTIONS, n - 2)
     try:
-        values, vectors = eigsh(operator, count, which="SA", tol=1e-2, v0=start, maxiter=20)
+        values, vectors = eigsh(operator, count, which="SA", v0=start, maxiter=20,
+                                tol=1e-2)  # type: ignore[arg-type]  # fmt: skip
     except ArpackNoConvergence as partial:
         values, vectors = partial.eigenvalues, partial.eigenvectors
     keep = values < 0.1 * max(abs(values).max(initial=0.0), 1e-300)
-    return linalg.solve_triangular(L, vectors[:, keep], lower=True, trans="T")
+    return linalg.solve_triangular(L, vectors[:, keep], lower=True, trans=1)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..newton_batch import Stack
+from ...scaled import Scaled
 from .multipliers import BoxProof
 
 Array = NDArray[np.float64]
@@ -43,13 +43,13 @@ class DiscProof:
     linear: tuple[str, ...]
 
 
-def box_of(stack: Stack, proof: BoxProof) -> DiscBox:
+def box_of(scaled: Scaled, proof: BoxProof) -> DiscBox:
     """What closed a region, in the units of the problem."""
     nc = len(proof.regions)
-    unit = np.repeat(np.hstack([stack.to_r, stack.to_u]), 3, axis=1)
+    unit = np.repeat(np.hstack([scaled.to_r, scaled.to_u]), 3, axis=1)
     if proof.r is None:
         unit = np.hstack([unit, np.ones((nc, 1))])
     V = proof.V / unit[:, :, None] / unit[:, None, :]
     arcs = np.array([(region.middle, region.half) for region in proof.regions])
     letters = "".join(region.letter for region in proof.regions)
-    return DiscBox(letters, arcs, None if proof.r is None else proof.r * stack.to_r, V)
+    return DiscBox(letters, arcs, None if proof.r is None else proof.r * scaled.to_r, V)

@@ -11,7 +11,7 @@ which every contact is free or sticks are a linear system.  Solutions to begin w
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,31 +19,32 @@ from numpy.typing import NDArray
 from ....core.clock import NEVER, Deadline, TimeLimit, deadline_of, now
 from ....core.errors import TimeUp
 from ....problem.friction import FrictionProblem
-from ...multipliers.scales import RESOLVED, UNRESOLVED, resolves
-from ..enumerate import Solutions, missing
+from ...scaled import UNRESOLVED, Scaled
+from ...statuses import FREE, STICK
+from ...tolerances import ON, REFERENCE, RESOLVED, SOLVED
+from ..enumerate import Solutions, missing, nothing_found, without_load
 from ..existence import exist
-from ..multistart import EXTRA, ROUND, Finder, nothing_found, statuses, without_load
-from ..newton_batch import FREE, SLIP, STICK, Stack
-from .multipliers import EXACT, BoxProblem, BoxProof, contains
+from ..multistart import EXTRA, ROUND, Finder, statuses
+from ..newton_batch import newton, on_piece, polished, width
+from ..region_tree import RegionTree
+from .multipliers import BoxProblem, BoxProof
 from .proof import DiscProof, box_of
-from .sets import ON, Law, Region
+from .sets import Law, Region, states_of_regions
 
 Array = NDArray[np.float64]
 Regions = tuple[Region, ...]
 FINEST = 0.002  # rad: half of the smallest arc
 SURE = 1e-7  # scaled violation of the law that excludes the solution of a linear system
-CODE = {"f": FREE, "s": STICK, "l": SLIP, ".": FREE, "c": STICK}
 GHOST_STEPS, TURN = 12, 1e-6  # Newton steps for directions, rad of their differences
 SECONDS = 60.0  # whose work a search without a time limit may take: it may grow without end
 LARGEST = 300  # contacts up to which regions have multipliers: memory
-LOOK = 50.0  # operations of looking at a region per cube of the reactions, at least
 VAGUE = 1e-9  # relative error of a solution that can not be a reference
 STARTS = 300  # of Newton's method before the search
 
 
 def enumerate_discs(
-    problem: FrictionProblem, *, time_limit: TimeLimit = None, tolerance: float = 1e-8,
-    keep_proof: bool = False,
+    problem: FrictionProblem | Scaled, *, time_limit: TimeLimit = None,
+    tolerance: float = SOLVED, keep_proof: bool = False,
 ) -> Solutions:  # fmt: skip
     """All solutions of a 3D Coulomb problem; the global form is condensed.
 
@@ -53,21 +54,19 @@ def enumerate_discs(
     Tresca's law.
     """
     deadline = deadline_of(time_limit, SECONDS)
-    _ = problem.mu
     began = now()
     try:
-        local = problem.condensed(deadline)
+        scaled = Scaled.of(problem, deadline)
     except TimeUp as reason:
         return nothing_found(reason, began)
-    if local.q_norm == 0:
-        return without_load(local)
-    stack = Stack.of(local)
-    finder = Finder(stack, np.random.default_rng(0), tolerance)
-    search = DiscSearch(stack, finder, deadline)
+    if not scaled.q.any():
+        return without_load(scaled)
+    finder = Finder(scaled, np.random.default_rng(0), tolerance)
+    search = DiscSearch(scaled, finder, deadline)
     search.begin()
     search.run()
     entries = [replace(entry, distance=search.resolution,
-                       at_least=int(exist(local, [entry.r], deadline)),
+                       at_least=int(exist(scaled, [entry.r], deadline)),
                        sole=search.complete and not (entry.freedom or entry.touching))
                for entry in finder.solutions()]  # fmt: skip
     return Solutions(
@@ -76,22 +75,26 @@ def enumerate_discs(
     )  # fmt: skip
 
 
-@dataclass(eq=False)
-class DiscSearch:
+class DiscSearch(RegionTree):
     """The state of one search; `run` does it."""
 
-    stack: Stack
-    finder: Finder
-    deadline: Deadline = NEVER
-    examined: int = 0
-    undecided: int = 0
-    stopped: bool = False
-
-    def __post_init__(self) -> None:
+    def __init__(self, scaled: Scaled, finder: Finder, deadline: Deadline = NEVER) -> None:
+        super().__init__(scaled, deadline, [])
+        self.finder = finder
         self.proofs: list[BoxProof] = []
         self.linear: list[Regions] = []
         self.errors: list[float] = []
-        self.queue: list[Regions] = [] if self._penetrates else [self._root()]
+        if not self._penetrates:
+            self.queue.append(self._root())
+
+    @property
+    def several(self) -> bool:
+        """True where more than one solution is known."""
+        return len(self.finder.found) > 1
+
+    def _look_elsewhere(self, deadline: Deadline) -> None:
+        """Look for solutions from many starts."""
+        self.begin(deadline)
 
     def begin(self, deadline: Deadline | None = None) -> None:
         """Solutions from many starts, more where one is known to be missing."""
@@ -101,13 +104,12 @@ class DiscSearch:
         while used < STARTS or (self.finder.lacks_one and used < EXTRA * STARTS):
             if deadline.passed:
                 return
-            used += self.finder.search(ROUND if self.stack.width > ROUND else 10, deadline)
+            used += self.finder.search(ROUND if width(self.scaled) > ROUND else 10, deadline)
 
     @property
     def complete(self) -> bool:
         """True when every region was closed, and solutions can be told apart."""
-        closed = not self.queue and not self.undecided
-        return closed and self._resolved and not self._missing
+        return super().complete and self._resolved and not self._missing
 
     @property
     def resolution(self) -> float:
@@ -116,11 +118,10 @@ class DiscSearch:
         A reference within ON of another status counts as having both.  What it is off by, other
         solutions may be off by as much more as W is soft.
         """
-        off = max((_off_border(self.stack, r) for r in self.finder.found), default=0.0)
+        off = max((_off_border(self.scaled, r) for r in self.finder.found), default=0.0)
         if off == 0.0:
             return ON
-        W = (self.stack.W + self.stack.W.T) / 2
-        softest = max(float(np.linalg.eigvalsh(W)[0]), np.finfo(float).tiny)
+        softest = max(float(np.linalg.eigvalsh(self.scaled.symmetric)[0]), np.finfo(float).tiny)
         return max(ON, off / softest)
 
     @property
@@ -132,19 +133,18 @@ class DiscSearch:
 
     @property
     def _resolved(self) -> bool:
-        stack = self.stack
-        loaded = all(resolves(stack.problem, r * stack.to_r) for r in self.finder.found)
+        loaded = all(self.scaled.resolves(r) for r in self.finder.found)
         return loaded and self.resolution <= RESOLVED
 
     @property
     def _penetrates(self) -> bool:
         """True when a contact that can not react has u_N < 0, beyond rounding: no solution."""
-        return bool((self.stack.c[~self.stack.able, 0] < -SURE).any())
+        return bool((self.scaled.q[~self.scaled.reacts, 0] < -SURE).any())
 
     @property
     def reason(self) -> str:
         """Why the list is complete, or why not."""
-        if self.stopped and len(self.stack.mu) > LARGEST:
+        if self.stopped and len(self.scaled.mu) > LARGEST:
             return f"more than {LARGEST} contacts: regions were not looked at"
         if self.stopped:
             return f"stopped after {self.deadline}"
@@ -159,51 +159,30 @@ class DiscSearch:
     def proof(self) -> DiscProof:
         """What closed the regions, in the units of the problem."""
         return DiscProof(
-            tuple(box_of(self.stack, proof) for proof in self.proofs),
+            tuple(box_of(self.scaled, proof) for proof in self.proofs),
             tuple("".join(region.letter for region in regions) for regions in self.linear),
         )
-
-    def run(self, most_solutions: int | None = None) -> None:
-        """Divide until all regions are closed, the clock runs out, or enough are found."""
-        while self.queue:
-            if not self.affords_step:
-                self.stopped = True
-                return
-            if most_solutions is not None and len(self.finder.found) >= most_solutions:
-                return
-            self.step()
 
     @property
     def affords_step(self) -> bool:
         """True where there are time and memory to look at a region."""
-        few = len(self.stack.mu) <= LARGEST
-        return few and not self.deadline.passed and self.deadline.affords(self._look)
-
-    @property
-    def _look(self) -> float:
-        return LOOK * float(len(self.stack.W)) ** 3
-
-    def step(self) -> None:
-        """Close or divide the region that is next."""
-        self.deadline.spend(self._look)
-        self.queue += reversed(self._look_at(self.queue.pop()))
+        return len(self.scaled.mu) <= LARGEST and super().affords_step
 
     def _polish(self) -> None:
         """Known solutions to the last digits; those that can not be are no references."""
         self.errors = []
         for k, r in enumerate(self.finder.found):
-            better, step = self.stack.polished(r)
+            better, step = polished(self.scaled, r)
             if np.abs(better - r).max(initial=0.0) <= ON * (1 + np.abs(r).max(initial=0.0)):
                 self.finder.found[k] = better
-            self.errors.append(EXACT + 10 * step / (1 + float(np.abs(r).max(initial=0.0))))
+            self.errors.append(REFERENCE + 10 * step / (1 + float(np.abs(r).max(initial=0.0))))
 
     def _root(self) -> Regions:
         """Every contact undecided; those that can not react are free."""
-        return tuple(Region() if able else Region("f") for able in self.stack.able)
+        return tuple(Region() if able else Region("f") for able in self.scaled.reacts)
 
     def _look_at(self, regions: Regions) -> list[Regions]:
         """Regions that remain of one; none where it is closed or has to be given up."""
-        self.examined += 1
         if len(self.errors) < len(self.finder.found):
             self._polish()
         inside = [r for r in self.finder.found if self._holds(regions, r)]
@@ -215,11 +194,11 @@ class DiscSearch:
         if all(region.letter in "fs" for region in regions):
             self._settle(regions, bool(inside))
             return []
-        error = self._error(inside[0]) if inside else EXACT
+        error = self._error(inside[0]) if inside else REFERENCE
         if error > VAGUE:
             self.undecided += 1
             return []
-        box = BoxProblem(self.stack, regions, inside[0] if inside else None, error=error)
+        box = BoxProblem(self.scaled, regions, inside[0] if inside else None, error=error)
         answer = box.solve(self.deadline)
         if answer.proof is not None:
             self.proofs.append(answer.proof)
@@ -241,16 +220,16 @@ class DiscSearch:
         r, error = self._ghost(regions)
         if r is None or not self._holds(regions, r) or error > VAGUE:
             return False
-        u = self.stack.velocity(r[None])[0]
+        u = self.scaled.velocity(r[None])[0]
         slip = np.array([region.letter == "l" for region in regions])
         stick = np.array([region.letter == "s" for region in regions])
         size = 1 + np.abs(r).max()
-        excess = np.linalg.norm(r[:, 1:], axis=1) - self.stack.mu * r[:, 0]
+        excess = np.linalg.norm(r[:, 1:], axis=1) - self.scaled.mu * r[:, 0]
         worst = max(np.max(excess[stick], initial=-np.inf),
                     np.max(-u[~slip & ~stick, 0], initial=-np.inf))  # fmt: skip
         if worst <= SURE * size or not (r[slip, 0] > SURE * size).all():
             return False
-        answer = BoxProblem(self.stack, regions, r, error=error).solve(self.deadline)
+        answer = BoxProblem(self.scaled, regions, r, error=error).solve(self.deadline)
         if answer.proof is not None:
             self.proofs.append(answer.proof)
         return answer.proof is not None
@@ -258,14 +237,14 @@ class DiscSearch:
     def _ghost(self, regions: Regions) -> tuple[Array | None, float]:
         """(r with the equations of a pattern and u_T along r_T, relative error of it)."""
         slip = np.flatnonzero([region.letter == "l" for region in regions])
-        states = np.array([CODE[region.letter] for region in regions])
+        states = states_of_regions(regions)
         angle = np.array([region.middle for region in regions])
-        step = np.inf
+        step, r, u, direction = np.inf, np.empty(0), np.empty(0), np.empty(0)
         for _ in range(GHOST_STEPS):
             trial = np.vstack([angle, angle + TURN * np.eye(len(angle))[slip]])
             direction = np.stack([np.cos(trial), np.sin(trial)], axis=2)
-            r = self.stack.on_piece(np.tile(states, (len(trial), 1)), direction)
-            u = self.stack.velocity(r)
+            r = on_piece(self.scaled, np.tile(states, (len(trial), 1)), direction)
+            u = self.scaled.velocity(r)
             across = direction[..., 0] * u[..., 2] - direction[..., 1] * u[..., 1]
             value = across[0, slip]
             J = (across[1:, slip] - value).T / TURN
@@ -279,7 +258,7 @@ class DiscSearch:
             angle[slip] -= turn
         along = np.einsum("pi,pi->p", direction[0], u[0, :, 1:])
         proper = step < VAGUE and (along[slip] > SURE).all()
-        return (r[0], EXACT + 100 * step) if proper else (None, np.inf)
+        return (r[0], REFERENCE + 100 * step) if proper else (None, np.inf)
 
     def _error(self, r: Array) -> float:
         """Bound of the relative error of one of the solutions found."""
@@ -287,12 +266,12 @@ class DiscSearch:
 
     # ---------------------------------------------------------------- regions
     def _laws(self, r: Array) -> list[Law]:
-        z = np.hstack([r, self.stack.velocity(r[None])[0]])
-        return [Law(float(mu), own) for mu, own in zip(self.stack.mu, z, strict=True)]
+        z = np.hstack([r, self.scaled.velocity(r[None])[0]])
+        return [Law(float(mu), own) for mu, own in zip(self.scaled.mu, z, strict=True)]
 
     def _holds(self, regions: Regions, r: Array) -> bool:
         laws = self._laws(r)
-        return all(contains(law, region) for law, region in zip(laws, regions, strict=True))
+        return all(law.lies_in(region) for law, region in zip(laws, regions, strict=True))
 
     def _order(self, regions: Regions, scores: Array) -> Iterator[int]:
         """Contacts to divide, the most promising first."""
@@ -309,7 +288,7 @@ class DiscSearch:
         if own.letter == ".":
             parts = [Region("f"), Region("c")]
         elif own.letter == "c":
-            if self.stack.mu[p] == 0:
+            if self.scaled.mu[p] == 0:
                 return []
             parts = [Region("s"), replace(own, letter="l")]
         else:
@@ -321,7 +300,7 @@ class DiscSearch:
 
         The arc of two known solutions is cut between them.
         """
-        if own.half <= FINEST or self.stack.mu[p] == 0:
+        if own.half <= FINEST or self.scaled.mu[p] == 0:
             return []
         angles = [law.direction for law in (self._laws(r)[p] for r in inside)]
         known = [angle for angle in angles if angle is not None]
@@ -347,31 +326,31 @@ class DiscSearch:
     # ---------------------------------------------------------------- leaves
     def _start(self, regions: Regions) -> Array:
         """Scaled r on a pattern, slip in the middle of its arcs, signs disregarded."""
-        states = np.array([[CODE[region.letter] for region in regions]])
+        states = states_of_regions(regions)[None]
         angle = np.array([region.middle for region in regions])
         direction = np.column_stack([np.cos(angle), np.sin(angle)])
-        return self.stack.on_piece(states, direction[None])
+        return on_piece(self.scaled, states, direction[None])
 
     def _newton(self, regions: Regions) -> bool:
         """True when Newton's method from a region finds a solution that was not known."""
-        reached = self.stack.newton(self._start(regions), np.random.default_rng(0))
+        reached = newton(self.scaled, self._start(regions), np.random.default_rng(0))
         return any([self.finder.add(r) for r in reached])
 
     def _settle(self, regions: Regions, known: bool) -> None:
         """A region without slip: its linear system has a solution of the law or not."""
         self.linear.append(regions)
         r = self._start(regions)[0]
-        u = self.stack.velocity(r[None])[0]
+        u = self.scaled.velocity(r[None])[0]
         free = np.array([region.letter == "f" for region in regions])
         closed = ~free
         equations = max(np.abs(r[free]).max(initial=0.0), np.abs(u[closed]).max(initial=0.0))
-        matrix = self.stack.W[np.ix_(np.repeat(closed, 3), np.repeat(closed, 3))]
+        matrix = self.scaled.W[np.ix_(np.repeat(closed, 3), np.repeat(closed, 3))]
         if equations > 1e-9 * (1 + np.abs(r).max()) or _ill_conditioned(matrix):
             self.undecided += 1
             return
         if known:
             return
-        tangent = np.linalg.norm(r[:, 1:], axis=1) - self.stack.mu * r[:, 0]
+        tangent = np.linalg.norm(r[:, 1:], axis=1) - self.scaled.mu * r[:, 0]
         worst = max(np.max(-u[free, 0], initial=-np.inf),
                     np.max(tangent[closed], initial=-np.inf),
                     np.max(-r[closed, 0], initial=-np.inf))  # fmt: skip
@@ -383,13 +362,14 @@ class DiscSearch:
         return any(np.abs(r - other).max() <= 10 * ON * size for other in self.finder.found)
 
 
-def _off_border(stack: Stack, r: Array) -> float:
+def _off_border(scaled: Scaled, r: Array) -> float:
     """Largest distance from another status, scaled, that counts as none without being it."""
-    u, states = stack.velocity(r[None])[0], statuses(stack, r)[0]
-    stick = np.minimum(r[:, 0], stack.mu * r[:, 0] - np.linalg.norm(r[:, 1:], axis=1))
-    slip = np.where(stack.mu > 0, np.linalg.norm(u[:, 1:], axis=1), np.inf)
-    distance = np.choose(states, [np.abs(u[:, 0]), stick, np.minimum(r[:, 0], slip)])
-    distance = np.abs(distance[stack.able])
+    u, states = scaled.velocity(r[None])[0], statuses(scaled, r)[0]
+    stick = np.minimum(r[:, 0], scaled.mu * r[:, 0] - np.linalg.norm(r[:, 1:], axis=1))
+    slip = np.where(scaled.mu > 0, np.linalg.norm(u[:, 1:], axis=1), np.inf)
+    distance = np.select([states == FREE, states == STICK],
+                         [np.abs(u[:, 0]), stick], np.minimum(r[:, 0], slip))  # fmt: skip
+    distance = np.abs(distance[scaled.reacts])
     return float(distance[distance <= ON].max(initial=0.0))
 
 

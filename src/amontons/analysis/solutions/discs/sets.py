@@ -24,17 +24,20 @@ c1, c2 the generators of r_N and s: the span of c1, c2, k holds them all, also a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...multipliers.lmi import restricted
+from ...statuses import States, states_of
+from ...tolerances import ON, SUMMED
+from ..groups import Form
 
 Array = NDArray[np.float64]
 SAMPLES = 16  # directions of a full circle
 FEWEST = 6  # of an arc: a form of e has five coefficients
-ON = 1e-10  # scaled distance at which a reference counts as on a border of the law
 INTERVALS, PARTS, DIVISIONS = 96, 12, 5  # of directions: at first, of one, how often divided
 MOST = 20_000  # intervals at a time
 NEAR = 0.3  # rad from e0 within which the span replaces the cone
@@ -64,6 +67,11 @@ class Region:
             count = max(FEWEST, int(np.ceil(self.half / np.pi * SAMPLES)) + 1)
             own = np.linspace(self.middle - self.half, self.middle + self.half, count)
         return np.concatenate([own, extra])
+
+
+def states_of_regions(regions: Sequence[Region]) -> States:
+    """The states (nc,) of regions, arcs disregarded."""
+    return states_of("".join(region.letter for region in regions))
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,14 +118,23 @@ class Law:
             return bool(np.abs(u).max() <= ON)
         return bool(abs(u[0]) <= ON and self.mu == 0)  # else by direction
 
-    # ---------------------------------------------------------------- generators
-    def _columns(self, *columns: Array) -> Array:
-        """Columns (6,) padded to the size of this law."""
-        G = np.zeros((self.size, len(columns)))
-        for j, column in enumerate(columns):
-            G[: len(column), j] = column
-        return G
+    def lies_in(self, region: Region) -> bool:
+        """True where the reference lies in a closed region; also where there is none."""
+        if self.z0 is None or region.letter == ".":
+            return True
+        if region.letter in "fs":
+            return self.holds(region.letter)
+        r, u = self.z0[:3], self.z0[3:]
+        if self.mu == 0 or region.letter == "c":
+            return bool(abs(u[0]) <= ON)
+        if self.direction is None:
+            return False
+        if np.abs(r).max() <= ON and np.abs(u).max() <= ON:
+            return True
+        apart = abs((self.direction - region.middle + np.pi) % (2 * np.pi) - np.pi)
+        return bool(apart <= region.half + ON)
 
+    # ---------------------------------------------------------------- generators
     def slip(self, angle: Array, order: int = 0) -> tuple[Array, Array]:
         """(c1, c2, g) and (c1, c2, k) at e, (j, size, 2 or 3), or their derivatives."""
         turned = angle + order * np.pi / 2
@@ -146,125 +163,35 @@ def _wrapped(angle: Array) -> Array:
 
 
 # ------------------------------------------------------------- matrix inequalities
-@dataclass(frozen=True, eq=False)
-class Inequalities:
-    """Slacks of one contact, linear in the entries of V and `extras` further unknowns.
-
-    matrices: tensors (entries + extras, s, s) each.  feasible (extras,): see `multipliers.lmi`.
-    """
-
-    matrices: list[Array]
-    feasible: Array
-
-
-class _Builder:
-    """Collects slacks and the extras that they bring."""
-
-    def __init__(self, rows: list[int]) -> None:
-        self.rows, self.entries = rows, len(rows) * (len(rows) + 1) // 2
-        self.forms: list[tuple[Array, list[tuple[int, Array]]]] = []
-        self.bounds: list[list[tuple[int, Array]]] = []
-        self.feasible: list[float] = []
-
-    def unknown(self, start: float) -> int:
-        self.feasible.append(start)
-        return len(self.feasible) - 1
-
-    def at_least_zero(self) -> int:
-        """A new unknown >= 0."""
-        k = self.unknown(1.0)
-        self.bounds.append([(k, np.ones((1, 1)))])
-        return k
-
-    def form(self, G: Array, signs: list[tuple[int, int]]) -> list[tuple[int, Array]]:
-        """-G^T V G minus unknown numbers >= 0 times the given products of coefficients."""
-        terms = []
-        for i, j in signs:
-            product = np.zeros((G.shape[1], G.shape[1]))
-            product[i, j] = product[j, i] = -0.5
-            terms.append((self.at_least_zero(), product))
-        self.forms.append((G[self.rows], terms))
-        return terms
-
-    def done(self) -> Inequalities:
-        extras = len(self.feasible)
-        matrices = []
-        for G, terms in self.forms:
-            tensor = restricted(G[None], extras)[0]
-            for k, matrix in terms:
-                tensor[self.entries + k] += matrix
-            matrices.append(tensor)
-        for terms in self.bounds:
-            size = len(terms[0][1])
-            tensor = np.zeros((self.entries + extras, size, size))
-            for k, matrix in terms:
-                tensor[self.entries + k] += matrix
-            matrices.append(tensor)
-        return Inequalities(matrices, np.array(self.feasible))
-
-
-def inequalities(
+def forms_of(
     law: Law, region: Region, rows: list[int], extra: tuple[float, ...] = ()
-) -> Inequalities:
-    """What a form V on the given rows of d has to satisfy; extra: more directions of slip."""
-    out = _Builder(rows)
-    axes = np.eye(law.size)
+) -> list[Form]:
+    """Where a form V on the given rows of d has to be negative; extra: more directions."""
+    axes, out = np.eye(law.size), []
     apex = [] if law.apex is None else [law.apex]
+
+    def add(columns: list[Array], *, inside: bool = False, disc: bool = False) -> None:
+        """Generators, and an apex unless the reference is inside."""
+        more = [] if inside else apex
+        pairs = ((0, len(columns)),) if more and not disc else ()
+        G = np.column_stack([*columns, *more])
+        out.append(Form(G[rows], pairs, disc and not inside))
+
     if "f" in region.statuses:
-        free = [axes[3], axes[4], axes[5]]
-        if 4 not in rows:
-            free = free[:1]
-        if law.holds("f"):
-            out.form(law._columns(*free), [])
-        else:
-            out.form(law._columns(*free, *apex), [(0, len(free))] if apex else [])
+        add([axes[3], axes[4], axes[5]] if 4 in rows else [axes[3]], inside=law.holds("f"))
     if law.mu == 0 and region.letter != "f":
-        _frictionless(out, law, axes, apex)
-        return out.done()
+        add([axes[0], axes[4], axes[5]], inside=law.holds("l"))
+        return out
     if "s" in region.statuses:
-        _stick(out, law, axes, apex)
+        disc = [axes[0], law.mu * axes[1], law.mu * axes[2]]
+        add(disc, inside=law.holds("s"), disc=True)
     if "l" in region.statuses:
-        _slip(out, law, region.angles(extra))
-    return out.done()
-
-
-def _frictionless(out: _Builder, law: Law, axes: Array, apex: list[Array]) -> None:
-    free = law.holds("l")
-    columns = [axes[0], axes[4], axes[5]] + ([] if free else apex)
-    out.form(law._columns(*columns), [(0, 3)] if len(columns) > 3 else [])
-
-
-def _stick(out: _Builder, law: Law, axes: Array, apex: list[Array]) -> None:
-    """The cone |x| <= x_0 of (r_N, r_T / mu), times a."""
-    disc = [axes[0], law.mu * axes[1], law.mu * axes[2]]
-    if law.holds("s"):
-        out.form(law._columns(*disc), [])
-        return
-    terms = out.form(law._columns(*disc, *apex), [])
-    size = 3 + len(apex)
-    terms.append((out.at_least_zero(), -np.diag([1.0, -1.0, -1.0, 0.0])[:size, :size]))
-    if not apex:
-        return
-    cone = [np.eye(2), np.array([[1.0, 0], [0, -1.0]]), np.array([[0, 1.0], [1.0, 0]])]
-    dual = [(out.unknown(float(i == 0)), matrix) for i, matrix in enumerate(cone)]
-    out.bounds.append(dual)  # v_0 >= |(v_1, v_2)|
-    for i, (k, _) in enumerate(dual):
-        product = np.zeros((4, 4))
-        product[i, 3] = product[3, i] = -0.5
-        terms.append((k, product))
-
-
-def _slip(out: _Builder, law: Law, angles: Array) -> None:
-    cone, span = law.slip(angles)
-    near = np.zeros(len(angles), dtype=bool)
-    if law.direction is not None:
-        near = np.abs(_wrapped(angles - law.direction)) <= NEAR
-    for j, close in enumerate(near):
-        if close:
-            out.form(span[j], [])
-        else:
-            m = cone.shape[2]
-            out.form(cone[j], [(a, b) for a in range(m) for b in range(a + 1, m)])
+        angles = region.angles(extra)
+        for angle, cone, span in zip(angles, *law.slip(angles), strict=True):
+            near = law.direction is not None and abs(_wrapped(angle - law.direction)) <= NEAR
+            pairs = () if near else tuple(combinations(range(cone.shape[1]), 2))
+            out.append(Form((span if near else cone)[rows], pairs))
+    return out
 
 
 # ------------------------------------------------------------------ proof on an arc
@@ -307,7 +234,7 @@ def _negative_between(
         bend = _most_bent(V, middle, width, size)
         norm = float(np.linalg.norm(G, axis=(1, 2)).max())
         margin = np.repeat(bend * width**2 / 8, 2)
-        margin += size * (2 * norm * uncertainty + 1e-13 * norm**2)
+        margin += size * (2 * norm * uncertainty + SUMMED * norm**2)
         Q = -np.swapaxes(G, 1, 2) @ V @ G
         hopeful[np.repeat(~good, 2)] |= test(Q)
         holds = test(Q - margin[:, None, None] * np.eye(G.shape[2]))
@@ -333,7 +260,7 @@ def _most_bent(V: Array, G: list[Array], width: float, size: float) -> Array:
 def definite(Q: Array) -> NDArray[np.bool_]:
     """Which symmetric Q (j, s, s) are positive definite."""
     minors = [np.linalg.det(Q[:, :k, :k]) for k in range(1, Q.shape[1] + 1)]
-    return (np.array(minors) > 0).all(axis=0)
+    return np.all(np.array(minors) > 0, axis=0)
 
 
 def copositive(Q: Array) -> NDArray[np.bool_]:

@@ -1,11 +1,8 @@
-"""A 2D Coulomb problem in scaled variables: the box of its solutions, and its linear pieces.
+"""A 2D Coulomb problem: the box of its solutions, and its linear pieces, scaled.
 
-Scaled variables: r sqrt|W_ii| and u / sqrt|W_ii|, divided by |q / sqrt|W_ii|| of the contacts
-that q can press (`load_size`), all rounded to powers of two: the scaled problem is the given
-one without rounding.  Every solution dissipates, r u <= 0, so r W r + q r <= 0: where W is
-positive definite that ellipsoid bounds all reactions and velocities beforehand, and proofs hold
-without further assumption; so they do where W is singular but no reaction in the cone has
-W r = 0.
+Every solution dissipates, r u <= 0, so r W r + q r <= 0: where W is positive definite that
+ellipsoid bounds all reactions and velocities beforehand, and proofs hold without further
+assumption; so they do where W is singular but no reaction in the cone has W r = 0.
 """
 
 from __future__ import annotations
@@ -18,16 +15,13 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.optimize import linprog
 
-from ...linear.dense import dense
-from ...problem.friction import FrictionProblem
 from ..multipliers.rounding import EPSILON, gamma
-from ..multipliers.scales import contact_sizes, load_size, power_of_two
-from . import pattern_search as search
+from ..scaled import Scaled, load_size, power_of_two
+from ..statuses import FREE, MINUS, PLUS, STICK, States
+from ..tolerances import SLACK
 
 Array = NDArray[np.float64]
-States = NDArray[np.int8]
 REACH = 1e6  # size of scaled reactions up to which proofs hold where W is singular
-SLACK = 1e-9  # violation of the law by a set of solutions, scaled, that counts as none
 SYMMETRIC = 1e-12  # of W where only a symmetric one is bounded
 
 
@@ -50,22 +44,13 @@ class Box:
     bounded: bool
 
 
-class ScaledProblem:
-    """The problem in scaled variables, u = W r + c, and the box of all solutions."""
+class PlaneProblem:
+    """u = W r + c in scaled variables, and the box of all solutions."""
 
-    def __init__(self, problem: FrictionProblem) -> None:
-        assert problem.W is not None and problem.q is not None
-        self.problem, self.mu = problem, problem.mu
-        nc = self.contacts = problem.contacts
-        W = dense(problem.W)
-        size, self.reacts = contact_sizes(W, nc)
-        root = np.repeat(power_of_two(np.sqrt(size)), 2)
-        load = load_size(problem.q / root.reshape(nc, 2), self.mu, self.reacts)
-        self._finer = np.sqrt(size) / root[0::2], float(load or 1.0)
-        self.unit = float(power_of_two(load or 1.0))
-        self.to_r, self.to_u = self.unit / root, self.unit * root
-        self.W = W / root / root[:, None]
-        self.c = problem.q.ravel() / self.to_u
+    def __init__(self, scaled: Scaled) -> None:
+        self.scaled, self.W, self.mu, self.reacts = scaled, scaled.W, scaled.mu, scaled.reacts
+        nc = self.contacts = scaled.contacts
+        self.c = scaled.q.ravel().copy()
         normal = self.c[0::2]  # a view: rounding of the gap of a contact that can not react
         normal[~self.reacts & (np.abs(normal) <= SLACK)] = 0.0
         generators = np.zeros((2 * nc, 2 * nc))  # r = generators x
@@ -87,8 +72,8 @@ class ScaledProblem:
             bounded = size < REACH
             found = self._wide_box(min(size, REACH))
         low, high = found
-        size, load = self._finer
-        load /= self.unit
+        size = np.sqrt(self.scaled.size)
+        load = load_size(self.scaled.q, self.mu, self.reacts) or 1.0
         x = np.repeat(size / load * self.shrink * np.maximum(self.mu, 1.0), 2)
         u = np.repeat(1 / (load * size), 2)
         each = np.stack([x.reshape(-1, 2), u.reshape(-1, 2)], axis=1).ravel()
@@ -97,7 +82,8 @@ class ScaledProblem:
         terms = u * (np.abs(self.W) @ (np.abs(self.generators) @ most))
         A = u[:, None] * (self.W @ self.generators) / x
         return Box(A, u * self.c, low * each - room, high * each + room,
-                   gamma(2 * self.contacts + 12) * terms, self.to_u / u, bounded)  # fmt: skip
+                   gamma(2 * self.contacts + 12) * terms,
+                   self.scaled.to_u.repeat(2) / u, bounded)  # fmt: skip
 
     def _ellipsoid(self) -> tuple[Array, Array] | None:
         """The box of r W r + c r <= 0, rounding included; None where W is not surely definite.
@@ -177,18 +163,18 @@ class ScaledProblem:
         return low.ravel(), high.ravel()
 
     # ---------------------------------------------------------------- one pattern
-    def system(self, states: States) -> tuple[Array, Array]:
+    def system(self, states: States) -> tuple[Array, NDArray[np.int64]]:
         """(r = R y, rows of u that vanish): the linear system (W R y + c)[rows] = 0."""
         columns, rows = [], []
         for i, state in enumerate(states):
             n, t = 2 * i, 2 * i + 1
-            slope = {search.SLIP_PLUS: self.mu[i], search.SLIP_MINUS: -self.mu[i]}
-            if state == search.OPEN:
+            slope = {PLUS: self.mu[i], MINUS: -self.mu[i]}
+            if state == FREE:
                 continue
             rows.append(n)
             unit = self.shrink[i] if state in slope else 1.0
             columns.append({n: unit, t: unit * slope.get(state, 0.0)})
-            if state == search.STICK:
+            if state == STICK:
                 rows.append(t)
                 columns.append({t: 1.0})
         R = np.zeros((2 * self.contacts, len(columns)))
@@ -201,15 +187,15 @@ class ScaledProblem:
         rows: list[tuple[dict[int, float], dict[int, float]]] = []
         for i, state in enumerate(states):
             n, t, mu = 2 * i, 2 * i + 1, float(self.mu[i])
-            if state == search.OPEN:
+            if state == FREE:
                 rows.append(({}, {n: 1.0}))
-            elif state == search.STICK:
+            elif state == STICK:
                 rows += [({n: mu, t: -1.0}, {}), ({n: mu, t: 1.0}, {})]
             else:
                 rows.append(({n: 1.0}, {}))
-                if state == search.SLIP_PLUS:
+                if state == PLUS:
                     rows.append(({}, {t: -1.0}))
-                elif state == search.SLIP_MINUS:
+                elif state == MINUS:
                     rows.append(({}, {t: 1.0}))
         P, Q = np.zeros((2, len(rows), 2 * self.contacts))
         for k, (on_r, on_u) in enumerate(rows):

@@ -5,7 +5,7 @@ About a known solution z0, with d = z - z0 for another solution z of a branch, d
     d_p^T W_p d_p <= 0 in cone(C_s - z0_p) for all contacts p and statuses s,
     M = sum_p Z_p^T W_p Z_p >= tau I   on all d_r                    =>  d = 0.
 
-z0 obeys balance only up to `Known.off`: d + e lies in the cones with |e_u| <= off, so
+z0 obeys balance only up to `off`: d + e lies in the cones with |e_u| <= off, so
 
     tau |d|^2 <= sum_p (2 |d_p^T W_p e_p| + |e_p^T W_p e_p|) <= 2 beta |d| + alpha,
 
@@ -19,14 +19,16 @@ M need not be positive beside them.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg, sparse
 
-from ...multipliers.rounding import gamma, is_positive_definite, unit_scale
-from .known import Known
-from .problem import LoadProblem, States
+from ..multipliers.rounding import gamma, is_positive_definite, unit_scale
+from ..scaled import Scaled
+from ..statuses import States
+from .branches import Index, reactions, zeros
 
 Array = NDArray[np.float64]
 PENALTIES = 10.0 ** np.arange(0, 9, 2)  # of velocities that vanish, times |W_p|
@@ -35,7 +37,7 @@ SHARE = 0.5  # of the smallest eigenvalue of M that is proved
 
 @dataclass(frozen=True, eq=False)
 class BranchProof:
-    """Scaled multipliers (nc, k, k) of a branch; k = 5 where no solution is left.
+    """Scaled multipliers (nc, k, k) of a branch; k = 2 d + 1 where no solution is left.
 
     distance: bound of |r - r0| in scaled reactions, for every solution of the branch.
     """
@@ -46,26 +48,32 @@ class BranchProof:
 
 
 def prove(
-    local: LoadProblem, branch: States, multipliers: Array, known: Known | None
-) -> BranchProof | None:
-    """The proof, None where rounding could spoil it; slacks are not looked at."""
-    rows = local.zero_velocities(branch)
-    motion, size = _motions(local, branch, apex=known is None)
-    for penalty in PENALTIES if len(rows) else (0.0,):
+    scaled: Scaled, branch: States, multipliers: Array, off: Array | None, *,
+    all_reactions: bool = False,
+) -> BranchProof | None:  # fmt: skip
+    """The proof, None where rounding could spoil it; slacks are not looked at.
+
+    off (nc d,): of the known solution, None where there is none.  all_reactions: M is positive
+    for reactions outside of the branch too, by penalties.
+    """
+    rows = zeros(scaled, branch, all_reactions=all_reactions)
+    whole: Any = sparse.eye_array(len(scaled.W), format="csr")
+    R = whole if all_reactions else reactions(scaled, branch)
+    motion, size = _motions(scaled, R, apex=off is None)
+    for penalty in PENALTIES if len(rows[0]) else (0.0,):
         W = _penalised(multipliers, rows, penalty)
         M = motion.sum(W)
-        error = gamma(4 * len(W) + 24) * size.sum(np.abs(W))
+        error = gamma(2 * scaled.shape[1] * len(W) + 24) * size.sum(np.abs(W))
         scale = unit_scale(M)
         M, error = (A * scale[:, None] * scale for A in (M, error))
-        exact = known is None or not known.off.any()
+        exact = off is None or not off.any()
         tau = 0.0 if exact else SHARE * _smallest_eigenvalue(M)
         M[np.diag_indices(len(M))] -= tau
         if not is_positive_definite(M, error):
             continue
-        if exact:
+        if off is None or exact:
             return BranchProof(branch, W, 0.0)
-        assert known is not None
-        return BranchProof(branch, W, _distance(W, size, scale, tau, known.off))
+        return BranchProof(branch, W, _distance(W, size, scale, tau, off))
     return None
 
 
@@ -81,30 +89,31 @@ class _Motion:
         rr, ru, uu = diagonal_parts(W)
         mixed = self.R.T @ (ru @ self.U)
         M = self.U.T @ (uu @ self.U) + mixed + mixed.T + (self.R.T @ rr @ self.R).toarray()
-        if W.shape[1] == 5:
-            last = self.R.T @ W[:, :2, 4].ravel() + self.U.T @ W[:, 2:4, 4].ravel()
+        if W.shape[1] % 2:
+            d = W.shape[1] // 2
+            last = self.R.T @ W[:, :d, -1].ravel() + self.U.T @ W[:, d:-1, -1].ravel()
             M[:, -1] += last
             M[-1] += last
-            M[-1, -1] += W[:, 4, 4].sum()
+            M[-1, -1] += W[:, -1, -1].sum()
         return (M + M.T) / 2
 
 
 def diagonal_parts(W: Array) -> tuple[sparse.csr_array, ...]:
-    """The parts r r, r u and u u of multipliers (nc, k, k), as (2 nc, 2 nc) each."""
-    nc = len(W)
+    """The parts r r, r u and u u of multipliers (nc, k, k), as (nc d, nc d) each."""
+    nc, d = len(W), W.shape[1] // 2
     each, pointer = np.arange(nc), np.arange(nc + 1)
     return tuple(
         sparse.csr_array(sparse.bsr_array((np.ascontiguousarray(part), each, pointer),
-                                          shape=(2 * nc, 2 * nc)))
-        for part in (W[:, :2, :2], W[:, :2, 2:4], W[:, 2:4, 2:4])
+                                          shape=(d * nc, d * nc)))
+        for part in (W[:, :d, :d], W[:, :d, d : 2 * d], W[:, d : 2 * d, d : 2 * d])
     )  # fmt: skip
 
 
-def _motions(local: LoadProblem, branch: States, *, apex: bool) -> tuple[_Motion, _Motion]:
+def _motions(scaled: Scaled, R: sparse.csr_array, *, apex: bool) -> tuple[_Motion, _Motion]:
     """Of the variables, and of the sizes of the terms that they are sums of."""
-    R = local.reactions(branch)
-    out = []
-    for r, W, q in ((R, local.W, local.q), (abs(R), np.abs(local.W), np.abs(local.q))):
+    load, out = scaled.q.ravel(), []
+    r: Any
+    for r, W, q in ((R, scaled.W, load), (abs(R), np.abs(scaled.W), np.abs(load))):
         U = np.asarray((r.T @ W.T).T)
         if apex:
             U = np.column_stack([U, q])
@@ -113,13 +122,12 @@ def _motions(local: LoadProblem, branch: States, *, apex: bool) -> tuple[_Motion
     return out[0], out[1]
 
 
-def _penalised(multipliers: Array, rows: NDArray[np.int64], penalty: float) -> Array:
-    """Multipliers with the squares of vanishing velocities added."""
-    W = multipliers.copy()
-    contact, component = rows // 2, rows % 2
+def _penalised(multipliers: Array, rows: tuple[Index, Index], penalty: float) -> Array:
+    """Multipliers with the squares of what vanishes added."""
+    W, (contact, component) = multipliers.copy(), rows
     size = np.abs(W).max(axis=(1, 2), initial=0.0)[contact]
     size = np.maximum(size, 1e-3 * size.max(initial=1.0))
-    W[contact, 2 + component, 2 + component] += penalty * size
+    W[contact, component, component] += penalty * size
     return W
 
 
@@ -143,11 +151,12 @@ def _distance(W: Array, size: _Motion, scale: Array, tau: float, off: Array) -> 
     """Bound of the largest scaled reaction by which another solution can differ."""
     if tau <= 0:
         return np.inf
-    e = np.zeros((len(W), 4))
-    e[:, 2:] = off.reshape(-1, 2)
+    d = W.shape[1] // 2
+    e = np.zeros((len(W), 2 * d))
+    e[:, d:] = off.reshape(-1, d)
     push = np.einsum("pab,pb->pa", np.abs(W), e)
     alpha = float(np.einsum("pa,pa->", push, e)) * (1 + 1e-9)
-    along = size.R.T @ push[:, :2].ravel() + size.U.T @ push[:, 2:].ravel()
+    along = size.R.T @ push[:, :d].ravel() + size.U.T @ push[:, d:].ravel()
     beta = float(np.linalg.norm(scale * along)) * (1 + 1e-9)
     reach = (beta + np.sqrt(beta**2 + tau * alpha)) / tau * (1 + 1e-9)
     return float(reach * np.max(size.R @ scale, initial=0.0))

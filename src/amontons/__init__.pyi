@@ -1,0 +1,87 @@
+"""The public names for type checkers and editors; `__init__.py` loads them on first use."""
+
+from .analysis import (
+    BasinMethod as BasinMethod, BasinRun as BasinRun, Basins as Basins, Branch as Branch,
+    Claim as Claim, ContactRates as ContactRates, Continuation as Continuation,
+    CriterionFriction as CriterionFriction, CriticalFriction as CriticalFriction,
+    Diagram as Diagram, Event as Event, EventKind as EventKind, Existence as Existence,
+    FirstOrder as FirstOrder, IndexSets as IndexSets, MidpointRule as MidpointRule,
+    Opening as Opening, PathProblem as PathProblem, PieceSolution as PieceSolution,
+    RateEquation as RateEquation, Solutions as Solutions, StepPath as StepPath, Stop as Stop,
+    Switch as Switch, Tangent as Tangent, TangentCone as TangentCone,
+    ThetaMethod as ThetaMethod, Uniqueness as Uniqueness, Verdict as Verdict,
+    Witness as Witness, graded as graded, performance_profile as performance_profile,
+)
+from .analysis.paths.path_crossing import PathCrossing as PathCrossing
+from .app.api import solve as solve
+from .app.model_solution import ModelSolution as ModelSolution
+from .app.questions import (
+    all_solutions as all_solutions, basins as basins, critical_friction as critical_friction,
+    diagram as diagram, existence as existence, first_order as first_order, follow as follow,
+    full_contact_friction as full_contact_friction, multistart as multistart,
+    p_matrix_friction as p_matrix_friction, uniqueness as uniqueness,
+)
+from .core.errors import (
+    AmontonsError as AmontonsError, FileFormatError as FileFormatError,
+    Interrupted as Interrupted, InvalidInput as InvalidInput, InvertedCells as InvertedCells,
+    MissingDependency as MissingDependency, NotConverged as NotConverged,
+    NotWritten as NotWritten, SingularOperator as SingularOperator, TimeUp as TimeUp,
+    UnsupportedForm as UnsupportedForm, UnsupportedLaw as UnsupportedLaw,
+)
+from .core.warned import ResultWarning as ResultWarning
+from .io.case import read_case as read_case
+from .io.checkpoint import (
+    export_fclib as export_fclib, load_start as load_start, load_state as load_state,
+    save_state as save_state,
+)
+from .io.fclib import read_fclib as read_fclib, write_fclib as write_fclib
+from .linear import Direct as Direct, GeometricMultigrid as GeometricMultigrid, Petsc as Petsc
+from .mechanics.contact import (
+    LevelSet as LevelSet, Nitsche as Nitsche, Plane as Plane, Sphere as Sphere,
+)
+from .mechanics.meshes import (
+    Cells as Cells, Facets as Facets, Mesh as Mesh, box as box, mesh_shape as mesh_shape,
+    read_cad as read_cad, read_mesh as read_mesh, refined as refined,
+)
+from .mechanics.model import (
+    Body as Body, BodyForce as BodyForce, CiarletGeymonat as CiarletGeymonat,
+    Contact as Contact, ContactFields as ContactFields, Fix as Fix,
+    LinearElastic as LinearElastic, Model as Model, NeoHookean as NeoHookean,
+    Pressure as Pressure, Rigid as Rigid, Traction as Traction, distributed as distributed,
+)
+from .mechanics.ready.packings import SpherePacking as SpherePacking
+from .mechanics.ready.walls import Bond as Bond, Wall as Wall
+from .mechanics.steps import (
+    MoreauJean as MoreauJean, Passage as Passage, QuasiStatic as QuasiStatic, State as State,
+    TimeStep as TimeStep, at_rest as at_rest, evolve as evolve,
+)
+from .problem.friction import Form as Form, FrictionProblem as FrictionProblem
+from .problem.judge.measures import Criterion as Criterion
+from .problem.law import (
+    CappedCoulomb as CappedCoulomb, Cohesive as Cohesive, Compliant as Compliant,
+    Coulomb as Coulomb, Mixed as Mixed,
+    Orthotropic as Orthotropic, Tresca as Tresca,
+)
+from .problem.solution import (
+    ContactStatus as ContactStatus, Convergence as Convergence,
+    FrictionSolution as FrictionSolution, Outcome as Outcome,
+)
+from .solvers import (
+    AcceleratedGradient as AcceleratedGradient, ActiveSet as ActiveSet,
+    AlartCurnier as AlartCurnier, Armijo as Armijo, Auto as Auto, Batch as Batch,
+    ChangeNorm as ChangeNorm, CompressedDelassus as CompressedDelassus,
+    ContactMultigrid as ContactMultigrid, CycleShape as CycleShape,
+    FischerBurmeister as FischerBurmeister, FrictionBound as FrictionBound,
+    FrictionFunction as FrictionFunction, FullStep as FullStep, GaussSeidel as GaussSeidel,
+    GoldsteinPrice as GoldsteinPrice, Hybrid as Hybrid, InexactNewton as InexactNewton,
+    InnerStart as InnerStart, InteriorPoint as InteriorPoint, Iterate as Iterate,
+    Jacobi as Jacobi, JeanMoreau as JeanMoreau, LocalSolver as LocalSolver, Metric as Metric,
+    Modification as Modification, MultigridCycle as MultigridCycle, NaturalMap as NaturalMap,
+    NonMonotone as NonMonotone, ProximalPoint as ProximalPoint, Restart as Restart,
+    RhoStrategy as RhoStrategy, SemismoothNewton as SemismoothNewton,
+    SmoothingNewton as SmoothingNewton, SweepOrder as SweepOrder, Uzawa as Uzawa,
+)
+from .solvers.driver import drive as drive
+from .solvers.newton.nonlinear import NonlinearNewton as NonlinearNewton
+
+__version__: str

@@ -1,0 +1,367 @@
+"""Questions about a model or a discrete problem: other verbs than `solve`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..core.clock import TimeLimit, deadline_of
+from ..core.errors import InvalidInput, TimeUp, UnsupportedLaw
+from ..problem.friction import FrictionProblem
+from ..problem.law import Coulomb, Tresca
+from ..problem.solution import FrictionSolution
+from .api import checked
+from .model_solution import ModelSolution
+
+if TYPE_CHECKING:
+    from ..analysis.basins.study import Basins
+    from ..analysis.certificates.critical_friction import CriticalFriction
+    from ..analysis.certificates.older_criteria import CriterionFriction
+    from ..analysis.certificates.opening import Opening
+    from ..analysis.certificates.uniqueness import Uniqueness
+    from ..analysis.paths.continuation import Continuation
+    from ..analysis.paths.diagram import Diagram
+    from ..analysis.paths.path import Branch, PathProblem
+    from ..analysis.paths.tangents import FirstOrder, Tangent
+    from ..analysis.solutions.enumerate import Solutions
+    from ..mechanics.model import Model
+
+FEW = 10  # starts of Newton's method where a search ends without any solution
+LEAST = 1.0  # seconds for them beyond a time limit
+SEARCH, WORK = 0.5, 60.0  # share of a limit, or seconds of work, for the search in `basins`
+HUGE = 1e12  # friction above which rounding hides what the law says
+
+
+def all_solutions(
+    problem: FrictionProblem | Model, *, time_limit: TimeLimit = None,
+    keep_proof: bool = False,
+) -> Solutions:  # fmt: skip
+    """All solutions of a Coulomb problem, and whether there can be no other.
+
+    time_limit: seconds, after which the list may lack some; in 3D by default the work of about
+    60 s, counted in operations, so that a busy machine finds the same.  keep_proof: keep what
+    excludes all others, in `Solutions.proof`.  In 2D the search takes milliseconds for ten
+    contacts and grows exponentially: some ten contacts with much friction, some fifty with
+    little; more than 200 are left to `multistart`, which proves nothing.  In 3D some contacts
+    with much friction, some tens with little.  Raises UnsupportedForm under Tresca's law.
+    """
+    limit = _begun(time_limit)
+    discrete = _discrete(problem)
+    from ..analysis.solutions import enumerate as exact
+
+    _searchable(discrete)
+    _check_has_W(problem, "all solutions", limit)
+    if discrete.dimension == 3:
+        from ..analysis.solutions.discs.search import enumerate_discs
+
+        return enumerate_discs(discrete, time_limit=limit, keep_proof=keep_proof)
+    if discrete.dimension == 2 and discrete.contacts > exact.CONTACTS:
+        found = multistart(discrete, time_limit=limit)
+        reason = f"more than {exact.CONTACTS} contacts: {found.reason}"
+        return replace(found, reason=reason)
+    found = exact.enumerate_solutions(discrete, time_limit=limit, keep_proof=keep_proof)
+    if found.complete or found.solutions:
+        return found
+    some = multistart(discrete, starts=FEW, time_limit=None if limit is None else LEAST)
+    # the search did not come to any
+    return replace(found, solutions=some.solutions, resolution=some.resolution)
+
+
+def multistart(
+    problem: FrictionProblem | Model, *, starts: int = 1000, seed: int = 0,
+    time_limit: TimeLimit = None,
+) -> Solutions:  # fmt: skip
+    """Solutions of a Coulomb problem, 2D or 3D, by Newton's method from many starts; no proof.
+
+    starts: their number; seed: of their random choice; time_limit: seconds.  Finds in seconds
+    what there is up to some hundred contacts, as far as it can be checked.  Raises
+    UnsupportedForm under Tresca's law.
+    """
+    from ..analysis.solutions.multistart import multistart as search
+
+    limit = _begun(time_limit)
+    discrete = _discrete(problem)
+    _check_has_W(problem, "multistart", limit)
+    return search(discrete, starts=starts, seed=seed, time_limit=limit)
+
+
+def basins(
+    problem: FrictionProblem | Model, methods: Any = ("auto",), parameters: Any = None,
+    starts: Any = None, *, solutions: Any = None, draws: int = 10, seed: int = 0,
+    tolerance: float = 1e-8, within: float = 1e-4, max_iterations: int | None = None,
+    run_limit: float | None = None, reaction_size: float | None = None,
+    displacement_size: float | None = None, time_limit: TimeLimit = None,
+    callback: Callable[[int, int], None] | None = None,
+) -> Basins:  # fmt: skip
+    """Which solution each method finds, with each value of its parameters, from each start.
+
+    methods: names such as "uzawa", solvers, or `BasinMethod`s; a mapping gives them names.
+    Of a model also "nitsche": its contact by Nitsche's method, with the fields of `Nitsche`.
+    parameters: values by field, {"rho": [1, 10]} or {"uzawa.rho": …}; all combinations are run.
+    starts: names of `analysis.basin_starts` ("cone", "cone:20", …) or a mapping, also of other
+    names to an Iterate or several; draws: random starts of each kind; reaction_size,
+    displacement_size: how large, by default as in the solutions.  solutions: those that runs
+    are told by, {"free": …} with anything that has r, or what `all_solutions` gave; by default
+    they are searched for, with up to half the time_limit, and without proof those that runs
+    find are added.  within: how near they are told by, in energy norm, relative to the largest.
+    run_limit: seconds of one run, more is a failure; time_limit: seconds of everything, runs
+    that do not fit are left out and said to be missing.  A run counts as a solution only when
+    the judge agrees to `tolerance`, the balance of its r and v included.  callback(done, all)
+    is called after each run.
+    """
+    from ..analysis.basins.nitsche import by_nitsche
+    from ..analysis.basins.solutions import Atlas, given_solutions
+    from ..analysis.basins.study import StudyOptions, check_callback, study
+
+    options = StudyOptions(draws, seed, tolerance, within, max_iterations, run_limit,
+                           reaction_size, displacement_size)  # fmt: skip
+    check_callback(callback)
+    deadline = deadline_of(time_limit)
+    discrete = _discrete(problem)
+    _check_has_W(problem, "basins", _begun(time_limit))
+    atlas = Atlas(discrete, within)
+    if solutions is not None:
+        given_solutions(atlas, solutions)
+    elif isinstance(discrete.law, Tresca):
+        atlas.reason = "given bounds of friction (Tresca): nobody has searched for all"
+    elif not isinstance(discrete.law, Coulomb):
+        atlas.reason = f"{discrete.law.name}: nobody has searched for all"
+    else:
+        limit = deadline.share(SEARCH) if time_limit is not None else deadline_of(None, WORK)
+        given_solutions(atlas, all_solutions(discrete, time_limit=limit))
+    makers = {} if isinstance(problem, FrictionProblem) else {"nitsche": by_nitsche(problem)}
+    return study(atlas, methods, parameters, starts, options, deadline, callback, makers)
+
+
+def _begun(time_limit: TimeLimit) -> TimeLimit:
+    """The limit as a deadline from now on, so that assembling counts too; None without one."""
+    return None if time_limit is None else deadline_of(time_limit)
+
+
+def _searchable(problem: FrictionProblem) -> None:
+    """Raise UnsupportedForm where there is no mu to search with."""
+    if isinstance(problem.law, Tresca):
+        raise UnsupportedLaw(
+            "all solutions: expected Coulomb friction; with given bounds (Tresca) there is one "
+            "motion, see uniqueness"
+        )
+    if not isinstance(problem.law, Coulomb):
+        raise UnsupportedLaw(
+            f"all solutions: expected Coulomb friction, got {problem.law.name}"
+        )
+
+
+def _discrete(problem: FrictionProblem | Model) -> FrictionProblem:
+    """The problem, or that of a model; raises InvalidInput for friction without limits."""
+    problem = checked(problem)
+    discrete = problem if isinstance(problem, FrictionProblem) else problem.assemble()
+    mu = discrete.law.mu if isinstance(discrete.law, Coulomb) else np.zeros(1)
+    if (largest := float(mu.max(initial=0.0))) > HUGE:
+        raise InvalidInput(
+            f"mu: expected friction of at most {HUGE:g} to ask for all solutions, got "
+            f"{largest:g}; contacts that can not slip are bonded, hold them by supports"
+        )
+    return discrete
+
+
+def follow(
+    problem: FrictionProblem | Model | PathProblem, parameter: str = "load",
+    interval: tuple[float, float] = (0.0, 1.0), *, base: FrictionProblem | Model | None = None,
+    start: object = None, at: float | None = None, options: Continuation | None = None,
+    along: Tangent | None = None, **limits: Any,
+) -> Branch:  # fmt: skip
+    """The solution curve over a parameter, both ways from a start, with its folds and events.
+
+    parameter: "load" or "friction", see `path_of`; a PathProblem has its own.  base, for
+    "load": the problem at 0, `problem` being that at 1.  start: a point or an event of a
+    branch, or a solution at the parameter `at`, by default the lower end of the interval;
+    without one the curve begins at a solution found there.  2D problems with Coulomb friction
+    under a load are tracked exactly, from event to event; others are continued step by step,
+    with `options`, which also asks for that.
+    along: one of the tangents of `first_order` at the start, to go that way only.
+    limits: max_points (per direction), time_limit (seconds for all), callback(point, event),
+    which stops by returning True.
+    Each end of the branch has a named reason.
+    """
+    from ..analysis.paths import asked, checks
+    from ..analysis.paths.following import Limits, follow_path
+
+    checks.check_options(options)
+    bounds = Limits(checks.checked_interval(interval), **checks.checked_limits(limits))
+    _check_followed(problem, "follow", bounds.deadline)
+    path, y, p = asked.on_path(problem, parameter, bounds, _base(base), start, at)
+    if along is None:
+        return follow_path(path, y, p, bounds, options=options)
+    return asked.followed_along(path, y, p, bounds, options, along)
+
+
+def first_order(
+    problem: FrictionProblem | Model | PathProblem, parameter: str = "load",
+    interval: tuple[float, float] = (0.0, 1.0), *, base: FrictionProblem | Model | None = None,
+    start: object = None, at: float | None = None, tolerance: float = 1e-9,
+) -> FirstOrder:  # fmt: skip
+    """All one-sided tangents of the solution curves through a solution, as in `follow`.
+
+    They solve the first-order system; directions that lie on a border of their piece are kept
+    where a curve leaves along them.  tolerance: distance to a border that counts as none, in
+    the unknowns of the path.
+    """
+    from ..analysis.paths import asked, checks
+    from ..analysis.paths.following import Limits
+
+    bounds = Limits(checks.checked_interval(interval))
+    _check_followed(problem, "first_order", bounds.deadline)
+    path, y, p = asked.on_path(problem, parameter, bounds, _base(base), start, at)
+    return asked.tangents_at(path, y, p, tolerance)
+
+
+def _check_followed(problem: Any, verb: str, limit: TimeLimit) -> None:
+    """Raise where a problem is no PathProblem, and has no load and friction to follow."""
+    from ..analysis.paths.path import PathProblem
+
+    if not isinstance(problem, PathProblem):
+        _check_has_W(checked(problem), verb, limit)
+
+
+def diagram(
+    problem: FrictionProblem | Model, parameter: str = "load",
+    interval: tuple[float, float] = (0.0, 1.0), *, base: FrictionProblem | Model | None = None,
+    at: Sequence[float] | None = None, options: Continuation | None = None, **limits: Any,
+) -> Diagram:  # fmt: skip
+    """All branches through all solutions at the values `at` of a parameter, in 2D.
+
+    at: by default both ends and the middle of the interval; all solutions there are searched
+    for as in `all_solutions`, with their share of the time each.  Others as in `follow`.
+    """
+    from ..analysis.paths import checks
+    from ..analysis.paths.diagram import bifurcation_diagram
+    from ..analysis.paths.following import Limits
+    from ..analysis.paths.parametrised import path_of
+
+    checks.check_options(options)
+    bounds = Limits(checks.checked_interval(interval), **checks.checked_limits(limits))
+    a, b = bounds.interval
+    values = (a, (a + b) / 2, b) if at is None else checks.checked_values(at, bounds.interval)
+    _check_has_W(checked(problem), "diagram", bounds.deadline)
+    path: Any = path_of(problem, parameter, bounds.interval, _base(base))
+    return bifurcation_diagram(path, bounds, values, options=options)
+
+
+def _check_has_W(problem: FrictionProblem | Model, verb: str, limit: TimeLimit) -> None:
+    """Raise SingularOperator where `verb` needs W and contact alone holds a body."""
+    if not getattr(problem, "is_large", False):  # those are followed in displacements
+        from ..mechanics.model.diagnosis import check_has_W
+        from ..mechanics.steps.timed import steady
+
+        examined = problem if isinstance(problem, FrictionProblem) else steady(problem)
+        with suppress(TimeUp):  # the verb says so
+            check_has_W(examined, verb, deadline_of(limit))
+
+
+def _base(base: Any) -> FrictionProblem | Model | None:
+    return None if base is None else checked(base, "base")
+
+
+def uniqueness(
+    problem: FrictionProblem | Model, solution: FrictionSolution | ModelSolution | None = None,
+    *, time_limit: TimeLimit = None,
+) -> Uniqueness:  # fmt: skip
+    """Whether a problem has one solution: for every load, for this load, or more than one.
+
+    solution: one that was found; by default the problem is solved.  time_limit: seconds, half
+    of them at most for the bounds on the critical friction; by default the work of about 60 s,
+    counted in operations, so that a busy machine comes to the same verdict.  The verdict is
+    undecided, with the reason, where there is neither a proof nor a second solution.
+    """
+    limit = _begun(time_limit)
+    discrete = _discrete(problem)
+    found = solution.solution if isinstance(solution, ModelSolution) else solution
+    from ..analysis.certificates.uniqueness import assess
+
+    held = "" if isinstance(problem, FrictionProblem) else problem.held_by_contact
+    verdict = assess(discrete, found, time_limit=limit, held=held or "a body")
+    balance = problem.imbalance() if held else None
+    if balance is None or not balance.is_proved:
+        return verdict
+    text = f"{verdict.reason} {balance.reason[0].upper()}{balance.reason[1:]}."
+    return replace(verdict, reason=text)
+
+
+def existence(
+    problem: FrictionProblem | Model, *, time_limit: TimeLimit = None
+) -> Opening:
+    """Whether a problem has a solution for every load: a motion that opens all contacts.
+
+    Else reactions that hold each other, on which it depends; or undecided, with the reason.
+    time_limit: seconds, by default the work of about 20 s, counted in operations.
+    """
+    from ..analysis.certificates.opening import opening
+
+    return opening(_discrete(problem), time_limit=_begun(time_limit))
+
+
+def critical_friction(
+    problem: FrictionProblem | Model, *, gap: float = 1e-2,
+    time_limit: TimeLimit = None,
+) -> CriticalFriction:
+    """Bounds on the friction below which every load of a 2D problem has exactly one solution.
+
+    gap: relative distance of the bounds that is good enough.  time_limit: seconds, by default
+    the work of about 60 s, counted in operations.  Exact up to
+    13 contacts.  Raises UnsupportedForm in 3D and under Tresca's law.
+    """
+    from ..analysis.certificates.critical_friction import critical_friction as bounds
+
+    limit = _begun(time_limit)
+    discrete = _discrete(problem)
+    if discrete.dimension == 2 and isinstance(discrete.law, Coulomb):  # else it says so
+        _check_has_W(problem, "critical friction", limit)
+    return bounds(discrete, gap=gap, time_limit=limit)
+
+
+def p_matrix_friction(
+    problem: FrictionProblem | Model, *, given_tangents: bool = False, gap: float = 1e-2,
+    time_limit: TimeLimit = None,
+) -> CriterionFriction:  # fmt: skip
+    """The friction up to which the P-matrix criterion holds, in 2D and 3D, for few contacts.
+
+    Below its `lower` every load has at most one solution.  given_tangents: as printed, with the
+    tangents of the problem and a square in the place of the friction disc in 3D; that depends
+    on the tangents and is not safe.  gap: relative distance of the bounds that is good enough
+    in 3D.  time_limit: seconds, by default the work of about 60 s, counted in operations.
+    Raises UnsupportedForm for more than 10 contacts in 2D, 4 in 3D, and under Tresca's law.
+    """
+    from ..analysis.certificates.older_criteria import p_matrix_friction as ask
+
+    limit = _begun(time_limit)
+    discrete = _with_W(problem, "the P-matrix criterion", limit)
+    return ask(discrete, given_tangents=given_tangents, gap=gap, time_limit=limit)
+
+
+def full_contact_friction(
+    problem: FrictionProblem | Model, *, sharp: bool = False, gap: float = 1e-2,
+    time_limit: TimeLimit = None,
+) -> CriterionFriction:  # fmt: skip
+    """The friction c / sqrt(1 - c^2) of the full contact number c, in 2D and 3D.
+
+    Not safe where contacts open: below it rates are unique while all contacts stay closed.
+    sharp: what that needs in 3D, the printed c is smaller there.  Raises UnsupportedForm for
+    more than 12 contacts in 2D, 4 in 3D, and under Tresca's law.  Others as of
+    `p_matrix_friction`.
+    """
+    from ..analysis.certificates.older_criteria import full_contact_friction as ask
+
+    limit = _begun(time_limit)
+    discrete = _with_W(problem, "full contact", limit)
+    return ask(discrete, sharp=sharp, gap=gap, time_limit=limit)
+
+
+def _with_W(problem: FrictionProblem | Model, verb: str, limit: TimeLimit) -> FrictionProblem:
+    discrete = _discrete(problem)
+    if isinstance(discrete.law, Coulomb):  # else the verb says so
+        _check_has_W(problem, verb, limit)
+    return discrete

@@ -1,0 +1,44 @@
+"""Which key of a case file an address in its model is."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ...core.errors import Address, dotted
+
+LOADS = ("traction", "pressure", "body_force")  # in the order in which a model has them
+FRICTION = {"mu": "coulomb", "mu_across": "coulomb", "direction": "direction",
+            "tresca": "tresca", "cap": "cap", "cohesion": "cohesion"}  # fmt: skip
+
+
+def key_of(at: Address, tables: dict[str, Any]) -> str:
+    """The key, such as contact[0].friction.coulomb of ("contacts", 0, "mu"); "" of none.
+
+    tables: what the file says.  Bodies and contacts of [wall] have no tables of their own.
+    """
+    part, *rest = at or ("",)
+    if part in ("bodies", "contacts") and "wall" in tables:
+        return "wall"
+    if part == "bodies":
+        return "material" if "material" in rest else "mesh"
+    if part == "supports":
+        return dotted(("fix", *rest))
+    if part == "contacts":
+        inner = [key for name in rest[1:] for key in _contact_keys(name)]
+        return dotted(("contact", *rest[:1], *inner))
+    if part == "loads" and rest:
+        return _load_key(int(rest[0]), tuple(rest[1:]), tables)
+    return ""
+
+
+def _contact_keys(name: str | int) -> Address:
+    return ("friction", FRICTION[name]) if name in FRICTION else (name,)
+
+
+def _load_key(number: int, inner: Address, tables: dict[str, Any]) -> str:
+    for kind in LOADS:
+        count = len(tables.get(kind, ()))
+        if number < count:
+            return dotted((kind, number, *inner))
+        number -= count
+    return ""

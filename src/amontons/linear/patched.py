@@ -1,0 +1,144 @@
+"""A matrix of node blocks in which one solve has some rows of its own.
+
+Contact multigrid changes coarse matrices near the surface only.  All other rows are those of a
+matrix that several solves read at the same time and nobody writes to.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numba import uint64
+from numpy.typing import NDArray
+
+from ..core.compiled import njit
+from .node_blocks import NodeBlocks, row_product
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Some rows of a matrix: node (k,) ascending, and slots (e,): their entries in its data.
+
+    number (nodes,): place of a node among them, -1 for others; indptr (k + 1,), indices (e,).
+    """
+
+    node: Index
+    number: NDArray[np.int32]
+    slots: Index
+    indptr: NDArray[np.int32]
+    indices: NDArray[np.int32]
+
+    @classmethod
+    def of(cls, A: NodeBlocks, node: Index) -> Rows:
+        """The rows of nodes (k,) in ascending order."""
+        number = np.full(A.nodes, -1, dtype=np.int32)
+        number[node] = np.arange(len(node))
+        counts = np.diff(A.indptr)[node]
+        ends = np.concatenate([[0], np.cumsum(counts)])
+        slots = np.arange(ends[-1]) + np.repeat(A.indptr[node] - ends[:-1], counts)
+        return cls(node, number, slots, ends.astype(np.int32), A.indices[slots])
+
+
+@dataclass(eq=False)
+class PatchedBlocks:
+    """base with rows of its own: data (e, 3, 3) and inverse (k, 3, 3), to begin with its."""
+
+    base: NodeBlocks
+    rows: Rows
+    data: Array = field(init=False)
+    inverse: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.data = self.base.data[self.rows.slots]
+        self.inverse = self.base.inverse[self.rows.node]
+
+    @property
+    def nodes(self) -> int:
+        """Number of block rows."""
+        return self.base.nodes
+
+    @property
+    def _arrays(self) -> tuple[Array | NDArray[np.int32], ...]:
+        A, own = self.base, self.rows
+        return (own.number, A.indptr, A.indices, A.data, A.inverse,
+                own.indptr, own.indices, self.data, self.inverse)  # fmt: skip
+
+    def smooth(self, b: Array, x: Array, held: NDArray[np.bool_], backward: bool) -> None:
+        """A block Gauss-Seidel sweep on A x = b over the nodes that are not held."""
+        _sweep(*self._arrays, b, x, held, backward)
+
+    def first_smooth(self, b: Array, x: Array, r: Array) -> None:
+        """A forward sweep from x = 0, and r = b - A x."""
+        _first_sweep(*self._arrays, b, x, r)
+
+    def merged(self) -> NodeBlocks:
+        """The whole matrix, copied."""
+        data, inverse = self.base.data.copy(), self.base.inverse.copy()
+        data[self.rows.slots], inverse[self.rows.node] = self.data, self.inverse
+        return replace(self.base, data=data, inverse=inverse)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _relax(D, b, s, x, i):
+    """x_i += D (b_i - s)."""
+    r0, r1, r2 = b[i, 0] - s[0], b[i, 1] - s[1], b[i, 2] - s[2]
+    x[i, 0] += D[0, 0] * r0 + D[0, 1] * r1 + D[0, 2] * r2
+    x[i, 1] += D[1, 0] * r0 + D[1, 1] * r1 + D[1, 2] * r2
+    x[i, 2] += D[2, 0] * r0 + D[2, 1] * r1 + D[2, 2] * r2
+
+
+@njit(cache=True, error_model="numpy")
+def _sweep(number, indptr, indices, data, inverse, own_ptr, own_indices, own_data, own_inverse,
+           b, x, held, backward):  # noqa: PLR0913 # fmt: skip
+    n = len(indptr) - 1
+    for step in range(n):
+        i = uint64(n - 1 - step if backward else step)
+        if held[i]:
+            continue
+        k = number[i]
+        if k < 0:
+            s = row_product(indices, data, x, uint64(indptr[i]), uint64(indptr[i + 1]))
+            _relax(inverse[i], b, s, x, i)
+        else:
+            first, last = uint64(own_ptr[k]), uint64(own_ptr[k + 1])
+            s = row_product(own_indices, own_data, x, first, last)
+            _relax(own_inverse[k], b, s, x, i)
+
+
+@njit(cache=True, error_model="numpy")
+def _first_sweep(number, indptr, indices, data, inverse, own_ptr, own_indices, own_data,
+                 own_inverse, b, x, r):  # noqa: PLR0913 # fmt: skip
+    """A sweep from 0 reads the lower triangle; what is left is minus the upper one times x."""
+    n = len(indptr) - 1
+    x[:] = 0.0
+    for i in range(n):
+        k = number[i]
+        if k < 0:
+            last = uint64(indptr[i])
+            while last < uint64(indptr[i + 1]) and indices[last] < i:
+                last += uint64(1)
+            s = row_product(indices, data, x, uint64(indptr[i]), last)
+            _relax(inverse[i], b, s, x, i)
+        else:
+            last = uint64(own_ptr[k])
+            while last < uint64(own_ptr[k + 1]) and own_indices[last] < i:
+                last += uint64(1)
+            s = row_product(own_indices, own_data, x, uint64(own_ptr[k]), last)
+            _relax(own_inverse[k], b, s, x, i)
+    for i in range(n):
+        k = number[i]
+        if k < 0:
+            first = last = uint64(indptr[i + 1])
+            while first > uint64(indptr[i]) and indices[first - uint64(1)] > i:
+                first -= uint64(1)
+            s = row_product(indices, data, x, first, last)
+        else:
+            first = last = uint64(own_ptr[k + 1])
+            while first > uint64(own_ptr[k]) and own_indices[first - uint64(1)] > i:
+                first -= uint64(1)
+            s = row_product(own_indices, own_data, x, first, last)
+        r[i, 0], r[i, 1], r[i, 2] = -s[0], -s[1], -s[2]

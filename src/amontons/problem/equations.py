@@ -1,0 +1,398 @@
+"""What M, H, f, w or W, q answer: motions of reactions, and how far a state is from a solution.
+
+The judge's measures are in `judge`: the exact one where W is there or cheap to form, else that
+of the residual.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from functools import cached_property, wraps
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.arrays import expect_shape, read_only
+from ..core.clock import NEVER, Deadline
+from ..core.errors import SingularOperator, UnsupportedForm
+from ..linear.blocks import (
+    BlockRows,
+    block_rows,
+    inverse_norms,
+    kernel_rows,
+    spatial,
+    velocity_inplace,
+)
+from ..linear.distributed import DistributedMatrix
+from . import indefinite
+from .judge import measures as judge
+from .judge.contacts import Assessed, assessed
+from .judge.measures import Measure, Weakest
+from .judge.sharp import sharp_error
+from .matrices import entry_sizes
+from .protocol import Form, Problem
+from .settling import Accepted, Motion, accepted_exactly
+
+if TYPE_CHECKING:
+    from scipy import sparse
+
+    from ..core.arrays import Matrix
+    from .solution import Obstruction
+
+Array = NDArray[np.float64]
+JUDGE_FLOPS = 18, 60  # floating point operations of a judgement per block of W, per contact
+ESTIMATED = 9_000  # unknowns of a mesh above which the size of u is taken from a coarse level
+
+
+def _of_plain(judged: Callable[..., Any]) -> Callable[..., Any]:
+    """A judgement of r that is made of s in `FrictionProblem.plain`."""
+
+    @wraps(judged)
+    def asked(self: Equations, r: Array, *more: Any, **named: Any) -> Any:
+        plain = self.plain
+        if plain.has_v is not self.has_v:  # of r alone: a compliance needs the Delassus form
+            more, named = (), {}
+        return judged(plain, r if plain is self else self.law.pressed(r), *more, **named)
+
+    return asked
+
+
+class Equations(Problem):
+    """The members of `FrictionProblem` that its data answer."""
+
+    has_q = True
+    M: sparse.csc_array | None
+    H: sparse.csc_array | None
+    f: Array | None
+    w: Array | None
+    W: Matrix | None
+    q: Array | None
+    blur: Array | None
+    load_scale: float | None
+    u_scale: float | None
+
+    # ---------------------------------------------------------------- W
+    @cached_property
+    def blocks(self) -> BlockRows:
+        """W in rows of 3x3 blocks (Delassus form only)."""
+        self._need(Form.DELASSUS)
+        W, d = self.W, self.dimension
+        assert W is not None
+        return self._shared.once(block_rows, (W,), W, d)
+
+    @cached_property
+    def kernel_data(self) -> tuple[Any, ...]:
+        """What kernels take: indptr, indices, data, q (nc, 3), kind, parameters, rho."""
+        b = self.blocks
+        assert self.q is not None
+        q = read_only(spatial(self.q))
+        rho = read_only(inverse_norms(b.diagonal_blocks))
+        return b.indptr, b.indices, b.data, q, self.law.kind, self.law.parameters, rho
+
+    @cached_property
+    def judge_flops(self) -> float:
+        """Floating point operations of one judgement, 0 where they are not counted."""
+        if self.form is Form.GLOBAL:
+            return 0.0
+        each, own = JUDGE_FLOPS
+        return float(each * len(self.blocks.indices) + own * self.contacts)
+
+    @cached_property
+    def q_norm(self) -> float:
+        """Euclidean norm of q (Delassus form only)."""
+        self._need(Form.DELASSUS)
+        return float(np.linalg.norm(self.q))  # type: ignore[arg-type]
+
+    # ---------------------------------------------------------------- motions
+    @cached_property
+    def free_velocity(self) -> Array:
+        """q, (nc, d): local velocity without reactions, w + H^T M^-1 f in the global form."""
+        if self.q is not None:
+            return self.q
+        return self._free[0]
+
+    @property
+    def free_blur(self) -> Array:
+        """What rounding may have left of the free velocity, (nc,), unit of u."""
+        return self._free[1]
+
+    @cached_property
+    def _free(self) -> tuple[Array, Array]:
+        """H^T M^-1 f + w, and its blur (global form only)."""
+        assert self.f is not None and self.H is not None and self.w is not None
+        v = self.solve_M(self.f)
+        q = self.local_velocity(v)
+        terms = (abs(self.H).T @ np.abs(v)).reshape(self.w.shape) + np.abs(self.w)
+        blur = judge.FLOOR * judge.EPSILON * np.linalg.norm(terms, axis=1)
+        return read_only(q), read_only(blur)
+
+    def velocity(self, r: Array) -> tuple[Array, Array | None]:
+        """(u, v) of reactions r, (nc, d); v is None in the Delassus form."""
+        if self.form is Form.DELASSUS:
+            indptr, indices, data, q = self.kernel_data[:4]
+            u = np.empty_like(q)
+            velocity_inplace(indptr, indices, data, q, spatial(r), u)
+            return u[:, : self.dimension], None
+        assert self.H is not None and self.f is not None
+        v = self.solve_M(self.H @ r.ravel() + self.f)
+        return self.local_velocity(v), v
+
+    def motion(self, r: Array, v: Array | None = None) -> Motion:
+        """(u, v) of a state, without v of its reactions; v = 0 where M is singular."""
+        if v is not None:
+            return self.local_velocity(v), v
+        try:
+            return self.velocity(r)
+        except SingularOperator:  # and no solver has found another v
+            v = np.zeros(self.unknowns)
+            return self.local_velocity(v), v
+
+    def local_velocity(self, v: Array) -> Array:
+        """u = H^T v + w, (nc, d)."""
+        assert self.H is not None and self.w is not None
+        return (self.H.T @ v).reshape(self.w.shape) + self.w
+
+    # ---------------------------------------------------------------- judging
+    @cached_property
+    def measure(self) -> Measure:
+        """Which error measure applies, see `judge`."""
+        if self.form is Form.DELASSUS:
+            return Measure.EXACT
+        try:
+            cheap = self.condensing_is_cheap and self.condensed() is not None
+        except SingularOperator:
+            cheap = False
+        return Measure.EXACT if cheap else Measure.RESIDUAL
+
+    def prepare(self, deadline: Deadline = NEVER) -> None:
+        """Form W where `measure` asks for it; raises TimeUp when it is not there in time."""
+        if self.form is Form.GLOBAL:
+            with suppress(SingularOperator):
+                if self.condensing_is_cheap:
+                    self.condensed(deadline)
+
+    @_of_plain
+    def error(self, r: Array, v: Array | None = None) -> float:
+        """Unit-free error of reactions r, (nc, d), and of the motion v, (n,), if it is given.
+
+        Without v it is that of the motion of r.  Infinite when r or v hold a number that is not
+        finite, and without v when M is singular.  Raises UnsupportedForm for a v in the
+        Delassus form, which has none, InvalidInput for one of another size.
+        """
+        if v is not None:
+            self._check_motion(v)
+        if self.measure is Measure.EXACT:
+            error = self.condensed().exact_error(r)
+            return error if v is None else max(error, self.imbalance(r, v))
+        if v is None:
+            try:
+                v = self.velocity(r)[1]
+            except SingularOperator:
+                return np.inf
+        assert v is not None
+        return self._residual_error(r, v)
+
+    @_of_plain
+    def rounding(self, r: Array) -> float:
+        """What rounding alone may hide in `error`, unit-free: no smaller error can be known."""
+        if self.measure is Measure.EXACT:
+            p = self.condensed()
+            return judge.ratio(p._hidden(p.rho, r), p.q_norm)
+        return judge.ratio(self._hidden(self.rho, r), self.scales[1])
+
+    @_of_plain
+    def certain_error(self, r: Array, v: Array | None = None) -> float:
+        """`error`, evaluated sharply where rounding could hide one in it."""
+        error, hidden = self.error(r, v), self.rounding(r)
+        if hidden <= error or self.measure is not Measure.EXACT:
+            return max(error, hidden)
+        p = self.condensed()
+        found, left = sharp_error(*p.kernel_data, kernel_rows(r))
+        return max(judge.ratio(max(found, left), p.q_norm), self.imbalance(r, v))
+
+    @np.errstate(over="ignore", invalid="ignore")  # of iterates that run away
+    def imbalance(self, r: Array, v: Array | None) -> float:
+        """|M v - H r - f| relative to the load; 0 for v = None, the motion of r.
+
+        Where the exact measure judges, only what is beyond the rounding of its terms counts: a
+        factor of stiff bodies beside small loads gives no better v.
+        """
+        if v is None:
+            return 0.0
+        assert self.M is not None and self.H is not None and self.f is not None
+        push = self.H @ r.ravel()
+        rest = float(np.linalg.norm(self.M @ v - push - self.f))
+        if not np.isfinite(rest):
+            return np.inf
+        load = self.load or float(np.linalg.norm(push))
+        if self.measure is Measure.EXACT and rest > judge.EPSILON * load:
+            terms = self._sizes[0] @ np.abs(v) + self._sizes[1] @ np.abs(r.ravel())
+            rounding = judge.FLOOR * judge.EPSILON * np.linalg.norm(terms + np.abs(self.f))
+            rest = max(rest - float(rounding), 0.0)
+        return judge.ratio(rest, load)
+
+    @cached_property
+    def _sizes(self) -> tuple[Any, Any]:
+        """|M| and |H|, entry by entry."""
+        return self._shared.once(entry_sizes, (self.M, self.H), self.M, self.H)
+
+    def _check_motion(self, v: Array) -> None:
+        if self.form is Form.DELASSUS:
+            raise UnsupportedForm(
+                "v: expected None, the problem is in its local form, which has reactions only"
+            )
+        expect_shape("v", np.shape(v), (self.unknowns,))
+
+    def _hidden(self, rho: Array, r: Array) -> float:
+        return judge.rounding_error(self.law.kind, self.law.parameters, rho, kernel_rows(r))
+
+    @_of_plain
+    def weakest(self, r: Array, v: Array | None = None) -> Weakest:
+        """The contact farthest from its law on its own scale; arguments as in `error`."""
+        if self.measure is Measure.EXACT:
+            return self.condensed().assessed(r).weakest
+        if v is None:
+            try:
+                v = self.velocity(r)[1]
+            except SingularOperator:
+                return Weakest(np.inf, None)
+        assert v is not None
+        if not (np.isfinite(r).all() and np.isfinite(v).all()):
+            return Weakest(np.inf, None)
+        u, q = self.local_velocity(v), self.open_velocity
+        rho = np.where(self.rho > 0, self.rho, np.inf)
+        parts = (q, u - q, r / rho[:, None])
+        scale = np.sum([np.linalg.norm(part, axis=1) for part in parts], axis=0)
+        found = judge.weakest_of(r, u, self.law, self.rho, scale)
+        return found._replace(hidden=self.rounding(r))
+
+    def accepted(
+        self, r: Array, v: Array | None, error: float, tolerance: float
+    ) -> Accepted:
+        """See `Problem`; by the exact measure the motion is that of r, and v is not read."""
+        if self.measure is Measure.EXACT:
+            return accepted_exactly(self.condensed(), r, v, error, tolerance)
+        return super().accepted(r, v, error, tolerance)
+
+    @property
+    def gains_energy(self) -> bool:
+        """True where a contact alone gains energy by its reactions: methods go round there."""
+        return indefinite.gains_energy(self)
+
+    def obstruction(self, u: Array) -> tuple[Obstruction | None, str]:
+        """What in the problem may be the reason of a failure, at velocities u, in words."""
+        return indefinite.obstruction(self, u)
+
+    def natural_error(self, r: Array, v: Array | None = None) -> float:
+        """[ABD] eq. (13) of reactions r, (nc, d), with v, (n,), if it is known."""
+        u = self.velocity(r)[0] if v is None or not self.has_v else self.local_velocity(v)
+        return judge.published_natural_error(r, u, self.free_velocity, self.law)
+
+    @_of_plain
+    def assessed(self, r: Array) -> Assessed:
+        """All that is asked of reactions that may have converged (Delassus form only)."""
+        return assessed(self.kernel_data, kernel_rows(r), self._floor, self.q_norm)
+
+    @cached_property
+    def _floor(self) -> Array:
+        return self.blur if self.blur is not None else np.zeros(self.contacts)
+
+    @_of_plain
+    def exact_error(self, r: Array) -> float:
+        """The exact measure of the Delassus form."""
+        rows = kernel_rows(r)
+        size = self.q_norm
+        if size == 0:
+            return 0.0 if not rows.any() else np.inf
+        return judge.natural_error(*self.kernel_data, rows) / size
+
+    @np.errstate(over="ignore", invalid="ignore")
+    def _residual_error(self, r: Array, v: Array) -> float:
+        law = judge.scaled_residual(r, self.local_velocity(v), self.law, self.rho)
+        error = max(
+            self.imbalance(r, v), judge.ratio(law, self.scales[1]), self.unbalanced(r)
+        )
+        return float(error) if np.isfinite(error) else np.inf
+
+    def unbalanced(self, r: Array) -> float:
+        """Largest force that moves a loose body as a whole, relative to those on it.
+
+        A loose body is one that contact alone holds; 0 where there is none, and in the Delassus
+        form, which has none.
+        """
+        modes = self.loose_modes
+        if modes.shape[1] == 0:
+            return 0.0
+        assert self.f is not None and self.H is not None
+        load = modes.T @ self.f
+        pushes = (self.H.T @ modes).reshape(*r.shape, -1) * r[:, :, None]
+        least = judge.FLOOR * judge.EPSILON * (np.abs(modes).T @ np.abs(self.f))
+        size = np.abs(load) + np.abs(pushes).sum(axis=(0, 1)) + least
+        rest = np.abs(load + pushes.sum(axis=(0, 1)))
+        return float(np.divide(rest, size, out=np.zeros_like(rest), where=size > 0).max())
+
+    @cached_property
+    def loose_modes(self) -> Array:
+        """Rigid modes of bodies that contact alone holds, orthonormal columns (n, k)."""
+        loose = self.u_scale is not None and self.guess is not None
+        if self.form is Form.GLOBAL and not loose:
+            try:
+                _ = self.open_velocity if self._is_estimated else self.free_velocity
+            except SingularOperator:
+                loose = True
+        if not loose:
+            return np.zeros((self.unknowns, 0))
+        return self.matrices.loose_modes
+
+    @cached_property
+    def rho(self) -> Array:
+        """Augmentation parameter, (nc,), unit of r / u; 0 where a contact can not react."""
+        if self.form is Form.DELASSUS:
+            return self.kernel_data[-1]
+        return inverse_norms(self.local_stiffness)
+
+    @cached_property
+    def scales(self) -> tuple[float, float]:
+        """Sizes of the load and of u for the residual measure (global form only)."""
+        if self.u_scale is not None:
+            return self.load, self.u_scale
+        return self.load, float(np.linalg.norm(self.open_velocity))
+
+    @cached_property
+    def load(self) -> float:
+        """Size of the load, unit of f (global form only)."""
+        assert self.f is not None
+        return self.load_scale if self.load_scale is not None else float(np.linalg.norm(self.f))
+
+    @cached_property
+    def open_velocity(self) -> Array:
+        """u without reactions, (nc, d); of large meshes from a coarse level, to some per cent.
+
+        Where contact alone holds a body: u of the guess, else w (global form only).
+        """
+        assert self.w is not None
+        if self.u_scale is not None and self.guess is not None:
+            return self.local_velocity(self.guess)
+        try:
+            return self._open_velocity()
+        except SingularOperator:
+            return self.w
+
+    @property
+    def _is_estimated(self) -> bool:
+        """True for large meshes, where M^-1 f would cost too much only to judge."""
+        large = self.unknowns > ESTIMATED and not isinstance(self.M, DistributedMatrix)
+        return large and (bool(self.levels) or self.near_nullspace is not None)
+
+    def _open_velocity(self) -> Array:
+        hierarchy = self.hierarchy if self._is_estimated else None
+        if hierarchy is None:
+            return self.free_velocity
+        assert self.f is not None and self.M is not None
+        v = self.guess if self.guess is not None else np.zeros(self.unknowns)
+        rest = self.f - self.M @ v if self.guess is not None else self.f
+        nodes = hierarchy.nodes
+        v = v + nodes.gather(hierarchy.estimate(nodes.spread(rest), ESTIMATED // 9))
+        return self.local_velocity(v)

@@ -1,0 +1,148 @@
+"""What the stages of the portfolio share: the best reaction so far, and what work costs.
+
+Costs are operation counts, so that the same problem takes the same path on every machine.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...linear.blocks import spatial
+from ...problem.friction import FrictionProblem
+from ...problem.judge.measures import natural_error
+from ...problem.law import Coulomb
+from ..contract import Iterate, Target
+from ..newton.inexact import InexactNewton
+from ..newton.joints import Joints
+from ..newton.semismooth import Condensed, SemismoothNewton
+from ..newton.smoothing import Workspace
+from ..sweeps.kernels import SweepOrder, sweep_data, sweeps_inplace, watch_for
+from .race import Race
+
+Array = NDArray[np.float64]
+FIRST_SWEEPS = 10  # plain sweeps before the race
+EXACT_WORK = 1e6  # products of blocks in an LU up to which an exact step costs no more
+# Nanoseconds measured on one core: only their ratios matter, and only roughly.
+SWEEP_BLOCK = 2.0
+SWEEP_CONTACT = 30.0
+HISTORY_CONTACT = 35.0
+PRODUCT = 5.4
+NEWTON_CONTACT = 500.0
+NEWTON_START, NEWTON_PER_DIGIT = 20, 8  # steps that smoothing Newton takes, typically
+
+
+@dataclass(eq=False)
+class State:
+    """One run on the Delassus form; r is the best reaction so far, (nc, 3)."""
+
+    problem: FrictionProblem
+    target: Target
+    r: Array
+    error: float = math.inf  # of r, unit of u
+    latest: float = math.inf  # of the last reaction tried
+    spent: float = 0.0  # cost of the accelerated sweeps
+    budget: float = 0.0  # cost of Newton steps not yet matched by sweeps
+
+    def __post_init__(self) -> None:
+        self.start = self.r
+        self.error = self.judge(self.r) if self.r.any() else math.inf
+        self.goal = self.target.tolerance * self.problem.q_norm
+        self.data = sweep_data(self.problem, order=SweepOrder.APPROACH)
+
+    # ---------------------------------------------------------------- kind of the problem
+    @property
+    def is_coulomb(self) -> bool:
+        """True under Coulomb's law, which has a cone and relaxations."""
+        return isinstance(self.problem.law, Coulomb)
+
+    @cached_property
+    def joints(self) -> Joints | None:
+        """Groups of contacts between deformable bodies; None where they are too small."""
+        return Joints.of(self.problem.whole[0])
+
+    @cached_property
+    def newton_kind(self) -> type[SemismoothNewton]:
+        """Newton with approximate steps; with exact ones where an LU in blocks is quick."""
+        exact = Condensed.in_blocks(self.problem, EXACT_WORK)
+        return SemismoothNewton if exact else InexactNewton
+
+    # ---------------------------------------------------------------- tools
+    @cached_property
+    def race(self) -> Race:
+        """Over-relaxed sweeps from the first point: accelerated ones keep the slow modes."""
+        r = spatial(self.start)
+        sweeps_inplace(self.data, r, FIRST_SWEEPS, watch_for(0.0))
+        return Race(self.problem, r)
+
+    @cached_property
+    def work(self) -> Workspace:
+        """Symbolic factor, made when Newton is first thought of."""
+        return Workspace.of(self.problem)
+
+    # ---------------------------------------------------------------- costs
+    @cached_property
+    def step_cost(self) -> float:
+        """Nanoseconds of a Newton step, by operations."""
+        blocks, contacts = len(self.problem.blocks.indices), self.problem.contacts
+        if not self.is_coulomb:
+            return 0.3 * float(3 * contacts) ** 3
+        products = PRODUCT * self.work.symbolic.products + NEWTON_CONTACT * contacts
+        return products + 2 * SWEEP_BLOCK * blocks
+
+    @property
+    def sweep_cost(self) -> float:
+        """Nanoseconds of a sweep."""
+        blocks, contacts = len(self.problem.blocks.indices), self.problem.contacts
+        return SWEEP_BLOCK * blocks + SWEEP_CONTACT * contacts
+
+    @property
+    def accelerated_cost(self) -> float:
+        """Nanoseconds of an accelerated sweep."""
+        return self.sweep_cost + HISTORY_CONTACT * self.problem.contacts
+
+    def newton_cost(self) -> float:
+        """Nanoseconds that Newton will take from here."""
+        digits = math.log10(max(self.error / self.goal, 1.0))
+        return self.step_cost * (NEWTON_START + NEWTON_PER_DIGIT * digits)
+
+    def sweeps_left(self, before: float, count: int) -> float:
+        """Sweeps to the goal at the rate of the last `count`, infinite without progress."""
+        if before == math.inf:  # no rate yet
+            return 0.0
+        if not math.isfinite(self.latest):
+            return math.inf
+        rate = math.log(max(before, 1e-300) / max(self.latest, 1e-300)) / count
+        left = math.log(max(self.latest / self.goal, 1.0))
+        return left / rate if rate > 0 else math.inf
+
+    def affordable(self, steps: int) -> int:
+        """Newton steps of one compiled call that still fit before the driver's deadline."""
+        left = self.target.seconds_left
+        return (
+            steps
+            if math.isinf(left)
+            else max(1, min(steps, int(1e9 * left / self.step_cost)))
+        )
+
+    # ---------------------------------------------------------------- bookkeeping
+    def judge(self, r: Array) -> float:
+        """Error of r, (nc, 3), unit of u."""
+        return natural_error(*self.problem.kernel_data, r)
+
+    def offer(self, x: Array, iterations: int, stage: str, error: float = math.inf) -> Iterate:
+        """Keep x if it is better, and hand out the best; error of x, unit of u, if known."""
+        self.latest = error = error if error < math.inf else self.judge(x)
+        if error < self.error:
+            self.r, self.error = x, error
+        return Iterate(
+            self.r[:, : self.problem.dimension].copy(), iterations=iterations, stage=stage
+        )
+
+    def iterate(self, r: Array) -> Iterate:
+        """A start for other solvers from r, (nc, 3)."""
+        return Iterate(r[:, : self.problem.dimension].copy())
