@@ -68,13 +68,18 @@ def write(output: Output, path: str | os.PathLike[str]) -> None:
 
 def plot(output: Output, path: str | os.PathLike[str]) -> None:
     """Draw the status figure; the suffix decides: .png, .svg, .pdf."""
+    expect_picture(path)
+    with replacing(path) as temporary:
+        plot_status(output, temporary)
+
+
+def expect_picture(path: str | os.PathLike[str]) -> None:
+    """Raise InvalidInput unless the suffix is that of a picture."""
     suffix = Path(path).suffix.lower()
     if suffix not in FIGURES:
         raise InvalidInput(
             f"{path}: expected a name that ends in {', '.join(FIGURES)}, got {suffix!r}"
         )
-    with replacing(path) as temporary:
-        plot_status(output, temporary)
 
 
 def plot_status(output: Output, path: Path) -> None:

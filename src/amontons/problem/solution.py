@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.errors import SingularOperator
+from ..core.faces import Shown
 from ..core.warned import ResultWarning
 from .judge import measures as judge
 from .judge.measures import Measure
@@ -85,7 +86,7 @@ class Step(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Convergence:
+class Convergence(Shown):
     """The record of a solve."""
 
     outcome: Outcome
@@ -156,7 +157,7 @@ class Convergence:
 
 
 @dataclass(frozen=True, eq=False)
-class FrictionSolution:
+class FrictionSolution(Shown):
     """Reactions and velocities of a discrete problem, and what they mean.
 
     r, u: (nc, d) in the local frames; v: (n,) or None in the Delassus form; warnings: reasons

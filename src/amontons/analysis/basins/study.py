@@ -19,6 +19,7 @@ import numpy as np
 
 from ...core.clock import Deadline, now
 from ...core.errors import InvalidInput, NotConverged, SingularOperator, UnsupportedForm
+from ...core.faces import Shown
 from .methods import Ended, Maker, RunLimits, Runs, methods_of
 from .solutions import FAILED, OTHER, Atlas, KnownSolution
 from .starts import Drawing, Start, Starts, drawn, size_of_displacements, size_of_reactions
@@ -49,7 +50,7 @@ class BasinRun:
 
 
 @dataclass(frozen=True, eq=False)
-class Basins:
+class Basins(Shown):
     """What `basins` found; complete: the solutions are all that there are, with proof.
 
     scale: energy, unit of sqrt(r u), that distances are relative to.

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ...core.clock import Deadline, now
 from ...core.errors import SingularOperator, TimeUp, UnsupportedForm
+from ...core.faces import Shown
 from ..tolerances import SAME
 from .continuation import Continuation
 from .following import Limits, follow_path, track_both
@@ -24,7 +25,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Diagram:
+class Diagram(Shown):
     """Branches of one problem, each line of the diagram in one of them only.
 
     complete: all solutions at every value in `at` were found, with proof, and lie on a branch.

@@ -24,6 +24,7 @@ from scipy import sparse
 
 from ...core.arrays import Matrix
 from ...core.clock import NEVER, Deadline
+from ...core.faces import Shown
 from ...problem.judge.measures import Measure
 from ...problem.solution import Convergence, Outcome, Step
 from .events import Event, EventKind, Point, Stop
@@ -94,7 +95,7 @@ class PathProblem(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Branch:
+class Branch(Shown):
     """A solution curve as a table: points in order, the events on it, and why it ends.
 
     states (points, n), parameter, arclength (points,): arclength is 0 at the start and negative

@@ -1,0 +1,32 @@
+"""The faces of a result: methods of classes in all rooms, answered by the room `io`.
+
+Results stand in lower rooms than pictures and files.  So that `branch.plot("b.png")` needs no
+import upwards, a class says here that it can be shown, and what it looks like is found by name
+when somebody asks.
+"""
+
+from __future__ import annotations
+
+import os
+from importlib import import_module
+from typing import Any
+
+HOMES = {"plot": "amontons.io.plots.faces"}  # the module whose function of that name answers
+
+
+class Shown:
+    """A result that can be looked at."""
+
+    __slots__ = ()
+
+    def plot(self, path: str | os.PathLike[str] | None = None, **options: Any) -> Any:
+        """A matplotlib figure of it, written to `path` too: .png, .svg or .pdf.
+
+        options: those of the figure of its class, see `amontons.io.plots.faces`.  Raises
+        InvalidInput for a suffix that is no picture's.
+        """
+        return _face("plot")(self, path, **options)
+
+
+def _face(name: str) -> Any:
+    return getattr(import_module(HOMES[name]), name)

@@ -1,0 +1,64 @@
+"""What results look like, by their class: a new face of a class is registered here.
+
+`core.faces.Shown` has the methods that users call.
+"""
+
+from __future__ import annotations
+
+import os
+from functools import singledispatch
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from ...analysis.basins.study import Basins
+from ...analysis.paths.diagram import Diagram
+from ...analysis.paths.path import Branch
+from ...problem.solution import Convergence, FrictionSolution
+from ..results import expect_picture
+from .basins import basins_figure
+from .branch import branch_figure
+from .convergence import convergence_figure
+from .saving import save_figure
+from .solution import status_figure
+
+
+def plot(result: Any, path: str | os.PathLike[str] | None = None, **options: Any) -> Figure:
+    """The figure of a result, written too where a path is given."""
+    if path is not None:
+        expect_picture(path)
+    figure = figure_of(result, **options)
+    if path is not None:
+        save_figure(figure, path)
+    return figure
+
+
+@singledispatch
+def figure_of(result: Any, **options: Any) -> Figure:
+    """The figure of a result; raises TypeError for what has none."""
+    raise TypeError(f"{type(result).__name__} has no figure")
+
+
+@figure_of.register
+def _(result: FrictionSolution, **options: Any) -> Figure:
+    return status_figure(result, **options)
+
+
+@figure_of.register
+def _(result: Convergence, **options: Any) -> Figure:
+    return convergence_figure(result, **options)
+
+
+@figure_of.register
+def _(result: Branch, **options: Any) -> Figure:
+    return branch_figure(result, **options)
+
+
+@figure_of.register
+def _(result: Diagram, **options: Any) -> Figure:
+    return branch_figure(result.branches, **options)
+
+
+@figure_of.register
+def _(result: Basins, **options: Any) -> Figure:
+    return basins_figure(result, **options)
