@@ -47,7 +47,8 @@ from .mechanics.model import (
     Body as Body, BodyForce as BodyForce, CiarletGeymonat as CiarletGeymonat,
     Contact as Contact, ContactFields as ContactFields, Fix as Fix,
     LinearElastic as LinearElastic, Model as Model, NeoHookean as NeoHookean,
-    Pressure as Pressure, Rigid as Rigid, Traction as Traction, distributed as distributed,
+    NodalForce as NodalForce, Pressure as Pressure, Rigid as Rigid, Traction as Traction,
+    distributed as distributed,
 )
 from .mechanics.ready.packings import SpherePacking as SpherePacking
 from .mechanics.ready.walls import Bond as Bond, Wall as Wall

@@ -33,7 +33,9 @@ class Case:
     """A model or a discrete problem, how to solve it, a title, and how it goes on in time.
 
     path: the file, None of a problem without one; tables: what a case file says, with
-    overrides; key_of: the words of the file for an address in the model.
+    overrides; key_of: the words of the file for an address in the model.  moving: the model
+    as it goes on in time, where `target` is its state at the end, which can be solved for at
+    once.  notes: what the file says and the case leaves out, in words.
     """
 
     target: Model | FrictionProblem
@@ -43,6 +45,8 @@ class Case:
     evolution: Evolution | None = None
     tables: dict[str, Any] = field(default_factory=dict)
     key_of: Callable[[Address], str] = lambda at: ""
+    moving: Model | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -55,6 +59,11 @@ class Case:
         if isinstance(self.target, FrictionProblem):
             raise InvalidInput(f"{self.title}: a discrete problem, it has no model")
         return self.target
+
+    @property
+    def in_time(self) -> Model:
+        """The model whose loads and supports depend on time, if any do."""
+        return self.model if self.moving is None else self.moving
 
     @property
     def has_model(self) -> bool:
@@ -133,6 +142,7 @@ FORMATS = (
     Format("a TOML case file", (".toml",), "amontons.io.case:read_case"),
     Format("an FCLib HDF5 file", (".hdf5", ".h5"), "amontons.io.fclib.case:read",
            b"\x89HDF\r\n\x1a\n"),
+    Format("a CalculiX or Abaqus deck", (".inp", ".inp.gz"), "amontons.io.decks.case:read"),
 )  # fmt: skip
 
 
@@ -157,7 +167,7 @@ def format_of(path: Path) -> Format:
 
 def _fitting(path: Path, known: Sequence[Format]) -> Format | None:
     for each in known:
-        if path.suffix.lower() in each.suffixes:
+        if path.name.lower().endswith(each.suffixes):
             return each
     try:
         with path.open("rb") as file:

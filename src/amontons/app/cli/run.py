@@ -81,7 +81,7 @@ def run(
     place = check_folder(f"{read.name}-results" if folder is None else folder)
     exported = None if export is None else check_folder(export, "--export-fclib")
     with read.naming_keys():
-        _ = read.model.discretisation, read.model.law
+        _ = read.in_time.discretisation, read.in_time.law
     if not quiet:
         say_growth(read)
     settings = with_flags(read.settings, tolerance)
@@ -127,9 +127,9 @@ def _prepared(
         for text in changed:
             click.echo(f"--restart: {text}, from step {start.index + 1} on", err=True)
     else:
-        results, start = RunFolder(place, case), at_rest(read.model)
+        results, start = RunFolder(place, case), at_rest(read.in_time)
     steps = evolve(
-        read.model, read.evolution.method, until=read.evolution.until, start=start,
+        read.in_time, read.evolution.method, until=read.evolution.until, start=start,
         solver=settings.solver(), tolerance=settings.tolerance,
         contact_tolerance=settings.contact_tolerance, max_iterations=settings.max_iterations,
         time_limit=settings.time_limit,
@@ -237,7 +237,7 @@ def _draw(results: RunFolder, asked: _Run) -> None:
     times = table["time"].tolist()
     note = asked.unfinished(times[-1])
     frames = [*asked.frames[:-1], replace(asked.frames[-1], stamp=note)]
-    draw_film(asked.case.model, frames, results.folder / PICTURES)
+    draw_film(asked.case.in_time, frames, results.folder / PICTURES)
     works = [Energies(*row) for row in table[list(WORKS)].tolist()]
     save_figure(energy_figure(times, works, note=note), results.folder / BALANCE)
 

@@ -38,7 +38,7 @@ def run(
 ) -> int:  # fmt: skip
     """Solve and write; returns the exit code."""
     opened = open_source(source, overrides, method)
-    if opened.evolution is not None:
+    if opened.evolution is not None and opened.moving is None:
         raise FileFormatError(
             f"{source}: a case in time, it has [evolution]; use: amontons run {source}"
         )

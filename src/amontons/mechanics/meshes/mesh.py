@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...core.arrays import LARGEST, real, squarable
+from ...core.arrays import LARGEST, integers, read_only, real, squarable
 from ...core.errors import InvalidInput, shown
 from ...linear.levels import checked_levels
 from .cells import CELLS
@@ -33,6 +33,7 @@ class Mesh:
     levels: prolongations of nodal values, finest first: levels[0] has shape (n, nodes of the
     next coarser mesh), levels[1] leads from the one after that to it, and so on; every coarse
     node is a node of this mesh.  `box`, `refined` and `second_order` fill them.
+    node_sets: name -> numbers of points, which may be held and loaded as surfaces are.
     """
 
     points: Array
@@ -41,6 +42,7 @@ class Mesh:
     grid: tuple[int, ...] | None = None
     name: str = ""
     levels: tuple[sparse.csr_array, ...] = ()
+    node_sets: dict[str, Index] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         points = real("points", self.points)
@@ -64,6 +66,7 @@ class Mesh:
         surfaces = {k: oriented(blocks, v, k, points) for k, v in self.surfaces.items()}
         object.__setattr__(self, "surfaces", surfaces)
         object.__setattr__(self, "levels", checked_levels(self.levels, len(points)))
+        object.__setattr__(self, "node_sets", self._checked_sets())
 
     def _check_use(self) -> None:
         if not self.cells:
@@ -78,6 +81,22 @@ class Mesh:
                 f"points[{int(np.flatnonzero(~used)[0])}]: belongs to no cell; "
                 f"{int((~used).sum())} such points, leave them out and renumber"
             )
+
+    def _checked_sets(self) -> dict[str, Index]:
+        """Sorted numbers, once each; raises InvalidInput for those of no point."""
+        found = {}
+        for name, nodes in self.node_sets.items():
+            if name in self.surfaces:
+                raise InvalidInput(f"node set {name!r}: a surface has this name too")
+            numbers = integers(f"node set {name!r}", nodes).ravel()
+            if numbers.size and not 0 <= numbers.min() <= numbers.max() < len(self.points):
+                wrong = numbers.min() if numbers.min() < 0 else numbers.max()
+                raise InvalidInput(
+                    f"node set {name!r}: expected numbers from 0 to {len(self.points) - 1}, "
+                    f"got {wrong}"
+                )
+            found[name] = read_only(np.unique(numbers))
+        return found
 
     def __repr__(self) -> str:
         kinds = ", ".join(f"{len(b.nodes)} {b.kind}" for b in self.cells)
@@ -121,7 +140,9 @@ class Mesh:
         return boundary(self.cells)
 
     def surface_nodes(self, name: str) -> Index:
-        """Sorted node numbers of a surface, (k,)."""
+        """Sorted node numbers of a surface, or of a node set, (k,)."""
+        if name in self.node_sets:
+            return self.node_sets[name]
         return np.unique(np.concatenate([b.nodes.ravel() for b in self.surface(name)]))
 
     def bounding_box(self) -> tuple[Array, Array]:

@@ -16,6 +16,8 @@ from .mesh import Mesh
 Index = NDArray[np.int64]
 Parents = tuple[tuple[int, ...], ...]
 
+INSIDE = 1e-9  # rounding of a sum of weights
+
 
 def second_order(mesh: Mesh) -> Mesh:
     """The same mesh with nodes also in the middle of edges, quadrilaterals and hexahedra.
@@ -45,7 +47,18 @@ def second_order(mesh: Mesh) -> Mesh:
         for name, group in mesh.surfaces.items()
     }
     points = prolongation @ mesh.points
-    return Mesh(points, cells, surfaces, name=mesh.name, levels=(prolongation, *mesh.levels))
+    return Mesh(points, cells, surfaces, name=mesh.name, levels=(prolongation, *mesh.levels),
+                node_sets=carried(mesh.node_sets, prolongation))  # fmt: skip
+
+
+def carried(sets: Mapping[str, Index], prolongation: sparse.csr_array) -> dict[str, Index]:
+    """Node sets of a finer mesh: a middle belongs to one if all that it lies between do."""
+    found = {}
+    for name, nodes in sets.items():
+        inside = np.zeros(prolongation.shape[1])
+        inside[nodes] = 1.0
+        found[name] = np.flatnonzero(prolongation @ inside > 1 - INSIDE)
+    return found
 
 
 def with_middles(

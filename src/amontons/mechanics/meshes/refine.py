@@ -9,7 +9,7 @@ from ...core.errors import InvalidInput, shown
 from .cells import LINEAR, SECOND
 from .facets import Cells, Facets
 from .mesh import Mesh
-from .order import with_middles
+from .order import carried, with_middles
 from .quadratic_cells import PARENTS
 
 Array = NDArray[np.float64]
@@ -68,7 +68,8 @@ def _once(mesh: Mesh) -> Mesh:
         )
         for name, group in mesh.surfaces.items()
     }
-    return Mesh(points, cells, surfaces, name=mesh.name, levels=(prolongation, *mesh.levels))
+    return Mesh(points, cells, surfaces, name=mesh.name, levels=(prolongation, *mesh.levels),
+                node_sets=carried(mesh.node_sets, prolongation))  # fmt: skip
 
 
 def _children(kind: str, table: Index, points: Array) -> list[tuple[str, Index]]:

@@ -96,7 +96,7 @@ def _names(dof: int, bodies: Sequence[Body], supports: Sequence[Fix], offsets: I
     node = (dof - int(offsets[body])) // mesh.dim
     found = []
     for support in supports:
-        k, surface = locate(bodies, support.on)
+        k, surface = locate(bodies, support.on, sets=True)
         if k == body and node in mesh.surface_nodes(surface):
             found.append(f"fix on {support.on!r}")
     return ", ".join(dict.fromkeys(found))

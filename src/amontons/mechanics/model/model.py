@@ -29,7 +29,7 @@ from .large_fields import recover_large
 from .laws import law_of, rubs
 from .nitsche import nitsche_matrices, nitsche_problem
 from .nodal_forces import follows
-from .parts import FINITE, SMALL, Body, BodyForce, Contact, Fix, Load, Pressure
+from .parts import FINITE, SMALL, Body, BodyForce, Contact, Fix, Load, NodalForce, Pressure
 from .rigid import Piece, check_held, loose_modes
 from .values import ScalarValue, is_number
 
@@ -81,16 +81,21 @@ class Model:
             for k, item in enumerate(getattr(self, part)):
                 for name in (name for name in fields if hasattr(item, name)):
                     with within(part, k, name):
-                        self._check_surface(getattr(item, name), optional=name == "master")
+                        self._check_surface(item, name)
 
-    def _check_surface(self, name: object, *, optional: bool) -> None:
+    def _check_surface(self, part: object, field: str) -> None:
         """Raise InvalidInput for a surface that no body has, or more than one."""
+        name, optional = getattr(part, field), field == "master"
         if name is None and optional:
             return
         if not isinstance(name, str):
             raise InvalidInput(f"surface: expected a name, got {name!r}")
-        k, surface = locate(self.bodies, name)
-        self.bodies[k].mesh.surface(surface)
+        sets = isinstance(part, Fix | NodalForce)
+        k, surface = locate(self.bodies, name, sets=sets)
+        if not sets:
+            self.bodies[k].mesh.surface(surface)
+        elif not len(self.bodies[k].mesh.surface_nodes(surface)):
+            raise InvalidInput(f"node set {surface!r}: holds no nodes")
 
     @property
     def dimension(self) -> int:
@@ -374,7 +379,7 @@ def _bonded(parts: Discretisation, f: Array, w: Array) -> tuple[Array, float]:
 
 
 def _tuple_of(name: str, values: object, kind: object) -> tuple:
-    wanted = getattr(kind, "__name__", "Traction, Pressure or BodyForce")
+    wanted = getattr(kind, "__name__", "Traction, Pressure, BodyForce or NodalForce")
     if isinstance(values, kind):  # type: ignore[arg-type]
         raise InvalidInput(f"{name}: expected a list of {wanted}, got one alone; write [it]")
     try:

@@ -72,7 +72,7 @@ class Body:
 
 @dataclass(frozen=True, eq=False)
 class Fix:
-    """Prescribed displacement of a surface, unit of length.
+    """Prescribed displacement of a surface or node set, unit of length.
 
     value: one number or None (free) or function x -> number per component, or one function
     x -> components, x being the point (dim,) of a node; 0 holds all components.
@@ -135,7 +135,24 @@ class BodyForce:
         check_configuration(self.configuration)
 
 
-Load = Traction | Pressure | BodyForce
+@dataclass(frozen=True, eq=False)
+class NodalForce:
+    """A force at every node of a node set or surface: components or functions of x (dim,).
+
+    Its sum is the number of nodes times the value; a force that is spread over a surface is a
+    Traction.  It keeps its direction and size when the body deforms.
+    """
+
+    on: str
+    value: VectorValue
+
+    def __post_init__(self) -> None:
+        check_vector(self.value, f"nodal force on {self.on!r}")
+
+    configuration = REFERENCE
+
+
+Load = Traction | Pressure | BodyForce | NodalForce
 
 
 def check_configuration(value: object) -> None:

@@ -13,7 +13,7 @@ from ..elements.elasticity import body_load
 from ..elements.moved_loads import pressure_forces
 from ..meshes.mesh import Mesh, unknown
 from ..meshes.surfaces import surface_load
-from .parts import Body, BodyForce, Fix, Load, Pressure, Traction
+from .parts import Body, BodyForce, Fix, Load, NodalForce, Pressure, Traction
 from .timing import lasting
 from .values import component_at, vector_at
 
@@ -52,9 +52,10 @@ class Prescribed:
         return held, np.split(self.lasting.reshape(-1, dim), offsets[1:-1] // dim)
 
 
-def locate(bodies: Sequence[Body], on: str) -> tuple[int, str]:
-    """(body, surface) of a name "surface" or "body.surface"."""
-    found = [k for k, body in enumerate(bodies) if on in body.mesh.surfaces]
+def locate(bodies: Sequence[Body], on: str, *, sets: bool = False) -> tuple[int, str]:
+    """(body, surface) of a name "surface" or "body.surface"; sets: also node sets."""
+    named = [{*body.mesh.surfaces, *(body.mesh.node_sets if sets else ())} for body in bodies]
+    found = [k for k, known in enumerate(named) if on in known]
     if len(found) == 1:
         return found[0], on
     if len(found) > 1:
@@ -62,11 +63,11 @@ def locate(bodies: Sequence[Body], on: str) -> tuple[int, str]:
         raise InvalidInput(f"surface {on!r}: several bodies have it, write one of {choices}")
     for k, body in enumerate(bodies):
         prefix = f"{body.name}."
-        if on.startswith(prefix) and on[len(prefix) :] in body.mesh.surfaces:
+        if on.startswith(prefix) and on[len(prefix) :] in named[k]:
             return k, on[len(prefix) :]
-    names = [s for body in bodies for s in body.mesh.surfaces]
+    names = [s for known in named for s in known]
     if len(bodies) > 1:
-        names += [f"{body.name}.{s}" for body in bodies for s in body.mesh.surfaces]
+        names += [f"{bodies[k].name}.{s}" for k, known in enumerate(named) for s in known]
     raise InvalidInput(unknown("surface", on, dict.fromkeys(names)))
 
 
@@ -76,7 +77,7 @@ def prescribed_values(
     """Prescribed displacement of every dof, NaN where it is free, (dofs,)."""
     values = np.full(int(offsets[-1]), np.nan)
     for at, support in enumerate(supports):
-        k, surface = locate(bodies, support.on)
+        k, surface = locate(bodies, support.on, sets=True)
         mesh = bodies[k].mesh
         nodes = mesh.surface_nodes(surface)
         dofs = offsets[k] + nodes[:, None] * mesh.dim + np.arange(mesh.dim)
@@ -113,6 +114,8 @@ def external_load(
         with within("loads", at):
             if isinstance(load, BodyForce):
                 _add_body_force(out, bodies, load, offsets)
+            elif isinstance(load, NodalForce):
+                _add_nodal_force(out, bodies, load, offsets)
             elif load is not None:
                 k, surface = locate(bodies, load.on)
                 mesh = bodies[k].mesh
@@ -120,6 +123,18 @@ def external_load(
                         else _drawn(mesh, surface, load))  # fmt: skip
                 out[offsets[k] : offsets[k + 1]] += part.ravel()
     return out
+
+
+def _add_nodal_force(
+    out: Array, bodies: Sequence[Body], load: NodalForce, offsets: Index
+) -> None:
+    k, name = locate(bodies, load.on, sets=True)
+    mesh = bodies[k].mesh
+    nodes = mesh.surface_nodes(name)
+    with within("value"):
+        force = vector_at(load.value, mesh.points[nodes], f"nodal force on {load.on!r}")
+    dofs = offsets[k] + nodes[:, None] * mesh.dim + np.arange(mesh.dim)
+    np.add.at(out, dofs, force)
 
 
 def _drawn(mesh: Mesh, surface: str, load: Traction) -> Array:

@@ -155,7 +155,7 @@ class Motion:
         node, axis = divmod(dof - int(offsets[k]), d)
         mesh = bodies[k].mesh
         names = [s.on for s in self.model.supports
-                 if is_timed(s.value) and (found := locate(bodies, s.on))[0] == k
+                 if is_timed(s.value) and (found := locate(bodies, s.on, sets=True))[0] == k
                  and node in mesh.surface_nodes(found[1])]  # fmt: skip
         held = bool(self.parts.is_fixed[dof])
         before, now = ("held", "free") if held else ("free", "held")

@@ -1,0 +1,1 @@
+"""Keyword decks of CalculiX and Abaqus: cards, flattened, as cases."""

@@ -1,0 +1,339 @@
+"""A deck as a case: its model, its steps in time, and what of it was left out.
+
+Signs and order: a contact pair names the slave first; pressures push into a body.  Contact is
+that of mortar elements, whatever discretisation the deck asks for; surfaces that overlap by a
+law of pressure over overclosure do so only where the law is read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...core.errors import Address, AmontonsError, FileFormatError, InvalidInput
+from ...mechanics.model import BodyForce, Contact, Fix, Model, NodalForce, Pressure
+from ...mechanics.model.parts import Body
+from ...mechanics.steps import QuasiStatic
+from ..case.evolution import Evolution
+from ..case.overrides import override_settings
+from ..case.settings import Settings
+from ..readers import Case
+from .cards import Card, Row, read_cards
+from .flat import Deck, Placed, flatten
+from .history import Course, History, Span, read_history
+from .keywords import sorted_out
+from .materials import Interaction, read_interactions, read_sections
+from .meshing import Region
+from .scopes import Index, missing
+
+OPTIONS = ("allow", "hard")
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a deck is read: cards that may be left out; hard: laws of overclosure too."""
+
+    allow: tuple[str, ...] = ()
+    hard: bool = False
+
+
+@dataclass
+class Found:
+    """The parts of a model with the card that each comes from."""
+
+    supports: list[Fix] = field(default_factory=list)
+    loads: list[Any] = field(default_factory=list)
+    contacts: list[Contact] = field(default_factory=list)
+    cards: dict[str, list[Card]] = field(
+        default_factory=lambda: {"supports": [], "loads": [], "contacts": []}
+    )
+
+    def add(self, kind: str, part: Any, card: Card) -> None:
+        """Add one part."""
+        getattr(self, kind).append(part)
+        self.cards[kind].append(card)
+
+    def line_of(self, at: Address) -> str:
+        """Where in the deck the culprit stands."""
+        if len(at) < 2 or at[0] not in self.cards or not isinstance(at[1], int):
+            return ""
+        card = self.cards[at[0]][at[1]]
+        return f"line {card.number}: {card}"
+
+
+def read(path: Path, overrides: Sequence[str] = (), method: str | None = None) -> Case:
+    """The case in a deck.  Overrides: those of the solver, deck.allow and deck.hard."""
+    settings, options = _settings(overrides, method)
+    deck = flatten(read_cards(path))
+    notes = _leave_out(deck, options)
+    if not deck.steps:
+        raise FileFormatError(f"{path}: *STEP: missing, the deck loads nothing")
+    try:
+        return _case(path, deck, settings, options, notes)
+    except FileFormatError:
+        raise
+    except AmontonsError as reason:
+        raise FileFormatError(f"{path}: {reason}") from reason
+
+
+def _settings(overrides: Sequence[str], method: str | None) -> tuple[Settings, Options]:
+    own = [text for text in overrides if text.split("=")[0].strip().startswith("deck.")]
+    rest = [text for text in overrides if text not in own]
+    settings = override_settings(Settings(method or "auto"), rest)
+    values: dict[str, Any] = {}
+    for text in own:
+        key, _, value = text.partition("=")
+        name = key.strip().removeprefix("deck.")
+        if name == "allow":
+            words = value.strip().strip("[]").replace('"', "").split(",")
+            values["allow"] = tuple(word.strip() for word in words if word.strip())
+        elif name == "hard" and value.strip().lower() in ("true", "false"):
+            values["hard"] = value.strip().lower() == "true"
+        else:
+            raise InvalidInput(
+                f"--set {text}: expected deck.allow=[KEYWORD, ...] or deck.hard=true"
+            )
+    return settings, Options(**values)
+
+
+def _leave_out(deck: Deck, options: Options) -> list[str]:
+    """Take the cards away that are not read, and say so."""
+    kept, notes = sorted_out([p.card for p in deck.model], options.allow)
+    chosen = {id(card) for card in kept}
+    deck.model = [p for p in deck.model if id(p.card) in chosen]
+    for k, step in enumerate(deck.steps):
+        kept, more = sorted_out([p.card for p in step], options.allow)
+        chosen = {id(card) for card in kept}
+        deck.steps[k] = [p for p in step if id(p.card) in chosen]
+        notes += [note for note in more if note not in notes]
+    return notes
+
+
+def _case(
+    path: Path, deck: Deck, settings: Settings, options: Options, notes: list[str]
+) -> Case:
+    sections = read_sections(deck, deck.model)
+    region = Region.of(deck, sections)
+    history = read_history(deck, deck.model, deck.steps)
+    title = _title(deck) or path.name.split(".")[0]
+    notes += _formulations(deck)
+    found = Found()
+    _name_nodes(region, history)
+    contacts = _contacts(deck, region, options, notes)
+    _name_faces(region, history)
+    mesh, at = region.mesh(title)
+    _supports_and_loads(found, region, history, at, notes)
+    for contact, card in contacts:
+        found.add("contacts", contact, card)
+    materials = {s.name: s.material.law(region.plane) for s in sections}
+    make = partial(_model, [Body(mesh, materials)], found, title)
+    key_of = found.line_of
+    moving = make(None)
+    evolution = Evolution(QuasiStatic(_step(history.spans)), history.until)
+    return Case(
+        make(history.until), settings, title, path, evolution=evolution, key_of=key_of,
+        moving=moving, notes=tuple(notes),
+    )  # fmt: skip
+
+
+def _title(deck: Deck) -> str:
+    for placed in deck.model:
+        if placed.card.keyword == "HEADING":
+            for row in placed.card.rows():
+                return ",".join(row.fields)[:80]
+    return ""
+
+
+def _formulations(deck: Deck) -> list[str]:
+    """What elements of the deck do otherwise than ours."""
+    from .shapes import SHAPES
+
+    kinds = dict.fromkeys(block.kind for block in deck.blocks)
+    notes = [f"{kind}: {SHAPES[kind].note}" for kind in kinds if SHAPES[kind].note]
+    for step in deck.steps:
+        if "NLGEOM" in step[0].card.options and step[0].card.label("NLGEOM") != "NO":
+            notes.append(
+                "NLGEOM: strains are taken as small; a rotation that spoils this is warned of"
+            )
+            break
+    return notes
+
+
+def _step(spans: Sequence[Span]) -> float:
+    """The length of a step in time that meets the end of every step of the deck."""
+    step = min(span.increment for span in spans)
+    for span in spans:
+        count = max(int(np.ceil((span.end - span.begin) / step - 1e-9)), 1)
+        step = min(step, (span.end - span.begin) / count)
+    return step
+
+
+# ------------------------------------------------------------------------------ contacts
+def _contacts(
+    deck: Deck, region: Region, options: Options, notes: list[str]
+) -> list[tuple[Contact, Card]]:
+    cards = [p.card for p in deck.model]
+    for step in deck.steps:
+        for placed in step:
+            if placed.card.keyword in ("CONTACTPAIR", "SURFACEINTERACTION"):
+                raise placed.card.error("stands in a step; expected before the first one")
+    interactions = read_interactions(cards)
+    out = []
+    for placed in deck.model:
+        card = placed.card
+        if card.keyword != "CONTACTPAIR":
+            continue
+        for option in ("ADJUST", "TIED", "HCRIT", "NOTHICKNESS"):
+            if option in card.options and card.options[option] not in ("0", "0.", "0.0"):
+                raise card.error(f"{option}: is not read")
+        name = card.name("INTERACTION")
+        if name not in interactions:
+            raise card.error(missing("surface interaction", name, interactions))
+        _check_law(interactions[name], options, notes)
+        for row in card.rows():
+            if len(row.fields) != 2:
+                raise row.error(
+                    f"*CONTACT PAIR: expected slave, master, got {len(row.fields)} names"
+                )
+            slave, master = (_surface(region, placed, text, row) for text in row.fields)
+            interaction = interactions[name]
+            out.append((Contact(slave, master=master, mu=interaction.friction,
+                                cap=interaction.limit), card))  # fmt: skip
+        if card.label("TYPE") in (None, "NODE TO SURFACE"):
+            notes.append(f"{card} (line {card.number}): NODE TO SURFACE is taken as mortar")
+    if not out:
+        raise InvalidInput("*CONTACT PAIR: missing, a deck without contact")
+    return out
+
+
+def _check_law(interaction: Interaction, options: Options, notes: list[str]) -> None:
+    """Raise FileFormatError for a law of pressure over overclosure, unless told to leave it."""
+    said = [
+        (card, word) for card, word, given in (
+            (interaction.behaviour_card, interaction.behaviour,
+             interaction.behaviour != "HARD"),
+            (interaction.card, "stick slope of *FRICTION", interaction.slope is not None),
+        ) if given and card is not None
+    ]  # fmt: skip
+    for card, word in said:
+        if not options.hard:
+            raise card.error(
+                f"{word}: compliant contact is not read; --set deck.hard=true takes contact as "
+                "hard and sticking as rigid"
+            )
+        text = f"{card} (line {card.number}): {word} is taken as hard, as asked"
+        if text not in notes:
+            notes.append(text)
+
+
+def _surface(region: Region, placed: Placed, text: str, row: Row) -> str:
+    """Ask the mesh for a surface; returns its name there."""
+    faces, nodes = placed.scope.surface(text, row)
+    name = text.strip('"').upper()
+    if name not in region.facets:
+        if nodes is None:
+            region.add_faces(name, faces, row)
+        else:
+            region.add_covering(name, nodes, row)
+    return name
+
+
+# ------------------------------------------------------------------------------ history
+def _name_nodes(region: Region, history: History) -> None:
+    """Node sets of supports and forces: named after the line of their card."""
+    for word, given in (("support", history.supports), ("force", history.forces)):
+        for k, (nodes, _, _) in enumerate(given.groups(region.dim)):
+            region.node_sets[f"{word} {k + 1}"] = nodes
+
+
+def _name_faces(region: Region, history: History) -> None:
+    for (name, label), (_, card, scope) in history.faces.items():
+        row = Row(card.file, card.number, [])
+        if label:
+            faces = [(scope.elements(name, row), label)]
+        else:
+            faces, nodes = scope.surface(name, row)
+            if nodes is not None:
+                raise row.error(f"surface {name}: expected one of element faces")
+        region.add_faces(_loaded(name, label), faces, row)
+
+
+def _loaded(name: str, label: str) -> str:
+    return f"pressure {name} {label}".strip()
+
+
+def _supports_and_loads(
+    found: Found, region: Region, history: History, at: Index, notes: list[str]
+) -> None:
+    dim, share = region.dim, 1.0 / region.thickness
+    for k, (nodes, courses, card) in enumerate(history.supports.groups(dim)):
+        name = f"support {k + 1}"
+        if _without_elements(region, name, nodes, at):
+            notes.append(f"{card} (line {card.number}): nodes without elements are left out")
+        if len(region.node_sets[name]):
+            found.add("supports", (name, courses), card)
+    for k, (nodes, courses, card) in enumerate(history.forces.groups(dim)):
+        name = f"force {k + 1}"
+        if _without_elements(region, name, nodes, at):
+            label = region.deck.node_name(int(nodes[at[nodes] < 0][0]))
+            raise card.error(f"node {label}: belongs to no element, where does its force go?")
+        found.add("loads", (NodalForce, name, [_scaled(c, share) for c in courses]), card)
+    for (name, label), (course, card, _) in history.faces.items():
+        found.add("loads", (Pressure, _loaded(name, label), course), card)
+    for name, (course, way, card, scope) in history.bodies.items():
+        chosen = set(scope.elements(name, Row(card.file, card.number, [])).tolist())
+        for section in region.sections:
+            own = set(section.elements.tolist())
+            if not own & chosen:
+                continue
+            if own - chosen:
+                raise card.error(f"GRAV: {name} holds only a part of {section.name}")
+            density = section.material.density
+            if density is None:
+                raise card.error(f"GRAV: the material of {section.name} has no *DENSITY")
+            found.add("loads", (BodyForce, section.name, (course, density * way[:dim])), card)
+
+
+def _without_elements(region: Region, name: str, nodes: Index, at: Index) -> bool:
+    """True where nodes of a set belong to no element; leaves them out of it."""
+    kept = nodes[at[nodes] >= 0]
+    region.node_sets[name] = kept
+    return len(kept) < len(nodes)
+
+
+def _scaled(course: Course | None, factor: float) -> Course:
+    if course is None:
+        return Course()
+    return replace(course, values=tuple(factor * v for v in course.values))
+
+
+def _model(bodies: list[Body], found: Found, title: str, time: float | None) -> Model:
+    """The model at a time, or as it goes on in time where that is None."""
+    value = partial(_value, time)
+    supports = [
+        Fix(name, [None if c is None else value(c) for c in courses])
+        for name, courses in found.supports
+    ]  # fmt: skip
+    loads: list[Any] = []
+    for kind, name, courses in found.loads:
+        if kind is NodalForce:
+            loads.append(NodalForce(name, [value(c) for c in courses]))
+        elif kind is Pressure:
+            loads.append(Pressure(name, value(courses)))
+        else:
+            course, way = courses
+            loads.append(BodyForce([value(_scaled(course, w)) for w in way], region=name))
+    return Model(bodies, supports, found.contacts, loads, name=title)
+
+
+def _value(time: float | None, course: Course) -> Any:
+    if course.is_zero:
+        return 0.0
+    if time is not None:
+        return course.at(time)
+    return lambda x, t: course.at(t)

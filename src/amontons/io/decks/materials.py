@@ -1,0 +1,170 @@
+"""Materials, sections and interactions of a deck."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ...core.errors import InvalidInput
+from ...mechanics.elements.elasticity import LinearElastic
+from .cards import Card, Row, number
+from .flat import Deck, Placed
+from .scopes import Index, missing
+
+PLANES = {"": "strain", "strain": "strain", "stress": "stress"}
+
+
+@dataclass(frozen=True)
+class Elastic:
+    """Young's modulus and Poisson's ratio, and the density where one is given."""
+
+    young: float
+    poisson: float
+    density: float | None
+    card: Card
+
+    def law(self, plane: str) -> LinearElastic:
+        """The material for a plane state; raises FileFormatError for what is none."""
+        try:
+            return LinearElastic(self.young, self.poisson, PLANES[plane], self.density)
+        except InvalidInput as reason:
+            raise self.card.error(str(reason)) from None
+
+
+@dataclass(frozen=True)
+class Section:
+    """Elements of one material; thickness in 2D."""
+
+    name: str
+    elements: Index
+    material: Elastic
+    thickness: float
+    card: Card
+
+
+@dataclass
+class Interaction:
+    """How two surfaces touch: friction coefficient, and pressure over overclosure.
+
+    behaviour: "HARD", or the word of a law that lets surfaces overlap, with its numbers; slope:
+    shear stress over elastic slip, None where there is none.
+    """
+
+    card: Card
+    friction: float = 0.0
+    slope: float | None = None
+    limit: float | None = None
+    behaviour: str = "HARD"
+    values: Sequence[Row] = ()
+    behaviour_card: Card | None = None
+
+
+def read_materials(cards: Sequence[Card]) -> dict[str, Elastic]:
+    """The materials by name."""
+    found: dict[str, Elastic] = {}
+    density: dict[str, float] = {}
+    current: Card | None = None
+    for card in cards:
+        if card.keyword == "MATERIAL":
+            current = card
+            if card.name("NAME") in found:
+                raise card.error(f"NAME: material {card.name('NAME')} is there already")
+        elif card.keyword in ("ELASTIC", "DENSITY"):
+            if current is None:
+                raise card.error("stands before the first *MATERIAL")
+            name = current.name("NAME")
+            if card.keyword == "DENSITY":
+                density[name] = number(_first(card).fields[0], _first(card), "density")
+            else:
+                found[name] = _elastic(card)
+    return {
+        name: Elastic(e.young, e.poisson, density.get(name), e.card)
+        for name, e in found.items()
+    }
+
+
+def _elastic(card: Card) -> Elastic:
+    kind = card.label("TYPE") or "ISO"
+    if kind not in ("ISO", "ISOTROPIC"):
+        raise card.error(f"TYPE={kind}: is not read, expected ISOTROPIC (two constants)")
+    rows = list(card.rows())
+    if len(rows) > 1:
+        raise rows[1].error("*ELASTIC: constants at several temperatures are not read")
+    row = _first(card)
+    if len(row.fields) < 2:
+        raise row.error(f"*ELASTIC: expected two constants, got {len(row.fields)}")
+    values = [number(text, row, "*ELASTIC") for text in row.fields[:2]]
+    return Elastic(values[0], values[1], None, card)
+
+
+def _first(card: Card) -> Row:
+    """The first data line."""
+    for row in card.rows():
+        return row
+    raise card.error("expected a line of data, got none")
+
+
+def read_sections(deck: Deck, placed: Sequence[Placed]) -> list[Section]:
+    """Which elements are of which material."""
+    materials = read_materials([p.card for p in placed])
+    found = []
+    for each in placed:
+        card = each.card
+        if card.keyword != "SOLIDSECTION":
+            continue
+        name = card.name("MATERIAL")
+        if name not in materials:
+            raise card.error(missing("material", name, materials))
+        row = next(card.rows(), Row(card.file, card.number, [""]))
+        thickness = number(row.fields[0], row, "thickness") or 1.0
+        if thickness < 0:
+            raise row.error(f"thickness: expected a length > 0, got {thickness:g}")
+        place = Row(card.file, card.number, [])
+        title = card.name("ELSET")
+        elements = each.scope.elements(title, place)
+        inside = each.scope.own.title
+        found.append(Section(f"{inside}.{title}" if inside else title, elements,
+                             materials[name], thickness, card))  # fmt: skip
+    if not found:
+        raise InvalidInput("*SOLID SECTION: missing, expected one that gives a material")
+    return found
+
+
+def read_interactions(cards: Sequence[Card]) -> dict[str, Interaction]:
+    """The interactions by name."""
+    found: dict[str, Interaction] = {}
+    current: Interaction | None = None
+    for card in cards:
+        if card.keyword == "SURFACEINTERACTION":
+            current = found[card.name("NAME")] = Interaction(card)
+        elif card.keyword in ("SURFACEBEHAVIOR", "FRICTION"):
+            if current is None:
+                raise card.error("stands before the first *SURFACE INTERACTION")
+            (_behaviour if card.keyword == "SURFACEBEHAVIOR" else _friction)(current, card)
+    return found
+
+
+def _behaviour(interaction: Interaction, card: Card) -> None:
+    word = card.label("PRESSURE-OVERCLOSURE") or "HARD"
+    if "NOSEPARATION" in card.options:
+        raise card.error("NO SEPARATION: is not read")
+    interaction.behaviour, interaction.values = word, tuple(card.rows())
+    interaction.behaviour_card = card
+
+
+def _friction(interaction: Interaction, card: Card) -> None:
+    for option in ("USER", "EXPONENTIALDECAY", "ROUGH", "LAGRANGE"):
+        if option in card.options and option != "LAGRANGE":
+            raise card.error(f"{option}: is not read, expected a coefficient")
+    rows = list(card.rows())
+    if len(rows) != 1:
+        raise card.error(f"expected one line with a coefficient, got {len(rows)}")
+    row = rows[0]
+    values = [number(text, row, "*FRICTION") for text in row.fields]
+    if values[0] < 0:
+        raise row.error(f"*FRICTION: expected a coefficient >= 0, got {values[0]:g}")
+    interaction.friction = values[0]
+    if len(values) > 1 and values[1] > 0 and "SLIPTOLERANCE" not in card.options:
+        interaction.slope = values[1]
+    if card.options.get("TAUMAX"):
+        interaction.limit = number(card.options["TAUMAX"], row, "TAUMAX")

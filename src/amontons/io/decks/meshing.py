@@ -1,0 +1,176 @@
+"""The mesh of a flat deck: cells by section, the surfaces and node sets that are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import InvalidInput
+from ...mechanics.meshes import Cells, Facets, Mesh
+from ...mechanics.meshes.cells import CELLS, FACET_KIND
+from .cards import Card, Row
+from .flat import Deck
+from .materials import Section
+from .scopes import Faces, Index
+from .shapes import SHAPES, side_of
+
+Array = NDArray[np.float64]
+NOT_YET = {"quad8": "8-node quadrilaterals", "hex20": "20-node bricks"}
+
+
+@dataclass
+class Region:
+    """What is known of the mesh before it is made.
+
+    section_of (elements,): number of the section, -1 without one; at (elements,): block and
+    row of each element.
+    """
+
+    deck: Deck
+    sections: Sequence[Section]
+    plane: str
+    section_of: Index
+    block_of: Index
+    facets: dict[str, list[Facets]] = field(default_factory=dict)
+    node_sets: dict[str, Index] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, deck: Deck, sections: Sequence[Section]) -> Region:
+        """Check elements and sections; raises FileFormatError for what can not be meshed."""
+        if not deck.blocks:
+            raise InvalidInput("*ELEMENT: missing, the deck has no elements")
+        count = sum(len(block.nodes) for block in deck.blocks)
+        section_of = np.full(count, -1)
+        for k, section in enumerate(sections):
+            section_of[section.elements] = k
+        block_of = np.concatenate([
+            np.full(len(block.nodes), k) for k, block in enumerate(deck.blocks)
+        ])  # fmt: skip
+        first = deck.blocks[0]
+        for block in deck.blocks:
+            shape = SHAPES[block.kind]
+            if shape.plane == "axisymmetric":
+                raise block.card.error("axisymmetric elements are not read")
+            if shape.cell in NOT_YET:
+                raise block.card.error(f"{NOT_YET[shape.cell]} are not read")
+            if shape.plane != SHAPES[first.kind].plane:
+                raise block.card.error(
+                    f"expected elements of one kind, got {first.kind} and {block.kind}"
+                )
+            own = section_of[block.first : block.first + len(block.nodes)]
+            if (own < 0).any():
+                raise block.card.error(
+                    f"{int((own < 0).sum())} of its elements are in no *SOLID SECTION: they "
+                    "have no material"
+                )
+        return cls(deck, sections, SHAPES[first.kind].plane, section_of, block_of)
+
+    @property
+    def dim(self) -> int:
+        """2 or 3."""
+        return 2 if self.plane else 3
+
+    @property
+    def thickness(self) -> float:
+        """Of all sections in 2D; raises FileFormatError where they differ."""
+        if not self.plane:
+            return 1.0
+        for section in self.sections[1:]:
+            if section.thickness != self.sections[0].thickness:
+                raise section.card.error("thickness: sections of several thicknesses")
+        return self.sections[0].thickness
+
+    def add_faces(self, name: str, faces: Faces, where: Card | Row) -> None:
+        """Ask for a surface of element faces."""
+        out = self.facets.setdefault(name, [])
+        for elements, label in faces:
+            for block_number in np.unique(self.block_of[elements]):
+                block = self.deck.blocks[block_number]
+                own = elements[self.block_of[elements] == block_number] - block.first
+                sides = SHAPES[block.kind].sides
+                if not label:
+                    out += [_facets(self.dim, block.nodes[own][:, side]) for side in sides]
+                    continue
+                side = side_of(label)
+                if side is None or not 0 <= side < len(sides):
+                    raise where.error(
+                        f"face {label}: expected S1 to S{len(sides)} for {block.kind}"
+                    )
+                out.append(_facets(self.dim, block.nodes[own][:, sides[side]]))
+
+    def add_covering(self, name: str, nodes: Index, where: Card | Row) -> None:
+        """Ask for the surface that nodes make: the outer facets all of whose nodes they are."""
+        marked = np.zeros(len(self.deck.points), dtype=bool)
+        marked[nodes] = True
+        found = [f for f in self._boundary() if len(f.nodes)]
+        kept = [Facets(f.kind, f.nodes[marked[f.nodes].all(axis=1)]) for f in found]
+        covered = np.zeros(len(marked), dtype=bool)
+        for facets in kept:
+            covered[facets.nodes] = True
+        left = nodes[~covered[nodes]]
+        if len(left):
+            raise where.error(
+                f"surface {name}: of its {len(nodes)} nodes {len(left)} make no facet of the "
+                f"mesh with others of them, node {self.deck.node_name(int(left[0]))} for one; "
+                "give it as a surface of element faces"
+            )
+        self.facets[name] = [f for f in kept if len(f.nodes)]
+
+    def _boundary(self) -> tuple[Facets, ...]:
+        from ...mechanics.meshes.facets import boundary
+
+        return boundary(tuple(self._cells()))
+
+    def _cells(self) -> list[Cells]:
+        """All cells, one block for each type and section."""
+        out = []
+        for block in self.deck.blocks:
+            own = self.section_of[block.first : block.first + len(block.nodes)]
+            out += [
+                Cells(SHAPES[block.kind].cell, block.nodes[own == k], self.sections[k].name)
+                for k in np.unique(own)
+            ]
+        return out
+
+    def mesh(self, title: str) -> tuple[Mesh, Index]:
+        """The mesh, and the number in it of each node of the deck, -1 for one without elements.
+
+        Raises FileFormatError that names a surface without outer facets.
+        """
+        used = np.zeros(len(self.deck.points), dtype=bool)
+        for block in self.deck.blocks:
+            used[block.nodes] = True
+        at = np.where(used, np.cumsum(used) - 1, -1)
+        points = self.deck.points[used]
+        if self.dim == 2:
+            if np.ptp(points[:, 2]):
+                raise InvalidInput("*NODE: plane elements with nodes at several z")
+            points = points[:, :2]
+        cells = [Cells(c.kind, at[c.nodes], c.region) for c in self._cells()]
+        surfaces = {
+            name: tuple(Facets(f.kind, at[f.nodes]) for f in _joined(facets))
+            for name, facets in self.facets.items()
+        }
+        sets = {name: at[nodes] for name, nodes in self.node_sets.items()}
+        mesh = Mesh(points, tuple(cells), surfaces, name=title, node_sets=sets)
+        return mesh, at
+
+
+def _facets(dim: int, nodes: Index) -> Facets:
+    return Facets(FACET_KIND[dim, nodes.shape[1]], nodes)
+
+
+def _joined(facets: Sequence[Facets]) -> list[Facets]:
+    """One block for each kind, every facet once."""
+    out = []
+    for kind in dict.fromkeys(f.kind for f in facets):
+        nodes = np.concatenate([f.nodes for f in facets if f.kind == kind])
+        corners = np.sort(nodes[:, : CELLS[kind].corner_count], axis=1)
+        _, first = np.unique(corners, axis=0, return_index=True)
+        out.append(Facets(kind, nodes[np.sort(first)]))
+    return out
+
+

@@ -1,0 +1,74 @@
+"""Element types of decks: the cell they are, what they assume, and the nodes of their sides.
+
+Sides are numbered as CalculiX and Abaqus do, from S1; nodes are those of the deck's element.
+Integration: ours is the full rule of each cell; where a deck asks for another one, a result
+differs by that, which `note` says.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+FULL = "full integration"
+
+
+@dataclass(frozen=True)
+class Shape:
+    """An element of a deck.
+
+    cell: kind of our mesh; nodes: how many the deck gives; plane: "" in 3D, else "strain",
+    "stress" or "axisymmetric"; sides: nodes of each, corners first; note: what the type means
+    beyond the cell.
+    """
+
+    cell: str
+    nodes: int
+    sides: tuple[tuple[int, ...], ...]
+    plane: str = ""
+    note: str = ""
+
+
+TRI = ((0, 1), (1, 2), (2, 0))
+TRI6 = ((0, 1, 3), (1, 2, 4), (2, 0, 5))
+QUAD = ((0, 1), (1, 2), (2, 3), (3, 0))
+QUAD8 = ((0, 1, 4), (1, 2, 5), (2, 3, 6), (3, 0, 7))
+TET = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))
+TET10 = ((0, 1, 2, 4, 5, 6), (0, 3, 1, 7, 8, 4), (1, 3, 2, 8, 9, 5), (2, 3, 0, 9, 7, 6))
+HEX = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
+HEX20 = (
+    (0, 1, 2, 3, 8, 9, 10, 11), (4, 7, 6, 5, 15, 14, 13, 12), (0, 4, 5, 1, 16, 12, 17, 8),
+    (1, 5, 6, 2, 17, 13, 18, 9), (2, 6, 7, 3, 18, 14, 19, 10), (3, 7, 4, 0, 19, 15, 16, 11),
+)  # fmt: skip
+WEDGE = ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0))
+REDUCED = "reduced integration there, full here"
+INCOMPATIBLE = "incompatible modes there, none here"
+
+
+def _planes() -> dict[str, Shape]:
+    found = {}
+    for prefix, plane in (("CPE", "strain"), ("CPS", "stress"), ("CAX", "axisymmetric")):
+        for name, cell, nodes, sides in (
+            ("3", "tri", 3, TRI), ("4", "quad", 4, QUAD), ("6", "tri6", 6, TRI6),
+            ("8", "quad8", 8, QUAD8),
+        ):  # fmt: skip
+            found[prefix + name] = Shape(cell, nodes, sides, plane)
+            if name in ("4", "8"):
+                found[f"{prefix}{name}R"] = Shape(cell, nodes, sides, plane, REDUCED)
+            if name == "4":
+                found[f"{prefix}4I"] = Shape(cell, nodes, sides, plane, INCOMPATIBLE)
+    return found
+
+
+SHAPES = {
+    "C3D4": Shape("tet", 4, TET), "C3D10": Shape("tet10", 10, TET10),
+    "C3D8": Shape("hex", 8, HEX), "C3D8R": Shape("hex", 8, HEX, note=REDUCED),
+    "C3D8I": Shape("hex", 8, HEX, note=INCOMPATIBLE), "C3D6": Shape("wedge", 6, WEDGE),
+    "C3D20": Shape("hex20", 20, HEX20), "C3D20R": Shape("hex20", 20, HEX20, note=REDUCED),
+} | _planes()  # fmt: skip
+
+
+def side_of(label: str) -> int | None:
+    """The number of a side from 0 of "S3", also "P3" of a pressure; None for another word."""
+    if label[:1] in ("S", "P") and label[1:].isdigit():
+        return int(label[1:]) - 1
+    return None
