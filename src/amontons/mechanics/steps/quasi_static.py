@@ -30,6 +30,7 @@ from .energy import Energies, Forces, slow_energies
 from .large_steps import LargeSlowModel
 from .moreau_jean import Solve
 from .passage import Crossing, taken
+from .springs import Springs
 from .state import State, TimeStep, undeformed
 from .system import Motion
 from .undetermined import carried_on
@@ -72,6 +73,8 @@ class SlowModel:
 
     def __init__(self, model: Model, crossing: Crossing | None = None) -> None:
         self.motion, self.crossing = Motion(model), crossing
+        parts = self.motion.parts
+        self.springs = Springs.of(self.motion.body.law, parts.carried.shape[1])
 
     def begin(self, state: State) -> State:
         """The state before the first step: undeformed, also where supports hold the body."""
@@ -86,7 +89,7 @@ class SlowModel:
         """
         parts = self.motion.parts
         load, prescribed = self.motion.applied(time)
-        problem = self.motion.body.increment(load, prescribed, state.slip)
+        problem = self.motion.body.increment(load, prescribed, self._remembered(state))
         arrive = None
         if self.crossing is not None:
             steps: Any = self._before(state, time), problem  # the path refuses Nitsche's form
@@ -119,7 +122,11 @@ class SlowModel:
         load = parts.K @ q - parts.whole_H @ state.force.ravel()
         motion = (parts.whole_H.T @ state.velocity).reshape(parts.carried.shape)
         drift = (time - state.time) * motion[:, 1:]
-        return self.motion.body.increment(load, held, state.slip - drift)
+        return self.motion.body.increment(load, held, self._remembered(state) - drift)
+
+    def _remembered(self, state: State) -> Array:
+        """Where friction counts its way from, (nc, d-1)."""
+        return self.springs.remembered(state.slip, state.force)
 
     def explained(self, solution: FrictionSolution) -> FrictionSolution:
         """The same record; one that failed says which bodies give way."""
@@ -128,13 +135,12 @@ class SlowModel:
     def _energies(self, state: State, q1: Array, load: Array, r: Array) -> Energies:
         """The balance of `slow_energies`; r (nc, d): reactions after the step."""
         parts, dq = self.motion.parts, q1 - state.displacement
-        before = self._forces(
-            state.displacement, self.motion.load_of(state), parts.whole_H @ state.force.ravel()
-        )
-        after = self._forces(q1, load, parts.whole_H @ r.ravel())
+        before = self._forces(state.displacement, self.motion.load_of(state), state.force)
+        after = self._forces(q1, load, r)
         friction = float((r[:, 1:] * parts.local(dq)[:, 1:]).sum())
+        friction += self.springs.work(state.force, r)
         return slow_energies(before, after, dq, parts.held, friction)
 
-    def _forces(self, q: Array, load: Array, pushed: Array) -> Forces:
-        inner = self.motion.parts.K @ q
-        return Forces(inner, load, pushed, float(0.5 * q @ inner))
+    def _forces(self, q: Array, load: Array, r: Array) -> Forces:
+        inner, pushed = self.motion.parts.K @ q, self.motion.parts.whole_H @ r.ravel()
+        return Forces(inner, load, pushed, float(0.5 * q @ inner), self.springs.energy(r))
