@@ -51,6 +51,7 @@ class Output:
     from_fclib: bool = False
     uniqueness: dict[str, Any] | None = None  # what is known about other solutions
     warnings: tuple[ResultWarning, ...] = ()
+    notes: tuple[str, ...] = ()  # what its file says and the model leaves out
 
 
 # ------------------------------------------------------------------------------- choosing
@@ -171,6 +172,7 @@ def summary(output: Output) -> dict[str, Any]:
         "max_cone_violation": found.max_cone_violation,
         "uniqueness": output.uniqueness,
         "warnings": [warning.record for warning in output.warnings],
+        "notes": list(output.notes),
         "versions": versions(),
     }
     return finite(data)

@@ -25,7 +25,7 @@ from .locking import locked
 from .run_folder import BALANCE, PICTURES, WORKS, RunFolder, clear, continued
 from .sources import open_source, with_flags
 from .stopping import Stopping
-from .terminal import check_folder, say_growth
+from .terminal import check_folder, say_growth, say_notes
 
 if TYPE_CHECKING:
     from ...io.plots import Frame
@@ -83,6 +83,7 @@ def run(
     with read.naming_keys():
         _ = read.in_time.discretisation, read.in_time.law
     if not quiet:
+        say_notes(read.notes)
         say_growth(read)
     settings = with_flags(read.settings, tolerance)
     with Stopping() as stop, ExitStack() as stack:

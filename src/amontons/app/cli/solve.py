@@ -25,7 +25,7 @@ from .. import api
 from ..model_solution import ModelSolution
 from .group import INTERRUPTED
 from .sources import open_source, with_flags
-from .terminal import check_folder, check_writable, say_when
+from .terminal import check_folder, check_writable, say_notes, say_when
 from .uniqueness import brief, describe, record
 
 
@@ -40,7 +40,8 @@ def run(
     opened = open_source(source, overrides, method)
     if opened.evolution is not None and opened.moving is None:
         raise FileFormatError(
-            f"{source}: a case in time, it has [evolution]; use: amontons run {source}"
+            f"{source}: a case in time, whose state depends on the way; use: amontons run "
+            f"{source}"
         )
     settings = with_flags(
         opened.settings, tolerance, max_iterations, time_limit, contact_tolerance
@@ -105,7 +106,7 @@ def _output(
     opened: Case, found: FrictionSolution | ModelSolution, method: str
 ) -> output.Output:
     if isinstance(found, ModelSolution):
-        return replace(found.output, title=opened.title, method=method)
+        return replace(found.output, title=opened.title, method=method, notes=opened.notes)
     return output.Output(found, title=opened.title, method=method, warnings=found.warnings,
                          from_fclib=opened.path is not None)  # fmt: skip
 
@@ -134,6 +135,7 @@ def _report(
     result: output.Output, verdict: Uniqueness | None, full: bool, folder: Path
 ) -> None:
     click.echo(output.describe(result))
+    say_notes(result.notes)
     model = result.model
     if model is None or model.kind is FrictionProblem:
         click.echo(describe(verdict) if full and verdict is not None else brief(verdict))

@@ -61,9 +61,15 @@ def say_growth(case: Case) -> None:
     from ...mechanics.steps.timed import growth_in_words
 
     assert case.evolution is not None
-    words = growth_in_words(case.model)
+    words = growth_in_words(case.in_time)
     if words and isinstance(case.evolution.method, QuasiStatic):
         click.echo(words)
+
+
+def say_notes(notes: Sequence[str]) -> None:
+    """Print what the file of a case says and its model leaves out, a line for each."""
+    for note in notes:
+        click.echo(f"deck: {note}")
 
 
 def deliver_json(text: str, target: str | None) -> None:

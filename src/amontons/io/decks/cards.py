@@ -94,22 +94,24 @@ class Card:
                         del fields[-1]  # a comma at the end
                     yield Row(piece.file, piece.start + k, fields)
 
-    @property
-    def data(self) -> str:
-        """All data as one text, without remarks."""
-        lines = (line for piece in self.pieces for line in piece.lines)
-        return "\n".join(line for line in lines if not line.lstrip().startswith("**"))
+    def table(self, width: int | None) -> NDArray[np.float64] | None:
+        """Numbers (rows, width) if every line has so many numbers, else None; for large tables.
 
-    def table(self, width: int) -> NDArray[np.float64] | None:
-        """Numbers (rows, width) if all data are so many full rows of numbers, else None.
-
-        Rows may go on over lines.  For large tables: what they say wrong is found line by line.
+        width None: lines of any length, (numbers, 1).  What is wrong with data is found line
+        by line.
         """
-        text = self.data
+        lines = [line for piece in self.pieces for line in piece.lines]
+        lines = [text for line in lines if (text := line.strip()) and text[:2] != "**"]
+        text = "\n".join(lines)
         if GAP.search(text):
             return None
+        if width is not None and any(
+            line.count(",") - line.endswith(",") != width - 1 for line in lines
+        ):
+            return None
         words = text.replace(",", " ").split()
-        if not words or len(words) % width:
+        width = width or 1
+        if not words or len(words) != width * (len(words) // width):
             return None
         try:
             numbers = np.array(words, dtype=np.float64)

@@ -23,7 +23,7 @@ from ..case.evolution import Evolution
 from ..case.overrides import override_settings
 from ..case.settings import Settings
 from ..readers import Case
-from .cards import Card, Row, read_cards
+from .cards import Card, Row, number, read_cards
 from .flat import Deck, Placed, flatten
 from .history import Course, History, Span, read_history
 from .keywords import sorted_out
@@ -46,7 +46,7 @@ class Options:
 class Found:
     """The parts of a model with the card that each comes from."""
 
-    supports: list[Fix] = field(default_factory=list)
+    supports: list[Any] = field(default_factory=list)
     loads: list[Any] = field(default_factory=list)
     contacts: list[Contact] = field(default_factory=list)
     cards: dict[str, list[Card]] = field(
@@ -132,13 +132,12 @@ def _case(
         found.add("contacts", contact, card)
     materials = {s.name: s.material.law(region.plane) for s in sections}
     make = partial(_model, [Body(mesh, materials)], found, title)
-    key_of = found.line_of
-    moving = make(None)
     evolution = Evolution(QuasiStatic(_step(history.spans)), history.until)
-    return Case(
-        make(history.until), settings, title, path, evolution=evolution, key_of=key_of,
-        moving=moving, notes=tuple(notes),
-    )  # fmt: skip
+    case = Case(make(None), settings, title, path, evolution=evolution, key_of=found.line_of,
+                notes=tuple(notes))  # fmt: skip
+    if len(deck.steps) > 1 and any(contact.mu for contact, _ in contacts):
+        return case  # friction remembers the steps before
+    return replace(case, target=make(history.until), moving=case.target)
 
 
 def _title(deck: Deck) -> str:
@@ -194,16 +193,14 @@ def _contacts(
         name = card.name("INTERACTION")
         if name not in interactions:
             raise card.error(missing("surface interaction", name, interactions))
-        _check_law(interactions[name], options, notes)
+        law = _law(interactions[name], options, notes)
         for row in card.rows():
             if len(row.fields) != 2:
                 raise row.error(
                     f"*CONTACT PAIR: expected slave, master, got {len(row.fields)} names"
                 )
             slave, master = (_surface(region, placed, text, row) for text in row.fields)
-            interaction = interactions[name]
-            out.append((Contact(slave, master=master, mu=interaction.friction,
-                                cap=interaction.limit), card))  # fmt: skip
+            out.append((Contact(slave, master=master, **law), card))
         if card.label("TYPE") in (None, "NODE TO SURFACE"):
             notes.append(f"{card} (line {card.number}): NODE TO SURFACE is taken as mortar")
     if not out:
@@ -211,24 +208,32 @@ def _contacts(
     return out
 
 
-def _check_law(interaction: Interaction, options: Options, notes: list[str]) -> None:
-    """Raise FileFormatError for a law of pressure over overclosure, unless told to leave it."""
-    said = [
-        (card, word) for card, word, given in (
-            (interaction.behaviour_card, interaction.behaviour,
-             interaction.behaviour != "HARD"),
-            (interaction.card, "stick slope of *FRICTION", interaction.slope is not None),
-        ) if given and card is not None
-    ]  # fmt: skip
-    for card, word in said:
-        if not options.hard:
-            raise card.error(
-                f"{word}: compliant contact is not read; --set deck.hard=true takes contact as "
-                "hard and sticking as rigid"
-            )
-        text = f"{card} (line {card.number}): {word} is taken as hard, as asked"
-        if text not in notes:
-            notes.append(text)
+def _law(interaction: Interaction, options: Options, notes: list[str]) -> dict[str, Any]:
+    """Numbers of a contact; raises FileFormatError for a law of overclosure that is not read.
+
+    LINEAR: pressure over overclosure, the tension that it has far away is left out; HARD is
+    hard.  With the option `hard` all are.
+    """
+    numbers: dict[str, Any] = {"mu": interaction.friction, "cap": interaction.limit}
+    word, card = interaction.behaviour, interaction.behaviour_card or interaction.card
+    if options.hard:
+        if word != "HARD" or interaction.slope is not None:
+            text = f"{card} (line {card.number}): contact is taken as hard and rigid, as asked"
+            notes += [text] if text not in notes else []
+        return numbers
+    if word == "LINEAR":
+        for row in interaction.values[:1]:
+            numbers["stiffness"] = number(row.fields[0], row, "*SURFACE BEHAVIOR")
+        if not numbers.get("stiffness", 0.0) > 0:
+            raise card.error("expected a stiffness > 0, pressure over overclosure")
+    elif word != "HARD":
+        raise card.error(
+            f"{word}: this law of pressure over overclosure is not read, expected HARD or "
+            "LINEAR; --set deck.hard=true takes contact as hard and sticking as rigid"
+        )
+    if interaction.slope is not None and interaction.friction:
+        numbers["stick_stiffness"] = interaction.slope
+    return numbers
 
 
 def _surface(region: Region, placed: Placed, text: str, row: Row) -> str:

@@ -345,7 +345,7 @@ def _generated(card: Card, scope: Scope, what: str, name: str) -> Index:
 def _listed(card: Card, scope: Scope, what: str, name: str) -> Index:
     """Numbers and names of sets."""
     look = scope.nodes if what == "node" else scope.elements
-    table = card.table(1)
+    table = card.table(None)
     if table is not None and _regular(table.ravel()):
         labels = table.ravel().astype(np.int64)
         found = scope.own.nodes(labels) if what == "node" else scope.own.elements(labels)

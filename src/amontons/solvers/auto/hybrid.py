@@ -11,7 +11,8 @@
     global form, W dear             `CompressedDelassus`, then semismooth Newton without W, then
                                     the Delassus form after all if W fits into memory
     global form, M singular         semismooth Newton with a factor of the whole system;
-                                    on a mesh `ContactMultigrid`; Newton on the natural map
+                                    on a mesh `ContactMultigrid`; Newton on the natural map;
+                                    proximal points (`tethers`)
     Nitsche's method                Newton, then proximal points (`newton.nitsche`)
     large deformations              `NonlinearNewton`
 
@@ -67,6 +68,7 @@ from ..newton.semismooth import SemismoothNewton
 from ..sweeps.gauss_seidel import GaussSeidel
 from .compressed import CompressedDelassus
 from .portfolio import FIRST, JOINTS, Portfolio
+from .tethers import Tethers
 
 MESH = 3_000  # unknowns of a mesh from which multigrid beats a factorisation
 STALLED = 20  # iterates without halving the error after which Auto changes the method
@@ -177,6 +179,8 @@ def _held_by_contact(
         yield from _watched(ContactMultigrid(), problem, begin, target, best)
     natural = replace(whole, function=NaturalMap())
     yield from _watched(natural, problem, best[0], target, best)
+    yield from _watched(Tethers(), problem, begin, target, best)
+    yield from _watched(whole, problem, best[0], target, best)
 
 
 def _is_mesh(problem: FrictionProblem) -> bool:
