@@ -15,7 +15,7 @@ _HOME = {
                     "InvertedCells", "MissingDependency", "NotConverged", "NotWritten",
                     "SingularOperator", "TimeUp", "UnsupportedForm", "UnsupportedLaw"),
     "problem.law": ("CappedCoulomb", "Cohesive", "Compliant", "Coulomb", "Mixed", "Orthotropic",
-                    "Tresca"),
+                    "Tied", "Tresca"),
     "problem.judge.measures": ("Criterion",),
     "linear": ("Direct", "GeometricMultigrid", "Petsc"),
     "problem.friction": ("Form", "FrictionProblem"),

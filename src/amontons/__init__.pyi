@@ -61,7 +61,7 @@ from .problem.judge.measures import Criterion as Criterion
 from .problem.law import (
     CappedCoulomb as CappedCoulomb, Cohesive as Cohesive, Compliant as Compliant,
     Coulomb as Coulomb, Mixed as Mixed,
-    Orthotropic as Orthotropic, Tresca as Tresca,
+    Orthotropic as Orthotropic, Tied as Tied, Tresca as Tresca,
 )
 from .problem.solution import (
     ContactStatus as ContactStatus, Convergence as Convergence,

@@ -51,11 +51,12 @@ def classify(
 
     margin is the distance to the nearest change of status, in the unit of r_N: rho u_N for an
     open contact, the smaller of r_N and the slack of the friction bound for a sticking one, the
-    smaller of r_N and rho |u_T| for a slipping one; r_N counts from its largest tension.
+    smaller of r_N and rho |u_T| for a slipping one; r_N counts from its largest tension.  Ties,
+    which have no other status, have infinite ones.
     """
     closed, sliding = problem.law.regions(r, u, problem.rho)
     closed = closed & (
-        r[:, 0] + problem.law.cohesion > 0
+        (r[:, 0] + problem.law.cohesion > 0) | problem.law.tied
     )  # of an unconverged state: without force there is no contact
     status = np.where(
         closed, np.where(sliding, ContactStatus.SLIP, ContactStatus.STICK), ContactStatus.OPEN
@@ -72,6 +73,7 @@ def margins(
     slide = problem.rho * np.linalg.norm(u[:, 1:], axis=1)
     stick = status == ContactStatus.STICK
     closed = np.minimum(pressure, np.where(stick, slack, slide))
+    closed = np.where(problem.law.tied, np.inf, closed)
     return np.maximum(
         np.where(status == ContactStatus.OPEN, problem.rho * u[:, 0], closed), 0.0
     )

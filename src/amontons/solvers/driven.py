@@ -53,5 +53,6 @@ def sliding_rho(rho: Array, driven: Mask, bound: Array, u: Array) -> Array:
     driven (nc,): contacts with a driven tangent; bound (nc,): of their friction; u (nc, d).
     """
     speed = np.linalg.norm(u[:, 1:], axis=1)
+    bound = np.where(np.isfinite(bound), bound, 0.0)  # tied contacts do not slide
     least = OUTSIDE * bound / np.where(speed > 0, speed, 1.0)
     return np.where(driven & (speed > 0), np.maximum(rho, least), rho)

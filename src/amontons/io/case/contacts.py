@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from ...mechanics.meshes import Mesh
     from ...mechanics.model import Contact
 
-LAWS = "a table, { coulomb = COEFFICIENT } or { tresca = STRESS }"
+LAWS = "a table, { coulomb = COEFFICIENT } or { tresca = STRESS }, or 'tied'"
 NUMBERS = {"coulomb": "mu", "tresca": "tresca", "cap": "cap", "cohesion": "cohesion",
            "stiffness": "stiffness", "stick_stiffness": "stick_stiffness"}  # fmt: skip
 POSITIVE = ("stiffness", "stick_stiffness")
@@ -33,8 +33,7 @@ def read_contact(table: Table, mesh: Mesh) -> Contact:
                 mesh.surface(table.text(key))
     if ("obstacle" in table.data) == ("master" in table.data):
         raise table.error("", "expected either obstacle or master")
-    friction = table.as_table("friction", table.need("friction", LAWS), LAWS)
-    numbers = _friction(friction)
+    numbers = _friction(table)
     found = configuration(table)  # older words for kinematics
     if "kinematics" in table.data:
         found["kinematics"] = table.choice("kinematics", ("small", "finite"))
@@ -46,15 +45,34 @@ def read_contact(table: Table, mesh: Mesh) -> Contact:
         return Contact(slave, obstacle, **numbers, method=method, **found)
 
 
-def _friction(table: Table) -> dict[str, Any]:
+def _friction(contact: Table) -> dict[str, Any]:
     """The numbers of a law by the names that `Contact` has for them."""
-    table.only(*NUMBERS, "direction")
+    given = contact.need("friction", LAWS)
+    if given == "tied":
+        return {"tied": True}
+    table = contact.as_table("friction", given, LAWS)
+    table.only(*NUMBERS, "direction", "tied")
+    if "tied" in table.data:
+        return _tied(table)
     if ("coulomb" in table.data) == ("tresca" in table.data):
         raise table.error("", "expected either coulomb, a coefficient, or tresca, a stress")
     if "cap" in table.data and "tresca" in table.data:
         raise table.error("cap", "a largest shear stress goes with coulomb; tresca is one")
     numbers = _orthotropic(table)
-    done = {"coulomb", "direction"} if numbers else set()
+    return numbers | _scalars(table, {"coulomb", "direction"} if numbers else set())
+
+
+def _tied(table: Table) -> dict[str, Any]:
+    """Bonds, maybe elastic ones: { tied = true, stiffness = … }."""
+    table.only("tied", *POSITIVE)
+    if table.data["tied"] is not True:
+        raise table.error("tied", "expected true; without the key contact is unilateral")
+    return {"tied": True} | _scalars(table, {"tied"})
+
+
+def _scalars(table: Table, done: set[str]) -> dict[str, Any]:
+    """The numbers that are a number or an expression, but for the keys that are done."""
+    numbers: dict[str, Any] = {}
     for key in (key for key in table.data if key not in done):
         value = numbers[NUMBERS[key]] = _steady(table, key)
         if isinstance(value, float) and value < 0:

@@ -217,7 +217,10 @@ def discretise(
         load = (load - K @ prescribed)[free]
     return Discretisation(
         offsets, K, free, fixed, prescribed, M=M, H=H, load=load,
-        gap=np.concatenate([p.rows.gap for p in placed]),
+        gap=np.concatenate([
+            np.zeros_like(p.rows.gap) if contact.tied else p.rows.gap
+            for contact, p in zip(contacts, placed, strict=True)
+        ]),
         carried=_local(whole_H, abs(whole_H), prescribed, d),
         placed=placed,
         parts=[

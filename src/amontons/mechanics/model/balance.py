@@ -104,16 +104,18 @@ def _escape(local: Array, power: Array, law: Law, size: float) -> Array | None:
         u = np.concatenate([u[:, :1], np.einsum("cij,cjk->cik", law.stretch, u[:, 1:])], axis=1)
     coulomb, parameters = law.kind == COULOMB, law.parameters
     slack = sparse.diags_array(np.where(coulomb, parameters[:, MU], 0.0))
-    lost = np.where(coulomb, 0.0, parameters[:, BOUND]) / size
+    lost = np.where(coulomb | law.tied, 0.0, parameters[:, BOUND]) / size
     # unknowns: motion = a - b with a, b >= 0 as its size is minimised, and t >= |u_T|
     rows = [sparse.hstack([_both(-u[:, 0]), slack])]  # mu t <= u_N
     for side in sides:
         along = np.einsum("c,ick->ik", side, u[:, 1:])
         rows.append(sparse.hstack([_both(along), -sparse.eye_array(nc)]))
+    ties = np.flatnonzero(law.tied)  # do not move at all: their t is 0 too
+    rows.append(sparse.hstack([_both(u[ties, 0]), sparse.csr_array((len(ties), nc))]))
     rows.append(sparse.csr_array(np.concatenate([-power, power, lost])[None]))
-    right = np.append(np.zeros((1 + len(sides)) * nc), -1.0)
+    right = np.append(np.zeros((1 + len(sides)) * nc + len(ties)), -1.0)
     cost = np.concatenate([np.ones(2 * k), np.zeros(nc)])
-    bounds = [(0, 1 / WORKS)] * (2 * k) + [(0, None)] * nc
+    bounds = [(0, 1 / WORKS)] * (2 * k) + [(0, 0 if tied else None) for tied in law.tied]
     matrix = sparse.vstack(rows, format="csc")
     result = linprog(cost, matrix, right, bounds=bounds, method="highs-ipm")
     return result.x[:k] - result.x[k : 2 * k] if result.status == 0 else None

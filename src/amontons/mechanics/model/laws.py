@@ -17,19 +17,21 @@ from ...problem.law import (
     Kind,
     Law,
     Orthotropic,
+    Tied,
     Tresca,
     joined,
 )
 from ...problem.law.law import BOUND, MU
 from .assembly import Discretisation
-from .parts import Contact
+from .parts import BONDS, Contact
 from .placing import Placed
 from .values import scalar_at
 
 Array = NDArray[np.float64]
 TOUCHING = 1e-6  # gap, relative to the size of a node's area, up to which both sides touch
 
-SPRINGS = ("stiffness", "stick_stiffness")
+APART = 0.5  # the same, up to which sides may be tied
+SPRINGS = BONDS
 CHANGES = {"mu_across": "orthotropic friction"} | dict.fromkeys(
     SPRINGS, "compliance of contact"
 )  # numbers of laws that are changes of variables of u
@@ -53,6 +55,11 @@ def check_law(k: int, contact: Contact, dimension: int, *, large: bool) -> None:
             "cohesion needs small strains and contact in the reference configuration",
             ("contacts", k, "cohesion"), where,
         )  # fmt: skip
+    if large and contact.tied:
+        raise UnsupportedLaw(
+            "ties need small strains and contact in the reference configuration",
+            ("contacts", k, "tied"), where,
+        )  # fmt: skip
     if not (large or contact.nitsche is not None):
         return
     for name, what in CHANGES.items():
@@ -75,7 +82,7 @@ def law_of(contacts: Sequence[Contact], parts: Discretisation) -> Law:
 def rubs(law: Law) -> NDArray[np.bool_]:
     """Contacts with friction, (nc,)."""
     mu, bound = law.parameters[:, MU], law.parameters[:, BOUND]
-    return ((mu > 0) | (law.kind == Kind.TRESCA)) & (bound > 0)
+    return ((mu > 0) | (law.kind == Kind.TRESCA) | law.tied) & (bound > 0)
 
 
 def _law(contact: Contact, placed: Placed) -> Law:
@@ -85,8 +92,10 @@ def _law(contact: Contact, placed: Placed) -> Law:
         for name in contact.numbers
     }
     weights = placed.rows.weights
-    if "tresca" in values:
-        law: Law = Tresca(values["tresca"] * weights)
+    if contact.tied:
+        law: Law = _tied(contact, placed)
+    elif "tresca" in values:
+        law = Tresca(values["tresca"] * weights)
     elif "cap" in values:
         law = CappedCoulomb(values["mu"], values["cap"] * weights)
     elif "mu_across" in values:
@@ -106,6 +115,19 @@ def _law(contact: Contact, placed: Placed) -> Law:
     return Compliant(
         law, *(1 / (values[name] * weights) if name in values else rigid for name in SPRINGS)
     )
+
+
+def _tied(contact: Contact, placed: Placed) -> Tied:
+    """Ties of sides that are not too far apart to be meant."""
+    gap, weights = placed.rows.gap, placed.rows.weights
+    far = np.abs(gap) > APART * weights ** (1 / (placed.rows.points.shape[1] - 1))
+    for i in np.flatnonzero(far)[:1]:
+        raise InvalidInput(
+            f"contact on {contact.slave!r}: {int(far.sum())} of its points are farther from "
+            f"the other side than half of their facets are long, the first {gap[i]:.3g} at "
+            f"{placed.rows.points[i].tolist()}; leave out by where= what is not to be tied"
+        )
+    return Tied(len(gap))
 
 
 def _angle(contact: Contact, placed: Placed) -> Array:

@@ -296,9 +296,10 @@ class Model:
         self._loose_but_held(self.discretisation, self.law)
 
     def with_mu(self, mu: ScalarValue) -> Model:
-        """The same model with Coulomb friction mu in all its contacts."""
+        """The same model with Coulomb friction mu in all contacts that are not tied."""
         return self._variant(
             contacts=tuple(
+                c if c.tied else
                 replace(c, mu=mu, tresca=None, mu_across=None, direction=None, angle=None)
                 for c in self.contacts
             )

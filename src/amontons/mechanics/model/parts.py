@@ -22,6 +22,7 @@ from ...problem.law import (
     Coulomb,
     Law,
     Orthotropic,
+    Tied,
     Tresca,
 )
 from ..contact import Nitsche, Obstacle
@@ -34,6 +35,7 @@ from .values import ScalarValue, VectorValue, check_scalar, check_vector
 
 Array = NDArray[np.float64]
 Material = LinearElastic | NeoHookean | CiarletGeymonat
+BONDS = ("stiffness", "stick_stiffness")  # numbers of a law that ties have too
 METHODS = ("nodal", "mortar", "nitsche")  # "dual-mortar" is another name of the second
 REFERENCE, CURRENT = CONFIGURATIONS = ("reference", "current")
 SMALL, FINITE = KINEMATICS = ("small", "finite")
@@ -194,6 +196,8 @@ class Contact:
     stiffness, stick_stiffness: contact that gives way (`problem.law.compliant`), pressure over
     overclosure and shear traction over elastic slip, stress / length, > 0; by default rigid.
     As a value Compliant(law, compliance, stick_compliance), which are their inverses.
+    tied: the sides neither part nor slip (`problem.law.tied`), and keep the distance that they
+    have in the undeformed state; with a stiffness an elastic bond.  As a value law=Tied().
     mu_across: orthotropic friction (`problem.law.orthotropic`), mu along `direction`, a vector
     in global axes seen in the tangent plane of each contact, mu_across across it; in 3D.
     where: a function of points (n, dim) -> (n,) bool that tells which slave nodes take part.
@@ -216,6 +220,7 @@ class Contact:
     law: InitVar[Law | None] = None
     mu_across: ScalarValue | None = None
     direction: Sequence[float] | None = None
+    tied: bool = False
     stiffness: ScalarValue | None = None
     stick_stiffness: ScalarValue | None = None
     angle: ScalarValue | None = None  # of the direction, from t1 to t2 of the contact frame
@@ -224,10 +229,7 @@ class Contact:
         self._check_kinematics(configuration)
         if law is not None:
             self._take(law)
-        if (self.mu is None) == (self.tresca is None):
-            raise InvalidInput(
-                f"contact on {self.slave!r}: expected either mu or tresca (mu=0: no friction)"
-            )
+        self._check_law()
         if (self.obstacle is None) == (self.master is None):
             raise InvalidInput(
                 f"contact on {self.slave!r}: expected either an obstacle or a master surface"
@@ -236,8 +238,6 @@ class Contact:
             raise InvalidInput(f"method: expected a text, got {shown(self.method)}")
         if self.method is None:
             object.__setattr__(self, "method", "nodal" if self.master is None else "mortar")
-        if self.cap is not None and self.mu is None:
-            raise InvalidInput(f"contact on {self.slave!r}: cap goes with mu, not with tresca")
         self._check_directions()
         for name, value in self.numbers.items():
             check_scalar(value, f"{name} on {self.slave!r}")
@@ -260,6 +260,21 @@ class Contact:
             raise InvalidInput(
                 f"obstacle: expected a Plane, Sphere or LevelSet, got {self.obstacle!r}"
             )
+
+    def _check_law(self) -> None:
+        where = f"contact on {self.slave!r}"
+        if not isinstance(self.tied, bool):
+            raise InvalidInput(f"{where}: tied: expected True or False, got {shown(self.tied)}")
+        if self.tied:
+            rubs = [name for name in self.numbers if name not in BONDS]
+            if rubs:
+                raise InvalidInput(
+                    f"{where}: tied sides have no friction; expected no {rubs[0]}"
+                )
+        elif (self.mu is None) == (self.tresca is None):
+            raise InvalidInput(f"{where}: expected either mu or tresca (mu=0: no friction)")
+        if self.cap is not None and self.mu is None:
+            raise InvalidInput(f"{where}: cap goes with mu, not with tresca")
 
     def _check_directions(self) -> None:
         given = (self.direction is not None) + (self.angle is not None)
@@ -315,10 +330,11 @@ class Contact:
 
     def _take(self, law: Law) -> None:
         """Set the numbers of a law; raises InvalidInput for one that has no such numbers."""
-        if self.numbers:
+        if self.numbers or self.tied:
             raise InvalidInput(
                 f"contact on {self.slave!r}: expected law or its numbers, got both"
             )
+        object.__setattr__(self, "tied", bool(law.tied.all() and len(law)))
         for name, value in _numbers_of(law).items():
             one = len(value) == 1
             object.__setattr__(self, name, float(value[0]) if one else value)
@@ -330,6 +346,8 @@ def _numbers_of(law: Law) -> dict[str, Array]:
         return _numbers_of(law.law) | _stiffnesses(law)
     if isinstance(law, Cohesive):
         return _numbers_of(law.law) | {"cohesion": law.cohesion}
+    if isinstance(law, Tied):
+        return {}
     if isinstance(law, Coulomb):
         return {"mu": law.mu}
     if isinstance(law, Tresca):
@@ -339,8 +357,8 @@ def _numbers_of(law: Law) -> dict[str, Array]:
     if isinstance(law, Orthotropic):
         return {"mu": law.mu1, "mu_across": law.mu2, "angle": law.angle}
     raise InvalidInput(
-        "law: expected Coulomb, Tresca, CappedCoulomb or Orthotropic, with or without cohesion "
-        f"and compliance, got {shown(law)}"
+        "law: expected Coulomb, Tresca, CappedCoulomb, Orthotropic or Tied, with or without "
+        f"cohesion and compliance, got {shown(law)}"
     )
 
 

@@ -155,7 +155,7 @@ class MovingModel:
         gap = parts.gap + self._local(q0)[:, 0]
         near = self.closed + method.reach
         closing = gap + method.prediction * h * u0[:, 0] <= near
-        active = np.flatnonzero(closing | self.springs.presses)
+        active = np.flatnonzero(closing | self.springs.presses | self.law.tied)
         before, after = self.motion.prescribed(state.time), self.motion.prescribed(time)
         held = (after - before) / h
         force = theta * self.motion.load(time) + (1 - theta) * self.motion.load(state.time)
@@ -168,7 +168,9 @@ class MovingModel:
         start = Iterate(h * state.force[active])
         local = self._local_problem if self._condenses else None
         springs, pulled = self.springs.at(active), state.force[active]
-        shifts = _Shifts.of(u0[active], gap[active], method, springs, pulled)
+        shifts = _Shifts.of(
+            u0[active], gap[active], method, springs, pulled, self.law.tied[active]
+        )
         while True:
             solution = solve(self._problem(active, f, carried + shifts.values), start, local)
             v1 = parts.spread(_velocity(solution), held)
@@ -261,8 +263,8 @@ class _Shifts:
 
     before (k, d): u0; opening (k,): gap over h, of open contacts; theta; restitution: that of
     contacts with the law on u1; on_mean (k,): those with the law on u_theta; springs: contacts
-    that give way, gap (k,) and pulled (k, d), forces at first, over theta h; tries: how often
-    restitution was made smaller.
+    that give way, gap (k,) and pulled (k, d), forces at first, over theta h; tied (k,);
+    tries: how often restitution was made smaller.
     """
 
     before: Array
@@ -273,18 +275,20 @@ class _Shifts:
     springs: Springs
     gap: Array
     pulled: Array
+    tied: Mask
     tries: int = 0
 
     @classmethod
     def of(
-        cls, before: Array, gap: Array, method: MoreauJean, springs: Springs, pulled: Array
-    ) -> _Shifts:
+        cls, before: Array, gap: Array, method: MoreauJean, springs: Springs, pulled: Array,
+        tied: Mask,
+    ) -> _Shifts:  # fmt: skip
         """Those of a step that begins with u0 (k, d), gaps (k,) and forces (k, d)."""
         none = np.zeros(len(before), dtype=bool)
         opening = np.maximum(gap, 0) / method.step if method.reach else np.zeros(len(gap))
         end = method.theta * method.step
         return cls(before, opening, method.theta, method.restitution, none, springs, gap / end,
-                   pulled / end)  # fmt: skip
+                   pulled / end, tied)  # fmt: skip
 
     @property
     def values(self) -> Array:
@@ -296,6 +300,7 @@ class _Shifts:
         # gap at the end >= 0: u1 >= -(gap + (1 - theta) h u0) / (theta h)
         is_open = self.opening > 0
         out[is_open, 0] = (self.opening / self.theta + mean[:, 0])[is_open]
+        out[self.tied] = 0.0  # u1 = 0
         return self.springs.shifted(out, mean, self.gap, self.pulled)
 
     def changed(self, r: Array, after: Array, excess: float) -> _Shifts | None:

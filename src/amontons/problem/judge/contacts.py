@@ -15,7 +15,7 @@ from numba import uint64
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
-from ..law.law import BOUND, MU, TRESCA, given
+from ..law.law import BOUND, MU, TIED, TRESCA, given
 from ..law.states import OPEN, SLIP, STICK
 from .measures import EPSILON, PENETRATION, Weakest, contact_residual, hidden_square, ratio
 
@@ -27,8 +27,11 @@ LARGER = 1.0 + 4.0 * EPSILON  # than its bound, more than rounding explains
 def settled_contact(r0, r1, r2, u0, u1, u2, rho, kind, p):  # noqa: PLR0913
     """(status, does the law let it slide?, share of r_N and of r_T that it keeps) of a contact.
 
-    A closed one keeps all, an open one nothing; under Tresca's law the shear up to its bound.
+    A closed or tied one keeps all, an open one nothing; under Tresca's law the shear up to its
+    bound.
     """
+    if kind == TIED:
+        return STICK, False, 1.0, 1.0
     slip = math.sqrt(u1 * u1 + u2 * u2)
     x1, x2 = r1 - rho * u1, r2 - rho * u2
     x, shear = math.sqrt(x1 * x1 + x2 * x2), math.sqrt(r1 * r1 + r2 * r2)
@@ -92,6 +95,8 @@ def assess(  # noqa: PLR0913
             hidden += hidden_square(r0, r1, r2, rho[i], 0.0 if fixed else p[MU])
         elif r0 != 0.0 or r1 != 0.0 or r2 != 0.0:
             size = math.inf
+        elif kind[i] == TIED:
+            size = math.sqrt(u0 * u0 + u1 * u1 + u2 * u2)
         else:
             size = max(-u0, 0.0)
         total += size * size

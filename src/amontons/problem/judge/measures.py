@@ -46,7 +46,7 @@ from numba import uint64
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
-from ..law.law import BOUND, MU, Law, given
+from ..law.law import BOUND, MU, TIED, Law, given
 
 Array = NDArray[np.float64]
 EPSILON = float(np.finfo(float).eps)
@@ -98,7 +98,7 @@ def contact_residual(r0, r1, r2, u0, u1, u2, rho, kind, p):  # noqa: PLR0913
     x2 = r2 - rho * u2
     t = math.sqrt(x1 * x1 + x2 * x2)
     if fixed:
-        p0 = max(x0, 0.0)
+        p0 = x0 if kind == TIED else max(x0, 0.0)
         scale = 1.0 if t <= coefficient else coefficient / t
     elif coefficient * t <= -x0:
         p0, scale = 0.0, 0.0
@@ -128,6 +128,8 @@ def _error_at_rest(q, kind, parameters, rho):
             e0, e1, e2 = contact_residual(
                 0.0, 0.0, 0.0, q[i, 0], q[i, 1], q[i, 2], rho[i], kind[i], parameters[i]
             )
+        elif kind[i] == TIED:
+            e0, e1, e2 = q[i, 0], q[i, 1], q[i, 2]
         scale = PENETRATION if rho[i] > 0.0 else 1.0
         total += max(e0 * e0 + e1 * e1 + e2 * e2, (scale * min(q[i, 0], 0.0)) ** 2)
     return math.sqrt(total) if math.isfinite(total) else math.inf
@@ -156,6 +158,8 @@ def natural_error(indptr, indices, data, q, kind, parameters, rho, r):
                 r[i, 0], r[i, 1], r[i, 2], u0, u1, u2, rho[i], kind[i], parameters[i]
             )
             total += max(e0 * e0 + e1 * e1 + e2 * e2, (PENETRATION * min(u0, 0.0)) ** 2)
+        elif kind[i] == TIED:
+            total += u0 * u0 + u1 * u1 + u2 * u2
         elif u0 < 0.0:
             total += u0 * u0
         if rho[i] <= 0.0 and (r[i, 0] != 0.0 or r[i, 1] != 0.0 or r[i, 2] != 0.0):
@@ -219,6 +223,8 @@ def residual_sizes(r: Array, u: Array, law: Law, rho: Array) -> Array:
     inner = law.at(index).natural_map(r[index], u[index], rho[index]) / rho[index, None]
     size = np.maximum(-law.stretched(u, r)[:, 0], 0.0)
     size[index] = np.maximum(np.linalg.norm(inner, axis=1), PENETRATION * size[index])
+    rigid = (rho <= 0) & law.tied
+    size[rigid] = np.linalg.norm(law.stretched(u, r)[rigid], axis=1)
     size[(rho <= 0) & r.any(axis=1)] = math.inf
     return size
 

@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from ...core.compiled import njit
-from ..law.law import BOUND, MU, given
+from ..law.law import BOUND, MU, TIED, given
 from .measures import EPSILON, PENETRATION, contact_residual
 
 SPLIT = 134217729.0  # 2^27 + 1: halves a double into two numbers of 26 bits
@@ -66,14 +66,17 @@ def sharp_error(indptr, indices, data, q, kind, parameters, rho, r):
         if rho[i] <= 0.0:
             if r[i, 0] != 0.0 or r[i, 1] != 0.0 or r[i, 2] != 0.0:
                 return math.inf, 0.0
-            total += min(u[0], 0.0) ** 2
+            if kind[i] == TIED:
+                total += u[0] ** 2 + u[1] ** 2 + u[2] ** 2
+            else:
+                total += min(u[0], 0.0) ** 2
             continue
         slip = math.sqrt(u[1] ** 2 + u[2] ** 2)
         fixed, p = given(kind[i], parameters[i], r[i, 0]), parameters[i]
         normal = u[0] if fixed else u[0] + p[MU] * slip
         x0, x1, x2 = r[i, 0] - rho[i] * normal, r[i, 1] - rho[i] * u[1], r[i, 2] - rho[i] * u[2]
         bound = p[BOUND] if fixed else p[MU] * x0
-        if x0 > 0.0 and math.sqrt(x1 * x1 + x2 * x2) < bound:
+        if kind[i] == TIED or (x0 > 0.0 and math.sqrt(x1 * x1 + x2 * x2) < bound):
             size = normal * normal + u[1] ** 2 + u[2] ** 2
         else:
             e0, e1, e2 = contact_residual(

@@ -7,7 +7,8 @@ from .coulomb import Coulomb
 from .law import Kind, Law
 from .mixed import Mixed, joined
 from .orthotropic import Orthotropic
+from .tied import Tied
 from .tresca import Tresca
 
 __all__ = ["CappedCoulomb", "Cohesive", "Compliant", "Coulomb", "Kind", "Law", "Mixed",
-           "Orthotropic", "Tresca", "joined"]
+           "Orthotropic", "Tied", "Tresca", "joined"]

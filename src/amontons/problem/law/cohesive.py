@@ -50,6 +50,8 @@ class Cohesive(Changed):
             object.__setattr__(self, "law", self.law.at(np.zeros(len(tension), dtype=int)))
         *_, tension = same_length(law=self.law.parameters[:, 0], cohesion=tension)
         object.__setattr__(self, "tension", tension)
+        if (tension[self.law.tied] > 0).any():
+            raise InvalidInput("cohesion: expected 0 at tied contacts, which bear any tension")
 
     @property
     def name(self) -> str:

@@ -1,8 +1,8 @@
 """What a law of friction is: a kind and parameters per contact, and what is asked of both.
 
 Rows [x_N, x_T] in the local frame, (nc, d), d = 2 or 3; r_N >= 0 is compression, u_N >= 0 open.
-Every law here has the same normal part, 0 <= u_N, 0 <= r_N, one of them zero, and friction that
-opposes the slip within a bound, the multi-valued limit of all of them:
+Every law but TIED has the same normal part, 0 <= u_N, 0 <= r_N, one of them zero, and friction
+that opposes the slip within a bound, the multi-valued limit of all of them:
 
     |r_T| <= g(r_N),    r_T = -g(r_N) u_T / |u_T|  where u_T != 0
 
@@ -10,6 +10,7 @@ opposes the slip within a bound, the multi-valued limit of all of them:
     COULOMB   mu r_N               mu, infinity
     TRESCA    tau                  0, tau        also where r_N = 0
     CAPPED    min(mu r_N, tau)     mu, tau
+    TIED      infinite             0, infinity   u = 0 and r free
 
 At a given r_N a capped contact is one of the other two, so `given` tells all that kernels need:
 whether the bound is the second parameter or the first times r_N.  Contacts of several kinds may
@@ -46,15 +47,16 @@ class Kind(IntEnum):
     COULOMB = 0
     TRESCA = 1
     CAPPED = 2
+    TIED = 3
 
 
-COULOMB, TRESCA, CAPPED = (int(kind) for kind in Kind)
+COULOMB, TRESCA, CAPPED, TIED = (int(kind) for kind in Kind)
 
 
 @njit(cache=True, error_model="numpy", inline="always")
 def given(kind, p, r0):
     """Whether friction at r_N = r0 is bounded by the number p[BOUND], and not by p[MU] r_N."""
-    return kind == TRESCA or (kind == CAPPED and p[MU] * r0 > p[BOUND])
+    return kind == TRESCA or kind == TIED or (kind == CAPPED and p[MU] * r0 > p[BOUND])
 
 
 class Law:
@@ -71,7 +73,13 @@ class Law:
     def given(self, r: Array) -> Mask:
         """Contacts whose bound at r is a number, and not proportional to r_N; (nc,)."""
         mu, bound = self.parameters.T
-        return (self.kind == TRESCA) | ((self.kind == CAPPED) & (mu * r[:, 0] > bound))
+        capped = (self.kind == CAPPED) & (mu * r[:, 0] > bound)
+        return (self.kind == TRESCA) | self.tied | capped
+
+    @cached_property
+    def tied(self) -> Mask:
+        """Contacts that neither part nor slip, (nc,)."""
+        return self.kind == TIED
 
     def bound(self, r: Array) -> Array:
         """Largest |r_T| allowed at r, shape (nc,)."""
@@ -84,7 +92,8 @@ class Law:
 
     def excess(self, r: Array) -> Array:
         """What |r_T| is above its bound, or tension, whichever is more; (nc,), unit of r."""
-        return np.maximum(np.linalg.norm(r[:, 1:], axis=1) - self.bound(r), -r[:, 0])
+        shear = np.linalg.norm(r[:, 1:], axis=1) - self.bound(r)
+        return np.where(self.tied, 0.0, np.maximum(shear, -r[:, 0]))
 
     def natural_map(self, r: Array, u: Array, rho: Array) -> Array:
         """Residual of the law, (nc, d), unit of r; zero exactly at a solution."""
@@ -101,13 +110,16 @@ class Law:
         return closed, sliding & (closed | (self.kind == TRESCA))
 
     def _regimes(self, r: Array) -> list[tuple[Law, Mask]]:
-        """Coulomb's and Tresca's law for the contacts that have them at r."""
+        """Coulomb's and Tresca's law, and ties, for the contacts that have them at r."""
         from .coulomb import Coulomb
+        from .tied import Tied
         from .tresca import Tresca
 
-        fixed = self.given(r)
-        pairs = ((Coulomb, MU, ~fixed), (Tresca, BOUND, fixed))
-        return [(law(self.parameters[own, k]), own) for law, k, own in pairs if own.any()]
+        fixed, tied = self.given(r), self.tied
+        pairs = ((Coulomb, MU, ~fixed), (Tresca, BOUND, fixed & ~tied))
+        found: list[tuple[Law, Mask]] = []
+        found += [(law(self.parameters[own, k]), own) for law, k, own in pairs if own.any()]
+        return [*found, (Tied(int(tied.sum())), tied)] if tied.any() else found
 
     def augmented_reaction(self, x: Array) -> Array:
         """(x_N^+, projection of x_T onto the disk that the law allows at x_N^+), (nc, d).
@@ -115,7 +127,7 @@ class Law:
         Alart and Curnier's form: r obeys the law with u where r = this of x = r - rho u,
         whatever rho > 0.
         """
-        normal = np.maximum(x[:, 0], 0.0)
+        normal = np.where(self.tied, x[:, 0], np.maximum(x[:, 0], 0.0))
         return np.column_stack([normal, project_disk(x[:, 1:], self.bound(x))])
 
     def augmented_reaction_jacobian(self, x: Array) -> Array:
@@ -127,7 +139,7 @@ class Law:
         in_t, in_radius = project_disk_jacobian(x[:, 1:], radius)
         in_t[radius == 0] = 0.0
         out = np.zeros((*x.shape, x.shape[1]))
-        out[:, 0, 0] = x[:, 0] > 0
+        out[:, 0, 0] = (x[:, 0] > 0) | self.tied
         out[:, 1:, 1:] = in_t
         out[:, 1:, 0] = in_radius * self.bound_slope(x)[:, None]
         return out
@@ -189,8 +201,8 @@ class Law:
         if self.stretch is not None:  # both coefficients, both half axes
             mu, bound = (np.linalg.eigvalsh(self.stretch) * p[:, None] for p in (mu, bound))
         table = {
-            "friction coefficient": mu[self.kind != TRESCA].ravel(),
-            "friction bound": bound[self.kind != COULOMB].ravel(),
+            "friction coefficient": mu[(self.kind != TRESCA) & ~self.tied].ravel(),
+            "friction bound": bound[(self.kind != COULOMB) & ~self.tied].ravel(),
             "cohesion": self.cohesion[self.cohesion > 0],
         }
         if self.give is not None:

@@ -16,6 +16,7 @@ from .cohesive import Cohesive
 from .compliant import Compliant
 from .coulomb import Coulomb
 from .law import BOUND, MU, Array, Kind, Kinds, Law
+from .tied import Tied
 from .tresca import Tresca
 
 
@@ -69,4 +70,6 @@ def of_kinds(kind: Kinds, parameters: Array) -> Law:
         return Tresca(bound)
     if (kind == Kind.CAPPED).all():
         return CappedCoulomb(mu, bound)
+    if (kind == Kind.TIED).all():
+        return Tied(len(kind))
     return Mixed(read_only(np.array(kind)), read_only(np.array(parameters)))

@@ -8,8 +8,9 @@ from numpy.typing import ArrayLike
 from ...core.compiled import njit
 from .capped import solve_capped
 from .coulomb import Coulomb
-from .law import BOUND, COULOMB, MU, TRESCA, Array, Law
+from .law import BOUND, COULOMB, MU, TIED, TRESCA, Array, Law
 from .one_contact import solve_coulomb, solve_tresca
+from .tied import solve_tied
 
 
 @njit(cache=True, error_model="numpy")
@@ -19,6 +20,8 @@ def solve_contact(A, b0, b1, b2, kind, p, g1, g2):  # noqa: PLR0913
         return solve_coulomb(A, b0, b1, b2, p[MU], g1, g2)
     if kind == TRESCA:
         return solve_tresca(A, b0, b1, b2, p[BOUND], g1, g2)
+    if kind == TIED:
+        return solve_tied(A, b0, b1, b2)
     return solve_capped(A, b0, b1, b2, p[MU], p[BOUND], g1, g2)
 
 

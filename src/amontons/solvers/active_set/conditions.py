@@ -132,6 +132,7 @@ class Settings:
     c_tangential: Array
     modification: Modification
     function: FrictionFunction = FrictionFunction.PRODUCT
+    tied: Mask | bool = False  # contacts that are closed and stick, whatever r and u
 
     def sliding(self, lam: Array, u: Array, g: Array, k: Index) -> Robin:
         """The conditions of the contacts k; lam, u, g: of all."""
@@ -146,7 +147,7 @@ def conditions(r: Array, u: Array, g: Array, first: bool, settings: Settings) ->
 
     first: no bound is known yet, so all contacts stick, as after zero initial values.
     """
-    normal = r[:, 0] - settings.c_normal * u[:, 0] > 0  # (4.1)
+    normal = (r[:, 0] - settings.c_normal * u[:, 0] > 0) | settings.tied  # (4.1)
     lam, slip = -r[:, 1:], u[:, 1:]
     s = lam + settings.c_tangential[:, None] * slip
     tangential = np.linalg.norm(s, axis=1) > g  # (3.4)
@@ -167,7 +168,7 @@ def newton_conditions(r: Array, u: Array, law: Law, settings: Settings) -> Condi
     With its slope mu of Coulomb's law, 0 at a cap; not for bounds of open contacts.
     """
     pressure = r[:, 0] - settings.c_normal * u[:, 0]
-    normal, pressed = pressure > 0, pressure[:, None]
+    normal, pressed = (pressure > 0) | settings.tied, pressure[:, None]
     lam, slip, g, mu = -r[:, 1:], u[:, 1:], law.bound(pressed), law.bound_slope(pressed)
     moving = mu * np.maximum(pressure, 0)  # the part of g that moves with r_N: all or nothing
     s = lam + settings.c_tangential[:, None] * slip

@@ -215,7 +215,9 @@ class ActiveSet:
             given.append(
                 np.where(own > 0, own, usual) if option is None else np.full(len(own), option)
             )
-        return Settings(given[0], given[1], self.modification, self.function)
+        return Settings(
+            given[0], given[1], self.modification, self.function, problem.law.tied
+        )
 
     def _system(self, problem: FrictionProblem) -> System:
         if self.multigrid is None:

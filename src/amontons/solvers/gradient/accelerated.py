@@ -48,7 +48,7 @@ from ...core.options import check_options
 from ...problem.friction import Form, FrictionProblem
 from ...problem.law import Law
 from ...problem.law.cones import with_de_saxce
-from ...problem.law.law import BOUND, MU, given
+from ...problem.law.law import BOUND, MU, TIED, given
 from ..contract import Iterate, Target, check_at_least, check_positive
 from .motion import in_identity, in_stiffness
 
@@ -140,7 +140,7 @@ def projected_step(r, alpha, ahead, u, kind, parameters):  # noqa: PLR0913
         normal = r[i, 0] - alpha[i] * (ahead[i, 0] + (0.0 if fixed else mu * slip))
         scale = 1.0
         if fixed:
-            normal = max(normal, 0.0)
+            normal = normal if kind[i] == TIED else max(normal, 0.0)
             scale = mu / pull if pull > mu else 1.0
         elif mu * pull <= -normal:
             normal, scale = 0.0, 0.0

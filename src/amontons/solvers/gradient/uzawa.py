@@ -182,7 +182,8 @@ class _Springs:
     def reaction(self, multiplier: Array, u: Array) -> tuple[Array, Array]:
         """p, (nc, d), and B = -dp/du, (nc, d, d)."""
         x = multiplier - self.rho * u
-        normal, closed = np.maximum(x[:, 0], 0), x[:, 0] > 0
+        closed = (x[:, 0] > 0) | self.law.tied
+        normal = np.where(closed, x[:, 0], 0.0)
         radius = self.law.bound(x)
         p = np.column_stack([normal, project_disk(x[:, 1:], radius)])
         in_t, in_radius = project_disk_jacobian(x[:, 1:], radius)

@@ -40,8 +40,9 @@ from ...linear.grid import GridBlocks
 from ...linear.hierarchy import Nodes
 from ...linear.node_blocks import NodeBlocks, row_product
 from ...problem.judge.measures import contact_residual
-from ...problem.law import Law, Tresca
-from ...problem.law.law import BOUND, MU, TRESCA, given
+from ...problem.law import Kind, Law, Tied, Tresca
+from ...problem.law.law import BOUND, MU, TRESCA, columns_of, given
+from ...problem.law.mixed import of_kinds
 from ...problem.law.single import solve_contact
 from ...problem.law.states import OPEN, SLIP, STICK
 from ...problem.one_sided import HELD, OneSided
@@ -157,10 +158,12 @@ class ContactNodes:
         x[self.node] = before + np.einsum("kab,kb->ka", V, moved)
 
     def frozen(self) -> ContactNodes:
-        """The same states under Tresca's law with the present bounds."""
-        if isinstance(self.law, Tresca):
+        """The same states under Tresca's law with the present bounds; ties as they are."""
+        if isinstance(self.law, Tresca | Tied):
             return self
-        out = replace(self, law=Tresca(self.law.bound(self.r)))
+        kind = np.where(self.law.tied, Kind.TIED, Kind.TRESCA).astype(np.int8)
+        law = of_kinds(kind, columns_of(0.0, self.law.bound(self.r), len(kind)))
+        out = replace(self, law=law)
         out.r, out.u, out.state = self.r, self.u, self.state
         return out
 
@@ -176,7 +179,7 @@ class ContactNodes:
         E'(a) = a stiffness - force + sum of bound |u_T + a d_T|'; under Tresca's law.
         """
         d = np.einsum("cai,ca->ci", self.H[:, :, 1:], step[self.node])
-        bound = self.law.bound(self.r)
+        bound = np.where(self.law.tied, 0.0, self.law.bound(self.r))
 
         def slope(a: float) -> float:
             u = self.u[:, 1:] + a * d

@@ -40,6 +40,7 @@ from ...problem.law.cones import (
 from ...problem.law.law import MU
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 Linearised = tuple[Array, Array, Array]
 
 
@@ -63,20 +64,22 @@ def columns(rho: Array, d: int) -> Array:
     return rho[:, None] if rho.ndim == 1 else rho[:, [0] + [1] * (d - 1)]
 
 
-def _disk_function(r: Array, u: Array, rho: Array, radius: Array) -> Array:
-    """r - (x_N^+, P_disk(radius)(x_T))."""
+def _disk_function(r: Array, u: Array, rho: Array, radius: Array, tied: Mask) -> Array:
+    """r - (x_N^+, P_disk(radius)(x_T)); of tied contacts r - x."""
     x = r - columns(rho, r.shape[1]) * u
-    return r - np.column_stack([np.maximum(x[:, 0], 0), project_disk(x[:, 1:], radius)])
+    normal = np.where(tied, x[:, 0], np.maximum(x[:, 0], 0))
+    return r - np.column_stack([normal, project_disk(x[:, 1:], radius)])
 
 
 def _disk_linearised(  # noqa: PLR0913
-    r: Array, u: Array, rho: Array, radius: Array, radius_r: Array, radius_u: Array
-) -> Linearised:
+    r: Array, u: Array, rho: Array, radius: Array, radius_r: Array, radius_u: Array,
+    tied: Mask,
+) -> Linearised:  # fmt: skip
     """`_disk_function` with the derivatives of the radius in r_N and u_N, (nc,)."""
     d = r.shape[1]
     each = columns(rho, d)
     x = r - each * u
-    closed = (x[:, 0] > 0).astype(float)
+    closed = ((x[:, 0] > 0) | tied).astype(float)
     in_t, in_radius = project_disk_jacobian(x[:, 1:], radius)
     in_t[radius == 0] = 0  # the disk is a point: exact, and regular also at x_T = 0
     A = np.zeros((len(r), d, d))
@@ -87,7 +90,7 @@ def _disk_linearised(  # noqa: PLR0913
     B[:, 1:, 1:] = each[:, -1, None, None] * in_t
     A[:, 1:, 0] = -in_radius * radius_r[:, None]
     B[:, 1:, 0] = -in_radius * radius_u[:, None]
-    return _disk_function(r, u, rho, radius), A, B
+    return _disk_function(r, u, rho, radius, tied), A, B
 
 
 def one_per_contact(rho: Array) -> Array:
@@ -106,11 +109,11 @@ class AlartCurnier:
 
     def residual(self, r: Array, u: Array, law: Law, rho: Array) -> Array:
         """F, (nc, d), unit of r."""
-        return _disk_function(r, u, rho, self._radius(r, u, law, rho)[0])
+        return _disk_function(r, u, rho, self._radius(r, u, law, rho)[0], law.tied)
 
     def linearise(self, r: Array, u: Array, law: Law, rho: Array) -> Linearised:
         """(F, A, B) at (r, u)."""
-        return _disk_linearised(r, u, rho, *self._radius(r, u, law, rho))
+        return _disk_linearised(r, u, rho, *self._radius(r, u, law, rho), law.tied)
 
     def _radius(self, r: Array, u: Array, law: Law, rho: Array) -> tuple[Array, Array, Array]:
         normal = columns(rho, 2)[:, 0]
@@ -130,13 +133,14 @@ class JeanMoreau:
 
     def residual(self, r: Array, u: Array, law: Law, rho: Array) -> Array:
         """F, (nc, d), unit of r."""
-        return _disk_function(r, u, rho, law.bound(r))
+        return _disk_function(r, u, rho, law.bound(r), law.tied)
 
     def linearise(self, r: Array, u: Array, law: Law, rho: Array) -> Linearised:
         """(F, A, B) at (r, u)."""
         touching = (r[:, 0] == 0) & ~law.given(r)
         slope = np.where(touching, law.parameters[:, MU], law.bound_slope(r))
-        return _disk_linearised(r, u, rho, law.bound(r), slope, np.zeros(len(r)))
+        none = np.zeros(len(r))
+        return _disk_linearised(r, u, rho, law.bound(r), slope, none, law.tied)
 
 
 @dataclass(frozen=True)
