@@ -52,9 +52,11 @@ def _of_plain(judged: Callable[..., Any]) -> Callable[..., Any]:
     @wraps(judged)
     def asked(self: Equations, r: Array, *more: Any, **named: Any) -> Any:
         plain = self.plain
+        if plain is self:
+            return judged(self, r, *more, **named)
         if plain.has_v is not self.has_v:  # of r alone: a compliance needs the Delassus form
             more, named = (), {}
-        return judged(plain, r if plain is self else self.law.pressed(r), *more, **named)
+        return judged(plain, self.law.pressed(r), *more, **named)
 
     return asked
 
@@ -184,7 +186,7 @@ class Equations(Problem):
         if v is not None:
             self._check_motion(v)
         if self.measure is Measure.EXACT:
-            error = self.condensed().exact_error(r)
+            error = self.condensed()._exact_error(r)
             return error if v is None else max(error, self.imbalance(r, v))
         if v is None:
             try:
@@ -302,6 +304,9 @@ class Equations(Problem):
     @_of_plain
     def exact_error(self, r: Array) -> float:
         """The exact measure of the Delassus form."""
+        return self._exact_error(r)
+
+    def _exact_error(self, r: Array) -> float:
         rows = kernel_rows(r)
         size = self.q_norm
         if size == 0:

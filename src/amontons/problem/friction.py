@@ -242,9 +242,13 @@ class FrictionProblem(Equations):
             return FrictionProblem._from_blocks(W, self.free_velocity, self.law)
         return FrictionProblem.from_delassus(W, self.free_velocity, self.law)
 
-    @cached_property
-    def plain(self) -> FrictionProblem:  # type: ignore[override]  # made once
+    @property
+    def plain(self) -> FrictionProblem:
         """The problem of the plain law in other variables, see `plain_of`; else itself."""
+        return self if self.law.plain is self.law else self._plain
+
+    @cached_property
+    def _plain(self) -> FrictionProblem:
         return plain_of(self)
 
     def restricted(self, contacts: NDArray[np.int64]) -> FrictionProblem:
