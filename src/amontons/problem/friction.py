@@ -186,6 +186,12 @@ class FrictionProblem(Equations):
         expect_shape("q", q.shape, (self.contacts, self.dimension))
         return replace(self, q=q, blur=None)
 
+    def with_hierarchy(self, hierarchy: Hierarchy) -> FrictionProblem:
+        """The same problem with multigrid levels of one's own for M (global form)."""
+        problem = self.fresh()
+        problem.matrices.put_hierarchy(hierarchy)
+        return problem
+
     def assembled(self) -> FrictionProblem:
         """The same problem with M as a stored matrix, for solvers that need its entries.
 
