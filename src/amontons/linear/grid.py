@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,9 @@ from numpy.typing import NDArray
 from ..core.compiled import njit
 from .node_blocks import NodeBlocks, block_inverse
 from .work import Work
+
+if TYPE_CHECKING:
+    from .transfer import Transfer
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -36,6 +40,7 @@ class GridBlocks:
 
     cells: tuple[int, int, int]
     element: Array
+    is_stored: ClassVar[bool] = False
     used: NDArray[np.uint8]
     stencils: Array = field(init=False)
     inverses: Array = field(init=False)
@@ -150,21 +155,19 @@ class GridBlocks:
         inverse = block_inverse(data[own], size)
         return NodeBlocks(indptr.astype(np.int32), indices.astype(np.int32), data, inverse)
 
-    def entries(self, node: Index) -> tuple[Index, Index, NDArray[np.int32], Array]:
-        """Rows of some nodes (k,): first and last entry of each, columns, blocks."""
-        rows = self.rows(node)
-        ends = rows.indptr.astype(np.int64)
-        return ends[:-1], ends[1:], rows.indices, rows.data
-
-    def inverse_at(self, node: Index) -> Array:
-        """Inverses of the diagonal blocks of some nodes, (k, 3, 3)."""
-        return self.rows(node).inverse
-
-    def coarse(self, used: NDArray[np.uint8]) -> NodeBlocks:
+    def coarse(self, P: Transfer) -> NodeBlocks:
         """The matrix on the grid of half as many cells: that of cells of twice the size."""
         cells = tuple(n // 2 for n in self.cells)
-        grid = GridBlocks(cells, 2.0 * self.element, used)  # type: ignore[arg-type]
-        return grid.rows(np.arange(grid.nodes))
+        return GridBlocks(cells, 2.0 * self.element, P.coarse_used).stored()  # type: ignore[arg-type]
+
+    def stored(self) -> NodeBlocks:
+        """The whole matrix: 27 blocks a node."""
+        return self.rows(np.arange(self.nodes))
+
+    @property
+    def is_positive(self) -> bool:
+        """True where a node has a stiffness in all directions."""
+        return bool((np.einsum("zyxaa->zyxa", self.stencils[:, :, :, 1, 1, 1]) > 0).all())
 
 
 def _stencils(element: Array) -> Array:

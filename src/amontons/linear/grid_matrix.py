@@ -70,7 +70,7 @@ class GridMatrix:
 
     def tocsc(self) -> sparse.csc_array:
         """The stored matrix: 27 blocks a node."""
-        rows = self.blocks.rows(np.arange(self.nodes.count))
+        rows = self.blocks.stored()
         n = 3 * self.nodes.count
         whole = sparse.bsr_array((rows.data, rows.indices, rows.indptr), shape=(n, n)).tocsr()
         out = sparse.csc_array(whole[self.nodes.place][:, self.nodes.place])

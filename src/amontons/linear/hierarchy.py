@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from .grid import GridBlocks
+from .level_matrix import LevelMatrix
 from .node_blocks import DEAD, NodeBlocks
 from .patched import PatchedBlocks, Rows
 from .transfer import Transfer
@@ -19,6 +19,7 @@ from .work import Work
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+Kind = Callable[[LevelMatrix], LevelMatrix]
 COARSEST = 120  # nodes of the level that is solved directly, at most
 SMALL = 1e-10  # singular values of the coarsest matrix below this part of the largest rest
 
@@ -103,7 +104,7 @@ def transfers(
 class Level:
     """One level: its matrix and the transfer to the next coarser one (None: the coarsest)."""
 
-    A: NodeBlocks | GridBlocks | PatchedBlocks
+    A: LevelMatrix
     P: Transfer | None = None
     work: Work = field(init=False)
     free: NDArray[np.bool_] = field(init=False)  # no node is held
@@ -111,8 +112,8 @@ class Level:
     def __post_init__(self) -> None:
         self.work, self.free = Work(self.A.nodes), np.zeros(self.A.nodes, dtype=bool)
 
-    def patched(self, A: PatchedBlocks) -> Level:
-        """The same with some rows of a solve's own."""
+    def of(self, A: LevelMatrix | PatchedBlocks) -> Level:
+        """The same with another matrix."""
         out = copy(self)
         out.A = A
         return out
@@ -122,13 +123,15 @@ class Level:
 class Hierarchy:
     """All levels, finest first, and the inverse of the coarsest matrix.
 
-    geometric: number of levels that come from the given prolongations, the finest included.
+    geometric: number of levels that come from the given prolongations, the finest included;
+    kind: of the matrices, None where it is that of the package.
     Nothing of it changes after it was made, so any number of solves share it.
     """
 
     levels: list[Level]
     geometric: int
     nodes: Nodes
+    kind: Kind | None = None
     coarse_inverse: Array = field(init=False)
     coarse_size: Array | None = field(default=None, init=False)
 
@@ -150,7 +153,7 @@ class Hierarchy:
     @classmethod
     def on(
         cls,
-        A: NodeBlocks | GridBlocks,
+        A: LevelMatrix,
         nodes: Nodes,
         given: Sequence[Transfer],
         modes: Array | None,
@@ -161,11 +164,11 @@ class Hierarchy:
             if A.nodes <= 8:
                 break
             levels[-1].P = P
-            A = A.coarse(P.coarse_used) if isinstance(A, GridBlocks) else P.galerkin(A)
+            A = A.coarse(P)
             levels.append(Level(A))
         geometric = len(levels)
         if A.nodes > COARSEST:
-            assert isinstance(A, NodeBlocks)
+            A = A.stored()
             for P in algebraic(A, _coarse_modes(levels, nodes, modes)):
                 levels[-1].P = P
                 A = P.galerkin(A)
@@ -174,21 +177,23 @@ class Hierarchy:
 
     def invert_coarsest(self) -> None:
         """The inverse of the coarsest matrix, a pseudo-inverse where it is singular."""
-        A = self.levels[-1].A
-        A = A.merged() if isinstance(A, PatchedBlocks) else A
+        A = self.levels[-1].A.stored()
         diagonal = A.diagonal_blocks
         if self.coarse_size is None:
             self.coarse_size = np.asarray(np.abs(diagonal).max(axis=(1, 2), initial=0.0))
         self.coarse_inverse = inverse_at_rest(A.dense(), diagonal, self.coarse_size)
 
+    def made_of(self, kind: Kind) -> Hierarchy:
+        """The same with kind(A) for the matrix A of every level."""
+        out = copy(self)
+        out.levels, out.kind = [level.of(kind(level.A)) for level in self.levels], kind
+        return out
+
     def patched(self, rows: Sequence[Rows]) -> Hierarchy:
         """The same with rows of a solve's own on every coarse level."""
         out = copy(self)
         coarse = zip(self.levels[1:], rows, strict=True)
-        own = [
-            level.patched(PatchedBlocks(level.A, own))  # type: ignore[arg-type]  # stored ones
-            for level, own in coarse
-        ]
+        own = [level.of(PatchedBlocks(level.A.stored(), own)) for level, own in coarse]
         out.levels = [self.levels[0], *own]
         return out
 

@@ -8,6 +8,7 @@ diagonal.  So every compiled loop is written for blocks of 3x3 only.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numba import uint64
@@ -15,6 +16,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..core.compiled import njit
+
+if TYPE_CHECKING:
+    from .transfer import Transfer
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -29,6 +33,7 @@ class NodeBlocks:
     inverse: of the diagonal blocks; zero in directions without stiffness.
     """
 
+    is_stored: ClassVar[bool] = True
     indptr: NDArray[np.int32]
     indices: NDArray[np.int32]
     data: Array
@@ -78,14 +83,32 @@ class NodeBlocks:
         rows = np.repeat(np.arange(self.nodes), np.diff(self.indptr))
         return np.flatnonzero(rows == self.indices)
 
-    def entries(self, node: Index) -> tuple[Index, Index, NDArray[np.int32], Array]:
-        """Rows of some nodes (k,): first and last entry of each, columns, blocks."""
-        first = self.indptr[node].astype(np.int64)
-        return first, self.indptr[node + 1].astype(np.int64), self.indices, self.data
+    @property
+    def is_positive(self) -> bool:
+        """True where all unknowns have a stiffness of their own."""
+        own = np.einsum("kii->ki", self.diagonal_blocks)
+        return bool(np.isfinite(self.inverse).all() and (own > 0).all())
 
-    def inverse_at(self, node: Index) -> Array:
-        """Inverses of the diagonal blocks of some nodes, (k, 3, 3)."""
-        return self.inverse[node]
+    def slots(self, node: Index) -> tuple[Index, Index]:
+        """Places of the entries of rows (k,), row after row, and the ends of these (k + 1,)."""
+        counts = np.diff(self.indptr)[node]
+        ends = np.concatenate([[0], np.cumsum(counts)])
+        return np.arange(ends[-1]) + np.repeat(self.indptr[node] - ends[:-1], counts), ends
+
+    def rows(self, node: Index) -> NodeBlocks:
+        """The block rows of some nodes, (k,), as the rows of a matrix."""
+        slots, ends = self.slots(node)
+        return NodeBlocks(
+            ends.astype(np.int32), self.indices[slots], self.data[slots], self.inverse[node]
+        )
+
+    def coarse(self, P: Transfer) -> NodeBlocks:
+        """P^T A P, with ones at coarse padding."""
+        return P.galerkin(self)
+
+    def stored(self) -> NodeBlocks:
+        """Itself."""
+        return self
 
     def residual(self, x: Array, b: Array, out: Array) -> None:
         """out = b - A x."""

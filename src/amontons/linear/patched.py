@@ -37,9 +37,7 @@ class Rows:
         """The rows of nodes (k,) in ascending order."""
         number = np.full(A.nodes, -1, dtype=np.int32)
         number[node] = np.arange(len(node))
-        counts = np.diff(A.indptr)[node]
-        ends = np.concatenate([[0], np.cumsum(counts)])
-        slots = np.arange(ends[-1]) + np.repeat(A.indptr[node] - ends[:-1], counts)
+        slots, ends = A.slots(node)
         return cls(node, number, slots, ends.astype(np.int32), A.indices[slots])
 
 
@@ -75,7 +73,7 @@ class PatchedBlocks:
         """A forward sweep from x = 0, and r = b - A x."""
         _first_sweep(*self._arrays, b, x, r)
 
-    def merged(self) -> NodeBlocks:
+    def stored(self) -> NodeBlocks:
         """The whole matrix, copied."""
         data, inverse = self.base.data.copy(), self.base.inverse.copy()
         data[self.rows.slots], inverse[self.rows.node] = self.data, self.inverse

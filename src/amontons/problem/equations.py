@@ -171,7 +171,7 @@ class Equations(Problem):
         if v is not None:
             self._check_motion(v)
         if self.measure is Measure.EXACT:
-            error = self.condensed().exact_error(r)
+            error = self.condensed()._exact_error(r)
             return error if v is None else max(error, self.imbalance(r, v))
         if v is None:
             try:
@@ -289,6 +289,9 @@ class Equations(Problem):
     @of_plain
     def exact_error(self, r: Array) -> float:
         """The exact measure of the Delassus form."""
+        return self._exact_error(r)
+
+    def _exact_error(self, r: Array) -> float:
         rows = kernel_rows(r)
         size = self.q_norm
         if size == 0:

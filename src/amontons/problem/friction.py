@@ -186,6 +186,12 @@ class FrictionProblem(Equations):
         expect_shape("q", q.shape, (self.contacts, self.dimension))
         return replace(self, q=q, blur=None)
 
+    def with_hierarchy(self, hierarchy: Hierarchy) -> FrictionProblem:
+        """The same problem with multigrid levels of one's own for M (global form)."""
+        problem = self.fresh()
+        problem.matrices.put_hierarchy(hierarchy)
+        return problem
+
     def assembled(self) -> FrictionProblem:
         """The same problem with M as a stored matrix, for solvers that need its entries.
 
@@ -242,9 +248,13 @@ class FrictionProblem(Equations):
             return FrictionProblem._from_blocks(W, self.free_velocity, self.law)
         return FrictionProblem.from_delassus(W, self.free_velocity, self.law)
 
-    @cached_property
-    def plain(self) -> FrictionProblem:  # type: ignore[override]  # made once
+    @property
+    def plain(self) -> FrictionProblem:
         """The problem of the plain law in other variables, see `plain_of`; else itself."""
+        return self if self.law.plain is self.law else self._plain
+
+    @cached_property
+    def _plain(self) -> FrictionProblem:
         return plain_of(self)
 
     def restricted(self, contacts: NDArray[np.int64]) -> FrictionProblem:

@@ -126,6 +126,10 @@ class GlobalMatrices:
         """Multigrid levels of M; None where the unknowns do not come in nodes."""
         return self._of_M(GlobalMatrices._hierarchy, self)
 
+    def put_hierarchy(self, hierarchy: Hierarchy) -> None:
+        """Let these be the levels."""
+        self.shared.put(GlobalMatrices._hierarchy, (self.M,), hierarchy)
+
     def _hierarchy(self) -> Hierarchy | None:
         component = None if self.structure is None else self.structure.component
         return prepared(

@@ -35,13 +35,11 @@ def check_dimension(law: Law, dimension: int) -> None:
 
 
 def plain_of(problem: FrictionProblem) -> FrictionProblem:
-    """The problem in s and u' of the plain law; itself where its law is that.
+    """The problem in s and u' of the plain law.
 
     Errors of r are those of s there: cohesion counts as load.
     """
     law = problem.law
-    if law.plain is law:
-        return problem
     if law.give is not None:
         problem = _with_give(problem, law.give)
     if law.cohesion.any():

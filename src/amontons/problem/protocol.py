@@ -51,7 +51,7 @@ class Start(Protocol):
     v: Array | None
 
 
-class Problem(Protocol):
+class Problem:
     """A discrete problem of contact, see the module."""
 
     law: Law
@@ -71,11 +71,11 @@ class Problem(Protocol):
     # ---------------------------------------------------------------- needed
     def error(self, r: Array, v: Array | None = None) -> float:
         """Unit-free error of a state; infinite of numbers that are not finite."""
-        ...
+        raise NotImplementedError
 
     def motion(self, r: Array, v: Array | None = None) -> Motion:
         """(u, v) of a state; without v as its reactions move it, or as well as is known."""
-        ...
+        raise NotImplementedError
 
     # ---------------------------------------------------------------- sizes, beginning
     @property

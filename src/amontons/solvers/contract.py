@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -167,15 +168,17 @@ class Takes(NamedTuple):
 
 def taken_by(solver: Any) -> Takes:
     """What a solver, or a class of solvers, takes."""
-    solves = getattr(solver, "solves", None)
-    if solves is None:
-        also = (NitscheProblem,) if getattr(solver, "nitsche", False) else ()
-        solves = (FrictionProblem, *also)
+    return _taken(solver if isinstance(solver, type) else type(solver))
+
+
+@cache
+def _taken(kind: Any) -> Takes:
+    also = (NitscheProblem,) if getattr(kind, "nitsche", False) else ()
     return Takes(
-        solves,
-        getattr(solver, "form", Form.ANY),
-        getattr(solver, "matrix_free", False),
-        getattr(solver, "needs_cone", False),
+        getattr(kind, "solves", (FrictionProblem, *also)),
+        getattr(kind, "form", Form.ANY),
+        getattr(kind, "matrix_free", False),
+        getattr(kind, "needs_cone", False),
     )
 
 

@@ -41,7 +41,7 @@ CONTENT = 5  # iterates with which a solver is content before its goal is tighte
 QUICK = 300  # contacts up to which one iterate is no time to press Ctrl-C
 EARLY = 100  # iterates after which a problem that no method is made for is given up
 GAVE_UP = (Outcome.STAGNATED, Outcome.BREAKDOWN, Outcome.CYCLED, Outcome.NON_FINITE)
-NUMBERS = int | float | np.number
+NUMBERS = (int, float, np.number)
 TIGHTEST = 1e-300  # smallest goal: contacts far smaller than others need tiny sums
 
 

@@ -30,8 +30,8 @@ from scipy import sparse
 from ...core.errors import InvalidInput
 from ...core.options import check_options
 from ...linear.hierarchy import SMALL, Hierarchy, Nodes
-from ...linear.node_blocks import NodeBlocks, block_inverse, residual, sweep
-from ...linear.transfer import Transfer
+from ...linear.level_matrix import LevelMatrix
+from ...linear.node_blocks import NodeBlocks, block_inverse
 from ...problem.one_sided import HELD, OneSided
 from ..contract import check_at_least
 from .conditions import Conditions
@@ -110,7 +110,8 @@ class ContactCycles:
         A = NodeBlocks.from_sparse(basis.M, place, self.nodes.count)
         given = Hierarchy.of(A, component, basis.levels, basis.near_nullspace)
         self.levels, self.coarse_inverse = given.levels, given.coarse_inverse
-        self.plain = [level.A.data.copy() for level in self.levels[1:]]
+        self.matrices = [level.A.stored() for level in self.levels]
+        self.plain = [A.data.copy() for A in self.matrices[1:]]
         self.contacts = Contacts.of(basis, self.nodes)
         self._prepare_rows()
         self._prepare_galerkin()
@@ -118,11 +119,9 @@ class ContactCycles:
     # ------------------------------------------------------------------ finest level
     def _prepare_rows(self) -> None:
         """The original rows of the contact nodes, and where they are stored."""
-        A, node = self.levels[0].A, self.contacts.node
-        counts = np.diff(A.indptr)[node]
-        self.owner = np.repeat(np.arange(len(node)), counts)
-        start = np.cumsum(counts) - counts
-        self.stored = np.arange(counts.sum()) - np.repeat(start - A.indptr[node], counts)
+        A, node = self.matrices[0], self.contacts.node
+        self.stored, ends = A.slots(node)
+        self.owner = np.repeat(np.arange(len(node)), np.diff(ends))
         self.rows = A.data[self.stored].copy()
         self.own = np.flatnonzero(A.indices[self.stored] == node[self.owner])
         self.size = np.abs(self.rows[self.own]).max(axis=(1, 2), initial=0.0)
@@ -130,7 +129,7 @@ class ContactCycles:
 
     def set(self, given: Conditions, f: Array, w: Array) -> None:
         """Take over the conditions of a step; f (n,) load, w (nc, d) constant part of u."""
-        A, contacts = self.levels[0].A, self.contacts
+        A, contacts = self.matrices[0], self.contacts
         K, U = contacts.to_nodes(given.G_r), contacts.to_nodes(given.G_u)
         U[:, range(3), range(3)] += contacts.idle * self.size[:, None]
         scale = self.size[:, None, None]  # Dirichlet rows in the unit of the others
@@ -155,10 +154,12 @@ class ContactCycles:
     # ------------------------------------------------------------------ coarse levels
     def _prepare_galerkin(self) -> None:
         """What the difference of the coarse matrices is made of: P and M on contact rows."""
-        self.prolongations = [_matrix(level.P) for level in self.levels if level.P is not None]
+        self.prolongations = [
+            level.P.masked() for level in self.levels if level.P is not None
+        ]
         if not self.prolongations:
             return
-        A, nodes = self.levels[0].A, self.contacts.node
+        A, nodes = self.matrices[0], self.contacts.node
         size = 3 * A.nodes
         M = sparse.bsr_array((A.data, A.indices, A.indptr), shape=(size, size))
         self.unknowns = (3 * nodes[:, None] + np.arange(3)).ravel()
@@ -170,7 +171,7 @@ class ContactCycles:
     def _update_coarse(self, given: Conditions) -> None:
         """Galerkin matrices of this step, from the differences to the plain ones."""
         if not self.prolongations:  # small enough to be solved at once
-            self.coarse_inverse = np.linalg.pinv(self.levels[0].A.dense(), rcond=SMALL)
+            self.coarse_inverse = np.linalg.pinv(self.matrices[0].dense(), rcond=SMALL)
             return
         fixed = self._dirichlet(given)
         identity = np.eye(fixed.shape[1])
@@ -182,13 +183,12 @@ class ContactCycles:
         L = self.contacts.to_nodes(free[:, :, None] * given.G_u * free[:, None, :])
         truncated = self.P - QP
         delta = sparse.csr_array(truncated.T @ (_blocks(L) @ truncated) - X - X.T)
-        for k, level in enumerate(self.levels[1:]):
+        for k, A in enumerate(self.matrices[1:]):
             if k:
                 P = self.prolongations[k]
                 delta = sparse.csr_array(P.T @ (delta @ P))
-            assert isinstance(level.A, NodeBlocks)
-            _add_blocks(level.A, self.plain[k], delta)
-        self.coarse_inverse = np.linalg.pinv(self.levels[-1].A.dense(), rcond=SMALL)
+            _add_blocks(A, self.plain[k], delta)
+        self.coarse_inverse = np.linalg.pinv(self.matrices[-1].dense(), rcond=SMALL)
 
     # ------------------------------------------------------------------ cycles
     def cycle(self, x: Array, option: MultigridCycle) -> float:
@@ -198,8 +198,8 @@ class ContactCycles:
 
     def residual(self, x: Array) -> float:
         """|b - A x| / |b| of the linear problem."""
-        A, r = self.levels[0].A, self.levels[0].work.r
-        residual(A.indptr, A.indices, A.data, x, self.b, r)
+        r = self.levels[0].work.r
+        self.matrices[0].residual(x, self.b, r)
         return float(np.linalg.norm(r) / max(np.linalg.norm(self.b), 1e-300))
 
     def _visit(self, k: int, b: Array, x: Array, shape: CycleShape, sweeps: int) -> None:
@@ -208,9 +208,8 @@ class ContactCycles:
             x[:] = (self.coarse_inverse @ b.reshape(-1)).reshape(-1, 3)
             return
         A, r, coarse, below = level.A, level.work.r, self.levels[k + 1], self.levels[k + 1].work
-        assert isinstance(A, NodeBlocks)
         self._smooth(A, b, x, sweeps)
-        residual(A.indptr, A.indices, A.data, x, b, r)
+        A.residual(x, b, r)
         self._keep_free(k, r)
         level.P.restrict(r, below.b)
         below.x[:] = 0.0
@@ -230,23 +229,11 @@ class ContactCycles:
             node = self.contacts.node
             values[node] -= np.einsum("kij,kj->ki", self.projection, values[node])
 
-    def _smooth(self, A: NodeBlocks, b: Array, x: Array, sweeps: int) -> None:
+    def _smooth(self, A: LevelMatrix, b: Array, x: Array, sweeps: int) -> None:
         held = self.none_held[: A.nodes]
         for _ in range(sweeps):
-            sweep(A.indptr, A.indices, A.data, A.inverse, b, x, held, False)
-            sweep(A.indptr, A.indices, A.data, A.inverse, b, x, held, True)
-
-
-def _matrix(P: Transfer) -> sparse.csr_array:
-    """A transfer as a scalar matrix, without padding."""
-    if len(P.blocks):
-        shape = (3 * P.fine, 3 * P.coarse)
-        out = sparse.csr_array(sparse.bsr_array((P.blocks, P.indices, P.indptr), shape=shape))
-    else:
-        out = sparse.kron(P.scalar(), sparse.eye_array(3), format="csr")
-    fine, coarse = np.ones(3 * P.fine), np.ones(3 * P.coarse)
-    fine[P.idle], coarse[P.coarse_idle] = 0.0, 0.0
-    return sparse.csr_array(sparse.diags_array(fine) @ out @ sparse.diags_array(coarse))
+            A.smooth(b, x, held, False)
+            A.smooth(b, x, held, True)
 
 
 def _blocks(blocks: Array) -> sparse.csr_array:

@@ -108,8 +108,30 @@ def _run(
     return iter(solver.iterates(problem, start, target))
 
 
-class _Known(NamedTuple):
-    """An iterate and its error."""
+class Attempt(NamedTuple):
+    """A method that Auto tries on the global form; from the best iterate or the start."""
+
+    solver: Solver
+    from_best: bool = True
+    on_meshes: bool = False  # there alone
+
+
+WHOLE = SemismoothNewton(linear=Direct())
+# M is singular: where contact just holds a body, the branches of Newton's method may leave no
+# stiffness against sliding; those of the natural map do, from a state that is nearly right.
+HELD = (
+    Attempt(WHOLE, from_best=False),
+    Attempt(ContactMultigrid(), from_best=False, on_meshes=True),
+    Attempt(replace(WHOLE, function=NaturalMap())),
+    Attempt(Tethers(), from_best=False),
+    Attempt(WHOLE),
+)
+DEAR = (Attempt(CompressedDelassus()), Attempt(SemismoothNewton()))  # W is
+
+
+@dataclass(eq=False)
+class _Best:
+    """The best iterate so far and its error."""
 
     iterate: Iterate
     error: float
@@ -125,9 +147,7 @@ class Auto:
 
     def choice(self, problem: Problem) -> Auto | NonlinearNewton:
         """The method of a problem that one alone solves, else itself."""
-        if isinstance(problem, FrictionProblem) or not isinstance(problem, NonlinearProblem):
-            return self
-        return NonlinearNewton()
+        return NonlinearNewton() if isinstance(problem, NonlinearProblem) else self
 
     def iterates(
         self, problem: FrictionProblem | NitscheProblem, start: Iterate, target: Target
@@ -135,52 +155,45 @@ class Auto:
         """Iterates of one method after another, until nothing is left to try."""
         if not isinstance(problem, FrictionProblem):
             yield from robust_iterates(problem, start, target)
-            return
-        if problem.contacts == 0:
-            return
-        best = [_Known(start, target.start_error)]
-        if _worth_multigrid(problem):
-            yield from _watched(ContactMultigrid(), problem, best[0], target, best)
-        problem = problem.assembled()
-        if problem.form is Form.GLOBAL and not _regular(problem):
-            yield from _held_by_contact(problem, start, target, best)
-        elif problem.condensing_is_cheap:
-            yield from _stages(problem.condensed(target.deadline), start, target)
-        else:
-            yield from self._on_meshes(problem, target, best)
+        elif problem.contacts and problem.has_v:
+            yield from _of_global_form(problem, start, target)
+        elif problem.contacts:
+            yield from _stages(problem, start, target)
 
-    def _on_meshes(
-        self, problem: FrictionProblem, target: Target, best: list[_Known]
-    ) -> Iterates:
-        for solver in (CompressedDelassus(), SemismoothNewton()):
-            yield from _watched(solver, problem, best[0], target, best)
-        try:
-            condensed = problem.condensed(target.deadline)
-        except InvalidInput as reason:
-            raise Breakdown(str(reason)) from reason
-        yield from _stages(condensed, best[0].iterate, target)
+
+def _of_global_form(problem: FrictionProblem, start: Iterate, target: Target) -> Iterates:
+    best = _Best(start, target.start_error)
+    if _worth_multigrid(problem):
+        yield from _watched(ContactMultigrid(), problem, best, target, best)
+    problem = problem.assembled()
+    if not _regular(problem):
+        yield from _tried(HELD, problem, start, target, best)
+        return
+    if not problem.condensing_is_cheap:
+        yield from _tried(DEAR, problem, start, target, best)
+    try:
+        condensed = problem.condensed(target.deadline)
+    except InvalidInput as reason:
+        raise Breakdown(str(reason)) from reason
+    yield from _stages(condensed, best.iterate, target)
+
+
+def _tried(
+    attempts: tuple[Attempt, ...],
+    problem: FrictionProblem,
+    start: Iterate,
+    target: Target,
+    best: _Best,
+) -> Iterates:
+    """Iterates of one method after another, each until it breaks down or stalls."""
+    first = _Best(start, target.start_error)
+    for solver, from_best, on_meshes in attempts:
+        if not on_meshes or _is_mesh(problem):
+            yield from _watched(solver, problem, best if from_best else first, target, best)
 
 
 def _stages(problem: FrictionProblem, start: Iterate, target: Target) -> Iterator[Iterate]:
     return Portfolio(problem, target, spatial(start.r), JOINTS + FIRST).stages()
-
-
-def _held_by_contact(
-    problem: FrictionProblem, start: Iterate, target: Target, best: list[_Known]
-) -> Iterates:
-    """Newton on the whole system, M being singular; then multigrid, and Newton from there.
-
-    Where contact just holds a body its branches may leave no stiffness against sliding.
-    """
-    whole = SemismoothNewton(linear=Direct())
-    begin = _Known(start, target.start_error)
-    yield from _watched(whole, problem, begin, target, best)
-    if _is_mesh(problem):
-        yield from _watched(ContactMultigrid(), problem, begin, target, best)
-    natural = replace(whole, function=NaturalMap())
-    yield from _watched(natural, problem, best[0], target, best)
-    yield from _watched(Tethers(), problem, begin, target, best)
-    yield from _watched(whole, problem, best[0], target, best)
 
 
 def _is_mesh(problem: FrictionProblem) -> bool:
@@ -189,7 +202,7 @@ def _is_mesh(problem: FrictionProblem) -> bool:
 
 def _worth_multigrid(problem: FrictionProblem) -> bool:
     """True for meshes on which a factorisation takes longer than some cycles."""
-    if problem.form is not Form.GLOBAL or problem.unknowns < MESH:
+    if problem.unknowns < MESH:
         return False
     if isinstance(problem.M, DistributedMatrix):
         return False  # its levels would have to be spread too
@@ -208,19 +221,19 @@ def _regular(problem: FrictionProblem) -> bool:
 def _watched(
     solver: Solver,
     problem: FrictionProblem,
-    start: _Known,
+    start: _Best,
     target: Target,
-    best: list[_Known],
+    best: _Best,
 ) -> Iterates:
-    """Iterates of a solver until it breaks down or stalls; best[0] becomes the best so far."""
+    """Iterates of a solver until it breaks down or stalls; best becomes the best so far."""
     patience = Patience(STALLED, mark=start.error)
     iterates, judged = solver.iterates(problem, start.iterate, target), None
     try:
         while (iterate := sent(iterates, judged)) is not None:
             judged = yield iterate
             error = target.error(problem, iterate, judged)
-            if error < best[0].error:
-                best[0] = _Known(iterate, error)
+            if error < best.error:
+                best.iterate, best.error = iterate, error
             if patience.over(error):
                 return
     except (Breakdown, SingularOperator):

@@ -100,7 +100,7 @@ TURNS = (
 # fmt: on
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Portfolio:
     """One run of a table of stages from a reaction r, (nc, 3)."""
 
@@ -120,5 +120,5 @@ class Portfolio:
 
 def _walk(table: tuple[Stage, ...], state: State, turn: int) -> Iterator[Iterate]:
     for stage in table:
-        if (state.is_coulomb or not stage.needs_cone) and stage.when(state, turn):
+        if stage.when(state, turn) and (state.is_coulomb or not stage.needs_cone):
             yield from stage.run(state, stage, turn)

@@ -50,7 +50,7 @@ class State:
 
     def __post_init__(self) -> None:
         self.start = self.r
-        self.error = self.judge(self.r) if self.r.any() else math.inf
+        self.error = self.judge(self.r) if np.count_nonzero(self.r) else math.inf
         self.goal = self.target.tolerance * self.problem.q_norm
         self.data = sweep_data(self.problem, order=SweepOrder.APPROACH)
 

@@ -38,7 +38,6 @@ from numpy.typing import NDArray
 
 from ...core.errors import UnsupportedForm
 from ...core.options import check_options
-from ...linear.grid import GridBlocks
 from ...linear.hierarchy import Hierarchy
 from ...problem.friction import Form, FrictionProblem
 from ..anderson import Anderson
@@ -173,7 +172,7 @@ class _Run:
     def cycles(self, x: Array) -> Iterator[float]:
         """Errors of x, (nodes, 3), which is improved in place between them."""
         depth = self.options.depth
-        if isinstance(self.level.A, GridBlocks):  # whose cycles are as cheap as the mixing
+        if not self.level.A.is_stored:  # then cycles are as cheap as the mixing
             depth = min(depth, GRID_DEPTH)
         mixing = Anderson(x.size, depth)
         before = np.empty_like(x)

@@ -11,7 +11,6 @@ from scipy import sparse
 from ...linear.blocks import spatial
 from ...linear.hierarchy import Hierarchy, Level, Nodes
 from ...linear.node_blocks import NodeBlocks
-from ...linear.patched import PatchedBlocks
 from ...linear.transfer import Transfer
 from ...problem.friction import FrictionProblem
 from ...problem.law.law import BOUND
@@ -118,11 +117,10 @@ def _prepare(problem: FrictionProblem) -> ContactLevels:
     if basis.coupling is not None:
         hierarchy = _in_basis(hierarchy, basis)
     A = hierarchy.levels[0].A
-    assert not isinstance(A, PatchedBlocks)
     contacts = ContactNodes.of(basis, hierarchy.nodes, A)
     if contacts is None:
         raise Breakdown("contact multigrid: the contacts do not sit on nodes of their own")
-    if isinstance(A, NodeBlocks) and not (np.isfinite(A.inverse).all() and _positive(A)):
+    if not A.is_positive:
         raise Breakdown("contact multigrid: M has a diagonal block that is not positive")
     coarse = _coarse_contacts(hierarchy, contacts)
     touched = [contacts.node, *(c.node for _, c in coarse)]
@@ -151,9 +149,10 @@ def _in_basis(hierarchy: Hierarchy, basis: OneSided) -> Hierarchy:
         if coupling.nnz:
             P, coupling = _between_bases(P, coupling, geometric=k + 1 < hierarchy.geometric)
         levels[-1].P = P
-        A = P.galerkin(A)
+        A = A.coarse(P)
         levels.append(Level(A, old.P))
-    return Hierarchy(levels, hierarchy.geometric, nodes)
+    out = Hierarchy(levels, hierarchy.geometric, nodes)
+    return out if hierarchy.kind is None else out.made_of(hierarchy.kind)
 
 
 def _between_bases(
@@ -191,11 +190,6 @@ def _between_bases(
     return Transfer.of(tiles, P.idle, P.coarse_idle), coarse
 
 
-def _positive(A: NodeBlocks) -> bool:
-    """Whether all unknowns have a stiffness of their own."""
-    return bool((np.einsum("kii->ki", A.data[A.diagonal()]) > 0).all())
-
-
 def _coarse_contacts(
     hierarchy: Hierarchy, contacts: ContactNodes
 ) -> list[tuple[Index, ContactNodes]]:
@@ -204,7 +198,7 @@ def _coarse_contacts(
     kept = np.arange(len(contacts.node))
     for k in range(1, hierarchy.geometric):
         P, A = hierarchy.levels[k - 1].P, hierarchy.levels[k].A
-        assert P is not None and not isinstance(A, PatchedBlocks)
+        assert P is not None
         if len(P.blocks):
             break
         parent = _parent(P, contacts.node)

@@ -36,9 +36,9 @@ from numba import uint64
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
-from ...linear.grid import GridBlocks
 from ...linear.hierarchy import Nodes
-from ...linear.node_blocks import NodeBlocks, row_product
+from ...linear.level_matrix import LevelMatrix
+from ...linear.node_blocks import row_product
 from ...problem.judge.measures import contact_residual
 from ...problem.law import Kind, Law, Tied, Tresca
 from ...problem.law.law import BOUND, MU, TRESCA, columns_of, given
@@ -60,8 +60,8 @@ class ContactNodes:
     """Contacts at nodes: node (nc,), H (nc, 3, 3), w (nc, 3), and their law.
 
     inverse, compliance, to_reaction (nc, 3, 3): A_pp^-1, H^T A_pp^-1 H and H^-1; rho (nc,): of
-    the judge; rows: of the matrix, see `NodeBlocks.entries`.  State of the iteration: r, u
-    (nc, 3), and state (nc,) of the last local solves.
+    the judge; rows: indptr, columns and blocks of their rows of the matrix.  State of the
+    iteration: r, u (nc, 3), and state (nc,) of the last local solves.
     """
 
     node: Index
@@ -70,7 +70,7 @@ class ContactNodes:
     compliance: Array
     to_reaction: Array
     rho: Array
-    rows: tuple[Index, Index, NDArray[np.int32], Array]
+    rows: tuple[NDArray[np.int32], NDArray[np.int32], Array]
     w: Array = field(default_factory=lambda: np.zeros((0, 3)))
     law: Law = field(default_factory=lambda: Tresca(np.zeros(0)))
     driven: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 3), dtype=bool))
@@ -83,18 +83,20 @@ class ContactNodes:
         self.state = np.full(len(self.node), -1, dtype=np.int8)
 
     @classmethod
-    def at_nodes(cls, node: Index, H: Array, A: NodeBlocks | GridBlocks) -> ContactNodes:
+    def at_nodes(cls, node: Index, H: Array, A: LevelMatrix) -> ContactNodes:
         """Contacts without a law at nodes of a level with matrix A."""
-        inverse = A.inverse_at(node)
+        rows = A.rows(node)
+        inverse = rows.inverse
         compliance = np.einsum("kai,kab,kbj->kij", H, inverse, H)
         size = np.linalg.norm(compliance, 2, axis=(1, 2)) if len(node) else np.zeros(0)
         k, i = np.nonzero(np.abs(H).max(axis=1, initial=0.0) == 0)  # the second tangent in 2D
         compliance[k, i, i] = 1.0
         back: Any = np.linalg.pinv(H)
-        return cls(node, H, inverse, compliance, back, 1 / size, A.entries(node))
+        return cls(node, H, inverse, compliance, back, 1 / size,
+                   (rows.indptr, rows.indices, rows.data))  # fmt: skip
 
     def at(
-        self, chosen: NDArray[np.bool_], node: Index, A: NodeBlocks | GridBlocks
+        self, chosen: NDArray[np.bool_], node: Index, A: LevelMatrix
     ) -> ContactNodes:
         """Some of the contacts at nodes (k,) of another level."""
         return ContactNodes.at_nodes(node, self.H[chosen], A)
@@ -111,7 +113,7 @@ class ContactNodes:
 
     @classmethod
     def of(
-        cls, basis: OneSided, nodes: Nodes, A: NodeBlocks | GridBlocks
+        cls, basis: OneSided, nodes: Nodes, A: LevelMatrix
     ) -> ContactNodes | None:
         """From the one-sided basis; None where a contact is spread over several nodes."""
         nc, d = basis.dofs.shape
@@ -202,13 +204,13 @@ class ContactNodes:
 
 
 @njit(cache=True, error_model="numpy")
-def _sweep(first, last, indices, data, node, H, inverse, compliance, w, kind, parameters,
+def _sweep(indptr, indices, data, node, H, inverse, compliance, w, kind, parameters,
            f, x, r, u, state, backward):  # noqa: PLR0913 # fmt: skip
     y, b = np.empty(3), np.empty(3)
     for step in range(len(node)):
         c = len(node) - 1 - step if backward else step
         p = node[c]
-        s0, s1, s2 = row_product(indices, data, x, uint64(first[c]), uint64(last[c]))
+        s0, s1, s2 = row_product(indices, data, x, uint64(indptr[c]), uint64(indptr[c + 1]))
         g0, g1, g2 = f[p, 0] - s0, f[p, 1] - s1, f[p, 2] - s2
         for i in range(3):
             y[i] = x[p, i] + (

@@ -20,8 +20,8 @@ from numba import uint64
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
-from ...linear.grid import GridBlocks
 from ...linear.hierarchy import Hierarchy, inverse_at_rest
+from ...linear.level_matrix import LevelMatrix
 from ...linear.node_blocks import NodeBlocks, block_inverse
 from ...linear.patched import PatchedBlocks, Rows
 from ...linear.transfer import Transfer
@@ -65,13 +65,13 @@ class Near:
         return cls(slots, row, column, base, own, size, idle[row], idle[column], rows, places)
 
     @classmethod
-    def of_grid(cls, A: GridBlocks, nodes: Index, idle: NDArray[np.bool_]) -> Near:
+    def of_operator(cls, A: LevelMatrix, nodes: Index, idle: NDArray[np.bool_]) -> Near:
         """Rows and columns of contact nodes of a matrix that is not stored, nor changed."""
-        first, last, columns, data = A.entries(np.sort(nodes))
-        row = np.repeat(np.sort(nodes), last - first)
-        column = columns.astype(np.int64)
+        rows = A.rows(np.sort(nodes))
+        row = np.repeat(np.sort(nodes), np.diff(rows.indptr))
+        column = rows.indices.astype(np.int64)
         other = ~np.isin(column, nodes)
-        whole = np.concatenate([data, data[other].swapaxes(1, 2)])
+        whole = np.concatenate([rows.data, rows.data[other].swapaxes(1, 2)])
         row, column = (
             np.concatenate([row, column[other]]),
             np.concatenate([column, row[other]]),
@@ -104,23 +104,22 @@ class Truncation:
         slots: NDArray[Any] = np.empty(0, dtype=np.int64)
         for k, level in enumerate(hierarchy.levels):
             A = level.A
-            assert not isinstance(A, PatchedBlocks)
-            if k < len(contacts) and isinstance(A, NodeBlocks):
-                slots = np.union1d(slots, _touching(A, contacts[k]))
-            idle = np.zeros(3 * level.A.nodes, dtype=bool)
+            idle = np.zeros(3 * A.nodes, dtype=bool)
             if level.P is not None:
                 idle[level.P.idle] = True
             elif k:
                 idle[hierarchy.levels[k - 1].P.coarse_idle] = True
             idle = idle.reshape(-1, 3)
-            if isinstance(A, GridBlocks):
-                near = Near.of_grid(A, contacts[k], idle)
-            else:
+            if k or A.is_stored:
+                A = A.stored()
+                if k < len(contacts):
+                    slots = np.union1d(slots, _touching(A, contacts[k]))
                 near = Near.of(A, slots, idle)
+            else:
+                near = Near.of_operator(A, contacts[k], idle)
             self.near.append(near)
             if level.P is not None:
-                coarse = hierarchy.levels[k + 1].A
-                assert isinstance(coarse, NodeBlocks)
+                coarse = hierarchy.levels[k + 1].A.stored()
                 self.products.append(Product.of(level.P, near, coarse))
                 slots = np.unique(self.products[-1].target)
         for k, product in enumerate(self.products):
@@ -157,7 +156,7 @@ class Truncation:
 
     def solve(self, k: int, change: Array, b: Array) -> Array:
         """The solution of the tangent on level k, the coarsest one; b (nodes, 3)."""
-        A, near = self.hierarchy.levels[k].A, self.near[k]
+        A, near = self.hierarchy.levels[k].A.stored(), self.near[k]
         matrix = A.dense().reshape(A.nodes, 3, A.nodes, 3)
         place: Any = near.row, slice(None), near.column
         np.add.at(matrix, place, change)
