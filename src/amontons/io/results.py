@@ -20,16 +20,17 @@ from numpy.typing import NDArray
 from ..core.errors import InvalidInput
 from ..core.files import made, put, replacing
 from ..core.warned import ResultWarning
-from ..problem.solution import Convergence, FrictionSolution
+from ..problem.solution import ContactStatus, Convergence, FrictionSolution
 from ..solvers import METHODS
 
 if TYPE_CHECKING:
     from h5py import File
 
     from ..mechanics.model import ContactFields, Model
+    from ..mechanics.steps import TimeStep
 
 Array = NDArray[np.float64]
-SCHEMA = "amontons/solution/1"
+SCHEMA, RUN_SCHEMA = "amontons/solution/1", "amontons/run/1"
 LIBRARIES = ("amontons", "numpy", "scipy", "numba", "netgen-mesher")  # Netgen: CAD
 MOST_SETS = 12  # changes of sets that a summary shows; solution.json has all
 FIGURES = (".png", ".svg", ".pdf")
@@ -55,8 +56,9 @@ class Output:
 
 # ------------------------------------------------------------------------------- choosing
 def write(output: Output, path: str | os.PathLike[str]) -> None:
-    """Write one file; the suffix decides: .vtu, .h5 (or .hdf5), .json."""
-    writers = {".vtu": write_vtu, ".h5": write_h5, ".hdf5": write_h5, ".json": write_json}
+    """Write one file; the suffix decides: .vtu, .h5 (or .hdf5), .json, .csv."""
+    writers = {".vtu": write_vtu, ".h5": write_h5, ".hdf5": write_h5, ".json": write_json,
+               ".csv": write_csv}  # fmt: skip
     suffix = Path(path).suffix.lower()
     if suffix not in writers:
         raise InvalidInput(
@@ -112,7 +114,7 @@ def save(
         "status.png": plot_status, "convergence.png": plot_convergence,
     }  # fmt: skip
     if output.model is not None:
-        writers["solution.vtu"] = write_vtu
+        writers |= {"solution.vtu": write_vtu, "pairs.csv": write_csv}
     folder = Path(folder)
     jobs = [(folder / name, writer) for name, writer in writers.items()]
     if copy is not None:
@@ -136,6 +138,11 @@ def summary(output: Output) -> dict[str, Any]:
     setup = record.history[0].seconds if record.history else 0.0
     contacts = {"total": problem.contacts, **found.counts, "sliding": int(found.sliding.sum())}
     resultant = None if output.fields is None else output.fields.resultant.tolist()
+    numbers: dict[str, Any] = {"pairs": None, "supports": None, "load": None}
+    if output.model is not None and output.fields is not None:
+        from .numbers import records
+
+        numbers = records(output.model, output.fields)
     data = {
         "schema": SCHEMA,
         "title": output.title or problem.name,
@@ -167,6 +174,7 @@ def summary(output: Output) -> dict[str, Any]:
         "contacts": contacts,
         "active_sets": _active_sets(record),
         "resultant": resultant,
+        **numbers,
         "max_penetration": found.max_penetration,
         "max_cone_violation": found.max_cone_violation,
         "uniqueness": output.uniqueness,
@@ -174,6 +182,36 @@ def summary(output: Output) -> dict[str, Any]:
         "versions": versions(),
     }
     return finite(data)
+
+
+def step_record(step: TimeStep, title: str, works: dict[str, float]) -> dict[str, Any]:
+    """The record of a run after a step, schema amontons/run/1.
+
+    works: sums over all steps so far.  Without times of the clock: a run that was stopped and
+    goes on ends with the same record.
+    """
+    from .numbers import records
+
+    record, state = step.solution.convergence, step.state
+    counts = {s.name.lower(): int((step.status == s).sum()) for s in ContactStatus}
+    return finite({
+        "schema": RUN_SCHEMA,
+        "title": title or step.model.name,
+        "outcome": record.outcome.name.lower(),
+        "steps": state.index,
+        "time": step.time,
+        "error": record.error,
+        "tolerance": record.tolerance,
+        "dimension": step.model.dimension,
+        "contacts": {"total": len(step.gap), **counts, "sliding": int(step.sliding.sum())},
+        "works": works,
+        "kinetic": step.energies.kinetic,
+        "elastic": step.energies.elastic,
+        "resultant": step.fields.resultant.tolist(),
+        **records(step.model, step.fields),
+        "warnings": [warning.record for warning in step.warnings],
+        "versions": versions(),
+    })  # fmt: skip
 
 
 def _active_sets(record: Convergence) -> dict[str, Any] | None:
@@ -301,6 +339,18 @@ def write_vtu(output: Output, path: Path) -> None:
     """Write solution.vtu; raises InvalidInput for a problem without geometry."""
     from .vtk import write_model
 
+    model, fields = _of_model(output, "vtu")
+    write_model(model, fields, output.solution, path)
+
+
+def write_csv(output: Output, path: Path) -> None:
+    """Write pairs.csv; raises InvalidInput for a problem without geometry."""
+    from .numbers import pairs_csv
+
+    put(path, pairs_csv(*_of_model(output, "csv")))
+
+
+def _of_model(output: Output, suffix: str) -> tuple[Model, ContactFields]:
     if output.model is None or output.fields is None:
-        raise InvalidInput("vtu: this solution has no mesh; write .h5 or .json")
-    write_model(output.model, output.fields, output.solution, path)
+        raise InvalidInput(f"{suffix}: this solution has no mesh; write .h5 or .json")
+    return output.model, output.fields

@@ -22,7 +22,7 @@ from ...mechanics.steps.stepping import at_end
 from ...problem.solution import Outcome
 from .doubts import Doubts
 from .locking import locked
-from .run_folder import BALANCE, PICTURES, WORKS, RunFolder, clear, continued
+from .run_folder import BALANCE, PICTURES, WORKS, RunFolder, clear, continued, numbers_of
 from .sources import open_source, with_flags
 from .stopping import Stopping
 from .terminal import check_folder, say_growth
@@ -123,11 +123,11 @@ def _prepared(
     assert read.evolution is not None
     case = identity(read, settings)
     if restart:
-        results, start, changed = continued(place, case)
+        results, start, changed = continued(place, case, numbers_of(read.model))
         for text in changed:
             click.echo(f"--restart: {text}, from step {start.index + 1} on", err=True)
     else:
-        results, start = RunFolder(place, case), at_rest(read.model)
+        results, start = RunFolder(place, case, numbers_of(read.model)), at_rest(read.model)
     steps = evolve(
         read.model, read.evolution.method, until=read.evolution.until, start=start,
         solver=settings.solver(), tolerance=settings.tolerance,
@@ -222,7 +222,7 @@ def _keep_last(last: TimeStep | None, results: RunFolder, asked: _Run) -> None:
 def _keep(step: TimeStep, results: RunFolder, asked: _Run) -> None:
     """Write the picture of a step and its state."""
     results.draw(step)
-    results.save(step.state)
+    results.keep(step, asked.case.title)
     if asked.pictures:
         from ...io.plots import Frame
 
@@ -258,7 +258,7 @@ def _summary(results: RunFolder) -> None:
     table = results.table
     if not len(table):
         return
-    sums = {name: float(table[name].sum()) for name in (*WORKS, "defect")}
+    sums = results.works()
     click.echo(
         f"{len(table)} steps; work of loads {sums['loads']:.4g}, supports "
         f"{sums['supports']:.4g}, contact {sums['contact']:.4g}; dissipated by damping "
