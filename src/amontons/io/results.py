@@ -340,7 +340,7 @@ def write_vtu(output: Output, path: Path) -> None:
     from .vtk import write_model
 
     model, fields = _of_model(output, "vtu")
-    write_model(model, fields, output.solution, path)
+    write_model(model, fields, output.solution, path, output.title)
 
 
 def write_csv(output: Output, path: Path) -> None:

@@ -65,7 +65,7 @@ class _Run:
 def run(
     case: str, overrides: Sequence[str], tolerance: float | None, time_limit: float | None,
     folder: str | None, export: str | None, every: int, pictures: bool, restart: bool,
-    quiet: bool, export_steps: str | None = None,
+    quiet: bool, export_steps: str | None = None, xdmf: bool = False,
 ) -> int:  # fmt: skip
     """Step and write; returns the exit code."""
     if time_limit is not None and not time_limit > 0:
@@ -93,7 +93,7 @@ def run(
             clear(each, read.name)
         try:
             with stop.breaking():
-                results, steps = _prepared(asked, place, restart=restart)
+                results, steps = _prepared(asked, place, restart=restart, xdmf=xdmf)
         except KeyboardInterrupt:
             click.echo(f"{stop.word}.", err=True)
             return stop.code
@@ -116,18 +116,19 @@ def _chosen(export: str | None, steps: str | None) -> list[range] | None:
 
 
 def _prepared(
-    asked: _Run, place: Path, *, restart: bool
+    asked: _Run, place: Path, *, restart: bool, xdmf: bool
 ) -> tuple[RunFolder, Iterator[TimeStep]]:
     """The folder of results and the steps, from the beginning or from the checkpoint."""
     read, settings = asked.case, asked.settings
     assert read.evolution is not None
-    case = identity(read, settings)
+    case, numbers = identity(read, settings), numbers_of(read.model)
     if restart:
-        results, start, changed = continued(place, case, numbers_of(read.model))
+        results, start, changed = continued(place, case, numbers, read.title, xdmf)
         for text in changed:
             click.echo(f"--restart: {text}, from step {start.index + 1} on", err=True)
     else:
-        results, start = RunFolder(place, case, numbers_of(read.model)), at_rest(read.model)
+        results = RunFolder(place, case, numbers, read.title, xdmf)
+        start = at_rest(read.model)
     steps = evolve(
         read.model, read.evolution.method, until=read.evolution.until, start=start,
         solver=settings.solver(), tolerance=settings.tolerance,
@@ -222,7 +223,7 @@ def _keep_last(last: TimeStep | None, results: RunFolder, asked: _Run) -> None:
 def _keep(step: TimeStep, results: RunFolder, asked: _Run) -> None:
     """Write the picture of a step and its state."""
     results.draw(step)
-    results.keep(step, asked.case.title)
+    results.keep(step)
     if asked.pictures:
         from ...io.plots import Frame
 

@@ -23,6 +23,7 @@ from ...io.case import SOLVER, differences
 from ...io.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from ...io.numbers import csv_of, flat_columns, flat_values
 from ...io.results import step_record, to_json
+from ...io.series import LIST, MESH, step_name, write_list, write_step
 from ...io.vtk import write_model
 from ...mechanics.model import Model
 from ...mechanics.model.names import support_names
@@ -37,9 +38,9 @@ COLUMNS = ("index", "time", "open", "slip", "stick", *WORKS, "defect", "iteratio
 MOST_NUMBERS = 400  # columns of pairs and supports: HDF5 keeps a row's names in 64 kB
 STATE, TABLE, FILM, BALANCE = "state.h5", "steps.csv", "steps.pvd", "energy.png"
 RECORD = "solution.json"
-PICTURE = re.compile(r"step-\d{5,}\.(vtu|png)|film\.gif")
+PICTURE = re.compile(r"step-\d{5,}\.(vtu|h5|png)|film\.gif")
 OURS = (PICTURE, *(re.compile(re.escape(name))
-          for name in (STATE, TABLE, FILM, BALANCE, RECORD)))  # fmt: skip
+          for name in (STATE, TABLE, FILM, BALANCE, RECORD, LIST, MESH)))  # fmt: skip
 PICTURES = "pictures"  # folder of those drawn here
 
 
@@ -47,13 +48,16 @@ PICTURES = "pictures"  # folder of those drawn here
 class RunFolder:
     """A folder and what is in it: rows of the steps so far, indices of those with a VTK file.
 
-    case: what decides the numbers; numbers: columns of pairs and supports; saved: index of the
+    case: what decides the numbers; numbers: columns of pairs and supports; title: for files;
+    xdmf: write that too; saved: index of the
     last state that is safe, -1 for none; record: what solution.json holds.
     """
 
     folder: Path
     case: dict[str, Any]
     numbers: tuple[str, ...] = ()
+    title: str = ""
+    xdmf: bool = False
     rows: list[tuple] = field(default_factory=list)
     pictures: list[int] = field(default_factory=list)
     saved: int = -1
@@ -75,12 +79,14 @@ class RunFolder:
         """Write the VTK file of a step, once."""
         if step.state.index not in self.pictures[-1:]:
             with replacing(self.folder / picture_name(step.state.index)) as path:
-                write_model(step.model, step.fields, step, path)  # type: ignore[arg-type]
+                write_model(step.model, step.fields, step, path, self.title)
+            if self.xdmf:
+                write_step(self.folder, step, self.title, with_mesh=not self._in_series())
             self.pictures.append(step.state.index)
 
-    def keep(self, step: TimeStep, title: str) -> None:
+    def keep(self, step: TimeStep) -> None:
         """Write the checkpoint of a step, then the files that follow from it."""
-        self.record = step_record(step, title, self.works())
+        self.record = step_record(step, self.title, self.works())
         self.save(step.state)
 
     def save(self, state: State) -> None:
@@ -95,8 +101,14 @@ class RunFolder:
         """Write the table, the numbers at the end, and the list that ParaView opens."""
         write_bytes(self.folder / TABLE, csv_of((*COLUMNS, *self.numbers), self.table))
         write_bytes(self.folder / FILM, _pvd(self.table, self.pictures))
+        if self.xdmf and self._in_series():
+            write_list(self.folder, [(self.table["time"][k - 1], k) for k in self._in_series()])
         if self.record:
             write_bytes(self.folder / RECORD, to_json(self.record).encode("utf-8"))
+
+    def _in_series(self) -> list[int]:
+        """The steps with an HDF5 file: a call before may have written VTK files alone."""
+        return [k for k in self.pictures if (self.folder / step_name(k)).exists()]
 
     def works(self) -> dict[str, float]:
         """Sums of the works of all steps so far, and of what the balance misses."""
@@ -135,8 +147,9 @@ def clear(folder: Path, name: str) -> None:
 
 
 def continued(
-    folder: Path, case: dict[str, Any], numbers: tuple[str, ...] = ()
-) -> tuple[RunFolder, State, list[str]]:
+    folder: Path, case: dict[str, Any], numbers: tuple[str, ...] = (), title: str = "",
+    xdmf: bool = False,
+) -> tuple[RunFolder, State, list[str]]:  # fmt: skip
     """The folder of a run that goes on, its state, and how this call differs, in words.
 
     Raises FileFormatError where the checkpoint belongs to another case.
@@ -156,13 +169,12 @@ def continued(
             f"{path}: is of another case: {'; '.join(others)}; begin again without --restart, "
             "or write elsewhere with -o"
         )
-    table = np.full(len(found.table), np.nan, dtype=row_of(numbers))
-    for name in table.dtype.names or ():
-        if name in names:  # a checkpoint of an older version knows no pairs
-            table[name] = found.table[name]
+    table = np.zeros(len(found.table), dtype=row_of(numbers))
+    for name in (*COLUMNS, *numbers):  # a checkpoint of an older version knows no pairs
+        table[name] = found.table[name] if name in names else np.nan
     rows = [tuple(row) for row in table.tolist()]
-    run = RunFolder(folder, case, numbers, rows, found.pictures.tolist(), found.state.index,
-                    found.record)  # fmt: skip
+    run = RunFolder(folder, case, numbers, title, xdmf, rows, found.pictures.tolist(),
+                    found.state.index, found.record)  # fmt: skip
     run.follow()
     told = differences(found.case, case)
     if not found.counts_slip:
