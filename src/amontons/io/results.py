@@ -33,6 +33,7 @@ Array = NDArray[np.float64]
 SCHEMA, RUN_SCHEMA = "amontons/solution/1", "amontons/run/1"
 LIBRARIES = ("amontons", "numpy", "scipy", "numba", "netgen-mesher")  # Netgen: CAD
 MOST_SETS = 12  # changes of sets that a summary shows; solution.json has all
+MOST_PAIRS = 8  # contact pairs that a summary tells one by one; solution.json has all
 FIGURES = (".png", ".svg", ".pdf")
 
 
@@ -305,32 +306,43 @@ def describe(output: Output) -> str:
         force = ", ".join(f"{name} {value:.6g}" for name, value in pairs)
         lines.append(f"resultant on the slave: {force}")
         lines.append(f"largest pressure: {output.fields.pressure.max(initial=0.0):.6g}")
+        if output.model is not None and 1 < len(output.model.contacts) <= MOST_PAIRS:
+            lines += _pairs_in_words(output.model, output.fields)
     lines += map(str, output.warnings)
     return "\n".join(lines)
 
 
+def _pairs_in_words(model: Model, fields: ContactFields) -> list[str]:
+    """A line for every contact pair."""
+    from ..mechanics.model.pairs import pair_results
+
+    return [
+        f"  {pair.name}: force {', '.join(f'{value:.6g}' for value in pair.force)}; area "
+        f"{pair.area:.6g}, {pair.share_sticking:.0%} of it sticks; largest pressure "
+        f"{pair.largest_pressure:.6g}"
+        for pair in pair_results(model, fields).values()
+    ]
+
+
 # ------------------------------------------------------------------------------ HDF5, VTK
 def write_h5(output: Output, path: Path) -> None:
-    """Write solution.h5: r, u, v, status, sliding, margin, and points, frames of a model.
+    """Write solution.h5: r, u, v, status, sliding, margin, and the contact fields of a model.
 
     The solution of an FCLib problem is written as an FCLib file, with the group /solution.
+    Each array says in its attributes what it is, and in which unit.
     """
-    from .fclib import hdf5_bytes, put_arrays, put_fclib
+    from .arrays_h5 import notes_of, put_all
+    from .fclib import hdf5_bytes, put_fclib
 
-    found, fields = output.solution, output.fields
-    arrays = {"r": found.r, "u": found.u, "v": found.v, "status": found.status,
-              "sliding": found.sliding.astype(np.int8), "margin": found.margin}  # fmt: skip
-    if output.model is not None and fields is not None:
-        arrays |= {"points": fields.points, "frames": fields.frames, "weights": fields.weights}
-        for body, values in zip(output.model.bodies, fields.displacement, strict=True):
-            arrays[f"displacement/{body.name}"] = values
+    found = output.solution
     notes = {"schema": SCHEMA, "outcome": found.convergence.outcome.name.lower(),
-             "error": found.convergence.error, "converged": int(found.converged)}  # fmt: skip
+             "error": found.convergence.error, "converged": int(found.converged),
+             **notes_of(output.title or found.problem.name, versions())}  # fmt: skip
 
     def fill(file: File) -> None:
         if output.from_fclib:
             put_fclib(file, found.problem, solution=found)  # type: ignore[arg-type]
-        put_arrays(file, {k: a for k, a in arrays.items() if a is not None}, notes)
+        put_all(file, found, output.model, output.fields, notes)
 
     put(path, hdf5_bytes(fill))
 
