@@ -104,9 +104,13 @@ def at_once(solution: FrictionSolution) -> dict[str, Array]:
     """slid, path, friction_work of a static solution: one way from the undeformed state.
 
     Friction grows along it in proportion, so that half of its last value acts on the way.
+    What the springs of contacts that give way take of the motion is no slip.
     """
-    slid = np.where(solution.sliding[:, None], solution.u[:, 1:], 0.0)
-    work = -0.5 * (solution.r[:, 1:] * solution.u[:, 1:]).sum(axis=1)
+    give, stays, r = solution.problem.law.give, solution.u[:, 1:], solution.r
+    if give is not None:
+        stays = stays + give[:, 1 : r.shape[1]] * r[:, 1:]
+    slid = np.where(solution.sliding[:, None], stays, 0.0)
+    work = -0.5 * (r[:, 1:] * stays).sum(axis=1)
     return {"slid": slid, "path": np.linalg.norm(slid, axis=1),
             "friction_work": np.maximum(work, 0.0)}  # fmt: skip
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...core.errors import InvalidInput, UnsupportedForm, UnsupportedLaw, within
+from ...core.errors import InvalidInput, UnsupportedForm, within
 from ...core.prepared import Prepared
 from ...linear import Direct
 from ...linear.grid_matrix import GridMatrix
@@ -26,7 +26,7 @@ from .fields import ContactFields, recover_fields
 from .held import check_outside
 from .large_deformation import LargeDeformation, large_deformation
 from .large_fields import recover_large
-from .laws import law_of, rubs
+from .laws import check_law, law_of, rubs
 from .names import named_bodies, pair_names, tuple_of
 from .nitsche import nitsche_matrices, nitsche_problem
 from .nodal_forces import follows
@@ -124,14 +124,9 @@ class Model:
     def _check_configurations(self) -> None:
         """Contacts of one kinematics, one that the bodies can have, and loads that fit."""
         for k, contact in enumerate(self.contacts):
-            self._check_orthotropy(k, contact)
+            check_law(k, contact, self.dimension, large=self.is_large)
         for k, contact in enumerate(self.contacts if self.is_large else ()):
             at = ("contacts", k, "kinematics")
-            if contact.cohesion is not None:
-                raise UnsupportedLaw(
-                    "cohesion needs small strains and contact in the reference configuration",
-                    ("contacts", k, "cohesion"), f"contact on {contact.slave!r}",
-                )  # fmt: skip
             if contact.kinematics == SMALL and self._is_hyperelastic:
                 raise InvalidInput(
                     "hyperelastic laws have contact in the current configuration, "
@@ -151,22 +146,6 @@ class Model:
                     "configuration 'current' needs large deformations: hyperelastic laws, or "
                     "contacts with kinematics='finite'", ("loads", k, "configuration"), what,
                 )  # fmt: skip
-
-    def _check_orthotropy(self, k: int, contact: Contact) -> None:
-        """What orthotropic friction needs."""
-        at, where = ("contacts", k, "mu_across"), f"contact on {contact.slave!r}"
-        if contact.mu_across is None:
-            return
-        if self.dimension == 2:
-            raise InvalidInput(
-                "in 2D there is one direction to slide along; expected one coefficient",
-                at, where,
-            )  # fmt: skip
-        if self.is_large or contact.nitsche is not None:
-            raise UnsupportedLaw(
-                "orthotropic friction needs contact forces, method 'nodal' or 'mortar', and "
-                "small strains with contact in the reference configuration", at, where,
-            )  # fmt: skip
 
     @property
     def discretisation(self) -> Discretisation:
