@@ -13,6 +13,8 @@ from ..problem.solution import FrictionSolution
 
 if TYPE_CHECKING:
     from ..mechanics.model import ContactFields, Model
+    from ..mechanics.model.pairs import PairResult
+    from ..mechanics.model.reactions import SupportResult
 
 OF_SOLUTION = (
     "problem", "r", "u", "v", "status", "sliding", "margin", "convergence", "converged",
@@ -20,7 +22,7 @@ OF_SOLUTION = (
 )  # fmt: skip
 OF_FIELDS = (
     "displacement", "points", "frames", "weights", "gap", "pressure", "shear", "slip", "force",
-    "resultant",
+    "resultant", "load", "reaction",
 )  # fmt: skip
 
 
@@ -29,7 +31,8 @@ class ModelSolution:
     """A solved model.  Forwards what FrictionSolution and ContactFields know.
 
     displacement: (nodes, dim) per body; gap, pressure (nc,), shear, slip (nc, d-1) per contact;
-    resultant (d,): force of the obstacles on the slaves, global axes; r, u, v, status and so
+    resultant (d,): force of the obstacles on the slaves, global axes; load: force and moment
+    of all loads, reaction: forces of supports, (nodes, dim) per body; r, u, v, status and so
     on as in FrictionSolution.
     """
 
@@ -54,6 +57,20 @@ class ModelSolution:
         return f"<ModelSolution of {self.model.name or 'model'}: {counts}; {outcome}>"
 
     @cached_property
+    def pairs(self) -> dict[str, PairResult]:
+        """Force, moment, area, pressure, slip, … of every contact pair, by its name."""
+        from ..mechanics.model.pairs import pair_results
+
+        return pair_results(self.model, self.fields)
+
+    @cached_property
+    def supports(self) -> dict[str, SupportResult]:
+        """Force and moment of every support, by its name."""
+        from ..mechanics.model.reactions import support_results
+
+        return support_results(self.model, self.fields)
+
+    @cached_property
     def warnings(self) -> tuple[ResultWarning, ...]:
         """Reasons to doubt a result that has converged, each with a name."""
         from ..mechanics.model.doubts import model_warnings
@@ -76,7 +93,7 @@ class ModelSolution:
         )
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Write the solution; the suffix decides: .vtu, .h5 (or .hdf5), .json."""
+        """Write the solution; the suffix decides: .vtu, .h5 (or .hdf5), .json, .csv."""
         output.write(self.output, path)
 
     def plot(self, path: str | os.PathLike[str]) -> None:

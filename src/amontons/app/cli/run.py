@@ -22,7 +22,7 @@ from ...mechanics.steps.stepping import at_end
 from ...problem.solution import Outcome
 from .doubts import Doubts
 from .locking import locked
-from .run_folder import BALANCE, PICTURES, WORKS, RunFolder, clear, continued
+from .run_folder import BALANCE, PICTURES, WORKS, RunFolder, clear, continued, numbers_of
 from .sources import open_source, with_flags
 from .stopping import Stopping
 from .terminal import check_folder, say_growth, say_notes
@@ -65,7 +65,7 @@ class _Run:
 def run(
     case: str, overrides: Sequence[str], tolerance: float | None, time_limit: float | None,
     folder: str | None, export: str | None, every: int, pictures: bool, restart: bool,
-    quiet: bool, export_steps: str | None = None,
+    quiet: bool, export_steps: str | None = None, xdmf: bool = False,
 ) -> int:  # fmt: skip
     """Step and write; returns the exit code."""
     if time_limit is not None and not time_limit > 0:
@@ -94,7 +94,7 @@ def run(
             clear(each, read.name)
         try:
             with stop.breaking():
-                results, steps = _prepared(asked, place, restart=restart)
+                results, steps = _prepared(asked, place, restart=restart, xdmf=xdmf)
         except KeyboardInterrupt:
             click.echo(f"{stop.word}.", err=True)
             return stop.code
@@ -117,18 +117,19 @@ def _chosen(export: str | None, steps: str | None) -> list[range] | None:
 
 
 def _prepared(
-    asked: _Run, place: Path, *, restart: bool
+    asked: _Run, place: Path, *, restart: bool, xdmf: bool
 ) -> tuple[RunFolder, Iterator[TimeStep]]:
     """The folder of results and the steps, from the beginning or from the checkpoint."""
     read, settings = asked.case, asked.settings
     assert read.evolution is not None
-    case = identity(read, settings)
+    case, numbers = identity(read, settings), numbers_of(read.model)
     if restart:
-        results, start, changed = continued(place, case)
+        results, start, changed = continued(place, case, numbers, read.title, xdmf)
         for text in changed:
             click.echo(f"--restart: {text}, from step {start.index + 1} on", err=True)
     else:
-        results, start = RunFolder(place, case), at_rest(read.in_time)
+        results = RunFolder(place, case, numbers, read.title, xdmf)
+        start = at_rest(read.in_time)
     steps = evolve(
         read.in_time, read.evolution.method, until=read.evolution.until, start=start,
         solver=settings.solver(), tolerance=settings.tolerance,
@@ -223,7 +224,7 @@ def _keep_last(last: TimeStep | None, results: RunFolder, asked: _Run) -> None:
 def _keep(step: TimeStep, results: RunFolder, asked: _Run) -> None:
     """Write the picture of a step and its state."""
     results.draw(step)
-    results.save(step.state)
+    results.keep(step)
     if asked.pictures:
         from ...io.plots import Frame
 
@@ -259,7 +260,7 @@ def _summary(results: RunFolder) -> None:
     table = results.table
     if not len(table):
         return
-    sums = {name: float(table[name].sum()) for name in (*WORKS, "defect")}
+    sums = results.works()
     click.echo(
         f"{len(table)} steps; work of loads {sums['loads']:.4g}, supports "
         f"{sums['supports']:.4g}, contact {sums['contact']:.4g}; dissipated by damping "

@@ -24,7 +24,7 @@ def read_contact(table: Table, mesh: Mesh) -> Contact:
     from ...mechanics.model import Contact
 
     table.only("slave", "obstacle", "master", "friction", "method", "kinematics",
-               "configuration")  # fmt: skip
+               "configuration", "name")  # fmt: skip
     method = _contact_method(table)
     slave = table.text("slave")
     for key in ("slave", "master"):
@@ -37,6 +37,8 @@ def read_contact(table: Table, mesh: Mesh) -> Contact:
     found = configuration(table)  # older words for kinematics
     if "kinematics" in table.data:
         found["kinematics"] = table.choice("kinematics", ("small", "finite"))
+    if "name" in table.data:
+        found["name"] = table.text("name")
     with table.blamed():
         if "master" in table.data:
             master = table.text("master")

@@ -27,6 +27,7 @@ from .held import check_outside
 from .large_deformation import LargeDeformation, large_deformation
 from .large_fields import recover_large
 from .laws import check_law, law_of, rubs
+from .names import named_bodies, pair_names, tuple_of
 from .nitsche import nitsche_matrices, nitsche_problem
 from .nodal_forces import follows
 from .parts import FINITE, SMALL, Body, BodyForce, Contact, Fix, Load, NodalForce, Pressure
@@ -45,7 +46,8 @@ class Model:
 
     Gaps and normals are taken once in the reference configuration, unless the contacts or
     hyperelastic laws say otherwise: then where the nodes are, see `is_large`.  load_factor
-    multiplies the loads and the prescribed displacements, not the gaps.
+    multiplies the loads and the prescribed displacements, not the gaps.  pair_names: of the
+    contacts, their own or those of their slaves, all different.
     """
 
     bodies: Sequence[Body]
@@ -54,12 +56,13 @@ class Model:
     loads: Sequence[Load] = ()
     load_factor: float = 1.0
     name: str = ""
+    pair_names: tuple[str, ...] = field(default=(), init=False, repr=False)
     _shared: Prepared = field(default_factory=Prepared, init=False, repr=False)
 
     def __post_init__(self) -> None:
         for name, kind in (("bodies", Body), ("supports", Fix), ("contacts", Contact),
                            ("loads", Load)):  # fmt: skip
-            object.__setattr__(self, name, _tuple_of(name, getattr(self, name), kind))
+            object.__setattr__(self, name, tuple_of(name, getattr(self, name), kind))
         if not self.bodies:
             raise InvalidInput("expected at least one, got none", ("bodies",))
         if not self.contacts:
@@ -72,11 +75,12 @@ class Model:
                 "expected Nitsche's method in all of them or in none, got both", ("contacts",)
             )
         self._check_configurations()
+        object.__setattr__(self, "pair_names", pair_names(self.contacts))
         if not (is_number(self.load_factor) and np.isfinite(self.load_factor)):
             raise InvalidInput(
                 f"expected a finite number, got {self.load_factor!r}", ("load_factor",)
             )
-        object.__setattr__(self, "bodies", _named(self.bodies))
+        object.__setattr__(self, "bodies", named_bodies(self.bodies))
         for part, fields in SURFACES.items():
             for k, item in enumerate(getattr(self, part)):
                 for name in (name for name in fields if hasattr(item, name)):
@@ -323,9 +327,7 @@ class Model:
         surfaces = tuple(locate(self.bodies, c.slave) for c in self.contacts)
         if self.is_large:
             return recover_large(self, surfaces, solution)
-        return recover_fields(
-            self.bodies, surfaces, self.discretisation, solution, self.load_factor
-        )
+        return recover_fields(self, surfaces, solution)
 
 
 def _first(problem: FrictionProblem) -> FrictionProblem:
@@ -356,30 +358,3 @@ def _bonded(parts: Discretisation, f: Array, w: Array) -> tuple[Array, float]:
     bonded = sparse.csc_array(stored + H @ stiffness @ H.T)
     v = Direct().factor(bonded).solve(f - H @ (stiffness @ w.ravel()))
     return v, float(np.linalg.norm(H.T @ v + w.ravel()))
-
-
-def _tuple_of(name: str, values: object, kind: object) -> tuple:
-    wanted = getattr(kind, "__name__", "Traction, Pressure, BodyForce or NodalForce")
-    if isinstance(values, kind):  # type: ignore[arg-type]
-        raise InvalidInput(f"{name}: expected a list of {wanted}, got one alone; write [it]")
-    try:
-        items = tuple(values)  # type: ignore[arg-type]
-    except TypeError as error:
-        raise InvalidInput(f"{name}: expected a list, got {values!r}") from error
-    for item in items:
-        if not isinstance(item, kind):  # type: ignore[arg-type]
-            raise InvalidInput(f"{name}: expected {wanted}, got {item!r}")
-    return items
-
-
-def _named(bodies: Sequence[Body]) -> tuple[Body, ...]:
-    """Bodies with distinct names: "body", or "body 1", "body 2", … where none is given."""
-    several = len(bodies) > 1
-    out = tuple(
-        body if body.name else replace(body, name=f"body {k + 1}" if several else "body")
-        for k, body in enumerate(bodies)
-    )
-    names = [body.name for body in out]
-    if len(set(names)) < len(names):
-        raise InvalidInput(f"bodies: expected distinct names, got {', '.join(names)}")
-    return out

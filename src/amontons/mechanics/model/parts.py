@@ -204,6 +204,8 @@ class Contact:
     kinematics: "small", gap and normal are those of the undeformed bodies, or "finite", those
     where the nodes are now (nodal, obstacles only); by default "finite" with hyperelastic laws.
     configuration: the same in older words, "reference" or "current".
+    name: of the pair in results and files; by default that of the slave, with a number where
+    several contacts share it.
     """
 
     slave: str
@@ -224,8 +226,14 @@ class Contact:
     stiffness: ScalarValue | None = None
     stick_stiffness: ScalarValue | None = None
     angle: ScalarValue | None = None  # of the direction, from t1 to t2 of the contact frame
+    name: str = ""
 
     def __post_init__(self, configuration: str | None, law: Law | None) -> None:
+        if not isinstance(self.name, str) or not self.name.isprintable():
+            raise InvalidInput(
+                f"contact on {self.slave!r}: name: expected a text on one line, got "
+                f"{shown(self.name)}"
+            )
         self._check_kinematics(configuration)
         if law is not None:
             self._take(law)

@@ -55,7 +55,9 @@ from ...problem.protocol import Problem
 from ...problem.solution import FrictionSolution
 from ...solvers.contract import Iterate
 from ..model import Model
+from ..model.reactions import support_forces
 from .energy import Energies
+from .rubbing import rubbed
 from .springs import Springs
 from .state import State, TimeStep
 from .system import Inertia, Motion
@@ -177,15 +179,24 @@ class MovingModel:
             q1 = q0 + h * (theta * v1 + (1 - theta) * v0)
             impulse = np.zeros_like(parts.carried)
             impulse[active] = solution.r
-            energies = self._energies(state, v1, q1, force, impulse)
+            energies, held_by = self._energies(state, v1, q1, force, impulse)
             excess = energies.contact - self._allowed(energies)
             changed = excess > 0 and shifts.changed(solution.r, self._local(v1)[active], excess)
             if not changed:
                 break
             shifts, start = changed, Iterate(solution.r)
         u = self._local(q1)
-        new = State(state.index + 1, time, q1, v1, impulse / h, u[:, 1:])
-        return TimeStep(self.motion.body, new, solution, active, energies, parts.gap + u[:, 0])
+        sliding = np.zeros(len(u), dtype=bool)
+        sliding[active] = solution.sliding
+        mean = 0.5 * (u0 + self._local(v1))[:, 1:]
+        pulled, last = impulse / h, state.force
+        work = (impulse[:, 1:] * mean).sum(axis=1) + self.springs.taken(last, pulled)
+        slip = self.springs.slipped(self._local(q1 - q0), last, pulled)
+        new = State(state.index + 1, time, q1, v1, pulled, u[:, 1:],
+                    **rubbed(state, slip, sliding, np.minimum(work, 0.0)))  # fmt: skip
+        reaction = support_forces(parts, held_by / h)
+        return TimeStep(self.motion.body, new, solution, active, energies, parts.gap + u[:, 0],
+                        reaction, force)  # fmt: skip
 
     def explained(self, solution: FrictionSolution) -> FrictionSolution:
         """The same record: inertia balances any load."""
@@ -231,8 +242,8 @@ class MovingModel:
 
     def _energies(
         self, state: State, v1: Array, q1: Array, force: Array, impulse: Array
-    ) -> Energies:
-        """The balance of the step, see `energy`."""
+    ) -> tuple[Energies, Array]:
+        """The balance of the step, see `energy`, and the impulses (dofs,) left to supports."""
         parts, h, theta = self.motion.parts, self.method.step, self.method.theta
         M, K, C = self.M, self.K, self.C
         dv, dq = v1 - state.velocity, q1 - state.displacement
@@ -254,7 +265,7 @@ class MovingModel:
             kinetic=float(kinetic), elastic=float(elastic) + stored, gain=float(gain),
             loads=float(force @ dq), supports=float(held @ dq) / h,
             contact=work - jump, damping=float(dq @ (C @ dq)) / h, numerical=lost - jump,
-        )  # fmt: skip
+        ), rest  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

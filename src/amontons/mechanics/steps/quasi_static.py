@@ -26,10 +26,12 @@ from ...problem.nitsche import NitscheProblem
 from ...problem.solution import FrictionSolution
 from ..model import Model
 from ..model.diagnosis import with_diagnosis
+from ..model.reactions import support_forces
 from .energy import Energies, Forces, slow_energies
 from .large_steps import LargeSlowModel
 from .moreau_jean import Solve
 from .passage import Crossing, taken
+from .rubbing import quasi_static_friction, rubbed
 from .springs import Springs
 from .state import State, TimeStep, undeformed
 from .system import Motion
@@ -102,13 +104,17 @@ class SlowModel:
         q1 = parts.spread(solution.v, prescribed)
         dq = q1 - state.displacement
         u = parts.local(q1)
-        energies = self._energies(state, q1, load, solution.r)
+        slip = self.springs.slipped(parts.local(dq), state.force, solution.r)
+        work = quasi_static_friction(state.force[:, 1:], solution.r[:, 1:], slip)
+        energies = self._energies(state, q1, load, solution.r, float(work.sum()))
         time_step = time - state.time
         velocity = dq / time_step if time_step else np.zeros_like(dq)
-        new = State(state.index + 1, time, q1, velocity, solution.r, u[:, 1:])
+        new = State(state.index + 1, time, q1, velocity, solution.r, u[:, 1:],
+                    **rubbed(state, slip, solution.sliding, work))  # fmt: skip
+        reaction = support_forces(parts, parts.missing(q1, load, solution.r))
         active = np.arange(len(parts.gap))
         return TimeStep(self.motion.body, new, solution, active, energies, parts.gap + u[:, 0],
-                        passage=passage)  # fmt: skip
+                        reaction, load, passage=passage)  # fmt: skip
 
     def _before(self, state: State, time: float) -> FrictionProblem | NitscheProblem:
         """The problem that the last state solves, slipping as it did: p = 0 of `passage`.
@@ -132,13 +138,13 @@ class SlowModel:
         """The same record; one that failed says which bodies give way."""
         return with_diagnosis(solution, self.motion.body, solution.problem.f)
 
-    def _energies(self, state: State, q1: Array, load: Array, r: Array) -> Energies:
+    def _energies(
+        self, state: State, q1: Array, load: Array, r: Array, friction: float
+    ) -> Energies:
         """The balance of `slow_energies`; r (nc, d): reactions after the step."""
         parts, dq = self.motion.parts, q1 - state.displacement
         before = self._forces(state.displacement, self.motion.load_of(state), state.force)
         after = self._forces(q1, load, r)
-        friction = float((r[:, 1:] * parts.local(dq)[:, 1:]).sum())
-        friction += self.springs.work(state.force, r)
         return slow_energies(before, after, dq, parts.held, friction)
 
     def _forces(self, q: Array, load: Array, r: Array) -> Forces:

@@ -66,9 +66,13 @@ class Springs:
         """r . C r / 2 of forces (nc, d)."""
         return 0.5 * float((self.C * force**2).sum())
 
-    def work(self, before: Array, after: Array) -> float:
-        """What r_T . du'_T has beyond r_T . du_T, of forces (nc, d) of both ends of a step."""
-        return float((self.C * after * (after - before))[:, 1:].sum())
+    def slipped(self, du: Array, before: Array, after: Array) -> Array:
+        """du'_T, (nc, d-1), of motions du and forces of both ends of a step, (nc, d) each."""
+        return (du + self.C * (after - before))[:, 1:]
+
+    def taken(self, before: Array, after: Array) -> Array:
+        """What stick springs store more at the end of a step, (nc,), of forces (nc, d)."""
+        return 0.5 * (self.C * (after**2 - before**2))[:, 1:].sum(axis=1)
 
     # ---------------------------------------------------------------- dynamics
     def of_impulses(self, law: Law, h: float, theta: float) -> Law:
