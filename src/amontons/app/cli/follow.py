@@ -27,7 +27,7 @@ SHOWN = 40  # letters of a pattern
 def run(
     source: str, overrides: Sequence[str], parameter: str, low: float, high: float,
     mu: float | None, every: bool, max_points: int, time_limit: float | None,
-    folder: str | None, json_copy: str | None, quiet: bool,
+    folder: str | None, json_copy: str | None, quiet: bool, figures: str = "png",
 ) -> int:  # fmt: skip
     """Follow, write, show; the exit code."""
     check_writable(json_copy, "--json")
@@ -49,7 +49,7 @@ def run(
         branches = [questions.follow(target, name, (low, high), **limits)]
         complete, reason = None, ""
     text = to_json(record(branches, parameter, (low, high), complete, reason, at))
-    _write(place, text, branches, opened.title)
+    _write(place, text, branches, opened.title, figures)
     if json_copy is not None:
         deliver_json(text, json_copy)
     if json_copy != "-" and not quiet:
@@ -80,13 +80,15 @@ def record(
     }  # fmt: skip
 
 
-def _write(place: Path, text: str, branches: list[Branch], title: str) -> None:
-    from ...io.plots import branch_figure, save_figure
-
+def _write(
+    place: Path, text: str, branches: list[Branch], title: str, figures: str
+) -> None:
     with made(place):
         write_bytes(place / "follow.json", text.encode("utf-8"))
-        if branches:
-            save_figure(branch_figure(branches, title=title), place / "follow.png")
+        if branches and figures != "none":
+            from ...io.plots import branch_figure, save_figure
+
+            save_figure(branch_figure(branches, title=title), place / f"follow.{figures}")
 
 
 def _show(title: str, parameter: str, branches: list[Branch], reason: str, place: Path) -> None:
