@@ -174,7 +174,8 @@ class Branch(Shown):
     def orientation(self) -> NDArray[np.int8]:
         """Sign of det J_y on the line from every point to the next, (points - 1,).
 
-        1 as without friction, -1 as between two folds, 0 where it is not defined.  It changes only where the parameter turns back.
+        1 as without friction, -1 as between two folds, 0 where it is not defined.  It changes
+        only where the parameter turns back.
         """
         from .corrector import determinant_sign
 

@@ -323,22 +323,21 @@ Exit codes: 0 every branch has come to its end, 1 one was given up, 2 bad input.
               metavar="N", help="Points of a branch in each direction.")  # fmt: skip
 @click.option("--time-limit", type=float, metavar="SECONDS", help="Stop after that time.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
-              help="Replace a value of the case; continuation.KEY is a parameter of the "
-                   "algorithm, which then steps along curves also where they are known "
-                   "exactly: step, min_step, max_step, grow, shrink, residual, change, "
-                   "min_cosine, corrections, quick, border, ahead, aside, "
-                   "switch=tangent|first-order.")  # fmt: skip
+              help="Replace a value of the case; continuation.KEY is one of the algorithm, "
+              "which then steps along curves also where they are known exactly: step, "
+              "min_step, max_step, grow, shrink, residual, change, min_cosine, corrections, "
+              "quick, border, ahead, aside, switch=tangent|first-order.")  # fmt: skip
 @click.option("-o", "--output", "folder", metavar="DIR",
               help="Folder for the results. [name of the source with -results]")  # fmt: skip
 @click.option("--json", "json_copy", metavar="FILE",
               help="A copy of follow.json; - prints it and nothing else.")  # fmt: skip
-@flags.figures
+@flags.axes
 @click.option("--quiet", is_flag=True, help="No summary.")
 def follow(**options: object) -> int:
     """Follow the solutions while the load or the friction changes: folds, events, branches.
 
     SOURCE is a TOML case file, an FCLib HDF5 file, or example:NAME.  Writes follow.json (points
-    and events) and follow.png into DIR.
+    and events), follow.csv and follow.png into DIR.
     """
     from .follow import run as run_follow
 

@@ -19,6 +19,15 @@ def figures(command: Command) -> Command:
     return chosen(none(command))
 
 
+def axes(command: Command) -> Command:
+    """Of commands that draw branches: what over what, and in which format."""
+    known = '"r_N 3", "sum r_T", "force x", "displacement y SURFACE", norm, arclength'
+    up = click.option("--y", metavar="NAME",
+                      help=f"What the figure shows: {known}. [sum r_N]")  # fmt: skip
+    across = click.option("--x", metavar="NAME", help="Over what. [the parameter]")
+    return across(up(figures(command)))
+
+
 def fclib_error(command: Command) -> Command:
     """The published error where it costs something."""
     return click.option(

@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import RendererAgg
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgb
+from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
 from ...problem.solution import ContactStatus
@@ -25,6 +27,18 @@ WIDTHS = {ContactStatus.OPEN: 3.6, ContactStatus.SLIP: 2.6,
 MANY_CELLS = 1500  # in 2D, above which their sides are not drawn
 MARGIN = 0.04  # around the bodies, relative to the picture
 TRIAD = 0.07  # length of the axes in the corner, relative to the picture
+
+
+class _Picture(AxesImage):
+    """An image that vector formats get in the resolution of its buffer."""
+
+    fine: NDArray[np.uint8]
+
+    def draw(self, renderer: Any) -> None:
+        """Draw it; pixels of the screen take the smoothed one as it is."""
+        if not isinstance(renderer, RendererAgg):
+            self.set_data(self.fine)
+        super().draw(renderer)
 
 
 def draw_bodies(
@@ -94,8 +108,10 @@ def _draw_surfaces(
     image = render(scene.camera, moved, scene.sides, tints[scene.body_of % len(STONE)], painted,
                    window)  # fmt: skip
     limits = (window.left, window.right, window.low, window.high)
-    axes.imshow(image.colours, extent=limits, origin="lower", aspect="auto",
-                interpolation="nearest")  # fmt: skip
+    shown = _Picture(axes, extent=limits, origin="lower", interpolation="none")
+    shown.set_data(image.colours)
+    shown.fine = image.fine
+    axes.add_image(shown)
     axes.set(xlim=limits[:2], ylim=limits[2:])
     axes.set_axis_off()
     return image

@@ -83,7 +83,7 @@ def _covered(
     y = np.arange(up, dtype=np.float32) + 0.5
     dx, dy = (low[group, k] - a[:, k] for k in (0, 1))
 
-    def share(ex: Array, ey: Array) -> Array:
+    def share(ex: NDArray[Any], ey: NDArray[Any]) -> NDArray[Any]:
         """One barycentric coordinate at all pixels of the boxes, (k, up, across)."""
         along = (dx[:, None] + x) * (ey * inverse)[:, None]
         across_ = (dy[:, None] + y) * (ex * inverse)[:, None]

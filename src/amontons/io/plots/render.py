@@ -55,6 +55,7 @@ class Image:
     """An RGB image, rows upwards, and what it shows at every pixel of its buffer."""
 
     colours: NDArray[np.uint8]
+    fine: NDArray[np.uint8]  # as the buffer has it
     front: Seen
     window: Window  # of the buffer
     triangles: Index  # (k, 3) nodes
@@ -94,7 +95,7 @@ def render(
     wide = pixels.astype(np.uint16)
     rows = wide[::FINER] + wide[1::FINER]  # means of four pixels, that edges become smooth
     small = (rows[:, ::FINER] + rows[:, 1::FINER]) // FINER**2
-    return Image(small.astype(np.uint8), found, fine, triangles)
+    return Image(small.astype(np.uint8), pixels, found, fine, triangles)
 
 
 def _cut(table: Index) -> Index:

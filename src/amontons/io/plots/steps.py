@@ -10,9 +10,7 @@ from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
 
-import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from PIL import Image  # comes with matplotlib
@@ -23,7 +21,7 @@ from ...mechanics.model import Model
 from ...problem.solution import ContactStatus
 from .bodies import JOINTS, WIDTHS, draw_bodies
 from .layout import Sheet
-from .saving import save_figure
+from .saving import picture
 from .scene import Frame, Scene, magnification, room_needed
 from .style import UNKNOWN, Units, stamp_panel, with_unit
 
@@ -116,8 +114,9 @@ def draw_film(
         for k, frame in enumerate(frames, start=1):
             figure = step_figure(scene, frame, magnify=factor, room=room, units=units)
             paths.append(folder / f"{name}-{k:05d}.png")
-            save_figure(figure, paths[-1])
-            images.append(_image(figure))
+            drawn = picture(figure)
+            write_bytes(paths[-1], drawn)
+            images.append(_few_colours(drawn))
         if images:
             paths.append(folder / "film.gif")
             write_bytes(paths[-1], _film(images))
@@ -133,9 +132,7 @@ def _film(images: list[Image.Image]) -> bytes:
     return film.getvalue()
 
 
-def _image(figure: Figure) -> Image.Image:
-    """A figure with few colours, as a GIF wants it."""
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+def _few_colours(drawn: bytes) -> Image.Image:
+    """A picture as a GIF wants it."""
+    image = Image.open(BytesIO(drawn)).convert("RGB")
     return image.quantize(colors=64, dither=Image.Dither.NONE)

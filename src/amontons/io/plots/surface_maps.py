@@ -22,6 +22,7 @@ Patches = Iterator[tuple[Array, NDArray[np.int64]]]  # polygons (k, 4, 2) and th
 QUARTERS = {"quad9": ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3))}
 HEAT = "YlOrRd"
 TINY = 1e-300  # instead of a largest pressure of 0
+KEY = 0.36  # inches of the key of the arrows below its panel
 MAX_ARROWS = 400
 ARROW_LENGTH = 2.2  # of the longest, in spacings of the arrows: neighbours stay apart
 
@@ -130,6 +131,9 @@ def _shear_arrows(axes: Axes, pair: ContactPair, origin: Array, view: Array) -> 
     arrows = axes.quiver(at[:, 0], at[:, 1], shear[:, 0], shear[:, 1], color=INK, angles="xy",
                          scale_units="xy", scale=scale, width=0.003, pivot="tail")  # fmt: skip
     value = round_below(float(length.max()))
-    axes.quiverkey(arrows, 0.86, -0.12, value, f"{value:g}", labelpos="S", color=INK,
-                   labelsep=0.05, fontproperties={"size": 9})  # fmt: skip
+    place = axes.get_position(original=True)  # whatever shape the panel takes inside of it
+    inch = 1.0 / axes.get_figure(root=True).get_size_inches()[1]  # type: ignore[union-attr]
+    axes.quiverkey(arrows, place.x0 + 0.9 * place.width, place.y0 - KEY * inch, value,
+                   f"{value:g}", labelpos="S", color=INK, labelsep=0.05, coordinates="figure",
+                   fontproperties={"size": 8})  # fmt: skip
     return at + shear / scale
