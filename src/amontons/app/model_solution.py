@@ -96,6 +96,11 @@ class ModelSolution:
         """Write the solution; the suffix decides: .vtu, .h5 (or .hdf5), .json, .csv."""
         output.write(self.output, path)
 
-    def plot(self, path: str | os.PathLike[str]) -> None:
-        """Draw the status map of the contact surface and the pressure: .png, .svg or .pdf."""
-        output.plot(self.output, path)
+    def plot(self, path: str | os.PathLike[str] | None = None, **options: Any) -> Any:
+        """A figure of bodies, statuses and pressures, written to `path` too: .png, .svg, .pdf.
+
+        options: title.
+        """
+        from ..io.plots.faces import plot
+
+        return plot(self.output, path, **options)

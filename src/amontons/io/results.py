@@ -6,7 +6,7 @@ import json
 import math
 import os
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
 from enum import Enum
@@ -54,6 +54,8 @@ class Output:
     uniqueness: dict[str, Any] | None = None  # what is known about other solutions
     warnings: tuple[ResultWarning, ...] = ()
     notes: tuple[str, ...] = ()  # what its file says and the model leaves out
+    fclib_error: bool = False  # evaluate it also where that takes a factorisation of M
+    figures: str = "png"  # format of the figures that `save` writes; "" for none
 
 
 # ------------------------------------------------------------------------------- choosing
@@ -70,13 +72,6 @@ def write(output: Output, path: str | os.PathLike[str]) -> None:
         writers[suffix](output, temporary)
 
 
-def plot(output: Output, path: str | os.PathLike[str]) -> None:
-    """Draw the status figure; the suffix decides: .png, .svg, .pdf."""
-    expect_picture(path)
-    with replacing(path) as temporary:
-        plot_status(output, temporary)
-
-
 def expect_picture(path: str | os.PathLike[str]) -> None:
     """Raise InvalidInput unless the suffix is that of a picture."""
     suffix = Path(path).suffix.lower()
@@ -87,7 +82,7 @@ def expect_picture(path: str | os.PathLike[str]) -> None:
 
 
 def plot_status(output: Output, path: Path) -> None:
-    """Write status.png."""
+    """Write the figure of the statuses."""
     from .plots import picture, status_figure
 
     figure = status_figure(output.solution, output.fields, output.title, output.model)
@@ -95,7 +90,7 @@ def plot_status(output: Output, path: Path) -> None:
 
 
 def plot_convergence(output: Output, path: Path) -> None:
-    """Write convergence.png."""
+    """Write the figure of the errors."""
     from .plots import convergence_figure, picture
 
     figure = convergence_figure(output.solution.convergence, output.title)
@@ -113,8 +108,10 @@ def save(
     text = to_json(summary(output))  # before the first folder: it evaluates the solution
     writers: dict[str, Callable[[Output, Path], None]] = {
         "solution.json": lambda output, path: _write_text(path, text), "solution.h5": write_h5,
-        "status.png": plot_status, "convergence.png": plot_convergence,
     }  # fmt: skip
+    if output.figures:
+        writers[f"status.{output.figures}"] = plot_status
+        writers[f"convergence.{output.figures}"] = plot_convergence
     if output.model is not None:
         writers |= {"solution.vtu": write_vtu, "pairs.csv": write_csv}
     folder = Path(folder)
@@ -125,7 +122,16 @@ def save(
         stack.enter_context(made(folder))
         for path, writer in jobs:
             writer(output, stack.enter_context(replacing(path)))
+        _remove_others(folder, writers)
     return [path for path, _ in jobs]
+
+
+def _remove_others(folder: Path, written: Iterable[str]) -> None:
+    """Figures of an earlier solution in other formats would be taken for those of this one."""
+    for name in ("status", "convergence"):
+        for suffix in FIGURES:
+            if f"{name}{suffix}" not in written:
+                (folder / f"{name}{suffix}").unlink(missing_ok=True)
 
 
 def _write_text(path: Path, text: str) -> None:
@@ -139,6 +145,7 @@ def summary(output: Output) -> dict[str, Any]:
     problem = found.problem
     setup = record.history[0].seconds if record.history else 0.0
     contacts = {"total": problem.contacts, **found.counts, "sliding": int(found.sliding.sum())}
+    asked = output.fclib_error or problem.knows_q
     resultant = None if output.fields is None else output.fields.resultant.tolist()
     numbers: dict[str, Any] = {"pairs": None, "supports": None, "load": None}
     if output.model is not None and output.fields is not None:
@@ -157,7 +164,7 @@ def summary(output: Output) -> dict[str, Any]:
         "error": record.error,
         "contact_error": record.contact_error,
         "weakest": record.weakest,
-        "fclib_error": found.fclib_error,
+        "fclib_error": found.fclib_error if asked else None,
         "measure": record.measure.value,
         "tolerance": record.tolerance,
         "contact_tolerance": record.contact_tolerance,

@@ -220,6 +220,11 @@ class FrictionProblem(Equations):
             )
         return problem.assembled() if stored else problem
 
+    @property
+    def knows_q(self) -> bool:  # type: ignore[override]
+        """True where the free velocity is given, or has been found before."""
+        return self.q is not None or "_free" in self.__dict__
+
     def condensed(self, deadline: Deadline = NEVER) -> FrictionProblem:
         """The Delassus form of this problem: W = H^T M^-1 H, q = H^T M^-1 f + w.
 

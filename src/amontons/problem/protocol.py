@@ -63,6 +63,7 @@ class Problem:
     measure: Measure = Measure.RESIDUAL  # what `error` is called in records
     has_v: bool = True  # False where reactions are the only unknowns
     has_q: ClassVar[bool] = False  # True where published measures apply: there is a q
+    knows_q: bool = False  # True where q is at hand, without a factorisation of M
     guess: Array | None = None  # some v (n,) near the solution, if better than 0
     gains_energy: bool = False  # True where no method can be expected to come to an end
     judge_flops: float = 0.0  # floating point operations of a judgement where they are counted

@@ -83,6 +83,8 @@ class Step(NamedTuple):
     seconds: float
     sets: ActiveSets | None = None  # of an active set method
     flops: float | None = None  # floating point operations so far; None: not counted
+    stage: str = ""  # which method of a combination made it
+    own: tuple[float, ...] = ()  # errors since the last, by the method's own measure; unjudged
 
 
 @dataclass(frozen=True, eq=False)

@@ -46,6 +46,7 @@ class Iterate:
     sets: ActiveSets | None = None  # of a method that decides by sets of contacts
     ends: str | None = None
     flops: float | None = None  # floating point operations since the last; None: not counted
+    own: tuple[float, ...] = ()  # own measure of each iteration since the last, where known
 
 
 class Judgement(NamedTuple):

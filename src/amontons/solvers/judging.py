@@ -84,8 +84,9 @@ class Watch:
         seconds = now() - self.started
         self.flops = self._counted(iterate)
         step = Step(
-            self.iterations, error, self.linear_iterations, seconds, iterate.sets, self.flops
-        )
+            self.iterations, error, self.linear_iterations, seconds, iterate.sets, self.flops,
+            iterate.stage, iterate.own,
+        )  # fmt: skip
         self.history.append(step)
         self.last = weakest
         if self.best is None or self._better(error, weakest):

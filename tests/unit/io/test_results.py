@@ -252,7 +252,7 @@ def test_figure_of_several_pairs(dimension):
     found = corner(dimension)
     figure = status_figure(found.solution, found.fields, "corner", found.model)
     if dimension == 2:
-        left = figure.axes[0]
+        left = figure.axes[1]
         starts = [line.get_xdata() for line in left.lines[:4]]
         assert all((np.diff(x) > 0).all() for x in starts)
         assert {text.get_text() for text in left.texts} == {"bottom", "left"}

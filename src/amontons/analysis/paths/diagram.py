@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from ...core.clock import Deadline, now
 from ...core.errors import SingularOperator, TimeUp, UnsupportedForm
 from ...core.faces import Shown
+from ...core.files import write_bytes
 from ..tolerances import SAME
 from .continuation import Continuation
 from .following import Limits, follow_path, track_both
@@ -20,6 +22,9 @@ from .friction_path import FrictionPath
 from .path import Branch, EventKind, same, timed
 from .straight import leaving
 from .tangents import Tangent
+
+if TYPE_CHECKING:
+    from ...mechanics.model import Model
 
 Array = NDArray[np.float64]
 
@@ -71,6 +76,14 @@ class Diagram(Shown):
         branches tell.
         """
         return min(self.folds, default=None)
+
+    def to_csv(
+        self, path: str | os.PathLike[str], *quantities: str, model: Model | None = None
+    ) -> None:
+        """Write the points of all branches, one row each, as `Branch.to_csv`."""
+        from .quantities import csv_of
+
+        write_bytes(path, csv_of(self.branches, quantities, model).encode("utf-8"))
 
     def record(self) -> dict[str, Any]:
         """What the JSON file holds."""

@@ -13,10 +13,12 @@ Comput. Methods Appl. Mech. Engrg. 280 (2014).
 
 from __future__ import annotations
 
+import os
 from collections.abc import Hashable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol, runtime_checkable
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +27,14 @@ from scipy import sparse
 from ...core.arrays import Matrix
 from ...core.clock import NEVER, Deadline
 from ...core.faces import Shown
+from ...core.files import write_bytes
 from ...problem.judge.measures import Measure
 from ...problem.solution import Convergence, Outcome, Step
 from .events import Event, EventKind, Point, Stop
+
+if TYPE_CHECKING:
+    from ...mechanics.model import Model
+    from .quantities import Quantity
 
 Array = NDArray[np.float64]
 ROUNDING = 1e-12  # of a parameter, relative to one and itself
@@ -162,6 +169,42 @@ class Branch(Shown):
              **({} if tell is None else tell(point.state, point.parameter))}
             for point in self.points
         ]  # fmt: skip
+
+    @cached_property
+    def orientation(self) -> NDArray[np.int8]:
+        """Sign of det J_y on the line from every point to the next, (points - 1,).
+
+        1 as without friction, -1 as between two folds, 0 where it is not defined.  It changes
+        only where the parameter turns back.
+        """
+        from .corrector import determinant_sign
+
+        sense = np.sign(np.diff(self.parameter)).astype(np.int8)
+        found = np.zeros(len(sense), dtype=np.int8)
+        ends = np.flatnonzero(np.diff(sense)) + 1
+        for run in np.split(np.arange(len(sense)), ends) if len(sense) else ():
+            a, b = self.points[run[len(run) // 2]], self.points[run[len(run) // 2] + 1]
+            y, p = (a.state + b.state) / 2, (a.parameter + b.parameter) / 2
+            found[run] = determinant_sign(self.problem.jacobian(y, p)[0])
+        return found
+
+    def values(self, quantity: Quantity, model: Model | None = None) -> Array:
+        """A quantity at the points, (points,): "sum r_N", "r_T 3", "displacement x top", ...
+
+        See `analysis.paths.quantities` for all names; those of a model need it.  A function of
+        a solution works too.  Raises InvalidInput for a name that there is not.
+        """
+        from .quantities import values_of
+
+        return values_of(self, quantity, model)
+
+    def to_csv(
+        self, path: str | os.PathLike[str], *quantities: str, model: Model | None = None
+    ) -> None:
+        """Write the points, one row each: the table, the orientation, further quantities."""
+        from .quantities import csv_of
+
+        write_bytes(path, csv_of([self], quantities, model).encode("utf-8"))
 
     def at(self, parameter: float, deadline: Deadline = NEVER) -> list[Array]:
         """The states where the branch passes that value, in order along it.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from ... import __version__
+from . import flags
 from .group import Commands
 
 EPILOG = """\b
@@ -19,7 +20,6 @@ Examples:
 Exit codes: 0 converged, 1 not converged (results are written all the same),
 2 bad input (nothing is written), 130 interrupted (the best state is written).
 """
-SOURCE_HELP = """SOURCE is a TOML case file, an FCLib HDF5 file, or example:NAME."""
 
 
 @click.group(
@@ -72,6 +72,8 @@ Examples:
 @click.option("--uniqueness", "full_verdict", is_flag=True,
               help="Find out whether there are other solutions, for up to a minute; the cheap "
               "part of it is always done.")  # fmt: skip
+@flags.fclib_error
+@flags.figures
 @click.option("--quiet", is_flag=True, help="No progress, no summary.")
 def solve(**options: object) -> int:
     """Solve a problem and write the results.
@@ -321,21 +323,21 @@ Exit codes: 0 every branch has come to its end, 1 one was given up, 2 bad input.
               metavar="N", help="Points of a branch in each direction.")  # fmt: skip
 @click.option("--time-limit", type=float, metavar="SECONDS", help="Stop after that time.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
-              help="Replace a value of the case; continuation.KEY is a parameter of the "
-                   "algorithm, which then steps along curves also where they are known "
-                   "exactly: step, min_step, max_step, grow, shrink, residual, change, "
-                   "min_cosine, corrections, quick, border, ahead, aside, "
-                   "switch=tangent|first-order.")  # fmt: skip
+              help="Replace a value of the case; continuation.KEY is one of the algorithm, "
+              "which then steps along curves also where they are known exactly: step, "
+              "min_step, max_step, grow, shrink, residual, change, min_cosine, corrections, "
+              "quick, border, ahead, aside, switch=tangent|first-order.")  # fmt: skip
 @click.option("-o", "--output", "folder", metavar="DIR",
               help="Folder for the results. [name of the source with -results]")  # fmt: skip
 @click.option("--json", "json_copy", metavar="FILE",
               help="A copy of follow.json; - prints it and nothing else.")  # fmt: skip
+@flags.axes
 @click.option("--quiet", is_flag=True, help="No summary.")
 def follow(**options: object) -> int:
     """Follow the solutions while the load or the friction changes: folds, events, branches.
 
     SOURCE is a TOML case file, an FCLib HDF5 file, or example:NAME.  Writes follow.json (points
-    and events) and follow.png into DIR.
+    and events), follow.csv and follow.png into DIR.
     """
     from .follow import run as run_follow
 
@@ -393,8 +395,6 @@ def run(**options: object) -> int:
 @main.command()
 def examples() -> None:
     """List the built-in examples: `amontons solve example:NAME`, in time `amontons run`."""
-    from .sources import examples as known
+    from .sources import list_examples
 
-    width = max(len(name) for name in known())
-    for name, line in known().items():
-        click.echo(f"{name:<{width}}  {line}")
+    list_examples()

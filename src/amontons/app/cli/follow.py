@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from ...analysis.paths.path import Branch, Event, EventKind, Stop
+from ...analysis.paths.quantities import csv_of
 from ...core.errors import InvalidInput
 from ...core.files import made, write_bytes
 from ...io.results import to_json, versions
@@ -27,7 +28,8 @@ SHOWN = 40  # letters of a pattern
 def run(
     source: str, overrides: Sequence[str], parameter: str, low: float, high: float,
     mu: float | None, every: bool, max_points: int, time_limit: float | None,
-    folder: str | None, json_copy: str | None, quiet: bool,
+    folder: str | None, json_copy: str | None, quiet: bool, figures: str = "png",
+    x: str | None = None, y: str | None = None,
 ) -> int:  # fmt: skip
     """Follow, write, show; the exit code."""
     check_writable(json_copy, "--json")
@@ -49,7 +51,14 @@ def run(
         branches = [questions.follow(target, name, (low, high), **limits)]
         complete, reason = None, ""
     text = to_json(record(branches, parameter, (low, high), complete, reason, at))
-    _write(place, text, branches, opened.title)
+    model = opened.model if opened.has_model else None
+    table = csv_of(branches, [name for name in (x, y) if name is not None], model)
+    figure = None
+    if branches and figures != "none":
+        from ...io.plots import branch_figure
+
+        figure = branch_figure(branches, x=x, y=y, model=model, title=opened.title)
+    _write(place, text, table, figure, figures)
     if json_copy is not None:
         deliver_json(text, json_copy)
     if json_copy != "-" and not quiet:
@@ -80,13 +89,15 @@ def record(
     }  # fmt: skip
 
 
-def _write(place: Path, text: str, branches: list[Branch], title: str) -> None:
-    from ...io.plots import branch_figure, save_figure
-
+def _write(place: Path, text: str, table: str, figure: Any, suffix: str) -> None:
+    """All files, none before all of them are made."""
     with made(place):
         write_bytes(place / "follow.json", text.encode("utf-8"))
-        if branches:
-            save_figure(branch_figure(branches, title=title), place / "follow.png")
+        write_bytes(place / "follow.csv", table.encode("utf-8"))
+        if figure is not None:
+            from ...io.plots import save_figure
+
+            save_figure(figure, place / f"follow.{suffix}")
 
 
 def _show(title: str, parameter: str, branches: list[Branch], reason: str, place: Path) -> None:

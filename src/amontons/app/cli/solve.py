@@ -34,7 +34,7 @@ def run(
     max_iterations: int | None, time_limit: float | None, folder: str | None,
     json_copy: str | None, quiet: bool, full_verdict: bool,
     contact_tolerance: float | None = None, patience: int = 500, criterion: str = "judge",
-    start: str | None = None,
+    start: str | None = None, fclib_error: bool = False, figures: str = "png",
 ) -> int:  # fmt: skip
     """Solve and write; returns the exit code."""
     opened = open_source(source, overrides, method)
@@ -59,7 +59,8 @@ def run(
             patience=patience or None, criterion=Criterion(criterion),
             callback=(lambda step, iterate: None) if silent else None, start=begin,
         )  # fmt: skip
-    result = _output(opened, found, settings.method)
+    result = replace(_output(opened, found, settings.method), fclib_error=fclib_error,
+                     figures="" if figures == "none" else figures)  # fmt: skip
     left = None if settings.time_limit is None else deadline
     verdict = _verdict(found, full_verdict, left)
     if verdict is not None:

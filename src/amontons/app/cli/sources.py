@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import click
+
 from ...core.errors import FileFormatError, InvalidInput
 from ...core.expressions import nearest
 from ...io.case import DATA, Settings, make_solver, method_class, read_case
@@ -105,6 +107,14 @@ def examples() -> dict[str, str]:
             found[file.name[:-5]] = tomllib.loads(file.read_text(encoding="utf-8"))["title"]
     found |= {name: (make.__doc__ or "").splitlines()[0] for name, make in GALLERY.items()}
     return dict(sorted(found.items()))
+
+
+def list_examples() -> None:
+    """Print the built-in examples, one a line."""
+    known = examples()
+    width = max(len(name) for name in known)
+    for name, line in known.items():
+        click.echo(f"{name:<{width}}  {line}")
 
 
 def _example(name: str, overrides: Sequence[str], method: str | None) -> Case:

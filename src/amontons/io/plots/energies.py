@@ -6,11 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
 from ...core.errors import InvalidInput
 from ...mechanics.steps import Energies
-from .style import INK, UNKNOWN, Units, stamp, with_unit
+from .layout import SMALL, Sheet
+from .style import INK, UNKNOWN, Units, with_unit
 
 Array = NDArray[np.float64]
 ROUNDING = 1e-12  # work of contact that says nothing, relative to all that was put in
@@ -39,8 +41,8 @@ def energy_figure(
     stored += total("gain")[0] - stored[0]  # relative to the start
     dissipated = -total("contact")
     lost = total("damping") + total("numerical")
-    figure = Figure(figsize=(10.8, 4.4), dpi=130, layout="constrained")
-    left, right = figure.subplots(1, 2)
+    sheet = Sheet(10.8, 4.5, note=note)
+    left, right = (sheet.panel(x, 1.2, 4.4, 2.85) for x in (0.9, 6.2))
     # losses of the scheme last: those of quasi-static steps may be negative
     left.stackplot(t, stored, dissipated, lost, colors=("#56B4E9", "#E69F00", "#BBBBBB"),
                    labels=("stored (kinetic + elastic)", "dissipated by contact and friction",
@@ -70,9 +72,9 @@ def energy_figure(
               xlim=left.get_xlim())  # fmt: skip
     for axes in (left, right):
         handles = axes.get_legend_handles_labels()
-        axes.legend(*handles, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2,
-                    frameon=False, fontsize=9)  # fmt: skip
+        axes.legend(*handles, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2,
+                    frameon=False, fontsize=SMALL)  # fmt: skip
         axes.grid(alpha=0.25)
-        axes.spines[["top", "right"]].set_visible(False)
-    stamp(figure, note)
-    return figure
+    if shown:
+        right.yaxis.set_minor_locator(NullLocator())
+    return sheet.done()

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from functools import singledispatch
 from typing import Any
 
@@ -14,13 +15,19 @@ from matplotlib.figure import Figure
 from ...analysis.basins.study import Basins
 from ...analysis.paths.diagram import Diagram
 from ...analysis.paths.path import Branch
+from ...analysis.solutions.enumerate import Solutions
+from ...core.errors import InvalidInput, shown
+from ...mechanics.steps import TimeStep
 from ...problem.solution import Convergence, FrictionSolution
-from ..results import expect_picture
+from ..results import Output, expect_picture
 from .basins import basins_figure
 from .branch import branch_figure
 from .convergence import convergence_figure
 from .saving import save_figure
+from .scene import Frame, Scene, magnification
+from .several import all_solutions_figure
 from .solution import status_figure
+from .steps import series_figure, step_figure
 
 
 def plot(result: Any, path: str | os.PathLike[str] | None = None, **options: Any) -> Figure:
@@ -57,6 +64,33 @@ def _(result: Branch, **options: Any) -> Figure:
 @figure_of.register
 def _(result: Diagram, **options: Any) -> Figure:
     return branch_figure(result.branches, **options)
+
+
+@figure_of.register
+def _(result: Solutions, **options: Any) -> Figure:
+    return all_solutions_figure(result, **options)
+
+
+@figure_of.register
+def _(result: Output, *, title: str = "") -> Figure:
+    return status_figure(result.solution, result.fields, title or result.title, result.model)
+
+
+@figure_of.register
+def _(result: TimeStep, **options: Any) -> Figure:
+    frame, scene = Frame.of(result), Scene.of(result.model)
+    options.setdefault("magnify", magnification(scene, [frame]))
+    return step_figure(scene, frame, **options)
+
+
+@figure_of.register(list)
+@figure_of.register(tuple)
+def _(result: Sequence[TimeStep], **options: Any) -> Figure:
+    """Several steps side by side."""
+    if not result or not all(isinstance(step, TimeStep) for step in result):
+        raise InvalidInput(f"plot: expected steps in time, got {shown(result)}")
+    frames = [Frame.of(step) for step in result]
+    return series_figure(result[0].model, frames, **options)
 
 
 @figure_of.register

@@ -8,6 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
+from .layout import Sheet
+
 Array = NDArray[np.float64]
 LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 DASHES = ("-", "--", "-.", ":")
@@ -21,8 +23,9 @@ def profile_figure(
     what: the cost that is compared, for the label of the axis.
     """
     count = len(profiles)
-    figure = Figure(figsize=(4.6 * count + 0.4, 3.8), dpi=150, layout="constrained")
-    panels = figure.subplots(1, count, sharey=True, squeeze=False)[0]
+    columns = min(len(names), 4) or 1
+    sheet = Sheet(4.6 * count + 0.5, 3.6, rows=-(-len(names) // columns))
+    panels = [sheet.panel(0.75 + 4.6 * k, 0.6, 4.1, 2.6) for k in range(count)]
     for axes, (tolerance, (tau, rho)) in zip(panels, profiles.items(), strict=True):
         last = 1.5 * max(float(tau[-1]), 1.1)
         for k, name in enumerate(names):
@@ -34,11 +37,11 @@ def profile_figure(
                  xlabel=f"{what} / best {what}", title=f"tolerance {tolerance:g}")  # fmt: skip
         _plain_ticks(axes, last)
         axes.grid(alpha=0.25)
-        axes.spines[["top", "right"]].set_visible(False)
-    panels[0].set_ylabel("share of problems solved")
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center",
-                  ncols=min(len(names), 4), frameon=False)  # fmt: skip
-    return figure
+        axes.tick_params(labelleft=axes is panels[0])
+    if panels:
+        panels[0].set_ylabel("share of problems solved")
+        sheet.legend(panels[0].get_legend_handles_labels()[0], columns)
+    return sheet.done()
 
 
 def _plain_ticks(axes: Axes, last: float) -> None:

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from ...problem.solution import ContactStatus, FrictionSolution
+from .layout import decades
 from .style import COLOURS, INK, MARKERS, marker_size
 
 WIDE = 1e2  # ratio of largest to smallest reaction above which axes are logarithmic
@@ -17,7 +18,7 @@ def cone_plane(axes: Axes, solution: FrictionSolution) -> None:
     bound = solution.problem.law.bound(solution.r)
     shear = np.linalg.norm(solution.r[:, 1:], axis=1)
     closed = (solution.status != ContactStatus.OPEN) & (bound > 0)
-    axes.set(xlabel="friction bound  $\\mu r_N$", ylabel="tangential reaction  $|r_T|$",
+    axes.set(xlabel="friction bound  μ r_N", ylabel="tangential reaction  |r_T|",
              title="Reactions and the friction cone")  # fmt: skip
     if not closed.any():
         axes.text(0.5, 0.5, "no contact transmits friction", ha="center", va="center",
@@ -31,6 +32,8 @@ def cone_plane(axes: Axes, solution: FrictionSolution) -> None:
         low = max(low, 1e-6 * high)  # what lies lower is rounding
         axes.set_xlim(low / 2, 2 * high)
         axes.set_ylim(low / 20, 2 * high)
+        decades(axes.xaxis, low / 2, 2 * high)
+        decades(axes.yaxis, low / 20, 2 * high)
         line = np.geomspace(low / 2, 2 * high, 50)
     else:
         axes.set_xlim(0, 1.1 * high)
@@ -53,11 +56,13 @@ def ranked_reactions(axes: Axes, solution: FrictionSolution) -> None:
     order = np.argsort(-normal, kind="stable")
     rank = np.arange(1, len(order) + 1)
     positive = normal[(normal > 0) & (solution.status != ContactStatus.OPEN)]
-    axes.set(xlabel="contacts, largest reaction first", ylabel="normal reaction  $r_N$",
+    axes.set(xlabel="contacts, largest reaction first", ylabel="normal reaction  r_N",
              title="How the contacts share the load")  # fmt: skip
     if positive.size and positive.max() > WIDE * positive.min():
         axes.set_yscale("log")
-        axes.set_ylim(max(positive.min(), 1e-9 * positive.max()) / 2, 2 * positive.max())
+        low, high = max(positive.min(), 1e-9 * positive.max()) / 2, 2 * positive.max()
+        axes.set_ylim(low, high)
+        decades(axes.yaxis, low, high)
     elif positive.size:
         axes.set_ylim(0, 1.1 * positive.max())
     for status in ContactStatus:

@@ -1,25 +1,28 @@
-"""What is seen of a deformed model: its visible sides and joints, and how much it is magnified.
+"""What is seen of a deformed model: its surfaces and joints, and how much it is magnified.
 
-Bodies in 3D are seen from the front along the thinnest direction of the whole; joints are the
-slave edges on that side.
+Bodies in 3D are seen from above, a little aside from the direction in which they are thinnest;
+joints are the edges of the slave surfaces.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mechanics.model import Model
-from ...mechanics.steps import TimeStep
+from .camera import Camera
 from .style import round_below
+
+if TYPE_CHECKING:
+    from ...mechanics.model import Model
+    from ...mechanics.steps import TimeStep
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 SHOWN = 0.12  # size that the largest displacement gets, relative to the whole
-FRONT = 1e-6  # part of the depth within which nodes lie on the side that is seen
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,66 +45,78 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """The visible sides and joints of a model, found once for all pictures."""
+    """The surfaces and joints of a model, found once for all pictures.
+
+    Nodes are those of all bodies one after another.  sides: tables of nodes, cells in 2D and
+    facets outwards in 3D; outline (k, 2): sides of the boundary in 2D, empty in 3D; body_of
+    (nodes,); contact_of (nodes,): the contact at a node, the last of several, or -1; joints:
+    edges (k, 2) of the slave surfaces, and the contacts at their ends.
+    """
 
     model: Model
-    axes: tuple[int, int] = field(init=False)
-    sides: list[tuple[int, Index]] = field(init=False)  # body, nodes of its visible facets
-    joints: list[tuple[int, Index, Index]] = field(init=False)  # body, edges, contacts at ends
+    camera: Camera
+    points: Array = field(init=False)
+    body_of: Index = field(init=False)
+    sides: list[Index] = field(init=False)
+    outline: Index = field(init=False)
+    contact_of: Index = field(init=False)
+    joints: list[tuple[Index, Index]] = field(init=False)
+
+    @classmethod
+    def of(cls, model: Model, camera: Camera | None = None) -> Scene:
+        """The scene of a model, by default in its usual view."""
+        points = np.concatenate([body.mesh.points for body in model.bodies])
+        return cls(model, Camera.of(points) if camera is None else camera)
 
     def __post_init__(self) -> None:
-        points = np.concatenate([body.mesh.points for body in self.model.bodies])
-        spread = np.ptp(points, axis=0)
-        depth = int(np.argmin(spread)) if self.model.dimension == 3 else None
-        kept = [k for k in range(self.model.dimension) if k != depth]
-        near = None if depth is None else points[:, depth].min() + FRONT * spread[depth]
-        object.__setattr__(self, "axes", (kept[0], kept[1]))
-        object.__setattr__(self, "sides", self._sides(depth, near))
-        object.__setattr__(self, "joints", self._joints(depth, near))
+        meshes = [body.mesh for body in self.model.bodies]
+        counts = [len(mesh.points) for mesh in meshes]
+        first = np.cumsum([0, *counts])
+        flat = self.model.dimension == 2
+        sides = [
+            first[k] + block.nodes[:, : _corners(block.kind)]
+            for k, mesh in enumerate(meshes)
+            for block in (mesh.cells if flat else mesh.boundary)
+        ]
+        lines = [first[k] + block.nodes[:, :2] for k, mesh in enumerate(meshes) if flat
+                 for block in mesh.boundary]  # fmt: skip
+        outline = np.concatenate(lines) if lines else np.empty((0, 2), dtype=np.int64)
+        object.__setattr__(self, "outline", outline)
+        object.__setattr__(self, "points", np.concatenate([mesh.points for mesh in meshes]))
+        object.__setattr__(self, "body_of", np.repeat(np.arange(len(meshes)), counts))
+        object.__setattr__(self, "sides", sides)
+        contact_of, joints = self._joints(first)
+        object.__setattr__(self, "contact_of", contact_of)
+        object.__setattr__(self, "joints", joints)
 
-    def _seen(self, body: int, depth: int | None, near: float | None) -> NDArray[np.bool_]:
-        """Nodes of a body that lie on the visible side; all of them in 2D."""
-        points = self.model.bodies[body].mesh.points
-        if depth is None or near is None:
-            return np.ones(len(points), dtype=bool)
-        return points[:, depth] <= near
-
-    def _sides(self, depth: int | None, near: float | None) -> list[tuple[int, Index]]:
-        found = []
-        for k, body in enumerate(self.model.bodies):
-            seen = self._seen(k, depth, near)
-            blocks = body.mesh.cells if depth is None else body.mesh.boundary
-            for block in blocks:
-                nodes = block.nodes[:, : _corners(block.kind)]
-                found.append((k, nodes[seen[nodes].all(axis=1)]))
-        return found
-
-    def _joints(self, depth: int | None, near: float | None) -> list[tuple[int, Index, Index]]:
-        """Visible edges of the slave surfaces, both ends of which have a contact."""
-        bodies = self.model.bodies
-        at = [np.full(len(body.mesh.points), -1) for body in bodies]
+    def _joints(self, first: Index) -> tuple[Index, list[tuple[Index, Index]]]:
+        """The contact at every node, and the edges both ends of which have one."""
+        at = np.full(len(self.points), -1)
         surfaces: dict[tuple[int, str], None] = {}
-        first = 0
+        start = 0
         for contact, placed in zip(
             self.model.contacts, self.model.discretisation.placed, strict=True
         ):
-            at[placed.body][placed.rows.nodes] = first + np.arange(len(placed.rows.nodes))
-            first += len(placed.rows.nodes)
+            nodes = placed.rows.nodes
+            at[first[placed.body] + nodes] = start + np.arange(len(nodes))
+            start += len(nodes)
             surfaces[placed.body, contact.slave.rpartition(".")[2]] = None
         found = []
         for k, name in surfaces:
-            seen = self._seen(k, depth, near) & (at[k] >= 0)
-            for facets in bodies[k].mesh.surface(name):
-                edges = _edges(facets.nodes[:, : _corners(facets.kind)])
-                edges = edges[seen[edges].all(axis=1)]
-                found.append((k, edges, at[k][edges]))
-        return found
+            for facets in self.model.bodies[k].mesh.surface(name):
+                edges = first[k] + _edges(facets.nodes[:, : _corners(facets.kind)])
+                edges = edges[(at[edges] >= 0).all(axis=1)]
+                found.append((edges, at[edges]))
+        return at, found
 
     @property
     def size(self) -> float:
         """Length of the diagonal of the picture."""
-        points = np.concatenate([body.mesh.points for body in self.model.bodies])
-        return float(np.linalg.norm(np.ptp(points[:, list(self.axes)], axis=0)))
+        return float(np.linalg.norm(np.ptp(self.camera.project(self.points), axis=0)))
+
+    def moved(self, displacement: Sequence[Array], factor: float) -> Array:
+        """All nodes after magnified displacements, (nodes, dim)."""
+        return self.points + factor * np.concatenate(list(displacement))
 
 
 def _corners(kind: str) -> int:
@@ -118,16 +133,20 @@ def _edges(nodes: Index) -> Index:
 
 
 def magnification(scene: Scene, frames: Sequence[Frame]) -> float:
-    """A round factor that makes the largest displacement a visible part of the picture."""
+    """A round factor that makes the largest displacement a visible part of the picture.
+
+    Not below 1, which hides how large strains are, unless the bodies go out of sight.
+    """
     largest = room_needed(scene, frames)
     if largest == 0:
         return 1.0
-    return round_below(SHOWN * scene.size / largest)
+    factor = round_below(SHOWN * scene.size / largest)
+    return factor if largest > scene.size else max(1.0, factor)
 
 
 def room_needed(scene: Scene, frames: Sequence[Frame]) -> float:
     """The largest displacement in the plane of the picture, unit of length."""
     return max(
-        (float(np.abs(u[:, list(scene.axes)]).max()) for f in frames for u in f.displacement),
+        (float(np.abs(scene.camera.project(u)).max()) for f in frames for u in f.displacement),
         default=0.0,
     )

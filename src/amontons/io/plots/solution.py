@@ -1,16 +1,20 @@
-"""The state of the contacts of one solution, on their surface where there is one."""
+"""The state of the contacts of one solution: all bodies, their contact zones beside them."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from ...problem.solution import ContactStatus, FrictionSolution
-from .contact_pairs import contact_pairs
+from .bodies import draw_bodies
+from .contact_pairs import ContactPair, contact_pairs
+from .layout import Sheet
 from .reactions import cone_plane, ranked_reactions
-from .style import COLOURS, INK, stamp, status_marks
+from .scene import Frame, Scene, magnification
+from .style import COLOURS, INK, status_marks
 from .surface_curves import draw_curves
 from .surface_maps import draw_maps
 
@@ -18,6 +22,7 @@ if TYPE_CHECKING:
     from ...mechanics.model import ContactFields, Model
 
 MAX_MAPS = 4  # pairs in 3D: each has a row of its own
+ROW, BODIES, PANEL = 3.9, 3.9, 3.0  # height of a row, widths of the panels, inches
 
 
 def status_figure(
@@ -26,36 +31,86 @@ def status_figure(
     title: str = "",
     model: Model | None = None,
 ) -> Figure:
-    """Status and pressure on the contact surface; without geometry, reactions in the cone."""
-    pairs = [] if fields is None or model is None else contact_pairs(solution, fields, model)
+    """The deformed bodies, and status and pressure on the contact surfaces beside them.
+
+    Without geometry, the reactions in the friction cone, and ranked.
+    """
+    name = title or solution.problem.name or "contact status"
+    note = solution.convergence.stamp
+    if fields is None or model is None:
+        sheet = Sheet(9.6, ROW, title=name, note=note, rows=1)
+        left, right = (sheet.panel(x, 0.6, 3.7, 2.95) for x in (0.85, 5.7))
+        _reactions(left, right, solution)
+        _legend(sheet, solution, patches=False)
+        return sheet.done()
+    pairs = contact_pairs(solution, fields, model)
     maps = solution.problem.dimension == 3 and 0 < len(pairs) <= MAX_MAPS
     rows = len(pairs) if maps else 1
-    figure = Figure(figsize=(9.6, 0.4 + 4.2 * rows), dpi=150, layout="constrained")
-    panels = figure.subplots(rows, 2, squeeze=False)
-    if maps and model is not None:
-        for (left, right), pair in zip(panels, pairs, strict=True):
-            draw_maps(figure, left, right, pair, model, named=rows > 1)
-    elif pairs and solution.problem.dimension == 2:
-        draw_curves(*panels[0], pairs)
+    sheet = Sheet(BODIES + 9.1, ROW * rows, title=name, note=note, rows=1)
+    _bodies(sheet.panel(*_place(model, rows)), solution, fields, model)
+    if maps:
+        for k, pair in enumerate(pairs):
+            low = ROW * (rows - 1 - k) + 0.65
+            left, right = _beside(sheet, low, apart=0.75)
+            draw_maps(left, right, pair, model, named=rows > 1)
     else:
-        cone_plane(panels[0, 0], solution)
-        ranked_reactions(panels[0, 1], solution)
-    figure.suptitle(title or solution.problem.name or "contact status", color=INK)
-    _legend(figure, solution, markers=not maps)
-    for axes in panels.flat:
-        axes.spines[["top", "right"]].set_visible(False)
-    stamp(figure, solution.convergence.stamp)
-    return figure
+        _without_maps(sheet, solution, pairs)
+    _legend(sheet, solution, patches=maps)
+    return sheet.done()
 
 
-def _legend(figure: Figure, solution: FrictionSolution, markers: bool) -> None:
-    """One legend below both panels, with the number of contacts in every state."""
+def _place(model: Model, rows: int) -> tuple[float, float, float, float]:
+    """Where the bodies are drawn: left, bottom, width, height in inches."""
+    if model.dimension == 2:
+        return 0.6, 0.6, BODIES - 0.6, ROW - 0.95
+    height = min(ROW * rows - 0.4, 1.6 * BODIES)
+    return 0.1, (ROW * rows - height) / 2 - 0.05, BODIES, height
+
+
+def _beside(sheet: Sheet, low: float, apart: float) -> tuple[Axes, Axes]:
+    """The two panels of a row beside the bodies."""
+    left, high = BODIES + 0.95, ROW - 1.0
+    return (sheet.panel(left, low, PANEL, high),
+            sheet.panel(left + PANEL + apart, low, PANEL, high))  # fmt: skip
+
+
+def _bodies(
+    axes: Axes, solution: FrictionSolution, fields: ContactFields, model: Model
+) -> None:
+    """All bodies, deformed."""
+    scene = Scene.of(model)
+    frame = Frame(0.0, fields.displacement, solution.status)
+    factor = magnification(scene, [frame])
+    if model.dimension == 2:
+        axes.set(xlabel="x", ylabel="y")
+    draw_bodies(axes, scene, scene.moved(fields.displacement, factor), solution.status)
+    axes.set_title(f"Bodies, displacements × {factor:g}")
+
+
+def _without_maps(
+    sheet: Sheet, solution: FrictionSolution, pairs: list[ContactPair]
+) -> None:
+    """Curves along the surfaces in 2D, the reactions where there are too many in 3D."""
+    left, right = _beside(sheet, 0.6, apart=0.95)
+    if pairs and solution.problem.dimension == 2:
+        draw_curves(left, right, pairs)
+    else:
+        _reactions(left, right, solution)
+
+
+def _reactions(left: Axes, right: Axes, solution: FrictionSolution) -> None:
+    cone_plane(left, solution)
+    ranked_reactions(right, solution)
+
+
+def _legend(sheet: Sheet, solution: FrictionSolution, *, patches: bool) -> None:
+    """One legend below all panels, with the number of contacts in every state."""
     labels = {
         status: f"{status.name.lower()}: {solution.counts[status.name.lower()]}"
         for status in ContactStatus
     }
-    handles = status_marks(labels) if markers else [
+    handles = status_marks(labels) if not patches else [
         Patch(facecolor=COLOURS[status], edgecolor=INK, label=label)
         for status, label in labels.items()
     ]  # fmt: skip
-    figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
+    sheet.legend(handles, len(handles))

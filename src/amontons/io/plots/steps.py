@@ -10,29 +10,21 @@ from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
 
-import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 from PIL import Image  # comes with matplotlib
 
 from ...core.errors import InvalidInput
 from ...core.files import made, write_bytes
 from ...mechanics.model import Model
 from ...problem.solution import ContactStatus
-from .saving import save_figure
+from .bodies import JOINTS, WIDTHS, draw_bodies
+from .layout import Sheet
+from .saving import picture
 from .scene import Frame, Scene, magnification, room_needed
-from .style import UNKNOWN, Units, stamp, stamp_panel
+from .style import UNKNOWN, Units, stamp_panel, with_unit
 
-Array = NDArray[np.float64]
-STONE, EDGE = "#F1EDE6", "#B9B2A6"
-JOINTS = {ContactStatus.OPEN: "#CC79A7", ContactStatus.SLIP: "#E69F00",
-          ContactStatus.STICK: "#0072B2"}  # fmt: skip
-WIDTHS = {ContactStatus.OPEN: 3.6, ContactStatus.SLIP: 2.6,
-          ContactStatus.STICK: 1.3}  # fmt: skip  # points: told apart without colour too
 SECONDS = 0.25  # of one picture of a film
 LAST = 2.0  # seconds for which a film rests on its last picture
 
@@ -41,20 +33,22 @@ def step_figure(
     model: Model | Scene, frame: Frame, *, magnify: float = 1.0, room: float = 0.0,
     units: Units = UNKNOWN,
 ) -> Figure:  # fmt: skip
-    """The deformed bodies, their joints coloured by status.
+    """All bodies, deformed, their joints coloured by status.
 
     magnify: factor on displacements; room: magnified displacement that must fit in, unit of
     length, so that all pictures of a film have one frame.
     """
-    scene = model if isinstance(model, Scene) else Scene(model)
-    figure = Figure(figsize=(7.6, 6.4), dpi=110, layout="constrained")
-    axes = figure.subplots()
+    scene = model if isinstance(model, Scene) else Scene.of(model)
+    title = f"{_moment(frame, units)}, displacements × {magnify:g}"
+    sheet = Sheet(7.6, 5.6, title=title, note=frame.stamp, rows=1)
+    if scene.model.dimension == 2:
+        axes = sheet.panel(0.85, 0.6, 6.5, 4.9)
+    else:
+        axes = sheet.panel(0.1, 0.05, 7.4, 5.5)
     _draw_step(axes, scene, frame, magnify, room, units)
-    axes.set_title(f"{_moment(frame, units)}, displacements × {magnify:g}")
     labels = {s: f"{s.name.lower()}: {int((frame.status == s).sum())}" for s in ContactStatus}
-    _joint_legend(figure, labels)
-    stamp(figure, frame.stamp)
-    return figure
+    _joint_legend(sheet, labels)
+    return sheet.done()
 
 
 def series_figure(
@@ -63,22 +57,23 @@ def series_figure(
     """Some steps side by side, magnified alike; raises InvalidInput when there is none."""
     if not frames:
         raise InvalidInput("frames: expected at least one, got none")
-    scene = model if isinstance(model, Scene) else Scene(model)
+    scene = model if isinstance(model, Scene) else Scene.of(model)
     factor, room = magnification(scene, frames), room_needed(scene, frames)
-    figure = Figure(figsize=(3.4 * len(frames) + 0.5, 5.1), dpi=120, layout="constrained")
-    panels = figure.subplots(1, len(frames), sharey=True, squeeze=False)[0]
-    for axes, frame in zip(panels, frames, strict=True):
+    title = f"Joints by status of their contacts, displacements × {factor:g}"
+    sheet = Sheet(3.4 * len(frames) + 0.8, 3.9, title=title, rows=1)
+    for k, frame in enumerate(frames):
+        axes = sheet.panel(0.75 + 3.4 * k, 0.55, 3.2, 2.85)
         _draw_step(axes, scene, frame, factor, factor * room, units)
         shares = [int((frame.status == s).sum()) for s in ContactStatus]
         counted = ", ".join(
             f"{n} {s.name.lower()}" for n, s in zip(shares, ContactStatus, strict=True)
         )
-        axes.set_title(f"{_moment(frame, units)}\n{counted}", fontsize=10)
-        axes.label_outer()
+        axes.set_title(f"{_moment(frame, units)}\n{counted}")
+        if k:
+            axes.set_ylabel("")
         stamp_panel(axes, frame.stamp)
-    _joint_legend(figure, {s: s.name.lower() for s in ContactStatus})
-    figure.suptitle(f"Joints by status of their contacts, displacements × {factor:g}\n")
-    return figure
+    _joint_legend(sheet, {s: s.name.lower() for s in ContactStatus})
+    return sheet.done()
 
 
 def _moment(frame: Frame, units: Units) -> str:
@@ -88,53 +83,18 @@ def _moment(frame: Frame, units: Units) -> str:
 def _draw_step(
     axes: Axes, scene: Scene, frame: Frame, magnify: float, room: float, units: Units
 ) -> None:
-    """Deformed sides and joints in one frame for all steps."""
-    moved = [
-        (body.mesh.points + magnify * u)[:, list(scene.axes)]
-        for body, u in zip(scene.model.bodies, frame.displacement, strict=True)
-    ]
-    for body, nodes in scene.sides:
-        axes.add_collection(
-            PolyCollection(
-                list(moved[body][nodes]), facecolors=STONE, edgecolors=EDGE, linewidths=0.4
-            )
-        )
-    _draw_joints(axes, scene, frame, moved)
-    start = np.concatenate([b.mesh.points[:, list(scene.axes)] for b in scene.model.bodies])
-    margin = room + 0.02 * scene.size
-    low, high = start.min(axis=0) - margin, start.max(axis=0) + margin
-    x, y = ("xyz"[k] for k in scene.axes)
-    length = units.length or "unit of length"
-    axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]),
-             xlabel=f"${x}$ in {length}", ylabel=f"${y}$ in {length}")  # fmt: skip
-    axes.spines[["top", "right"]].set_visible(False)
+    """Deformed bodies and joints in one frame for all steps."""
+    moved = scene.moved(frame.displacement, magnify)
+    draw_bodies(axes, scene, moved, frame.status, room=room, joints=JOINTS, length=units.length)
+    axes.set(xlabel=with_unit("x", units.length), ylabel=with_unit("y", units.length))
 
 
-def _joint_legend(figure: Figure, labels: dict[ContactStatus, str]) -> None:
+def _joint_legend(sheet: Sheet, labels: dict[ContactStatus, str]) -> None:
     handles = [
         Line2D([], [], color=JOINTS[s], linewidth=1.5 * WIDTHS[s], label=text)
         for s, text in labels.items()
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
-
-
-def _draw_joints(axes: Axes, scene: Scene, frame: Frame, moved: list[Array]) -> None:
-    """Half an edge for each of its two contacts; open ones last, so that cracks show."""
-    halves: dict[int, list[Array]] = {int(s): [] for s in ContactStatus}
-    for body, edges, contacts in scene.joints:
-        ends = moved[body][edges]
-        middle = ends.mean(axis=1)
-        for side in (0, 1):
-            status = frame.status[contacts[:, side]]
-            half = np.stack([ends[:, side], middle], axis=1)
-            for s in ContactStatus:
-                halves[int(s)].extend(half[status == s])
-    for s in (ContactStatus.STICK, ContactStatus.SLIP, ContactStatus.OPEN):
-        axes.add_collection(
-            LineCollection(
-                halves[int(s)], colors=JOINTS[s], linewidths=WIDTHS[s], capstyle="round"
-            )
-        )
+    sheet.legend(handles, len(handles))
 
 
 def draw_film(
@@ -146,7 +106,7 @@ def draw_film(
     Returns the paths, the film last.
     """
     folder = Path(folder)
-    scene = Scene(model)
+    scene = Scene.of(model)
     factor = magnification(scene, frames)
     room = factor * room_needed(scene, frames)
     paths, images = [], []
@@ -154,8 +114,9 @@ def draw_film(
         for k, frame in enumerate(frames, start=1):
             figure = step_figure(scene, frame, magnify=factor, room=room, units=units)
             paths.append(folder / f"{name}-{k:05d}.png")
-            save_figure(figure, paths[-1])
-            images.append(_image(figure))
+            drawn = picture(figure)
+            write_bytes(paths[-1], drawn)
+            images.append(_few_colours(drawn))
         if images:
             paths.append(folder / "film.gif")
             write_bytes(paths[-1], _film(images))
@@ -171,9 +132,7 @@ def _film(images: list[Image.Image]) -> bytes:
     return film.getvalue()
 
 
-def _image(figure: Figure) -> Image.Image:
-    """A figure with few colours, as a GIF wants it."""
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+def _few_colours(drawn: bytes) -> Image.Image:
+    """A picture as a GIF wants it."""
+    image = Image.open(BytesIO(drawn)).convert("RGB")
     return image.quantize(colors=64, dither=Image.Dither.NONE)

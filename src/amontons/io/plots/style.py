@@ -70,15 +70,18 @@ def round_below(value: float) -> float:
 def stamp(figure: Figure, text: str) -> None:
     """Write over a figure that its result is none: a line on top, its first words across.
 
-    text: as `Convergence.stamp`, "" leaves the figure as it is.
+    text: as `Convergence.stamp`, "" leaves the figure as it is.  A figure without a layout
+    engine has room for the line.
     """
     if not text:
         return
     width, height = figure.get_size_inches()
     title, layout = figure.get_suptitle(), figure.get_layout_engine()
-    if title:  # stays at the top whatever the layout: room above it
+    if layout is None:
+        pass
+    elif title:  # stays at the top whatever the layout: room above it
         figure.suptitle(f"\n\n{title}", color=INK)
-    elif layout is not None:
+    else:
         layout.set(rect=(0.0, 0.0, 1.0, 1.0 - BAND / height))
     figure.text(0.5, 1.0 - 0.5 * BAND / height, text, ha="center", va="center", color="white",
                 weight="bold", fontsize=_fitting(text, width),

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ...problem.solution import ContactStatus
@@ -19,17 +18,21 @@ if TYPE_CHECKING:
     from ...mechanics.model import Model
 
 Array = NDArray[np.float64]
-Patches = Iterator[tuple[Array, NDArray[np.int64]]]  # polygons (k, corners, 2) and their nodes
+Patches = Iterator[tuple[Array, NDArray[np.int64]]]  # polygons (k, 4, 2) and their nodes
 QUARTERS = {"quad9": ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3))}
+HEAT = "YlOrRd"
+TINY = 1e-300  # instead of a largest pressure of 0
+KEY = 0.36  # inches of the key of the arrows below its panel
 MAX_ARROWS = 400
 ARROW_LENGTH = 2.2  # of the longest, in spacings of the arrows: neighbours stay apart
 
 
 def draw_maps(
-    figure: Figure, left: Axes, right: Axes, pair: ContactPair, model: Model, *, named: bool
+    left: Axes, right: Axes, pair: ContactPair, model: Model, *, named: bool
 ) -> None:
     """The surface seen along its mean normal: status left, pressure and shear arrows right."""
     origin, axes, names = _view(pair.points)
+    patches: Any
     patches, owner = _node_patches(model, pair, origin, axes)
     colours = np.array([COLOURS[status] for status in ContactStatus])[pair.status]
     known = owner >= 0
@@ -38,18 +41,31 @@ def draw_maps(
         PolyCollection(patches, facecolors=face, edgecolors=face, linewidths=0.2)
     )
     pressure = np.where(known, pair.pressure[np.maximum(owner, 0)], 0.0)
-    shown = PolyCollection(patches, array=pressure, cmap="YlOrRd", edgecolors="face",
-                           linewidths=0.2)  # fmt: skip
-    right.add_collection(shown)
-    figure.colorbar(shown, ax=right, label="pressure", shrink=0.85)
+    largest = max(float(pressure.max(initial=0.0)), TINY)
+    right.add_collection(
+        PolyCollection(patches, array=pressure, cmap=HEAT, clim=(0.0, largest),
+                       edgecolors="face", linewidths=0.2)
+    )  # fmt: skip
+    _draw_scale(right, largest)
     tips = _shear_arrows(right, pair, origin, axes)
     place = f" on {pair.name}" if named else ""
     left.set_title(f"Contact status{place}")
-    right.set_title("Pressure, and shear on the slave (arrows)")
+    right.set_title("Pressure, shear on the slave (arrows)")
     for panel in (left, right):
         panel.set(aspect="equal", xlabel=names[0], ylabel=names[1])
         panel.update_datalim(tips)  # no arrow leaves the frame; both panels show the same
         panel.autoscale_view()
+
+
+def _draw_scale(axes: Axes, largest: float) -> None:
+    """Colours of the pressures from 0 on, to the right of a panel whatever its shape."""
+    scale = axes.inset_axes((1.04, 0.08, 0.05, 0.84))
+    scale.imshow(np.linspace(0, 1, 128)[:, None], cmap=HEAT, origin="lower", aspect="auto",
+                 extent=(0.0, 1.0, 0.0, largest))  # fmt: skip
+    scale.set(xticks=[], ylabel="pressure")
+    scale.yaxis.set(ticks_position="right", label_position="right")
+    scale.tick_params(labelsize=8)
+    scale.yaxis.label.set_fontsize(9)
 
 
 def _view(points: Array) -> tuple[Array, Array, tuple[str, str]]:
@@ -66,7 +82,7 @@ def _view(points: Array) -> tuple[Array, Array, tuple[str, str]]:
 
 def _node_patches(
     model: Model, pair: ContactPair, origin: Array, axes: Array
-) -> tuple[list[Array], NDArray[np.int64]]:
+) -> tuple[Array, NDArray[np.int64]]:
     """Facets cut into one patch per node, and the contact at that node or -1."""
     patches, owner = [], []
     points = (model.bodies[pair.body].mesh.points - origin) @ axes.T
@@ -76,9 +92,9 @@ def _node_patches(
         cut = _thirds if facets.kind == "tri6" else _quarters
         for table in QUARTERS.get(facets.kind, [slice(None)]):
             for patch, nodes in cut(points, facets.nodes[:, table]):
-                patches.extend(patch)
+                patches.append(patch)
                 owner.append(contact[nodes])
-    return patches, np.concatenate(owner)
+    return np.concatenate(patches), np.concatenate(owner)
 
 
 def _quarters(points: Array, nodes: NDArray[np.int64]) -> Patches:
@@ -96,7 +112,8 @@ def _thirds(points: Array, nodes: NDArray[np.int64]) -> Patches:
     corners = points[nodes[:, :3]]
     centre = corners.mean(axis=1)
     for k in range(3):
-        yield np.stack([corners[:, k], corners[:, k - 2], centre], axis=1), nodes[:, 3 + k]
+        patch = [corners[:, k], corners[:, k - 2], centre, centre]  # four corners, as the rest
+        yield np.stack(patch, axis=1), nodes[:, 3 + k]
 
 
 def _shear_arrows(axes: Axes, pair: ContactPair, origin: Array, view: Array) -> Array:
@@ -114,6 +131,9 @@ def _shear_arrows(axes: Axes, pair: ContactPair, origin: Array, view: Array) -> 
     arrows = axes.quiver(at[:, 0], at[:, 1], shear[:, 0], shear[:, 1], color=INK, angles="xy",
                          scale_units="xy", scale=scale, width=0.003, pivot="tail")  # fmt: skip
     value = round_below(float(length.max()))
-    axes.quiverkey(arrows, 0.86, -0.12, value, f"{value:g}", labelpos="S", color=INK,
-                   labelsep=0.05, fontproperties={"size": 9})  # fmt: skip
+    place = axes.get_position(original=True)  # whatever shape the panel takes inside of it
+    inch = 1.0 / axes.get_figure(root=True).get_size_inches()[1]  # type: ignore[union-attr]
+    axes.quiverkey(arrows, place.x0 + 0.9 * place.width, place.y0 - KEY * inch, value,
+                   f"{value:g}", labelpos="S", color=INK, labelsep=0.05, coordinates="figure",
+                   fontproperties={"size": 8})  # fmt: skip
     return at + shear / scale

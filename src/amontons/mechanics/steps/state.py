@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...core.arrays import finite, integers, number
 from ...core.errors import InvalidInput, shown
+from ...core.faces import Shown
 from ...core.warned import ResultWarning
 from ...problem.protocol import Problem
 from ...problem.solution import ContactStatus, FrictionSolution
@@ -79,7 +80,7 @@ class State:
 
 
 @dataclass(frozen=True, eq=False)
-class TimeStep:
+class TimeStep(Shown):
     """One step: the state after it, its discrete problem's solution, its energies.
 
     active (k,): the contacts that are in the problem, in order; the rest is open.  gap (nc,)

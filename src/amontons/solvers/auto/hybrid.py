@@ -105,7 +105,14 @@ def _run(
         problem = problem.condensed(target.deadline)
     elif form is Form.GLOBAL and problem.form is Form.DELASSUS:
         raise InvalidInput(f"{type(solver).__name__}: the problem has no global form")
-    return iter(solver.iterates(problem, start, target))
+    return _staged(iter(solver.iterates(problem, start, target)), solver)
+
+
+def _staged(iterates: Iterator[Iterate], solver: Solver) -> Iterates:
+    """The same iterates, named by their solver; it is told what is sent."""
+    judged = None
+    while (iterate := sent(iterates, judged)) is not None:
+        judged = yield _named(iterate, solver)
 
 
 class Attempt(NamedTuple):
@@ -218,6 +225,11 @@ def _regular(problem: FrictionProblem) -> bool:
     return True
 
 
+def _named(iterate: Iterate, solver: Solver) -> Iterate:
+    """The iterate with the name of its solver as stage, unless it has one."""
+    return iterate if iterate.stage else replace(iterate, stage=type(solver).__name__)
+
+
 def _watched(
     solver: Solver,
     problem: FrictionProblem,
@@ -230,7 +242,7 @@ def _watched(
     iterates, judged = solver.iterates(problem, start.iterate, target), None
     try:
         while (iterate := sent(iterates, judged)) is not None:
-            judged = yield iterate
+            judged = yield _named(iterate, solver)
             error = target.error(problem, iterate, judged)
             if error < best.error:
                 best.iterate, best.error = iterate, error

@@ -102,9 +102,10 @@ class ContactMultigrid:
         x = levels.start(problem, start)
         if self.nested and start.v is None:
             self._nested_start(levels, tangent, problem, x)
-        goal, since = CLOSE * target.tolerance, 0
+        goal, own = CLOSE * target.tolerance, []
         for error in run.cycles(x):
-            since += 1
+            own.append(error)
+            since = len(own)
             ready = error <= goal
             if not (ready or since >= self.report or target.deadline.passed):
                 continue
@@ -114,8 +115,9 @@ class ContactMultigrid:
                 iterations=since,
                 linear_iterations=since,
                 stage="contact multigrid",
+                own=tuple(own),
             )
-            judged, since = (yield iterate), 0
+            judged, own = (yield iterate), []
             if ready:  # the error that would have been small enough
                 told = target.error(problem, iterate, judged)
                 goal = CLOSE * error * min(target.tolerance / told, 1.0) if told > 0 else 0.0
