@@ -11,8 +11,9 @@ from ...analysis.paths.events import EventKind
 from ...analysis.paths.path import Branch
 from ...mechanics.model.fields import ContactFields
 from ...mechanics.steps.system import Motion
+from ..units import Units
 from .charts import chart, line, rounded
-from .page import Page, Table, Units
+from .page import Page, Table
 from .skin import Skin
 from .states import Stage, State, chosen
 from .words import version_rows
@@ -123,7 +124,9 @@ def _fields(model: Model, branch: Branch, solution: Any, p: float) -> ContactFie
 
 def _verdict(branches: Sequence[Branch], reason: str, name: str) -> tuple[str, str]:
     folds = sum(len(b.folds) for b in branches)
-    text = reason or "Closed branches that pass none of these points are not seen; “--all” asks for them."
+    text = reason or (
+        "Closed branches that pass none of these points are not seen; “--all” asks for them."
+    )
     if folds:
         return f"No: {folds} folds, so some values of the {name} have several solutions", text
     if len(branches) > 1:

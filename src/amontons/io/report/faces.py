@@ -18,8 +18,9 @@ from ...core.files import write_bytes
 from ...problem.friction import FrictionProblem
 from ...problem.solution import FrictionSolution
 from ..results import Output
+from ..units import Units
 from .curves import curves_page
-from .page import Page, Units
+from .page import Page
 from .pages import solutions_page, solve_page
 
 SUFFIXES = (".html", ".htm")
@@ -68,9 +69,11 @@ def _(result: Output, *, title: str = "", units: Any = None) -> Page:
 
 
 @page_of.register
-def _(result: FrictionSolution, *, title: str = "", units: Any = None, model: Any = None) -> Page:
+def _(result: FrictionSolution, *, title: str = "", units: Any = None,
+      model: Any = None) -> Page:  # fmt: skip
     fields = None if model is None else model.recover(result)
-    output = Output(result, model, fields, title or result.problem.name, warnings=result.warnings)
+    name = title or result.problem.name
+    output = Output(result, model, fields, name, warnings=result.warnings)
     return solve_page(output, Units.of(units))
 
 

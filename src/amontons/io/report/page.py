@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from html import escape
@@ -18,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ... import __version__
-from ...core.errors import InvalidInput, shown
+from ..units import Units
 from .packing import Packer
 from .states import Stage, State, largest_forces
 
@@ -27,55 +26,6 @@ SCRIPTS = ("format.js", "charts.js", "bodies.js", "camera.js", "view.js", "page.
 FULL_NUMBERS = 250_000  # numbers of all states up to which they keep 32 bits
 FIELDS = ("status", "pressure", "shear", "slip", "gap", "displacement")
 TOKEN = re.compile(r"\{\{(\w+)\}\}")
-UNIT_NAMES = ("length", "force", "time")
-PLAIN = {("mm", "N"): "MPa", ("m", "N"): "Pa", ("m", "kN"): "kPa", ("m", "MN"): "MPa"}
-
-
-@dataclass(frozen=True)
-class Units:
-    """What the user calls the units; empty where nobody has said."""
-
-    length: str = ""
-    force: str = ""
-    time: str = ""
-
-    @classmethod
-    def of(cls, given: object) -> Units:
-        """Those of a text "mm,N,s", of a sequence, or of a dict by name, also in part.
-
-        Raises InvalidInput for anything else.
-        """
-        if given is None or isinstance(given, Units):
-            return given or cls()
-        if isinstance(given, str):
-            given = [word.strip() for word in given.split(",")]
-        if isinstance(given, dict):
-            wrong = [key for key in given if key not in UNIT_NAMES]
-            values = list(given.values())
-            pairs = {} if wrong else given
-        else:
-            values = list(given) if isinstance(given, Sequence) else [given]
-            wrong = values[len(UNIT_NAMES) :]
-            pairs = dict(zip(UNIT_NAMES, values, strict=False))
-        if wrong or not all(isinstance(value, str) for value in values):
-            raise InvalidInput(
-                "units: expected up to three names, length, force, time, such as 'mm,N,s' or "
-                f"{{'length': 'mm', 'force': 'N'}}, got {shown(given)}"
-            )
-        return cls(**pairs)
-
-    @property
-    def stress(self) -> str:
-        """Of force per area."""
-        if not (self.length and self.force):
-            return ""
-        return PLAIN.get((self.length, self.force), f"{self.force}/{self.length}²")
-
-    @property
-    def named(self) -> dict[str, str]:
-        """By the names that the page uses."""
-        return {"length": self.length, "force": self.force, "time": self.time,
-                "stress": self.stress}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -228,8 +178,9 @@ def _table(table: Table) -> str:
         cells = "".join(f"<td>{escape(_clean(cell))}</td>" for cell in rest)
         rows.append(f'<tr><th scope="row">{escape(_clean(first))}</th>{cells}</tr>')
     kind = "table" if head else "facts"
-    return (f'<section class="card"><h2>{escape(_clean(table.title))}</h2><div class="scroll">'
-            f'<table class="{kind}">{head}<tbody>{"".join(rows)}</tbody></table></div>'
+    wide = " span" if len(table.columns) > 3 else ""
+    return (f'<section class="card{wide}"><h2>{escape(_clean(table.title))}</h2>'
+            f'<div class="scroll"><table class="{kind}">{head}<tbody>{"".join(rows)}</tbody></table></div>'
             "</section>")  # fmt: skip
 
 

@@ -15,8 +15,9 @@ from ...problem.solution import FrictionSolution
 from ...solvers import Iterate
 from ...solvers.driver import drive
 from ..results import Output, method_name
+from ..units import Units
 from .charts import STATUS, chart, convergence_chart, count_chart, line, reaction_chart
-from .page import Page, Table, Units
+from .page import Page, Table
 from .skin import Skin
 from .states import Stage, State
 from .words import (
@@ -108,7 +109,8 @@ class Film:
 
 
 def run_page(
-    film: Film, table: Any, title: str, units: Units, note: str = "", warnings: Sequence[str] = (),
+    film: Film, table: Any, title: str, units: Units, note: str = "",
+    warnings: Sequence[str] = (),
 ) -> Page:  # fmt: skip
     """Steps in time; table: the rows of steps.csv, with named columns.  note: a stamp."""
     states = film.states()
@@ -123,14 +125,14 @@ def run_page(
     facts = [["steps", str(len(table))], ["time", f"{times[-1]:.6g} {units.time}".strip()],
              ["largest error", f"{table['error'].max():.1e}"],
              ["solving, all steps", f"{table['seconds'].sum():.3g} s"],
-             ["shown", f"{len(states)} states{shown}"]]  # fmt: skip
+             ["shown", f"{len(states)} states{shown}: {_span(states)}"]]  # fmt: skip
     if jumps:
         facts.append(["jumps at t", ", ".join(jumps)])
     return Page(
         "run", title, headline=f"{len(table)} steps to t = {times[-1]:.6g}",
         outcome="Not finished" if note else "All steps made", stamp=stamp,
-        verdict=("Not asked", "Every step may have several solutions; “amontons follow” traces how "
-                 "they change."),
+        verdict=("Not asked", "Every step may have several solutions; “amontons follow” traces "
+                 "how they change."),
         facts=[Table("Evolution", ("", ""), facts),
                Table("How it was solved", ("", ""), version_rows())],
         warnings=tuple(warnings),
@@ -139,6 +141,11 @@ def run_page(
         tables=[Table(title_of_rows, ("step", "time", *STATUS, "iterations", "error"), rows)],
         stage=film.stage if states else None, states=states, by="time", units=units,
     )  # fmt: skip
+
+
+def _span(states: Sequence[State]) -> str:
+    """Of which steps states are; those before a restart are gone."""
+    return " to ".join(dict.fromkeys(s.label for s in (states[0], states[-1])))
 
 
 def _step_row(row: Any) -> list[str]:
@@ -213,6 +220,10 @@ def _short(pattern: str, letters: int = 60) -> str:
     return pattern if len(pattern) <= letters else f"{pattern[: letters - 1]}…"
 
 
+def _number(count: int, word: str) -> str:
+    return f"{count} {word}" + ("s" if count != 1 else "")
+
+
 # ------------------------------------------------------------------------------- a race
 def bench_page(
     title: str, columns: Sequence[str], rows: list[list[str]],
@@ -223,13 +234,15 @@ def bench_page(
     charts = []
     for tolerance, (tau, rho) in profiles.items():
         last = 1.5 * max(float(tau[-1]), 1.1)
-        series = [line(method_name(name), np.append(tau, last), np.append(rho[k], rho[k, -1]), k,
-                       step=True) for k, name in enumerate(names)]  # fmt: skip
+        series = [line(method_name(name), np.append(tau, last),
+                       np.append(rho[k], rho[k, -1]), k, step=True)
+                  for k, name in enumerate(names)]  # fmt: skip
         charts.append(chart(f"Within a factor of the best, tolerance {tolerance:g}",
                             f"{what} / best {what}", "share of problems solved", series,
                             logx=True, top=1.0))  # fmt: skip
     return Page(
-        "bench", title, headline=f"{len(rows)} races of {len(names)} methods",
+        "bench", title, headline=f"{_number(len(rows), 'race')} of "
+        f"{_number(len(columns) - 2, 'method')}",
         facts=[Table("How it was measured", ("", ""), [*facts, *version_rows()])],
         tables=[Table(f"{what.capitalize()} to solution", tuple(columns), rows)], charts=charts,
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""States of a model as a page shows them: displacement, contact fields on both sides, forces."""
+"""States of a model as a page shows them: displacement, fields of both sides, forces."""
 
 from __future__ import annotations
 

@@ -10,7 +10,8 @@ from ...analysis.certificates.uniqueness import Uniqueness, Verdict
 from ...problem.judge.measures import Measure
 from ...problem.solution import TELLING, Convergence
 from ..results import Output, method_name, versions
-from .page import Table, Units
+from ..units import Units
+from .page import Table
 
 TITLES = {
     Verdict.UNIQUE_EVERY_LOAD: "Yes: one solution, whatever the load",

@@ -48,4 +48,5 @@ const MAP = ["440154", "481769", "472a7a", "433d84", "3d4e8a", "355e8d", "2e6d8e
 const STATUSES = ["open", "slip", "stick"];
 /** The value of a colour of the style sheet. */
 const colourOf = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
-const seriesColour = (colour) => `var(--${typeof colour === "number" ? `s${colour % 6}` : colour})`;
+const seriesColour = (colour) =>
+  `var(--${typeof colour === "number" ? `s${colour % 6}` : colour === "open" ? "open-line" : colour})`;

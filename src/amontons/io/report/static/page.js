@@ -107,7 +107,9 @@ if (DATA.view) {
   }
 }
 const charts = DATA.charts.map((chart) => drawChart(chart, view ? (index) => view.step(index) : null));
-byId("charts").append(...charts);
+const beside = view && DATA.by && DATA.by !== "solution" ? charts.slice(0, 1) : [];
+byId("beside").append(...beside);
+byId("charts").append(...charts.slice(beside.length));
 if (view) {
   tools();
   steps(charts);

@@ -61,7 +61,8 @@ class View {
     this.bodies ||= Array.from({ length: count }, () => new Bodies(this.shared, this.bodyColours));
     this.eyes ||= { whole: this.wholeEye(), slave: [], master: [] };
     const zones = this.wanted.zone ? this.shared.zones.length : 0, zone = Math.min(this.zone || 0, zones - 1);
-    if (solutions) this.bodies.forEach((bodies, k) => this.addPane(bodies, {}, this.eyes.whole, this.shared.states[k].label, ""));
+    if (solutions) this.bodies.forEach((bodies, k) => this.addPane(bodies, {}, this.eyes.whole, this.shared.states[k].label,
+      STATUSES.map((name) => `${this.shared.states[k].counts[name]} ${name}`).join(", ")));
     else {
       this.addPane(this.bodies[0], {}, this.eyes.whole, "", "");
       if (zones && !this.flat) {
