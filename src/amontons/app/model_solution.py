@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from ..core.faces import Shown
 from ..core.warned import ResultWarning
 from ..io import results as output
 from ..problem.solution import FrictionSolution
@@ -27,7 +28,7 @@ OF_FIELDS = (
 
 
 @dataclass(frozen=True, eq=False)
-class ModelSolution:
+class ModelSolution(Shown):
     """A solved model.  Forwards what FrictionSolution and ContactFields know.
 
     displacement: (nodes, dim) per body; gap, pressure (nc,), shear, slip (nc, d-1) per contact;

@@ -19,6 +19,7 @@ from ..core.errors import Address, AmontonsError, FileFormatError, InvalidInput
 from ..core.plugins import installed, load, loaded
 from ..problem.friction import FrictionProblem
 from ..problem.protocol import Problem
+from .units import Units
 
 if TYPE_CHECKING:
     from ..mechanics.model import Model
@@ -35,7 +36,8 @@ class Case:
     path: the file, None of a problem without one; tables: what a case file says, with
     overrides; key_of: the words of the file for an address in the model.  moving: the model
     as it goes on in time, where `target` is its state at the end, which can be solved for at
-    once.  notes: what the file says and the case leaves out, in words.
+    once.  notes: what the file says and the case leaves out, in words.  units: what they are
+    called.
     """
 
     target: Model | FrictionProblem
@@ -47,6 +49,7 @@ class Case:
     key_of: Callable[[Address], str] = lambda at: ""
     moving: Model | None = None
     notes: tuple[str, ...] = ()
+    units: Units = Units()
 
     @property
     def name(self) -> str:

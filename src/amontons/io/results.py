@@ -6,7 +6,7 @@ import json
 import math
 import os
 import platform
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
 from enum import Enum
@@ -58,6 +58,9 @@ class Output:
     figures: str = "png"  # format of the figures that `save` writes; "" for none
 
 
+Writer = Callable[[Output, Path], None]
+
+
 # ------------------------------------------------------------------------------- choosing
 def write(output: Output, path: str | os.PathLike[str]) -> None:
     """Write one file; the suffix decides: .vtu, .h5 (or .hdf5), .json, .csv."""
@@ -98,15 +101,16 @@ def plot_convergence(output: Output, path: Path) -> None:
 
 
 def save(
-    output: Output, folder: str | os.PathLike[str], copy: str | os.PathLike[str] | None = None
-) -> list[Path]:
+    output: Output, folder: str | os.PathLike[str], copy: str | os.PathLike[str] | None = None,
+    more: Mapping[str, Writer] | None = None,
+) -> list[Path]:  # fmt: skip
     """Write all files of a solution into a folder, made if need be; returns their paths.
 
-    copy: where a second solution.json goes.  Nothing is renamed before all is written, and a
-    failure leaves no new folder.
+    copy: where a second solution.json goes.  more: further files by name.  Nothing is renamed
+    before all is written, and a failure leaves no new folder.
     """
     text = to_json(summary(output))  # before the first folder: it evaluates the solution
-    writers: dict[str, Callable[[Output, Path], None]] = {
+    writers: dict[str, Writer] = {
         "solution.json": lambda output, path: _write_text(path, text), "solution.h5": write_h5,
     }  # fmt: skip
     if output.figures:
@@ -114,6 +118,7 @@ def save(
         writers[f"convergence.{output.figures}"] = plot_convergence
     if output.model is not None:
         writers |= {"solution.vtu": write_vtu, "pairs.csv": write_csv}
+    writers |= more or {}
     folder = Path(folder)
     jobs = [(folder / name, writer) for name, writer in writers.items()]
     if copy is not None:

@@ -6,6 +6,7 @@ import click
 
 from ... import __version__
 from . import flags
+from .folders import results_folder
 from .group import Commands
 
 EPILOG = """\b
@@ -65,8 +66,7 @@ Examples:
 @click.option("--criterion", type=click.Choice(["judge", "natural"]), default="judge",
               show_default=True, help="What the tolerance is for: the unit-free error, or "
               "|F_nat(r)| / |q| with rho = 1, as papers have it.")  # fmt: skip
-@click.option("-o", "--output", "folder", metavar="DIR",
-              help="Folder for the results. [name of the source with -results]")  # fmt: skip
+@results_folder("name of the source with -results")
 @click.option("--json", "json_copy", metavar="FILE",
               help="A copy of solution.json; - prints it and nothing else.")  # fmt: skip
 @click.option("--uniqueness", "full_verdict", is_flag=True,
@@ -166,6 +166,7 @@ METHOD:FIELD=VALUE,… sets options of a method, NAME=METHOD:… gives it a name
 @click.option("--profile", metavar="FILE.png",
               help="Draw Dolan-Moré performance profiles.")  # fmt: skip
 @click.option("--json", "json_copy", metavar="FILE", help="All times as JSON; - prints them.")
+@results_folder("bench-results", only_report=True)
 def bench(**options: object) -> None:
     """Compare methods on many problems: times to reach a tolerance, side by side.
 
@@ -199,6 +200,7 @@ Exit codes: 0 the list is complete, 1 there may be others, 2 bad input.
 @click.option("--json", "json_copy", metavar="FILE", help="The same as JSON; - prints it.")
 @click.option("--picture", metavar="FILE",
               help="Draw the solutions side by side: .png, .svg or .pdf.")  # fmt: skip
+@results_folder("name of the source with -results", only_report=True)
 def enumerate_solutions(**options: object) -> int:
     """Find all solutions of a problem with Coulomb friction, and prove that these are all.
 
@@ -327,8 +329,7 @@ Exit codes: 0 every branch has come to its end, 1 one was given up, 2 bad input.
               "which then steps along curves also where they are known exactly: step, "
               "min_step, max_step, grow, shrink, residual, change, min_cosine, corrections, "
               "quick, border, ahead, aside, switch=tangent|first-order.")  # fmt: skip
-@click.option("-o", "--output", "folder", metavar="DIR",
-              help="Folder for the results. [name of the source with -results]")  # fmt: skip
+@results_folder("name of the source with -results")
 @click.option("--json", "json_copy", metavar="FILE",
               help="A copy of follow.json; - prints it and nothing else.")  # fmt: skip
 @flags.axes
@@ -365,8 +366,7 @@ has been made is saved, go on with --restart.
 @click.option("--time-limit", type=float, metavar="SECONDS",
               help="Stop after that time, ready for --restart; solver.time_limit is for each "
               "step.")  # fmt: skip
-@click.option("-o", "--output", "folder", metavar="DIR",
-              help="Folder for the results. [name of the case with -results]")  # fmt: skip
+@results_folder("name of the case with -results")
 @click.option("--export-fclib", "export", metavar="DIR",
               help="Write the discrete problems of the steps as FCLib files.")  # fmt: skip
 @click.option("--export-steps", metavar="LIST",

@@ -15,7 +15,14 @@ from ...core.files import made, write_bytes
 from ...io.results import to_json, versions
 from .. import questions
 from .sources import open_source
-from .terminal import check_folder, check_writable, deliver_json, shortened, show_table
+from .terminal import (
+    check_folder,
+    check_writable,
+    deliver_json,
+    shortened,
+    show_table,
+    write_report,
+)
 
 SCHEMA = "amontons/follow/1"
 UNFINISHED = 1  # exit code
@@ -29,7 +36,7 @@ def run(
     source: str, overrides: Sequence[str], parameter: str, low: float, high: float,
     mu: float | None, every: bool, max_points: int, time_limit: float | None,
     folder: str | None, json_copy: str | None, quiet: bool, figures: str = "png",
-    x: str | None = None, y: str | None = None,
+    x: str | None = None, y: str | None = None, report: bool = False,
 ) -> int:  # fmt: skip
     """Follow, write, show; the exit code."""
     check_writable(json_copy, "--json")
@@ -51,7 +58,7 @@ def run(
         branches = [questions.follow(target, name, (low, high), **limits)]
         complete, reason = None, ""
     text = to_json(record(branches, parameter, (low, high), complete, reason, at))
-    model = opened.model if opened.has_model else None
+    model: Any = opened.model if opened.has_model else None
     table = csv_of(branches, [name for name in (x, y) if name is not None], model)
     figure = None
     if branches and figures != "none":
@@ -59,6 +66,11 @@ def run(
 
         figure = branch_figure(branches, x=x, y=y, model=model, title=opened.title)
     _write(place, text, table, figure, figures)
+    if report:
+        from ...io.report import curves_page
+
+        shown: Any = target if opened.has_model else None
+        write_report(curves_page(branches, opened.title, opened.units, shown, reason), place)
     if json_copy is not None:
         deliver_json(text, json_copy)
     if json_copy != "-" and not quiet:

@@ -29,6 +29,7 @@ from ...mechanics.model import Model
 from ...mechanics.model.names import support_names
 from ...mechanics.steps import Energies, State, TimeStep
 from ...problem.solution import ContactStatus
+from .terminal import REPORT
 
 WORKS = tuple(field.name for field in fields_of(Energies))
 WHOLE = ("index", "open", "slip", "stick", "iterations")
@@ -39,8 +40,8 @@ MOST_NUMBERS = 400  # columns of pairs and supports: HDF5 keeps a row's names in
 STATE, TABLE, FILM, BALANCE = "state.h5", "steps.csv", "steps.pvd", "energy.png"
 RECORD = "solution.json"
 PICTURE = re.compile(r"step-\d{5,}\.(vtu|h5|png)|film\.gif")
-OURS = (PICTURE, *(re.compile(re.escape(name))
-          for name in (STATE, TABLE, FILM, BALANCE, RECORD, LIST, MESH)))  # fmt: skip
+FILES = (STATE, TABLE, FILM, BALANCE, RECORD, LIST, MESH, REPORT)
+OURS = (PICTURE, *(re.compile(re.escape(name)) for name in FILES))
 PICTURES = "pictures"  # folder of those drawn here
 
 
