@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...linear.blocks import spatial
-from ..vtk import OFF
+from ..contact_fields import OFF
 from ..vtk import _contact_fields as contact_fields
 from .skin import Skin
 
