@@ -180,8 +180,8 @@ def _table(table: Table) -> str:
     kind = "table" if head else "facts"
     wide = " span" if len(table.columns) > 3 else ""
     return (f'<section class="card{wide}"><h2>{escape(_clean(table.title))}</h2>'
-            f'<div class="scroll"><table class="{kind}">{head}<tbody>{"".join(rows)}</tbody></table></div>'
-            "</section>")  # fmt: skip
+            f'<div class="scroll"><table class="{kind}">{head}<tbody>{"".join(rows)}</tbody>'
+            "</table></div></section>")  # fmt: skip
 
 
 @cache
