@@ -75,7 +75,11 @@ def __getattr__(name: str) -> Any:
         from .core.errors import InvalidInput
 
         raise InvalidInput(f"{name}: no longer there, use {_GONE[name]}")
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from .core.words import near
+
+    meant = None if name.startswith("_") else near(name, __all__)
+    hint = f"; did you mean {meant!r}?" if meant else ""
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}{hint}")
 
 
 def __dir__() -> list[str]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 from ..core.clock import TimeLimit, compiling, deadline_of, now
 from ..core.errors import Interrupted, InvalidInput, NotConverged
+from ..core.words import helpful
 from ..problem.friction import FrictionProblem
 from ..problem.judge.measures import Criterion
 from ..problem.protocol import Problem
@@ -41,6 +42,7 @@ def solve(
     check: bool = True, criterion: Criterion = Criterion.JUDGE,
     patience: int | None = PATIENCE,
 ) -> ModelSolution: ...  # fmt: skip
+@helpful
 def solve(
     problem: Any, solver: Any = None, *, tolerance: float = 1e-8, contact_tolerance: Any = None,
     max_iterations: Any = None, time_limit: Any = None, start: Any = None,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..core.faces import Shown
 from ..core.warned import ResultWarning
+from ..core.words import near
 from ..io import results as output
 from ..problem.solution import FrictionSolution
 
@@ -47,7 +48,9 @@ class ModelSolution(Shown):
             return getattr(self.solution, name)
         if name in OF_FIELDS:
             return getattr(self.fields, name)
-        raise AttributeError(f"ModelSolution has no attribute {name!r}")
+        meant = None if name.startswith("_") else near(name, (*OF_SOLUTION, *OF_FIELDS))
+        hint = f"; did you mean {meant!r}?" if meant else ""
+        raise AttributeError(f"ModelSolution has no attribute {name!r}{hint}")
 
     def __dir__(self) -> list[str]:
         return sorted([*object.__dir__(self), *OF_SOLUTION, *OF_FIELDS])

@@ -8,9 +8,7 @@ All numbers are floats, so that 9**9**9 is an overflow and not an endless intege
 from __future__ import annotations
 
 import ast
-import difflib
 import warnings
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache, reduce
 from typing import Any
@@ -19,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InvalidInput
+from .words import nearest
 
 Array = NDArray[np.float64]
 VARIABLES = ("x", "y", "z", "t")
@@ -39,13 +38,6 @@ COMPARE = {
 }  # fmt: skip
 MAX_LENGTH = 2000  # characters
 MAX_DEPTH = 150  # nested operations; keeps the recursion far from the interpreter's limit
-
-
-def nearest(word: str, known: Iterable[str]) -> str:
-    """The end of an error message: '; did you mean …?' or '; known: …'."""
-    names = sorted(known)
-    close = difflib.get_close_matches(str(word), names, n=1, cutoff=0.6)
-    return f"; did you mean '{close[0]}'?" if close else f"; known: {', '.join(names)}"
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from .case.settings import Settings
 
 GROUP = "amontons.readers"  # of entry points
+MESHES = (".msh", ".vtk", ".vtu", ".stp", ".step", ".brep", ".stl", ".med", ".unv", ".bdf")
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +166,12 @@ def format_of(path: Path) -> Format:
         return found
     *most, last = map(str, known)
     other = "neither" if len(known) == 2 else "none of them"
-    raise FileFormatError(f"{path}: expected {', '.join(most)} or {last}, this is {other}")
+    hint = ""
+    if path.suffix.lower() in MESHES:
+        hint = f'; a mesh is named in a case file: [mesh] file = "{path.name}"'
+    raise FileFormatError(
+        f"{path}: expected {', '.join(most)} or {last}, this is {other}{hint}"
+    )
 
 
 def _fitting(path: Path, known: Sequence[Format]) -> Format | None:

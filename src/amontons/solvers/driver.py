@@ -25,6 +25,7 @@ from ..core.errors import (
     shown,
 )
 from ..core.interrupts import Watching
+from ..core.words import near
 from ..problem.judge.measures import Criterion, Measure
 from ..problem.law import Coulomb
 from ..problem.protocol import Problem
@@ -164,8 +165,20 @@ def _check_solver(solver: Solver) -> None:
     """Raise InvalidInput for what is no solver."""
     if isinstance(solver, type) or not hasattr(solver, "iterates"):
         raise InvalidInput(
-            f"solver: expected an instance such as GaussSeidel(), got {solver!r}"
+            f"solver: expected an instance such as GaussSeidel(), got {_written(solver)}"
         )
+
+
+def _written(solver: object) -> str:
+    """What was given for a solver, and what is to be written for it."""
+    if isinstance(solver, type):
+        return f"the class; write {solver.__name__}()"
+    if isinstance(solver, str):
+        from . import METHODS
+
+        meant = near(solver, METHODS)
+        return f"{solver!r}" + (f"; write {METHODS[meant].__name__}()" if meant else "")
+    return shown(solver)
 
 
 def _fit(problem: Problem, solver: Solver, deadline: Deadline | None) -> Problem:

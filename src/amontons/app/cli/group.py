@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from ...core.errors import AmontonsError, TimeUp
+from ...core.words import nearest
 from .streams import open_missing, printed
 
 UNFINISHED, BAD_INPUT, INTERRUPTED = 1, 2, 130  # the last as shells tell of signals
@@ -36,6 +37,12 @@ class Commands(click.Group):
             _say_line(f"Error: standard output: can not be written: {reason}")
             code = BAD_INPUT
         sys.exit(code if isinstance(code, int) else 0)
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
+        """The command of the first word; an unknown one is answered with the nearest."""
+        if args and self.get_command(ctx, args[0]) is None and not args[0].startswith("-"):
+            ctx.fail(f"No such command {args[0]!r}{nearest(args[0], self.list_commands(ctx))}")
+        return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command; a user's mistake becomes one message and exit code 2."""

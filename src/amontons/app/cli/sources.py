@@ -12,7 +12,7 @@ from pathlib import Path
 import click
 
 from ...core.errors import FileFormatError, InvalidInput
-from ...core.expressions import nearest
+from ...core.words import near_file, nearest
 from ...io.case import DATA, Settings, make_solver, method_class, read_case
 from ...io.case.overrides import override_settings
 from ...io.readers import Case, read
@@ -59,7 +59,9 @@ def check_is_plain(path: Path) -> None:
     try:
         mode = path.stat().st_mode
     except FileNotFoundError:
-        hint = "" if path.suffix else "; built-in examples are written example:NAME"
+        hint = near_file(path)
+        if not hint and not path.suffix:
+            hint = "; built-in examples are written example:NAME"
         raise FileFormatError(f"{shown}: no such file{hint}") from None
     except (OSError, ValueError) as reason:
         why = getattr(reason, "strerror", None) or reason

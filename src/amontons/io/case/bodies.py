@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ...core.arrays import LARGEST
 from ...core.errors import FileFormatError, shown
 from ...core.files import check_is_regular
+from ...core.words import near, near_file
 from .tables import Table
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from ...mechanics.meshes import Mesh
     from ...mechanics.model.parts import Material
 
+NUMBERS = ("young", "poisson", "density")
 LAWS = {  # of materials, with their keys
     "linear-elastic": ("young", "poisson", "plane", "density"),
     "neo-hookean": ("young", "poisson"), "ciarlet-geymonat": ("young", "poisson", "a"),
@@ -72,7 +74,7 @@ def _read_file(table: Table, path: Path) -> Mesh:
     except FileFormatError as reason:
         raise table.error("file", str(reason)) from None
     if not os.path.isfile(name):  # also for names that no file can have
-        raise table.error("file", f"no such file: {name}")
+        raise table.error("file", f"no such file: {name}{near_file(name)}")
     if not is_cad(name):
         if "size" in table.data:
             raise table.error("size", "only for CAD files, a mesh file has its cells")
@@ -88,6 +90,12 @@ def _read_file(table: Table, path: Path) -> Mesh:
 
 def read_materials(table: Table, mesh: Mesh) -> Any:
     """One material for all, [material.default], and one per region named otherwise."""
+    for key, value in table.data.items():
+        if not isinstance(value, dict) and (key in NUMBERS or near(key, NUMBERS)):
+            raise table.error(
+                key, "a material stands under the name of its region: write [material.default] "
+                "for one of all regions"
+            )  # fmt: skip
     found = {region: read_material(table.table(region)) for region in table.data}
     if not found:
         raise table.error("", "expected a table [material.default]")

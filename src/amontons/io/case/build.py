@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import tomllib
 from collections.abc import Sequence
 from functools import partial
@@ -11,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...core.errors import FileFormatError, InvalidInput
-from ...core.expressions import nearest
 from ...core.files import check_is_regular
+from ...core.words import near_file, nearest
 from ..readers import Case
 from ..units import UNIT_NAMES, Units
 from .bodies import read_material, read_materials, read_mesh_table
@@ -51,6 +52,9 @@ def read_case(
     if method is not None:
         data = with_method(data, method)
     top = Table(str(path), "", apply_overrides(data, overrides, str(path)))
+    for key in top.data:
+        if key not in TOP and key in GENERAL:
+            raise top.error(key, f"unknown key; did you mean 'solver.{key}'?")
     top.only(*TOP)
     title = top.text("title", path.stem if path.stem != "case" else path.parent.name)
     model = _wall_model(top, title) if "wall" in top.data else _model(top, path, title)
@@ -88,7 +92,7 @@ def _load(path: Path) -> dict[str, Any]:
                 )
             return tomllib.load(file)
     except FileNotFoundError:
-        raise FileFormatError(f"{path}: no such file") from None
+        raise FileFormatError(f"{path}: no such file{near_file(path)}") from None
     except IsADirectoryError:
         raise FileFormatError(f"{path}: expected a TOML case file, this is a folder") from None
     except OSError as reason:
@@ -98,7 +102,24 @@ def _load(path: Path) -> dict[str, Any]:
     except FileFormatError:
         raise
     except (tomllib.TOMLDecodeError, RecursionError, ValueError) as reason:
-        raise FileFormatError(f"{path}: not valid TOML: {reason}") from None
+        why = f"{reason}{_hint(path, reason)}"
+        raise FileFormatError(f"{path}: not valid TOML: {why}") from None
+
+
+def _hint(path: Path, reason: Exception) -> str:
+    """What is often wrong in the line that is no TOML, in words."""
+    found = re.search(r"at line (\d+)", str(reason))
+    if found is None:
+        return ""
+    line = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    text = line[int(found[1]) - 1].strip() if int(found[1]) <= len(line) else ""
+    if re.search(r"\d,\d", text) and "[" not in text:
+        return f"; numbers have a point, not a comma: {text}"
+    if re.search(r"=\s*-?\.\d", text):
+        return f"; numbers begin with a digit, 0.1 and not .1: {text}"
+    if re.search(r"=\s*[A-Za-z]", text):
+        return f"; words stand in quotes: {text}"
+    return f": {text}"
 
 
 # -------------------------------------------------------------------------------- model

@@ -52,6 +52,9 @@ def _friction(contact: Table) -> dict[str, Any]:
     given = contact.need("friction", LAWS)
     if given == "tied":
         return {"tied": True}
+    if isinstance(given, int | float) and not isinstance(given, bool):
+        hint = f"write {{ coulomb = {given} }}"
+        raise contact.error("friction", f"expected {LAWS}, got {given}; {hint}")
     table = contact.as_table("friction", given, LAWS)
     table.only(*NUMBERS, "direction", "tied")
     if "tied" in table.data:

@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any
 
 from ... import linear, solvers
 from ...core.errors import Address, InvalidInput
-from ...core.expressions import nearest
 from ...core.options import alternatives, hints_of, is_enum, members_of, usual_part
 from ...core.plugins import installed, load, loaded
+from ...core.words import near, nearest
 from ...solvers import METHODS
 from ...solvers.contract import Solver
 
@@ -127,6 +127,9 @@ def _no_such_field(method: str, name: str, names: list[str]) -> str:
     text = f"{method} has no such field" if names else f"{method} has no fields"
     if owners:
         return f"{text}; '{name}' is a field of {', '.join(owners)}: choose with --method"
+    meant = near(name, (*names, *GENERAL))
+    if meant is not None:
+        return f"{text}; did you mean '{meant}'?"
     return text + (nearest(name, names) if names else "")
 
 

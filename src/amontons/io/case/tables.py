@@ -10,7 +10,7 @@ from typing import Any
 
 from ...core.arrays import LARGEST
 from ...core.errors import Address, FileFormatError, InvalidInput, dotted, shown
-from ...core.expressions import nearest
+from ...core.words import nearest
 
 LONGEST_TEXT = 500  # letters of a name or a title; expressions have a limit of their own
 
@@ -90,7 +90,10 @@ class Table:
     def as_number(self, key: str, value: Any) -> float:
         """A finite number, or a complaint about `key`."""
         if not isinstance(value, int | float) or isinstance(value, bool):
-            raise self.error(key, f"expected a number, got {shown(value)}")
+            hint = ""
+            if isinstance(value, str) and value.strip()[:1].isdigit():
+                hint = "; without quotes, units and percent"
+            raise self.error(key, f"expected a number, got {shown(value)}{hint}")
         try:
             number = float(value)
         except OverflowError:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ...core.arrays import LARGEST, number, real
 from ...core.errors import InvalidInput, shown
+from ...core.words import helpful
 
 Array = NDArray[np.float64]
 
@@ -33,6 +34,7 @@ class Obstacle(Protocol):
         ...
 
 
+@helpful
 @dataclass(frozen=True)
 class Plane:
     """The half-space behind a plane through `point`; `normal` points into the body.
@@ -76,6 +78,7 @@ class Plane:
         return np.zeros((*points.shape, points.shape[1]))
 
 
+@helpful
 @dataclass(frozen=True)
 class Sphere:
     """A ball (a disc in 2D) with `center`, 2 or 3 coordinates, and `radius` > 0."""

@@ -17,6 +17,7 @@ from scipy import sparse
 
 from ...core.arrays import number, read_only
 from ...core.errors import InvalidInput
+from ...core.words import helpful
 from ..meshes.cells import CELLS
 from ..meshes.check import determinant
 from ..meshes.facets import Cells
@@ -52,6 +53,7 @@ class Isotropic:
         return out + shear * np.einsum("il,jk->ijkl", eye, eye)
 
 
+@helpful
 @dataclass(frozen=True)
 class LinearElastic(Isotropic):
     """Isotropic elasticity: young, unit of stress, > 0; -1 < poisson < 0.5.

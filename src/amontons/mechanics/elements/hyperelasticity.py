@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...core.errors import InvalidInput, InvertedCells
+from ...core.words import helpful
 from ..meshes.cells import CELLS, ReferenceCell
 from ..meshes.check import determinant
 from ..meshes.linear_cells import Rule
@@ -57,6 +58,7 @@ class _Family(Isotropic):
         return kirchhoff / J[:, None, None]
 
 
+@helpful
 @dataclass(frozen=True)
 class NeoHookean(_Family):
     """Compressible neo-Hookean law: young, unit of stress, > 0; -1 < poisson < 0.5.
@@ -76,6 +78,7 @@ class NeoHookean(_Family):
         return self.shear / 2, 0.0, 0.0, self.shear, self.lame_lambda()
 
 
+@helpful
 @dataclass(frozen=True)
 class CiarletGeymonat(_Family):
     """Ciarlet-Geymonat law: young, unit of stress, > 0; 0 < poisson < 0.5.

@@ -12,6 +12,7 @@ from scipy import sparse
 
 from ...core.arrays import WHOLE, real
 from ...core.errors import InvalidInput, shown
+from ...core.words import helpful
 from .cells import FACET_KIND
 from .facets import Cells, Facets, sides
 from .mesh import Mesh
@@ -24,6 +25,7 @@ SIDES = {2: (("left", "right"), ("bottom", "top")),
          3: (("left", "right"), ("front", "back"), ("bottom", "top"))}  # fmt: skip
 
 
+@helpful
 def box(
     size: Sequence[float],
     cells: int | Sequence[int],

@@ -13,6 +13,7 @@ import numpy as np
 
 from ...core.errors import FileFormatError, MissingDependency
 from ...core.files import check_is_regular
+from ...core.words import near_file
 from . import gmsh
 from .mesh import Mesh
 from .raw import RawBlock, RawMesh, to_mesh
@@ -59,7 +60,7 @@ def file_head(path: Path) -> bytes:
         with path.open("rb") as file:
             head = file.read(4096)
     except FileNotFoundError:
-        raise FileFormatError(f"{path}: no such file") from None
+        raise FileFormatError(f"{path}: no such file{near_file(Path(path))}") from None
     except OSError as error:
         raise FileFormatError(f"{path}: can not be read: {error.strerror}") from None
     if not head.strip():

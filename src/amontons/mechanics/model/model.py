@@ -12,6 +12,7 @@ from scipy import sparse
 
 from ...core.errors import InvalidInput, UnsupportedForm, within
 from ...core.prepared import Prepared
+from ...core.words import helpful
 from ...linear import Direct
 from ...linear.grid_matrix import GridMatrix
 from ...problem.friction import FrictionProblem
@@ -40,6 +41,7 @@ SURFACES = {  # the fields of a model's parts that name one
 }  # fmt: skip
 
 
+@helpful
 @dataclass(frozen=True, eq=False)
 class Model:
     """Elastic bodies in frictional contact with obstacles and each other.

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ...core.arrays import number, real
 from ...core.errors import InvalidInput, shown
+from ...core.words import helpful
 from ...problem.law import (
     CappedCoulomb,
     Cohesive,
@@ -41,6 +42,7 @@ REFERENCE, CURRENT = CONFIGURATIONS = ("reference", "current")
 SMALL, FINITE = KINEMATICS = ("small", "finite")
 
 
+@helpful
 @dataclass(frozen=True, eq=False)
 class Body:
     """A mesh and its material: LinearElastic, NeoHookean or CiarletGeymonat, or one per region.
@@ -80,6 +82,7 @@ class Body:
                     )
 
 
+@helpful
 @dataclass(frozen=True, eq=False)
 class Fix:
     """Prescribed displacement of a surface or node set, unit of length.
@@ -95,6 +98,7 @@ class Fix:
         check_vector(self.value, f"fix on {self.on!r}", free=True)
 
 
+@helpful
 @dataclass(frozen=True, eq=False)
 class Traction:
     """Force per area on a surface (per length in 2D): components or functions of x (dim,).
@@ -112,6 +116,7 @@ class Traction:
         check_configuration(self.configuration)
 
 
+@helpful
 @dataclass(frozen=True, eq=False)
 class Pressure:
     """Force per area against the outward normal of a surface: a number or function of x (dim,).
@@ -128,6 +133,7 @@ class Pressure:
             object.__setattr__(self, "value", number(f"pressure on {self.on!r}", self.value))
 
 
+@helpful
 @dataclass(frozen=True, eq=False)
 class BodyForce:
     """Force per volume in all bodies, or in the named region: components or functions of x.
@@ -145,6 +151,7 @@ class BodyForce:
         check_configuration(self.configuration)
 
 
+@helpful
 @dataclass(frozen=True, eq=False)
 class NodalForce:
     """A force at every node of a node set or surface: components or functions of x (dim,).
@@ -173,6 +180,7 @@ def check_configuration(value: object) -> None:
         )
 
 
+@helpful
 @dataclass(frozen=True, eq=False)
 class Contact:
     """Unilateral contact of a slave surface with an obstacle or a master, with friction.

@@ -33,6 +33,8 @@ def check_vector(value: object, what: str, *, free: bool = False) -> None:
 
 def check_scalar(value: object, what: str) -> None:
     """Raise InvalidInput for a number below 0, or an array with one."""
+    if isinstance(value, str):
+        raise InvalidInput(f"{what}: expected a number or a function, got the text {value!r}")
     try:
         numbers = np.asarray(value, dtype=float)
     except (TypeError, ValueError):  # a function, or nothing of use, which `scalar_at` tells

@@ -49,6 +49,7 @@ from scipy import sparse
 
 from ...core.clock import NEVER, Deadline
 from ...core.errors import InvalidInput, UnsupportedForm
+from ...core.words import helpful
 from ...problem.friction import FrictionProblem
 from ...problem.nitsche import NO_MULTIPLIERS
 from ...problem.protocol import Problem
@@ -75,6 +76,7 @@ ROUNDING = 1e-10  # of what a contact gives and takes: it creates no energy belo
 W_LIMIT = 1e9  # bytes of W above which it is not formed
 
 
+@helpful
 @dataclass(frozen=True)
 class MoreauJean:
     """Options of the dynamics; `step`, the step size, in the unit of time of the model."""

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from ...core.clock import NEVER, Deadline
 from ...core.errors import InvalidInput, UnsupportedForm
+from ...core.words import helpful
 from ...problem.friction import FrictionProblem
 from ...problem.nitsche import NitscheProblem
 from ...problem.solution import FrictionSolution
@@ -40,6 +41,7 @@ from .undetermined import carried_on
 Array = NDArray[np.float64]
 
 
+@helpful
 @dataclass(frozen=True)
 class QuasiStatic:
     """Steps of size `step` in time, or in the load factor where nothing depends on time.
