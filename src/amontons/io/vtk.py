@@ -97,13 +97,12 @@ def _contact_fields(
 
 def _shares(model: Model, fields: ContactFields, at: NDArray[np.int64]) -> Array:
     """Part of each contact in its pair's area at the node, (nc,): 1 but for Gauss points."""
-    if model.contacts[0].nitsche is None:
-        return np.ones(len(at))
     sizes = [len(placed.rows.nodes) for placed in model.discretisation.placed]
     pair = np.repeat(np.arange(len(sizes)), sizes)
     _, label = np.unique(np.stack([pair, at]), axis=1, return_inverse=True)
     total = np.bincount(label.ravel(), fields.weights)
-    return fields.weights / total[label.ravel()]
+    whole = total[label.ravel()]
+    return np.divide(fields.weights, whole, out=np.ones(len(at)), where=whole > 0)
 
 
 def _gathered(combine: np.ufunc, values: NDArray, index: NDArray[np.int64]) -> NDArray:
