@@ -24,7 +24,7 @@ of the cells behind the surface.  v_o closes the overlap of a body placed in its
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -132,7 +132,7 @@ class NitscheProblem(Problem):
 
     form = Form.NITSCHE
     measure = Measure.NITSCHE
-    unfit = NO_MULTIPLIERS
+    unfit = no_inertia = NO_MULTIPLIERS
 
     @property
     def contacts(self) -> int:
@@ -153,10 +153,6 @@ class NitscheProblem(Problem):
     def rho(self) -> Array:
         """omega kappa, (q,), force per length."""
         return self.matrices.rho
-
-    def with_law(self, law: Law) -> NitscheProblem:
-        """The same problem under another law."""
-        return replace(self, law=law)
 
     def with_multipliers(self) -> FrictionProblem:
         """The same law at the same points with reactions as unknowns: an augmented Lagrangian.

@@ -68,6 +68,7 @@ class Problem:
     gains_energy: bool = False  # True where no method can be expected to come to an end
     judge_flops: float = 0.0  # floating point operations of a judgement where they are counted
     unfit: ClassVar[str] = "it is made for other problems"  # why a solver can not take this one
+    no_inertia: ClassVar[str] = ""  # why steps with inertia can not, where they can not
 
     # ---------------------------------------------------------------- needed
     def error(self, r: Array, v: Array | None = None) -> float:

@@ -38,7 +38,6 @@ from .solutions import KnownSolution
 
 Array = NDArray[np.float64]
 SPREAD = 0.1  # of the largest reaction of a solution, by which perturbed ones differ
-DRAWS = 10
 MOST = 1_000_000  # starts of one kind
 
 

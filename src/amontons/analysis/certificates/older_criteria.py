@@ -58,7 +58,7 @@ from .status_pieces import REAL, Pieces
 
 Array = NDArray[np.float64]
 Ask = Callable[[Array, Array, float, Deadline], Found]
-AskPlanar = Callable[[Pieces, Deadline], Found]
+AskPieces = Callable[[Pieces, Deadline], Found]
 SECONDS = 60.0  # whose work a criterion without a time limit may take
 DISCS = 4  # contacts in 3D up to which a criterion is computed
 SINGULAR = 1e12  # condition of W from which on it counts as singular
@@ -100,7 +100,7 @@ def p_matrix_friction(
     Tresca's law.
     """
     if problem.dimension == 2:
-        return _planar(problem, COMPARED, _p_matrix_planar, time_limit)
+        return _bounds(problem, COMPARED, _p_matrix_planar, time_limit)
     if given_tangents:
         return _spatial(problem, DISCS, _given_tangents, gap, time_limit)
     return _spatial(problem, DISCS, _p_matrix_discs, gap, time_limit)
@@ -118,7 +118,7 @@ def full_contact_friction(
     errors: as of `p_matrix_friction`; FULL_CONTACT contacts in 2D.
     """
     if problem.dimension == 2:
-        return _planar(problem, FULL_CONTACT, _full_contact_planar, time_limit)
+        return _bounds(problem, FULL_CONTACT, _full_contact_planar, time_limit)
     criterion = Criterion.SHARP if sharp else Criterion.FULL_CONTACT
 
     def ask(W: Array, shape: Array, gap: float, deadline: Deadline) -> Found:
@@ -141,34 +141,46 @@ def critical_discs(
     return _spatial(problem, DISCS, ask, gap, time_limit)
 
 
+def _bounds(
+    problem: FrictionProblem, most: int, ask: AskPieces, time_limit: TimeLimit
+) -> CriterionFriction:
+    """The bounds of `ask` for the contacts that react."""
+    deadline, began = deadline_of(time_limit, SECONDS), now()
+    _check_size(problem, most)
+    pieces = None
+    try:
+        pieces = Pieces.of(problem, deadline)
+        found = ask(pieces, deadline) if pieces.contacts else _nothing_reacts()
+    except TimeUp as reason:
+        found = Found(reason=str(reason))
+    difference = None
+    if pieces is not None and found.difference is not None:
+        difference = pieces.reaction(found.difference)
+    return CriterionFriction(found.lower, found.upper, difference, found.examined,
+                             now() - began, found.reason)  # fmt: skip
+
+
+def _nothing_reacts() -> Found:
+    """Where no contact reacts every load has one solution, whatever the friction."""
+    return Found(np.inf, np.inf, reason="no contact can react")
+
+
 # ---------------------------------------------------------------------------- in 3D
 def _spatial(
     problem: FrictionProblem, most: int, ask: Ask, gap: float, time_limit: TimeLimit
 ) -> CriterionFriction:
-    """The bounds of `ask` for the contacts that react."""
-    deadline, began = deadline_of(time_limit, SECONDS), now()
+    """The bounds of `ask`, where W is regular."""
     if not 0 < gap < 1:
         raise InvalidInput(f"gap: expected a number between 0 and 1, got {gap!r}")
     if problem.dimension != 3:
         raise UnsupportedForm("critical friction: expected a 3D problem, this one is 2D")
-    _check_size(problem, most)
-    part = None
-    try:
-        part = Pieces.of(problem, deadline)
-        W = part.W
-        if W.size and not np.linalg.cond(W) < SINGULAR:
-            found = Found(reason="W is singular: reactions are not unique without friction too")
-        elif not W.size:
-            found = _nothing_reacts()
-        else:
-            found = ask(W, part.shape, gap, deadline)
-    except TimeUp as reason:
-        found = Found(reason=str(reason))
-    difference = None
-    if part is not None and found.difference is not None:
-        difference = part.reaction(found.difference)
-    return CriterionFriction(found.lower, found.upper, difference, found.examined,
-                             now() - began, found.reason)  # fmt: skip
+
+    def regular(pieces: Pieces, deadline: Deadline) -> Found:
+        if not np.linalg.cond(pieces.W) < SINGULAR:
+            return Found(reason="W is singular: reactions are not unique without friction too")
+        return ask(pieces.W, pieces.shape, gap, deadline)
+
+    return _bounds(problem, most, regular, time_limit)
 
 
 def _check_size(problem: FrictionProblem, most: int) -> None:
@@ -220,30 +232,6 @@ def _minors(k: int) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64], Arra
 
 
 # ---------------------------------------------------------------------------- in 2D
-def _planar(
-    problem: FrictionProblem, most: int, ask: AskPlanar, time_limit: TimeLimit
-) -> CriterionFriction:
-    """All determinants, as `critical_friction` has them."""
-    deadline, began = deadline_of(time_limit, SECONDS), now()
-    _check_size(problem, most)
-    pieces = None
-    try:
-        pieces = Pieces.of(problem, deadline)
-        found = ask(pieces, deadline) if pieces.contacts else _nothing_reacts()
-    except TimeUp as reason:
-        found = Found(reason=str(reason))
-    difference = None
-    if pieces is not None and found.difference is not None:
-        difference = pieces.reaction(found.difference)
-    return CriterionFriction(found.lower, found.upper, difference, found.examined,
-                             now() - began, found.reason)  # fmt: skip
-
-
-def _nothing_reacts() -> Found:
-    """Where no contact reacts every load has one solution, whatever the friction."""
-    return Found(np.inf, np.inf, reason="no contact can react")
-
-
 def _p_matrix_planar(pieces: Pieces, deadline: Deadline) -> Found:
     threshold = p_matrix_threshold(pieces, deadline)
     return _of(threshold, threshold.null)

@@ -299,7 +299,7 @@ def _this_load(
         return _alone(verdict, _sentence(found.reason), found.distance)
     if found.outcome is LoadOutcome.REFUTED:
         return _refuted(verdict, scaled, found)
-    unsettled = found.reason != UNRESOLVED and not deadline.passed
+    unsettled = not (found.unresolved or deadline.passed)
     if local.dimension == 3 and local.contacts <= REGIONS and unsettled:
         answer = _by_list(
             scaled, solution, verdict, enumerate_discs(scaled, time_limit=deadline)
@@ -325,8 +325,8 @@ def _by_list(
         words = ", ".join("=".join((s.pattern, *s.touching[:3])) for s in found.solutions[:5])
         reason = f"Rounding of W, q and mu decides whether there is more than one of: {words}."
         return replace(verdict, reason=reason)
-    if found.reason == UNRESOLVED:  # a certificate would not tell more
-        return replace(verdict, reason=f"{verdict.reason} {_sentence(UNRESOLVED)}")
+    if found.unresolved:  # a certificate would not tell more
+        return replace(verdict, reason=f"{verdict.reason} {_sentence(found.reason)}")
     return None
 
 

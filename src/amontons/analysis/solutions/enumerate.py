@@ -13,8 +13,8 @@ A complete list means: every solution of the problem with W, q and mu as given i
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -100,9 +100,10 @@ class Solutions(Shown):
     complete: bool
     reason: str
     examined: int
-    seconds: float
+    seconds: float = 0.0
     proof: Proof | DiscProof | None = None
     resolution: float = np.inf
+    unresolved: bool = False  # is it incomplete because loads differ too much?
 
     def __len__(self) -> int:
         return len(self.solutions)
@@ -156,13 +157,14 @@ def enumerate_solutions(
             f"contacts: expected at most {CONTACTS}, got {problem.contacts}; the search grows "
             "exponentially, take a coarser mesh"
         )
-    began = now()
-    try:
-        scaled = Scaled.of(problem, deadline)
-    except TimeUp as reason:
-        return nothing_found(reason, began)
-    if not scaled.q.any():
-        return without_load(scaled)
+    return searched(
+        problem, deadline, lambda scaled: _all_of(scaled, deadline, tolerance, keep_proof)
+    )
+
+
+def _all_of(
+    scaled: Scaled, deadline: Deadline, tolerance: float, keep_proof: bool
+) -> Solutions:
     piece = PlaneProblem(scaled)
     cuts: list[Cut] | None = [] if keep_proof else None
     found, undecided, examined, stopped = _collect(piece, deadline, tolerance, cuts)
@@ -177,8 +179,8 @@ def enumerate_solutions(
         doubt = f"W is singular: reactions above {REACH:g} times the size of q / W may exist"
     return Solutions(
         solutions, doubt is None, doubt or "every other pattern is excluded", examined,
-        now() - began, _proof(piece, cuts),
-        max((s.distance for s in solutions), default=np.inf if doubt else 0.0),
+        proof=_proof(piece, cuts), unresolved=doubt is UNRESOLVED,
+        resolution=max((s.distance for s in solutions), default=np.inf if doubt else 0.0),
     )  # fmt: skip
 
 
@@ -205,17 +207,26 @@ def missing(total: int, expected: int = 1) -> str | None:
     return f"orientations add up to {total}, not {expected}: one is missing or too many"
 
 
-def nothing_found(reason: TimeUp, began: float) -> Solutions:
-    """The empty list of a search that was stopped before it began."""
-    return Solutions((), False, str(reason), 0, now() - began)
+def searched(
+    problem: FrictionProblem | Scaled, deadline: Deadline,
+    search: Callable[[Scaled], Solutions],
+) -> Solutions:  # fmt: skip
+    """What a search finds; without one where W is not there in time, or q is zero."""
+    began = now()
+    try:
+        scaled = Scaled.of(problem, deadline)
+    except TimeUp as reason:
+        return Solutions((), False, str(reason), 0, now() - began)
+    found = search(scaled) if scaled.q.any() else _without_load(scaled)
+    return replace(found, seconds=now() - began)
 
 
-def without_load(scaled: Scaled) -> Solutions:
+def _without_load(scaled: Scaled) -> Solutions:
     """What can be said where q is zero, or without contacts."""
     r = np.zeros(scaled.shape)
     rest = PieceSolution("f" * len(r), (), r, r.copy(), 0.0, 1, 0.0)
     reason = "q is zero: only r = 0 can be judged, others were not looked for"
-    return Solutions((rest,), not len(r), reason, 0, 0.0)
+    return Solutions((rest,), not len(r), reason, 0)
 
 
 # ------------------------------------------------------------------- the search

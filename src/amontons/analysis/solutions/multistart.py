@@ -18,14 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from ...core.clock import NEVER, Deadline, TimeLimit, deadline_of, now
-from ...core.errors import InvalidInput, TimeUp
+from ...core.clock import NEVER, Deadline, TimeLimit, deadline_of
+from ...core.errors import InvalidInput
 from ...problem.friction import FrictionProblem
 from ...solvers.driver import drive
 from ..scaled import Scaled
 from ..statuses import FREE, SLIP, STICK, States
 from ..tolerances import BORDER, SAME, SINGULAR, SOLVED
-from .enumerate import PieceSolution, Solutions, nothing_found, without_load
+from .enumerate import PieceSolution, Solutions, searched
 from .newton_batch import jacobian, linearise, newton, on_piece, solve_work, width
 
 Array = NDArray[np.float64]
@@ -52,22 +52,19 @@ def multistart(
     if not starts >= 1:
         raise InvalidInput(f"starts: expected at least 1, got {starts!r}")
     deadline = deadline_of(time_limit)
-    began = now()
-    try:
-        scaled = Scaled.of(problem, deadline)
-    except TimeUp as reason:
-        return nothing_found(reason, began)
-    if not scaled.q.any():
-        return without_load(scaled)
-    finder = Finder(scaled, np.random.default_rng(seed), tolerance)
-    finder.begin(deadline)
-    used = 0
-    while used < starts or (finder.lacks_one and used < EXTRA * starts):
-        if deadline.passed:
-            break
-        used += finder.search(min(ROUND, EXTRA * starts - used), deadline)
-    return Solutions(tuple(finder.solutions()), False, finder.reason(used), used, now() - began,
-                     resolution=SAME)  # fmt: skip
+
+    def search(scaled: Scaled) -> Solutions:
+        finder = Finder(scaled, np.random.default_rng(seed), tolerance)
+        finder.begin(deadline)
+        used = 0
+        while used < starts or (finder.lacks_one and used < EXTRA * starts):
+            if deadline.passed:
+                break
+            used += finder.search(min(ROUND, EXTRA * starts - used), deadline)
+        found = tuple(finder.solutions())
+        return Solutions(found, False, finder.reason(used), used, resolution=SAME)
+
+    return searched(problem, deadline, search)
 
 
 class Finder:

@@ -22,6 +22,7 @@ class RegionTree(ABC):
     stopped: by the clock, or because there are too many contacts.
     """
 
+    unresolved = False  # is it that solutions can not be told apart?
     LOOK = 50.0  # operations of looking at a region per cube of the reactions, at least
 
     def __init__(self, scaled: Scaled, deadline: Deadline, queue: list[Any]) -> None:

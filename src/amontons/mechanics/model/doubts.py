@@ -26,11 +26,11 @@ CHECKS: tuple[Check, ...] = (
     volumetric_locking,
     large_rotation,
     nodal_on_non_matching,
-    sliding_beyond_pairs,
-    sliding_beyond_curvature,
 )
+OF_THE_START = (sliding_beyond_pairs, sliding_beyond_curvature)  # its pairs, normals
 
 
 def model_warnings(model: Model, fields: ContactFields) -> tuple[ResultWarning, ...]:
     """All warnings about a solved state of a model, in the order of CHECKS."""
-    return tuple(warning for check in CHECKS for warning in check(model, fields))
+    checks = CHECKS if model.is_large else CHECKS + OF_THE_START
+    return tuple(warning for check in checks for warning in check(model, fields))

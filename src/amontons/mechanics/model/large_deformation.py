@@ -73,6 +73,10 @@ class LargeDeformation(NonlinearProblem):
 
     # ---------------------------------------------------------------- sizes
     measure = Measure.RESIDUAL
+    no_inertia = (
+        "dynamics are those of small strains with contact in the reference configuration; use "
+        "QuasiStatic, or LinearElastic and kinematics='small'"
+    )
 
     @property
     def law(self) -> Law:  # type: ignore[override]  # read only

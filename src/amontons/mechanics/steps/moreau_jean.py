@@ -51,7 +51,6 @@ from ...core.clock import NEVER, Deadline
 from ...core.errors import InvalidInput, UnsupportedForm
 from ...core.words import helpful
 from ...problem.friction import FrictionProblem
-from ...problem.nitsche import NO_MULTIPLIERS
 from ...problem.protocol import Problem
 from ...problem.solution import FrictionSolution
 from ...solvers.contract import Iterate
@@ -107,13 +106,8 @@ class MoreauJean:
 
     def prepare(self, model: Model, tolerance: float) -> MovingModel:
         """The matrices of all steps; tolerance of their solves."""
-        if model.is_large:
-            raise UnsupportedForm(
-                "model: dynamics are those of small strains with contact in the reference "
-                "configuration; use QuasiStatic, or LinearElastic and kinematics='small'"
-            )
-        if model.contacts[0].nitsche is not None:
-            raise UnsupportedForm(f"model: {NO_MULTIPLIERS}")
+        if model.kind.no_inertia:
+            raise UnsupportedForm(f"model: {model.kind.no_inertia}")
         return MovingModel(self, model, tolerance)
 
 

@@ -53,6 +53,7 @@ class LoadCertificate:
     examined: int
     reason: str
     seconds: float
+    unresolved: bool = False  # is it undecided because loads differ too much?
 
     def __str__(self) -> str:
         return f"{self.outcome.value}: {self.reason}"

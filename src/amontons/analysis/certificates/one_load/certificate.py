@@ -77,6 +77,7 @@ def certify_load(
     return LoadCertificate(
         outcome, other if outcome is LoadOutcome.REFUTED else None, branches, r, distance,
         tree.examined if tree else 0, reason, now() - began,
+        unresolved=tree is not None and tree.unresolved,
     )  # fmt: skip
 
 

@@ -16,13 +16,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ....core.clock import NEVER, Deadline, TimeLimit, deadline_of, now
-from ....core.errors import TimeUp
+from ....core.clock import NEVER, Deadline, TimeLimit, deadline_of
 from ....problem.friction import FrictionProblem
 from ...scaled import UNRESOLVED, Scaled
 from ...statuses import FREE, STICK
 from ...tolerances import ON, REFERENCE, RESOLVED, SOLVED
-from ..enumerate import Solutions, missing, nothing_found, without_load
+from ..enumerate import Solutions, missing, searched
 from ..existence import exist
 from ..multistart import EXTRA, ROUND, Finder, statuses
 from ..newton_batch import newton, on_piece, polished, width
@@ -54,25 +53,23 @@ def enumerate_discs(
     Tresca's law.
     """
     deadline = deadline_of(time_limit, SECONDS)
-    began = now()
-    try:
-        scaled = Scaled.of(problem, deadline)
-    except TimeUp as reason:
-        return nothing_found(reason, began)
-    if not scaled.q.any():
-        return without_load(scaled)
-    finder = Finder(scaled, np.random.default_rng(0), tolerance)
-    search = DiscSearch(scaled, finder, deadline)
-    search.begin()
-    search.run()
-    entries = [replace(entry, distance=search.resolution,
-                       at_least=int(exist(scaled, [entry.r], deadline)),
-                       sole=search.complete and not (entry.freedom or entry.touching))
-               for entry in finder.solutions()]  # fmt: skip
-    return Solutions(
-        tuple(entries), search.complete, search.reason, search.examined, now() - began,
-        search.proof() if keep_proof else None, search.resolution,
-    )  # fmt: skip
+
+    def search(scaled: Scaled) -> Solutions:
+        finder = Finder(scaled, np.random.default_rng(0), tolerance)
+        tree = DiscSearch(scaled, finder, deadline)
+        tree.begin()
+        tree.run()
+        entries = [replace(entry, distance=tree.resolution,
+                           at_least=int(exist(scaled, [entry.r], deadline)),
+                           sole=tree.complete and not (entry.freedom or entry.touching))
+                   for entry in finder.solutions()]  # fmt: skip
+        return Solutions(
+            tuple(entries), tree.complete, tree.reason, tree.examined,
+            proof=tree.proof() if keep_proof else None, resolution=tree.resolution,
+            unresolved=tree.unresolved,
+        )  # fmt: skip
+
+    return searched(problem, deadline, search)
 
 
 class DiscSearch(RegionTree):
@@ -132,6 +129,12 @@ class DiscSearch(RegionTree):
         return missing(sum(self.finder.sign), 0 if self._penetrates else 1)
 
     @property
+    def unresolved(self) -> bool:  # type: ignore[override]
+        """True where all regions are closed, but solutions can not be told apart."""
+        closed = not (self.stopped or self.undecided)
+        return closed and not self._resolved
+
+    @property
     def _resolved(self) -> bool:
         loaded = all(self.scaled.resolves(r) for r in self.finder.found)
         return loaded and self.resolution <= RESOLVED
@@ -150,7 +153,7 @@ class DiscSearch(RegionTree):
             return f"stopped after {self.deadline}"
         if self.undecided:
             return f"{self.undecided} regions could be neither divided nor excluded"
-        if not self._resolved:
+        if self.unresolved:
             return UNRESOLVED
         if self._missing is not None:
             return self._missing
