@@ -17,7 +17,7 @@ from ...core.files import make_folder, remove_empty
 from ...io.case import Settings, identity
 from ...io.checkpoint import export_fclib, steps_of
 from ...io.readers import Case
-from ...mechanics.steps import Energies, TimeStep, at_rest, evolve
+from ...mechanics.steps import Energies, QuasiStatic, TimeStep, at_rest, evolve
 from ...mechanics.steps.stepping import at_end
 from ...problem.solution import Outcome
 from .doubts import Doubts
@@ -197,7 +197,7 @@ def _follow(steps: Iterator[TimeStep], results: RunFolder, asked: _Run) -> int:
     if last is not None and asked.film is not None:
         _report(asked.film, results, asked)
     if not asked.quiet:
-        _summary(results)
+        _summary(results, asked)
         for line in asked.doubts.lines():
             click.echo(line)
     return code
@@ -275,18 +275,29 @@ def _show(step: TimeStep, asked: _Run) -> None:
         click.echo(f"\rt = {step.time:.6g} of {until:.6g} ", nl=False)
 
 
-def _summary(results: RunFolder) -> None:
+def _summary(results: RunFolder, asked: _Run) -> None:
     """Sums of all works, and where the results are."""
+    assert asked.case.evolution is not None
     table = results.table
     if not len(table):
         return
     sums = results.works()
+    rest = (
+        f"missed by straight lines between the steps {sums['numerical']:.4g}"
+        if isinstance(asked.case.evolution.method, QuasiStatic)
+        else f"dissipated by damping {sums['damping']:.4g}, by the scheme "
+        f"{sums['numerical']:.4g}"
+    )
     click.echo(
         f"{len(table)} steps; work of loads {sums['loads']:.4g}, supports "
-        f"{sums['supports']:.4g}, contact {sums['contact']:.4g}; dissipated by damping "
-        f"{sums['damping']:.4g}, by the scheme {sums['numerical']:.4g}; "
+        f"{sums['supports']:.4g}, contact {sums['contact']:.4g}; {rest}; "
         f"gain {sums['gain']:.4g}, defect {sums['defect']:.1e}"
     )
+    if not results.numbers:
+        click.echo(
+            f"{len(asked.case.model.contacts)} contact pairs are too many for columns of "
+            "steps.csv; solution.json has those of the last step"
+        )
     jumps = [f"{time:.6g}" for time in table["jump"] if time == time]
     if jumps:
         click.echo(f"jumps at t = {', '.join(jumps)}")
