@@ -14,6 +14,7 @@ from amontons.io.plots import (
     COLOURS,
     Camera,
     Frame,
+    draw_film,
     picture,
     series_figure,
     status_figure,
@@ -252,3 +253,17 @@ def test_a_figure_without_bodies_in_3d_is_legible():
 
     found = am.solve(sphere_packing())
     assert faults(status_figure(found)) == []
+
+
+def test_a_film_shows_all_bodies_in_every_picture(tmp_path):
+    model = two_bodies()
+    frames = [Frame.of(step) for step in am.evolve(model, am.QuasiStatic(0.5), until=1.0)]
+    *pages, film = draw_film(model, frames, tmp_path)
+    assert [page.name for page in pages] == ["step-00001.png", "step-00002.png"]
+    shown = [np.asarray(Image.open(page).convert("RGB")) for page in pages]
+    assert (shown[0] != shown[1]).any()
+    for image in shown:
+        for colour in STONE[:2]:
+            assert share_of(image, colour) > 0.01
+    with Image.open(film) as moving:
+        assert moving.n_frames == 2
