@@ -48,9 +48,10 @@ def test_all_solutions_are_drawn_with_and_without_bodies(tmp_path):
     model = brake()
     found = am.all_solutions(model)
     assert len(found) == 3
+    pieces = found.solutions
     for figure in (found.plot(tmp_path / "r.pdf"), found.plot(model=model, title="arm")):
         titles = [axes.get_title() for axes in figure.axes]
-        told = [f"{k}: orientation {s.orientation:+d}" for k, s in enumerate(found.solutions, 1)]
+        told = [f"{k}: orientation {s.orientation:+d}" for k, s in enumerate(pieces, 1)]
         assert [title.splitlines()[0] for title in titles] == told
         assert "3 solutions, complete" in figure.get_suptitle()
         assert faults(figure) == []
