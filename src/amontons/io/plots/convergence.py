@@ -39,7 +39,7 @@ def convergence_figure(record: Convergence, title: str = "") -> Figure:
     outcome = f"{record.outcome.name.lower().replace('_', ' ')} with {record.solver}"
     sheet = Sheet(9.6, 3.4, title=f"{title}: {outcome}" if title else outcome,
                   note=record.stamp, rows=-(-len(marks) // columns))  # fmt: skip
-    left, right = sheet.panel(0.8, 0.65, 4.2, 2.65), sheet.panel(5.3, 0.65, 4.2, 2.65)
+    left, right = (sheet.panel(x, 0.65, 4.1, 2.65) for x in (0.8, 5.2))
     seconds = np.array([step.seconds for step in history], dtype=float)
     setup = float(seconds.min(initial=np.inf)) if len(seconds) else 0.0
     iterations = np.array([step.iteration for step in history], dtype=float)
@@ -57,6 +57,7 @@ def convergence_figure(record: Convergence, title: str = "") -> Figure:
         _draw(axes, x, history, low)
         axes.axhline(record.tolerance, color=LIMIT, linestyle="--", linewidth=1)
     left.xaxis.set_major_locator(MaxNLocator(6, integer=True))
+    right.xaxis.set_major_locator(MaxNLocator(6))
     right.tick_params(labelleft=False)
     left.set_ylabel(f"error ({record.measure.value} measure)", fontsize=SMALL)
     sheet.legend(marks, columns)

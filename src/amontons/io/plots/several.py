@@ -165,7 +165,7 @@ def _bodies(
             for nodes in scene.sides:
                 axes.add_collection(
                     PolyCollection(rest[nodes], facecolors="none", alpha=0.25, edgecolors=INK,
-                                   linewidths=0.3), autolim=False
+                                   linewidths=0.3, zorder=0.5), autolim=False
                 )  # fmt: skip
             _contacts(axes, field, panel, factor, length)
             axes.set(aspect="equal", xticks=[], yticks=[])
@@ -195,7 +195,8 @@ def _contacts(
     moved = (tails != at).any(axis=1)
     if moved.any():
         axes.quiver(*tails[moved].T, *(at - tails)[moved].T, color="#D55E00", angles="xy",
-                    scale_units="xy", scale=1.0, width=0.006, zorder=3)  # fmt: skip
+                    scale_units="xy", scale=1.0, width=0.006, headwidth=5, headlength=6,
+                    headaxislength=5, zorder=5)  # fmt: skip
         (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
         space = 0.04 * (right - left)
         (x, y), (a, b) = tails.min(axis=0) - space, tails.max(axis=0) + space
