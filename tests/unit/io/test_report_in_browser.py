@@ -23,10 +23,14 @@ SMALLER = {  # examples that take long as they are
 }  # fmt: skip
 IN_TIME = ("release", "wall")
 NO_BODIES = ("cylinder", "one-contact", "spheres", "tower")
-PIXELS = """() => { const c = document.getElementById('canvas'), t = document.createElement('canvas');
-    t.width = c.width; t.height = c.height; const g = t.getContext('2d'); g.drawImage(c, 0, 0);
-    return Array.from(g.getImageData(0, 0, t.width, t.height).data.filter((_, k) => k % 7 < 3)); }"""
-SETTLED = "new Promise(f => requestAnimationFrame(() => requestAnimationFrame(f)))"
+PICTURE = """() => {
+    const canvas = document.getElementById('canvas'), copy = document.createElement('canvas');
+    copy.width = canvas.width; copy.height = canvas.height;
+    const pen = copy.getContext('2d'); pen.drawImage(canvas, 0, 0);
+    const words = new Uint32Array(pen.getImageData(0, 0, copy.width, copy.height).data.buffer);
+    let sum = 0; for (const word of words) sum = (Math.imul(sum, 31) + word) | 0;
+    return { sum, colours: new Set(words).size }; }"""
+SETTLED = "() => new Promise(f => requestAnimationFrame(() => requestAnimationFrame(f)))"
 
 
 @pytest.fixture(scope="module")
@@ -72,17 +76,17 @@ def made(tmp_path, verb, source, *more):
     return folder / "report.html"
 
 
-def pixels(page):
+def picture(page):
+    """A sum over the pixels of the view, and how many colours it has."""
     page.evaluate(SETTLED)
-    return np.array(page.evaluate(PIXELS))
+    return page.evaluate(PICTURE)
 
 
 def changes(page, act):
     """True when the picture is another after act()."""
-    before = pixels(page)
+    before = picture(page)
     act()
-    after = pixels(page)
-    return before.shape != after.shape or (before != after).mean() > 1e-4
+    return picture(page) != before
 
 
 def set_slider(page, name, value):
@@ -123,7 +127,7 @@ def test_every_example_has_a_page_that_turns(name, tmp_path, opened):
         assert not page.locator("#view").is_visible()
         return
     pane = page.locator(".pane").first
-    assert len(np.unique(pixels(page))) > 20  # something is drawn
+    assert picture(page)["colours"] > 20  # something is drawn
     assert changes(page, lambda: drag(page, pane))
     pane.press("0")
     assert changes(page, lambda: set_slider(page, "scale", 100))
@@ -227,7 +231,7 @@ def test_not_converged_is_stamped_across(tmp_path, opened):
 
 
 def test_hostile_words_do_nothing(cube, tmp_path, opened):
-    title = "</script><script>document.title='x'</script><img src=x onerror=alert(1)> {{css}} \ud800"
+    title = "</script><script>document.title='x'</script><img src=x onerror=alert(1)> \ud800"
     page = opened(report(cube, tmp_path / "r.html", title=title))
     assert page.title().startswith("</script><script>")
     assert page.locator("h1").inner_text().startswith("</script><script>document")
@@ -245,7 +249,7 @@ def test_time_moves_by_a_slider(tmp_path, opened):
     page.locator("#step").press("ArrowRight")
     assert label.inner_text() == "step 2, t = 0.1"
     page.locator("#play").click()
-    page.wait_for_function("window.report.view.index > 3")
+    playwright.expect(label).to_have_text("step 5, t = 0.25")
     page.locator("#play").click()
     assert "work of loads" in page.locator("#charts").inner_text()
 
