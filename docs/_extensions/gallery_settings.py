@@ -12,7 +12,7 @@ def gallery_settings(docs: Path) -> dict[str, Any]:
         "examples_dirs": [str(docs / "gallery")],
         "gallery_dirs": ["made"],
         "filename_pattern": r"\.py$",
-        "subsection_order": [f"../gallery/{name}" for name in SECTIONS] + ["*"],
+        "subsection_order": [f"gallery/{name}" for name in SECTIONS] + ["*"],
         "within_subsection_order": "FileNameSortKey",
         "remove_config_comments": True,
         "show_memory": False,
