@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from ..core.faces import Shown
 from ..core.warned import ResultWarning
 from ..io import results as output
 from ..problem.solution import FrictionSolution
@@ -25,7 +26,7 @@ OF_FIELDS = (
 
 
 @dataclass(frozen=True, eq=False)
-class ModelSolution:
+class ModelSolution(Shown):
     """A solved model.  Forwards what FrictionSolution and ContactFields know.
 
     displacement: (nodes, dim) per body; gap, pressure (nc,), shear, slip (nc, d-1) per contact;
@@ -79,6 +80,11 @@ class ModelSolution:
         """Write the solution; the suffix decides: .vtu, .h5 (or .hdf5), .json."""
         output.write(self.output, path)
 
-    def plot(self, path: str | os.PathLike[str]) -> None:
-        """Draw the status map of the contact surface and the pressure: .png, .svg or .pdf."""
-        output.plot(self.output, path)
+    def plot(self, path: str | os.PathLike[str] | None = None, **options: Any) -> Any:
+        """A figure of bodies, statuses and pressures, written to `path` too: .png, .svg, .pdf.
+
+        options: title.
+        """
+        from ..io.plots.faces import plot
+
+        return plot(self.output, path, **options)

@@ -11,7 +11,9 @@ import os
 from importlib import import_module
 from typing import Any
 
-HOMES = {"plot": "amontons.io.plots.faces"}  # the module whose function of that name answers
+HOMES = {  # the module whose function of that name answers
+    "plot": "amontons.io.plots.faces", "report": "amontons.io.report.faces",
+}  # fmt: skip
 
 
 class Shown:
@@ -26,6 +28,14 @@ class Shown:
         InvalidInput for a suffix that is no picture's.
         """
         return _face("plot")(self, path, **options)
+
+    def report(self, path: str | os.PathLike[str], **options: Any) -> Any:
+        """Write it as a page that turns: one HTML file, complete or not at all; its path.
+
+        options: title; units, "mm,N,s" or {"length": "mm", …}; model, of discrete results.
+        Raises InvalidInput for a suffix that is no page's, and NotWritten.
+        """
+        return _face("report")(self, path, **options)
 
 
 def _face(name: str) -> Any:

@@ -19,6 +19,7 @@ from ..core.errors import Address, AmontonsError, FileFormatError, InvalidInput
 from ..core.plugins import installed, load, loaded
 from ..problem.friction import FrictionProblem
 from ..problem.protocol import Problem
+from .units import Units
 
 if TYPE_CHECKING:
     from ..mechanics.model import Model
@@ -33,7 +34,8 @@ class Case:
     """A model or a discrete problem, how to solve it, a title, and how it goes on in time.
 
     path: the file, None of a problem without one; tables: what a case file says, with
-    overrides; key_of: the words of the file for an address in the model.
+    overrides; key_of: the words of the file for an address in the model; units: what they are
+    called.
     """
 
     target: Model | FrictionProblem
@@ -43,6 +45,7 @@ class Case:
     evolution: Evolution | None = None
     tables: dict[str, Any] = field(default_factory=dict)
     key_of: Callable[[Address], str] = lambda at: ""
+    units: Units = Units()
 
     @property
     def name(self) -> str:

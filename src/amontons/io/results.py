@@ -6,7 +6,7 @@ import json
 import math
 import os
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
 from enum import Enum
@@ -51,6 +51,9 @@ class Output:
     from_fclib: bool = False
     uniqueness: dict[str, Any] | None = None  # what is known about other solutions
     warnings: tuple[ResultWarning, ...] = ()
+
+
+Writer = Callable[[Output, Path], None]
 
 
 # ------------------------------------------------------------------------------- choosing
@@ -99,20 +102,22 @@ def plot_convergence(output: Output, path: Path) -> None:
 
 
 def save(
-    output: Output, folder: str | os.PathLike[str], copy: str | os.PathLike[str] | None = None
-) -> list[Path]:
+    output: Output, folder: str | os.PathLike[str], copy: str | os.PathLike[str] | None = None,
+    more: Mapping[str, Writer] | None = None,
+) -> list[Path]:  # fmt: skip
     """Write all files of a solution into a folder, made if need be; returns their paths.
 
-    copy: where a second solution.json goes.  Nothing is renamed before all is written, and a
-    failure leaves no new folder.
+    copy: where a second solution.json goes.  more: further files by name.  Nothing is renamed
+    before all is written, and a failure leaves no new folder.
     """
     text = to_json(summary(output))  # before the first folder: it evaluates the solution
-    writers: dict[str, Callable[[Output, Path], None]] = {
+    writers: dict[str, Writer] = {
         "solution.json": lambda output, path: _write_text(path, text), "solution.h5": write_h5,
         "status.png": plot_status, "convergence.png": plot_convergence,
     }  # fmt: skip
     if output.model is not None:
         writers["solution.vtu"] = write_vtu
+    writers |= more or {}
     folder = Path(folder)
     jobs = [(folder / name, writer) for name, writer in writers.items()]
     if copy is not None:

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from ...core.clock import Deadline, TimeLimit, deadline_of, now
 from ...core.errors import InvalidInput, TimeUp, UnsupportedForm
+from ...core.faces import Shown
 from ...problem.friction import FrictionProblem
 from ..scaled import UNRESOLVED, Scaled
 from ..statuses import STICK, word
@@ -86,7 +87,7 @@ class Proof:
 
 
 @dataclass(frozen=True, eq=False)
-class Solutions:
+class Solutions(Shown):
     """What `all_solutions` found; complete: every other pattern was excluded by a proof.
 
     examined: partial patterns that were looked at.  reason: why complete, or why not.

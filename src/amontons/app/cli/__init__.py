@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from ... import __version__
+from .folders import results_folder
 from .group import Commands
 
 EPILOG = """\b
@@ -19,7 +20,6 @@ Examples:
 Exit codes: 0 converged, 1 not converged (results are written all the same),
 2 bad input (nothing is written), 130 interrupted (the best state is written).
 """
-SOURCE_HELP = """SOURCE is a TOML case file, an FCLib HDF5 file, or example:NAME."""
 
 
 @click.group(
@@ -65,8 +65,7 @@ Examples:
 @click.option("--criterion", type=click.Choice(["judge", "natural"]), default="judge",
               show_default=True, help="What the tolerance is for: the unit-free error, or "
               "|F_nat(r)| / |q| with rho = 1, as papers have it.")  # fmt: skip
-@click.option("-o", "--output", "folder", metavar="DIR",
-              help="Folder for the results. [name of the source with -results]")  # fmt: skip
+@results_folder("name of the source with -results")
 @click.option("--json", "json_copy", metavar="FILE",
               help="A copy of solution.json; - prints it and nothing else.")  # fmt: skip
 @click.option("--uniqueness", "full_verdict", is_flag=True,
@@ -164,6 +163,7 @@ METHOD:FIELD=VALUE,… sets options of a method, NAME=METHOD:… gives it a name
 @click.option("--profile", metavar="FILE.png",
               help="Draw Dolan-Moré performance profiles.")  # fmt: skip
 @click.option("--json", "json_copy", metavar="FILE", help="All times as JSON; - prints them.")
+@results_folder("bench-results", only_report=True)
 def bench(**options: object) -> None:
     """Compare methods on many problems: times to reach a tolerance, side by side.
 
@@ -197,6 +197,7 @@ Exit codes: 0 the list is complete, 1 there may be others, 2 bad input.
 @click.option("--json", "json_copy", metavar="FILE", help="The same as JSON; - prints it.")
 @click.option("--picture", metavar="FILE",
               help="Draw the solutions side by side: .png, .svg or .pdf.")  # fmt: skip
+@results_folder("name of the source with -results", only_report=True)
 def enumerate_solutions(**options: object) -> int:
     """Find all solutions of a problem with Coulomb friction, and prove that these are all.
 
@@ -326,8 +327,7 @@ Exit codes: 0 every branch has come to its end, 1 one was given up, 2 bad input.
                    "exactly: step, min_step, max_step, grow, shrink, residual, change, "
                    "min_cosine, corrections, quick, border, ahead, aside, "
                    "switch=tangent|first-order.")  # fmt: skip
-@click.option("-o", "--output", "folder", metavar="DIR",
-              help="Folder for the results. [name of the source with -results]")  # fmt: skip
+@results_folder("name of the source with -results")
 @click.option("--json", "json_copy", metavar="FILE",
               help="A copy of follow.json; - prints it and nothing else.")  # fmt: skip
 @click.option("--quiet", is_flag=True, help="No summary.")
@@ -363,8 +363,7 @@ has been made is saved, go on with --restart.
 @click.option("--time-limit", type=float, metavar="SECONDS",
               help="Stop after that time, ready for --restart; solver.time_limit is for each "
               "step.")  # fmt: skip
-@click.option("-o", "--output", "folder", metavar="DIR",
-              help="Folder for the results. [name of the case with -results]")  # fmt: skip
+@results_folder("name of the case with -results")
 @click.option("--export-fclib", "export", metavar="DIR",
               help="Write the discrete problems of the steps as FCLib files.")  # fmt: skip
 @click.option("--export-steps", metavar="LIST",

@@ -7,10 +7,12 @@ progress, so a time without a solution is the time that was really spent.
 from __future__ import annotations
 
 import math
+import re
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
@@ -25,7 +27,10 @@ from ...problem.solution import TELLING, Convergence, Outcome
 from .. import api
 from .contestants import Contestant, contestants
 from .sources import open_source
-from .terminal import check_writable, deliver_json, show_table
+from .terminal import check_writable, deliver_json, report_folder, show_table, write_report
+
+if TYPE_CHECKING:
+    from ...io.report import Page
 
 SCHEMA = "amontons/bench/1"
 REPEATS = 5
@@ -71,10 +76,12 @@ class Timing:
 def run(
     files: Sequence[str], methods: Sequence[str], tolerances: str, time_limit: float,
     profile: str | None, json_copy: str | None, by: str = "time", criterion: str = "judge",
+    report: bool = False, folder: str | None = None,
 ) -> None:  # fmt: skip
     """Check all input, solve all, show."""
     check_writable(profile, "--profile", output.FIGURES)
     check_writable(json_copy, "--json")
+    place = report_folder(report, folder, "bench-results")
     racing = contestants(methods)
     goals = [_tolerance(text) for text in _words("tolerances", tolerances)]
     if not time_limit > 0:
@@ -94,6 +101,8 @@ def run(
         _show(timings, names, goals, by)
     if profile is not None:
         _draw(timings, names, goals, Path(profile), by)
+    if place is not None:
+        write_report(_page(timings, names, goals, by, stop), place)
     if json_copy is not None:
         rows = [asdict(timing) for timing in timings]
         data = {"schema": SCHEMA, "versions": output.versions(), "time_limit": time_limit,
@@ -179,6 +188,22 @@ def _once(
 # ------------------------------------------------------------------------------ showing
 def _show(timings: list[Timing], names: list[str], goals: list[float], by: str) -> None:
     """One line per file and tolerance, one column per method."""
+    compiled = sum(timing.compiling for timing in timings)
+    title = "Time to solution" if by == "time" else "Floating point operations to solution"
+    show_table(title, ["problem", "tolerance", *names], _rows(timings, names, goals, by))
+    solved = [
+        f"{name} {sum(math.isfinite(t.seconds) for t in timings if t.method == name)}"
+        for name in names
+    ]
+    click.echo(f"solved of {len(timings) // len(names)}: {', '.join(solved)}")
+    if compiled >= TELLING:
+        click.echo(f"compiling, once and not counted: {compiled:.2g} s")
+
+
+def _rows(
+    timings: list[Timing], names: list[str], goals: list[float], by: str
+) -> list[list[str]]:
+    """The cells of the table, the best of each line in bold."""
     table = {(t.file, t.tolerance, t.method): t for t in timings}
     rows = []
     for file in dict.fromkeys(t.file for t in timings):
@@ -187,16 +212,7 @@ def _show(timings: list[Timing], names: list[str], goals: list[float], by: str) 
             best = np.nanmin([math.inf, *(cell.cost(by) for cell in cells)])
             texts = [_cell(cell, by, best) for cell in cells]
             rows.append([Path(file).stem, f"{goal:g}", *texts])
-    compiled = sum(timing.compiling for timing in timings)
-    title = "Time to solution" if by == "time" else "Floating point operations to solution"
-    show_table(title, ["problem", "tolerance", *names], rows)
-    solved = [
-        f"{name} {sum(math.isfinite(t.seconds) for t in timings if t.method == name)}"
-        for name in names
-    ]
-    click.echo(f"solved of {len(timings) // len(names)}: {', '.join(solved)}")
-    if compiled >= TELLING:
-        click.echo(f"compiling, once and not counted: {compiled:.2g} s")
+    return rows
 
 
 def _cell(timing: Timing, by: str, best: float) -> str:
@@ -218,24 +234,48 @@ def _operations(value: float) -> str:
     return f"{value / 1e6:.3g} M" if value < 1e9 else f"{value / 1e9:.3g} G"
 
 
+def _profiles(
+    timings: list[Timing], names: list[str], goals: list[float], by: str
+) -> tuple[dict[float, Any], list[str]]:
+    """Performance profiles by tolerance, and the methods in them: those that count the cost."""
+    shown = [
+        name for name in names
+        if not any(math.isnan(t.cost(by)) for t in timings if t.method == name)
+    ]  # fmt: skip
+    profiles = {}
+    for goal in goals if shown else ():
+        columns = [
+            [t.cost(by) for t in timings if t.method == name and t.tolerance == goal]
+            for name in shown
+        ]
+        profiles[goal] = performance_profile(np.array(columns).T)
+    return profiles, shown
+
+
+def _page(
+    timings: list[Timing], names: list[str], goals: list[float], by: str, stop: Stop
+) -> Page:
+    """The report of a race."""
+    from ...io.report import bench_page
+
+    rows = [[re.sub(r"\[/?\w+\]", "", cell) for cell in row]
+            for row in _rows(timings, names, goals, by)]  # fmt: skip
+    profiles, shown = _profiles(timings, names, goals, by)
+    facts = [["criterion", stop.criterion.value], ["time limit", f"{stop.seconds:g} s"],
+             ["compiling, not counted", f"{sum(t.compiling for t in timings):.2g} s"]]
+    what = "time" if by == "time" else "operations"
+    return bench_page("Methods compared", ("problem", "tolerance", *names), rows, profiles,
+                      shown, facts, what)  # fmt: skip
+
+
 def _draw(
     timings: list[Timing], names: list[str], goals: list[float], path: Path, by: str
 ) -> None:
     """One panel per tolerance; methods that do not count operations are not in theirs."""
     from ...io.plots import profile_figure, save_figure
 
-    shown = [
-        name for name in names
-        if not any(math.isnan(t.cost(by)) for t in timings if t.method == name)
-    ]  # fmt: skip
+    profiles, shown = _profiles(timings, names, goals, by)
     if not shown:
         raise InvalidInput("--by flops: no method here counts its operations")
-    profiles = {}
-    for goal in goals:
-        columns = [
-            [t.cost(by) for t in timings if t.method == name and t.tolerance == goal]
-            for name in shown
-        ]
-        profiles[goal] = performance_profile(np.array(columns).T)
     what = "time" if by == "time" else "operations"
     save_figure(profile_figure(profiles, shown, what), path)

@@ -17,7 +17,15 @@ from ...solvers import Iterate
 from ...solvers.driver import drive
 from ..questions import all_solutions
 from .sources import open_source
-from .terminal import check_writable, deliver_json, say_when, shortened, show_table
+from .terminal import (
+    check_writable,
+    deliver_json,
+    report_folder,
+    say_when,
+    shortened,
+    show_table,
+    write_report,
+)
 
 Array = NDArray[np.float64]
 SCHEMA = "amontons/enumerate/1"
@@ -26,12 +34,14 @@ INCOMPLETE = 1  # exit code
 
 def run(
     source: str, overrides: Sequence[str], mu: float | None, time_limit: float | None,
-    json_copy: str | None, picture: str | None,
+    json_copy: str | None, picture: str | None, report: bool = False,
+    folder: str | None = None,
 ) -> int:  # fmt: skip
     """Search, show; the exit code."""
     check_writable(json_copy, "--json")
     check_writable(picture, "--picture", FIGURES)
     opened = open_source(source, overrides)
+    place = report_folder(report, folder, f"{opened.name}-results")
     problem = opened.discrete_with(mu)
     found = all_solutions(opened.target_with(mu), time_limit=time_limit)
     if json_copy != "-":
@@ -44,6 +54,12 @@ def run(
             f"{k}: orientation {s.orientation:+d}" for k, s in enumerate(found.solutions, 1)
         ]
         draw(opened, problem, [s.r for s in found.solutions], named, picture)
+    if place is not None:
+        from ...io.report import solutions_page
+
+        model = opened.target_with(mu) if opened.has_model else None
+        page = solutions_page(found, opened.title, opened.units, problem, model)  # type: ignore
+        write_report(page, place)
     return 0 if found.complete else INCOMPLETE
 
 

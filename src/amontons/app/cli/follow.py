@@ -14,7 +14,14 @@ from ...core.files import made, write_bytes
 from ...io.results import to_json, versions
 from .. import questions
 from .sources import open_source
-from .terminal import check_folder, check_writable, deliver_json, shortened, show_table
+from .terminal import (
+    check_folder,
+    check_writable,
+    deliver_json,
+    shortened,
+    show_table,
+    write_report,
+)
 
 SCHEMA = "amontons/follow/1"
 UNFINISHED = 1  # exit code
@@ -27,7 +34,7 @@ SHOWN = 40  # letters of a pattern
 def run(
     source: str, overrides: Sequence[str], parameter: str, low: float, high: float,
     mu: float | None, every: bool, max_points: int, time_limit: float | None,
-    folder: str | None, json_copy: str | None, quiet: bool,
+    folder: str | None, json_copy: str | None, quiet: bool, report: bool = False,
 ) -> int:  # fmt: skip
     """Follow, write, show; the exit code."""
     check_writable(json_copy, "--json")
@@ -50,6 +57,11 @@ def run(
         complete, reason = None, ""
     text = to_json(record(branches, parameter, (low, high), complete, reason, at))
     _write(place, text, branches, opened.title)
+    if report:
+        from ...io.report import curves_page
+
+        model: Any = target if opened.has_model else None
+        write_report(curves_page(branches, opened.title, opened.units, model, reason), place)
     if json_copy is not None:
         deliver_json(text, json_copy)
     if json_copy != "-" and not quiet:

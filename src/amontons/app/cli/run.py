@@ -25,10 +25,11 @@ from .locking import locked
 from .run_folder import BALANCE, PICTURES, WORKS, RunFolder, clear, continued
 from .sources import open_source, with_flags
 from .stopping import Stopping
-from .terminal import check_folder, say_growth
+from .terminal import REPORT, check_folder, say_growth
 
 if TYPE_CHECKING:
     from ...io.plots import Frame
+    from ...io.report import Film
 
 
 @dataclass
@@ -45,6 +46,7 @@ class _Run:
     stop: Stopping
     frames: list[Frame] = field(default_factory=list)
     doubts: Doubts = field(default_factory=Doubts)
+    film: Film | None = None  # of the report, where one is asked for
     failed: bool = False  # the step after the last one did not converge
 
     def unfinished(self, time: float) -> str:
@@ -65,7 +67,7 @@ class _Run:
 def run(
     case: str, overrides: Sequence[str], tolerance: float | None, time_limit: float | None,
     folder: str | None, export: str | None, every: int, pictures: bool, restart: bool,
-    quiet: bool, export_steps: str | None = None,
+    quiet: bool, export_steps: str | None = None, report: bool = False,
 ) -> int:  # fmt: skip
     """Step and write; returns the exit code."""
     if time_limit is not None and not time_limit > 0:
@@ -87,6 +89,10 @@ def run(
     settings = with_flags(read.settings, tolerance)
     with Stopping() as stop, ExitStack() as stack:
         asked = _Run(read, settings, every, pictures, quiet, time_limit, deadline, stop)
+        if report:
+            from ...io.report import Film
+
+            asked.film = Film(read.model)
         for each in {p.resolve(): p for p in (place, exported) if p is not None}.values():
             stack.callback(remove_empty, make_folder(each))
             stack.enter_context(locked(each))
@@ -163,6 +169,8 @@ def _follow(steps: Iterator[TimeStep], results: RunFolder, asked: _Run) -> int:
             results.add(step, now() - began)
             last = step
             asked.doubts.note(step, quiet=asked.quiet)
+            if asked.film is not None:
+                asked.film.add(step)
             if step.state.index % asked.every == 0:
                 _keep(step, results, asked)
             if not asked.quiet:
@@ -184,6 +192,8 @@ def _follow(steps: Iterator[TimeStep], results: RunFolder, asked: _Run) -> int:
     _keep_last(last, results, asked)
     if asked.frames:
         _draw(results, asked)
+    if last is not None and asked.film is not None:
+        _report(asked.film, results, asked)
     if not asked.quiet:
         _summary(results)
         for line in asked.doubts.lines():
@@ -240,6 +250,16 @@ def _draw(results: RunFolder, asked: _Run) -> None:
     draw_film(asked.case.model, frames, results.folder / PICTURES)
     works = [Energies(*row) for row in table[list(WORKS)].tolist()]
     save_figure(energy_figure(times, works, note=note), results.folder / BALANCE)
+
+
+def _report(film: Film, results: RunFolder, asked: _Run) -> None:
+    """Write report.html: the states of this call, the table of all steps so far."""
+    from ...io.report import run_page, save_page
+
+    table, case = results.table, asked.case
+    note = asked.unfinished(float(table["time"][-1]))
+    page = run_page(film, table, case.title, case.units, note, asked.doubts.lines())
+    save_page(page, results.folder / REPORT)
 
 
 def _show(step: TimeStep, asked: _Run) -> None:

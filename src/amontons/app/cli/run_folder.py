@@ -25,6 +25,7 @@ from ...io.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from ...io.vtk import write_model
 from ...mechanics.steps import Energies, State, TimeStep
 from ...problem.solution import ContactStatus
+from .terminal import REPORT
 
 WORKS = tuple(field.name for field in fields_of(Energies))
 WHOLE = ("index", "open", "slip", "stick", "iterations")
@@ -33,7 +34,8 @@ COLUMNS = ("index", "time", "open", "slip", "stick", *WORKS, "defect", "iteratio
 ROW = np.dtype([(name, np.int64 if name in WHOLE else np.float64) for name in COLUMNS])
 STATE, TABLE, FILM, BALANCE = "state.h5", "steps.csv", "steps.pvd", "energy.png"
 PICTURE = re.compile(r"step-\d{5,}\.(vtu|png)|film\.gif")
-OURS = (PICTURE, *(re.compile(re.escape(name)) for name in (STATE, TABLE, FILM, BALANCE)))
+FILES = (STATE, TABLE, FILM, BALANCE, REPORT)
+OURS = (PICTURE, *(re.compile(re.escape(name)) for name in FILES))
 PICTURES = "pictures"  # folder of those drawn here
 
 

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import click
@@ -13,9 +14,11 @@ import click
 from ...analysis.certificates.uniqueness import Uniqueness, assess, quick_verdict
 from ...core.clock import Deadline, TimeLimit
 from ...core.errors import FileFormatError, InvalidInput, SingularOperator, UnsupportedForm
+from ...core.files import put
 from ...io import results as output
 from ...io.checkpoint import load_start
 from ...io.readers import Case
+from ...io.units import Units
 from ...problem.friction import FrictionProblem
 from ...problem.judge.measures import Criterion
 from ...problem.nitsche import NitscheProblem
@@ -25,7 +28,7 @@ from .. import api
 from ..model_solution import ModelSolution
 from .group import INTERRUPTED
 from .sources import open_source, with_flags
-from .terminal import check_folder, check_writable, say_when
+from .terminal import REPORT, check_folder, check_writable, say_when
 from .uniqueness import brief, describe, record
 
 
@@ -34,7 +37,7 @@ def run(
     max_iterations: int | None, time_limit: float | None, folder: str | None,
     json_copy: str | None, quiet: bool, full_verdict: bool,
     contact_tolerance: float | None = None, patience: int = 500, criterion: str = "judge",
-    start: str | None = None,
+    start: str | None = None, report: bool = False,
 ) -> int:  # fmt: skip
     """Solve and write; returns the exit code."""
     opened = open_source(source, overrides, method)
@@ -64,12 +67,20 @@ def run(
     if verdict is not None:
         result = replace(result, uniqueness=record(verdict))
     copy = None if json_copy in (None, "-") else Path(str(json_copy))
-    output.save(result, place, copy)
+    more = {REPORT: partial(_page, units=opened.units)} if report else None
+    output.save(result, place, copy, more)
     if json_copy == "-":
         click.echo(output.to_json(output.summary(result)), nl=False)
     elif not quiet:
         _report(result, verdict, full_verdict, place)
     return _finish(found)
+
+
+def _page(result: output.Output, path: Path, units: Units) -> None:
+    """Write report.html."""
+    from ...io.report import page_of
+
+    put(path, page_of(result, units=units).html.encode("utf-8"))
 
 
 def _start(file: str, opened: Case) -> Iterate:

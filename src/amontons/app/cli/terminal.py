@@ -13,12 +13,16 @@ from rich.console import Console
 from rich.table import Table
 
 from ...core.errors import InvalidInput
-from ...core.files import write_bytes
+from ...core.files import made, write_bytes
 from ...problem.friction import FrictionProblem
 
 if TYPE_CHECKING:
     from ...io.readers import Case
+    from ...io.report import Page
     from ...mechanics.model import Model
+
+
+REPORT = "report.html"
 
 
 def show_table(
@@ -107,6 +111,21 @@ def _check_name(path: Path) -> None:
         raise InvalidInput(
             f"{shown}: can not be written: {getattr(reason, 'strerror', None) or reason}"
         ) from None
+
+
+def report_folder(asked: bool, folder: str | None, default: str) -> Path | None:
+    """Where --report writes, None where it is not asked for; -o needs it."""
+    if asked:
+        return check_folder(default if folder is None else folder)
+    if folder is not None:
+        raise InvalidInput("--output: this command writes into a folder with --report only")
+    return None
+
+
+def write_report(page: Page, folder: Path) -> None:
+    """Write report.html into a folder, made if need be."""
+    with made(folder):
+        write_bytes(folder / REPORT, page.html.encode("utf-8"))
 
 
 def check_folder(folder: str, what: str = "--output") -> Path:

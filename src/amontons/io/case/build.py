@@ -14,6 +14,7 @@ from ...core.errors import FileFormatError, InvalidInput
 from ...core.expressions import nearest
 from ...core.files import check_is_regular
 from ..readers import Case
+from ..units import UNIT_NAMES, Units
 from .bodies import read_material, read_materials, read_mesh_table
 from .contacts import read_contact, refuse_repeated
 from .evolution import Evolution, read_evolution, read_wall
@@ -30,7 +31,7 @@ EXAMPLE = "example:"  # before the name of a built-in case
 DATA = files("amontons") / "examples_data"
 LARGEST_FILE = 2**24  # bytes of a case file; meshes stand in files of their own
 TOP = ("title", "mesh", "wall", "material", "fix", "traction", "pressure", "body_force",
-       "contact", "solver", "continuation", "evolution")  # fmt: skip
+       "contact", "solver", "continuation", "evolution", "units")  # fmt: skip
 
 
 def read_case(
@@ -55,7 +56,16 @@ def read_case(
     model = _wall_model(top, title) if "wall" in top.data else _model(top, path, title)
     settings = _settings(top)
     return Case(model, settings, title, path, _evolution(top, settings), top.data,
-                key_of=partial(key_of, tables=top.data))  # fmt: skip
+                key_of=partial(key_of, tables=top.data), units=_units(top))  # fmt: skip
+
+
+def _units(top: Table) -> Units:
+    """The names of the units in [units]: length, force, time."""
+    if "units" not in top.data:
+        return Units()
+    table = top.table("units")
+    table.only(*UNIT_NAMES)
+    return Units(**{name: table.text(name) for name in table.data})
 
 
 def example_file(name: str) -> Path:

@@ -24,10 +24,10 @@ def identity(case: Case, settings: Settings) -> dict[str, Any]:
     """JSON data by dotted key: two cases with the same take the same steps.
 
     Meshes go in by their numbers: a mesh file may move, and must not change.  Left out: the
-    title, the end in time, and limits on work, which can only stop a run.
+    title, names of units, the end in time, and limits on work, which can only stop a run.
     """
     tables = {key: value for key, value in case.tables.items()
-              if key not in ("title", "solver", "evolution")}  # fmt: skip
+              if key not in ("title", "solver", "evolution", "units")}  # fmt: skip
     if "mesh" in tables:
         tables["mesh"] = {k: v for k, v in tables["mesh"].items() if k != "file"}
     assert case.evolution is not None

@@ -15,7 +15,7 @@ from ...analysis.basins.study import Basins
 from ...analysis.paths.diagram import Diagram
 from ...analysis.paths.path import Branch
 from ...problem.solution import Convergence, FrictionSolution
-from ..results import expect_picture
+from ..results import Output, expect_picture
 from .basins import basins_figure
 from .branch import branch_figure
 from .convergence import convergence_figure
@@ -52,6 +52,11 @@ def _(result: Convergence, **options: Any) -> Figure:
 @figure_of.register
 def _(result: Branch, **options: Any) -> Figure:
     return branch_figure(result, **options)
+
+
+@figure_of.register
+def _(result: Output, *, title: str = "") -> Figure:
+    return status_figure(result.solution, result.fields, title or result.title, result.model)
 
 
 @figure_of.register

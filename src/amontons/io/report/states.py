@@ -1,0 +1,143 @@
+"""States of a model as a page shows them: displacement, fields of both sides, forces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ...linear.blocks import spatial
+from ..vtk import OFF
+from ..vtk import _contact_fields as contact_fields
+from .skin import Skin
+
+if TYPE_CHECKING:
+    from ...mechanics.model import ContactFields
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+NAMES = {"pressure": "CPRESS", "shear": "CSHEAR", "slip": "CSLIP", "gap": "COPEN"}
+MOST_ARROWS = 2000  # forces that are drawn, the largest
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """One state: moved (V, 3) per vertex of the skin; status (C,) and values {field: (C,)}.
+
+    C: the contact vertices of the skin, both sides, `Stage.contacts`.  force (V, 3) on slaves.
+    label: what it is, in words; parameter: time, load or friction; stamp: as of the solution.
+    """
+
+    moved: Array
+    status: NDArray[np.int8]
+    values: dict[str, Array]
+    force: Array
+    label: str = ""
+    parameter: float = 0.0
+    stamp: str = ""
+    counts: dict[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """A model ready to be shown: its skin, its contact vertices, and what masters get."""
+
+    skin: Skin
+    contacts: Index = field(init=False)  # vertices, ascending
+    _shares: list[sparse.csr_array | None] = field(init=False)
+
+    def __post_init__(self) -> None:
+        zones = self.skin.zones
+        parts = [piece.ravel() for z in zones for piece in (z.pieces, z.master_pieces)]
+        object.__setattr__(self, "contacts", np.unique(np.concatenate(parts)))
+        object.__setattr__(self, "_shares", self._masters())
+
+    def state(self, fields: ContactFields, solution: Any, **words: Any) -> State:
+        """A state of the model; solution: of a solve, or a step in time."""
+        model, skin = self.skin.model, self.skin
+        sizes = [len(body.mesh.points) for body in model.bodies]
+        starts = np.cumsum([0, *sizes])
+        found = contact_fields(model, fields, solution, starts)
+        values = {name: found[key].astype(float) for name, key in NAMES.items()}
+        status = found["CSTATUS"].astype(np.int64)
+        self._give_masters(fields, solution, status, values)
+        at = skin.whole
+        mine = at[self.contacts]
+        moved = spatial(np.concatenate(fields.displacement))[at]
+        told = getattr(solution, "solution", solution)
+        counts = {name: int((solution.status == k).sum())
+                  for k, name in enumerate(("open", "slip", "stick"))}  # fmt: skip
+        return State(
+            moved, status[mine].astype(np.int8),
+            {name: array[mine] for name, array in values.items()},
+            found["CFORCE"][at], stamp=told.convergence.stamp, counts=counts, **words,
+        )  # fmt: skip
+
+    def _masters(self) -> list[sparse.csr_array | None]:
+        """Per pair the parts (nodes of all, nc) that contacts take of the nodes of the master.
+
+        They are the lengths of the nodes' columns in the contacts' normal rows: what contact
+        itself averages with.
+        """
+        model, found = self.skin.model, []
+        d = model.dimension
+        nodes = sum(len(body.mesh.points) for body in model.bodies)
+        whole = self.skin.whole
+        for zone, placed in zip(self.skin.zones, model.discretisation.placed, strict=True):
+            if not len(zone.master_pieces):
+                found.append(None)
+                continue
+            normal = sparse.csc_array(placed.H[:, ::d])
+            squares = sparse.coo_array(normal.power(2))
+            rows = squares.coords[0] // d
+            share = sparse.csr_array(
+                (squares.data, (rows, squares.coords[1])), shape=(nodes, normal.shape[1])
+            )
+            share.sum_duplicates()
+            share.data = np.sqrt(share.data)
+            other = np.ones(nodes, dtype=bool)
+            other[whole[np.unique(zone.master_pieces)]] = False
+            mine = whole[np.unique(zone.pieces)]
+            other[mine] = True  # where a body touches itself a node may be on both sides
+            share.data[np.repeat(other, np.diff(share.indptr))] = 0.0
+            found.append(share)
+        return found
+
+    def _give_masters(
+        self, fields: ContactFields, solution: Any, status: Index, values: dict[str, Array]
+    ) -> None:
+        """Means of the contacts around every master node; the status of the one with most."""
+        own = {"pressure": fields.pressure, "gap": fields.gap,
+               "shear": np.linalg.norm(fields.shear, axis=1),
+               "slip": np.linalg.norm(fields.slip, axis=1)}  # fmt: skip
+        placed = self.skin.model.discretisation.placed
+        ends = np.cumsum([0, *(len(pair.rows.nodes) for pair in placed)])
+        for share, first, last in zip(self._shares, ends[:-1], ends[1:], strict=True):
+            if share is None:
+                continue
+            rows = slice(first, last)
+            weighted = share * fields.weights[rows]
+            total = np.asarray(weighted.sum(axis=1)).ravel()
+            hit = np.flatnonzero((total > 0) & (status == OFF))
+            for name, array in own.items():
+                values[name][hit] = (weighted @ array[rows])[hit] / total[hit]
+            by_status = np.stack([weighted @ (solution.status[rows] == k) for k in range(3)])
+            status[hit] = np.argmax(by_status[:, hit], axis=0)
+
+
+def chosen(count: int, most: int) -> Index:
+    """At most so many of `count` states, evenly, the first and the last among them."""
+    if count <= most:
+        return np.arange(count)
+    return np.unique(np.rint(np.linspace(0, count - 1, most)).astype(np.int64))
+
+
+def largest_forces(states: Sequence[State]) -> Index:
+    """Vertices whose forces are drawn: the largest of all states, ascending."""
+    length = np.max([np.linalg.norm(state.force, axis=1) for state in states], axis=0)
+    order = np.argsort(-length, kind="stable")[:MOST_ARROWS]
+    return np.sort(order[length[order] > 0])
