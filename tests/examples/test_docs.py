@@ -1,4 +1,4 @@
-"""Every code block of README and docs runs as it stands, those of a page one after the other."""
+"""Every code block of README and docs runs as it stands, blocks of a page in their order."""
 
 import os
 import re
@@ -23,7 +23,7 @@ PAGES = sorted(
     for path in (*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("examples/*.md"))
     if not MADE & set(path.relative_to(ROOT / "docs").parts[:1] if "docs" in path.parts else ())
 )
-NEEDS = {"docs/distributed.md": "petsc4py"}  # pages whose blocks need an extra
+NEEDS = {"docs/distributed.md": "petsc4py", "docs/notebooks.md": "xarray"}  # pages whose blocks need an extra
 SLOW = {"docs/choosing-a-solver.md", "docs/tutorial.md"}  # commands of more than a minute
 ELSEWHERE = re.compile(  # other programs, and what .ci/run and .ci/full do themselves
     r"^(\w+=\S+ +)*(python -m (pip|pytest|venv|sphinx|reproduce)|mpirun|ruff|\.ci/|MPICC=)"
@@ -37,12 +37,11 @@ def blocks(path, *languages):
 
 
 def pages(*languages):
-    return [
-        pytest.param(page, id=name, marks=[pytest.mark.slow_docs] * (name in SLOW and "bash" in languages))
-        for page in PAGES
-        if blocks(page, *languages)
-        for name in [str(page.relative_to(ROOT))]
-    ]  # fmt: skip
+    for page in PAGES:
+        name = str(page.relative_to(ROOT))
+        slow = [pytest.mark.slow_docs] if name in SLOW and "bash" in languages else []
+        if blocks(page, *languages):
+            yield pytest.param(page, id=name, marks=slow)
 
 
 @pytest.fixture
@@ -58,7 +57,7 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.parametrize("page", pages("python"))
+@pytest.mark.parametrize("page", list(pages("python")))
 def test_python_blocks_run(page, folder):
     needed = NEEDS.get(str(page.relative_to(ROOT)))
     if needed and find_spec(needed) is None:
@@ -83,7 +82,7 @@ def test_all_that_is_not_ours_is_known():
     assert found <= {"amontons", "python", ".", "cd", "export"}, found
 
 
-@pytest.mark.parametrize("page", pages("bash", "console", "sh"))
+@pytest.mark.parametrize("page", list(pages("bash", "console", "sh")))
 def test_commands_run(page, folder):
     shell = f'amontons() {{ "{sys.executable}" -m amontons "$@"; }}\n'
     ours = [command for command in commands(page) if command.startswith("amontons ")]
@@ -101,7 +100,7 @@ def answers(command):
     return (0, 1) if re.match(r"amontons (uniqueness|bench|basins)", command) else (0,)
 
 
-@pytest.mark.parametrize("page", pages("toml"))
+@pytest.mark.parametrize("page", list(pages("toml")))
 def test_toml_blocks_are_toml(page):
     for block in blocks(page, "toml"):
         tomllib.loads(block)

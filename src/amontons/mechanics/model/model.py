@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...core.errors import InvalidInput, UnsupportedForm, UnsupportedLaw, within
+from ...core.faces import Told
 from ...core.prepared import Prepared
 from ...linear import Direct
 from ...linear.grid_matrix import GridMatrix
@@ -40,7 +41,7 @@ SURFACES = {  # the fields of a model's parts that name one
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class Model(Told):
     """Elastic bodies in frictional contact with obstacles and each other.
 
     Gaps and normals are taken once in the reference configuration, unless the contacts or
