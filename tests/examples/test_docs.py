@@ -23,7 +23,7 @@ PAGES = sorted(
     for path in (*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("examples/*.md"))
     if not MADE & set(path.relative_to(ROOT / "docs").parts[:1] if "docs" in path.parts else ())
 )
-NEEDS = {"docs/distributed.md": "petsc4py", "docs/notebooks.md": "xarray"}  # pages whose blocks need an extra
+NEEDS = {"docs/distributed.md": "petsc4py", "docs/notebooks.md": "xarray"}  # an extra each
 SLOW = {"docs/choosing-a-solver.md", "docs/tutorial.md"}  # commands of more than a minute
 ELSEWHERE = re.compile(  # other programs, and what .ci/run and .ci/full do themselves
     r"^(\w+=\S+ +)*(python -m (pip|pytest|venv|sphinx|reproduce)|mpirun|ruff|\.ci/|MPICC=)"
