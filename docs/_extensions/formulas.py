@@ -3,25 +3,34 @@
 docutils has the converter from LaTeX; Sphinx only needs to be told of it.
 """
 
+import html
+
 from docutils import nodes
-from docutils.utils.math import latex2mathml
+from docutils.utils.math import MathError, latex2mathml
+from sphinx.util import logging
+
+LOGGER = logging.getLogger(__name__)
 
 
-def mathml(text: str, block: bool) -> str:
-    """A formula in LaTeX as a <math> element."""
-    text = text.strip() if block else " ".join(text.split())
-    return latex2mathml.tex2mathml(text, as_block=block)
+def mathml(node: nodes.Node, block: bool) -> str:
+    """A formula as a <math> element; as it stands, with a warning, where it is wrong."""
+    text = node.astext().strip() if block else " ".join(node.astext().split())
+    try:
+        return latex2mathml.tex2mathml(text, as_block=block)
+    except MathError as reason:
+        LOGGER.warning("formula %r: %s", text, reason, location=node)
+        return f"<code>{html.escape(text)}</code>"
 
 
 def inline(writer, node):
     """A formula within a line."""
-    writer.body.append(mathml(node.astext(), False))
+    writer.body.append(mathml(node, False))
     raise nodes.SkipNode
 
 
 def display(writer, node):
     """A formula on lines of its own, numbered where the page asks for it."""
-    writer.body.append('<div class="formula">' + mathml(node.astext(), True))
+    writer.body.append('<div class="formula">' + mathml(node, True))
     if node["number"]:
         writer.body.append(f'<span class="eqno">({node["number"]})</span>')
     writer.body.append("</div>")

@@ -3,7 +3,25 @@
 from pathlib import Path
 from typing import Any
 
+from matplotlib.figure import Figure
+from sphinx_gallery.scrapers import figure_rst
+
+LAST = "___"  # sphinx-gallery's name for the value of a block's last line
 SECTIONS = ("start", "laws", "questions", "mechanics", "papers")
+
+
+def figures_of_results(block, block_vars, gallery_conf) -> str:
+    """A scraper: the figure that the last line of a block returned, as `solution.plot()` does.
+
+    Figures of results are none of pyplot's, which alone are found otherwise.
+    """
+    shown = block_vars["example_globals"].get(LAST)
+    if not isinstance(shown, Figure) or getattr(shown, "number", None) is not None:
+        return ""
+    path = next(block_vars["image_path_iterator"])
+    shown.savefig(path, dpi=100)
+    block_vars["example_globals"][LAST] = None  # once
+    return figure_rst([path], gallery_conf["src_dir"])
 
 
 def gallery_settings(docs: Path) -> dict[str, Any]:
@@ -12,7 +30,7 @@ def gallery_settings(docs: Path) -> dict[str, Any]:
         "examples_dirs": [str(docs / "gallery")],
         "gallery_dirs": ["made"],
         "filename_pattern": r"\.py$",
-        "subsection_order": [f"../gallery/{name}" for name in SECTIONS] + ["*"],
+        "subsection_order": [f"gallery/{name}" for name in SECTIONS] + ["*"],
         "within_subsection_order": "FileNameSortKey",
         "remove_config_comments": True,
         "show_memory": False,
@@ -23,6 +41,7 @@ def gallery_settings(docs: Path) -> dict[str, Any]:
         "only_warn_on_example_error": False,
         "download_all_examples": False,
         "copyfile_regex": "",
+        "image_scrapers": ("matplotlib", "gallery_settings.figures_of_results"),
         "reset_modules": ("matplotlib",),
         "image_srcset": [],
         "default_thumb_file": None,

@@ -11,7 +11,8 @@ It is no damage: what has opened still pulls with c.
 """
 
 # %%
-# A strip lies on a plane, and the end at the left is lifted.
+# A strip lies on a plane, and the end at the left is lifted. ``mu=0.3, cohesion=c`` is short for
+# ``law=am.Cohesive(am.Coulomb(0.3), c)``.
 import matplotlib.pyplot as plt
 
 import amontons as am

@@ -28,7 +28,7 @@ left.legend()
 problem = box_tower(4, push=0.1).condensed()
 random = np.random.default_rng(0)
 velocities = []
-for k in range(6):
+for _ in range(6):
     start = am.Iterate(random.random((problem.contacts, 3)) * [20, 0, 0])
     solution = am.solve(problem, am.GaussSeidel(), start=start, tolerance=1e-10)
     right.plot(solution.r[:4, 0], "o-", label=f"sum {solution.r[:4, 0].sum():.4f}")

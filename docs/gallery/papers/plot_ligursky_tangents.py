@@ -27,7 +27,7 @@ print(branch[20].rates)
 # which is sufficient and not necessary, and not that a tangent is missing.
 names = sorted({word for values in answers.values() for word in values})
 figure, axis = plt.subplots(figsize=(8, 2.6), layout="constrained")
-for row, (name, values) in enumerate(answers.items()):
+for row, values in enumerate(answers.values()):
     for word, colour in zip(names, ("seagreen", "firebrick", "grey"), strict=False):
         here = [k for k, value in enumerate(values) if value == word]
         axis.plot(here, [row] * len(here), "s", color=colour, label=word if row == 0 else None)

@@ -4,7 +4,7 @@ Rey 2026: Uzawa, and which solution it finds
 
 On Hild's triangle with one contact at :math:`\mu = 3.5` there are three solutions. Uzawa's method,
 
-.. math:: r_{k+1} = P_K (r_k - \rho\, \hat u_k),
+.. math:: r_{k+1} = P_K (r_k - \rho\, {\hat u}_k),
 
 goes to one of them, and which one depends on :math:`\rho` and on where it starts.
 """

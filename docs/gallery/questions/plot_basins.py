@@ -22,6 +22,6 @@ found = am.basins(
 print(found)
 
 # %%
-# A cell to each run. Sweeps that start at the unstable solution stay there only as long as rounding lets them; Newton's
+# A cell to each run, coloured by the solution at which it ended. Sweeps that start at the unstable solution stay there only as long as rounding lets them; Newton's
 # method finds whatever is near.
 found.plot()

@@ -5,7 +5,7 @@ A brake that releases, or jams
 An arm leans by 20 degrees against a drum. Its head is lifted by 0.02 mm while the drum drags the foot. Is the brake
 released? The answer is: that depends on how it came here. The same load has three solutions.
 
-A rigid arm jams from :math:`\mu = \tan 20° = 0.364` on; this one is elastic and gives way a little longer.
+A rigid arm jams from :math:`\mu = \tan 20^\circ = 0.364` on; this one is elastic and gives way a little longer.
 """
 
 # %%

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+import logging
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, overload
 
@@ -14,15 +12,18 @@ from ..core.words import helpful
 from ..problem.friction import FrictionProblem
 from ..problem.judge.measures import Criterion
 from ..problem.protocol import Problem
-from ..problem.solution import FrictionSolution, Outcome, Step
+from ..problem.solution import FrictionSolution, Outcome
 from ..solvers.contract import Iterate, Solver
 from ..solvers.driver import Callback, drive
 from ..solvers.judging import PATIENCE
 from .model_solution import ModelSolution
+from .progress import progress
 
 if TYPE_CHECKING:
     from ..mechanics.model import Model
 
+LOGGER = logging.getLogger("amontons")
+LOGGER.addHandler(logging.NullHandler())  # silent until somebody listens
 Start = Iterate | FrictionSolution | ModelSolution | None
 
 
@@ -96,14 +97,24 @@ def _solve(
     assembled, compiled = now() - began, compiling() - compiled
     if isinstance(options.get("start"), ModelSolution):
         options["start"] = options["start"].solution
-    with _progress(callback, options["tolerance"]) as seen:
+    with progress(callback, options["tolerance"]) as seen:
         found = drive(discrete, solver, callback=seen, **options)
     if model is None:
-        return found
+        return _logged(found)
     record = found.convergence
     record = replace(record, compiling=record.compiling + compiled)
     found = _explained(replace(found, convergence=record), model)
-    return ModelSolution(model, found, model.recover(found), assembled)
+    return _logged(ModelSolution(model, found, model.recover(found), assembled))
+
+
+def _logged(result: Any) -> Any:
+    """The result, told to the logger `amontons` with its doubts where level INFO is on."""
+    if LOGGER.isEnabledFor(logging.INFO):  # else nobody asks for what takes time to tell
+        found = getattr(result, "solution", result)
+        LOGGER.info("%s; %s", found.headline, found.convergence)
+        for doubt in result.warnings:
+            LOGGER.warning("%s [%s]", doubt.message, doubt.name)
+    return result
 
 
 def is_discrete(problem: object) -> bool:
@@ -134,28 +145,3 @@ def raise_unless_converged(result: FrictionSolution | ModelSolution) -> None:
         return
     message = f"{record}. {record.advice}"
     raise (Interrupted if record.by_user else NotConverged)(message, result)
-
-
-@contextmanager
-def _progress(callback: Callback | None, tolerance: float) -> Iterator[Callback | None]:
-    """A line on stderr with iteration, error and time, if that is a terminal."""
-    if callback is not None or not sys.stderr.isatty():
-        yield callback
-        return
-    from rich.console import Console
-
-    with Console(stderr=True).status("solving …", refresh_per_second=8) as line:
-        shown = 0.0  # drawing takes longer than a small solve: a few lines per second will do
-
-        def show(step: Step, iterate: Iterate) -> None:
-            nonlocal shown
-            if step.seconds < shown + 0.1:
-                return
-            shown = step.seconds
-            stage = f"[dim]{iterate.stage}[/dim]  " if iterate.stage else ""
-            line.update(
-                f"{stage}iteration {step.iteration}  error {step.error:.1e} "
-                f"[dim](goal {tolerance:.0e})[/dim]  {step.seconds:.1f} s"
-            )
-
-        yield show

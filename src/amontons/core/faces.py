@@ -13,10 +13,21 @@ from typing import Any
 
 HOMES = {  # the module whose function of that name answers
     "plot": "amontons.io.plots.faces", "report": "amontons.io.report.faces",
+    "html": "amontons.io.notebook.html", "view": "amontons.io.notebook.view",
+    "to_dataframe": "amontons.io.notebook.tables", "to_xarray": "amontons.io.notebook.tables",
 }  # fmt: skip
 
 
-class Shown:
+class Told:
+    """What a notebook tells of in a few lines."""
+
+    __slots__ = ()
+
+    def _repr_html_(self) -> str:
+        return _face("html")(self)
+
+
+class Shown(Told):
     """A result that can be looked at."""
 
     __slots__ = ()
@@ -36,6 +47,29 @@ class Shown:
         Raises InvalidInput for a suffix that is no page's, and NotWritten.
         """
         return _face("report")(self, path, **options)
+
+    def view(self, **options: Any) -> Any:
+        """Show bodies and contacts in 3D, to be turned (of solved models).
+
+        options: scalars, a field of the VTU file; magnify, of the displacement; off_screen;
+        show, False returns the plotter without opening it.  Raises MissingDependency without
+        PyVista, and InvalidInput for results without bodies.
+        """
+        return _face("view")(self, **options)
+
+    def to_dataframe(self) -> Any:
+        """A pandas table: a row for each contact, solution, point or run.
+
+        Raises MissingDependency without pandas.
+        """
+        return _face("to_dataframe")(self)
+
+    def to_xarray(self) -> Any:
+        """An xarray dataset with named dimensions, of solutions and branches.
+
+        Raises MissingDependency without xarray, and InvalidInput for other results.
+        """
+        return _face("to_xarray")(self)
 
 
 def _face(name: str) -> Any:

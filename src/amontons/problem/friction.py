@@ -32,6 +32,7 @@ from ..core.arrays import (
 )
 from ..core.clock import NEVER, Deadline
 from ..core.errors import InvalidInput, UnsupportedForm, UnsupportedLaw, shown
+from ..core.faces import Told
 from ..core.prepared import Prepared
 from ..linear import Factor
 from ..linear.blocks import BlockRows, block_part, block_rows
@@ -52,7 +53,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
-class FrictionProblem(Equations):
+class FrictionProblem(Told, Equations):
     """Either M, H, f, w (global form) or W, q (Delassus form), with a friction law.
 
     Build it with `from_global` or `from_delassus`; both check every shape and number.

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from ...core.clock import NEVER, Deadline, TimeLimit, deadline_of, now
 from ...core.errors import InvalidInput, TimeUp, UnsupportedForm
+from ...core.faces import Told
 from ...problem.friction import FrictionProblem
 from ..scaled import Scaled
 from ..statuses import STICK
@@ -67,7 +68,7 @@ class Witness:
 
 
 @dataclass(frozen=True, eq=False)
-class CriticalFriction:
+class CriticalFriction(Told):
     """Bounds on the critical friction, lower <= mu_* <= upper, in terms of t (largest mu).
 
     criterion: what proves lower: "determinants" (all patterns), "multipliers" (`proof`),

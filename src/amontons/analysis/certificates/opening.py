@@ -45,6 +45,7 @@ from scipy.sparse.linalg import lsmr
 
 from ...core.clock import Deadline, TimeLimit, deadline_of, now
 from ...core.errors import InvalidInput, SingularOperator, TimeUp
+from ...core.faces import Told
 from ...linear.dense import dense
 from ...problem.friction import Form, FrictionProblem
 from ...problem.indefinite import negative_direction
@@ -82,7 +83,7 @@ _MEANING = {
 
 
 @dataclass(frozen=True, eq=False)
-class Opening:
+class Opening(Told):
     """The verdict with its certificate.
 
     v: a motion with which H^T v + w is inside K*, (n,), in the Delassus form x (nc d,) with W x

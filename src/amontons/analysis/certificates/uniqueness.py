@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ...core.clock import Deadline, TimeLimit, deadline_of, now
 from ...core.errors import InvalidInput, SingularOperator, TimeUp
+from ...core.faces import Told
 from ...linear.dense import dense
 from ...problem.friction import FrictionProblem
 from ...problem.law import Coulomb, Law, Tresca
@@ -68,7 +69,7 @@ _MEANING = {
 
 
 @dataclass(frozen=True, eq=False)
-class Uniqueness:
+class Uniqueness(Told):
     """The verdict, and all that supports it.
 
     friction: largest coefficient of the problem, of which lower and upper are bounds: below

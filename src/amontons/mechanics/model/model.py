@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...core.errors import InvalidInput, UnsupportedForm, within
+from ...core.faces import Told
 from ...core.prepared import Prepared
 from ...core.words import helpful
 from ...linear import Direct
@@ -43,7 +44,7 @@ SURFACES = {  # the fields of a model's parts that name one
 
 @helpful
 @dataclass(frozen=True, eq=False)
-class Model:
+class Model(Told):
     """Elastic bodies in frictional contact with obstacles and each other.
 
     Gaps and normals are taken once in the reference configuration, unless the contacts or
