@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +27,7 @@ from ...problem.law.law import BOUND, MU
 from .assembly import Discretisation
 from .parts import BONDS, Contact
 from .placing import Placed
-from .values import scalar_at
+from .values import ScalarValue, scalar_at
 
 Array = NDArray[np.float64]
 TOUCHING = 1e-6  # gap, relative to the size of a node's area, up to which both sides touch
@@ -159,7 +158,8 @@ def _angle(contact: Contact, placed: Placed) -> Array:
 
 def _values(contact: Contact, name: str, placed: Placed) -> Array:
     """A number of the law at the contacts, (k,); a stress that is a function as its mean."""
-    value: Any = contact.numbers[name]
+    numbers: dict[str, ScalarValue] = contact.numbers
+    value = numbers[name]
     what = f"{name} on {contact.slave!r}"
     with within(name):
         given = scalar_at(
