@@ -15,7 +15,7 @@ _HOME = {
                     "InvertedCells", "MissingDependency", "NotConverged", "NotWritten",
                     "SingularOperator", "TimeUp", "UnsupportedForm", "UnsupportedLaw"),
     "problem.law": ("CappedCoulomb", "Cohesive", "Compliant", "Coulomb", "Mixed", "Orthotropic",
-                    "Tied", "Tresca"),
+                    "FrictionCurve", "Tied", "Tresca", "VaryingFriction"),
     "problem.judge.measures": ("Criterion",),
     "linear": ("Direct", "GeometricMultigrid", "Petsc"),
     "problem.friction": ("Form", "FrictionProblem"),

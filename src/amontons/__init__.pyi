@@ -63,6 +63,7 @@ from .problem.law import (
     CappedCoulomb as CappedCoulomb, Cohesive as Cohesive, Compliant as Compliant,
     Coulomb as Coulomb, Mixed as Mixed,
     Orthotropic as Orthotropic, Tied as Tied, Tresca as Tresca,
+    FrictionCurve as FrictionCurve, VaryingFriction as VaryingFriction,
 )
 from .problem.solution import (
     ContactStatus as ContactStatus, Convergence as Convergence,

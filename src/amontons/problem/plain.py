@@ -54,6 +54,8 @@ def of_plain(judged: Callable[..., Any]) -> Callable[..., Any]:
 
     @wraps(judged)
     def asked(self: Equations, r: Array, v: Array | None = None, **named: Any) -> Any:
+        if self.law.varies:
+            return asked(frozen(self, r, v), r, v, **named)
         plain, given = self.plain, () if v is None else (v,)
         if plain is self:
             return judged(self, r, *given, **named)
@@ -63,6 +65,12 @@ def of_plain(judged: Callable[..., Any]) -> Callable[..., Any]:
         return judged(plain, self.law.pressed(r), *given, **named)
 
     return asked
+
+
+def frozen(problem: Any, r: Array, v: Array | None) -> FrictionProblem:
+    """The problem with the coefficients of friction that belong to a state, see `varying`."""
+    u = problem.motion(r, v)[0]
+    return replace(problem, law=problem.law.frozen(r, u))
 
 
 # ---------------------------------------------------------------- compliance

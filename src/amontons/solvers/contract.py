@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.clock import NEVER, Deadline
-from ..core.errors import InvalidInput, UnsupportedForm
+from ..core.errors import InvalidInput, UnsupportedForm, shown
 from ..problem.friction import Form, FrictionProblem
 from ..problem.judge.measures import Criterion
 from ..problem.nitsche import NitscheProblem
@@ -202,3 +202,32 @@ def check_at_least(minimum: int, **fields: int) -> None:
     for name, value in fields.items():
         if value < minimum:
             raise InvalidInput(f"expected at least {minimum}, got {value}", (name,))
+
+
+NUMBERS = int | float | np.number
+
+
+def _check_number(name: str, value: object) -> None:
+    if not isinstance(value, NUMBERS) or isinstance(value, bool):
+        raise InvalidInput(f"{name}: expected a number, got {shown(value)}")
+    if isinstance(value, int) and value.bit_length() > 1000:  # more than a float can hold
+        raise InvalidInput(f"{name}: expected a number that floats can hold, got a larger one")
+
+
+def check_goals(
+    tolerance: float, contact_tolerance: float | None, max_iterations: int | None
+) -> None:
+    """Raise InvalidInput for what are no tolerances or no number of iterations."""
+    _check_number("tolerance", tolerance)
+    if contact_tolerance is not None:
+        _check_number("contact_tolerance", contact_tolerance)
+        if not contact_tolerance > 0:
+            raise InvalidInput(
+                f"contact_tolerance: expected a number > 0, got {contact_tolerance}"
+            )
+    if max_iterations is not None:
+        _check_number("max_iterations", max_iterations)
+    if not (0 < tolerance < 1):
+        raise InvalidInput(f"tolerance: expected between 0 and 1, got {tolerance}")
+    if max_iterations is not None and max_iterations < 1:
+        raise InvalidInput(f"max_iterations: expected at least 1, got {max_iterations}")

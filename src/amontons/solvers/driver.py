@@ -32,9 +32,19 @@ from ..problem.protocol import Problem
 from ..problem.solution import Convergence, FrictionSolution, Outcome, Step, StoppedBy
 from . import Auto
 from .changed_law import pressed_start, released, released_callback
-from .contract import Breakdown, Iterate, Solver, Target, check_solves, sent, taken_by
+from .contract import (
+    Breakdown,
+    Iterate,
+    Solver,
+    Target,
+    check_goals,
+    check_solves,
+    sent,
+    taken_by,
+)
 from .first_iterate import as_it_is, first_iterate, own_motion, with_motion
 from .judging import BLUR, PATIENCE, Taken, Watch
+from .varying_friction import varying_friction
 
 Array = NDArray[np.float64]
 Callback = Callable[[Step, Iterate], bool | None]
@@ -42,7 +52,6 @@ CONTENT = 5  # iterates with which a solver is content before its goal is tighte
 QUICK = 300  # contacts up to which one iterate is no time to press Ctrl-C
 EARLY = 100  # iterates after which a problem that no method is made for is given up
 GAVE_UP = (Outcome.STAGNATED, Outcome.BREAKDOWN, Outcome.CYCLED, Outcome.NON_FINITE)
-NUMBERS = (int, float, np.number)
 TIGHTEST = 1e-300  # smallest goal: contacts far smaller than others need tiny sums
 
 
@@ -119,7 +128,7 @@ class _Options(NamedTuple):
         """Raise InvalidInput for what is no option."""
         if self.callback is not None and not callable(self.callback):
             raise InvalidInput(f"callback: expected a function, got {self.callback!r}")
-        _check_options(self.tolerance, self.contact_tolerance, self.max_iterations)
+        check_goals(self.tolerance, self.contact_tolerance, self.max_iterations)
 
     @property
     def of_contacts(self) -> float:
@@ -140,6 +149,13 @@ def _drive(
     if isinstance(solver, Auto):
         solver = solver.choice(problem)
     given.check()
+    if problem.law.varies:
+        _check_solver(solver)
+        chosen = solver
+        return varying_friction(
+            problem, given, start,
+            lambda fixed, asked, begin: _drive(fixed, chosen, asked, begin, taken),
+        )  # fmt: skip
     if problem.plain is not problem:
         asked = given._replace(callback=released_callback(problem, given.callback))
         begin = pressed_start(problem, start)
@@ -383,28 +399,3 @@ def _check_stop(
         raise InvalidInput(
             f"patience: expected a whole number >= 1, or None, got {shown(patience)}"
         )
-
-
-def _check_number(name: str, value: object) -> None:
-    if not isinstance(value, NUMBERS) or isinstance(value, bool):
-        raise InvalidInput(f"{name}: expected a number, got {shown(value)}")
-    if isinstance(value, int) and value.bit_length() > 1000:  # more than a float can hold
-        raise InvalidInput(f"{name}: expected a number that floats can hold, got a larger one")
-
-
-def _check_options(
-    tolerance: float, contact_tolerance: float | None, max_iterations: int | None
-) -> None:
-    _check_number("tolerance", tolerance)
-    if contact_tolerance is not None:
-        _check_number("contact_tolerance", contact_tolerance)
-        if not contact_tolerance > 0:
-            raise InvalidInput(
-                f"contact_tolerance: expected a number > 0, got {contact_tolerance}"
-            )
-    if max_iterations is not None:
-        _check_number("max_iterations", max_iterations)
-    if not (0 < tolerance < 1):
-        raise InvalidInput(f"tolerance: expected between 0 and 1, got {tolerance}")
-    if max_iterations is not None and max_iterations < 1:
-        raise InvalidInput(f"max_iterations: expected at least 1, got {max_iterations}")

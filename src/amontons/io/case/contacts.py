@@ -90,6 +90,8 @@ def _scalars(table: Table, done: set[str]) -> dict[str, Any]:
 def _orthotropic(table: Table) -> dict[str, Any]:
     """The two coefficients and their direction, where coulomb is a list."""
     given = table.data.get("coulomb")
+    if isinstance(given, dict) and "direction" not in table.data:
+        return {"mu": _curve(table.table("coulomb"))}
     if isinstance(given, list) != ("direction" in table.data):
         raise table.error(
             "direction" if "direction" in table.data else "coulomb",
@@ -102,6 +104,16 @@ def _orthotropic(table: Table) -> dict[str, Any]:
     if min(along, across) < 0:
         raise table.error("coulomb", f"expected numbers >= 0, got {min(along, across)}")
     return {"mu": along, "mu_across": across, "direction": table.numbers("direction", (3,))}
+
+
+def _curve(table: Table) -> Any:
+    """Coefficients over pressure or slip speed, { mu = [0.3, 0.1], speed = [0.0, 1.0] }."""
+    from ...problem.law import FrictionCurve
+
+    table.only("mu", "pressure", "speed")
+    table.need("mu", "coefficients, one for each pressure or speed")
+    with table.blamed():
+        return FrictionCurve(**{key: table.data[key] for key in table.data})
 
 
 def _steady(table: Table, key: str) -> float | Expression:

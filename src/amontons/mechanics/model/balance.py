@@ -57,9 +57,9 @@ def imbalance(
     motion, of = rigid_motions(loose, parts.dofs)
     moved = parts.gathered(motion)
     size = float(np.abs(load) @ np.abs(moved).max(axis=1))
-    found = None
-    if size > 0 and len(law) <= MOST:
-        found = _escape(parts.whole_H.T @ motion, load @ moved / size, law, size)
+    found, most = None, law.widest
+    if size > 0 and len(law) <= MOST and most is not None:
+        found = _escape(parts.whole_H.T @ motion, load @ moved / size, most, size)
     if found is None:
         return Imbalance(
             f"contact and friction alone hold {in_words(loose)}: perhaps they do not suffice"

@@ -14,27 +14,29 @@ from ...problem.law import (
     Cohesive,
     Compliant,
     Coulomb,
+    FrictionCurve,
     Kind,
     Law,
     Orthotropic,
     Tied,
     Tresca,
+    VaryingFriction,
     joined,
 )
 from ...problem.law.law import BOUND, MU
 from .assembly import Discretisation
 from .parts import BONDS, Contact
 from .placing import Placed
-from .values import scalar_at
+from .values import ScalarValue, scalar_at
 
 Array = NDArray[np.float64]
 TOUCHING = 1e-6  # gap, relative to the size of a node's area, up to which both sides touch
 
 APART = 0.5  # the same, up to which sides may be tied
 SPRINGS = BONDS
-CHANGES = {"mu_across": "orthotropic friction"} | dict.fromkeys(
+CHANGES = {"mu_across": "orthotropic friction", "mu": VaryingFriction.name} | dict.fromkeys(
     SPRINGS, "compliance of contact"
-)  # numbers of laws that are changes of variables of u
+)  # numbers of laws that need both r and u
 SLANT = 1e-6  # part of a direction in the tangent plane that is one
 
 
@@ -63,7 +65,7 @@ def check_law(k: int, contact: Contact, dimension: int, *, large: bool) -> None:
     if not (large or contact.nitsche is not None):
         return
     for name, what in CHANGES.items():
-        if name in given:
+        if name in given and (name != "mu" or isinstance(contact.mu, FrictionCurve)):
             raise UnsupportedLaw(
                 f"{what} needs contact forces, method 'nodal' or 'mortar', and small strains "
                 "with contact in the reference configuration", ("contacts", k, name), where,
@@ -81,7 +83,10 @@ def law_of(contacts: Sequence[Contact], parts: Discretisation) -> Law:
 
 def rubs(law: Law) -> NDArray[np.bool_]:
     """Contacts with friction, (nc,)."""
-    mu, bound = law.parameters[:, MU], law.parameters[:, BOUND]
+    most = law.widest
+    if most is None:
+        return np.ones(len(law), dtype=bool)
+    mu, bound = most.parameters[:, MU], most.parameters[:, BOUND]
     return ((mu > 0) | (law.kind == Kind.TRESCA) | law.tied) & (bound > 0)
 
 
@@ -89,8 +94,17 @@ def _law(contact: Contact, placed: Placed) -> Law:
     """The law of one pair of surfaces."""
     values = {
         name: (_stiff if name in SPRINGS else _values)(contact, name, placed)
-        for name in contact.numbers
-    }
+        for name, value in contact.numbers.items() if not isinstance(value, FrictionCurve)
+    }  # fmt: skip
+    if isinstance(contact.mu, FrictionCurve):
+        values["mu"] = np.zeros(len(placed.rows.weights))
+        law = _law_of(contact, values, placed)
+        return VaryingFriction(contact.mu, placed.rows.weights, law=law)
+    return _law_of(contact, values, placed)
+
+
+def _law_of(contact: Contact, values: dict[str, Array], placed: Placed) -> Law:
+    """The law of numbers at the contacts, (k,) each."""
     weights = placed.rows.weights
     if contact.tied:
         law: Law = _tied(contact, placed)
@@ -144,7 +158,9 @@ def _angle(contact: Contact, placed: Placed) -> Array:
 
 def _values(contact: Contact, name: str, placed: Placed) -> Array:
     """A number of the law at the contacts, (k,); a stress that is a function as its mean."""
-    value, what = contact.numbers[name], f"{name} on {contact.slave!r}"
+    numbers: dict[str, ScalarValue] = contact.numbers
+    value = numbers[name]
+    what = f"{name} on {contact.slave!r}"
     with within(name):
         given = scalar_at(
             value, placed.all_points, what,

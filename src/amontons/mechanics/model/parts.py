@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import InitVar, dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +22,12 @@ from ...problem.law import (
     Cohesive,
     Compliant,
     Coulomb,
+    FrictionCurve,
     Law,
     Orthotropic,
     Tied,
     Tresca,
+    VaryingFriction,
 )
 from ..contact import Nitsche, Obstacle
 from ..elements.elasticity import LinearElastic, materials_by_region
@@ -195,6 +198,7 @@ class Contact:
 
     Either mu, the coefficient of Coulomb friction, or tresca, the largest shear traction (a
     stress): a number, one number per slave node, or a function of points (n, dim) -> (n,).
+    mu may be a FrictionCurve, numbers over pressure or slip speed (`problem.law.varying`).
     With mu also cap, the largest shear traction whatever the pressure; with both cohesion, the
     largest tensile traction, which acts where the sides touch in the undeformed state and is
     not lost when they part (`problem.law.cohesive`).  Stresses become forces, the area of the
@@ -218,7 +222,7 @@ class Contact:
 
     slave: str
     obstacle: Obstacle | None = None
-    mu: ScalarValue | None = None
+    mu: ScalarValue | FrictionCurve | None = None
     tresca: ScalarValue | None = None
     master: str | None = None
     method: str | Nitsche | None = None
@@ -301,10 +305,10 @@ class Contact:
             )
         if self.mu_across is None:
             return
-        if self.mu is None or self.cap is not None:
+        if self.mu is None or self.cap is not None or isinstance(self.mu, FrictionCurve):
             raise InvalidInput(
-                f"contact on {self.slave!r}: mu_across goes with mu, and neither with tresca "
-                "nor with cap"
+                f"contact on {self.slave!r}: mu_across goes with mu, and neither with tresca, "
+                "nor with cap, nor with a curve"
             )
         if self.direction is not None:
             vector = real("direction", self.direction)
@@ -337,7 +341,7 @@ class Contact:
         return self.method if isinstance(self.method, Nitsche) else None
 
     @property
-    def numbers(self) -> dict[str, ScalarValue]:
+    def numbers(self) -> dict[str, Any]:
         """What the law is given by: mu or tresca, and what goes with it."""
         names = ("mu", "mu_across", "angle", "tresca", "cap", "cohesion", "stiffness",
                  "stick_stiffness")  # fmt: skip
@@ -352,14 +356,17 @@ class Contact:
             )
         object.__setattr__(self, "tied", bool(law.tied.all() and len(law)))
         for name, value in _numbers_of(law).items():
-            one = len(value) == 1
-            object.__setattr__(self, name, float(value[0]) if one else value)
+            if not isinstance(value, FrictionCurve) and len(value) == 1:
+                value = float(value[0])  # noqa: PLW2901
+            object.__setattr__(self, name, value)
 
 
-def _numbers_of(law: Law) -> dict[str, Array]:
+def _numbers_of(law: Law) -> dict[str, Any]:
     """The numbers of a law by the names that `Contact` has for them; raises InvalidInput."""
     if isinstance(law, Compliant):
         return _numbers_of(law.law) | _stiffnesses(law)
+    if isinstance(law, VaryingFriction):
+        return _numbers_of(law.inner) | {"mu": law.curve}
     if isinstance(law, Cohesive):
         return _numbers_of(law.law) | {"cohesion": law.cohesion}
     if isinstance(law, Tied):

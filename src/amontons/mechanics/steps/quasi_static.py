@@ -12,7 +12,7 @@ finds any of them; with `crossing` the step is followed from the last state, see
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -23,6 +23,7 @@ from ...core.clock import NEVER, Deadline
 from ...core.errors import InvalidInput, UnsupportedForm
 from ...core.words import helpful
 from ...problem.friction import FrictionProblem
+from ...problem.law import VaryingFriction
 from ...problem.nitsche import NitscheProblem
 from ...problem.solution import FrictionSolution
 from ..model import Model
@@ -94,6 +95,9 @@ class SlowModel:
         parts = self.motion.parts
         load, prescribed = self.motion.applied(time)
         problem = self.motion.body.increment(load, prescribed, self._remembered(state))
+        if isinstance(problem.law, VaryingFriction):  # of the speed in this step
+            lasting = problem.law.lasting(abs(time - state.time) or 1.0)
+            problem = replace(problem, law=lasting)
         arrive = None
         if self.crossing is not None:
             steps: Any = self._before(state, time), problem  # the path refuses Nitsche's form

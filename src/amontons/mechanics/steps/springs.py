@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...problem.law import Compliant, Law
+from ...problem.law import Compliant, Law, VaryingFriction
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -77,6 +77,11 @@ class Springs:
     # ---------------------------------------------------------------- dynamics
     def of_impulses(self, law: Law, h: float, theta: float) -> Law:
         """The law of impulses r and velocities u1 of a step h, see the module."""
+        if isinstance(law, VaryingFriction):  # u_theta is theta of the u that the law has
+            inner, own = self.of_impulses(law.inner, h, theta), self.presses | self.sticks
+            return VaryingFriction(
+                law.curve, law.area * h, np.where(own, 1 / theta, 1.0), inner, law.pieces
+            )
         scaled = law.scaled(h)
         if not isinstance(scaled, Compliant):
             return scaled

@@ -81,7 +81,8 @@ def evolve(
             else:
                 found = solved(local(problem), first, limit)
                 u, v = problem.velocity(found.r)
-                solution = replace(found, problem=problem, u=u, v=v)
+                known = replace(problem, law=found.problem.law)  # coefficients that it found
+                solution = replace(found, problem=known, u=u, v=v)
             solution = prepared.explained(solution)
             if check and not solution.converged:
                 record = solution.convergence

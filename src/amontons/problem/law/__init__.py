@@ -9,6 +9,7 @@ from .mixed import Mixed, joined
 from .orthotropic import Orthotropic
 from .tied import Tied
 from .tresca import Tresca
+from .varying import FrictionCurve, VaryingFriction
 
-__all__ = ["CappedCoulomb", "Cohesive", "Compliant", "Coulomb", "Kind", "Law", "Mixed",
-           "Orthotropic", "Tied", "Tresca", "joined"]
+__all__ = ["CappedCoulomb", "Cohesive", "Compliant", "Coulomb", "FrictionCurve", "Kind", "Law",
+           "Mixed", "Orthotropic", "Tied", "Tresca", "VaryingFriction", "joined"]

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from ...core.errors import InvalidInput, shown
 from .changed import Changed
 from .compliant import Compliant
-from .law import Array, Law, per_contact, same_length
+from .law import INSIDE, Array, Law, per_contact, same_length
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +45,8 @@ class Cohesive(Changed):
                 "law: expected Coulomb, Tresca, … without cohesion or compliance, got "
                 f"{shown(self.law)}"
             )
+        if self.law.varies:
+            raise InvalidInput(f"law: {INSIDE}")
         tension = per_contact("cohesion", self.tension)
         if len(self.law) == 1 != len(tension):
             object.__setattr__(self, "law", self.law.at(np.zeros(len(tension), dtype=int)))
@@ -80,6 +82,10 @@ class Cohesive(Changed):
     def scaled(self, force: float | Array) -> Cohesive:
         """The law in another unit of r."""
         return Cohesive(self.law.scaled(force), self.tension * force)
+
+    def with_mu(self, mu: Array) -> Cohesive:
+        """The law with other coefficients mu, (nc,)."""
+        return Cohesive(self.law.with_mu(mu), self.tension)
 
     def with_bounds(self, bounds: Array) -> Cohesive:
         """The law with other bounds tau, (nc,)."""

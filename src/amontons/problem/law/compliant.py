@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ...core.arrays import read_only
 from ...core.errors import InvalidInput, shown
 from .changed import Changed
-from .law import Array, Law, per_contact, same_length
+from .law import INSIDE, Array, Law, per_contact, same_length
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +39,8 @@ class Compliant(Changed):
             raise InvalidInput(
                 f"law: expected Coulomb, Tresca, … without compliance, got {shown(self.law)}"
             )
+        if self.law.varies:
+            raise InvalidInput(f"law: {INSIDE}")
         given = (per_contact("compliance", self.compliance),
                  per_contact("stick_compliance", self.stick_compliance))  # fmt: skip
         size = max(map(len, given))
@@ -82,6 +84,10 @@ class Compliant(Changed):
         return Compliant(
             self.law.scaled(force), self.compliance / force, self.stick_compliance / force
         )
+
+    def with_mu(self, mu: Array) -> Compliant:
+        """The law with other coefficients mu, (nc,)."""
+        return Compliant(self.law.with_mu(mu), self.compliance, self.stick_compliance)
 
     def with_bounds(self, bounds: Array) -> Compliant:
         """The law with other bounds tau, (nc,)."""

@@ -38,6 +38,9 @@ from .cones import project_disk, project_disk_jacobian
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Kinds = NDArray[np.int8]
+INSIDE = (
+    "friction that follows a curve holds the others, VaryingFriction(curve, law=Cohesive(…))"
+)
 MU, BOUND = 0, 1  # columns of the parameters
 
 
@@ -145,6 +148,7 @@ class Law:
         return out
 
     # ---------------------------------------------------------------- variants
+    varies: ClassVar[bool] = False  # True where coefficients follow the state, see `varying`
     stretch: Array | None = None  # T of tangents, (nc, 2, 2), see `changed`
     give: Array | None = None  # diagonal of C, (nc, 3)
 
@@ -189,6 +193,17 @@ class Law:
         finite = np.isfinite(self.parameters[:, BOUND])
         bound = np.where(finite, bounds, self.parameters[:, BOUND])
         return self._of(self.kind, np.column_stack([self.parameters[:, MU], bound]))
+
+    def with_mu(self, mu: Array) -> Law:
+        """The law with other coefficients mu, (nc,), of the contacts that have one."""
+        has = (self.kind == COULOMB) | (self.kind == CAPPED)
+        mu = np.where(has, mu, self.parameters[:, MU])
+        return self._of(self.kind, np.column_stack([mu, self.parameters[:, BOUND]]))
+
+    @property
+    def widest(self) -> Law | None:
+        """The law with the largest bounds that it may have; None where that is not known."""
+        return self
 
     def _of(self, kind: Kinds, parameters: Array) -> Law:
         """A law of the same class with these kinds and parameters."""

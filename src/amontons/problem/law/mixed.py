@@ -18,6 +18,7 @@ from .coulomb import Coulomb
 from .law import BOUND, MU, Array, Kind, Kinds, Law
 from .tied import Tied
 from .tresca import Tresca
+from .varying import VaryingFriction, joined_varying
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +41,9 @@ def joined(laws: Sequence[Law]) -> Law:
     for law in laws:
         if not isinstance(law, Law):
             raise InvalidInput(f"law: expected Coulomb, Tresca, …, got {shown(law)}")
+    if any(law.varies for law in laws):
+        inner = [law.inner if isinstance(law, VaryingFriction) else law for law in laws]
+        return joined_varying(laws, joined(inner))
     plain = [law.plain for law in laws]
     kind = np.concatenate([law.kind for law in plain]) if plain else np.zeros(0, np.int8)
     parameters = np.concatenate([law.parameters for law in plain] or [np.zeros((0, 2))])
