@@ -135,6 +135,84 @@ def test_touching_solids_are_bonded(tmp_path):
     assert len(np.unique(mesh.points, axis=0)) == len(mesh.points)
 
 
+# --------------------------------------------------------------------------- touching solids
+def block_on_plate():
+    """A block of 1 x 1 x 1 in the middle of a plate of 2 x 2 x 1, both with a face "top"."""
+    plate, cube = Box((0, 0, 0), (2, 2, 1)), Box((0.5, 0.5, 1), (1.5, 1.5, 2))
+    plate.solids.name, cube.solids.name = "plate", "cube"
+    plate.faces.Max(Z).name, cube.faces.Max(Z).name = "top", "top"
+    plate.faces.Min(Z).name, cube.faces.Min(Z).name = "ground", "foot"
+    return Compound([plate, cube])
+
+
+def test_touching_solids_can_stay_apart(tmp_path):
+    """Whole faces, of each solid its own: the glued plate's top has a hole under the block."""
+    block_on_plate().WriteStep(str(tmp_path / "two.step"))
+    mesh = am.read_cad(tmp_path / "two.step", 0.5, glue=False)
+    assert mesh.regions == ("plate", "cube")
+    assert (volume(mesh, "plate"), volume(mesh, "cube")) == pytest.approx((4, 1))
+    assert area(mesh, "top-plate") == pytest.approx(4)
+    assert area(mesh, "top-cube") == area(mesh, "foot") == pytest.approx(1)
+    assert area(mesh, "top") == pytest.approx(5)
+    plate, cube = (
+        {n for b in mesh.cells if b.region == name for n in b.nodes.ravel()}
+        for name in mesh.regions
+    )
+    assert not plate & cube
+    numbers = [int(name[4:]) for name in mesh.surfaces if name.startswith("face")]
+    assert len(numbers) == 8 and len(set(numbers)) == 8
+
+
+def test_two_solids_of_one_name_stay_two_regions():
+    one, two = Box((0, 0, 0), (1, 1, 1)), Box((1, 0, 0), (2, 1, 1))
+    one.solids.name = two.solids.name = "body"
+    assert am.mesh_shape(Compound([one, two]), 1, glue=False).regions == ("body", "body-2")
+    shape = Compound([Box((0, 0, 0), (1, 1, 1)), Box((1, 0, 0), (2, 1, 1))])
+    assert am.mesh_shape(shape, 1, glue=False).regions == ("solid1", "solid2")
+
+
+def test_one_surface_of_glued_solids_is_taken_apart():
+    """Three in a row, the first joint opened: as many nodes more as it has."""
+    parts = [Box((k, 0, 0), (k + 1, 1, 1)) for k in range(3)]
+    for part, name in zip(parts, "abc", strict=True):
+        part.solids.name = name
+    parts[0].faces.Max(X).name = "joint"
+    glued = am.mesh_shape(Compound(parts), 0.5)
+    mesh = am.mesh_shape(Compound(parts), 0.5, glue={"joint": False})
+    extra = len(mesh.points) - len(glued.points)
+    assert extra == len(glued.surface_nodes("joint")) > 4
+    assert area(mesh, "joint-a") == area(mesh, "joint-b") == pytest.approx(1)
+    assert "joint" not in mesh.surfaces
+    assert sum(f.nodes.shape[0] for f in mesh.boundary) == sum(
+        f.nodes.shape[0] for f in glued.boundary
+    ) + 2 * sum(f.nodes.shape[0] for f in glued.surfaces["joint"])
+    with pytest.raises(InvalidInput, match="glue: surface 'joynt': not found.*mean 'joint'"):
+        am.mesh_shape(Compound(parts), 0.5, glue={"joynt": False})
+
+
+def test_glued_surface_in_contact_is_refused_with_what_to_do():
+    shape = block_on_plate()
+    mesh = am.mesh_shape(shape, 0.5)
+    joint = next(n for n in mesh.surfaces if n == "foot" or n == "top")
+    body = am.Body(mesh, am.LinearElastic(1, 0.3))
+    with pytest.raises(InvalidInput, match="bonded there.*glue=False"):
+        am.Model([body], contacts=[am.Contact(joint, am.Plane((0, 0, 1)), mu=0.1)]).problem()
+
+
+def test_force_through_solids_kept_apart():
+    """The block pressed on the plate by 0.01 with Poisson 0, between two simple bounds."""
+    mesh = am.mesh_shape(block_on_plate(), 0.5, glue=False)
+    model = am.Model(
+        [am.Body(mesh, am.LinearElastic(1000, 0.0))],
+        supports=[am.Fix("ground", (0, 0, 0)), am.Fix("top-cube", (0, 0, -0.01))],
+        contacts=[am.Contact("foot", master="top-plate", mu=0.2)],
+    )
+    solution = am.solve(model)
+    assert solution.converged
+    force = abs(solution.fields.resultant[2])
+    assert 1000 * 0.01 / 2 < force < 1000 * 0.01 / 1.25
+
+
 def test_solids_without_names_are_numbered():
     mesh = am.mesh_shape(Glue([Box((0, 0, 0), (1, 1, 1)), Box((1, 0, 0), (2, 1, 1))]), 1)
     assert mesh.regions == ("solid1", "solid2")

@@ -7,18 +7,21 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ...core.arrays import LARGEST
 from ...core.errors import FileFormatError, shown
 from ...core.files import check_is_regular
-from ...core.words import near, near_file
+from ...core.words import near, near_file, nearest
 from .tables import Table
 
 if TYPE_CHECKING:
     from ...mechanics.elements.rigid import Rigid
     from ...mechanics.meshes import Mesh
-    from ...mechanics.model.parts import Material
+    from ...mechanics.model.parts import Body, Material
 
 NUMBERS = ("young", "poisson", "density")
+GENERAL = ("name", "order", "move")  # keys of every mesh
 LAWS = {  # of materials, with their keys
     "linear-elastic": ("young", "poisson", "plane", "density"),
     "neo-hookean": ("young", "poisson"), "ciarlet-geymonat": ("young", "poisson", "a"),
@@ -27,15 +30,87 @@ LAWS = {  # of materials, with their keys
 MAX_NODES = 5_000_000  # of a box: a typing error must not fill the memory
 
 
+def read_bodies(top: Table, path: Path) -> list[Body]:
+    """A body for the table [mesh], or one for each table [[mesh]], which then have names."""
+    from ...mechanics.model import Body
+
+    given = top.need("mesh", 'a table [mesh] with box = [1, 1] and cells, or file = "part.msh"')
+    tables = top.tables("mesh") if isinstance(given, list) else [top.table("mesh")]
+    if not tables:
+        raise top.error("mesh", "expected at least one table [[mesh]]")
+    meshes = [read_mesh_table(table, path) for table in tables]
+    names = [_body_name(table, needed=len(tables) > 1) for table in tables]
+    for k, name in enumerate(names):
+        if name in names[:k]:
+            raise tables[k].error("name", f"'{name}' is that of mesh[{names.index(name)}], "
+                                  "expected another for every mesh")  # fmt: skip
+    laws = _materials(top.table("material"), names, meshes)
+    bodies = []
+    for table, mesh, law, name in zip(tables, meshes, laws, names, strict=True):
+        order = table.whole("order", 1)
+        if order not in (1, 2):
+            raise table.error("order", f"expected 1 or 2, got {order}")
+        with top.blamed("material"):
+            bodies.append(Body(mesh, law, name, order))
+    return bodies
+
+
+def _body_name(table: Table, *, needed: bool) -> str:
+    if "name" not in table.data and needed:
+        raise table.error("name", 'missing, expected a name for each of several meshes, such '
+                          'as name = "bracket"')  # fmt: skip
+    name = table.text("name", "")
+    if "." in name:
+        raise table.error("name", f"expected a name without a point, got {shown(name)}")
+    return name
+
+
+def _materials(table: Table, names: list[str], meshes: list[Mesh]) -> list[Any]:
+    """The material of every body: [material.NAME] of the mesh, else by its regions.
+
+    A table for nothing at all is refused with the names that there are.
+    """
+    if len(meshes) == 1 and names[0] not in table.data:
+        return [read_materials(table, meshes[0])]
+    regions = [r for mesh in meshes for r in mesh.regions if r != "default"]
+    for key in table.data:
+        if key not in (*names, *regions, "default"):
+            raise table.error(key, "no mesh and no region of one has this name"
+                              f"{nearest(key, dict.fromkeys([*names, *regions, 'default']))}"
+                              )  # fmt: skip
+    found = []
+    for name, mesh in zip(names, meshes, strict=True):
+        kept = {k: v for k, v in table.data.items() if k == "default" or k in mesh.regions}
+        if name in table.data:
+            found.append(read_material(table.table(name)))
+        elif kept:
+            found.append(read_materials(Table(table.file, table.where, kept), mesh))
+        else:
+            raise table.error(name, f"missing, expected a table [material.{name}], or "
+                              "[material.default] for all")  # fmt: skip
+    return found
+
+
 def read_mesh_table(table: Table, path: Path) -> Mesh:
-    """The mesh of a table [mesh]: a box, a mesh file or a CAD file."""
+    """The mesh of a table [mesh]: a box, a mesh file or a CAD file, moved where it says so."""
+    from ...mechanics.meshes import Mesh
+
+    mesh = _read_mesh(table, path)
+    if "move" not in table.data:
+        return mesh
+    points = mesh.points + np.array(table.numbers("move", (mesh.dim,)))
+    with table.blamed("move"):
+        return Mesh(points, mesh.cells, mesh.surfaces, mesh.grid, mesh.name, mesh.levels)
+
+
+def _read_mesh(table: Table, path: Path) -> Mesh:
     from ...mechanics.meshes import box
 
     if ("box" in table.data) == ("file" in table.data):
         raise table.error("", "expected either box, the sizes of a box, or file")
     if "file" in table.data:
         return _mesh_file(table, path)
-    table.only("box", "cells", "kind", "order")
+    table.only("box", "cells", "kind", *GENERAL)
     size = table.numbers("box", (2, 3))
     if any(0 < abs(length) < 1 / LARGEST for length in size):
         raise table.error("box", f"expected lengths above {1 / LARGEST:g}, got {size}")
@@ -55,7 +130,7 @@ def _mesh_file(table: Table, path: Path) -> Mesh:
     """The mesh of a mesh file or CAD file, refined if asked for."""
     from ...mechanics.meshes import refined
 
-    table.only("file", "size", "order", "refine")
+    table.only("file", "size", "refine", "glue", *GENERAL)
     times = table.whole("refine", 0, minimum=0) or 0
     mesh = _read_file(table, path)
     if mesh.cell_count * 2 ** (mesh.dim * times) > MAX_NODES:
@@ -79,13 +154,24 @@ def _read_file(table: Table, path: Path) -> Mesh:
         if "size" in table.data:
             raise table.error("size", "only for CAD files, a mesh file has its cells")
         with table.blamed("file"):
-            return read_mesh(name)
+            return read_mesh(name, glue=_glue(table))
     table.need("size", "the size of cells in mm, as a CAD file has no mesh")
     size = table.number("size")
     if size <= 0:
         raise table.error("size", f"expected a length > 0, got {size}")
     with table.blamed("file"):
-        return read_cad(name, size)
+        return read_cad(name, size, glue=_glue(table))
+
+
+def _glue(table: Table) -> bool | dict[str, bool]:
+    """Whether parts that touch are bonded, all or by surface."""
+    given = table.data.get("glue", True)
+    if isinstance(given, bool):
+        return given
+    if not isinstance(given, dict) or not all(isinstance(v, bool) for v in given.values()):
+        raise table.error("glue", "expected true, false, or a table of surfaces, "
+                          f"{{ joint = false }}, got {shown(given)}")  # fmt: skip
+    return given
 
 
 def read_materials(table: Table, mesh: Mesh) -> Any:

@@ -16,7 +16,7 @@ from ...core.files import check_is_regular
 from ...core.words import near_file, nearest
 from ..readers import Case
 from ..units import UNIT_NAMES, Units
-from .bodies import read_material, read_materials, read_mesh_table
+from .bodies import read_bodies, read_material
 from .contacts import read_contact, refuse_repeated
 from .evolution import Evolution, read_evolution, read_wall
 from .keys import key_of
@@ -124,31 +124,30 @@ def _hint(path: Path, reason: Exception) -> str:
 
 # -------------------------------------------------------------------------------- model
 def _model(top: Table, path: Path, title: str) -> Model:
-    from ...mechanics.model import Body, BodyForce, Fix, Model, Traction
+    from ...mechanics.model import BodyForce, Fix, Model, Traction
 
-    mesh = read_mesh_table(top.table("mesh"), path)
-    order = top.table("mesh").whole("order", 1)
-    if order not in (1, 2):
-        raise top.error("mesh.order", f"expected 1 or 2, got {order}")
-    material = read_materials(top.table("material"), mesh)
-    fixes = [on_surface(Fix, table, mesh, free=True) for table in top.tables("fix")]
+    bodies = read_bodies(top, path)
+    dim = bodies[0].mesh.dim
+    for k, body in enumerate(bodies):
+        if body.mesh.dim != dim:
+            raise top.error(f"mesh[{k}]", f"expected a mesh in {dim}D as the first, got "
+                            f"one in {body.mesh.dim}D")  # fmt: skip
+    fixes = [on_surface(Fix, table, bodies, free=True) for table in top.tables("fix")]
     loads: list = [
-        on_surface(Traction, table, mesh, "configuration") for table in top.tables("traction")
+        on_surface(Traction, table, bodies, "configuration") for table in top.tables("traction")
     ]
-    loads += [pressure_on(table, mesh) for table in top.tables("pressure")]
+    loads += [pressure_on(table, bodies) for table in top.tables("pressure")]
     for table in top.tables("body_force"):
         table.only("value", "region", "configuration")
         region = table.text("region") if "region" in table.data else None
-        value = vector(table, "value", mesh.dim)
+        value = vector(table, "value", dim)
         loads.append(BodyForce(value, region=region, **configuration(table)))
     if "contact" not in top.data:
         raise top.error("contact", "missing, expected at least one table [[contact]]")
-    contacts = [read_contact(table, mesh) for table in top.tables("contact")]
+    contacts = [read_contact(table, bodies) for table in top.tables("contact")]
     refuse_repeated(top)
-    with top.blamed("material"):
-        body = Body(mesh, material, order=order)
     with top.blamed("contact", partial(key_of, tables=top.data)):
-        return Model([body], supports=fixes, contacts=contacts, loads=loads, name=title)
+        return Model(bodies, supports=fixes, contacts=contacts, loads=loads, name=title)
 
 
 def _wall_model(top: Table, title: str) -> Model:

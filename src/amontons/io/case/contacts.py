@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ...core.expressions import Expression
@@ -10,8 +11,7 @@ from .values import configuration, scalar
 
 if TYPE_CHECKING:
     from ...mechanics.contact import Nitsche, Obstacle
-    from ...mechanics.meshes import Mesh
-    from ...mechanics.model import Contact
+    from ...mechanics.model import Body, Contact
 
 LAWS = "a table, { coulomb = COEFFICIENT } or { tresca = STRESS }, or 'tied'"
 NUMBERS = {"coulomb": "mu", "tresca": "tresca", "cap": "cap", "cohesion": "cohesion",
@@ -19,9 +19,10 @@ NUMBERS = {"coulomb": "mu", "tresca": "tresca", "cap": "cap", "cohesion": "cohes
 POSITIVE = ("stiffness", "stick_stiffness")
 
 
-def read_contact(table: Table, mesh: Mesh) -> Contact:
+def read_contact(table: Table, bodies: Sequence[Body]) -> Contact:
     """The contact of a table [[contact]]."""
     from ...mechanics.model import Contact
+    from ...mechanics.model.supports import locate
 
     table.only("slave", "obstacle", "master", "friction", "method", "kinematics",
                "configuration", "name")  # fmt: skip
@@ -30,7 +31,7 @@ def read_contact(table: Table, mesh: Mesh) -> Contact:
     for key in ("slave", "master"):
         if key in table.data:
             with table.blamed(key):
-                mesh.surface(table.text(key))
+                locate(bodies, table.text(key))
     if ("obstacle" in table.data) == ("master" in table.data):
         raise table.error("", "expected either obstacle or master")
     numbers = _friction(table)
@@ -43,7 +44,7 @@ def read_contact(table: Table, mesh: Mesh) -> Contact:
         if "master" in table.data:
             master = table.text("master")
             return Contact(slave, master=master, **numbers, method=method, **found)
-        obstacle = _obstacle(table.table("obstacle"), mesh.dim)
+        obstacle = _obstacle(table.table("obstacle"), bodies[0].mesh.dim)
         return Contact(slave, obstacle, **numbers, method=method, **found)
 
 

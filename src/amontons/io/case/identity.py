@@ -29,12 +29,20 @@ def identity(case: Case, settings: Settings) -> dict[str, Any]:
     tables = {key: value for key, value in case.tables.items()
               if key not in ("title", "solver", "evolution", "units")}  # fmt: skip
     if "mesh" in tables:
-        tables["mesh"] = {k: v for k, v in tables["mesh"].items() if k != "file"}
+        given = tables["mesh"]
+        tables["mesh"] = (
+            [_without_file(one) for one in given] if isinstance(given, list)
+            else _without_file(given)
+        )  # fmt: skip
     assert case.evolution is not None
     solver = {"method": settings.method, "tolerance": settings.tolerance,
               "contact_tolerance": settings.contact_tolerance, **settings.options}  # fmt: skip
     found = _flat({**tables, "evolution": case.evolution.method, "solver": solver})
     return {**found, MESH: _digest([body.mesh for body in case.model.bodies])}
+
+
+def _without_file(mesh: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in mesh.items() if key != "file"}
 
 
 def differences(old: dict[str, Any], new: dict[str, Any]) -> list[str]:

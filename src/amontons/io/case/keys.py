@@ -21,7 +21,8 @@ def key_of(at: Address, tables: dict[str, Any]) -> str:
     if part in ("bodies", "contacts") and "wall" in tables:
         return "wall"
     if part == "bodies":
-        return "material" if "material" in rest else "mesh"
+        several = rest[:1] if isinstance(tables.get("mesh"), list) else ()
+        return "material" if "material" in rest else dotted(("mesh", *several))
     if part == "supports":
         return dotted(("fix", *rest))
     if part == "contacts":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,16 +12,18 @@ from ...core.expressions import Expression
 from .tables import Table
 
 if TYPE_CHECKING:
-    from ...mechanics.meshes import Mesh
+    from ...mechanics.model import Body
 
 
 def on_surface(
-    kind: type, table: Table, mesh: Mesh, *more: str, free: bool = False
+    kind: type, table: Table, bodies: Sequence[Body], *more: str, free: bool = False
 ) -> Any:  # fmt: skip
-    """A support or load of a table, on a surface that the mesh has; more: its other keys."""
-    part = on_named(kind, table, mesh.dim, *more, free=free)
+    """A support or load of a table, on a surface that a body has; more: its other keys."""
+    from ...mechanics.model.supports import locate
+
+    part = on_named(kind, table, bodies[0].mesh.dim, *more, free=free)
     with table.blamed("on"):
-        mesh.surface(part.on)
+        locate(bodies, part.on)
     return part
 
 
@@ -38,16 +41,17 @@ def configuration(table: Table) -> dict[str, Any]:
     return {"configuration": table.choice("configuration", ("reference", "current"))}
 
 
-def pressure_on(table: Table, mesh: Mesh) -> Any:
+def pressure_on(table: Table, bodies: Sequence[Body]) -> Any:
     """The pressure of a table [[pressure]]."""
     from ...mechanics.model import Pressure
+    from ...mechanics.model.supports import locate
 
     table.only("on", "value")
     name = table.text("on")
     with table.blamed("on"):
-        mesh.surface(name)
+        locate(bodies, name)
     given = table.need("value", "a number or an expression")
-    value: Any = _entry(table, "value", given, mesh.dim)
+    value: Any = _entry(table, "value", given, bodies[0].mesh.dim)
     return Pressure(name, value)
 
 

@@ -112,7 +112,9 @@ def check_exterior(mesh: Mesh, surface: str, side: str = "slave") -> None:
     if inner:
         raise InvalidInput(
             f"{inner} of its {total} facets lie between two cells, contact needs an outer "
-            "surface", (side,), f"surface {surface!r}",
+            "surface; parts of a mesh that share nodes are bonded there: read it with "
+            "glue=False, in a case file glue = false under mesh, and they touch",
+            (side,), f"surface {surface!r}",
         )  # fmt: skip
 
 

@@ -17,19 +17,25 @@ from ...core.words import near_file
 from . import gmsh
 from .mesh import Mesh
 from .raw import RawBlock, RawMesh, to_mesh
+from .split import Glue, check_glue, split
 
 KINDS = {"triangle": "tri", "tetra": "tet", "hexahedron": "hex"}
 CAD_SUFFIXES = (".step", ".stp", ".iges", ".igs", ".brep")
 TAGS = ("gmsh:physical", "medit:ref", "cell_tags", "MaterialID", "region", "avsucd:material")
 
 
-def read_mesh(path: str | os.PathLike[str]) -> Mesh:
+def read_mesh(path: str | os.PathLike[str], *, glue: Glue = True) -> Mesh:
     """The mesh in a file: gmsh 2.2 or 4.1, or any format that meshio reads.
 
     Groups of the highest dimension become regions, groups one dimension lower surfaces, also
     named node sets (Abaqus NSET).  Groups without a name go by their number.  A mesh of plane
     cells with constant z is a mesh in 2D.  Raises FileFormatError naming file and line.
+
+    Regions that share nodes are bonded.  glue=False takes them apart where they meet, so that
+    they can be in contact, glue={"joint": False} only along the surface joint; its sides are
+    then called joint-steel and joint-copper after the regions, see `meshes.split.split`.
     """
+    check_glue(glue)
     name = os.fspath(path)
     if is_cad(name):
         raise FileFormatError(
@@ -42,8 +48,8 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
             text = Path(name).read_text(encoding="utf-8")
         except UnicodeDecodeError as error:
             raise FileFormatError(f"{name}: expected a text file in UTF-8 ({error})") from None
-        return to_mesh(gmsh.read_text(name, text), name)
-    return to_mesh(_from_meshio(name), name)
+        return split(to_mesh(gmsh.read_text(name, text), name), glue)
+    return split(to_mesh(_from_meshio(name), name), glue)
 
 
 def is_cad(path: str | os.PathLike[str]) -> bool:
