@@ -20,6 +20,7 @@ from numba.core import event
 
 from .errors import InvalidInput, TimeUp
 from .interrupts import hold, release
+from .telling import told
 
 
 class _Compiling(threading.local, event.Listener):
@@ -48,6 +49,32 @@ class _Compiling(threading.local, event.Listener):
 
 _compiling = _Compiling()
 event.register("numba:compiler_lock", _compiling)
+
+
+class _Compiles(threading.local, event.Listener):
+    """Whether this thread compiles a kernel, not only loads it; compilations nest."""
+
+    depth: int = 0
+
+    def on_start(self, event: event.Event) -> None:
+        """Tell those who asked when the outermost compilation begins."""
+        self.depth += 1
+        if self.depth == 1:
+            for tell in list(told):
+                tell()
+
+    def on_end(self, event: event.Event) -> None:
+        """Note the end."""
+        self.depth -= 1
+
+
+_compiles = _Compiles()
+event.register("numba:compile", _compiles)
+
+
+def compiles() -> bool:
+    """Whether this thread is compiling right now."""
+    return _compiles.depth > 0
 
 
 def compiling() -> float:

@@ -11,48 +11,86 @@ become of the functions that it calls.  So all kernels are kept under a digest o
 from __future__ import annotations
 
 import atexit
-import hashlib
 import os
 import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
 import numba
 from numba.core import config
+from numba.core.caching import FunctionCache, _Cache
+from numba.core.dispatcher import Dispatcher
+from numba.core.sigutils import normalize_signature
 
-PACKAGE = Path(__file__).resolve().parents[1]
+from . import clock
+from .shipped import name_of, shipped, sources
+from .spelling import spelled
+
+RECORD = os.environ.get("AMONTONS_RECORD_KERNELS", "")  # a file, see docs/startup.md
 MARK = b"njit("  # in every file with kernels
 ROOT = 0  # whose folders anybody may trust
 PATIENCE = 30 * 24 * 3600.0  # seconds after which kernels of another version may go
 Function = Callable[..., Any]
 
 
-def njit(**options: Any) -> Callable[[Function], Function]:
-    """`numba.njit` with the same options, its results kept in our folder."""
+def njit(*, cache: bool = True, **options: Any) -> Callable[[Function], Function]:
+    """`numba.njit` with the same options; its results come with the package, or are kept."""
 
     def decorate(function: Function) -> Function:
-        with _kept_in(_folder()):
-            made = numba.njit(**options)(function)
-        made._cache.save_overload = _if_it_can(made._cache.save_overload)
+        made = numba.njit(**options)(function)
+        if cache and isinstance(made, Dispatcher):  # numba can be switched off
+            made._cache = Kept(function)
         return made
 
     return decorate
 
 
-def _if_it_can(save: Function) -> Function:
-    """Keep a result where there is room for it; on a full disk it is compiled again."""
+class Kept(_Cache):
+    """Where numba looks for what it has compiled: first in the package, then in our folder."""
 
-    def kept(*arguments: Any) -> None:
+    def __init__(self, function: Function) -> None:
+        self.function = function
+
+    @cached_property
+    def own(self) -> FunctionCache:
+        """Numba's cache in our folder, made when it is asked for: most never are."""
+        with _kept_in(_folder()):
+            return FunctionCache(self.function)
+
+    @property
+    def cache_path(self) -> str:
+        """The folder in which new results are kept."""
+        return self.own.cache_path
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """What was compiled for these types, None where nothing was."""
+        types, _ = normalize_signature(sig)
+        if RECORD and not clock.compiles():
+            _record(self.function, types)
+        found = shipped().result(name_of(self.function, types), target_context)
+        return self.own.load_overload(sig, target_context) if found is None else found
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep a result where there is room for it; on a full disk it is compiled again."""
         with suppress(OSError):
-            save(*arguments)
+            self.own.save_overload(sig, data)
 
-    return kept
+    def enable(self) -> None:
+        """Numba's switch, of which nothing here makes use."""
+
+    disable = flush = enable
+
+
+def _record(function: Function, types: Sequence[Any]) -> None:
+    """Note that a function was called with these types, a line for each process and call."""
+    with open(RECORD, "a", encoding="utf-8") as file:
+        file.write(f"{function.__module__} {function.__qualname__} {spelled(types)}\n")
 
 
 @contextmanager
@@ -123,10 +161,4 @@ def _forget_old(above: Path) -> None:
 
 def _digest() -> str:
     """Sixteen letters that change with any file that holds kernels."""
-    found = hashlib.sha256()
-    for path in sorted(PACKAGE.rglob("*.py")):
-        text = path.read_bytes()
-        if MARK in text:
-            found.update(f"{path.relative_to(PACKAGE)} {len(text)} ".encode())
-            found.update(text)
-    return found.hexdigest()[:16]
+    return sources(mark=MARK)

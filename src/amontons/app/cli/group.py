@@ -5,11 +5,13 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from functools import cache
 from typing import Any
 
 import click
 
 from ...core.errors import AmontonsError, TimeUp
+from ...core.telling import telling
 from ...core.words import nearest
 from .streams import open_missing, printed
 
@@ -47,7 +49,8 @@ class Commands(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command; a user's mistake becomes one message and exit code 2."""
         try:
-            code = super().invoke(ctx)
+            with telling(_say_compiling):
+                code = super().invoke(ctx)
         except TimeUp as error:
             _say_line(f"Not finished: {printable(str(error))}")
             ctx.exit(UNFINISHED)
@@ -61,6 +64,17 @@ class Commands(click.Group):
             _say_line("Interrupted.")
             ctx.exit(INTERRUPTED)
         ctx.exit(code if isinstance(code, int) else 0)
+
+
+@cache
+def _say_compiling() -> None:
+    """Say once on a terminal what takes some seconds; in time reported it is apart anyway."""
+    if not sys.stderr.isatty():
+        return
+    from ...core.shipped import shipped
+
+    why = shipped().why_not or "not all come with the package"
+    _say_line(f"compiling kernels once, some seconds ({why})")
 
 
 def _say_line(text: str) -> None:
