@@ -260,3 +260,25 @@ def test_case_files_and_the_command_line(tmp_path):
         told = run("solve", case)
         assert told.exit_code != 0
         assert words in told.output
+
+
+def test_a_rigid_body_stands_on_its_springs():
+    """Without springs its reactions would not be known: three contacts, three motions."""
+    body = am.Body(am.box((1, 1), 2), am.Rigid(density=1.0))
+    model = am.Model([body], [], [am.Contact("bottom", FLOOR, **SPRINGS)],
+                     [am.BodyForce((0.05, -1.0))])  # fmt: skip
+    fields = am.solve(model).fields
+    assert fields.weights @ fields.gap == pytest.approx(-1 / STIFF)
+    assert fields.weights @ fields.slip[:, 0] == pytest.approx(0.05 / STICKY)
+
+
+@pytest.mark.parametrize("method", [am.QuasiStatic(0.1), am.MoreauJean(0.01)])
+def test_springs_go_on_from_a_saved_state(method):
+    body = am.Body(am.box((1, 1), 2), am.LinearElastic(young=YOUNG, poisson=0.0, density=1.0))
+    drag = am.Fix("top", lambda x, t: (0.03 * np.sin(3 * t), -0.02))
+    model = am.Model([body], [drag], [am.Contact("bottom", FLOOR, **SPRINGS)])
+    end = 20 * method.step
+    whole = list(am.evolve(model, method, until=end))
+    rest = list(am.evolve(model, method, start=whole[9].state, until=end))
+    assert whole[-1].state.force[:, 1].any()
+    np.testing.assert_array_equal(rest[-1].state.force, whole[-1].state.force)

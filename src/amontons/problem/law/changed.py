@@ -9,7 +9,7 @@ Without C r.u + c u_N = s.u', and always what the plain law says of (s, u') is s
 
 is the same problem for s with another H or W and another load (`FrictionProblem.plain`), which
 all solvers take, and what is known of the plain law holds for it.  With a compliance C it is
-W + C that stands for W, so that the plain problem is in the Delassus form.  c, a tension, is
+W + C that stands for W, or a spring at each contact in the global form.  c, a tension, is
 that of `cohesive`, T that of `orthotropic`, C that of `compliant`; a contact may have all.
 """
 
