@@ -125,10 +125,12 @@ def differences(out: Path, reference: Path, *, pictures: bool = True) -> list[st
 
 def _pairs(ours: Checkpoint, theirs: Checkpoint) -> Iterator[tuple[str, Any, Any]]:
     """Parts of two checkpoints, by name; floats as their bits."""
-    for name in ("index", "time", "displacement", "velocity", "force", "slip"):
+    for name in ("index", "time", "displacement", "velocity", "force", "slip", "slid", "path",
+                 "friction_work"):  # fmt: skip
         parts = [np.asarray(getattr(c.state, name)) for c in (ours, theirs)]
         yield name, *(part.reshape(-1).view(np.uint8) for part in parts)
     yield "case", ours.case == theirs.case, True
+    yield "record", ours.record == theirs.record, True
     for name in ours.table.dtype.names or ():
         if name != OWN:
             parts = [np.ascontiguousarray(c.table[name]) for c in (ours, theirs)]

@@ -60,7 +60,7 @@ def test_what_differs_is_seen(runs):
 
 
 def test_exit_at_some_renames(runs):
-    assert fine(at_every_call(runs, ("replace",), stride=11)) == 5
+    assert fine(at_every_call(runs, ("replace",), stride=11)) == 6
 
 
 def test_exit_at_some_calls(runs):

@@ -126,7 +126,7 @@ def save_checkpoint(path: str | os.PathLike[str], checkpoint: Checkpoint) -> Non
         group = file.create_group(RUN)
         group["case"] = np.frombuffer(case.encode(), dtype=np.uint8)
         group["table"], group["pictures"] = checkpoint.table, checkpoint.pictures
-        record = json.dumps(checkpoint.record, sort_keys=True)
+        record = json.dumps(checkpoint.record)  # in its order, in which it is written again
         group["record"] = np.frombuffer(record.encode(), dtype=np.uint8)
         group["digest"] = np.frombuffer(_digest(checkpoint, case), dtype=np.uint8)
 

@@ -93,6 +93,10 @@ def test_slip_is_carried_on(case, tmp_path):
     assert sorted(path.name for path in half.iterdir()) == names
     for name in set(names) - {"state.h5", "steps.csv"}:
         assert (half / name).read_bytes() == (whole / name).read_bytes(), name
+    record = (whole / "solution.json").read_bytes()
+    (half / "solution.json").unlink()
+    run(case, "-o", half, "--restart")  # nothing is left to do, and it is written again
+    assert (half / "solution.json").read_bytes() == record
     for one, other in zip(table(whole), table(half), strict=True):
         assert one | {"seconds": ""} == other | {"seconds": ""}
     with meshio.xdmf.TimeSeriesReader(half / "steps.xdmf") as series:
