@@ -34,8 +34,9 @@ def curves_page(
     """Branches over their parameter; a point on them shows the bodies there."""
     name = branches[0].name if branches else "parameter"
     series, marks, points = [], [], []
-    most = max(2, MOST_POINTS // max(len(branches), 1))
     stage = None if model is None or not branches else Stage(Skin(model))
+    most = MOST_POINTS if stage is None else stage.most(MOST_POINTS)
+    most = max(2, most // max(len(branches), 1))
     states: list[State] = []
     for k, branch in enumerate(branches):
         heights = np.array(_heights(branch))

@@ -83,6 +83,7 @@ class Film:
 
     def __post_init__(self) -> None:
         self.stage = Stage(Skin(self.model))
+        self.most = self.stage.most(self.most)
 
     def add(self, step: TimeStep) -> None:
         """Take a step, unless so many are kept that only every other one counts."""

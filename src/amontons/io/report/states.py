@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 NAMES = {"pressure": "CPRESS", "shear": "CSHEAR", "slip": "CSLIP", "gap": "COPEN"}
+MOST_NUMBERS = 3_000_000  # of all states of a page together, some megabytes
 MOST_ARROWS = 2000  # forces that are drawn, the largest
 
 
@@ -30,10 +31,10 @@ class State:
     label: what it is, in words; parameter: time, load or friction; stamp: as of the solution.
     """
 
-    moved: Array
+    moved: NDArray[np.float32]
     status: NDArray[np.int8]
     values: dict[str, Array]
-    force: Array
+    force: NDArray[np.float32]
     label: str = ""
     parameter: float = 0.0
     stamp: str = ""
@@ -52,6 +53,11 @@ class Stage:
         parts = [piece.ravel() for z in zones for piece in (z.pieces, z.master_pieces)]
         object.__setattr__(self, "contacts", np.unique(np.concatenate(parts)))
 
+    def most(self, wanted: int) -> int:
+        """How many states a page can hold, 2 to `wanted`."""
+        each = 3 * len(self.skin.points) + 8 * len(self.contacts)
+        return max(2, min(wanted, MOST_NUMBERS // each))
+
     def state(self, fields: ContactFields, solution: Any, **words: Any) -> State:
         """A state of the model; solution: of a solve, or a step in time."""
         model, skin = self.skin.model, self.skin
@@ -67,9 +73,10 @@ class Stage:
         counts = {name: int((solution.status == k).sum())
                   for k, name in enumerate(("open", "slip", "stick"))}  # fmt: skip
         return State(
-            moved, status[mine].astype(np.int8),
+            moved.astype(np.float32), status[mine].astype(np.int8),
             {name: array[mine] for name, array in values.items()},
-            found["CFORCE"][at], stamp=told.convergence.stamp, counts=counts, **words,
+            found["CFORCE"][at].astype(np.float32), stamp=told.convergence.stamp,
+            counts=counts, **words,
         )  # fmt: skip
 
 

@@ -36,9 +36,10 @@ class Eye {
     return half;
   }
 
-  /** Fit to a pane of so many pixels. */
-  fit(width, height) {
-    const wide = width / height, y = Math.max(this.half[1], this.half[0] / wide), x = y * wide;
+  /** Fit to a pane of so many pixels, some of which a heading takes. */
+  fit(width, height, heading) {
+    const free = Math.max(0.4, 1 - (2 * heading) / height), wide = width / height;
+    const y = Math.max(this.half[1] / free, this.half[0] / wide), x = y * wide;
     Object.assign(this.camera, { left: -x, right: x, top: y, bottom: -y });
     this.camera.updateProjectionMatrix();
     this.camera.updateMatrixWorld();

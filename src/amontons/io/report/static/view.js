@@ -80,7 +80,7 @@ class View {
     const element = make("div", { class: "pane", tabindex: "0", role: "application",
       "aria-label": `${name}: drag or use arrow keys to turn, + and - to zoom, 0 for the first view, n and p to pick contact nodes` });
     if (title) element.append(make("h3", {}, title, ...(detail ? [make("small", {}, detail)] : [])));
-    const pane = { element, bodies, what, eye, ...bodies.scene(what) };
+    const pane = { element, bodies, what, eye, heading: title ? 40 : 0, ...bodies.scene(what) };
     if (this.data.stamp || bodies.state?.stamp) element.append(make("div", { class: "across" }, make("span", {}, this.data.stamp)));
     pane.axes = new Axes(element, this.view.dimension);
     pane.dot = make("div", { class: "dot", hidden: true });
@@ -126,7 +126,7 @@ class View {
     if (side === "master") from.negate();
     from.normalize();
     const up = Math.abs(from.z) > 0.8 ? new THREE.Vector3(0, 1, 0) : new THREE.Vector3(0, 0, 1);
-    return (this.eyes[side][zone] = new Eye(box, from, up, 1.35));
+    return (this.eyes[side][zone] = new Eye(box, from, up, 1.2));
   }
 
   // ------------------------------------------------------------------------- what is shown
@@ -204,7 +204,7 @@ class View {
       const at = [box.left - stage.left, stage.bottom - box.bottom, box.width, box.height];
       renderer.setViewport(...at);
       renderer.setScissor(...at);
-      pane.eye.fit(box.width, box.height);
+      pane.eye.fit(box.width, box.height, pane.heading);
       renderer.render(pane.scene, pane.eye.camera);
       pane.axes.draw(pane.eye.camera);
       this.mark(pane, box);
