@@ -19,7 +19,7 @@ def figures_of_results(block, block_vars, gallery_conf) -> str:
     if not isinstance(shown, Figure) or getattr(shown, "number", None) is not None:
         return ""
     path = next(block_vars["image_path_iterator"])
-    shown.savefig(path, dpi=100)
+    shown.savefig(path, dpi=100, bbox_inches="tight")
     block_vars["example_globals"][LAST] = None  # once
     return figure_rst([path], gallery_conf["src_dir"])
 

@@ -24,7 +24,8 @@ solution = am.solve(model)
 solution
 
 # %%
-# Bodies, deformed, and the contact zone beside them: pressure and shear, and what sticks.
+# In 2D the surface of contact as curves: gap, slip and status on the left, pressure and shear within its bound on the
+# right. In 3D the bodies are drawn as well.
 solution.plot()
 
 # %%
