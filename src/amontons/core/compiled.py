@@ -64,7 +64,7 @@ class Kept(_Cache):
             return FunctionCache(self.function)
 
     @property
-    def cache_path(self) -> str:
+    def cache_path(self) -> Any:
         """The folder in which new results are kept."""
         return self.own.cache_path
 
