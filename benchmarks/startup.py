@@ -28,12 +28,12 @@ IN_TIME = ("release", "wall")  # cases of `amontons run`
 ONE = """
 import amontons as am
 problem = am.FrictionProblem.from_delassus(W=[[1, 0.2], [0.2, 1]], q=[[-1, 0.5]], mu=[0.3])
-assert am.solve(problem).convergence.converged
+assert am.solve(problem).convergence.error < 1e-8
 """
 HEAD = """# Start-up
 
 Regenerate: `python benchmarks/startup.py --before {before}`.  CPU seconds of whole processes in
-fresh environments; first: nothing was ever compiled or kept; second: least of {repeats} more runs.
+fresh environments; first: nothing was ever compiled or kept; second: least of {repeats} runs.
 
 {machine}.
 
