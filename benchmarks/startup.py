@@ -28,12 +28,12 @@ IN_TIME = ("release", "wall")  # cases of `amontons run`
 ONE = """
 import amontons as am
 problem = am.FrictionProblem.from_delassus(W=[[1, 0.2], [0.2, 1]], q=[[-1, 0.5]], mu=[0.3])
-assert am.solve(problem).convergence.converged
+assert am.solve(problem).convergence.error < 1e-8
 """
 HEAD = """# Start-up
 
 Regenerate: `python benchmarks/startup.py --before {before}`.  CPU seconds of whole processes in
-fresh environments; first: nothing was ever compiled or kept, second: least of {repeats} later runs.
+fresh environments; first: nothing was ever compiled or kept; second: least of {repeats} runs.
 
 {machine}.
 
@@ -80,9 +80,11 @@ class Installed:
         self.size = sum(x.stat().st_size for x in files) / 1e6
 
     def bin(self, name):
+        """A program of the environment."""
         return self.venv / "bin" / name
 
     def environment(self, cache):
+        """Variables of its processes."""
         dropped = ("PYTHONPATH", "XDG_CACHE_HOME", "VIRTUAL_ENV")
         kept = {k: v for k, v in os.environ.items() if k not in dropped}
         return {**kept, "NUMBA_CACHE_DIR": str(cache), "OMP_NUM_THREADS": "1"}
@@ -99,6 +101,7 @@ class Installed:
             return first, second, third
 
     def example(self, name):
+        """The three times of an example."""
         verb = "run" if name in IN_TIME else "solve"
         known = subprocess.run([self.bin("amontons"), verb, "--help"], text=True,
                                capture_output=True).stdout  # fmt: skip
@@ -106,6 +109,7 @@ class Installed:
         return self.three([self.bin("amontons"), verb, f"example:{name}", "-o", "out"], more)
 
     def examples(self):
+        """Names of all that it has."""
         listed = subprocess.run(
             [self.bin("amontons"), "examples"], text=True, capture_output=True, check=True
         ).stdout

@@ -29,7 +29,7 @@ from numba.core.dispatcher import Dispatcher
 from numba.core.sigutils import normalize_signature
 
 from . import clock
-from .shipped import name_of, shipped, sources
+from .shipped import PACKAGE, name_of, shipped, sources
 from .spelling import spelled
 
 RECORD = os.environ.get("AMONTONS_RECORD_KERNELS", "")  # a file, see docs/startup.md
@@ -64,7 +64,7 @@ class Kept(_Cache):
             return FunctionCache(self.function)
 
     @property
-    def cache_path(self) -> str:
+    def cache_path(self) -> Any:
         """The folder in which new results are kept."""
         return self.own.cache_path
 
@@ -161,4 +161,4 @@ def _forget_old(above: Path) -> None:
 
 def _digest() -> str:
     """Sixteen letters that change with any file that holds kernels."""
-    return sources(mark=MARK)
+    return sources(PACKAGE, MARK)

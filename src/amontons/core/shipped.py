@@ -33,7 +33,7 @@ import numba
 from numba.core import serialize
 from numba.core.compiler import CompileResult
 from numba.core.environment import Environment, lookup_environment
-from numba.core.runtime import rtsys
+from numba.core.runtime.nrt import rtsys
 
 PACKAGE = Path(__file__).resolve().parents[1]
 FILE = PACKAGE / "kernels.bin"

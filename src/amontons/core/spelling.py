@@ -21,7 +21,7 @@ def _one(kind: Any) -> str:
         return f"Array({_one(kind.dtype)}, {kind.ndim}, {kind.layout!r}{flags})"
     if isinstance(kind, types.BaseNamedTuple):
         made = kind.instance_class
-        return f"named({made.__module__ + ':' + made.__qualname__!r}, {spelled(tuple(kind))})"
+        return f"named({made.__module__ + ':' + made.__qualname__!r}, {spelled(kind.types)})"
     if isinstance(kind, types.UniTuple):
         return f"UniTuple({_one(kind.dtype)}, {kind.count})"
     if isinstance(kind, types.Tuple):
@@ -38,7 +38,7 @@ def read(text: str) -> tuple[types.Type, ...]:
     return tuple(eval(f"[{text}]", names))
 
 
-def _named(made: str, *members: types.Type) -> types.Type:
+def _named(made: str, *members: types.Type) -> Any:
     """The type of a named tuple "module:class" with these members."""
     module, name = made.split(":")
     return types.BaseTuple.from_types(members, getattr(importlib.import_module(module), name))

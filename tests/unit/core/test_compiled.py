@@ -15,7 +15,7 @@ CALL = """
 import numpy as np
 from amontons.core import compiled
 from amontons.solvers.sweeps.kernels import _dot
-_dot(np.ones(2), np.ones(2))
+_dot(np.ones(2, np.float32), np.ones(2, np.float32))  # never comes with the package
 print(compiled._folder())
 """
 

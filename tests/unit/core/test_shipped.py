@@ -229,3 +229,22 @@ def test_kernels_of_changed_sources_are_stale(installed, tmp_path):
     path.write_text(text[:begin] + head + "\n    return -1.0\n" + text[end:])
     said = run(site, CALL, NUMBA_CACHE_DIR=tmp_path / "cache")
     assert said.startswith("-1.0 compiled they are for sources")
+
+
+@pytest.mark.skipif(bool(shipped.shipped().why_not), reason="this package came without kernels")
+@pytest.mark.parametrize("example", ["cube", "brake", "hertz"])
+def test_the_first_solve_of_an_example_compiles_nothing(example, tmp_path):
+    """Otherwise: python packaging/record.py."""
+    code = f"""
+from amontons.app.cli import main
+from amontons.core.telling import told
+
+told.append(lambda: print("compiles"))
+main(["solve", "example:{example}", "-o", "out", "--quiet"], standalone_mode=False)
+"""
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", code], capture_output=True, text=True, cwd=tmp_path,
+        env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "compiles" not in done.stdout
