@@ -86,7 +86,8 @@ def _draw_step(
     """Deformed bodies and joints in one frame for all steps."""
     moved = scene.moved(frame.displacement, magnify)
     draw_bodies(axes, scene, moved, frame.status, room=room, joints=JOINTS, length=units.length)
-    axes.set(xlabel=with_unit("x", units.length), ylabel=with_unit("y", units.length))
+    if scene.model.dimension == 2:
+        axes.set(xlabel=with_unit("x", units.length), ylabel=with_unit("y", units.length))
 
 
 def _joint_legend(sheet: Sheet, labels: dict[ContactStatus, str]) -> None:
