@@ -38,6 +38,7 @@ _HOME = {
                         "evolve"),
     "io.checkpoint": ("export_fclib", "load_start", "load_state", "save_state"),
     "io.case": ("read_case",),
+    "io.series": ("export_xdmf",),
     "app.model_solution": ("ModelSolution",),
     "core.warned": ("ResultWarning",),
     "app.api": ("solve",),

@@ -35,6 +35,7 @@ from .io.checkpoint import (
     save_state as save_state,
 )
 from .io.fclib import read_fclib as read_fclib, write_fclib as write_fclib
+from .io.series import export_xdmf as export_xdmf
 from .linear import Direct as Direct, GeometricMultigrid as GeometricMultigrid, Petsc as Petsc
 from .mechanics.contact import (
     LevelSet as LevelSet, Nitsche as Nitsche, Plane as Plane, Sphere as Sphere,

@@ -200,7 +200,7 @@ def test_a_run_on_a_full_disk_says_what_is_safe(writers, tmp_path):
     write = writers["moving"]
     calls = tried(write, tmp_path / "good")[1].calls
     renames = [k for k, call in enumerate(calls, start=1) if call == "replace"]
-    with Faults(tmp_path, at=renames[7]).injected(), pytest.raises(Failed) as reason:
+    with Faults(tmp_path, at=renames[8]).injected(), pytest.raises(Failed) as reason:
         write(tmp_path)
     for words in ("No space left", "step-00004.vtu", "state after step 2", "--restart"):
         assert words in str(reason.value)

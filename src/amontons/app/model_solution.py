@@ -14,6 +14,8 @@ from ..problem.solution import FrictionSolution
 
 if TYPE_CHECKING:
     from ..mechanics.model import ContactFields, Model
+    from ..mechanics.model.pairs import PairResult
+    from ..mechanics.model.reactions import SupportResult
 
 OF_SOLUTION = (
     "problem", "r", "u", "v", "status", "sliding", "margin", "convergence", "converged",
@@ -21,7 +23,7 @@ OF_SOLUTION = (
 )  # fmt: skip
 OF_FIELDS = (
     "displacement", "points", "frames", "weights", "gap", "pressure", "shear", "slip", "force",
-    "resultant",
+    "resultant", "load", "reaction",
 )  # fmt: skip
 
 
@@ -30,7 +32,8 @@ class ModelSolution(Shown):
     """A solved model.  Forwards what FrictionSolution and ContactFields know.
 
     displacement: (nodes, dim) per body; gap, pressure (nc,), shear, slip (nc, d-1) per contact;
-    resultant (d,): force of the obstacles on the slaves, global axes; r, u, v, status and so
+    resultant (d,): force of the obstacles on the slaves, global axes; load: force and moment
+    of all loads, reaction: forces of supports, (nodes, dim) per body; r, u, v, status and so
     on as in FrictionSolution.
     """
 
@@ -55,6 +58,20 @@ class ModelSolution(Shown):
         return f"<ModelSolution of {self.model.name or 'model'}: {counts}; {outcome}>"
 
     @cached_property
+    def pairs(self) -> dict[str, PairResult]:
+        """Force, moment, area, pressure, slip, … of every contact pair, by its name."""
+        from ..mechanics.model.pairs import pair_results
+
+        return pair_results(self.model, self.fields)
+
+    @cached_property
+    def supports(self) -> dict[str, SupportResult]:
+        """Force and moment of every support, by its name."""
+        from ..mechanics.model.reactions import support_results
+
+        return support_results(self.model, self.fields)
+
+    @cached_property
     def warnings(self) -> tuple[ResultWarning, ...]:
         """Reasons to doubt a result that has converged, each with a name."""
         from ..mechanics.model.doubts import model_warnings
@@ -77,7 +94,7 @@ class ModelSolution(Shown):
         )
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Write the solution; the suffix decides: .vtu, .h5 (or .hdf5), .json."""
+        """Write the solution; the suffix decides: .vtu, .h5 (or .hdf5), .json, .csv."""
         output.write(self.output, path)
 
     def plot(self, path: str | os.PathLike[str] | None = None, **options: Any) -> Any:

@@ -7,7 +7,7 @@ import json
 import os
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -20,11 +20,11 @@ from ..core.errors import FileFormatError, InvalidInput
 from ..core.files import check_is_regular, make_folder
 from ..core.hdf5 import check_contained
 from ..mechanics.steps import State, TimeStep
+from ..mechanics.steps.state import ARRAYS, RUBBED
 from ..solvers import Iterate
 from .fclib import DAMAGE, write_fclib, write_hdf5
 
 GROUP = "amontons_state"
-ARRAYS = {"displacement": 1, "velocity": 1, "force": 2, "slip": 2}  # name: dimensions
 RUN = "amontons_run"  # beside the state, in the checkpoint of a run
 Read = TypeVar("Read")
 
@@ -35,13 +35,16 @@ class Checkpoint:
 
     case: what decides the numbers, JSON data by key; table (steps,): a structured array, one
     row for each step so far, with the field `index`; pictures: indices of the steps that have
-    a VTK file.
+    a VTK file; record: of the last of these steps, JSON data.  counts_slip: False for a file
+    of an older version, whose state knows nothing of what has slid before it.
     """
 
     state: State
     case: dict[str, Any]
     table: NDArray[np.void]
     pictures: NDArray[np.int64]
+    record: dict[str, Any] = field(default_factory=dict)
+    counts_slip: bool = True
 
 
 def save_state(path: str | os.PathLike[str], state: State) -> None:
@@ -123,6 +126,8 @@ def save_checkpoint(path: str | os.PathLike[str], checkpoint: Checkpoint) -> Non
         group = file.create_group(RUN)
         group["case"] = np.frombuffer(case.encode(), dtype=np.uint8)
         group["table"], group["pictures"] = checkpoint.table, checkpoint.pictures
+        record = json.dumps(checkpoint.record, sort_keys=True)
+        group["record"] = np.frombuffer(record.encode(), dtype=np.uint8)
         group["digest"] = np.frombuffer(_digest(checkpoint, case), dtype=np.uint8)
 
     write_hdf5(path, fill)
@@ -139,7 +144,7 @@ def load_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
 def _put_state(file: h5py.File, state: State) -> None:
     group = file.create_group(GROUP)
     group["index"], group["time"] = state.index, state.time
-    for name in ARRAYS:
+    for name in (*ARRAYS, *RUBBED):
         group[name] = getattr(state, name)
 
 
@@ -168,8 +173,9 @@ def _state(path: Path, file: h5py.File) -> State:
     if GROUP not in file:
         raise FileFormatError(f"{path}: /{GROUP}: missing group")
     group: Any = file[GROUP]
-    values = {name: np.asarray(group[name][()], dtype=float) for name in ARRAYS}
-    for name, dimensions in ARRAYS.items():
+    known = ARRAYS | {name: k for name, k in RUBBED.items() if name in group}
+    values = {name: np.asarray(group[name][()], dtype=float) for name in known}
+    for name, dimensions in known.items():
         if values[name].ndim != dimensions:
             raise FileFormatError(
                 f"{path}: /{GROUP}/{name}: expected {dimensions} dimensions, "
@@ -187,7 +193,10 @@ def _checkpoint(path: Path, file: h5py.File) -> Checkpoint:
         )
     group: Any = file[RUN]
     case = group["case"][()].tobytes().decode()
-    found = Checkpoint(state, json.loads(case), group["table"][()], group["pictures"][()])
+    inner: Any = file[GROUP]
+    record = group["record"][()].tobytes().decode() if "record" in group else "{}"
+    found = Checkpoint(state, json.loads(case), group["table"][()], group["pictures"][()],
+                       json.loads(record), all(name in inner for name in RUBBED))  # fmt: skip
     if group["digest"][()].tobytes() != _digest(found, case):
         raise FileFormatError(f"{path}: has changed since it was written: the digest differs")
     return found
@@ -196,10 +205,13 @@ def _checkpoint(path: Path, file: h5py.File) -> Checkpoint:
 def _digest(checkpoint: Checkpoint, case: str) -> bytes:
     """A hash of all that a checkpoint holds."""
     state = checkpoint.state
+    names = (*ARRAYS, *RUBBED) if checkpoint.counts_slip else tuple(ARRAYS)
     parts = [np.array([state.index]), np.array([state.time]),
-             *(getattr(state, name) for name in ARRAYS),
+             *(getattr(state, name) for name in names),
              checkpoint.table, checkpoint.pictures]  # fmt: skip
     whole = hashlib.sha256(case.encode())
+    if checkpoint.counts_slip:  # older versions have no record either
+        whole.update(json.dumps(checkpoint.record, sort_keys=True).encode())
     for part in parts:
         whole.update(f"{part.dtype.descr} {part.shape}".encode())
         whole.update(np.ascontiguousarray(part).tobytes())

@@ -20,18 +20,20 @@ from numpy.typing import NDArray
 from ..core.errors import InvalidInput
 from ..core.files import made, put, replacing
 from ..core.warned import ResultWarning
-from ..problem.solution import Convergence, FrictionSolution
+from ..problem.solution import ContactStatus, Convergence, FrictionSolution
 from ..solvers import METHODS
 
 if TYPE_CHECKING:
     from h5py import File
 
     from ..mechanics.model import ContactFields, Model
+    from ..mechanics.steps import TimeStep
 
 Array = NDArray[np.float64]
-SCHEMA = "amontons/solution/1"
+SCHEMA, RUN_SCHEMA = "amontons/solution/1", "amontons/run/1"
 LIBRARIES = ("amontons", "numpy", "scipy", "numba", "netgen-mesher")  # Netgen: CAD
 MOST_SETS = 12  # changes of sets that a summary shows; solution.json has all
+MOST_PAIRS = 8  # contact pairs that a summary tells one by one; solution.json has all
 FIGURES = (".png", ".svg", ".pdf")
 
 
@@ -58,8 +60,9 @@ Writer = Callable[[Output, Path], None]
 
 # ------------------------------------------------------------------------------- choosing
 def write(output: Output, path: str | os.PathLike[str]) -> None:
-    """Write one file; the suffix decides: .vtu, .h5 (or .hdf5), .json."""
-    writers = {".vtu": write_vtu, ".h5": write_h5, ".hdf5": write_h5, ".json": write_json}
+    """Write one file; the suffix decides: .vtu, .h5 (or .hdf5), .json, .csv."""
+    writers = {".vtu": write_vtu, ".h5": write_h5, ".hdf5": write_h5, ".json": write_json,
+               ".csv": write_csv}  # fmt: skip
     suffix = Path(path).suffix.lower()
     if suffix not in writers:
         raise InvalidInput(
@@ -116,7 +119,7 @@ def save(
         "status.png": plot_status, "convergence.png": plot_convergence,
     }  # fmt: skip
     if output.model is not None:
-        writers["solution.vtu"] = write_vtu
+        writers |= {"solution.vtu": write_vtu, "pairs.csv": write_csv}
     writers |= more or {}
     folder = Path(folder)
     jobs = [(folder / name, writer) for name, writer in writers.items()]
@@ -141,6 +144,11 @@ def summary(output: Output) -> dict[str, Any]:
     setup = record.history[0].seconds if record.history else 0.0
     contacts = {"total": problem.contacts, **found.counts, "sliding": int(found.sliding.sum())}
     resultant = None if output.fields is None else output.fields.resultant.tolist()
+    numbers: dict[str, Any] = {"pairs": None, "supports": None, "load": None}
+    if output.model is not None and output.fields is not None:
+        from .numbers import records
+
+        numbers = records(output.model, output.fields)
     data = {
         "schema": SCHEMA,
         "title": output.title or problem.name,
@@ -172,6 +180,7 @@ def summary(output: Output) -> dict[str, Any]:
         "contacts": contacts,
         "active_sets": _active_sets(record),
         "resultant": resultant,
+        **numbers,
         "max_penetration": found.max_penetration,
         "max_cone_violation": found.max_cone_violation,
         "uniqueness": output.uniqueness,
@@ -179,6 +188,36 @@ def summary(output: Output) -> dict[str, Any]:
         "versions": versions(),
     }
     return finite(data)
+
+
+def step_record(step: TimeStep, title: str, works: dict[str, float]) -> dict[str, Any]:
+    """The record of a run after a step, schema amontons/run/1.
+
+    works: sums over all steps so far.  Without times of the clock: a run that was stopped and
+    goes on ends with the same record.
+    """
+    from .numbers import records
+
+    record, state = step.solution.convergence, step.state
+    counts = {s.name.lower(): int((step.status == s).sum()) for s in ContactStatus}
+    return finite({
+        "schema": RUN_SCHEMA,
+        "title": title or step.model.name,
+        "outcome": record.outcome.name.lower(),
+        "steps": state.index,
+        "time": step.time,
+        "error": record.error,
+        "tolerance": record.tolerance,
+        "dimension": step.model.dimension,
+        "contacts": {"total": len(step.gap), **counts, "sliding": int(step.sliding.sum())},
+        "works": works,
+        "kinetic": step.energies.kinetic,
+        "elastic": step.energies.elastic,
+        "resultant": step.fields.resultant.tolist(),
+        **records(step.model, step.fields),
+        "warnings": [warning.record for warning in step.warnings],
+        "versions": versions(),
+    })  # fmt: skip
 
 
 def _active_sets(record: Convergence) -> dict[str, Any] | None:
@@ -272,32 +311,43 @@ def describe(output: Output) -> str:
         force = ", ".join(f"{name} {value:.6g}" for name, value in pairs)
         lines.append(f"resultant on the slave: {force}")
         lines.append(f"largest pressure: {output.fields.pressure.max(initial=0.0):.6g}")
+        if output.model is not None and 1 < len(output.model.contacts) <= MOST_PAIRS:
+            lines += _pairs_in_words(output.model, output.fields)
     lines += map(str, output.warnings)
     return "\n".join(lines)
 
 
+def _pairs_in_words(model: Model, fields: ContactFields) -> list[str]:
+    """A line for every contact pair."""
+    from ..mechanics.model.pairs import pair_results
+
+    return [
+        f"  {pair.name}: force {', '.join(f'{value:.6g}' for value in pair.force)}; area "
+        f"{pair.area:.6g}, {pair.share_sticking:.0%} of it sticks; largest pressure "
+        f"{pair.largest_pressure:.6g}"
+        for pair in pair_results(model, fields).values()
+    ]
+
+
 # ------------------------------------------------------------------------------ HDF5, VTK
 def write_h5(output: Output, path: Path) -> None:
-    """Write solution.h5: r, u, v, status, sliding, margin, and points, frames of a model.
+    """Write solution.h5: r, u, v, status, sliding, margin, and the contact fields of a model.
 
     The solution of an FCLib problem is written as an FCLib file, with the group /solution.
+    Each array says in its attributes what it is, and in which unit.
     """
-    from .fclib import hdf5_bytes, put_arrays, put_fclib
+    from .arrays_h5 import notes_of, put_all
+    from .fclib import hdf5_bytes, put_fclib
 
-    found, fields = output.solution, output.fields
-    arrays = {"r": found.r, "u": found.u, "v": found.v, "status": found.status,
-              "sliding": found.sliding.astype(np.int8), "margin": found.margin}  # fmt: skip
-    if output.model is not None and fields is not None:
-        arrays |= {"points": fields.points, "frames": fields.frames, "weights": fields.weights}
-        for body, values in zip(output.model.bodies, fields.displacement, strict=True):
-            arrays[f"displacement/{body.name}"] = values
+    found = output.solution
     notes = {"schema": SCHEMA, "outcome": found.convergence.outcome.name.lower(),
-             "error": found.convergence.error, "converged": int(found.converged)}  # fmt: skip
+             "error": found.convergence.error, "converged": int(found.converged),
+             **notes_of(output.title or found.problem.name, versions())}  # fmt: skip
 
     def fill(file: File) -> None:
         if output.from_fclib:
             put_fclib(file, found.problem, solution=found)  # type: ignore[arg-type]
-        put_arrays(file, {k: a for k, a in arrays.items() if a is not None}, notes)
+        put_all(file, found, output.model, output.fields, notes)
 
     put(path, hdf5_bytes(fill))
 
@@ -306,6 +356,18 @@ def write_vtu(output: Output, path: Path) -> None:
     """Write solution.vtu; raises InvalidInput for a problem without geometry."""
     from .vtk import write_model
 
+    model, fields = _of_model(output, "vtu")
+    write_model(model, fields, output.solution, path, output.title)
+
+
+def write_csv(output: Output, path: Path) -> None:
+    """Write pairs.csv; raises InvalidInput for a problem without geometry."""
+    from .numbers import pairs_csv
+
+    put(path, pairs_csv(*_of_model(output, "csv")))
+
+
+def _of_model(output: Output, suffix: str) -> tuple[Model, ContactFields]:
     if output.model is None or output.fields is None:
-        raise InvalidInput("vtu: this solution has no mesh; write .h5 or .json")
-    write_model(output.model, output.fields, output.solution, path)
+        raise InvalidInput(f"{suffix}: this solution has no mesh; write .h5 or .json")
+    return output.model, output.fields

@@ -1,7 +1,8 @@
-"""A solved model as one VTK file: bodies, displacement, stress, and contact fields at nodes."""
+"""A solved model as one VTK file: bodies, displacement, stress, and contact on both sides."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,122 +10,124 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..linear.blocks import spatial
-from ..mechanics.elements import cell_stress, von_mises
-from ..mechanics.elements.hyperelasticity import cauchy_stress, is_hyperelastic
+from ..mechanics.elements import von_mises
+from ..mechanics.elements.nodal_stress import stress_of
 from ..mechanics.elements.rigid import Rigid
+from ..mechanics.meshes import Mesh
 from ..mechanics.meshes.write import write_meshes
-from ..problem.solution import FrictionSolution
+from .contact_fields import contact_fields
 
 if TYPE_CHECKING:
     from ..mechanics.model import Body, ContactFields, Model
+    from ..mechanics.steps import TimeStep
+    from ..problem.solution import FrictionSolution
 
 Array = NDArray[np.float64]
-OFF = -1  # CSTATUS of nodes that are no contact; the other contact fields are zero there
+ENTRIES = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))  # of a symmetric tensor, as in VTK
+
+
+@dataclass(frozen=True, eq=False)
+class ModelFields:
+    """All that a file for viewers holds of a solved model.
+
+    point, cell: values of nodes and cells of all bodies, one after another; whole: numbers of
+    the whole, some of them names that stand for a number; stamp: "" of what has converged.
+    """
+
+    meshes: list[Mesh]
+    point: dict[str, NDArray]
+    cell: dict[str, NDArray]
+    whole: dict[str, float]
+    stamp: str
 
 
 def write_model(
-    model: Model, fields: ContactFields, solution: FrictionSolution, path: Path
-) -> None:
-    """Write all bodies with `displacement`, `von_mises` and the fields people know.
+    model: Model, fields: ContactFields, solution: FrictionSolution | TimeStep, path: Path,
+    title: str = "",
+) -> None:  # fmt: skip
+    """Write all bodies with the fields of `model_fields` as one VTU file."""
+    found = model_fields(model, fields, solution, title)
+    write_meshes(path, found.meshes, found.point, found.cell, found.whole, found.stamp)
 
-    COPEN gap, CPRESS pressure (positive in compression), CSHEAR and CSLIP lengths of the shear
-    traction and of the slip, CSTATUS 0 open, 1 slip, 2 stick and -1 off the contact surface,
-    CSLIDING 0 or 1, CFORCE force on the slave in global axes.  Corners of triangles of second
-    order are no contacts: the first four get the mean of the contacts around.  By Nitsche's
-    method a node takes the Gauss points next to it: means of CPRESS and CSHEAR by area.
 
-    Field data CONVERGED, 0 or 1, and ERROR; a cell field CONVERGED as well, to be seen at once.
+def model_fields(
+    model: Model, fields: ContactFields, solution: FrictionSolution | TimeStep, title: str = ""
+) -> ModelFields:
+    """The fields of a solution or of a step in time.
 
-    Where several pairs meet at a node, CFORCE, CPRESS and CSHEAR are those of the sum of their
-    forces, pressures and shear vectors; COPEN is the least, CSLIP, CSTATUS, CSLIDING the most.
+    At nodes displacement, reaction (force of supports), stress and von_mises (means of the
+    cells around, by volume), and the fields of `contact_fields`.  In cells stress, von_mises at
+    the centre, body (number of the connected part), region, CONVERGED.  Stresses have the six
+    entries xx, yy, zz, xy, yz, xz; zero in rigid bodies.
+
+    Of the whole: CONVERGED, 0 or 1, ERROR, TimeValue of a step, and what names say: `body 0:
+    bracket`, `region 0: steel`, `title: …`, `version: …`.
     """
+    from .results import versions
+
+    starts = np.cumsum([0, *(len(body.mesh.points) for body in model.bodies)])
     pairs = list(zip(model.bodies, fields.displacement, strict=True))
-    starts = np.cumsum([0, *(len(body.mesh.points) for body, _ in pairs)])
     stress = [_stress(body, moved) for body, moved in pairs]
-    owner = [np.full(body.mesh.cell_count, k) for k, (body, _) in enumerate(pairs)]
-    displacement = spatial(np.concatenate(fields.displacement))
+    centres, nodes = (np.concatenate(each) for each in zip(*stress, strict=True))
     record = getattr(solution, "solution", solution).convergence  # of a step in time, too
     converged = int(not record.stamp)
-    cells = len(np.concatenate(owner))
-    write_meshes(
-        path,
-        [body.mesh for body, _ in pairs],
-        {"displacement": displacement, **_contact_fields(model, fields, solution, starts)},
-        {"von_mises": von_mises(np.concatenate(stress)), "body": np.concatenate(owner),
-         "CONVERGED": np.full(cells, converged, dtype=np.int8)},
-        {"CONVERGED": converged, "ERROR": float(record.error)},
-        record.stamp,
-    )  # fmt: skip
+    names, owner = _parts(model)
+    regions, region = _regions(model)
+    point = {
+        "displacement": spatial(np.concatenate(fields.displacement)),
+        "reaction": spatial(np.concatenate(fields.reaction)),
+        "stress": _six(nodes), "von_mises": von_mises(nodes),
+        **contact_fields(model, fields, solution.sliding, starts),
+    }  # fmt: skip
+    cell = {
+        "stress": _six(centres), "von_mises": von_mises(centres), "body": owner,
+        "region": region, "CONVERGED": np.full(len(owner), converged, dtype=np.int8),
+    }  # fmt: skip
+    whole: dict[str, Any] = {"CONVERGED": converged, "ERROR": float(record.error)}
+    if hasattr(solution, "time"):
+        whole["TimeValue"] = float(solution.time)  # as ParaView calls it
+    whole |= {f"body {k}: {name}": k for k, name in enumerate(names)}
+    whole |= {f"region {k}: {name}": k for k, name in enumerate(regions)}
+    if title or model.name:
+        whole[f"title: {title or model.name}"] = 1
+    whole[f"version: amontons {versions().get('amontons', '')}".rstrip()] = 1
+    meshes = [body.mesh for body in model.bodies]
+    return ModelFields(meshes, point, cell, whole, record.stamp)
 
 
-def _stress(body: Body, moved: Array) -> Array:
-    """Stress (cells, 3, 3) at displacements (nodes, d); 0 in a rigid body, nobody knows it."""
+def _stress(body: Body, moved: Array) -> tuple[Array, Array]:
+    """Stress of cells and nodes at displacements (nodes, d); 0 in rigid bodies."""
     if isinstance(body.material, Rigid):
-        return np.zeros((body.mesh.cell_count, 3, 3))
-    stress: Any = cauchy_stress if is_hyperelastic(body.material) else cell_stress
-    return stress(body.mesh, body.material, moved)
+        return np.zeros((body.mesh.cell_count, 3, 3)), np.zeros((len(moved), 3, 3))
+    return stress_of(body.mesh, body.material, moved)
 
 
-def _contact_fields(
-    model: Model, fields: ContactFields, solution: FrictionSolution, starts: NDArray[np.int64]
-) -> dict[str, NDArray]:
-    """Values per node of all bodies."""
-    at = starts[fields.body] + fields.node
-    nodes, index = np.unique(at, return_inverse=True)
-    share = _shares(model, fields, at)
-    shear = np.einsum("ik,ikc->ic", fields.shear, fields.frames[:, 1:])  # global axes: they add
-    slip = np.linalg.norm(fields.slip, axis=1)
-    found = {
-        "COPEN": _gathered(np.minimum, fields.gap, index),
-        "CPRESS": _gathered(np.add, share * fields.pressure, index),
-        "CSHEAR": np.linalg.norm(_gathered(np.add, share[:, None] * shear, index), axis=1),
-        "CSLIP": _gathered(np.maximum, slip, index),
-        "CSTATUS": _gathered(np.maximum, solution.status.astype(np.int32), index),
-        "CSLIDING": _gathered(np.maximum, solution.sliding.astype(np.int32), index),
-        "CFORCE": spatial(_gathered(np.add, fields.force, index)),
-    }
-    out = {}
-    for name, values in found.items():
-        everywhere = np.zeros((starts[-1], *values.shape[1:]), dtype=values.dtype)
-        if name == "CSTATUS":
-            everywhere[:] = OFF
-        everywhere[nodes] = values
-        out[name] = everywhere
-    for name in ("COPEN", "CPRESS", "CSHEAR", "CSLIP"):
-        out[name] = _with_corners(out[name], fields, starts)
-    return out
+def _six(stress: Array) -> Array:
+    """The entries (k, 6) of symmetric tensors (k, 3, 3), in VTK's order."""
+    return np.stack([stress[:, i, j] for i, j in ENTRIES], axis=1)
 
 
-def _shares(model: Model, fields: ContactFields, at: NDArray[np.int64]) -> Array:
-    """Part of each contact in its pair's area at the node, (nc,): 1 but for Gauss points."""
-    if model.contacts[0].nitsche is None:
-        return np.ones(len(at))
-    sizes = [len(placed.rows.nodes) for placed in model.discretisation.placed]
-    pair = np.repeat(np.arange(len(sizes)), sizes)
-    _, label = np.unique(np.stack([pair, at]), axis=1, return_inverse=True)
-    total = np.bincount(label.ravel(), fields.weights)
-    return fields.weights / total[label.ravel()]
+def _parts(model: Model) -> tuple[list[str], NDArray[np.int64]]:
+    """Names of the connected parts of all bodies, and the part of every cell."""
+    parts, d = model.discretisation.parts, model.dimension
+    of = np.empty(model.discretisation.dofs // d, dtype=np.int64)
+    for k, part in enumerate(parts):
+        of[part.dofs[::d] // d] = k
+    starts = model.discretisation.offsets // d
+    owner = [
+        of[start + block.nodes[:, 0]]
+        for start, body in zip(starts, model.bodies, strict=False)
+        for block in body.mesh.cells
+    ]
+    return [part.name for part in parts], np.concatenate(owner)
 
 
-def _gathered(combine: np.ufunc, values: NDArray, index: NDArray[np.int64]) -> NDArray:
-    """Values of the contacts at each node, combined; index (nc,): their place in the result."""
-    out = np.zeros((index.max(initial=-1) + 1, *values.shape[1:]), dtype=values.dtype)
-    out[index] = values  # one of them, to begin with
-    if combine is np.add:
-        out[:] = 0
-    combine.at(out, index, values)
-    return out
-
-
-def _with_corners(values: Array, fields: ContactFields, starts: NDArray[np.int64]) -> Array:
-    """Values (n,) with means at corners of triangles of second order: no contacts there."""
-    total, count = np.zeros_like(values), np.zeros_like(values)
-    for body, blocks in fields.facets:
-        for facets in blocks:
-            if facets.kind == "tri6":
-                nodes = facets.nodes + starts[body]
-                for k in range(3):
-                    sides = nodes[:, [3 + k, 3 + (k - 1) % 3]]
-                    np.add.at(total, nodes[:, k], values[sides].mean(axis=1))
-                    np.add.at(count, nodes[:, k], 1)
-    return np.where(count > 0, total / np.maximum(count, 1), values)
+def _regions(model: Model) -> tuple[list[str], NDArray[np.int64]]:
+    """Names of all regions, and the region of every cell."""
+    names = list(dict.fromkeys(r for body in model.bodies for r in body.mesh.regions))
+    of = [
+        np.full(len(block.nodes), names.index(block.region))
+        for body in model.bodies
+        for block in body.mesh.cells
+    ]
+    return names, np.concatenate(of)

@@ -6,9 +6,8 @@ of the residual.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import suppress
-from functools import cached_property, wraps
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,6 +31,7 @@ from .judge.contacts import Assessed, assessed
 from .judge.measures import Measure, Weakest
 from .judge.sharp import sharp_error
 from .matrices import entry_sizes
+from .plain import of_plain
 from .protocol import Form, Problem
 from .settling import Accepted, Motion, accepted_exactly
 
@@ -44,19 +44,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 JUDGE_FLOPS = 18, 60  # floating point operations of a judgement per block of W, per contact
 ESTIMATED = 9_000  # unknowns of a mesh above which the size of u is taken from a coarse level
-
-
-def _of_plain(judged: Callable[..., Any]) -> Callable[..., Any]:
-    """A judgement of r that is made of s in `FrictionProblem.plain`."""
-
-    @wraps(judged)
-    def asked(self: Equations, r: Array, *more: Any, **named: Any) -> Any:
-        plain = self.plain
-        if plain.has_v is not self.has_v:  # of r alone: a compliance needs the Delassus form
-            more, named = (), {}
-        return judged(plain, r if plain is self else self.law.pressed(r), *more, **named)
-
-    return asked
 
 
 class Equations(Problem):
@@ -173,7 +160,7 @@ class Equations(Problem):
                 if self.condensing_is_cheap:
                     self.condensed(deadline)
 
-    @_of_plain
+    @of_plain
     def error(self, r: Array, v: Array | None = None) -> float:
         """Unit-free error of reactions r, (nc, d), and of the motion v, (n,), if it is given.
 
@@ -194,7 +181,7 @@ class Equations(Problem):
         assert v is not None
         return self._residual_error(r, v)
 
-    @_of_plain
+    @of_plain
     def rounding(self, r: Array) -> float:
         """What rounding alone may hide in `error`, unit-free: no smaller error can be known."""
         if self.measure is Measure.EXACT:
@@ -202,7 +189,7 @@ class Equations(Problem):
             return judge.ratio(p._hidden(p.rho, r), p.q_norm)
         return judge.ratio(self._hidden(self.rho, r), self.scales[1])
 
-    @_of_plain
+    @of_plain
     def certain_error(self, r: Array, v: Array | None = None) -> float:
         """`error`, evaluated sharply where rounding could hide one in it."""
         error, hidden = self.error(r, v), self.rounding(r)
@@ -248,7 +235,7 @@ class Equations(Problem):
     def _hidden(self, rho: Array, r: Array) -> float:
         return judge.rounding_error(self.law.kind, self.law.parameters, rho, kernel_rows(r))
 
-    @_of_plain
+    @of_plain
     def weakest(self, r: Array, v: Array | None = None) -> Weakest:
         """The contact farthest from its law on its own scale; arguments as in `error`."""
         if self.measure is Measure.EXACT:
@@ -290,7 +277,7 @@ class Equations(Problem):
         u = self.velocity(r)[0] if v is None or not self.has_v else self.local_velocity(v)
         return judge.published_natural_error(r, u, self.free_velocity, self.law)
 
-    @_of_plain
+    @of_plain
     def assessed(self, r: Array) -> Assessed:
         """All that is asked of reactions that may have converged (Delassus form only)."""
         return assessed(self.kernel_data, kernel_rows(r), self._floor, self.q_norm)
@@ -299,7 +286,7 @@ class Equations(Problem):
     def _floor(self) -> Array:
         return self.blur if self.blur is not None else np.zeros(self.contacts)
 
-    @_of_plain
+    @of_plain
     def exact_error(self, r: Array) -> float:
         """The exact measure of the Delassus form."""
         rows = kernel_rows(r)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import wraps
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,11 +12,15 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..core.arrays import Matrix, locked, read_only
-from ..core.errors import InvalidInput
+from ..core.errors import InvalidInput, UnsupportedForm
+from ..linear.distributed import DistributedMatrix
 from .law import Law
+from .protocol import Form
 
 if TYPE_CHECKING:
+    from .equations import Equations
     from .friction import FrictionProblem
+    from .structure import Structure
 
 Array = NDArray[np.float64]
 
@@ -45,12 +51,92 @@ def plain_of(problem: FrictionProblem) -> FrictionProblem:
     return replace(problem, law=law.plain)
 
 
+def of_plain(judged: Callable[..., Any]) -> Callable[..., Any]:
+    """A judgement of r, and maybe v, that is made of s in `FrictionProblem.plain`."""
+
+    @wraps(judged)
+    def asked(self: Equations, r: Array, v: Array | None = None, **named: Any) -> Any:
+        plain, given = self.plain, () if v is None else (v,)
+        if plain is self:
+            return judged(self, r, *given, **named)
+        if v is not None:
+            wider = plain_motion(self, r, v)  # type: ignore[arg-type]
+            given = () if wider is None else (wider,)
+        return judged(plain, self.law.pressed(r), *given, **named)
+
+    return asked
+
+
+# ---------------------------------------------------------------- compliance
+def plain_motion(problem: FrictionProblem, r: Array, v: Array | None) -> Array | None:
+    """The v of `problem.plain` at a state (r, v); None where that has none."""
+    plain = problem.plain
+    if v is None or not plain.has_v:
+        return None
+    if plain.unknowns == problem.unknowns:
+        return v
+    assert problem.law.give is not None and plain.M is not None
+    size = plain.M.diagonal()[-1]
+    return np.concatenate([v, (np.sqrt(_flat(problem, problem.law.give) / size)) * r.ravel()])
+
+
+def _flat(problem: FrictionProblem, give: Array) -> Array:
+    """Diagonal of C, (nc d,)."""
+    return give[:, : problem.dimension].ravel()
+
+
 def _with_give(problem: FrictionProblem, give: Array) -> FrictionProblem:
-    """The problem of u + C r, in the Delassus form; raises SingularOperator as condensing."""
-    problem = problem.condensed()
+    """The problem of u + C r: with W + C, or with springs in its global form."""
+    if problem.form is Form.GLOBAL:
+        return _with_springs(problem, give)
     assert problem.W is not None
     W = problem._shared.once(_softer, (problem.W, give), problem.W, give, problem.dimension)
     return replace(problem, W=W)
+
+
+def _with_springs(problem: FrictionProblem, give: Array) -> FrictionProblem:
+    """Every contact in series with springs y: u + C r = H^T v + (m C)^½ y + w, m y = (m C)^½ r.
+
+    m, a typical entry of M, is the same for all: equal bodies share what is made of them.
+    """
+    if isinstance(problem.M, DistributedMatrix):
+        raise UnsupportedForm("compliance of contact: not on several processes")
+    problem = problem.assembled()
+    sources = (problem.M, problem.H, give)
+    M, H = problem._shared.once(_sprung, sources, *sources, problem.dimension)
+    more = np.zeros(H.shape[0] - problem.unknowns)
+    assert problem.f is not None
+    modes, guess = problem.near_nullspace, problem.guess
+    if modes is not None:
+        modes = read_only(np.vstack([modes, np.zeros((len(more), modes.shape[1]))]))
+    return replace(
+        problem, M=M, H=H, f=read_only(np.concatenate([problem.f, more])), levels=(),
+        near_nullspace=modes, structure=_with_spring_nodes(problem.structure, len(give)),
+        guess=None if guess is None else read_only(np.concatenate([guess, more])),
+    )  # fmt: skip
+
+
+def _sprung(M: Any, H: Any, give: Array, d: int) -> tuple[Any, Any]:
+    """(M, H) with a spring at every contact."""
+    C = give[:, :d].ravel()
+    size = float(np.abs(M.diagonal()).mean()) or 1 / float(C[C > 0].mean())
+    wider = sparse.block_diag([M, size * sparse.eye_array(len(C))], format="csc")
+    taller = sparse.vstack([H, sparse.diags_array(np.sqrt(size * C))], format="csc")
+    taller.eliminate_zeros()
+    out = sparse.csc_array(wider), sparse.csc_array(taller)
+    for matrix in out:
+        matrix.sort_indices()
+    return locked(out[0]), locked(out[1])
+
+
+def _with_spring_nodes(known: Structure | None, contacts: int) -> Structure | None:
+    """A node, and a body, for the spring of every contact."""
+    if known is None:
+        return None
+    nodes, d, number = len(known.piece), known.dimension, np.arange(contacts)
+    more = known.piece.max(initial=-1) + 1 + number.astype(np.int32)
+    place = np.concatenate([known.place, d * nodes + np.arange(d * contacts)])
+    return replace(known, place=place, piece=np.concatenate([known.piece, more]))
 
 
 def _softer(W: Matrix, give: Array, d: int) -> Any:

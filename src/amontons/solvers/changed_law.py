@@ -6,11 +6,17 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ..problem.friction import FrictionProblem
+from ..problem.plain import plain_motion
 from ..problem.protocol import Problem
 from ..problem.solution import FrictionSolution
 from .contract import Iterate
 from .first_iterate import first_iterate
 
+Array = NDArray[np.float64]
 Callback = Callable[[Any, Iterate], bool | None]
 
 
@@ -19,7 +25,9 @@ def pressed_start(problem: Problem, start: Any) -> Iterate | None:
     if start is None:
         return None
     given = first_iterate(problem, start)
-    v = given.v if problem.plain.has_v else None
+    v = given.v
+    if isinstance(problem, FrictionProblem):
+        v = plain_motion(problem, given.r, v)
     return replace(given, r=problem.law.pressed(given.r), v=v)
 
 
@@ -27,17 +35,21 @@ def released_callback(problem: Problem, callback: Callback | None) -> Callback |
     """A callback of `problem.plain` that hands the iterates of the problem on."""
     if not callable(callback):  # what is wrong is refused by the driver
         return callback
-    return lambda step, iterate: callback(
-        step, replace(iterate, r=problem.law.released(iterate.r))
-    )
+    return lambda step, iterate: callback(step, replace(
+        iterate, r=problem.law.released(iterate.r), v=_own(problem, iterate.v)
+    ))  # fmt: skip
 
 
 def released(problem: Problem, found: FrictionSolution) -> FrictionSolution:
     """The solution of a problem from that of its `plain` one."""
     r = problem.law.released(found.r)
     told = None if found.settled is None else found.settled._replace(r=r)
-    if found.problem.has_v is not problem.has_v:  # a compliance needs the Delassus form
-        of, u, v = problem.recover(r)
-        return replace(found, problem=of, r=r, u=u, v=v, settled=told)
     u = problem.law.unstretched(found.u, r)
-    return replace(found, problem=problem, r=r, u=u, settled=told)
+    return replace(
+        found, problem=problem, r=r, u=u, v=_own(problem, found.v), settled=told
+    )
+
+
+def _own(problem: Problem, v: Array | None) -> Array | None:
+    """v of a problem from that of its `plain` one, which may have springs of contacts."""
+    return v[: problem.unknowns] if v is not None and problem.has_v else None

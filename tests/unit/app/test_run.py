@@ -68,8 +68,8 @@ def test_a_run_restarts_where_it_stopped(tmp_path):
     rows = table(whole)
     assert [int(row["index"]) for row in rows] == list(range(1, 31))
     assert sorted(p.name for p in whole.iterdir()) == [
-        "state.h5", "step-00010.vtu", "step-00020.vtu", "step-00030.vtu", "steps.csv",
-        "steps.pvd",
+        "solution.json", "state.h5", "step-00010.vtu", "step-00020.vtu", "step-00030.vtu",
+        "steps.csv", "steps.pvd",
     ]  # fmt: skip
     problems = sorted((tmp_path / "problems").iterdir())
     assert [p.name for p in problems] == [f"wall-{k:05d}.hdf5" for k in range(1, 31)]

@@ -178,7 +178,7 @@ def test_unknown_suffix(solution, tmp_path):
 def test_nothing_half_written(solution, tmp_path, monkeypatch):
     output.save(solution.output, tmp_path)
     old = {path: path.read_bytes() for path in tmp_path.iterdir()}
-    assert len(old) == 5
+    assert len(old) == 6
 
     def fail(*arguments):
         raise OSError(28, "No space left on device")

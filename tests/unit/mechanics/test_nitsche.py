@@ -342,7 +342,8 @@ def test_case_file_to_results(method, tmp_path, monkeypatch):
     solution = am.solve(model)
     assert record["resultant"] == pytest.approx(solution.resultant)
     assert {p.name for p in (tmp_path / "case-results").iterdir()} == {
-        "solution.json", "solution.h5", "solution.vtu", "status.png", "convergence.png"
+        "solution.json", "solution.h5", "solution.vtu", "pairs.csv", "status.png",
+        "convergence.png",
     }  # fmt: skip
     options = model.contacts[0].nitsche
     assert (options.kappa, options.theta) == (

@@ -373,6 +373,7 @@ has been made is saved, go on with --restart.
               help="Write a VTK file, and the state, every N steps.")  # fmt: skip
 @click.option("--pictures", is_flag=True,
               help="Draw the written steps, a film of them, and the energies.")  # fmt: skip
+@click.option("--xdmf", is_flag=True, help="Also steps.xdmf, and an HDF5 file per VTK file.")
 @click.option("--restart", is_flag=True,
               help="Go on from the state in DIR, of the same case, after any end.")  # fmt: skip
 @click.option("--quiet", is_flag=True, help="No progress, no summary.")
@@ -380,9 +381,8 @@ def run(**options: object) -> int:
     """Follow a case in time: dynamics, or quasi-static steps.
 
     CASE is a TOML case file with a table [evolution], or example:NAME.  Writes into DIR:
-    steps.csv (energies), state.h5, step-NNNNN.vtu and steps.pvd, which ParaView opens as a
-    film; with --pictures also energy.png and, in pictures/, the deformed bodies with the status
-    of their joints and film.gif.
+    steps.csv (energies, forces), solution.json (the end), state.h5, step-NNNNN.vtu and
+    steps.pvd, a film for ParaView; with --pictures energy.png and, in pictures/, the bodies.
     """
     from .run import run as run_case
 

@@ -17,12 +17,12 @@ from ...core.files import make_folder, remove_empty
 from ...io.case import Settings, identity
 from ...io.checkpoint import export_fclib, steps_of
 from ...io.readers import Case
-from ...mechanics.steps import Energies, TimeStep, at_rest, evolve
+from ...mechanics.steps import Energies, QuasiStatic, TimeStep, at_rest, evolve
 from ...mechanics.steps.stepping import at_end
 from ...problem.solution import Outcome
 from .doubts import Doubts
 from .locking import locked
-from .run_folder import BALANCE, PICTURES, WORKS, RunFolder, clear, continued
+from .run_folder import BALANCE, PICTURES, WORKS, RunFolder, clear, continued, numbers_of
 from .sources import open_source, with_flags
 from .stopping import Stopping
 from .terminal import REPORT, check_folder, say_growth
@@ -67,7 +67,7 @@ class _Run:
 def run(
     case: str, overrides: Sequence[str], tolerance: float | None, time_limit: float | None,
     folder: str | None, export: str | None, every: int, pictures: bool, restart: bool,
-    quiet: bool, export_steps: str | None = None, report: bool = False,
+    quiet: bool, export_steps: str | None = None, xdmf: bool = False, report: bool = False,
 ) -> int:  # fmt: skip
     """Step and write; returns the exit code."""
     if time_limit is not None and not time_limit > 0:
@@ -99,7 +99,7 @@ def run(
             clear(each, read.name)
         try:
             with stop.breaking():
-                results, steps = _prepared(asked, place, restart=restart)
+                results, steps = _prepared(asked, place, restart=restart, xdmf=xdmf)
         except KeyboardInterrupt:
             click.echo(f"{stop.word}.", err=True)
             return stop.code
@@ -122,18 +122,19 @@ def _chosen(export: str | None, steps: str | None) -> list[range] | None:
 
 
 def _prepared(
-    asked: _Run, place: Path, *, restart: bool
+    asked: _Run, place: Path, *, restart: bool, xdmf: bool
 ) -> tuple[RunFolder, Iterator[TimeStep]]:
     """The folder of results and the steps, from the beginning or from the checkpoint."""
     read, settings = asked.case, asked.settings
     assert read.evolution is not None
-    case = identity(read, settings)
+    case, numbers = identity(read, settings), numbers_of(read.model)
     if restart:
-        results, start, changed = continued(place, case)
+        results, start, changed = continued(place, case, numbers, read.title, xdmf)
         for text in changed:
             click.echo(f"--restart: {text}, from step {start.index + 1} on", err=True)
     else:
-        results, start = RunFolder(place, case), at_rest(read.model)
+        results = RunFolder(place, case, numbers, read.title, xdmf)
+        start = at_rest(read.model)
     steps = evolve(
         read.model, read.evolution.method, until=read.evolution.until, start=start,
         solver=settings.solver(), tolerance=settings.tolerance,
@@ -195,7 +196,7 @@ def _follow(steps: Iterator[TimeStep], results: RunFolder, asked: _Run) -> int:
     if last is not None and asked.film is not None:
         _report(asked.film, results, asked)
     if not asked.quiet:
-        _summary(results)
+        _summary(results, asked)
         for line in asked.doubts.lines():
             click.echo(line)
     return code
@@ -232,7 +233,7 @@ def _keep_last(last: TimeStep | None, results: RunFolder, asked: _Run) -> None:
 def _keep(step: TimeStep, results: RunFolder, asked: _Run) -> None:
     """Write the picture of a step and its state."""
     results.draw(step)
-    results.save(step.state)
+    results.keep(step)
     if asked.pictures:
         from ...io.plots import Frame
 
@@ -273,18 +274,29 @@ def _show(step: TimeStep, asked: _Run) -> None:
         click.echo(f"\rt = {step.time:.6g} of {until:.6g} ", nl=False)
 
 
-def _summary(results: RunFolder) -> None:
+def _summary(results: RunFolder, asked: _Run) -> None:
     """Sums of all works, and where the results are."""
+    assert asked.case.evolution is not None
     table = results.table
     if not len(table):
         return
-    sums = {name: float(table[name].sum()) for name in (*WORKS, "defect")}
+    sums = results.works()
+    rest = (
+        f"missed by straight lines between the steps {sums['numerical']:.4g}"
+        if isinstance(asked.case.evolution.method, QuasiStatic)
+        else f"dissipated by damping {sums['damping']:.4g}, by the scheme "
+        f"{sums['numerical']:.4g}"
+    )
     click.echo(
         f"{len(table)} steps; work of loads {sums['loads']:.4g}, supports "
-        f"{sums['supports']:.4g}, contact {sums['contact']:.4g}; dissipated by damping "
-        f"{sums['damping']:.4g}, by the scheme {sums['numerical']:.4g}; "
+        f"{sums['supports']:.4g}, contact {sums['contact']:.4g}; {rest}; "
         f"gain {sums['gain']:.4g}, defect {sums['defect']:.1e}"
     )
+    if not results.numbers:
+        click.echo(
+            f"{len(asked.case.model.contacts)} contact pairs are too many for columns of "
+            "steps.csv; solution.json has those of the last step"
+        )
     jumps = [f"{time:.6g}" for time in table["jump"] if time == time]
     if jumps:
         click.echo(f"jumps at t = {', '.join(jumps)}")

@@ -1,17 +1,16 @@
 """The results folder of a run: its checkpoint, and what follows from it.
 
 state.h5 holds all that a run needs to go on, its table and its list of pictures too, and is
-replaced in one moment.  steps.csv and steps.pvd are written out of it, after it, and again when
-a run goes on: wherever a process is killed, all that `--restart` reads belongs to one step.
+replaced in one moment.  steps.csv, steps.pvd and solution.json are written out of it, after it,
+and again when a run goes on: wherever a process is killed, all that `--restart` reads belongs
+to one step.
 """
 
 from __future__ import annotations
 
-import csv
 import re
 from dataclasses import dataclass, field
 from dataclasses import fields as fields_of
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -22,19 +21,26 @@ from ...core.errors import FileFormatError
 from ...core.files import KEPT, remove_parts, replacing, write_bytes
 from ...io.case import SOLVER, differences
 from ...io.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
+from ...io.numbers import csv_of, flat_columns, flat_values
+from ...io.results import step_record, to_json
+from ...io.series import LIST, MESH, step_name, write_list, write_step
 from ...io.vtk import write_model
+from ...mechanics.model import Model
+from ...mechanics.model.names import support_names
 from ...mechanics.steps import Energies, State, TimeStep
 from ...problem.solution import ContactStatus
 from .terminal import REPORT
 
 WORKS = tuple(field.name for field in fields_of(Energies))
 WHOLE = ("index", "open", "slip", "stick", "iterations")
+SUMMED = tuple(name for name in WORKS if name not in ("kinetic", "elastic"))  # of a step each
 COLUMNS = ("index", "time", "open", "slip", "stick", *WORKS, "defect", "iterations", "error",
            "seconds", "jump")  # fmt: skip
-ROW = np.dtype([(name, np.int64 if name in WHOLE else np.float64) for name in COLUMNS])
+MOST_NUMBERS = 400  # columns of pairs and supports: HDF5 keeps a row's names in 64 kB
 STATE, TABLE, FILM, BALANCE = "state.h5", "steps.csv", "steps.pvd", "energy.png"
-PICTURE = re.compile(r"step-\d{5,}\.(vtu|png)|film\.gif")
-FILES = (STATE, TABLE, FILM, BALANCE, REPORT)
+RECORD = "solution.json"
+PICTURE = re.compile(r"step-\d{5,}\.(vtu|h5|png)|film\.gif")
+FILES = (STATE, TABLE, FILM, BALANCE, RECORD, LIST, MESH, REPORT)
 OURS = (PICTURE, *(re.compile(re.escape(name)) for name in FILES))
 PICTURES = "pictures"  # folder of those drawn here
 
@@ -43,14 +49,20 @@ PICTURES = "pictures"  # folder of those drawn here
 class RunFolder:
     """A folder and what is in it: rows of the steps so far, indices of those with a VTK file.
 
-    case: what decides the numbers; saved: index of the last state that is safe, -1 for none.
+    case: what decides the numbers; numbers: columns of pairs and supports; title: for files;
+    xdmf: write that too; saved: index of the
+    last state that is safe, -1 for none; record: what solution.json holds.
     """
 
     folder: Path
     case: dict[str, Any]
+    numbers: tuple[str, ...] = ()
+    title: str = ""
+    xdmf: bool = False
     rows: list[tuple] = field(default_factory=list)
     pictures: list[int] = field(default_factory=list)
     saved: int = -1
+    record: dict[str, Any] = field(default_factory=dict)
 
     def add(self, step: TimeStep, seconds: float) -> None:
         """Take a step into the table."""
@@ -58,35 +70,68 @@ class RunFolder:
         counts = [int((step.status == status).sum()) for status in ContactStatus]
         jumped = step.passage is not None and step.passage.jumped
         jump = step.passage.folds[0] if jumped else np.nan
+        numbers = flat_values(step.pairs, step.supports) if self.numbers else []
         self.rows.append((
             step.state.index, step.time, *counts, *(getattr(e, name) for name in WORKS),
-            e.defect, record.iterations, record.error, seconds, jump,
+            e.defect, record.iterations, record.error, seconds, jump, *numbers,
         ))  # fmt: skip
 
     def draw(self, step: TimeStep) -> None:
         """Write the VTK file of a step, once."""
         if step.state.index not in self.pictures[-1:]:
             with replacing(self.folder / picture_name(step.state.index)) as path:
-                write_model(step.model, step.fields, step, path)  # type: ignore[arg-type]
+                write_model(step.model, step.fields, step, path, self.title)
+            if self.xdmf:
+                write_step(self.folder, step, self.title, with_mesh=not self._in_series())
             self.pictures.append(step.state.index)
+
+    def keep(self, step: TimeStep) -> None:
+        """Write the checkpoint of a step, then the files that follow from it."""
+        self.record = step_record(step, self.title, self.works())
+        self.save(step.state)
 
     def save(self, state: State) -> None:
         """Write the checkpoint of a state, then the files that follow from it."""
         pictures = np.array(self.pictures, dtype=np.int64)
-        checkpoint = Checkpoint(state, self.case, self.table, pictures)
+        checkpoint = Checkpoint(state, self.case, self.table, pictures, self.record)
         save_checkpoint(self.folder / STATE, checkpoint)
         self.saved = state.index
         self.follow()
 
     def follow(self) -> None:
-        """Write the table, and the list of pictures that ParaView opens."""
-        write_bytes(self.folder / TABLE, _csv(self.table))
+        """Write the table, the numbers at the end, and the list that ParaView opens."""
+        write_bytes(self.folder / TABLE, csv_of((*COLUMNS, *self.numbers), self.table))
         write_bytes(self.folder / FILM, _pvd(self.table, self.pictures))
+        if self.xdmf and self._in_series():
+            write_list(self.folder, [(self.table["time"][k - 1], k) for k in self._in_series()])
+        if self.record:
+            write_bytes(self.folder / RECORD, to_json(self.record).encode("utf-8"))
+
+    def _in_series(self) -> list[int]:
+        """The steps with an HDF5 file: a call before may have written VTK files alone."""
+        return [k for k in self.pictures if (self.folder / step_name(k)).exists()]
+
+    def works(self) -> dict[str, float]:
+        """Sums of the works of all steps so far, and of what the balance misses."""
+        table = self.table
+        return {name: float(table[name].sum()) for name in (*SUMMED, "defect")}
 
     @property
     def table(self) -> NDArray[np.void]:
-        """All rows, (steps,), fields COLUMNS; `jump` is NaN where there was none."""
-        return np.array(self.rows, dtype=ROW)
+        """All rows, (steps,), fields COLUMNS and numbers; NaN: no jump, or not known."""
+        return np.array(self.rows, dtype=row_of(self.numbers))
+
+
+def row_of(numbers: tuple[str, ...]) -> np.dtype:
+    """The type of a row, with the columns of pairs and supports."""
+    kinds = [(name, np.int64 if name in WHOLE else np.float64) for name in COLUMNS]
+    return np.dtype([*kinds, *((name, np.float64) for name in numbers)])
+
+
+def numbers_of(model: Model) -> tuple[str, ...]:
+    """The columns of all pairs and supports; none where they are more than MOST_NUMBERS."""
+    names = flat_columns(model.dimension, model.pair_names, support_names(model.supports))
+    return names if len(names) <= MOST_NUMBERS else ()
 
 
 def picture_name(index: int) -> str:
@@ -102,15 +147,19 @@ def clear(folder: Path, name: str) -> None:
             remove_parts(place, (*OURS, exported))
 
 
-def continued(folder: Path, case: dict[str, Any]) -> tuple[RunFolder, State, list[str]]:
-    """The folder of a run that goes on, its state, and how its solver differs, in words.
+def continued(
+    folder: Path, case: dict[str, Any], numbers: tuple[str, ...] = (), title: str = "",
+    xdmf: bool = False,
+) -> tuple[RunFolder, State, list[str]]:  # fmt: skip
+    """The folder of a run that goes on, its state, and how this call differs, in words.
 
     Raises FileFormatError where the checkpoint belongs to another case.
     """
     path = folder / STATE
     found = load_checkpoint(path)
     indices = np.arange(1, found.state.index + 1)
-    if found.table.dtype != ROW or not np.array_equal(found.table["index"], indices):
+    names = found.table.dtype.names or ()
+    if not set(COLUMNS) <= set(names) or not np.array_equal(found.table["index"], indices):
         raise FileFormatError(
             f"{path}: /amontons_run/table: expected {found.state.index} rows with "
             f"{', '.join(COLUMNS)}"
@@ -121,21 +170,21 @@ def continued(folder: Path, case: dict[str, Any]) -> tuple[RunFolder, State, lis
             f"{path}: is of another case: {'; '.join(others)}; begin again without --restart, "
             "or write elsewhere with -o"
         )
-    rows = [tuple(row) for row in found.table.tolist()]
-    run = RunFolder(folder, case, rows, found.pictures.tolist(), found.state.index)
+    table = np.zeros(len(found.table), dtype=row_of(numbers))
+    for name in (*COLUMNS, *numbers):  # a checkpoint of an older version knows no pairs
+        table[name] = found.table[name] if name in names else np.nan
+    rows = [tuple(row) for row in table.tolist()]
+    run = RunFolder(folder, case, numbers, title, xdmf, rows, found.pictures.tolist(),
+                    found.state.index, found.record)  # fmt: skip
     run.follow()
-    return run, found.state, differences(found.case, case)
+    told = differences(found.case, case)
+    if not found.counts_slip:
+        told.append("it is of an older version, slip and friction work are counted anew")
+    return run, found.state, told
 
 
 def _without_solver(case: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in case.items() if not key.startswith(SOLVER)}
-
-
-def _csv(table: NDArray[np.void]) -> bytes:
-    text = StringIO(newline="")
-    rows = [["" if value != value else value for value in row] for row in table.tolist()]
-    csv.writer(text).writerows([COLUMNS, *rows])
-    return text.getvalue().encode("utf-8")
 
 
 def _pvd(table: NDArray[np.void], pictures: list[int]) -> bytes:

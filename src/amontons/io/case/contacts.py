@@ -14,7 +14,9 @@ if TYPE_CHECKING:
     from ...mechanics.model import Contact
 
 LAWS = "a table, { coulomb = COEFFICIENT } or { tresca = STRESS }"
-NUMBERS = {"coulomb": "mu", "tresca": "tresca", "cap": "cap", "cohesion": "cohesion"}
+NUMBERS = {"coulomb": "mu", "tresca": "tresca", "cap": "cap", "cohesion": "cohesion",
+           "stiffness": "stiffness", "stick_stiffness": "stick_stiffness"}  # fmt: skip
+POSITIVE = ("stiffness", "stick_stiffness")
 
 
 def read_contact(table: Table, mesh: Mesh) -> Contact:
@@ -22,7 +24,7 @@ def read_contact(table: Table, mesh: Mesh) -> Contact:
     from ...mechanics.model import Contact
 
     table.only("slave", "obstacle", "master", "friction", "method", "kinematics",
-               "configuration")  # fmt: skip
+               "configuration", "name")  # fmt: skip
     method = _contact_method(table)
     slave = table.text("slave")
     for key in ("slave", "master"):
@@ -36,6 +38,8 @@ def read_contact(table: Table, mesh: Mesh) -> Contact:
     found = configuration(table)  # older words for kinematics
     if "kinematics" in table.data:
         found["kinematics"] = table.choice("kinematics", ("small", "finite"))
+    if "name" in table.data:
+        found["name"] = table.text("name")
     with table.blamed():
         if "master" in table.data:
             master = table.text("master")
@@ -57,6 +61,8 @@ def _friction(table: Table) -> dict[str, Any]:
         value = numbers[NUMBERS[key]] = _steady(table, key)
         if isinstance(value, float) and value < 0:
             raise table.error(key, f"expected a number >= 0, got {value}")
+        if key in POSITIVE and value == 0:
+            raise table.error(key, "expected a number > 0; without the key contact is rigid")
     return numbers
 
 

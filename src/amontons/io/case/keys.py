@@ -8,7 +8,8 @@ from ...core.errors import Address, dotted
 
 LOADS = ("traction", "pressure", "body_force")  # in the order in which a model has them
 FRICTION = {"mu": "coulomb", "mu_across": "coulomb", "direction": "direction",
-            "tresca": "tresca", "cap": "cap", "cohesion": "cohesion"}  # fmt: skip
+            "tresca": "tresca", "cap": "cap", "cohesion": "cohesion",
+            "stiffness": "stiffness", "stick_stiffness": "stick_stiffness"}  # fmt: skip
 
 
 def key_of(at: Address, tables: dict[str, Any]) -> str:

@@ -44,7 +44,8 @@ def energy_figure(
     # losses of the scheme last: those of quasi-static steps may be negative
     left.stackplot(t, stored, dissipated, lost, colors=("#56B4E9", "#E69F00", "#BBBBBB"),
                    labels=("stored (kinetic + elastic)", "dissipated by contact and friction",
-                           "lost in time scheme and damping"))  # fmt: skip
+                           "lost in time scheme and damping" if any(e.kinetic for e in energies)
+                           else "missed by straight lines between steps"))  # fmt: skip
     left.plot(t, put_in, color=INK, linewidth=1.6, linestyle="--",
               label="work of loads and supports")  # fmt: skip
     left.set(xlabel=with_unit("time", units.time),

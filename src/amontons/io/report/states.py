@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from ...linear.blocks import spatial
-from ..vtk import OFF
-from ..vtk import _contact_fields as contact_fields
+from ..contact_fields import SLAVE, contact_fields
 from .skin import Skin
 
 if TYPE_CHECKING:
@@ -45,17 +43,15 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """A model ready to be shown: its skin, its contact vertices, and what masters get."""
+    """A model ready to be shown: its skin and its contact vertices."""
 
     skin: Skin
     contacts: Index = field(init=False)  # vertices, ascending
-    _shares: list[sparse.csr_array | None] = field(init=False)
 
     def __post_init__(self) -> None:
         zones = self.skin.zones
         parts = [piece.ravel() for z in zones for piece in (z.pieces, z.master_pieces)]
         object.__setattr__(self, "contacts", np.unique(np.concatenate(parts)))
-        object.__setattr__(self, "_shares", self._masters())
 
     def most(self, wanted: int) -> int:
         """How many states a page can hold, 2 to `wanted`."""
@@ -67,10 +63,11 @@ class Stage:
         model, skin = self.skin.model, self.skin
         sizes = [len(body.mesh.points) for body in model.bodies]
         starts = np.cumsum([0, *sizes])
-        found = contact_fields(model, fields, solution, starts)
+        found = contact_fields(model, fields, solution.sliding, starts)
         values = {name: found[key].astype(float) for name, key in NAMES.items()}
-        status = found["CSTATUS"].astype(np.int64)
-        self._give_masters(fields, solution, status, values)
+        status = found["CSTATUS"]
+        on_slaves = (found["CSIDE"] & SLAVE).astype(bool)
+        force = np.where(on_slaves[:, None], found["CFORCE"], 0.0)
         at = skin.whole
         mine = at[self.contacts]
         moved = spatial(np.concatenate(fields.displacement))[at]
@@ -80,60 +77,9 @@ class Stage:
         return State(
             moved.astype(np.float32), status[mine].astype(np.int8),
             {name: array[mine] for name, array in values.items()},
-            found["CFORCE"][at].astype(np.float32), stamp=told.convergence.stamp,
+            force[at].astype(np.float32), stamp=told.convergence.stamp,
             counts=counts, **words,
         )  # fmt: skip
-
-    def _masters(self) -> list[sparse.csr_array | None]:
-        """Per pair the parts (nodes of all, nc) that contacts take of the nodes of the master.
-
-        They are the lengths of the nodes' columns in the contacts' normal rows: what contact
-        itself averages with.
-        """
-        model, found = self.skin.model, []
-        d = model.dimension
-        nodes = sum(len(body.mesh.points) for body in model.bodies)
-        whole = self.skin.whole
-        for zone, placed in zip(self.skin.zones, model.discretisation.placed, strict=True):
-            if not len(zone.master_pieces):
-                found.append(None)
-                continue
-            normal = sparse.csc_array(placed.H[:, ::d])
-            squares = sparse.coo_array(normal.power(2))
-            rows = squares.coords[0] // d
-            share = sparse.csr_array(
-                (squares.data, (rows, squares.coords[1])), shape=(nodes, normal.shape[1])
-            )
-            share.sum_duplicates()
-            share.data = np.sqrt(share.data)
-            other = np.ones(nodes, dtype=bool)
-            other[whole[np.unique(zone.master_pieces)]] = False
-            mine = whole[np.unique(zone.pieces)]
-            other[mine] = True  # where a body touches itself a node may be on both sides
-            share.data[np.repeat(other, np.diff(share.indptr))] = 0.0
-            found.append(share)
-        return found
-
-    def _give_masters(
-        self, fields: ContactFields, solution: Any, status: Index, values: dict[str, Array]
-    ) -> None:
-        """Means of the contacts around every master node; the status of the one with most."""
-        own = {"pressure": fields.pressure, "gap": fields.gap,
-               "shear": np.linalg.norm(fields.shear, axis=1),
-               "slip": np.linalg.norm(fields.slip, axis=1)}  # fmt: skip
-        placed = self.skin.model.discretisation.placed
-        ends = np.cumsum([0, *(len(pair.rows.nodes) for pair in placed)])
-        for share, first, last in zip(self._shares, ends[:-1], ends[1:], strict=True):
-            if share is None:
-                continue
-            rows = slice(first, last)
-            weighted = share * fields.weights[rows]
-            total = np.asarray(weighted.sum(axis=1)).ravel()
-            hit = np.flatnonzero((total > 0) & (status == OFF))
-            for name, array in own.items():
-                values[name][hit] = (weighted @ array[rows])[hit] / total[hit]
-            by_status = np.stack([weighted @ (solution.status[rows] == k) for k in range(3)])
-            status[hit] = np.argmax(by_status[:, hit], axis=0)
 
 
 def chosen(count: int, most: int) -> Index:

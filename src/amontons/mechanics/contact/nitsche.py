@@ -107,6 +107,17 @@ class NitscheTerms:
     theta: Array
     stiffness: Array
 
+    def symmetric_force(self, displacement: Array, weights: Array, r: Array) -> Array:
+        """Forces (n_dofs,) of theta / kappa (t - p), which do no work on rigid motions.
+
+        weights (q,): areas; r (q, d): reactions.
+        """
+        if not self.theta.any():
+            return np.zeros_like(displacement)
+        t = (self.traction.T @ displacement).reshape(r.shape)
+        share = (self.theta / self.kappa)[:, None] * (weights[:, None] * t - r)
+        return self.traction @ share.ravel()
+
     def at(self, kept: Mask) -> NitscheTerms:
         """A selection of these points."""
         columns = np.repeat(kept, self.traction.shape[1] // len(kept))

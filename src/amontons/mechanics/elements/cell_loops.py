@@ -128,6 +128,30 @@ def stiffness_inplace(points, nodes, slopes, weights, moduli, pointers, columns,
         _scatter(local, cell, pointers, columns, out, unit)
 
 
+@njit(cache=True, error_model="numpy")
+def nodal_gradients_inplace(u, points, nodes, slopes, out, weights, unit):
+    """Add displacement gradients of cells at their own nodes to out (n, dim, dim), by volume.
+
+    u (n, dim); slopes (a, a, dim) at the nodes of the reference cell; weights (n,) gets the sum
+    of the volumes.  Corners where a cell has no volume are left out.
+    """
+    dim, count = len(unit), nodes.shape[1]
+    jac, H, G = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((dim, count))
+    for cell in nodes:
+        for q in range(count):
+            volume = _gradients(points, cell, slopes[q], jac, H, G, unit)
+            if not volume > 0.0:
+                continue
+            node = cell[q]
+            weights[node] += volume
+            for i in range(dim):
+                for m in range(dim):
+                    value = 0.0
+                    for a in range(count):
+                        value += u[cell[a], i] * G[m, a]
+                    out[node, i, m] += volume * value
+
+
 @njit(cache=True)
 def _matrices():
     """Five 3x3 matrices, apart: the compiler knows the strides of each."""

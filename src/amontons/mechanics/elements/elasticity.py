@@ -94,6 +94,18 @@ class LinearElastic(Isotropic):
             return 2 * value * self.shear / (value + 2 * self.shear)
         return value
 
+    def stress(self, gradient: Array) -> Array:
+        """Stress (k, 3, 3) of displacement gradients (k, dim, dim); see `cell_stress`."""
+        dim = gradient.shape[1]
+        strain = 0.5 * (gradient + gradient.swapaxes(1, 2))
+        out = np.zeros((len(strain), 3, 3))
+        out[:, :dim, :dim] = 2 * self.shear * strain
+        across = 3 if dim == 3 or self.plane == "strain" else 2
+        lame = self.lame_lambda(dim) * np.trace(strain, axis1=1, axis2=2)
+        for k in range(across):
+            out[:, k, k] += lame
+        return out
+
 
 Materials = Mapping[str, LinearElastic]
 Law = TypeVar("Law")
@@ -172,15 +184,7 @@ def cell_stress(mesh: Mesh, material: LinearElastic | Materials, displacement: A
         cell, law = CELLS[block.kind], by_region[block.region]
         slopes = cell.gradients(mesh.points[block.nodes], cell.centre)
         gradient = np.einsum("kac,kad->kcd", displacement[block.nodes], slopes)
-        strain = 0.5 * (gradient + gradient.swapaxes(1, 2))
-        trace = np.trace(strain, axis1=1, axis2=2)
-        lame = law.lame_lambda(mesh.dim) * trace
-        stress = np.zeros((len(strain), 3, 3))
-        stress[:, : mesh.dim, : mesh.dim] = 2 * law.shear * strain
-        across = 3 if mesh.dim == 3 or law.plane == "strain" else 2
-        for k in range(across):
-            stress[:, k, k] += lame
-        parts.append(stress)
+        parts.append(law.stress(gradient))
     return np.concatenate(parts)
 
 

@@ -31,8 +31,34 @@ from .pattern import node_pattern
 Array = NDArray[np.float64]
 
 
+class _Family(Isotropic):
+    """What all members of the family have."""
+
+    @property
+    def coefficients(self) -> tuple[float, float, float, float, float]:
+        """a, b, c, d, e of the family, unit of stress."""
+        raise NotImplementedError
+
+    def stress(self, gradient: Array) -> Array:
+        """Cauchy stress P F^T / J (k, 3, 3) of displacement gradients (k, dim, dim).
+
+        Raises InvertedCells where J <= 0.
+        """
+        dim = gradient.shape[1]
+        F = np.tile(np.eye(3), (len(gradient), 1, 1))
+        F[:, :dim, :dim] += gradient
+        J = np.linalg.det(F)
+        _check(float(J.min(initial=np.inf)))
+        a, b, c, d, e = self.coefficients
+        B = F @ F.swapaxes(1, 2)
+        trace = np.trace(B, axis1=1, axis2=2)[:, None, None]
+        g = (2 * c * J**2 - d + e * np.log(J))[:, None, None]
+        kirchhoff = 2 * a * B + 2 * b * (trace * B - B @ B) + g * np.eye(3)
+        return kirchhoff / J[:, None, None]
+
+
 @dataclass(frozen=True)
-class NeoHookean(Isotropic):
+class NeoHookean(_Family):
     """Compressible neo-Hookean law: young, unit of stress, > 0; -1 < poisson < 0.5.
 
     W = shear / 2 (tr C - 3) - shear ln J + lame_lambda / 2 (ln J)^2, [BW] eq. (6.27).
@@ -51,7 +77,7 @@ class NeoHookean(Isotropic):
 
 
 @dataclass(frozen=True)
-class CiarletGeymonat(Isotropic):
+class CiarletGeymonat(_Family):
     """Ciarlet-Geymonat law: young, unit of stress, > 0; 0 < poisson < 0.5.
 
     W = a (tr C - 3) + b (tr cof C - 3) + c (J^2 - 1) - d ln J with b = shear / 2 - a,
@@ -210,16 +236,6 @@ def cauchy_stress(
     for cells in mesh.cells:
         cell = CELLS[cells.kind]
         slopes = cell.gradients(mesh.points[cells.nodes], cell.centre)
-        F = np.tile(np.eye(3), (len(cells.nodes), 1, 1))
-        F[:, : mesh.dim, : mesh.dim] += np.einsum(
-            "kac,kad->kcd", displacement[cells.nodes], slopes
-        )
-        J = np.linalg.det(F)
-        _check(float(J.min()))
-        a, b, c, d, e = laws[cells.region].coefficients  # type: ignore[attr-defined]
-        B = F @ F.swapaxes(1, 2)
-        trace = np.trace(B, axis1=1, axis2=2)[:, None, None]
-        g = (2 * c * J**2 - d + e * np.log(J))[:, None, None]
-        kirchhoff = 2 * a * B + 2 * b * (trace * B - B @ B) + g * np.eye(3)
-        parts.append(kirchhoff / J[:, None, None])
+        gradient = np.einsum("kac,kad->kcd", displacement[cells.nodes], slopes)
+        parts.append(laws[cells.region].stress(gradient))  # type: ignore[attr-defined]
     return np.concatenate(parts)

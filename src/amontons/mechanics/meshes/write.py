@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,7 +63,8 @@ def write_meshes(
 def _with_fields(text: bytes, fields: Mapping[str, float], remark: str) -> bytes:
     """A VTU file with field data before its end, as its writer knows none."""
     arrays = "".join(
-        f'<DataArray type="{"Int32" if isinstance(value, int) else "Float64"}" Name="{name}" '
+        f'<DataArray type="{"Int32" if isinstance(value, int) else "Float64"}" '
+        f'Name={quoteattr(name)} '
         f'NumberOfTuples="1" format="ascii">{value!r}</DataArray>\n'
         for name, value in fields.items()
         if math.isfinite(value)

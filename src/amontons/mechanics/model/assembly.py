@@ -134,6 +134,17 @@ class Discretisation:
             return self.fixed
         return np.union1d(self.fixed, self.rigid.dofs)
 
+    def missing(self, displacement: Array, load: Array, r: Array) -> Array:
+        """Forces (dofs,) that loads (dofs,) and reactions r (nc, d) leave to supports."""
+        out = self.K @ displacement - load - self.whole_H @ r.ravel()
+        ends = np.cumsum([0, *(len(p.rows.nodes) for p in self.placed)])
+        for placed, a, b in zip(self.placed, ends[:-1], ends[1:], strict=True):
+            if placed.nitsche is not None:
+                out -= placed.nitsche.symmetric_force(
+                    displacement, placed.rows.weights, r[a:b]
+                )  # fmt: skip
+        return out
+
     def gathered(self, force: Array) -> Array:
         """Forces on the unknowns (n, ...) of nodal forces (dofs, ...), none on driven ones."""
         return force[self.free] if self.rigid is None else self.rigid.spread.T @ force

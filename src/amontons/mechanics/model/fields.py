@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,12 @@ from ..contact import forces
 from ..meshes import Facets
 from .assembly import Discretisation
 from .parts import Body
+from .reactions import arms, support_forces
+from .supports import external_load
+from .wrench import Wrench
+
+if TYPE_CHECKING:
+    from .model import Model
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -26,10 +33,13 @@ class ContactFields:
     displacement: (nodes, dim) per body, unit of length.  Per contact, in the order of the
     discrete problem: points (nc, d), frames (nc, d, d) with rows n, t1(, t2), weights (nc,)
     area, gap (nc,) after deformation, pressure (nc,) >= 0 in compression, shear (nc, d-1)
-    traction on the slave in the local frame, slip (nc, d-1) tangential displacement, force
-    (nc, d) on the slave in global axes.  resultant (d,): sum of the forces of obstacles on
-    slaves, global axes.  body, node (nc,): where the contact sits; facets: per pair the body
-    and the facets of its slave surface, for plots.
+    traction on the slave in the local frame, slip (nc, d-1) tangential displacement since the
+    start, force (nc, d) on the slave in global axes.  resultant (d,): sum of the forces of
+    obstacles on slaves, global axes.  body, node (nc,): where the contact sits; facets: per
+    pair the body and the facets of its slave surface, for plots.  status (nc,): ContactStatus.
+    What has slid: slid (nc, d-1), net, path (nc,), the length of the way, friction_work (nc,),
+    energy that it took.  reaction: forces of supports at the nodes, (nodes, dim) per body;
+    load: resultant of all loads.
     """
 
     displacement: tuple[Array, ...]
@@ -45,16 +55,19 @@ class ContactFields:
     body: Index
     node: Index
     facets: tuple[tuple[int, tuple[Facets, ...]], ...]
+    status: NDArray[np.int8]
+    slid: Array
+    path: Array
+    friction_work: Array
+    reaction: tuple[Array, ...]
+    load: Wrench
 
 
 def recover_fields(
-    bodies: Sequence[Body],
-    surfaces: tuple[tuple[int, str], ...],
-    parts: Discretisation,
-    solution: FrictionSolution,
-    factor: float,
+    model: Model, surfaces: tuple[tuple[int, str], ...], solution: FrictionSolution
 ) -> ContactFields:
-    """Fields of a solution at a load factor; surfaces: (body, slave surface) per pair."""
+    """Fields of a solution at the load factor; surfaces: (body, slave surface) per pair."""
+    bodies, parts = model.bodies, model.discretisation
     rows = [placed.rows for placed in parts.placed]
     frames = np.concatenate([r.frames for r in rows])
     if solution.r.shape != frames.shape[:2]:
@@ -66,25 +79,52 @@ def recover_fields(
         raise InvalidInput(
             "solution: holds no displacements; solve the global form, model.assemble()"
         )
-    v = solution.v
+    whole = parts.spread(solution.v, model.load_factor * parts.prescribed)
+    load = model.load_factor * external_load(bodies, model.loads, parts.offsets)
+    displacement = by_body(bodies, parts, whole)
+    rest = parts.missing(whole, load, solution.r)
     weights = np.concatenate([r.weights for r in rows])
     force = forces(rows, solution.r)
     traction = solution.r / weights[:, None]
     return ContactFields(
-        displacement=_by_body(bodies, parts, v, factor),
+        displacement=displacement,
         points=np.concatenate([r.points for r in rows]),
         frames=frames, weights=weights, gap=solution.u[:, 0], pressure=traction[:, 0],
         shear=traction[:, 1:], slip=solution.u[:, 1:], force=force, resultant=force.sum(axis=0),
         body=np.concatenate([np.full(len(p.rows.nodes), p.body) for p in parts.placed]),
         node=np.concatenate([r.nodes for r in rows]),
         facets=tuple((k, bodies[k].mesh.surface(name)) for k, name in surfaces),
+        reaction=by_body(bodies, parts, support_forces(parts, rest)),
+        load=load_wrench(model, displacement, load), status=solution.status,
+        **at_once(solution),
     )  # fmt: skip
 
 
-def _by_body(
-    bodies: Sequence[Body], parts: Discretisation, v: Array, factor: float
+def at_once(solution: FrictionSolution) -> dict[str, Array]:
+    """slid, path, friction_work of a static solution: one way from the undeformed state.
+
+    Friction grows along it in proportion, so that half of its last value acts on the way.
+    What the springs of contacts that give way take of the motion is no slip.
+    """
+    give, stays, r = solution.problem.law.give, solution.u[:, 1:], solution.r
+    if give is not None:
+        stays = stays + give[:, 1 : r.shape[1]] * r[:, 1:]
+    slid = np.where(solution.sliding[:, None], stays, 0.0)
+    work = -0.5 * (r[:, 1:] * stays).sum(axis=1)
+    return {"slid": slid, "path": np.linalg.norm(slid, axis=1),
+            "friction_work": np.maximum(work, 0.0)}  # fmt: skip
+
+
+def load_wrench(model: Model, displacement: Sequence[Array], load: Array) -> Wrench:
+    """The resultant of nodal loads (dofs,)."""
+    at = arms(model, displacement)
+    return Wrench.of(at, load.reshape(at.shape))
+
+
+def by_body(
+    bodies: Sequence[Body], parts: Discretisation, whole: Array
 ) -> tuple[Array, ...]:
-    whole = parts.spread(v, factor * parts.prescribed)
+    """Values of all dofs (dofs,) body by body, (nodes, dim) each."""
     pairs = zip(parts.offsets[:-1], parts.offsets[1:], strict=True)
     return tuple(
         whole[a:b].reshape(body.mesh.points.shape)

@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.errors import InvalidInput
+from ...core.errors import InvalidInput, InvertedCells
 from ...problem.solution import FrictionSolution
 from ..contact import frames
-from .fields import ContactFields
+from .fields import ContactFields, at_once, by_body, load_wrench
+from .nodal_forces import nodal_forces
 from .nonlinear_parts import nonlinear_parts
+from .reactions import support_forces
 
 if TYPE_CHECKING:
     from .model import Model
@@ -27,31 +29,33 @@ def recover_large(
     model: Model, surfaces: tuple[tuple[int, str], ...], solution: FrictionSolution
 ) -> ContactFields:
     """Fields of a solution at the model's load factor; surfaces: (body, slave) per pair."""
-    linear = model.discretisation
+    linear, parts = model.discretisation, nonlinear_parts(model)
     whole = model.load_factor * linear.prescribed
     if solution.v is None or solution.v.shape != linear.free.shape:
         raise InvalidInput("solution: it belongs to another model, or holds no displacements")
     whole[linear.free] = solution.v
-    return large_fields(model, surfaces, whole, solution.r, solution.u)
-
-
-def large_fields(
-    model: Model, surfaces: tuple[tuple[int, str], ...], displacement: Array, r: Array, u: Array
-) -> ContactFields:
-    """Fields of displacements (dofs,); r and u = [gap, slip] (nc, d) in the frames there."""
-    parts = nonlinear_parts(model)
-    rows = [placed.rows for placed in model.discretisation.placed]
-    axes = frames(parts.meet(displacement.reshape(parts.X.shape)).normals)
+    r, u, moved = solution.r, solution.u, whole.reshape(parts.X.shape)
+    rows = [placed.rows for placed in linear.placed]
+    meeting = parts.meet(moved)
+    axes = frames(meeting.normals)
     weights = np.concatenate([row.weights for row in rows])
     force = np.einsum("pkc,pk->pc", axes, r)
     traction = r / weights[:, None]
-    bodies = np.split(displacement.reshape(parts.X.shape), parts.ends)
+    load = (model.load_factor * nodal_forces(model, model.loads)).at(moved)
+    pushed = meeting.columns(axes, len(moved)) @ r.ravel()
+    try:
+        held = support_forces(linear, parts.forces(moved) - load - pushed)
+    except InvertedCells:  # of a state that has not converged: nobody knows its forces
+        held = np.zeros_like(whole)
+    displacement = by_body(model.bodies, linear, whole)
     return ContactFields(
-        displacement=tuple(bodies), points=parts.points, frames=axes, weights=weights,
+        displacement=displacement, points=parts.points, frames=axes, weights=weights,
         gap=u[:, 0], pressure=traction[:, 0], shear=traction[:, 1:], slip=u[:, 1:],
         force=force, resultant=force.sum(axis=0),
-        body=np.concatenate([np.full(len(p.rows.nodes), p.body)
-                             for p in model.discretisation.placed]),
+        body=np.concatenate([np.full(len(p.rows.nodes), p.body) for p in linear.placed]),
         node=np.concatenate([row.nodes for row in rows]),
         facets=tuple((k, model.bodies[k].mesh.surface(name)) for k, name in surfaces),
+        reaction=by_body(model.bodies, linear, held),
+        load=load_wrench(model, displacement, load), status=solution.status,
+        **at_once(solution),
     )  # fmt: skip

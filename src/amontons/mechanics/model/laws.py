@@ -7,10 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.errors import InvalidInput, within
+from ...core.arrays import LARGEST
+from ...core.errors import InvalidInput, UnsupportedLaw, within
 from ...problem.law import (
     CappedCoulomb,
     Cohesive,
+    Compliant,
     Coulomb,
     Kind,
     Law,
@@ -27,7 +29,38 @@ from .values import scalar_at
 Array = NDArray[np.float64]
 TOUCHING = 1e-6  # gap, relative to the size of a node's area, up to which both sides touch
 
+SPRINGS = ("stiffness", "stick_stiffness")
+CHANGES = {"mu_across": "orthotropic friction"} | dict.fromkeys(
+    SPRINGS, "compliance of contact"
+)  # numbers of laws that are changes of variables of u
 SLANT = 1e-6  # part of a direction in the tangent plane that is one
+
+
+def check_law(k: int, contact: Contact, dimension: int, *, large: bool) -> None:
+    """Raise InvalidInput or UnsupportedLaw where contact k of a model can not have its law.
+
+    large: contact is found in the current configuration.
+    """
+    where = f"contact on {contact.slave!r}"
+    given = contact.numbers
+    if "mu_across" in given and dimension == 2:
+        raise InvalidInput(
+            "in 2D there is one direction to slide along; expected one coefficient",
+            ("contacts", k, "mu_across"), where,
+        )  # fmt: skip
+    if large and "cohesion" in given:
+        raise UnsupportedLaw(
+            "cohesion needs small strains and contact in the reference configuration",
+            ("contacts", k, "cohesion"), where,
+        )  # fmt: skip
+    if not (large or contact.nitsche is not None):
+        return
+    for name, what in CHANGES.items():
+        if name in given:
+            raise UnsupportedLaw(
+                f"{what} needs contact forces, method 'nodal' or 'mortar', and small strains "
+                "with contact in the reference configuration", ("contacts", k, name), where,
+            )  # fmt: skip
 
 
 def law_of(contacts: Sequence[Contact], parts: Discretisation) -> Law:
@@ -47,7 +80,10 @@ def rubs(law: Law) -> NDArray[np.bool_]:
 
 def _law(contact: Contact, placed: Placed) -> Law:
     """The law of one pair of surfaces."""
-    values = {name: _values(contact, name, placed) for name in contact.numbers}
+    values = {
+        name: (_stiff if name in SPRINGS else _values)(contact, name, placed)
+        for name in contact.numbers
+    }
     weights = placed.rows.weights
     if "tresca" in values:
         law: Law = Tresca(values["tresca"] * weights)
@@ -60,11 +96,16 @@ def _law(contact: Contact, placed: Placed) -> Law:
         law = Orthotropic(values["mu"], values["mu_across"], angle)
     else:
         law = Coulomb(values["mu"])
-    if "cohesion" not in values:
+    if "cohesion" in values:
+        size = weights ** (1 / (placed.rows.points.shape[1] - 1))
+        touching = placed.rows.gap <= TOUCHING * size
+        law = Cohesive(law, np.where(touching, values["cohesion"] * weights, 0.0))
+    if not any(name in values for name in SPRINGS):
         return law
-    size = weights ** (1 / (placed.rows.points.shape[1] - 1))
-    touching = placed.rows.gap <= TOUCHING * size
-    return Cohesive(law, np.where(touching, values["cohesion"] * weights, 0.0))
+    rigid = np.zeros(len(weights))
+    return Compliant(
+        law, *(1 / (values[name] * weights) if name in values else rigid for name in SPRINGS)
+    )
 
 
 def _angle(contact: Contact, placed: Placed) -> Array:
@@ -91,3 +132,14 @@ def _values(contact: Contact, name: str, placed: Placed) -> Array:
             return given[placed.kept]
         # averaged as the gap is; dual functions may be negative
         return np.maximum(placed.rows.mean(lambda x: scalar_at(value, x, what)), 0.0)
+
+
+def _stiff(contact: Contact, name: str, placed: Placed) -> Array:
+    """A stiffness per area at the contacts, (k,), > 0."""
+    out = _values(contact, name, placed)
+    for i in np.flatnonzero(out < 1 / LARGEST)[:1]:
+        raise InvalidInput(
+            f"contact on {contact.slave!r}: expected a {name} > 0, got {out[i]:g} at "
+            f"{placed.rows.points[i].tolist()}; without one contact is rigid"
+        )
+    return out

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...core.errors import InvalidInput, UnsupportedForm, UnsupportedLaw, within
+from ...core.errors import InvalidInput, UnsupportedForm, within
 from ...core.prepared import Prepared
 from ...linear import Direct
 from ...linear.grid_matrix import GridMatrix
@@ -26,7 +26,8 @@ from .fields import ContactFields, recover_fields
 from .held import check_outside
 from .large_deformation import LargeDeformation, large_deformation
 from .large_fields import recover_large
-from .laws import law_of, rubs
+from .laws import check_law, law_of, rubs
+from .names import named_bodies, pair_names, tuple_of
 from .nitsche import nitsche_matrices, nitsche_problem
 from .nodal_forces import follows
 from .parts import FINITE, SMALL, Body, BodyForce, Contact, Fix, Load, Pressure
@@ -45,7 +46,8 @@ class Model:
 
     Gaps and normals are taken once in the reference configuration, unless the contacts or
     hyperelastic laws say otherwise: then where the nodes are, see `is_large`.  load_factor
-    multiplies the loads and the prescribed displacements, not the gaps.
+    multiplies the loads and the prescribed displacements, not the gaps.  pair_names: of the
+    contacts, their own or those of their slaves, all different.
     """
 
     bodies: Sequence[Body]
@@ -54,12 +56,13 @@ class Model:
     loads: Sequence[Load] = ()
     load_factor: float = 1.0
     name: str = ""
+    pair_names: tuple[str, ...] = field(default=(), init=False, repr=False)
     _shared: Prepared = field(default_factory=Prepared, init=False, repr=False)
 
     def __post_init__(self) -> None:
         for name, kind in (("bodies", Body), ("supports", Fix), ("contacts", Contact),
                            ("loads", Load)):  # fmt: skip
-            object.__setattr__(self, name, _tuple_of(name, getattr(self, name), kind))
+            object.__setattr__(self, name, tuple_of(name, getattr(self, name), kind))
         if not self.bodies:
             raise InvalidInput("expected at least one, got none", ("bodies",))
         if not self.contacts:
@@ -72,11 +75,12 @@ class Model:
                 "expected Nitsche's method in all of them or in none, got both", ("contacts",)
             )
         self._check_configurations()
+        object.__setattr__(self, "pair_names", pair_names(self.contacts))
         if not (is_number(self.load_factor) and np.isfinite(self.load_factor)):
             raise InvalidInput(
                 f"expected a finite number, got {self.load_factor!r}", ("load_factor",)
             )
-        object.__setattr__(self, "bodies", _named(self.bodies))
+        object.__setattr__(self, "bodies", named_bodies(self.bodies))
         for part, fields in SURFACES.items():
             for k, item in enumerate(getattr(self, part)):
                 for name in (name for name in fields if hasattr(item, name)):
@@ -120,14 +124,9 @@ class Model:
     def _check_configurations(self) -> None:
         """Contacts of one kinematics, one that the bodies can have, and loads that fit."""
         for k, contact in enumerate(self.contacts):
-            self._check_orthotropy(k, contact)
+            check_law(k, contact, self.dimension, large=self.is_large)
         for k, contact in enumerate(self.contacts if self.is_large else ()):
             at = ("contacts", k, "kinematics")
-            if contact.cohesion is not None:
-                raise UnsupportedLaw(
-                    "cohesion needs small strains and contact in the reference configuration",
-                    ("contacts", k, "cohesion"), f"contact on {contact.slave!r}",
-                )  # fmt: skip
             if contact.kinematics == SMALL and self._is_hyperelastic:
                 raise InvalidInput(
                     "hyperelastic laws have contact in the current configuration, "
@@ -147,22 +146,6 @@ class Model:
                     "configuration 'current' needs large deformations: hyperelastic laws, or "
                     "contacts with kinematics='finite'", ("loads", k, "configuration"), what,
                 )  # fmt: skip
-
-    def _check_orthotropy(self, k: int, contact: Contact) -> None:
-        """What orthotropic friction needs."""
-        at, where = ("contacts", k, "mu_across"), f"contact on {contact.slave!r}"
-        if contact.mu_across is None:
-            return
-        if self.dimension == 2:
-            raise InvalidInput(
-                "in 2D there is one direction to slide along; expected one coefficient",
-                at, where,
-            )  # fmt: skip
-        if self.is_large or contact.nitsche is not None:
-            raise UnsupportedLaw(
-                "orthotropic friction needs contact forces, method 'nodal' or 'mortar', and "
-                "small strains with contact in the reference configuration", at, where,
-            )  # fmt: skip
 
     @property
     def discretisation(self) -> Discretisation:
@@ -338,9 +321,7 @@ class Model:
         surfaces = tuple(locate(self.bodies, c.slave) for c in self.contacts)
         if self.is_large:
             return recover_large(self, surfaces, solution)
-        return recover_fields(
-            self.bodies, surfaces, self.discretisation, solution, self.load_factor
-        )
+        return recover_fields(self, surfaces, solution)
 
 
 def _first(problem: FrictionProblem) -> FrictionProblem:
@@ -371,30 +352,3 @@ def _bonded(parts: Discretisation, f: Array, w: Array) -> tuple[Array, float]:
     bonded = sparse.csc_array(stored + H @ stiffness @ H.T)
     v = Direct().factor(bonded).solve(f - H @ (stiffness @ w.ravel()))
     return v, float(np.linalg.norm(H.T @ v + w.ravel()))
-
-
-def _tuple_of(name: str, values: object, kind: object) -> tuple:
-    wanted = getattr(kind, "__name__", "Traction, Pressure or BodyForce")
-    if isinstance(values, kind):  # type: ignore[arg-type]
-        raise InvalidInput(f"{name}: expected a list of {wanted}, got one alone; write [it]")
-    try:
-        items = tuple(values)  # type: ignore[arg-type]
-    except TypeError as error:
-        raise InvalidInput(f"{name}: expected a list, got {values!r}") from error
-    for item in items:
-        if not isinstance(item, kind):  # type: ignore[arg-type]
-            raise InvalidInput(f"{name}: expected {wanted}, got {item!r}")
-    return items
-
-
-def _named(bodies: Sequence[Body]) -> tuple[Body, ...]:
-    """Bodies with distinct names: "body", or "body 1", "body 2", … where none is given."""
-    several = len(bodies) > 1
-    out = tuple(
-        body if body.name else replace(body, name=f"body {k + 1}" if several else "body")
-        for k, body in enumerate(bodies)
-    )
-    names = [body.name for body in out]
-    if len(set(names)) < len(names):
-        raise InvalidInput(f"bodies: expected distinct names, got {', '.join(names)}")
-    return out

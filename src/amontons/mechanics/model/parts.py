@@ -15,7 +15,15 @@ from numpy.typing import NDArray
 
 from ...core.arrays import number, real
 from ...core.errors import InvalidInput, shown
-from ...problem.law import CappedCoulomb, Cohesive, Coulomb, Law, Orthotropic, Tresca
+from ...problem.law import (
+    CappedCoulomb,
+    Cohesive,
+    Compliant,
+    Coulomb,
+    Law,
+    Orthotropic,
+    Tresca,
+)
 from ..contact import Nitsche, Obstacle
 from ..elements.elasticity import LinearElastic, materials_by_region
 from ..elements.hyperelasticity import CiarletGeymonat, NeoHookean
@@ -166,12 +174,17 @@ class Contact:
     node times the value at the node; with mortar times the mean of the function with the dual
     function of the node, if that is > 0.  law: the same numbers as a value, CappedCoulomb(mu,
     cap), Cohesive(Coulomb(mu), cohesion), …, each one number or one per slave node.
+    stiffness, stick_stiffness: contact that gives way (`problem.law.compliant`), pressure over
+    overclosure and shear traction over elastic slip, stress / length, > 0; by default rigid.
+    As a value Compliant(law, compliance, stick_compliance), which are their inverses.
     mu_across: orthotropic friction (`problem.law.orthotropic`), mu along `direction`, a vector
     in global axes seen in the tangent plane of each contact, mu_across across it; in 3D.
     where: a function of points (n, dim) -> (n,) bool that tells which slave nodes take part.
     kinematics: "small", gap and normal are those of the undeformed bodies, or "finite", those
     where the nodes are now (nodal, obstacles only); by default "finite" with hyperelastic laws.
     configuration: the same in older words, "reference" or "current".
+    name: of the pair in results and files; by default that of the slave, with a number where
+    several contacts share it.
     """
 
     slave: str
@@ -188,9 +201,17 @@ class Contact:
     law: InitVar[Law | None] = None
     mu_across: ScalarValue | None = None
     direction: Sequence[float] | None = None
+    stiffness: ScalarValue | None = None
+    stick_stiffness: ScalarValue | None = None
     angle: ScalarValue | None = None  # of the direction, from t1 to t2 of the contact frame
+    name: str = ""
 
     def __post_init__(self, configuration: str | None, law: Law | None) -> None:
+        if not isinstance(self.name, str) or not self.name.isprintable():
+            raise InvalidInput(
+                f"contact on {self.slave!r}: name: expected a text on one line, got "
+                f"{shown(self.name)}"
+            )
         self._check_kinematics(configuration)
         if law is not None:
             self._take(law)
@@ -277,8 +298,9 @@ class Contact:
 
     @property
     def numbers(self) -> dict[str, ScalarValue]:
-        """What the law is given by: mu or tresca, mu_across, angle, cap, cohesion."""
-        names = ("mu", "mu_across", "angle", "tresca", "cap", "cohesion")
+        """What the law is given by: mu or tresca, and what goes with it."""
+        names = ("mu", "mu_across", "angle", "tresca", "cap", "cohesion", "stiffness",
+                 "stick_stiffness")  # fmt: skip
         named = {name: getattr(self, name) for name in names}
         return {name: value for name, value in named.items() if value is not None}
 
@@ -288,22 +310,38 @@ class Contact:
             raise InvalidInput(
                 f"contact on {self.slave!r}: expected law or its numbers, got both"
             )
-        inner = law.law if isinstance(law, Cohesive) else law
-        if isinstance(inner, Coulomb):
-            values = {"mu": inner.mu}
-        elif isinstance(inner, Tresca):
-            values = {"tresca": inner.limit}
-        elif isinstance(inner, CappedCoulomb):
-            values = {"mu": inner.mu, "cap": inner.cap}
-        elif isinstance(inner, Orthotropic):
-            values = {"mu": inner.mu1, "mu_across": inner.mu2, "angle": inner.angle}
-        else:
-            raise InvalidInput(
-                "law: expected Coulomb, Tresca, CappedCoulomb or Orthotropic, with or without "
-                f"cohesion, got {shown(law)}"
-            )
-        if inner is not law:
-            values["cohesion"] = law.cohesion
-        for name, value in values.items():
+        for name, value in _numbers_of(law).items():
             one = len(value) == 1
             object.__setattr__(self, name, float(value[0]) if one else value)
+
+
+def _numbers_of(law: Law) -> dict[str, Array]:
+    """The numbers of a law by the names that `Contact` has for them; raises InvalidInput."""
+    if isinstance(law, Compliant):
+        return _numbers_of(law.law) | _stiffnesses(law)
+    if isinstance(law, Cohesive):
+        return _numbers_of(law.law) | {"cohesion": law.cohesion}
+    if isinstance(law, Coulomb):
+        return {"mu": law.mu}
+    if isinstance(law, Tresca):
+        return {"tresca": law.limit}
+    if isinstance(law, CappedCoulomb):
+        return {"mu": law.mu, "cap": law.cap}
+    if isinstance(law, Orthotropic):
+        return {"mu": law.mu1, "mu_across": law.mu2, "angle": law.angle}
+    raise InvalidInput(
+        "law: expected Coulomb, Tresca, CappedCoulomb or Orthotropic, with or without cohesion "
+        f"and compliance, got {shown(law)}"
+    )
+
+
+def _stiffnesses(law: Compliant) -> dict[str, Array]:
+    """Those of a compliance; none where it is zero."""
+    given = {"stiffness": law.compliance, "stick_stiffness": law.stick_compliance}
+    for values in given.values():
+        if values.any() and not values.all():
+            raise InvalidInput(
+                "law: expected a compliance > 0 at all nodes of a contact, or 0 at all; give "
+                "rigid nodes a Contact of their own (where=)"
+            )
+    return {name: 1 / values for name, values in given.items() if values.any()}

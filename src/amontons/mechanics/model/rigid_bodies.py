@@ -76,6 +76,10 @@ class _Held:
             )  # fmt: skip
         return found
 
+    def held_by(self, rest: Array) -> Array:
+        """Forces (len(at),) of supports, the smallest that do what is missing, (k,), does."""
+        return self.inverse.T @ (self.modes.T @ rest)
+
 
 @dataclass(frozen=True, eq=False)
 class RigidBodies:

@@ -25,9 +25,10 @@ a straight line.  For contact this is
 
     mean = (r0 + r1) . du / 2,                                                              (4)
 
-the true work where both grow in proportion or stay.  Where it is more than the force at the end
-says, friction = r1_T . du_T <= 0 (the pressure has fallen), and where it is positive (friction
-has turned round, or contact has opened, within the step), contact is booked by friction, and
+the true work where both grow in proportion or stay.  Contact by contact, only the tangential
+part is booked, as nothing does work along the normal; and where it is more than the force at
+the end says, r1_T . du_T <= 0 (the pressure has fallen), or positive (friction has turned round
+within the step), that force alone is booked (`rubbing`).  With the sum, contact = friction,
 
     numerical = friction - mean                                                             (5)
 
@@ -57,10 +58,10 @@ TOLERATED = 1e-7  # work of contact, relative to all of the step, that is the so
 class Energies:
     """Energies at the end of a step, and works within it, all in the unit of work.
 
-    loads, supports: work done on the bodies.  contact: work of all contacts and impacts, never
-    positive.  damping: dissipated, never negative.  numerical: lost in the time scheme, never
-    negative in dynamics, in quasi-static steps what a straight line misses.  gain: of kinetic +
-    elastic.
+    loads, supports: work done on the bodies.  elastic: with that of contacts which give way.
+    contact: work of all contacts and impacts but for what they store so, never positive.
+    damping: dissipated, never negative.  numerical: lost in the time scheme, never negative in
+    dynamics, in quasi-static steps what a straight line misses.  gain: of kinetic + elastic.
     """
 
     kinetic: float = 0.0
@@ -95,13 +96,15 @@ class Energies:
 class Forces:
     """Forces (dofs,) on all dofs at one end of a quasi-static step, and the stored energy.
 
-    inner: those that the bodies need; load: external ones; pushed: those of contact.
+    inner: those that the bodies need; load: external ones; pushed: those of contact; springs:
+    energy that contacts which give way store.
     """
 
     inner: Array
     load: Array
     pushed: Array
     elastic: float
+    springs: float = 0.0
 
 
 def slow_energies(  # noqa: PLR0913
@@ -111,7 +114,8 @@ def slow_energies(  # noqa: PLR0913
     """The balance (3) to (5) of a quasi-static step that moves the dofs by dq (dofs,).
 
     The load before is the one that the state balances, whatever was said of that time: a load
-    that is there at once grows along the step.  fixed: prescribed dofs; friction: r1_T . du_T;
+    that is there at once grows along the step.  fixed: prescribed dofs; friction: work of
+    friction on the bodies;
     path: `path_work` of large deformations; bend: work of loads beyond that of their mean.
     """
     balanced = before.inner - before.pushed
@@ -119,12 +123,13 @@ def slow_energies(  # noqa: PLR0913
     load[fixed] = before.load[fixed]
     held = np.zeros_like(dq)
     held[fixed] = (balanced - load + after.inner - after.load - after.pushed)[fixed]
-    gain = after.elastic - before.elastic
+    stored = after.springs - before.springs
+    gain = after.elastic - before.elastic + stored
     works = {"loads": 0.5 * (load + after.load) @ dq + bend, "supports": 0.5 * held @ dq}
-    mean = 0.5 * (before.pushed + after.pushed) @ dq
+    mean = 0.5 * (before.pushed + after.pushed) @ dq + stored  # that on u', see `springs`
     size = abs(gain) + sum(map(abs, works.values()))
-    contact = friction if mean > TOLERATED * size else max(friction, mean)
-    return Energies(elastic=after.elastic, gain=gain, contact=float(contact),
+    contact = friction if abs(friction - mean) > TOLERATED * size else float(mean)
+    return Energies(elastic=after.elastic + after.springs, gain=gain, contact=contact,
                     numerical=float(path + bend + contact - mean),
                     **{name: float(work) for name, work in works.items()})  # fmt: skip
 

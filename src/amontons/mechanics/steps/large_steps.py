@@ -18,9 +18,11 @@ from ..model.diagnosis import with_diagnosis
 from ..model.large_deformation import large_step
 from ..model.nodal_forces import NodalForces
 from ..model.nonlinear_parts import nonlinear_parts
+from ..model.reactions import support_forces
 from .energy import Energies, Forces, path_work, slow_energies
 from .moreau_jean import Solve
 from .passage import Crossing, taken
+from .rubbing import quasi_static_friction, rubbed
 from .state import State, TimeStep, undeformed
 from .system import Motion
 
@@ -68,26 +70,30 @@ class LargeSlowModel:
         assert solution.v is not None
         q1 = problem.displacement(solution.v).ravel()
         axes = frames(problem.contact_point(solution.v).n)
-        energies = self._energies(state, q1, load, solution.r, solution.u)
+        way = solution.u[:, 1:]
+        work = quasi_static_friction(state.force[:, 1:], solution.r[:, 1:], way)
+        energies = self._energies(state, q1, load, solution.r, float(work.sum()))
         passed = time - state.time
         velocity = (q1 - q0) / passed if passed else np.zeros_like(q1)
-        slip = state.slip + solution.u[:, 1:]
-        new = State(state.index + 1, time, q1, velocity, solution.r, slip)
-        active = np.arange(len(slip))
+        new = State(state.index + 1, time, q1, velocity, solution.r, state.slip + way,
+                    **rubbed(state, way, solution.sliding, work))  # fmt: skip
+        acting = self._forces(q1, load, solution.r)
+        rest = acting.inner - acting.load - acting.pushed
+        active = np.arange(len(way))
         return TimeStep(self.motion.body, new, solution, active, energies, solution.u[:, 0],
-                        axes, passage)  # fmt: skip
+                        support_forces(self.motion.parts, rest), acting.load, axes,
+                        passage)  # fmt: skip
 
     def explained(self, solution: FrictionSolution) -> FrictionSolution:
         """The same record; one that failed says which bodies give way."""
         return with_diagnosis(solution, self.motion.body)
 
     def _energies(
-        self, state: State, q1: Array, load: NodalForces, r: Array, u: Array
+        self, state: State, q1: Array, load: NodalForces, r: Array, friction: float
     ) -> Energies:
-        """The balance of `slow_energies`; r, u (nc, d): reactions, [gap, slip] of the step."""
+        """The balance of `slow_energies`; r (nc, d): reactions after the step."""
         q0, load_0 = state.displacement, self.motion.load_of(state)
         before, after = self._forces(q0, load_0, state.force), self._forces(q1, load, r)
-        friction = float((r[:, 1:] * u[:, 1:]).sum())
         path = path_work(before, after, q1 - q0)
         bend = self._bend(q0, q1, load_0, load)
         return slow_energies(before, after, q1 - q0, self.motion.parts.fixed, friction, path,

@@ -24,6 +24,8 @@ The law is one of contacts, so of nodes: e is the restitution of a body only whe
 moves with its nodes, as one that is stiff against the step (a period below h).  A soft body
 leaves after its waves have run through it, with what they bring back, whatever e.
 
+Contacts that give way have the law of the end of the step, see `springs`, and no restitution.
+
 M_hat does not change, and its W falls apart into the bodies: it is formed once, and every step
 cuts the active contacts out of it.
 
@@ -53,7 +55,10 @@ from ...problem.protocol import Problem
 from ...problem.solution import FrictionSolution
 from ...solvers.contract import Iterate
 from ..model import Model
+from ..model.reactions import support_forces
 from .energy import Energies
+from .rubbing import rubbed
+from .springs import Springs
 from .state import State, TimeStep
 from .system import Inertia, Motion
 
@@ -127,7 +132,8 @@ class MovingModel:
         )
         nc, d = parts.carried.shape
         M_free = parts.reduced(self.M_hat)
-        self.law = self.motion.body.law.scaled(h)  # of impulses
+        self.springs = Springs.of(self.motion.body.law, d)
+        self.law = self.springs.of_impulses(self.motion.body.law, h, theta)
         self.base = FrictionProblem.from_global(
             M_free, parts.H, np.zeros(parts.unknowns), np.zeros((nc, d)), self.law,
             near_nullspace=parts.near_nullspace, levels=parts.levels,
@@ -150,7 +156,8 @@ class MovingModel:
         u0 = self._local(v0)
         gap = parts.gap + self._local(q0)[:, 0]
         near = self.closed + method.reach
-        active = np.flatnonzero(gap + method.prediction * h * u0[:, 0] <= near)
+        closing = gap + method.prediction * h * u0[:, 0] <= near
+        active = np.flatnonzero(closing | self.springs.presses)
         before, after = self.motion.prescribed(state.time), self.motion.prescribed(time)
         held = (after - before) / h
         force = theta * self.motion.load(time) + (1 - theta) * self.motion.load(state.time)
@@ -162,22 +169,32 @@ class MovingModel:
         carried = self._local(held)[active]  # by the supports
         start = Iterate(h * state.force[active])
         local = self._local_problem if self._condenses else None
-        shifts = _Shifts.of(u0[active], gap[active], method)
+        springs, pulled = self.springs.at(active), state.force[active]
+        shifts = _Shifts.of(u0[active], gap[active], method, springs, pulled)
         while True:
             solution = solve(self._problem(active, f, carried + shifts.values), start, local)
             v1 = parts.spread(_velocity(solution), held)
             q1 = q0 + h * (theta * v1 + (1 - theta) * v0)
             impulse = np.zeros_like(parts.carried)
             impulse[active] = solution.r
-            energies = self._energies(state, v1, q1, force, impulse)
+            energies, held_by = self._energies(state, v1, q1, force, impulse)
             excess = energies.contact - self._allowed(energies)
             changed = excess > 0 and shifts.changed(solution.r, self._local(v1)[active], excess)
             if not changed:
                 break
             shifts, start = changed, Iterate(solution.r)
         u = self._local(q1)
-        new = State(state.index + 1, time, q1, v1, impulse / h, u[:, 1:])
-        return TimeStep(self.motion.body, new, solution, active, energies, parts.gap + u[:, 0])
+        sliding = np.zeros(len(u), dtype=bool)
+        sliding[active] = solution.sliding
+        mean = 0.5 * (u0 + self._local(v1))[:, 1:]
+        pulled, last = impulse / h, state.force
+        work = (impulse[:, 1:] * mean).sum(axis=1) + self.springs.taken(last, pulled)
+        slip = self.springs.slipped(self._local(q1 - q0), last, pulled)
+        new = State(state.index + 1, time, q1, v1, pulled, u[:, 1:],
+                    **rubbed(state, slip, sliding, np.minimum(work, 0.0)))  # fmt: skip
+        reaction = support_forces(parts, held_by / h)
+        return TimeStep(self.motion.body, new, solution, active, energies, parts.gap + u[:, 0],
+                        reaction, force)  # fmt: skip
 
     def explained(self, solution: FrictionSolution) -> FrictionSolution:
         """The same record: inertia balances any load."""
@@ -223,8 +240,8 @@ class MovingModel:
 
     def _energies(
         self, state: State, v1: Array, q1: Array, force: Array, impulse: Array
-    ) -> Energies:
-        """The balance of the step, see `energy`."""
+    ) -> tuple[Energies, Array]:
+        """The balance of the step, see `energy`, and the impulses (dofs,) left to supports."""
         parts, h, theta = self.motion.parts, self.method.step, self.method.theta
         M, K, C = self.M, self.K, self.C
         dv, dq = v1 - state.velocity, q1 - state.displacement
@@ -236,15 +253,17 @@ class MovingModel:
         held[parts.held] = rest[parts.held]
         kinetic, elastic = 0.5 * v1 @ (M @ v1), 0.5 * q1 @ (K @ q1)
         v0, q0 = state.velocity, state.displacement
-        work = float(pushed @ dq) / h
+        stored = self.springs.energy(impulse / h)
+        taken = stored - self.springs.energy(state.force)
+        work = float(pushed @ dq) / h + taken  # but for what springs store
         lost = float((theta - 0.5) * (dv @ (M @ dv) + dq @ (K @ dq)))
         jump = min(max((theta - 0.5) * float(pushed @ dv), work), lost)
-        gain = kinetic + elastic - 0.5 * v0 @ (M @ v0) - 0.5 * q0 @ (K @ q0)
+        gain = kinetic + elastic - 0.5 * v0 @ (M @ v0) - 0.5 * q0 @ (K @ q0) + taken
         return Energies(
-            kinetic=float(kinetic), elastic=float(elastic), gain=float(gain),
+            kinetic=float(kinetic), elastic=float(elastic) + stored, gain=float(gain),
             loads=float(force @ dq), supports=float(held @ dq) / h,
             contact=work - jump, damping=float(dq @ (C @ dq)) / h, numerical=lost - jump,
-        )  # fmt: skip
+        ), rest  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,7 +271,8 @@ class _Shifts:
     """What is added to u1 in the law of the active contacts, (k, d).
 
     before (k, d): u0; opening (k,): gap over h, of open contacts; theta; restitution: that of
-    contacts with the law on u1; on_mean (k,): those with the law on u_theta; tries: how often
+    contacts with the law on u1; on_mean (k,): those with the law on u_theta; springs: contacts
+    that give way, gap (k,) and pulled (k, d), forces at first, over theta h; tries: how often
     restitution was made smaller.
     """
 
@@ -261,14 +281,21 @@ class _Shifts:
     theta: float
     restitution: float
     on_mean: Mask
+    springs: Springs
+    gap: Array
+    pulled: Array
     tries: int = 0
 
     @classmethod
-    def of(cls, before: Array, gap: Array, method: MoreauJean) -> _Shifts:
-        """Those of a step that begins with u0 (k, d) and gaps (k,)."""
+    def of(
+        cls, before: Array, gap: Array, method: MoreauJean, springs: Springs, pulled: Array
+    ) -> _Shifts:
+        """Those of a step that begins with u0 (k, d), gaps (k,) and forces (k, d)."""
         none = np.zeros(len(before), dtype=bool)
         opening = np.maximum(gap, 0) / method.step if method.reach else np.zeros(len(gap))
-        return cls(before, opening, method.theta, method.restitution, none)
+        end = method.theta * method.step
+        return cls(before, opening, method.theta, method.restitution, none, springs, gap / end,
+                   pulled / end)  # fmt: skip
 
     @property
     def values(self) -> Array:
@@ -280,7 +307,7 @@ class _Shifts:
         # gap at the end >= 0: u1 >= -(gap + (1 - theta) h u0) / (theta h)
         is_open = self.opening > 0
         out[is_open, 0] = (self.opening / self.theta + mean[:, 0])[is_open]
-        return out
+        return self.springs.shifted(out, mean, self.gap, self.pulled)
 
     def changed(self, r: Array, after: Array, excess: float) -> _Shifts | None:
         """Laws that create less than r and u1 = after, (k, d), did by `excess`; None: no other.
@@ -293,7 +320,7 @@ class _Shifts:
         creating = own > ROUNDING * size  # with restitution 1 it is zero but for rounding
         if (creating & ~self.on_mean).any():
             return replace(self, on_mean=self.on_mean | creating)
-        impact = (self.before[:, 0] < 0) & ~self.on_mean
+        impact = (self.before[:, 0] < 0) & ~self.on_mean & ~self.springs.presses
         power = float(r[impact, 0] @ -self.before[impact, 0])
         e = self.restitution
         if e > 0 and power > 0 and self.tries < TRIES:

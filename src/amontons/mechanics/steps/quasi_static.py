@@ -26,10 +26,13 @@ from ...problem.nitsche import NitscheProblem
 from ...problem.solution import FrictionSolution
 from ..model import Model
 from ..model.diagnosis import with_diagnosis
+from ..model.reactions import support_forces
 from .energy import Energies, Forces, slow_energies
 from .large_steps import LargeSlowModel
 from .moreau_jean import Solve
 from .passage import Crossing, taken
+from .rubbing import quasi_static_friction, rubbed
+from .springs import Springs
 from .state import State, TimeStep, undeformed
 from .system import Motion
 from .undetermined import carried_on
@@ -72,6 +75,8 @@ class SlowModel:
 
     def __init__(self, model: Model, crossing: Crossing | None = None) -> None:
         self.motion, self.crossing = Motion(model), crossing
+        parts = self.motion.parts
+        self.springs = Springs.of(self.motion.body.law, parts.carried.shape[1])
 
     def begin(self, state: State) -> State:
         """The state before the first step: undeformed, also where supports hold the body."""
@@ -86,7 +91,7 @@ class SlowModel:
         """
         parts = self.motion.parts
         load, prescribed = self.motion.applied(time)
-        problem = self.motion.body.increment(load, prescribed, state.slip)
+        problem = self.motion.body.increment(load, prescribed, self._remembered(state))
         arrive = None
         if self.crossing is not None:
             steps: Any = self._before(state, time), problem  # the path refuses Nitsche's form
@@ -99,13 +104,17 @@ class SlowModel:
         q1 = parts.spread(solution.v, prescribed)
         dq = q1 - state.displacement
         u = parts.local(q1)
-        energies = self._energies(state, q1, load, solution.r)
+        slip = self.springs.slipped(parts.local(dq), state.force, solution.r)
+        work = quasi_static_friction(state.force[:, 1:], solution.r[:, 1:], slip)
+        energies = self._energies(state, q1, load, solution.r, float(work.sum()))
         time_step = time - state.time
         velocity = dq / time_step if time_step else np.zeros_like(dq)
-        new = State(state.index + 1, time, q1, velocity, solution.r, u[:, 1:])
+        new = State(state.index + 1, time, q1, velocity, solution.r, u[:, 1:],
+                    **rubbed(state, slip, solution.sliding, work))  # fmt: skip
+        reaction = support_forces(parts, parts.missing(q1, load, solution.r))
         active = np.arange(len(parts.gap))
         return TimeStep(self.motion.body, new, solution, active, energies, parts.gap + u[:, 0],
-                        passage=passage)  # fmt: skip
+                        reaction, load, passage=passage)  # fmt: skip
 
     def _before(self, state: State, time: float) -> FrictionProblem | NitscheProblem:
         """The problem that the last state solves, slipping as it did: p = 0 of `passage`.
@@ -119,22 +128,25 @@ class SlowModel:
         load = parts.K @ q - parts.whole_H @ state.force.ravel()
         motion = (parts.whole_H.T @ state.velocity).reshape(parts.carried.shape)
         drift = (time - state.time) * motion[:, 1:]
-        return self.motion.body.increment(load, held, state.slip - drift)
+        return self.motion.body.increment(load, held, self._remembered(state) - drift)
+
+    def _remembered(self, state: State) -> Array:
+        """Where friction counts its way from, (nc, d-1)."""
+        return self.springs.remembered(state.slip, state.force)
 
     def explained(self, solution: FrictionSolution) -> FrictionSolution:
         """The same record; one that failed says which bodies give way."""
         return with_diagnosis(solution, self.motion.body, solution.problem.f)
 
-    def _energies(self, state: State, q1: Array, load: Array, r: Array) -> Energies:
+    def _energies(
+        self, state: State, q1: Array, load: Array, r: Array, friction: float
+    ) -> Energies:
         """The balance of `slow_energies`; r (nc, d): reactions after the step."""
         parts, dq = self.motion.parts, q1 - state.displacement
-        before = self._forces(
-            state.displacement, self.motion.load_of(state), parts.whole_H @ state.force.ravel()
-        )
-        after = self._forces(q1, load, parts.whole_H @ r.ravel())
-        friction = float((r[:, 1:] * parts.local(dq)[:, 1:]).sum())
+        before = self._forces(state.displacement, self.motion.load_of(state), state.force)
+        after = self._forces(q1, load, r)
         return slow_energies(before, after, dq, parts.held, friction)
 
-    def _forces(self, q: Array, load: Array, pushed: Array) -> Forces:
-        inner = self.motion.parts.K @ q
-        return Forces(inner, load, pushed, float(0.5 * q @ inner))
+    def _forces(self, q: Array, load: Array, r: Array) -> Forces:
+        inner, pushed = self.motion.parts.K @ q, self.motion.parts.whole_H @ r.ravel()
+        return Forces(inner, load, pushed, float(0.5 * q @ inner), self.springs.energy(r))

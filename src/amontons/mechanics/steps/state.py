@@ -17,6 +17,9 @@ from ...problem.solution import ContactStatus, FrictionSolution
 from ..contact import forces
 from ..model import ContactFields, Fix, Model
 from ..model.doubts import model_warnings
+from ..model.fields import by_body, load_wrench
+from ..model.pairs import PairResult, pair_results
+from ..model.reactions import SupportResult, support_results
 from ..model.supports import locate, prescribed_values
 from ..model.values import VectorValue, check_vector, vector_at
 from .energy import Energies
@@ -27,6 +30,7 @@ from .timed import part_at, steady
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 ARRAYS = {"displacement": 1, "velocity": 1, "force": 2, "slip": 2}  # name: dimensions
+RUBBED = {"slid": 2, "path": 1, "friction_work": 1}  # the same of what no step needs
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +39,9 @@ class State:
 
     index: steps done; time; displacement, velocity (dofs,) of all bodies one after another;
     force (nc, d): contact forces on the slaves in the local frames, zero where none is active;
-    slip (nc, d-1): tangential displacement since the start.
+    slip (nc, d-1): tangential displacement since the start.  What no step needs, zero where
+    it is not given: slid (nc, d-1), what the contacts have slid, net; path (nc,), the length of
+    that way; friction_work (nc,), the energy that it took.
     """
 
     index: int
@@ -44,6 +50,9 @@ class State:
     velocity: Array
     force: Array
     slip: Array
+    slid: Array = None  # type: ignore[assignment]  # zeros where none
+    path: Array = None  # type: ignore[assignment]
+    friction_work: Array = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         index = integers("state: index", self.index)
@@ -53,6 +62,14 @@ class State:
         object.__setattr__(self, "time", number("state: time", self.time))
         for name, dimensions in ARRAYS.items():
             array = finite(f"state: {name}", getattr(self, name), dimensions)
+            object.__setattr__(self, name, array)
+        for name, dimensions in RUBBED.items():
+            given, shape = getattr(self, name), self.slip.shape[:dimensions]
+            array = finite(
+                f"state: {name}", np.zeros(shape) if given is None else given, dimensions
+            )
+            if array.shape != shape:
+                raise InvalidInput(f"state: {name}: expected shape {shape}, got {array.shape}")
             object.__setattr__(self, name, array)
 
     @property
@@ -68,6 +85,8 @@ class TimeStep:
     active (k,): the contacts that are in the problem, in order; the rest is open.  gap (nc,)
     after the step, unit of length.  frames (nc, d, d): those of the deformed state where it is
     large, else those of the model hold.  passage: the path of the step where it was followed.
+    reaction, load (dofs,): nodal forces of supports, and of loads, at the end of the step, in
+    dynamics their means over it.
     """
 
     model: Model
@@ -76,6 +95,8 @@ class TimeStep:
     active: Index
     energies: Energies
     gap: Array
+    reaction: Array
+    load: Array
     frames: Array | None = None
     passage: Passage | None = None
 
@@ -92,20 +113,15 @@ class TimeStep:
     @property
     def displacement(self) -> tuple[Array, ...]:
         """Displacement of every body, (nodes, dim)."""
-        return self._by_body(self.state.displacement)
+        return self._split(self.state.displacement)
 
     @property
     def v(self) -> tuple[Array, ...]:
         """Velocity of every body, (nodes, dim)."""
-        return self._by_body(self.state.velocity)
+        return self._split(self.state.velocity)
 
-    def _by_body(self, values: Array) -> tuple[Array, ...]:
-        offsets = self.model.discretisation.offsets
-        parts = np.split(values, offsets[1:-1])
-        return tuple(
-            part.reshape(body.mesh.points.shape)
-            for part, body in zip(parts, self.model.bodies, strict=True)
-        )
+    def _split(self, values: Array) -> tuple[Array, ...]:
+        return by_body(self.model.bodies, self.model.discretisation, values)
 
     @cached_property
     def status(self) -> NDArray[np.int8]:
@@ -141,7 +157,20 @@ class TimeStep:
             body=np.concatenate([np.full(len(p.rows.nodes), p.body) for p in placed]),
             node=np.concatenate([r.nodes for r in rows]),
             facets=tuple((k, self.model.bodies[k].mesh.surface(name)) for k, name in surfaces),
+            status=self.status, slid=self.state.slid, path=self.state.path,
+            friction_work=self.state.friction_work, reaction=self._split(self.reaction),
+            load=load_wrench(self.model, self.displacement, self.load),
         )  # fmt: skip
+
+    @cached_property
+    def pairs(self) -> dict[str, PairResult]:
+        """Force, moment, area, slip, … of every contact pair, by its name."""
+        return pair_results(self.model, self.fields)
+
+    @cached_property
+    def supports(self) -> dict[str, SupportResult]:
+        """Force and moment of every support, by its name."""
+        return support_results(self.model, self.fields)
 
     @cached_property
     def warnings(self) -> tuple[ResultWarning, ...]:

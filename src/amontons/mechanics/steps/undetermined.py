@@ -26,6 +26,8 @@ def carried_on(found: FrictionSolution, before: Array) -> FrictionSolution:
     if not isinstance(problem, FrictionProblem) or problem.H is None:
         return found
     felt = np.asarray(abs(problem.H).sum(axis=0)).reshape(found.r.shape) > 0
+    if problem.law.give is not None:  # the springs of a contact feel it
+        felt |= problem.law.give[:, : felt.shape[1]] > 0
     free = ~felt[:, 1:] & (found.u[:, 1:] == 0)
     free &= (found.status == ContactStatus.STICK)[:, None]
     if not (free & (before[:, 1:] != 0)).any():

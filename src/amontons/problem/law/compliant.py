@@ -9,7 +9,8 @@ slipped elastically by -c_T r_T.  As u + C r = (W + C) r + q, a problem with com
 without it whose W has more on its diagonal: definite where c, c_T > 0, also where W is not.
 Its energy r.C r / 2 is stored in the contacts.  c -> 0 is the law without compliance.
 
-c_T counts from the state in which u = 0: it is meant for one step, not for a path of steps.
+c_T counts from the state in which u_T = 0; in steps one after the other, u_T is to count from
+the last u_T + c_T r_T (`mechanics.steps.springs`).
 """
 
 from __future__ import annotations

@@ -193,6 +193,9 @@ class Law:
             "friction bound": bound[self.kind != COULOMB].ravel(),
             "cohesion": self.cohesion[self.cohesion > 0],
         }
+        if self.give is not None:
+            table["contact compliance"] = self.give[self.give[:, 0] > 0, 0]
+            table["stick compliance"] = self.give[self.give[:, 1] > 0, 1]
         return {name: values for name, values in table.items() if values.size}
 
 

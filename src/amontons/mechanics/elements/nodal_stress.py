@@ -1,0 +1,80 @@
+"""Stress at nodes: what the cells around say of it there, averaged by volume."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import InvertedCells
+from ..meshes.cells import CELLS, ReferenceCell
+from .cell_loops import nodal_gradients_inplace
+from .elasticity import cell_stress, geometry_of, materials_by_region
+from .hyperelasticity import cauchy_stress, is_hyperelastic
+
+if TYPE_CHECKING:
+    from ..meshes.mesh import Mesh
+
+Array = NDArray[np.float64]
+ASIDE = 1e-3  # how far from the apex of a pyramid its gradients are taken: there are none at it
+
+
+def stress_of(mesh: Mesh, material: Any, displacement: Array) -> tuple[Array, Array]:
+    """Stress at the centres of the cells, (cells, 3, 3), and at the nodes, (nodes, 3, 3).
+
+    material: of a body that deforms; displacement (nodes, dim).  Cauchy stress of hyperelastic
+    laws, see `cell_stress` for the others.  Regions keep their laws: a node between them has
+    the mean of their stresses.  Raises InvertedCells where the centre of a cell is.
+    """
+    of: Any = cauchy_stress if is_hyperelastic(material) else cell_stress
+    at_centres = of(mesh, material, displacement)
+    return at_centres, _at_nodes(mesh, material, displacement, at_centres)
+
+
+def _at_nodes(mesh: Mesh, material: Any, displacement: Array, at_centres: Array) -> Array:
+    laws = materials_by_region(mesh, material)
+    u = np.ascontiguousarray(displacement, dtype=float)
+    n, dim = u.shape
+    unit = (1.0,) * dim
+    total, weight = np.zeros((n, 3, 3)), np.zeros(n)
+    for law in {id(law): law for law in laws.values()}.values():
+        gradient, volume = np.zeros((n, dim, dim)), np.zeros(n)
+        for cells in mesh.cells:
+            if laws[cells.region] is law:
+                cell = CELLS[cells.kind]
+                rule = (_places(cell), np.ones(cell.nodes))
+                points, nodes, slopes, _ = geometry_of(mesh, cells, rule)
+                nodal_gradients_inplace(u, points, nodes, slopes, gradient, volume, unit)
+        at = np.flatnonzero(volume)
+        try:
+            stress = law.stress(gradient[at] / volume[at, None, None])
+        except InvertedCells:  # at corners, though no cell is at its centre
+            return _mean_of_centres(mesh, at_centres)
+        total[at] += volume[at, None, None] * stress
+        weight += volume
+    missing = weight == 0
+    out = total / np.where(missing, 1.0, weight)[:, None, None]
+    if missing.any():
+        out[missing] = _mean_of_centres(mesh, at_centres)[missing]
+    return out
+
+
+def _places(cell: ReferenceCell) -> Array:
+    """Where gradients at the nodes are taken, (nodes, dim)."""
+    if cell.kind != "pyramid":
+        return cell.corners
+    return (1 - ASIDE) * cell.corners + ASIDE * cell.centre
+
+
+def _mean_of_centres(mesh: Mesh, at_centres: Array) -> Array:
+    """Mean of the stresses of the cells around every node, (nodes, 3, 3)."""
+    total, count = np.zeros((len(mesh.points), 3, 3)), np.zeros(len(mesh.points))
+    first = 0
+    for cells in mesh.cells:
+        own = at_centres[first : first + len(cells.nodes)]
+        for column in cells.nodes.T:
+            np.add.at(total, column, own)
+            np.add.at(count, column, 1)
+        first += len(cells.nodes)
+    return total / count[:, None, None]

@@ -1,0 +1,100 @@
+"""What supports do to the bodies: forces at their nodes, and resultants.
+
+Where the bodies need `inner`, loads give `load` and contacts `pushed`, what is left at dofs
+that supports hold is theirs:  reaction = inner - load - pushed.  Forces of supports on a rigid
+body are known as far as they move it: of all that do the same, the smallest is taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..elements.hyperelasticity import is_hyperelastic
+from .names import support_names
+from .supports import prescribed_values
+from .wrench import Wrench
+
+if TYPE_CHECKING:
+    from .assembly import Discretisation
+    from .fields import ContactFields
+    from .model import Model
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class SupportResult:
+    """The force of one support on the bodies, (d,), global axes, and its moment.
+
+    name: the surface, numbered where several supports hold one.  A component that several
+    supports prescribe at a node counts for the first of them.
+    """
+
+    name: str
+    on: str
+    wrench: Wrench
+
+    @property
+    def force(self) -> Array:
+        """(d,), global axes; in 2D per thickness."""
+        return self.wrench.force
+
+    @property
+    def moment(self) -> Array:
+        """About `point`, (3,), in 2D (1,)."""
+        return self.wrench.moment
+
+    @property
+    def point(self) -> Array:
+        """(d,), the origin unless `about` has moved it."""
+        return self.wrench.point
+
+    def about(self, point: Sequence[float]) -> SupportResult:
+        """The same with the moment about another point (d,)."""
+        return SupportResult(self.name, self.on, self.wrench.about(point))
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """Plain data: name, on, force, moment, point."""
+        return {"name": self.name, "on": self.on, **self.wrench.record}
+
+
+def support_forces(parts: Discretisation, rest: Array) -> Array:
+    """Forces of supports on all dofs (dofs,), of inner - load - pushed there, (dofs,)."""
+    out = np.zeros_like(rest)
+    out[parts.fixed] = rest[parts.fixed]
+    if parts.rigid is not None:
+        out[parts.rigid.dofs] = 0.0
+        for body in parts.rigid.bodies:
+            out[body.at] = body.held_by(rest[body.dofs])
+    return out
+
+
+def arms(model: Model, displacement: Sequence[Array]) -> Array:
+    """Where the forces at all nodes act, (nodes, d): deformed at finite strains alone.
+
+    Small strains balance forces on the undeformed body, and so do their moments.
+    """
+    points = np.concatenate([body.mesh.points for body in model.bodies])
+    if any(is_hyperelastic(body.material) for body in model.bodies):
+        return points + np.concatenate(list(displacement))
+    return points
+
+
+def support_results(model: Model, fields: ContactFields) -> dict[str, SupportResult]:
+    """The force of every support of a solved model, by its name."""
+    parts = model.discretisation
+    at, whole = arms(model, fields.displacement), np.concatenate(fields.reaction)
+    left, out = np.ones(whole.size, dtype=bool), {}
+    for name, support in zip(support_names(model.supports), model.supports, strict=True):
+        held = ~np.isnan(prescribed_values(model.bodies, (support,), parts.offsets)) & left
+        left &= ~held
+        nodes = np.flatnonzero(held.reshape(whole.shape).any(axis=1))
+        forces = np.where(held.reshape(whole.shape)[nodes], whole[nodes], 0.0)
+        out[name] = SupportResult(name, support.on, Wrench.of(at[nodes], forces))
+    return out
