@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...analysis.paths.events import EventKind
 from ...analysis.paths.path import Branch
-from ...mechanics.model.fields import ContactFields
+from ...mechanics.model.fields import ContactFields, by_body
 from ...mechanics.steps.system import Motion
+from ...mechanics.steps.timed import steady
 from ..units import Units
 from .charts import chart, line, rounded
 from .page import Page, Table
@@ -97,30 +99,15 @@ def _state(stage: Stage, model: Model, branch: Branch, index: int, prefix: str) 
 
 def _fields(model: Model, branch: Branch, solution: Any, p: float) -> ContactFields:
     """Fields of a point: supports stand where the load, or the time, at that point has them."""
-    from dataclasses import replace
-
-    from ...mechanics.model.large_fields import large_fields
-    from ...mechanics.model.supports import locate
-    from ...mechanics.steps.timed import steady
-
     body = steady(model)
     if branch.name != "load":
         return body.recover(solution)
     motion = Motion(model)
     if not motion.is_timed:
         return body.with_load(p).recover(solution)
-    prescribed = motion.applied(p)[1]
     parts = body.discretisation
-    if body.is_large:
-        whole = np.array(prescribed)
-        whole[parts.free] = solution.v
-        surfaces = tuple(locate(body.bodies, c.slave) for c in body.contacts)
-        return large_fields(body, surfaces, whole, solution.r, solution.u)
-    fields = body.recover(solution)
-    whole = parts.spread(solution.v, prescribed)
-    moved = [part.reshape(b.mesh.points.shape) for part, b in
-             zip(np.split(whole, parts.offsets[1:-1]), body.bodies, strict=True)]  # fmt: skip
-    return replace(fields, displacement=tuple(moved))
+    whole = parts.spread(solution.v, motion.applied(p)[1])
+    return replace(body.recover(solution), displacement=by_body(body.bodies, parts, whole))
 
 
 def _verdict(branches: Sequence[Branch], reason: str, name: str) -> tuple[str, str]:

@@ -24,6 +24,7 @@ from .words import (
     cost_table,
     judged_table,
     outcome_words,
+    pairs_table,
     result_table,
     verdict_words,
     version_rows,
@@ -58,6 +59,7 @@ def solve_page(output: Output, units: Units, title: str = "") -> Page:
         outcome=outcome_words(record), stamp=record.stamp, verdict=verdict_words(verdict),
         facts=[result_table(output, units), judged_table(output), cost_table(output)],
         warnings=tuple(f"{w.message} [{w.name}]" for w in output.warnings),
+        tables=pairs_table(output, units),
         charts=[c for c in charts if c], stage=stage, states=states or [], units=units,
     )  # fmt: skip
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...linear.blocks import spatial
-from ..contact_fields import contact_fields
+from ..contact_fields import SLAVE, contact_fields
 from .skin import Skin
 
 if TYPE_CHECKING:
@@ -65,7 +65,9 @@ class Stage:
         starts = np.cumsum([0, *sizes])
         found = contact_fields(model, fields, solution.sliding, starts)
         values = {name: found[key].astype(float) for name, key in NAMES.items()}
-        status = found["CSTATUS"].astype(np.int64)
+        status = found["CSTATUS"]
+        on_slaves = (found["CSIDE"] & SLAVE).astype(bool)
+        force = np.where(on_slaves[:, None], found["CFORCE"], 0.0)
         at = skin.whole
         mine = at[self.contacts]
         moved = spatial(np.concatenate(fields.displacement))[at]
@@ -75,7 +77,7 @@ class Stage:
         return State(
             moved.astype(np.float32), status[mine].astype(np.int8),
             {name: array[mine] for name, array in values.items()},
-            found["CFORCE"][at].astype(np.float32), stamp=told.convergence.stamp,
+            force[at].astype(np.float32), stamp=told.convergence.stamp,
             counts=counts, **words,
         )  # fmt: skip
 

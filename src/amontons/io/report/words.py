@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...analysis.certificates.uniqueness import Uniqueness, Verdict
+from ...mechanics.model.pairs import pair_results
 from ...problem.judge.measures import Measure
 from ...problem.solution import TELLING, Convergence
 from ..results import Output, method_name, versions
@@ -63,6 +64,23 @@ def result_table(output: Output, units: Units) -> Table:
         rows.append(["largest penetration",
                      with_unit(f"{found.max_penetration:.2g}", units.length)])  # fmt: skip
     return Table("Result", ("", ""), rows)
+
+
+def pairs_table(output: Output, units: Units) -> list[Table]:
+    """Force, area, largest pressure, slip and friction work of every contact pair."""
+    if output.model is None or output.fields is None:
+        return []
+    rows = [
+        [name, ", ".join(f"{value:.5g}" for value in _rounded(pair.force)), f"{pair.area:.5g}",
+         f"{pair.largest_pressure:.5g}", f"{pair.friction_work:.4g}",
+         f"{100 * pair.share_sticking:.3g} %"]
+        for name, pair in pair_results(output.model, output.fields).items()
+    ]  # fmt: skip
+    names = (("force on the slave", units.force), ("area in contact", ""),
+             ("largest pressure", units.stress), ("friction work", ""))  # fmt: skip
+    columns = ("pair", *(f"{name}, {unit}" if unit else name for name, unit in names),
+               "sticking")  # fmt: skip
+    return [Table("Contact pairs", columns, rows)]
 
 
 def judged_table(output: Output) -> Table:
