@@ -119,7 +119,8 @@ def test_the_current_folder_is_not_searched(tmp_path, monkeypatch):
 
 def test_a_reader_by_entry_point(module, monkeypatch):
     np.savez("small.npz", W=np.eye(2), q=np.array([[-1.0, 0.5]]), mu=[0.3])
-    with pytest.raises(am.FileFormatError, match=r"\(.toml\) or .*\(.hdf5, .h5\).*neither"):
+    known = r"\(.toml\), .*\(.hdf5, .h5\) or .*\(.inp, .inp.gz\).*none of them"
+    with pytest.raises(am.FileFormatError, match=known):
         open_source("small.npz")
     offer(monkeypatch, "amontons.readers", "npz", "delassus_npz:FORMAT")
     result = run("solve", "small.npz", "--set", "solver.tolerance=1e-9")

@@ -80,7 +80,8 @@ def near_file(path: Path) -> str:
 
 def helpful(thing: Thing) -> Thing:
     """A function, or a class, whose TypeError for an unknown argument names the nearest one."""
-    target: Callable[..., Any] = thing.__init__ if isinstance(thing, type) else thing  # type: ignore[misc]
+    is_class = isinstance(thing, type)
+    target: Callable[..., Any] = thing.__init__ if is_class else thing  # type: ignore[misc]
     names = [name for name in inspect.signature(target).parameters if name != "self"]
     title = thing.__name__
 
@@ -91,7 +92,6 @@ def helpful(thing: Thing) -> Thing:
                 raise TypeError(f"{title}: no argument '{name}'{nearest(name, names)}")
         return target(*args, **named)
 
-    if isinstance(thing, type):
+    if is_class:
         thing.__init__ = called  # type: ignore[misc]
-        return thing
-    return called  # type: ignore[return-value]
+    return thing if is_class else called  # type: ignore[return-value]

@@ -194,7 +194,7 @@ FLAGS = {
     "no file": (["solve", "gone.hdf5"], ["gone.hdf5", "no such file"]),
     "no example": (["solve", "example:cub"], ["cub", "did you mean 'cube'"]),
     "folder": (["solve", "folder"], ["folder"]),
-    "text": (["solve", "text.txt"], ["text.txt", "neither"]),
+    "text": (["solve", "text.txt"], ["text.txt", "none of them"]),
     "empty": (["solve", "empty.hdf5"], ["empty"]),
     "no command": (["slove", "good.hdf5"], ["slove"]),
     "unknown flag": (["solve", "good.hdf5", "--tolerence", "1"], ["--tolerence"]),

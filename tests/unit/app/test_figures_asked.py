@@ -28,13 +28,13 @@ def written(folder):
 def test_formats_and_none(tmp_path):
     place = tmp_path / "out"
     run("solve", *SMALL, "-o", place, "--figures", "svg")
-    assert written(place) == ["convergence.svg", "solution.json", "status.svg"]
+    assert written(place) == ["convergence.svg", "pairs.csv", "solution.json", "status.svg"]
     run("solve", *SMALL, "-o", place, "--figures", "pdf", "--quiet")
-    assert written(place) == ["convergence.pdf", "solution.json", "status.pdf"]
+    assert written(place) == ["convergence.pdf", "pairs.csv", "solution.json", "status.pdf"]
     run("solve", *SMALL, "-o", place, "--no-figures")  # older ones would be another's
-    assert written(place) == ["solution.json"]
+    assert written(place) == ["pairs.csv", "solution.json"]
     run("solve", *SMALL, "-o", place)
-    assert written(place) == ["convergence.png", "solution.json", "status.png"]
+    assert written(place) == ["convergence.png", "pairs.csv", "solution.json", "status.png"]
 
 
 def test_a_wrong_format_is_refused(tmp_path):

@@ -171,11 +171,10 @@ def test_the_command_line_says_it_too(tmp_path, monkeypatch, verb):
 
 def test_pictures_of_a_run_that_failed_say_so(tmp_path, monkeypatch):
     """The first step holds, the second does not."""
-    from amontons.io.plots import energies, steps
+    from amontons.io.plots import layout
 
     stamped = []
-    monkeypatch.setattr(steps, "stamp", lambda figure, text: stamped.append(text))
-    monkeypatch.setattr(energies, "stamp", lambda figure, text: stamped.append(text))
+    monkeypatch.setattr(layout, "stamp", lambda figure, text: stamped.append(text))
     monkeypatch.chdir(tmp_path)
     write_gmsh(parts(2), tmp_path / "parts.msh")
     case = tmp_path / "case.toml"

@@ -30,6 +30,11 @@ if TYPE_CHECKING:
 
 EXAMPLE = "example:"  # before the name of a built-in case
 DATA = files("amontons") / "examples_data"
+SLIPS = {  # values that are no TOML, and what is meant
+    r"[-+]?\d+,\d+": "numbers have a point, not a comma",
+    r"[-+]?\.\d+": "numbers begin with a digit, 0.1 and not .1",
+    r"(?!true$|false$|inf$|nan$)[A-Za-z][\w-]*": "words stand in quotes",
+}
 LARGEST_FILE = 2**24  # bytes of a case file; meshes stand in files of their own
 TOP = ("title", "mesh", "wall", "material", "fix", "traction", "pressure", "body_force",
        "contact", "solver", "continuation", "evolution", "units")  # fmt: skip
@@ -102,24 +107,18 @@ def _load(path: Path) -> dict[str, Any]:
     except FileFormatError:
         raise
     except (tomllib.TOMLDecodeError, RecursionError, ValueError) as reason:
-        why = f"{reason}{_hint(path, reason)}"
+        why = f"{reason}{_hint(path)}"
         raise FileFormatError(f"{path}: not valid TOML: {why}") from None
 
 
-def _hint(path: Path, reason: Exception) -> str:
-    """What is often wrong in the line that is no TOML, in words."""
-    found = re.search(r"at line (\d+)", str(reason))
-    if found is None:
-        return ""
-    line = path.read_text(encoding="utf-8", errors="replace").splitlines()
-    text = line[int(found[1]) - 1].strip() if int(found[1]) <= len(line) else ""
-    if re.search(r"\d,\d", text) and "[" not in text:
-        return f"; numbers have a point, not a comma: {text}"
-    if re.search(r"=\s*-?\.\d", text):
-        return f"; numbers begin with a digit, 0.1 and not .1: {text}"
-    if re.search(r"=\s*[A-Za-z]", text):
-        return f"; words stand in quotes: {text}"
-    return f": {text}"
+def _hint(path: Path) -> str:
+    """What is often wrong in a file that is no TOML, in words, or ""."""
+    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+        value = line.partition("#")[0].partition("=")[2].strip()
+        for pattern, words in SLIPS.items():
+            if re.fullmatch(pattern, value):
+                return f"; {words}: {line.strip()}"
+    return ""
 
 
 # -------------------------------------------------------------------------------- model

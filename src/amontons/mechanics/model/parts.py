@@ -354,8 +354,9 @@ class Contact:
             raise InvalidInput(
                 f"contact on {self.slave!r}: expected law or its numbers, got both"
             )
+        numbers = _numbers_of(law)
         object.__setattr__(self, "tied", bool(law.tied.all() and len(law)))
-        for name, value in _numbers_of(law).items():
+        for name, value in numbers.items():
             if not isinstance(value, FrictionCurve) and len(value) == 1:
                 value = float(value[0])  # noqa: PLW2901
             object.__setattr__(self, name, value)
