@@ -37,7 +37,7 @@ SYNONYMS: dict[str, tuple[str, ...]] = {
     "duration": ("until",), "dt": ("step",), "time_step": ("step",), "timestep": ("step",),
     "n": ("cells",), "resolution": ("cells",), "size": ("box", "lengths"),
     "path": ("file",), "filename": ("file",), "mesh_file": ("file",),
-    "material": ("material",), "materials": ("material",), "contacts": ("contact", "contacts"),
+    "materials": ("material",), "contacts": ("contact", "contacts"),
     "gauss_seidel": ("GaussSeidel",), "newton": ("semismooth-newton", "SemismoothNewton"),
     "nsgs": ("gauss-seidel", "GaussSeidel"), "penalty": ("active-set", "ActiveSet"),
     "export": ("convert",), "plot": ("solve",), "simulate": ("run",), "evolve": ("run",),

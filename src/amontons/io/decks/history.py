@@ -289,11 +289,10 @@ def _forces(history: History, each: Placed, span: Span, known: Amplitudes,
             course = Course() if before == FREE else out.courses[before]
             if adds:
                 _same_amplitude(row, card, out.cards[before])
-                base = Course(course.times[:1], course.values[:1])
-                size = course.last + value if card.label("AMPLITUDE") is None else None
-                if size is None:
+                if card.label("AMPLITUDE") is not None:
                     raise row.error("*CLOAD: forces with an amplitude at one node add up twice")
-                course = _course(_until(course, span.begin) or base, size, span, card, known)
+                before_it = _until(course, span.begin)
+                course = _course(before_it, course.last + value, span, card, known)
             else:
                 course = _course(course, value, span, card, known)
             out.courses.append(course)
@@ -310,10 +309,9 @@ def _same_amplitude(row: Row, card: Card, other: Card) -> None:
         )
 
 
-def _until(course: Course, t: float) -> Course | None:
-    kept = [k for k, time in enumerate(course.times) if time <= t]
-    if not kept:
-        return None
+def _until(course: Course, t: float) -> Course:
+    """What a course was up to a time, at least its first point."""
+    kept = [k for k, time in enumerate(course.times) if time <= t] or [0]
     return Course(tuple(course.times[k] for k in kept), tuple(course.values[k] for k in kept))
 
 

@@ -62,11 +62,6 @@ def _(result: Branch, **options: Any) -> Figure:
 
 
 @figure_of.register
-def _(result: Output, *, title: str = "") -> Figure:
-    return status_figure(result.solution, result.fields, title or result.title, result.model)
-
-
-@figure_of.register
 def _(result: Diagram, **options: Any) -> Figure:
     return branch_figure(result.branches, **options)
 
