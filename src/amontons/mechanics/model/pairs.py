@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from ...problem.law.states import ContactStatus
 from .matching import pairs_of
 from .reactions import arms
-from .wrench import Wrench
+from .wrench import Acting, Wrench
 
 if TYPE_CHECKING:
     from .fields import ContactFields
@@ -37,7 +36,7 @@ class Slip:
 
 
 @dataclass(frozen=True, eq=False)
-class PairResult:
+class PairResult(Acting):
     """What one contact pair transmits.
 
     name, slave, master: as in the model, master None with an obstacle, whose kind is then in
@@ -57,25 +56,6 @@ class PairResult:
     slip: Slip
     friction_work: float
     share_sticking: float
-
-    @property
-    def force(self) -> Array:
-        """On the slave, (d,), global axes."""
-        return self.wrench.force
-
-    @property
-    def moment(self) -> Array:
-        """Of the forces on the slave about `point`, (3,), in 2D (1,) about z."""
-        return self.wrench.moment
-
-    @property
-    def point(self) -> Array:
-        """(d,), the origin unless `about` has moved it."""
-        return self.wrench.point
-
-    def about(self, point: Sequence[float]) -> PairResult:
-        """The same with the moment about another point (d,)."""
-        return replace(self, wrench=self.wrench.about(point))
 
     @property
     def record(self) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..elements.hyperelasticity import is_hyperelastic
 from .names import support_names
 from .supports import prescribed_values
-from .wrench import Wrench
+from .wrench import Acting, Wrench
 
 if TYPE_CHECKING:
     from .assembly import Discretisation
@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class SupportResult:
+class SupportResult(Acting):
     """The force of one support on the bodies, (d,), global axes, and its moment.
 
     name: the surface, numbered where several supports hold one.  A component that several
@@ -38,25 +38,6 @@ class SupportResult:
     name: str
     on: str
     wrench: Wrench
-
-    @property
-    def force(self) -> Array:
-        """(d,), global axes; in 2D per thickness."""
-        return self.wrench.force
-
-    @property
-    def moment(self) -> Array:
-        """About `point`, (3,), in 2D (1,)."""
-        return self.wrench.moment
-
-    @property
-    def point(self) -> Array:
-        """(d,), the origin unless `about` has moved it."""
-        return self.wrench.point
-
-    def about(self, point: Sequence[float]) -> SupportResult:
-        """The same with the moment about another point (d,)."""
-        return SupportResult(self.name, self.on, self.wrench.about(point))
 
     @property
     def record(self) -> dict[str, Any]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,3 +53,28 @@ def cross(arms: Array, forces: Array) -> Array:
     if arms.shape[1] == 3:
         return np.cross(arms, forces)
     return (arms[:, 0] * forces[:, 1] - arms[:, 1] * forces[:, 0])[:, None]
+
+
+class Acting:
+    """What acts by a `wrench`: its force, and its moment about a point."""
+
+    wrench: Wrench
+
+    @property
+    def force(self) -> Array:
+        """(d,), global axes; in 2D per thickness."""
+        return self.wrench.force
+
+    @property
+    def moment(self) -> Array:
+        """About `point`, (3,), in 2D (1,) about z."""
+        return self.wrench.moment
+
+    @property
+    def point(self) -> Array:
+        """(d,), the origin unless `about` has moved it."""
+        return self.wrench.point
+
+    def about(self, point: Sequence[float]) -> Self:
+        """The same with the moment about another point (d,)."""
+        return replace(self, wrench=self.wrench.about(point))  # type: ignore[type-var]
