@@ -62,9 +62,9 @@ def solve(
     without progress after which a solve counts as stagnated; None to let time decide.
 
     A model is condensed for solvers that need the Delassus form; a FrictionProblem has the form
-    its owner chose, and the wrong one raises UnsupportedForm.  A model in large deformations
-    (`Model.is_large`) is solved by `NonlinearNewton`; the problem of its solution is the
-    tangent one of the deformed state.  A problem of your own is one that answers `Problem`.
+    its owner chose, and the wrong one raises UnsupportedForm.  A model in large deformations is
+    solved by `NonlinearNewton`; the problem of its solution is the tangent one of the deformed
+    state.  A problem of your own is one that answers `Problem`.
     """
     options = {"tolerance": tolerance, "contact_tolerance": contact_tolerance,
                "max_iterations": max_iterations, "time_limit": time_limit,
