@@ -13,17 +13,17 @@ from ..problem.friction import FrictionProblem
 from ..problem.plain import plain_motion
 from ..problem.protocol import Problem
 from ..problem.solution import FrictionSolution
+from .asked import Asked, Callback
 from .contract import Iterate
 from .first_iterate import first_iterate
 
 Array = NDArray[np.float64]
-Callback = Callable[[Any, Iterate], bool | None]
 Solve = Callable[[Any, Any, Any], FrictionSolution]  # problem, options, start
 
 
-def changed_law(problem: Problem, given: Any, start: Any, solve: Solve) -> FrictionSolution:
+def changed_law(problem: Problem, given: Asked, start: Any, solve: Solve) -> FrictionSolution:
     """The solution of a problem whose `plain` one is another; given: options of the driver."""
-    asked = given._replace(callback=_released_callback(problem, given.callback))
+    asked = replace(given, callback=_released_callback(problem, given.callback))
     found = solve(problem.plain, asked, _pressed(problem, start))
     return _released(problem, found)
 

@@ -22,15 +22,14 @@ from ..problem.law.law import MU
 from ..problem.protocol import Problem
 from ..problem.settling import Accepted
 from ..problem.solution import Convergence, FrictionSolution, Outcome, Step, StoppedBy
+from .asked import Asked
 from .contract import Breakdown, Iterate, Judgement, Solver, Target, sent
 from .first_iterate import own_motion, with_motion
 
 Array = NDArray[np.float64]
 Taken = Callable[[Problem, Iterate], Iterate]
-Callback = Callable[[Step, Iterate], bool | None]
 MEMORY = 64  # iterates among which a repetition counts as a cycle
 AT_REST = 1e-10  # relative change of r below which an iterate has not moved
-PATIENCE = 500  # iterates without any progress before a solve counts as stagnated
 PROGRESS = 0.99  # the best error must fall at least by this factor within PATIENCE
 BLUR = 1e-2  # rounding, relative to the tolerance, above which an error is evaluated sharply
 BLURRED = 20  # iterates that would do if rounding could hide no error in them
@@ -46,11 +45,8 @@ class Watch:
     """The driver's memory of one solve."""
 
     problem: Problem
+    asked: Asked
     method: str  # name of the solver
-    tolerance: float
-    contact_tolerance: float
-    criterion: Criterion = Criterion.JUDGE
-    patience: int | None = PATIENCE  # None: never stagnated
     taken: Taken = own_motion  # what of an iterate is judged
     started: float = field(default_factory=now)
     compiled: float = field(default_factory=compiling)  # until then
@@ -72,18 +68,18 @@ class Watch:
     def judge(self, iterate: Iterate) -> Step:
         """Judge an iterate and remember it if it is the best."""
         iterate = self.taken(self.problem, iterate)
-        if self.criterion is Criterion.NATURAL:
+        if self.asked.criterion is Criterion.NATURAL:
             error = self.problem.natural_error(iterate.r, iterate.v)
             return self._noted(iterate, error, None, None)
         error, weakest, told = self.problem.error(iterate.r, iterate.v), None, None
-        if error <= self.tolerance:
-            told = self.problem.accepted(iterate.r, iterate.v, error, self.tolerance)
+        if error <= self.asked.tolerance:
+            told = self.problem.accepted(iterate.r, iterate.v, error, self.asked.tolerance)
             error, weakest = told.error, told.weakest
             if told.r is not iterate.r:
                 iterate = replace(iterate, r=told.r, v=told.v)
-        if weakest is not None and weakest.hidden > BLUR * self.tolerance:
+        if weakest is not None and weakest.hidden > BLUR * self.asked.tolerance:
             error = self.problem.certain_error(iterate.r, iterate.v)
-            if error > self.tolerance:
+            if error > self.asked.tolerance:
                 weakest = None
                 self.blurred += 1
         return self._noted(iterate, error, weakest, told)
@@ -129,29 +125,29 @@ class Watch:
     @property
     def converged(self) -> bool:
         """True when the best iterate will do in the sum and at every contact."""
-        good = self.error <= self.tolerance
-        return good and (self.weakest is None or self.weakest.error <= self.contact_tolerance)
+        good = self.error <= self.asked.tolerance
+        return good and (self.weakest is None or self.weakest.error <= self.asked.of_contacts)
 
     @property
     def weak(self) -> bool:
         """True when the best iterate will do in the sum alone."""
-        return self.error <= self.tolerance and not self.converged
+        return self.error <= self.asked.tolerance and not self.converged
 
     @property
     def in_words(self) -> str:
         """Why the best iterate will not do though its error is small; "" where it would."""
-        if self.criterion is Criterion.NATURAL:
+        if self.asked.criterion is Criterion.NATURAL:
             return ""
         if self.best is not None and not self.converged:
             hidden = self.problem.rounding(self.best.r)
             mu = self.problem.law.parameters[:, MU].max(initial=0.0)
-            if mu * EPSILON > self.tolerance:
+            if mu * EPSILON > self.asked.tolerance:
                 return (
                     f"rounding of the slip, times friction of {mu:.0e}, is above the "
                     "tolerance: hold contacts that can not slip by supports, or take mu below "
                     "1e7"
                 )
-            if hidden > self.tolerance:
+            if hidden > self.asked.tolerance:
                 return (
                     f"rounding alone may hide an error of {hidden:.1e}: reactions are huge "
                     "beside what loads the contacts"
@@ -160,15 +156,15 @@ class Watch:
             return ""
         return (
             f"contact {self.weakest.contact} misses its law by {self.weakest.error:.1e} on its "
-            f"own scale, {self.contact_tolerance:.0e} is allowed"
+            f"own scale, {self.asked.of_contacts:.0e} is allowed"
         )
 
     def tighter(self, goal: float) -> float:
         """The next goal for the error, so that the weakest contact will do too."""
-        if self.criterion is Criterion.NATURAL:
-            return TIGHTER * goal * min(self.tolerance / self.error, 1.0)
+        if self.asked.criterion is Criterion.NATURAL:
+            return TIGHTER * goal * min(self.asked.tolerance / self.error, 1.0)
         assert self.weakest is not None
-        share = TIGHTER * self.contact_tolerance / self.weakest.error
+        share = TIGHTER * self.asked.of_contacts / self.weakest.error
         return max(min(self.error * share, TIGHTER * goal), np.finfo(float).tiny)
 
     def cycled(self, iterate: Iterate, error: float) -> bool:
@@ -199,9 +195,9 @@ class Watch:
 
         Or when rounding has hidden that of BLURRED ones: more of them will not be known better.
         """
-        if self.patience is None:
+        if self.asked.patience is None:
             return False
-        return len(self.history) - self.mark[0] > self.patience or self.blurred > BLURRED
+        return len(self.history) - self.mark[0] > self.asked.patience or self.blurred > BLURRED
 
 
 def run(
@@ -209,19 +205,17 @@ def run(
     watch: Watch,
     solver: Solver,
     start: Iterate,
-    deadline: Deadline,
-    limit: float,
-    callback: Callback | None,
 ) -> tuple[Outcome, str]:
     """Start the solver, and again with a tighter goal while only contacts are not settled."""
+    asked = watch.asked
     try:
-        watch.problem.prepare(deadline)
+        watch.problem.prepare(asked.deadline)
         watch.judge(with_motion(watch.problem, start))
         if watch.converged:
             return Outcome.CONVERGED, ""
         known = start.v is not None or watch.problem.measure is Measure.EXACT
         error = watch.error if known else np.inf
-        target = Target(watch.tolerance, deadline, watch.criterion, error)
+        target = Target(asked.tolerance, asked.deadline, asked.criterion, error)
         ended: tuple[Outcome, str] | None = (Outcome.STAGNATED, "")
         while target.tolerance >= TIGHTEST:
             if watch.weak or ended is None:
@@ -229,7 +223,7 @@ def run(
                 start = watch.best or start
                 target = replace(target, tolerance=goal, start_error=watch.error)
                 watch.content = 0
-            ended = _once(watching, watch, solver, start, target, limit, callback)
+            ended = _once(watching, watch, solver, start, target)
             if ended is not None:
                 break
         outcome, detail = ended or (Outcome.STAGNATED, "")
@@ -250,14 +244,13 @@ def _once(
     solver: Solver,
     start: Iterate,
     target: Target,
-    limit: float,
-    callback: Callback | None,
 ) -> tuple[Outcome, str] | None:
     """The loop over the iterates of one start.
 
     Returns why it ended; None when the error is below the target, but not that of contacts.
     A method with a stopping rule of its own (`Iterate.ends`) is not stopped before that holds.
     """
+    callback, limit = watch.asked.callback, watch.asked.max_iterations or np.inf
     try:
         each = watch.problem.operations if target.deadline.work is not None else 0.0
         iterates, judged = iter(solver.iterates(watch.problem, start, target)), None
@@ -316,7 +309,7 @@ def _content_too_early(watch: Watch, iterate: Iterate, target: Target) -> bool:
 
     Some iterates of it may come first: Newton is there with one more, and keeps its history.
     """
-    if watch.criterion is Criterion.JUDGE:
+    if watch.asked.criterion is Criterion.JUDGE:
         return False
     content = watch.problem.error(iterate.r, iterate.v) <= target.tolerance
     watch.content = watch.content + 1 if content else 0
@@ -329,7 +322,7 @@ def finished(
     """The record and the best state; whole: the problem that was given, perhaps condensed."""
     problem, told, best = watch.problem, watch.told, watch.best
     measure = problem.measure if best is not None else Measure.EXACT
-    natural = watch.criterion is Criterion.NATURAL
+    natural = watch.asked.criterion is Criterion.NATURAL
     if told is not None and told.motion is not None and whole is problem and not problem.has_v:
         of, r, (u, v) = whole, told.r, told.motion
     elif best is None:  # stopped in the first factorisation: do not start it again
@@ -353,7 +346,7 @@ def finished(
         outcome,
         watch.iterations,
         error,
-        watch.tolerance,
+        watch.asked.tolerance,
         tuple(watch.history),
         watch.linear_iterations,
         seconds,
@@ -361,7 +354,7 @@ def finished(
         Measure.NATURAL if natural else measure,
         detail,
         contact_error=None if weakest is None else weakest.error,
-        contact_tolerance=watch.contact_tolerance,
+        contact_tolerance=watch.asked.of_contacts,
         weakest=None if weakest is None else weakest.contact,
         compiling=compiling() - watch.compiled,
         flops=watch.flops,
