@@ -44,7 +44,7 @@ from .contract import (
 )
 from .first_iterate import as_it_is, first_iterate, own_motion, with_motion
 from .judging import BLUR, PATIENCE, Taken, Watch
-from .varying_friction import varying_friction
+from .varying_law import varying_law
 
 Array = NDArray[np.float64]
 Callback = Callable[[Step, Iterate], bool | None]
@@ -152,7 +152,7 @@ def _drive(
     if problem.law.varies:
         _check_solver(solver)
         chosen = solver
-        return varying_friction(
+        return varying_law(
             problem, given, start,
             lambda fixed, asked, begin: _drive(fixed, chosen, asked, begin, taken),
         )  # fmt: skip

@@ -18,8 +18,10 @@ from ...problem.law import (
     Kind,
     Law,
     Orthotropic,
+    Overclosure,
     Tied,
     Tresca,
+    VaryingCompliance,
     VaryingFriction,
     joined,
 )
@@ -94,8 +96,12 @@ def _law(contact: Contact, placed: Placed) -> Law:
     """The law of one pair of surfaces."""
     values = {
         name: (_stiff if name in SPRINGS else _values)(contact, name, placed)
-        for name, value in contact.numbers.items() if not isinstance(value, FrictionCurve)
+        for name, value in contact.numbers.items()
+        if not isinstance(value, FrictionCurve | Overclosure)
     }  # fmt: skip
+    if isinstance(contact.stiffness, Overclosure):
+        law = _law_of(contact, values, placed)
+        return VaryingCompliance(contact.stiffness, placed.rows.weights, law)
     if isinstance(contact.mu, FrictionCurve):
         values["mu"] = np.zeros(len(placed.rows.weights))
         law = _law_of(contact, values, placed)
