@@ -25,7 +25,7 @@ def read_contact(table: Table, bodies: Sequence[Body]) -> Contact:
     from ...mechanics.model.supports import locate
 
     table.only("slave", "obstacle", "master", "friction", "method", "kinematics",
-               "configuration", "name")  # fmt: skip
+               "configuration", "name", "clearance")  # fmt: skip
     method = _contact_method(table)
     slave = table.text("slave")
     for key in ("slave", "master"):
@@ -38,6 +38,8 @@ def read_contact(table: Table, bodies: Sequence[Body]) -> Contact:
     found = configuration(table)  # older words for kinematics
     if "kinematics" in table.data:
         found["kinematics"] = table.choice("kinematics", ("small", "finite"))
+    if "clearance" in table.data:
+        found["clearance"] = _steady(table, "clearance")
     if "name" in table.data:
         found["name"] = table.text("name")
     with table.blamed():

@@ -54,6 +54,11 @@ def check_law(k: int, contact: Contact, dimension: int, *, large: bool) -> None:
             "in 2D there is one direction to slide along; expected one coefficient",
             ("contacts", k, "mu_across"), where,
         )  # fmt: skip
+    if large and contact.clearance is not None:
+        raise UnsupportedLaw(
+            "a given clearance needs small strains and contact in the reference configuration",
+            ("contacts", k, "clearance"), where,
+        )  # fmt: skip
     if large and "cohesion" in given:
         raise UnsupportedLaw(
             "cohesion needs small strains and contact in the reference configuration",

@@ -208,6 +208,8 @@ class Contact:
     mu_across: orthotropic friction (`problem.law.orthotropic`), mu along `direction`, a vector
     in global axes seen in the tangent plane of each contact, mu_across across it; in 3D.
     where: a function of points (n, dim) -> (n,) bool that tells which slave nodes take part.
+    clearance: the gap of the undeformed sides, < 0 where they overlap, in the place of the one
+    that their meshes give: a number, or a function of points (n, dim) -> (n,).
     kinematics: "small", gap and normal are those of the undeformed bodies, or "finite", those
     where the nodes are now (nodal, obstacles only); by default "finite" with hyperelastic laws.
     configuration: the same in older words, "reference" or "current".
@@ -234,6 +236,7 @@ class Contact:
     stick_stiffness: ScalarValue | None = None
     angle: ScalarValue | None = None  # of the direction, from t1 to t2 of the contact frame
     name: str = ""
+    clearance: float | Callable[[Array], Array] | None = None
 
     def __post_init__(self, configuration: str | None, law: Law | None) -> None:
         if not isinstance(self.name, str) or not self.name.isprintable():
@@ -254,6 +257,9 @@ class Contact:
         if self.method is None:
             object.__setattr__(self, "method", "nodal" if self.master is None else "mortar")
         self._check_directions()
+        if self.clearance is not None and not callable(self.clearance):
+            given = number(f"clearance on {self.slave!r}", self.clearance)
+            object.__setattr__(self, "clearance", given)
         for name, value in self.numbers.items():
             if not (name == "stiffness" and isinstance(value, Overclosure)):
                 check_scalar(value, f"{name} on {self.slave!r}")
