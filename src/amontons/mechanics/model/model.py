@@ -73,6 +73,9 @@ class Model(Told):
         dims = {body.mesh.dim for body in self.bodies}
         if len(dims) > 1:
             raise InvalidInput("expected all in 2D or all in 3D, got both", ("bodies",))
+        if len({body.axisymmetric for body in self.bodies}) > 1:
+            raise InvalidInput("expected all axisymmetric or none of them, got both",
+                               ("bodies",))  # fmt: skip
         if len({contact.nitsche is None for contact in self.contacts}) > 1:
             raise InvalidInput(
                 "expected Nitsche's method in all of them or in none, got both", ("contacts",)
@@ -110,6 +113,11 @@ class Model(Told):
         return self.bodies[0].mesh.dim
 
     @property
+    def axisymmetric(self) -> bool:
+        """Whether the bodies are half sections of bodies of revolution, see `Body`."""
+        return self.bodies[0].axisymmetric
+
+    @property
     def is_large(self) -> bool:
         """True where contact is found in the current configuration, and loads may follow.
 
@@ -131,6 +139,11 @@ class Model(Told):
 
     def _check_configurations(self) -> None:
         """Contacts of one kinematics, one that the bodies can have, and loads that fit."""
+        if self.is_large and self.axisymmetric:
+            raise InvalidInput(
+                "axisymmetric bodies have contact of small kinematics; expected no "
+                "kinematics='finite'", ("contacts", 0, "kinematics"), "contacts",
+            )  # fmt: skip
         for k, contact in enumerate(self.contacts):
             check_law(k, contact, self.dimension, large=self.is_large)
         for k, contact in enumerate(self.contacts if self.is_large else ()):
