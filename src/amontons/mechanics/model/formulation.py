@@ -274,9 +274,16 @@ def _bonded(parts: Discretisation, f: Array, w: Array) -> tuple[Array, float]:
     H, M = parts.H, parts.M
     near = abs(H).T @ M.diagonal()
     if parts.rigid is not None:  # between rigid bodies, which have none
-        near[near == 0] = near.max(initial=0.0) or 1.0
+        near[near == 0] = near.max(initial=0.0) or _load_by_length(parts, f)
     stiffness = sparse.diags_array(near)
     stored = M.tocsc() if isinstance(M, GridMatrix) else M
     bonded = sparse.csc_array(stored + H @ stiffness @ H.T)
     v = Direct().factor(bonded).solve(f - H @ (stiffness @ w.ravel()))
     return v, float(np.linalg.norm(H.T @ v + w.ravel()))
+
+
+def _load_by_length(parts: Discretisation, f: Array) -> float:
+    """A stiffness where nothing deforms: the load moves contacts by about their distance."""
+    points = np.concatenate([placed.rows.points for placed in parts.placed])
+    length = float(np.ptp(points, axis=0).max())
+    return (float(np.linalg.norm(f)) or 1.0) / (length or 1.0)
