@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ...core.arrays import number, real
 from ...core.errors import InvalidInput, shown
-from ...core.words import helpful
+from ...core.words import helpful, nearest
 from ...problem.law import (
     FrictionCurve,
     Law,
@@ -227,6 +227,7 @@ class Contact:
         if not isinstance(self.method, Nitsche) and self.method not in METHODS:
             raise InvalidInput(
                 f"method: expected one of {', '.join(METHODS)}, got {self.method!r}"
+                f"{nearest(self.method, METHODS)}"
             )
         if self.where is not None and not callable(self.where):
             raise InvalidInput(
@@ -238,7 +239,8 @@ class Contact:
             or not (hasattr(self.obstacle, "gap") and hasattr(self.obstacle, "normals"))
         ):
             raise InvalidInput(
-                f"obstacle: expected a Plane, Sphere or LevelSet, got {self.obstacle!r}"
+                f"obstacle: expected a Plane, Sphere or LevelSet, got {self.obstacle!r}; "
+                'another surface is master="NAME"'
             )
 
     def _check_law(self) -> None:
