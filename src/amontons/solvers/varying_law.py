@@ -27,11 +27,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.clock import deadline_of
 from ..core.errors import UnsupportedLaw
 from ..problem.judge.measures import Criterion
 from ..problem.law import Law, VaryingCompliance, VaryingFriction
 from ..problem.solution import FrictionSolution, Outcome, Step
+from .asked import Asked
 
 Array = NDArray[np.float64]
 Solve = Callable[[Any, Any, Any], FrictionSolution]  # problem, options, start
@@ -128,7 +128,7 @@ class _Tangents:
         )
 
 
-def varying_law(problem: Any, given: Any, start: Any, solve: Solve) -> FrictionSolution:
+def varying_law(problem: Any, given: Asked, start: Any, solve: Solve) -> FrictionSolution:
     """The solution of a problem whose law varies; given: options of the driver.
 
     Its problem has the fixed law that belongs to the solution.
@@ -136,7 +136,6 @@ def varying_law(problem: Any, given: Any, start: Any, solve: Solve) -> FrictionS
     law: VaryingFriction | VaryingCompliance = problem.law
     if given.criterion is not Criterion.JUDGE:
         raise UnsupportedLaw(f"criterion: published errors do not know {law.name}")
-    deadline = deadline_of(given.time_limit)
     state = None if start is None else _state(problem, start)
     way = (_Friction if isinstance(law, VaryingFriction) else _Tangents)(law, state)  # type: ignore[arg-type]
     error = np.inf
@@ -147,7 +146,7 @@ def varying_law(problem: Any, given: Any, start: Any, solve: Solve) -> FrictionS
         if given.max_iterations is not None:
             done = sum(found.convergence.iterations for found in rounds)
             left = max(given.max_iterations - done, 1)
-        options = given._replace(tolerance=goal, time_limit=deadline, max_iterations=left)
+        options = replace(given, tolerance=goal, max_iterations=left)
         found = solve(replace(problem, law=way.fixed), options, start)
         rounds.append(found)
         change = way.changes(found.r, found.u)
@@ -182,7 +181,7 @@ def _judged(problem: Any, found: FrictionSolution) -> tuple[float, Any]:
 
 
 def _ended(
-    given: Any, found: FrictionSolution, error: float, weakest: Any, goal: float,
+    given: Asked, found: FrictionSolution, error: float, weakest: Any, goal: float,
     change: Array, way: _Friction | _Tangents, rounds: list[FrictionSolution],
 ) -> tuple[Outcome, str] | None:  # fmt: skip
     """Why the loop ends here, None where it goes on."""
@@ -207,7 +206,7 @@ def _ended(
 
 
 def _whole(
-    problem: Any, given: Any, rounds: list[FrictionSolution], way: _Friction | _Tangents,
+    problem: Any, given: Asked, rounds: list[FrictionSolution], way: _Friction | _Tangents,
     error: float, weakest: Any, outcome: Outcome, detail: str,
 ) -> FrictionSolution:  # fmt: skip
     """The last solution with the record of all rounds."""
