@@ -66,7 +66,7 @@ def check_law(k: int, contact: Contact, dimension: int, lacks: Mapping[str, str]
     asked = {name for name, value in given.items()
              if name != "mu" or isinstance(value, FrictionCurve)}  # fmt: skip
     asked |= {"tied"} if contact.tied else set()
-    asked |= set() if contact.clearance is None else {"clearance"}
+    asked |= {"clearance"} if contact.clearance is not None else set()
     for name, why in lacks.items():
         if name in asked:
             raise UnsupportedLaw(why, ("contacts", k, name), where)
