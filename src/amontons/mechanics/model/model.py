@@ -22,10 +22,13 @@ from ...problem.nitsche import NitscheProblem
 from ...problem.protocol import Problem
 from ...problem.solution import FrictionSolution
 from ..elements.hyperelasticity import is_hyperelastic
-from .assembly import Discretisation, discretise, locate
+from .assembly import Discretisation, Ties, discretise, locate
 from .balance import Imbalance, imbalance, in_words
+from .beside import Beside
+from .constraints import Constraint, Reference, Spring
 from .fields import ContactFields, recover_fields
 from .held import check_outside
+from .joined import joined_loose
 from .large_deformation import LargeDeformation, large_deformation
 from .large_fields import recover_large
 from .laws import check_law, law_of, rubs
@@ -50,7 +53,9 @@ class Model(Told):
     Gaps and normals are taken once in the reference configuration, unless the contacts or
     hyperelastic laws say otherwise: then where the nodes are, see `is_large`.  load_factor
     multiplies the loads and the prescribed displacements, not the gaps.  pair_names: of the
-    contacts, their own or those of their slaves, all different.
+    contacts, their own or those of their slaves, all different.  references, constraints,
+    springs: points beside the bodies, what ties degrees of freedom to one another, and linear
+    springs between them.
     """
 
     bodies: Sequence[Body]
@@ -59,12 +64,17 @@ class Model(Told):
     loads: Sequence[Load] = ()
     load_factor: float = 1.0
     name: str = ""
+    references: Sequence[Reference] = ()
+    constraints: Sequence[Constraint] = ()
+    springs: Sequence[Spring] = ()
     pair_names: tuple[str, ...] = field(default=(), init=False, repr=False)
+    beside: Beside = field(default=None, init=False, repr=False)  # type: ignore[assignment]
     _shared: Prepared = field(default_factory=Prepared, init=False, repr=False)
 
     def __post_init__(self) -> None:
         for name, kind in (("bodies", Body), ("supports", Fix), ("contacts", Contact),
-                           ("loads", Load)):  # fmt: skip
+                           ("loads", Load), ("references", Reference), ("springs", Spring),
+                           ("constraints", Constraint)):  # fmt: skip
             object.__setattr__(self, name, tuple_of(name, getattr(self, name), kind))
         if not self.bodies:
             raise InvalidInput("expected at least one, got none", ("bodies",))
@@ -84,6 +94,8 @@ class Model(Told):
                 f"expected a finite number, got {self.load_factor!r}", ("load_factor",)
             )
         object.__setattr__(self, "bodies", named_bodies(self.bodies))
+        object.__setattr__(self, "beside", Beside.of(self.bodies, self.references,
+                                                     self.constraints))  # fmt: skip
         for part, fields in SURFACES.items():
             for k, item in enumerate(getattr(self, part)):
                 for name in (name for name in fields if hasattr(item, name)):
@@ -98,6 +110,8 @@ class Model(Told):
         if not isinstance(name, str):
             raise InvalidInput(f"surface: expected a name, got {name!r}")
         sets = isinstance(part, Fix | NodalForce)
+        if sets and self.beside.named(name) is not None:
+            return
         k, surface = locate(self.bodies, name, sets=sets)
         if not sets:
             self.bodies[k].mesh.surface(surface)
@@ -131,6 +145,13 @@ class Model(Told):
 
     def _check_configurations(self) -> None:
         """Contacts of one kinematics, one that the bodies can have, and loads that fit."""
+        for name in ("references", "constraints", "springs") if self.is_large else ():
+            if getattr(self, name):
+                raise UnsupportedForm(
+                    "small strains alone have constraints, springs and references, not "
+                    "hyperelastic laws and contacts with kinematics='finite'", (name, 0),
+                    "model",
+                )  # fmt: skip
         for k, contact in enumerate(self.contacts):
             check_law(k, contact, self.dimension, large=self.is_large)
         for k, contact in enumerate(self.contacts if self.is_large else ()):
@@ -158,8 +179,9 @@ class Model(Told):
     @property
     def discretisation(self) -> Discretisation:
         """Matrices at load factor 1, assembled once and shared by variants of this model."""
+        ties = Ties(self.references, self.constraints, self.springs)
         return self._shared.once(
-            discretise, (), self.bodies, self.supports, self.loads, self.contacts
+            discretise, (), self.bodies, self.supports, self.loads, self.contacts, None, ties
         )
 
     def assemble(self) -> FrictionProblem:
@@ -224,7 +246,7 @@ class Model(Told):
         w[:, 0] += parts.gap
         w[:, 1:] -= before
         f = parts.gathered(load - parts.K @ prescribed)
-        f = parts.with_driven(f, parts.M, prescribed) if parts.rigid is not None else f
+        f = parts.with_driven(f, parts.M, prescribed) if parts.eliminated is not None else f
         return self._discrete(f, w, prescribed)
 
     def _discrete(
@@ -237,11 +259,11 @@ class Model(Told):
         parts, law = self.discretisation, self.law
         loose = self._loose_but_held(parts, law)
         if self.contacts[0].nitsche is not None:
-            if parts.rigid is not None:
+            if parts.eliminated is not None:
                 raise UnsupportedForm(
-                    "Nitsche's method takes the place of reactions by stresses, and a rigid "
-                    "body has none; use nodal or mortar contact", ("contacts", 0, "method"),
-                    "model",
+                    "Nitsche's method takes the place of reactions by stresses, which rigid "
+                    "bodies and constraints do not give; use nodal or mortar contact",
+                    ("contacts", 0, "method"), "model",
                 )  # fmt: skip
             matrices = self._shared.once(nitsche_matrices, (), parts, not loose)
             return nitsche_problem(parts, matrices, f, w, prescribed, law, self.name)
@@ -288,6 +310,9 @@ class Model(Told):
 
     def _loose(self, parts: Discretisation) -> list[tuple[Piece, Array]]:
         """Pieces with the rigid modes that supports leave free."""
+        if parts.eliminated is not None and not parts.eliminated.only_rigid:
+            return self._shared.once(joined_loose, (), parts.parts, parts.eliminated,
+                                     parts.is_fixed)  # fmt: skip
         return loose_modes(parts.parts, parts.is_fixed)
 
     def _loose_but_held(self, parts: Discretisation, law: Law) -> bool:
@@ -354,7 +379,7 @@ def _bonded(parts: Discretisation, f: Array, w: Array) -> tuple[Array, float]:
     """
     H, M = parts.H, parts.M
     near = abs(H).T @ M.diagonal()
-    if parts.rigid is not None:  # between rigid bodies, which have none
+    if parts.eliminated is not None:  # between rigid bodies, which have none
         near[near == 0] = near.max(initial=0.0) or 1.0
     stiffness = sparse.diags_array(near)
     stored = M.tocsc() if isinstance(M, GridMatrix) else M
