@@ -22,11 +22,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.clock import deadline_of
 from ..core.errors import UnsupportedLaw
 from ..problem.judge.measures import Criterion
 from ..problem.law.varying import VaryingFriction
 from ..problem.solution import FrictionSolution, Outcome, Step
+from .asked import Asked
 
 Array = NDArray[np.float64]
 Solve = Callable[[Any, Any, Any], FrictionSolution]  # problem, options, start
@@ -37,7 +37,7 @@ LOOSE = 1e-2  # of the last error of the whole: for the solves on the way
 STILL = 1e-14  # relative change of mu that is none
 
 
-def varying_friction(problem: Any, given: Any, start: Any, solve: Solve) -> FrictionSolution:
+def varying_friction(problem: Any, given: Asked, start: Any, solve: Solve) -> FrictionSolution:
     """The solution of a problem with `VaryingFriction`; given: options of the driver.
 
     Its problem has the coefficients of the solution.
@@ -45,7 +45,6 @@ def varying_friction(problem: Any, given: Any, start: Any, solve: Solve) -> Fric
     law: VaryingFriction = problem.law
     if given.criterion is not Criterion.JUDGE:
         raise UnsupportedLaw(f"criterion: published errors do not know {law.name}")
-    deadline = deadline_of(given.time_limit)
     mu = law.inner.parameters[:, 0] if start is None else _first(problem, start)
     weight, last, error = 1.0, None, np.inf
     rounds: list[FrictionSolution] = []
@@ -55,7 +54,7 @@ def varying_friction(problem: Any, given: Any, start: Any, solve: Solve) -> Fric
         if given.max_iterations is not None:
             done = sum(found.convergence.iterations for found in rounds)
             left = max(given.max_iterations - done, 1)
-        options = given._replace(tolerance=goal, time_limit=deadline, max_iterations=left)
+        options = replace(given, tolerance=goal, max_iterations=left)
         found = solve(replace(problem, law=law.inner.with_mu(mu)), options, start)
         rounds.append(found)
         wanted = law.coefficients(found.r, found.u)
@@ -93,7 +92,7 @@ def _judged(problem: Any, found: FrictionSolution) -> tuple[float, Any]:
 
 
 def _ended(
-    given: Any, found: FrictionSolution, error: float, weakest: Any, goal: float,
+    given: Asked, found: FrictionSolution, error: float, weakest: Any, goal: float,
     change: float, rounds: list[FrictionSolution],
 ) -> tuple[Outcome, str] | None:  # fmt: skip
     """Why the loop ends here, None where it goes on."""
@@ -122,7 +121,7 @@ def _ended(
 
 
 def _whole(
-    problem: Any, given: Any, rounds: list[FrictionSolution], mu: Array, error: float,
+    problem: Any, given: Asked, rounds: list[FrictionSolution], mu: Array, error: float,
     weakest: Any, outcome: Outcome, detail: str,
 ) -> FrictionSolution:  # fmt: skip
     """The last solution with the record of all rounds."""

@@ -63,6 +63,17 @@ class Placed:
     nitsche: NitscheTerms | None = None
     sides: tuple[Mesh, str, Mesh, str] | None = None
 
+    @property
+    def each(self) -> str:
+        """What its points are, in words."""
+        return "slave node" if self.nitsche is None else "Gauss point"
+
+    def besides(self, displacement: Array, r: Array) -> Array | float:
+        """Forces (dofs,) of contacts beside H r, at displacements (dofs,) and r (k, d)."""
+        if self.nitsche is None:
+            return 0.0
+        return self.nitsche.symmetric_force(displacement, self.rows.weights, r)
+
     @cached_property
     def mismatch(self) -> Mismatch:
         """How far the meshes of a nodal pair are from each other, slave nodes as in kept."""

@@ -73,7 +73,8 @@ class Tightened:
             if isinstance(part, Pretension) and part.name in locked else part
             for part in model.constraints
         ]  # fmt: skip
-        return type(self._loose)(replace(model, constraints=held), self._loose.crossing, lengths)
+        tightened = replace(model, constraints=held)
+        return type(self._loose)(tightened, self._loose.crossing, lengths)
 
     def explained(self, solution: FrictionSolution) -> FrictionSolution:
         """As the model of the step has it."""
