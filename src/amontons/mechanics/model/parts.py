@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.arrays import number, real
+from ...core.arrays import real
 from ...core.errors import InvalidInput, shown
 from ...core.words import helpful
 from ...problem.law import (
@@ -35,7 +35,7 @@ from ..elements.hyperelasticity import CiarletGeymonat, NeoHookean
 from ..elements.rigid import Rigid
 from ..meshes.mesh import Mesh
 from ..meshes.order import second_order
-from .values import ScalarValue, VectorValue, check_scalar, check_vector
+from .values import ScalarValue, VectorValue, check_scalar, check_vector, pressure_of
 
 Array = NDArray[np.float64]
 Material = LinearElastic | NeoHookean | CiarletGeymonat
@@ -133,7 +133,7 @@ class Pressure:
 
     def __post_init__(self) -> None:
         if not callable(self.value):
-            object.__setattr__(self, "value", number(f"pressure on {self.on!r}", self.value))
+            object.__setattr__(self, "value", pressure_of(self.value, self.on))
 
 
 @helpful
