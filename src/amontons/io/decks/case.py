@@ -16,21 +16,36 @@ from typing import Any
 import numpy as np
 
 from ...core.errors import Address, AmontonsError, FileFormatError, InvalidInput
-from ...mechanics.model import BodyForce, Contact, Fix, Model, NodalForce, Pressure
+from ...mechanics.model import (
+    BodyForce,
+    Contact,
+    Fix,
+    Model,
+    NodalForce,
+    Pressure,
+    Reference,
+    Spring,
+)
+from ...mechanics.model.constraints import Constraint
 from ...mechanics.model.parts import Body
 from ...mechanics.steps import QuasiStatic
 from ..case.evolution import Evolution
 from ..case.overrides import override_settings
 from ..case.settings import Settings
 from ..readers import Case
+from .axes import Turned
 from .cards import Card, Row, read_cards
 from .contacts import Options, adjusted, read_contacts
 from .flat import Deck, flatten
 from .history import Course, History, Span, read_history
+from .joints import Joints, tied
 from .keywords import sorted_out
 from .materials import read_sections
 from .meshing import Region
 from .scopes import Index
+from .special import special_nodes
+
+KINDS = ("supports", "loads", "contacts", "references", "constraints", "springs")
 
 
 @dataclass
@@ -40,9 +55,10 @@ class Found:
     supports: list[Any] = field(default_factory=list)
     loads: list[Any] = field(default_factory=list)
     contacts: list[Contact] = field(default_factory=list)
-    cards: dict[str, list[Card]] = field(
-        default_factory=lambda: {"supports": [], "loads": [], "contacts": []}
-    )
+    references: list[Reference] = field(default_factory=list)
+    constraints: list[Constraint] = field(default_factory=list)
+    springs: list[Spring] = field(default_factory=list)
+    cards: dict[str, list[Card]] = field(default_factory=lambda: {key: [] for key in KINDS})
 
     def add(self, kind: str, part: Any, card: Card) -> None:
         """Add one part."""
@@ -109,11 +125,13 @@ def _case(
     path: Path, deck: Deck, settings: Settings, options: Options, notes: list[str]
 ) -> Case:
     sections = read_sections(deck, deck.model)
+    joints, turned = Joints.of(deck), Turned.of(deck)
     region = Region.of(deck, sections)
-    history = read_history(deck, deck.model, deck.steps)
+    history = read_history(deck, deck.model, deck.steps, joints.lengths)
     title = _title(deck) or path.name.split(".")[0]
     notes += _formulations(deck)
     found = Found()
+    _joined(found, region, history, joints, turned)
     _name_nodes(region, history)
     contacts = read_contacts(deck, region, options, notes)
     _name_faces(region, history)
@@ -127,8 +145,9 @@ def _case(
     evolution = Evolution(QuasiStatic(_step(history.spans)), history.until)
     case = Case(make(None), settings, title, path, evolution=evolution, key_of=found.line_of,
                 notes=tuple(notes))  # fmt: skip
-    if len(deck.steps) > 1 and any(contact.mu for contact in found.contacts):
-        return case  # friction remembers the steps before
+    rubs = any(contact.mu for contact in found.contacts)
+    if len(deck.steps) > 1 and (rubs or history.locked):
+        return case  # friction and locked bolts remember the steps before
     return replace(case, target=make(history.until), moving=case.target)
 
 
@@ -165,6 +184,27 @@ def _step(spans: Sequence[Span]) -> float:
 
 
 # ------------------------------------------------------------------------------ history
+def _joined(
+    found: Found, region: Region, history: History, joints: Joints, turned: Turned
+) -> None:
+    """References, constraints and springs, and what supports and loads give to them."""
+    joints.name_surfaces(region)
+    at, share = region.numbering, 1.0 / region.thickness
+    axes, loads = special_nodes(history, joints, turned, at, region.dim)
+    names = {int(n): part.name for part, nodes, _ in axes for n in nodes if len(nodes) == 1}
+    made = tied(joints, at, region.dim, share, names, history.locked)
+    for part, _, card in axes:
+        found.add("constraints", part, card)
+    for kind in ("references", "constraints", "springs"):
+        for part, card in getattr(made, kind):
+            found.add(kind, part, card)
+    for kind, name, courses, card in loads:
+        if kind == "supports":
+            found.add(kind, (name, courses), card)
+        else:
+            found.add(kind, (NodalForce, name, [_scaled(c, share) for c in courses]), card)
+
+
 def _name_nodes(region: Region, history: History) -> None:
     """Node sets of supports and forces: named after the line of their card."""
     for word, given in (("support", history.supports), ("force", history.forces)):
@@ -249,7 +289,10 @@ def _model(bodies: list[Body], found: Found, title: str, time: float | None) -> 
         else:
             course, way = courses
             loads.append(BodyForce([value(_scaled(course, w)) for w in way], region=name))
-    return Model(bodies, supports, found.contacts, loads, name=title)
+    return Model(
+        bodies, supports, found.contacts, loads, name=title, references=found.references,
+        constraints=found.constraints, springs=found.springs,
+    )  # fmt: skip
 
 
 def _value(time: float | None, course: Course) -> Any:

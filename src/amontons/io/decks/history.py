@@ -20,8 +20,8 @@ from .scopes import Index, Scope, missing
 
 Array = NDArray[np.float64]
 AT_ONCE = 1e-9  # share of a step in which a load that is there at once comes
-FREE, TRANSLATIONS = -1, 3
-ROTATIONS = range(4, 7)
+FREE, COMPONENTS = -1, 6
+TRANSLATIONS = 3
 HELD = {"ENCASTRE": (1, 2, 3), "PINNED": (1, 2, 3), "XSYMM": (1,), "YSYMM": (2,),
         "ZSYMM": (3,), "XASYMM": (2, 3), "YASYMM": (1, 3), "ZASYMM": (1, 2)}  # fmt: skip
 
@@ -73,11 +73,16 @@ class Span:
 
 @dataclass
 class Prescribed:
-    """Courses of displacements or forces, by number: `at` (nodes, 3), FREE where none is."""
+    """Courses of displacements or forces, by number: `at` (nodes, 6), FREE where none is."""
 
     at: Index
     courses: list[Course] = field(default_factory=list)
     cards: list[Card] = field(default_factory=list)
+
+    def of(self, node: int, components: Sequence[int]) -> list[Course | None]:
+        """The courses of some components of a node."""
+        numbers = self.at[node, list(components)]
+        return [None if c == FREE else self.courses[c] for c in numbers]
 
     def groups(self, dim: int) -> list[tuple[Index, list[Course | None], Card]]:
         """Nodes with the same courses in all components, (nodes, courses, card)."""
@@ -96,13 +101,18 @@ class Prescribed:
 
 @dataclass
 class History:
-    """All that steps prescribe: supports, forces at nodes, loads on faces and in bodies."""
+    """All that steps prescribe: supports, forces at nodes, loads on faces and in bodies.
+
+    bolts: nodes of pretension sections; locked: when those are that keep their length.
+    """
 
     supports: Prescribed
     forces: Prescribed
     faces: dict[tuple[str, str], tuple[Course, Card, Scope]] = field(default_factory=dict)
     bodies: dict[str, tuple[Course, Array, Card, Scope]] = field(default_factory=dict)
     spans: list[Span] = field(default_factory=list)
+    bolts: set[int] = field(default_factory=set)
+    locked: dict[int, float] = field(default_factory=dict)
 
     @property
     def until(self) -> float:
@@ -110,11 +120,12 @@ class History:
         return self.spans[-1].end
 
 
-def read_history(deck: Deck, before: Sequence[Placed], steps: Sequence[Sequence[Placed]]
-                 ) -> History:  # fmt: skip
+def read_history(deck: Deck, before: Sequence[Placed], steps: Sequence[Sequence[Placed]],
+                 bolts: set[int] | None = None) -> History:  # fmt: skip
     """Follow the steps; raises FileFormatError with the line of what can not be followed."""
-    shape = (len(deck.points), TRANSLATIONS)
-    history = History(Prescribed(np.full(shape, FREE)), Prescribed(np.full(shape, FREE)))
+    shape = (len(deck.points), COMPONENTS)
+    history = History(Prescribed(np.full(shape, FREE)), Prescribed(np.full(shape, FREE)),
+                      bolts=bolts or set())  # fmt: skip
     amplitudes = _amplitudes([p.card for p in before])
     first = _span(steps[0], 0.0)
     for each in before:
@@ -229,14 +240,17 @@ def _boundary(
     history: History, each: Placed, span: Span, known: Amplitudes, *, step: int
 ) -> None:
     card, out = each.card, history.supports
-    for option in ("FIXED", "USER", "SUBMODEL", "TYPE", "MASSFLOW"):
+    if "FIXED" in card.options:
+        _lock(history, each, span)
+        return
+    for option in ("USER", "SUBMODEL", "TYPE", "MASSFLOW"):
         if option in card.options and card.label(option) != "DISPLACEMENT":
             raise card.error(f"{option}: is not read, expected prescribed displacements")
     for row in card.rows():
         nodes = each.scope.nodes(row.fields[0], row)
         for component, value in _held(row):
             old = out.at[nodes, component]
-            if step and (old == FREE).any():
+            if step and component < TRANSLATIONS and (old == FREE).any():
                 raise row.error(
                     "*BOUNDARY: a support that comes in a later step is not read; hold the "
                     "same components in the first one"
@@ -246,6 +260,21 @@ def _boundary(
                 out.courses.append(_course(course, value, span, card, known))
                 out.cards.append(card)
                 out.at[nodes[old == before], component] = len(out.courses) - 1
+
+
+def _lock(history: History, each: Placed, span: Span) -> None:
+    """FIXED: bolts that a force has tightened keep their length, and supports their value."""
+    for row in each.card.rows():
+        nodes = each.scope.nodes(row.fields[0], row)
+        for component, _ in _held(row):
+            free = nodes[history.supports.at[nodes, component] == FREE]
+            if component or not set(free.tolist()) <= history.bolts or not span.begin:
+                raise row.error(
+                    "*BOUNDARY, FIXED: is read for the nodes of bolts (*PRE-TENSION SECTION) "
+                    "after the step that tightens them, and for what is held already"
+                )
+            for node in free:
+                history.locked.setdefault(int(node), span.begin)
 
 
 def _held(row: Row) -> list[tuple[int, float]]:
@@ -262,9 +291,9 @@ def _held(row: Row) -> list[tuple[int, float]]:
     if len(row.fields) > 2 and row.fields[2]:
         last = whole(row.fields[2], row, "*BOUNDARY: component")
     value = number(row.fields[3], row, "*BOUNDARY: value") if len(row.fields) > 3 else 0.0
-    if not 1 <= first <= last <= ROTATIONS[-1]:
-        raise row.error(f"*BOUNDARY: expected components from 1 to 3, got {first} to {last}")
-    return [(k - 1, value) for k in range(first, last + 1) if k not in ROTATIONS]
+    if not 1 <= first <= last <= COMPONENTS:
+        raise row.error(f"*BOUNDARY: expected components from 1 to 6, got {first} to {last}")
+    return [(k - 1, value) for k in range(first, last + 1)]
 
 
 def _forces(history: History, each: Placed, span: Span, known: Amplitudes,
@@ -279,8 +308,8 @@ def _forces(history: History, each: Placed, span: Span, known: Amplitudes,
         if len(row.fields) < 3:
             raise row.error("*CLOAD: expected nodes, component, value")
         component = whole(row.fields[1], row, "*CLOAD: component") - 1
-        if not 0 <= component < TRANSLATIONS:
-            raise row.error(f"*CLOAD: expected a component from 1 to 3, got {component + 1}")
+        if not 0 <= component < COMPONENTS:
+            raise row.error(f"*CLOAD: expected a component from 1 to 6, got {component + 1}")
         value = number(row.fields[2], row, "*CLOAD: value")
         old, more = out.at[nodes, component], given[nodes, component]
         for before, adds in {(int(b), bool(a)) for b, a in zip(old, more, strict=True)}:

@@ -144,6 +144,14 @@ class Region:
             )
         self.facets[name] = out
 
+    def facet_size(self, name: str) -> float:
+        """The mean length of a side of the facets of a surface."""
+        sizes = []
+        for facets in self.facets[name]:
+            x = self.deck.points[facets.nodes[:, : CELLS[facets.kind].corner_count]]
+            sizes.append(np.linalg.norm(x - np.roll(x, 1, axis=1), axis=2).ravel())
+        return float(np.concatenate(sizes).mean())
+
     def add_covering(self, name: str, nodes: Index, where: Card | Row) -> None:
         """Ask for the surface that nodes make: the outer facets all of whose nodes they are."""
         marked = np.zeros(len(self.deck.points), dtype=bool)
@@ -178,16 +186,21 @@ class Region:
             ]
         return out
 
+    @property
+    def numbering(self) -> Index:
+        """The number in the mesh of each node of the deck, -1 for one without elements."""
+        used = np.zeros(len(self.deck.points), dtype=bool)
+        for block in self.deck.blocks:
+            used[block.nodes] = True
+        return np.where(used, np.cumsum(used) - 1, -1)
+
     def mesh(self, title: str) -> tuple[Mesh, Index]:
         """The mesh, and the number in it of each node of the deck, -1 for one without elements.
 
         Raises FileFormatError that names a surface without outer facets.
         """
-        used = np.zeros(len(self.deck.points), dtype=bool)
-        for block in self.deck.blocks:
-            used[block.nodes] = True
-        at = np.where(used, np.cumsum(used) - 1, -1)
-        points = self.deck.points[used]
+        at = self.numbering
+        points = self.deck.points[at >= 0]
         if self.dim == 2:
             if np.ptp(points[:, 2]):
                 raise InvalidInput("*NODE: plane elements with nodes at several z")
@@ -197,7 +210,7 @@ class Region:
             name: tuple(Facets(f.kind, at[f.nodes]) for f in _joined(facets))
             for name, facets in self.facets.items()
         }
-        sets = {name: at[nodes] for name, nodes in self.node_sets.items()}
+        sets = {name: at[nodes[at[nodes] >= 0]] for name, nodes in self.node_sets.items()}
         mesh = Mesh(points, tuple(cells), surfaces, name=title, node_sets=sets)
         return mesh, at
 
