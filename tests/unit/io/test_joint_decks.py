@@ -179,9 +179,3 @@ def test_wrong_cards_are_told(tmp_path, model, loads, words):
 
     with pytest.raises(am.AmontonsError, match=words):
         solve()
-
-
-def test_a_lock_without_a_bolt_is_refused(tmp_path):
-    later = "*STEP\n*STATIC\n*BOUNDARY, FIXED\nTOP, 3, 3\n*END STEP\n"
-    with pytest.raises(am.FileFormatError, match="FIXED: is read for the nodes of bolts"):
-        case_of(tmp_path, HELD, step(f"{TOP[4]}, 1, 3.") + later)

@@ -87,6 +87,11 @@ class Joints:
         return out
 
     @property
+    def all_named(self) -> list[int]:
+        """Nodes without elements that stand for references, rotations and bolts."""
+        return [*self.named, *self.turns]
+
+    @property
     def lengths(self) -> set[int]:
         """Nodes whose first component is the length of a bolt."""
         return {bolt.node for bolt in self.bolts}
@@ -341,13 +346,11 @@ class Tied:
 
 
 def tied(
-    joints: Joints, at: Index, dim: int, share: float, turned: dict[int, str],
-    locked: dict[int, float],
-) -> Tied:  # fmt: skip
+    joints: Joints, at: Index, dim: int, share: float, turned: dict[int, str]
+) -> Tied:
     """The parts of the model; at: number in the mesh of each node, -1 without elements.
 
-    share: of forces, 1 / thickness in 2D; turned: nodes with axes of their own, under a name;
-    locked: when the bolts of nodes are.
+    share: of forces, 1 / thickness in 2D; turned: nodes with axes of their own, under a name.
     """
     out = Tied()
     lengths = joints.lengths
@@ -385,8 +388,8 @@ def tied(
         out.constraints.append((made, card))
     for bolt in joints.bolts:
         normal = None if bolt.normal is None else bolt.normal[:dim].tolist()
-        name, lock = joints.title(bolt.node), locked.get(bolt.node)
-        out.constraints.append((Pretension(name, bolt.sides, normal, lock), bolt.card))
+        made = Pretension(joints.title(bolt.node), bolt.sides, normal)
+        out.constraints.append((made, bolt.card))
     for terms, stiffness, card in joints.springs:
         for each in _single([term(raw) for raw in terms]):
             out.springs.append((Spring(each, stiffness * share), card))

@@ -15,6 +15,7 @@ READ = {
     "SURFACEBEHAVIOR", "FRICTION", "CONTACTPAIR", "BOUNDARY", "AMPLITUDE", "STEP", "STATIC",
     "CLOAD", "DLOAD", "DSLOAD", "EQUATION", "MPC", "TIE", "TRANSFORM", "COUPLING", "KINEMATIC",
     "DISTRIBUTING", "RIGIDBODY", "PRE-TENSIONSECTION", "SPRING", "CLEARANCE",
+    "CHANGEFRICTION", "CHANGESURFACEBEHAVIOR", "MODELCHANGE",
 }  # fmt: skip
 OUTPUT = {
     "NODEPRINT", "NODEFILE", "NODEOUTPUT", "ELPRINT", "ELFILE", "ELEMENTOUTPUT", "CONTACTFILE",
@@ -36,8 +37,6 @@ MEANS = {  # what a card would have done
     "PLASTIC": "the material would yield", "HYPERELASTIC": "the material would be rubber",
     "ORIENTATION": "the axes of a material are turned", "DYNAMIC": "inertia would act",
     "TEMPERATURE": "the bodies would grow and shrink",
-    "CHANGEFRICTION": "friction would change", "MODELCHANGE": "parts would come and go",
-    "CHANGESURFACEBEHAVIOR": "contact would change",
     "GAP": "contact elements would act",
     "FREQUENCY": "vibrations would be computed", "BUCKLE": "buckling would be computed",
     "CONTACT": "surfaces in contact would be found",

@@ -118,7 +118,13 @@ def _joined(members: list[Piece]) -> Piece:
     names = list(dict.fromkeys(piece.name for piece in members))
     modes = sparse.block_diag([piece.modes for piece in members]).toarray()
     dofs = np.concatenate([piece.dofs for piece in members])
-    return Piece(" + ".join(names), dofs, modes, tuple(members))
+    rigid, first = [], 0
+    for piece in members:
+        count = piece.modes.shape[1]
+        rigid += [first + k for k in (range(count) if piece.rigid is None else piece.rigid)]
+        first += count
+    some = None if all(piece.rigid is None for piece in members) else rigid
+    return Piece(" + ".join(names), dofs, modes, some, tuple(members))
 
 
 def _refuse(mine: Index, columns: _Columns, null: Array, eliminated: Elimination) -> None:
