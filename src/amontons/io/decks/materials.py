@@ -11,7 +11,7 @@ from .cards import Card, Row, number
 from .flat import Deck, Placed
 from .scopes import Index, missing
 
-PLANES = {"": "strain", "strain": "strain", "stress": "stress"}
+PLANES = {"": "strain", "strain": "strain", "stress": "stress", "axisymmetric": "strain"}
 
 
 @dataclass(frozen=True)

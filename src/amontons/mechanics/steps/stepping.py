@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...core.clock import NEVER, Deadline, check_seconds
-from ...core.errors import Interrupted, InvalidInput, NotConverged
+from ...core.errors import Interrupted, InvalidInput, NotConverged, shown
 from ...problem.friction import Form, FrictionProblem
 from ...problem.solution import FrictionSolution
 from ...solvers.contract import Iterate, Solver, check_at_least, check_solves, taken_by
@@ -57,6 +57,10 @@ def evolve(
         check_seconds(time_limit)
     if max_iterations is not None:
         check_at_least(1, max_iterations=max_iterations)
+    if not hasattr(method, "prepare"):
+        raise InvalidInput(
+            f"method: expected QuasiStatic(step) or MoreauJean(step), got {shown(method)}"
+        )
     own = _stage_of(start, method)
     prepared = method.prepare(model if own is None else own.model(start), tolerance)  # type: ignore[arg-type]
     if solver is not None:
