@@ -113,8 +113,8 @@ def _digest(cards: Sequence[Card]) -> str:
     for card in cards:
         whole.update(repr((card.keyword, sorted(card.options.items()))).encode())
         if card.keyword not in ("NODE", "ELEMENT"):
-            for row in card.rows():
-                whole.update(repr(row.fields).encode())
+            for piece in card.pieces:
+                whole.update(piece.text.encode())
     return whole.hexdigest()
 
 
@@ -235,9 +235,11 @@ def _node(row: Row) -> list[float]:
 
 def _no_doubles(labels: Index, before: Index, card: Card, what: str) -> None:
     """Raise FileFormatError for a number that is given twice."""
+    again = labels[before >= 0]
+    if not len(again) and (np.diff(labels) > 0).all():
+        return
     found, counts = np.unique(labels, return_counts=True)
     twice = found[counts > 1]
-    again = labels[before >= 0]
     if not len(twice) and not len(again):
         return
     label = int(twice[0] if len(twice) else again[0])
@@ -258,11 +260,10 @@ def _elements(deck: Deck, card: Card, scope: Scope) -> None:
     if kind not in SHAPES:
         raise card.error(f"TYPE={kind}: {missing('element type', kind, SHAPES)}")
     width = 1 + SHAPES[kind].nodes
-    table = card.table(width)
-    if table is None or not _regular(table.ravel()):
-        table = _element_rows(card, width)
-    whole_numbers = table.astype(np.int64)
-    labels, nodes = whole_numbers[:, 0], whole_numbers[:, 1:]
+    table = card.table(width, np.int64)
+    if table is None or (table.size and table.min() <= 0):
+        table = _element_rows(card, width).astype(np.int64)
+    labels, nodes = table[:, 0], table[:, 1:]
     known = scope.own.nodes(nodes.ravel()).reshape(nodes.shape)
     if (known < 0).any():
         k, n = np.argwhere(known < 0)[0]
