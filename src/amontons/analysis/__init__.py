@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .certificates.critical_friction import CriticalFriction, Witness
     from .certificates.older_criteria import CriterionFriction
     from .certificates.opening import Existence, Opening
-    from .certificates.uniqueness import Uniqueness, Verdict
+    from .certificates.verdict import Uniqueness, Verdict
     from .grading import graded
     from .paths.cones import TangentCone
     from .paths.contact_rates import ContactRates
@@ -36,7 +36,7 @@ _HOME = {
     "certificates.critical_friction": ("CriticalFriction", "Witness",),
     "certificates.older_criteria": ("CriterionFriction",),
     "certificates.opening": ("Existence", "Opening",),
-    "certificates.uniqueness": ("Uniqueness", "Verdict",),
+    "certificates.verdict": ("Uniqueness", "Verdict",),
     "grading": ("graded",),
     "paths.cones": ("TangentCone",),
     "paths.contact_rates": ("ContactRates",),
