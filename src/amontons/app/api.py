@@ -7,16 +7,16 @@ import os
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, overload
 
-from ..core.clock import TimeLimit, compiling, deadline_of, now
+from ..core.clock import TimeLimit, compiling, now
 from ..core.errors import Interrupted, InvalidInput, NotConverged, clipped
 from ..core.words import helpful
 from ..problem.friction import FrictionProblem
 from ..problem.judge.measures import Criterion
 from ..problem.protocol import Problem
 from ..problem.solution import FrictionSolution, Outcome
+from ..solvers.asked import PATIENCE, Asked, Callback
 from ..solvers.contract import Iterate, Solver
-from ..solvers.driver import Callback, drive
-from ..solvers.judging import PATIENCE
+from ..solvers.driver import drive_as_asked
 from .model_solution import ModelSolution
 from .progress import progress
 
@@ -63,43 +63,39 @@ def solve(
     without progress after which a solve counts as stagnated; None to let time decide.
 
     A model is condensed for solvers that need the Delassus form; a FrictionProblem has the form
-    its owner chose, and the wrong one raises UnsupportedForm.  A model in large deformations
-    (`Model.is_large`) is solved by `NonlinearNewton`; the problem of its solution is the
-    tangent one of the deformed state.  A problem of your own is one that answers `Problem`.
+    its owner chose, and the wrong one raises UnsupportedForm.  A model in large deformations is
+    solved by `NonlinearNewton`; the problem of its solution is the tangent one of the deformed
+    state.  A problem of your own is one that answers `Problem`.
     """
-    options = {"tolerance": tolerance, "contact_tolerance": contact_tolerance,
-               "max_iterations": max_iterations, "time_limit": time_limit,
-               "start": start, "criterion": criterion, "patience": patience,
-               "condense": not is_discrete(problem)}  # fmt: skip
-    result = _solve(problem, solver, callback, options)
+    asked = Asked(
+        tolerance, contact_tolerance, max_iterations, time_limit, callback, criterion, patience,
+        condense=not is_discrete(problem),
+    )  # fmt: skip
+    result = solve_as_asked(problem, asked, start, solver)
     if check:
         raise_unless_converged(result)
     return result
 
 
 def solve_any_form(
-    problem: FrictionProblem | Model, solver: Solver | None = None, *,
-    callback: Callback | None = None, **options: Any,
+    problem: FrictionProblem | Model, solver: Solver | None = None, *, start: Start = None,
+    **options: Any,
 ) -> FrictionSolution | ModelSolution:  # fmt: skip
     """Solve like `solve` with check=False, condensing a FrictionProblem too where need be."""
-    options = {"tolerance": 1e-8, **options, "condense": True}
-    return _solve(problem, solver, callback, options)
+    return solve_as_asked(problem, Asked(**options, condense=True), start, solver)
 
 
-def _solve(
-    problem: FrictionProblem | Model, solver: Solver | None, callback: Callback | None,
-    options: dict[str, Any],
-) -> Any:  # fmt: skip
-    """Assemble, drive, recover."""
+def solve_as_asked(
+    problem: Any, asked: Asked, start: Start = None, solver: Solver | None = None
+) -> Any:
+    """Assemble, drive, recover: what `solve` does, without a look at whether it converged."""
     model: Any = None if is_discrete(problem) else checked(problem)
     began, compiled = now(), compiling()
-    options["time_limit"] = deadline_of(options.get("time_limit"))
     discrete: Any = problem if model is None else model.discrete_problem()
     assembled, compiled = now() - began, compiling() - compiled
-    if isinstance(options.get("start"), ModelSolution):
-        options["start"] = options["start"].solution
-    with progress(callback, options["tolerance"]) as seen:
-        found = drive(discrete, solver, callback=seen, **options)
+    begin = start.solution if isinstance(start, ModelSolution) else start
+    with progress(asked.callback, asked.tolerance) as seen:
+        found = drive_as_asked(discrete, replace(asked, callback=seen), begin, solver)
     if model is None:
         return _logged(found)
     record = found.convergence

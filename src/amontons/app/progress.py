@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from typing import Any
 
 from ..problem.solution import Step
+from ..solvers.asked import Callback
 from ..solvers.contract import Iterate
-from ..solvers.driver import Callback
 
 PAUSE = 0.1  # seconds: drawing takes longer than a small solve
 

@@ -253,7 +253,7 @@ def diagram(
 
 def _check_has_W(problem: FrictionProblem | Model, verb: str, limit: TimeLimit) -> None:
     """Raise SingularOperator where `verb` needs W and contact alone holds a body."""
-    if not getattr(problem, "is_large", False):  # those are followed in displacements
+    if problem.kind.has_q:  # others are followed in displacements
         from ..mechanics.model.diagnosis import check_has_W
         from ..mechanics.steps.timed import steady
 

@@ -173,8 +173,6 @@ def _weights(H: sparse.csc_array, normals: Array) -> sparse.coo_array:
 
 def _shares(model: Model, fields: ContactFields, at: Index) -> Array:
     """Part of each contact in its pair's area at the node, (nc,): 1 but for Gauss points."""
-    if model.contacts[0].nitsche is None:
-        return np.ones(len(at))
     sizes = [len(placed.rows.nodes) for placed in model.discretisation.placed]
     pair = np.repeat(np.arange(len(sizes)), sizes)
     _, label = np.unique(np.stack([pair, at]), axis=1, return_inverse=True)

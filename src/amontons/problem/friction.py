@@ -381,7 +381,20 @@ class FrictionProblem(Told, Equations):
     @property
     def local_stiffness(self) -> Array:
         """H_i^T D^-1 H_i, (nc, d, d), D the block diagonal of M: a cheap stand-in for W_ii."""
-        return self.matrices.local_stiffness
+        return self.matrices.local_stiffness / self._unit_stiffness
+
+    @property
+    def diagonal(self) -> Array:
+        """The diagonal of M, (n,), with what stands in for it where nothing deforms."""
+        return self.matrices.diagonal * self._unit_stiffness
+
+    @cached_property
+    def _unit_stiffness(self) -> float:
+        """1, or load by motion where M is 0 and has no stiffness to compare with."""
+        if self.M is None or isinstance(self.M, OPERATORS) or self.M.diagonal().any():
+            return 1.0
+        load, size = self.scales
+        return load / size if load > 0 and size > 0 else 1.0
 
     @property
     def condensing_is_cheap(self) -> bool:

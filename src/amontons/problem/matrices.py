@@ -202,6 +202,27 @@ class GlobalMatrices:
         return [slice(first, first + size) for first in range(0, count, size)]
 
     @property
+    def diagonal(self) -> Array:
+        """The diagonal of M, (n,), positive; see `_diagonal`."""
+        return self._of_both(GlobalMatrices._diagonal, self)
+
+    def _diagonal(self) -> Array:
+        """Unknowns of no stiffness, as rigid bodies have them, are given that of the others.
+
+        A turn counts as the motion of the farthest contact, the largest |H_j|.  Where M is 0
+        that of the others is 1.
+        """
+        own = np.asarray(self.M.diagonal(), dtype=float)
+        stiff = own > 0
+        if stiff.all():
+            return own
+        lever = np.zeros(len(own))
+        H = self.H.tocoo()
+        np.maximum.at(lever, H.row, np.abs(H.data))
+        typical = float(np.median(own[stiff])) if stiff.any() else 1.0
+        return np.where(stiff, own, typical * np.where(lever > 0, lever, 1.0) ** 2)
+
+    @property
     def local_stiffness(self) -> Array:
         """H_i^T D^-1 H_i, (nc, d, d), D the block diagonal of M: a cheap stand-in for W_ii."""
         return self._of_both(GlobalMatrices._local_stiffness, self)
@@ -213,6 +234,9 @@ class GlobalMatrices:
         index = (touched[:, None] * size + np.arange(size)).ravel()
         H = sparse.csr_array(self.H)[index]
         part = M.part(index) if isinstance(M, OPERATORS) else M[:, index].tocsr()[index]
+        free = part.diagonal() == 0  # nothing but contacts resists: bodies that are rigid
+        if free.any():
+            part = part + sparse.diags_array(np.where(free, self.diagonal[index], 0.0))
         product = sparse.csc_array(diagonal_blocks_inverse(part, size) @ H)
         full = (sparse.csr_array(H.T) @ product).tobsr((d, d))
         out = np.zeros((self.contacts, d, d))

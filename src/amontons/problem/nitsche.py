@@ -132,7 +132,7 @@ class NitscheProblem(Problem):
 
     form = Form.NITSCHE
     measure = Measure.NITSCHE
-    unfit = no_inertia = NO_MULTIPLIERS
+    unfit = no_inertia = no_path = NO_MULTIPLIERS
 
     @property
     def contacts(self) -> int:

@@ -69,6 +69,7 @@ class Problem:
     judge_flops: float = 0.0  # floating point operations of a judgement where they are counted
     unfit: ClassVar[str] = "it is made for other problems"  # why a solver can not take this one
     no_inertia: ClassVar[str] = ""  # why steps with inertia can not, where they can not
+    no_path: ClassVar[str] = ""  # why continuation can not follow its solutions
 
     # ---------------------------------------------------------------- needed
     def error(self, r: Array, v: Array | None = None) -> float:
@@ -80,6 +81,11 @@ class Problem:
         raise NotImplementedError
 
     # ---------------------------------------------------------------- sizes, beginning
+    @property
+    def kind(self) -> type[Problem]:
+        """Its class; a model says in advance which it will be."""
+        return type(self)
+
     @property
     def contacts(self) -> int:
         """Number of contacts nc."""

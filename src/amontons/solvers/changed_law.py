@@ -13,14 +13,22 @@ from ..problem.friction import FrictionProblem
 from ..problem.plain import plain_motion
 from ..problem.protocol import Problem
 from ..problem.solution import FrictionSolution
+from .asked import Asked, Callback
 from .contract import Iterate
 from .first_iterate import first_iterate
 
 Array = NDArray[np.float64]
-Callback = Callable[[Any, Iterate], bool | None]
+Solve = Callable[[Any, Any, Any], FrictionSolution]  # problem, options, start
 
 
-def pressed_start(problem: Problem, start: Any) -> Iterate | None:
+def changed_law(problem: Problem, given: Asked, start: Any, solve: Solve) -> FrictionSolution:
+    """The solution of a problem whose `plain` one is another; given: options of the driver."""
+    asked = replace(given, callback=_released_callback(problem, given.callback))
+    found = solve(problem.plain, asked, _pressed(problem, start))
+    return _released(problem, found)
+
+
+def _pressed(problem: Problem, start: Any) -> Iterate | None:
     """What a user gives as a start, for `problem.plain`."""
     if start is None:
         return None
@@ -31,7 +39,7 @@ def pressed_start(problem: Problem, start: Any) -> Iterate | None:
     return replace(given, r=problem.law.pressed(given.r), v=v)
 
 
-def released_callback(problem: Problem, callback: Callback | None) -> Callback | None:
+def _released_callback(problem: Problem, callback: Callback | None) -> Callback | None:
     """A callback of `problem.plain` that hands the iterates of the problem on."""
     if not callable(callback):  # what is wrong is refused by the driver
         return callback
@@ -40,7 +48,7 @@ def released_callback(problem: Problem, callback: Callback | None) -> Callback |
     ))  # fmt: skip
 
 
-def released(problem: Problem, found: FrictionSolution) -> FrictionSolution:
+def _released(problem: Problem, found: FrictionSolution) -> FrictionSolution:
     """The solution of a problem from that of its `plain` one."""
     r = problem.law.released(found.r)
     told = None if found.settled is None else found.settled._replace(r=r)

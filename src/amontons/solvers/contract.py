@@ -16,9 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.clock import NEVER, Deadline
-from ..core.errors import InvalidInput, UnsupportedForm, shown
+from ..core.errors import InvalidInput, UnsupportedForm, UnsupportedLaw, shown
+from ..core.words import near
 from ..problem.friction import Form, FrictionProblem
 from ..problem.judge.measures import Criterion
+from ..problem.law import Coulomb
 from ..problem.nitsche import NitscheProblem
 from ..problem.protocol import Problem
 from ..problem.status import ActiveSets
@@ -181,6 +183,44 @@ def _taken(kind: Any) -> Takes:
         getattr(kind, "matrix_free", False),
         getattr(kind, "needs_cone", False),
     )
+
+
+def check_solver(solver: Solver) -> None:
+    """Raise InvalidInput for what is no solver."""
+    if isinstance(solver, type) or not hasattr(solver, "iterates"):
+        raise InvalidInput(
+            f"solver: expected an instance such as GaussSeidel(), got {_written(solver)}"
+        )
+
+
+def _written(solver: object) -> str:
+    """What was given for a solver, and what is to be written for it."""
+    if isinstance(solver, type):
+        return f"the class; write {solver.__name__}()"
+    if isinstance(solver, str):
+        from . import METHODS
+
+        meant = near(solver, METHODS)
+        return f"{solver!r}" + (f"; write {METHODS[meant].__name__}()" if meant else "")
+    return shown(solver)
+
+
+def fitted(problem: Problem, solver: Solver, deadline: Deadline | None) -> Problem:
+    """The problem as the solver takes it; raises UnsupportedForm where it does not."""
+    takes = taken_by(solver)
+    if not isinstance(problem, takes.solves):
+        check_solves(solver, type(problem))
+    if takes.needs_cone and not isinstance(problem.law, Coulomb):
+        raise UnsupportedLaw(
+            f"{type(solver).__name__} needs Coulomb's cone, the problem has "
+            f"{problem.law.name}; use Auto, SemismoothNewton or GaussSeidel", ("solver",), "",
+        )  # fmt: skip
+    try:
+        return problem.in_form(takes.form, not takes.matrix_free, deadline)
+    except UnsupportedForm as reason:
+        raise UnsupportedForm(
+            f"{type(solver).__name__} {reason.text}", ("solver",), ""
+        ) from None
 
 
 def check_solves(solver: Any, kind: type[Problem]) -> None:

@@ -1,4 +1,10 @@
-"""The driver's memory of one solve: it judges every iterate and knows the best one."""
+"""One solve as the driver sees it: judge every iterate, know the best one, stop, record.
+
+An iterate has converged when its error is below the tolerance and so is, on its own scale, that
+of its weakest contact (`judge`).  Where only the first holds, the solver is started again from
+there with a tolerance that promises the second; where that does not come about, the outcome is
+WEAK_CONTACTS.
+"""
 
 from __future__ import annotations
 
@@ -9,23 +15,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.clock import Deadline, compiling, now
-from ..problem.judge.measures import EPSILON, Criterion, Weakest
+from ..core.errors import SingularOperator, TimeUp
+from ..core.interrupts import Watching
+from ..problem.judge.measures import EPSILON, Criterion, Measure, Weakest
 from ..problem.law.law import MU
 from ..problem.protocol import Problem
 from ..problem.settling import Accepted
-from ..problem.solution import Step, StoppedBy
-from .contract import Iterate, Judgement
-from .first_iterate import own_motion
+from ..problem.solution import Convergence, FrictionSolution, Outcome, Step, StoppedBy
+from .asked import Asked
+from .contract import Breakdown, Iterate, Judgement, Solver, Target, sent
+from .first_iterate import own_motion, with_motion
 
 Array = NDArray[np.float64]
 Taken = Callable[[Problem, Iterate], Iterate]
 MEMORY = 64  # iterates among which a repetition counts as a cycle
 AT_REST = 1e-10  # relative change of r below which an iterate has not moved
-PATIENCE = 500  # iterates without any progress before a solve counts as stagnated
 PROGRESS = 0.99  # the best error must fall at least by this factor within PATIENCE
 BLUR = 1e-2  # rounding, relative to the tolerance, above which an error is evaluated sharply
 BLURRED = 20  # iterates that would do if rounding could hide no error in them
 TIGHTER = 0.3  # goal of a second start, relative to what would just do
+TIGHTEST = 1e-300  # smallest goal: contacts far smaller than others need tiny sums
+CONTENT = 5  # iterates with which a solver is content before its goal is tightened
+EARLY = 100  # iterates after which a problem that no method is made for is given up
+GAVE_UP = (Outcome.STAGNATED, Outcome.BREAKDOWN, Outcome.CYCLED, Outcome.NON_FINITE)
 
 
 @dataclass
@@ -33,10 +45,8 @@ class Watch:
     """The driver's memory of one solve."""
 
     problem: Problem
-    tolerance: float
-    contact_tolerance: float
-    criterion: Criterion = Criterion.JUDGE
-    patience: int | None = PATIENCE  # None: never stagnated
+    asked: Asked
+    method: str  # name of the solver
     taken: Taken = own_motion  # what of an iterate is judged
     started: float = field(default_factory=now)
     compiled: float = field(default_factory=compiling)  # until then
@@ -58,18 +68,18 @@ class Watch:
     def judge(self, iterate: Iterate) -> Step:
         """Judge an iterate and remember it if it is the best."""
         iterate = self.taken(self.problem, iterate)
-        if self.criterion is Criterion.NATURAL:
+        if self.asked.criterion is Criterion.NATURAL:
             error = self.problem.natural_error(iterate.r, iterate.v)
             return self._noted(iterate, error, None, None)
         error, weakest, told = self.problem.error(iterate.r, iterate.v), None, None
-        if error <= self.tolerance:
-            told = self.problem.accepted(iterate.r, iterate.v, error, self.tolerance)
+        if error <= self.asked.tolerance:
+            told = self.problem.accepted(iterate.r, iterate.v, error, self.asked.tolerance)
             error, weakest = told.error, told.weakest
             if told.r is not iterate.r:
                 iterate = replace(iterate, r=told.r, v=told.v)
-        if weakest is not None and weakest.hidden > BLUR * self.tolerance:
+        if weakest is not None and weakest.hidden > BLUR * self.asked.tolerance:
             error = self.problem.certain_error(iterate.r, iterate.v)
-            if error > self.tolerance:
+            if error > self.asked.tolerance:
                 weakest = None
                 self.blurred += 1
         return self._noted(iterate, error, weakest, told)
@@ -115,29 +125,29 @@ class Watch:
     @property
     def converged(self) -> bool:
         """True when the best iterate will do in the sum and at every contact."""
-        good = self.error <= self.tolerance
-        return good and (self.weakest is None or self.weakest.error <= self.contact_tolerance)
+        good = self.error <= self.asked.tolerance
+        return good and (self.weakest is None or self.weakest.error <= self.asked.of_contacts)
 
     @property
     def weak(self) -> bool:
         """True when the best iterate will do in the sum alone."""
-        return self.error <= self.tolerance and not self.converged
+        return self.error <= self.asked.tolerance and not self.converged
 
     @property
     def in_words(self) -> str:
         """Why the best iterate will not do though its error is small; "" where it would."""
-        if self.criterion is Criterion.NATURAL:
+        if self.asked.criterion is Criterion.NATURAL:
             return ""
         if self.best is not None and not self.converged:
             hidden = self.problem.rounding(self.best.r)
             mu = self.problem.law.parameters[:, MU].max(initial=0.0)
-            if mu * EPSILON > self.tolerance:
+            if mu * EPSILON > self.asked.tolerance:
                 return (
                     f"rounding of the slip, times friction of {mu:.0e}, is above the "
                     "tolerance: hold contacts that can not slip by supports, or take mu below "
                     "1e7"
                 )
-            if hidden > self.tolerance:
+            if hidden > self.asked.tolerance:
                 return (
                     f"rounding alone may hide an error of {hidden:.1e}: reactions are huge "
                     "beside what loads the contacts"
@@ -146,15 +156,15 @@ class Watch:
             return ""
         return (
             f"contact {self.weakest.contact} misses its law by {self.weakest.error:.1e} on its "
-            f"own scale, {self.contact_tolerance:.0e} is allowed"
+            f"own scale, {self.asked.of_contacts:.0e} is allowed"
         )
 
     def tighter(self, goal: float) -> float:
         """The next goal for the error, so that the weakest contact will do too."""
-        if self.criterion is Criterion.NATURAL:
-            return TIGHTER * goal * min(self.tolerance / self.error, 1.0)
+        if self.asked.criterion is Criterion.NATURAL:
+            return TIGHTER * goal * min(self.asked.tolerance / self.error, 1.0)
         assert self.weakest is not None
-        share = TIGHTER * self.contact_tolerance / self.weakest.error
+        share = TIGHTER * self.asked.of_contacts / self.weakest.error
         return max(min(self.error * share, TIGHTER * goal), np.finfo(float).tiny)
 
     def cycled(self, iterate: Iterate, error: float) -> bool:
@@ -185,6 +195,171 @@ class Watch:
 
         Or when rounding has hidden that of BLURRED ones: more of them will not be known better.
         """
-        if self.patience is None:
+        if self.asked.patience is None:
             return False
-        return len(self.history) - self.mark[0] > self.patience or self.blurred > BLURRED
+        return len(self.history) - self.mark[0] > self.asked.patience or self.blurred > BLURRED
+
+
+def run(
+    watching: Watching,
+    watch: Watch,
+    solver: Solver,
+    start: Iterate,
+) -> tuple[Outcome, str]:
+    """Start the solver, and again with a tighter goal while only contacts are not settled."""
+    asked = watch.asked
+    try:
+        watch.problem.prepare(asked.deadline)
+        watch.judge(with_motion(watch.problem, start))
+        if watch.converged:
+            return Outcome.CONVERGED, ""
+        known = start.v is not None or watch.problem.measure is Measure.EXACT
+        error = watch.error if known else np.inf
+        target = Target(asked.tolerance, asked.deadline, asked.criterion, error)
+        ended: tuple[Outcome, str] | None = (Outcome.STAGNATED, "")
+        while target.tolerance >= TIGHTEST:
+            if watch.weak or ended is None:
+                goal = watch.tighter(target.tolerance)
+                start = watch.best or start
+                target = replace(target, tolerance=goal, start_error=watch.error)
+                watch.content = 0
+            ended = _once(watching, watch, solver, start, target)
+            if ended is not None:
+                break
+        outcome, detail = ended or (Outcome.STAGNATED, "")
+    except TimeUp:
+        outcome, detail = Outcome.TIME_LIMIT, ""
+    except KeyboardInterrupt:
+        return _stopped(watch, StoppedBy.USER)
+    if outcome is Outcome.CONVERGED:
+        return outcome, detail
+    if watch.weak and outcome in GAVE_UP:
+        return Outcome.WEAK_CONTACTS, watch.in_words
+    return outcome, "; ".join(text for text in (detail, watch.in_words) if text)
+
+
+def _once(
+    watching: Watching,
+    watch: Watch,
+    solver: Solver,
+    start: Iterate,
+    target: Target,
+) -> tuple[Outcome, str] | None:
+    """The loop over the iterates of one start.
+
+    Returns why it ended; None when the error is below the target, but not that of contacts.
+    A method with a stopping rule of its own (`Iterate.ends`) is not stopped before that holds.
+    """
+    callback, limit = watch.asked.callback, watch.asked.max_iterations or np.inf
+    try:
+        each = watch.problem.operations if target.deadline.work is not None else 0.0
+        iterates, judged = iter(solver.iterates(watch.problem, start, target)), None
+        while (iterate := sent(iterates, judged)) is not None:
+            target.deadline.spend(iterate.iterations * each)
+            step = watch.judge(iterate)
+            converged = watch.converged
+            if not converged:
+                watching.begin()
+            stop = callback is not None and callback(step, iterate)
+            if converged and iterate.ends != "":
+                return Outcome.CONVERGED, iterate.stage or iterate.ends or ""
+            if iterate.ends:
+                return _stopped(watch, StoppedBy.RULE, f": {iterate.ends}")
+            if stop:
+                return _stopped(watch, StoppedBy.CALLBACK)
+            if not np.isfinite(step.error):
+                return Outcome.NON_FINITE, ""
+            if watch.iterations >= limit:
+                return Outcome.MAX_ITERATIONS, ""
+            if target.deadline.passed:
+                return Outcome.TIME_LIMIT, ""
+            if watch.weak and step.error <= target.tolerance and iterate.ends is None:
+                return None
+            if _content_too_early(watch, iterate, target):
+                return None
+            if len(watch.history) == EARLY and watch.problem.gains_energy:
+                return Outcome.BREAKDOWN, "stopped early"
+            if watch.cycled(iterate, step.error):
+                return Outcome.CYCLED, ""
+            if watch.stagnated:
+                return Outcome.STAGNATED, ""
+            judged = watch.judgement(step, target.deadline)
+        if watch.content:
+            return None
+        return Outcome.STAGNATED, "the method has nothing left to try"
+    except Breakdown as reason:
+        late = target.deadline.passed
+        return Outcome.TIME_LIMIT if late else Outcome.BREAKDOWN, str(reason)
+    except TimeUp:
+        return Outcome.TIME_LIMIT, ""
+    except SingularOperator as reason:
+        return Outcome.BREAKDOWN, str(reason)
+    except ArithmeticError as reason:
+        return Outcome.NON_FINITE, str(reason)
+
+
+def _stopped(watch: Watch, by: StoppedBy, why: str = "") -> tuple[Outcome, str]:
+    """The end on request, noted with who asked for it."""
+    watch.stopped_by = by
+    return Outcome.STOPPED, f"{by.value}{why}"
+
+
+def _content_too_early(watch: Watch, iterate: Iterate, target: Target) -> bool:
+    """True where a solver is content by the judge's error, but the criterion is another one.
+
+    Some iterates of it may come first: Newton is there with one more, and keeps its history.
+    """
+    if watch.asked.criterion is Criterion.JUDGE:
+        return False
+    content = watch.problem.error(iterate.r, iterate.v) <= target.tolerance
+    watch.content = watch.content + 1 if content else 0
+    return watch.content > CONTENT
+
+
+def finished(
+    watch: Watch, whole: Problem, outcome: Outcome, detail: str = ""
+) -> FrictionSolution:
+    """The record and the best state; whole: the problem that was given, perhaps condensed."""
+    problem, told, best = watch.problem, watch.told, watch.best
+    measure = problem.measure if best is not None else Measure.EXACT
+    natural = watch.asked.criterion is Criterion.NATURAL
+    if told is not None and told.motion is not None and whole is problem and not problem.has_v:
+        of, r, (u, v) = whole, told.r, told.motion
+    elif best is None:  # stopped in the first factorisation: do not start it again
+        r = whole.start()[0]
+        of, u, v = whole.recover(r, np.zeros(whole.unknowns) if whole.has_v else None)
+    else:
+        r = best.r
+        given = best.v if measure is not Measure.EXACT and problem.has_v else None
+        of, u, v = whole.recover(r, given)
+    error, weakest = watch.error, watch.weakest
+    if weakest is None and best is not None and not natural:
+        weakest = problem.weakest(best.r, best.v)
+        if weakest is not None and weakest.hidden > BLUR * error:
+            error = max(error, problem.certain_error(best.r, best.v))
+    found = None
+    if outcome not in (Outcome.CONVERGED, Outcome.STOPPED) and best is not None:
+        found, text = problem.obstruction(u)
+        detail = "; ".join(part for part in (detail, text) if part)
+    seconds = now() - watch.started
+    record = Convergence(
+        outcome,
+        watch.iterations,
+        error,
+        watch.asked.tolerance,
+        tuple(watch.history),
+        watch.linear_iterations,
+        seconds,
+        watch.method,
+        Measure.NATURAL if natural else measure,
+        detail,
+        contact_error=None if weakest is None else weakest.error,
+        contact_tolerance=watch.asked.of_contacts,
+        weakest=None if weakest is None else weakest.contact,
+        compiling=compiling() - watch.compiled,
+        flops=watch.flops,
+        stopped_by=watch.stopped_by,
+        obstruction=found,
+    )
+    settled = None if told is None else told.settled
+    return FrictionSolution(of, r, u, v, record, settled=settled)

@@ -89,6 +89,72 @@ def test_statics_of_a_rigid_block_on_an_elastic_one_is_that_of_a_very_stiff_one(
     np.testing.assert_allclose(found[0], found[1], atol=2e-3 * np.abs(found[1]).max())
 
 
+@pytest.mark.parametrize(("length", "force"), [(1.0, 1.0), (1e-6, 1e9), (1e3, 1e-6)])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_rigid_block_that_rests_on_a_plane_is_in_balance_in_any_units(dim, length, force):
+    body = am.Body(am.box([2 * length] + [length] * (dim - 1), 2), am.Rigid())
+    up = np.eye(dim)[-1]
+    contact = am.Contact("bottom", am.Plane(up), mu=0.5)
+    load = force * (0.2 * np.eye(dim)[0] - up)
+    model = am.Model([body], [], [contact], [am.Traction("top", load)])
+    solution = am.solve(model)
+    area = 2 * length ** (dim - 1)
+    np.testing.assert_allclose(solution.resultant, -area * load, atol=1e-6 * force * area)
+    assert np.abs(solution.displacement[0]).max() < 1e-6 * length
+
+
+def test_a_rigid_block_that_friction_can_not_hold_has_no_solution():
+    body = am.Body(am.box((2.0, 1.0), 2), am.Rigid())
+    contact = am.Contact("bottom", am.Plane((0, 1)), mu=0.5)
+    model = am.Model([body], [], [contact], [am.Traction("top", (0.6, -1.0))])
+    with pytest.raises(am.NotConverged, match="no solution.*no contact forces balance"):
+        am.solve(model)
+
+
+def stack(count, push):
+    """Rigid blocks 2 wide and 1 high, one on the other, the last one pushed."""
+    bodies = [
+        am.Body(am.box((2.0, 1.0), (2, 1), origin=(0, k)), am.Rigid(), f"b{k}")
+        for k in range(count)
+    ]
+    contacts = [am.Contact("b0.bottom", am.Plane((0, 1)), mu=0.5)]
+    contacts += [
+        am.Contact(f"b{k}.bottom", master=f"b{k - 1}.top", mu=0.5, method="nodal")
+        for k in range(1, count)
+    ]
+    return am.Model(bodies, [], contacts, [am.Traction(f"b{count - 1}.top", (push, -1.0))])
+
+
+def test_a_stack_of_rigid_blocks_stands_until_its_weight_leaves_the_edge():
+    # about the edge below: push * 2 * height against 2 * half the width
+    solution = am.solve(stack(6, 0.99 / 6))
+    for k in range(6):
+        np.testing.assert_allclose(
+            solution.pairs[f"b{k}.bottom"].force, (-0.33, 2.0), rtol=1e-5
+        )
+    with pytest.raises(am.NotConverged, match="no solution"):
+        am.solve(stack(6, 1.01 / 6))
+
+
+@pytest.mark.parametrize("across", [0.0, 1e-3, 0.5])
+def test_an_elastic_lid_presses_a_rigid_block_onto_a_plane(across):
+    found = []
+    for material in (am.Rigid(), am.LinearElastic(young=1e8, poisson=0.3)):
+        lid = am.Body(am.box((2.0, 1.0), (4, 2), origin=(0, 1)),
+                      am.LinearElastic(young=100, poisson=0.3), "lid")  # fmt: skip
+        base = am.Body(am.box((2.0, 1.0), (4, 2)), material, "base")
+        contacts = [
+            am.Contact("lid.bottom", master="base.top", mu=0.3, method="nodal"),
+            am.Contact("base.bottom", am.Plane((0, 1)), mu=0.5),
+        ]
+        found.append(
+            am.solve(am.Model([lid, base], [am.Fix("lid.top", (across, -0.02))], contacts))
+        )
+    for name in ("lid.bottom", "base.bottom"):
+        rigid, stiff = (s.pairs[name].force for s in found)
+        np.testing.assert_allclose(rigid, stiff, atol=2e-5 * 5)
+
+
 def test_quasi_static_steps_move_rigid_bodies_too():
     lid = am.Body(am.box((2.0, 1.0), (2, 1)), am.Rigid())
     stone = am.Body(am.box((2.0, 1.0), (4, 2), origin=(0, -1)), STONE)

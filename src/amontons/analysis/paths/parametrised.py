@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
@@ -10,8 +11,10 @@ from numpy.typing import NDArray
 
 from ...core.arrays import real
 from ...core.errors import InvalidInput, NotConverged, SingularOperator
+from ...mechanics.model.large_deformation import LargeDeformation
 from ...mechanics.steps.system import Motion
 from ...problem.friction import Form, FrictionProblem
+from ...problem.protocol import Problem
 from ...problem.solution import Outcome
 from ...solvers.driver import drive
 from .friction_path import FrictionPath
@@ -48,10 +51,21 @@ def path_of(
         if interval[0] < 0:
             raise InvalidInput(f"interval: expected friction >= 0, got {interval[0]:g}")
         return FrictionPath.friction(_discrete(problem))
-    if getattr(problem, "is_large", False):
-        if base is not None:
-            raise InvalidInput("base: expected none for a model with hyperelastic laws")
-        return load_path(problem, interval)  # type: ignore[arg-type]
+    return UNDER_LOAD.get(problem.kind, _of_reactions)(problem, interval, base)
+
+
+def _of_displacements(problem: Any, interval: tuple[float, float], base: Any) -> LoadPath:
+    """Of a model in large deformations."""
+    if base is not None:
+        raise InvalidInput("base: expected none for a model with hyperelastic laws")
+    return load_path(problem, interval)
+
+
+def _of_reactions(
+    problem: Model | FrictionProblem, interval: tuple[float, float],
+    base: Model | FrictionProblem | None,
+) -> FrictionPath:  # fmt: skip
+    """Of a problem that is linear but for its law, or a model of such."""
     if base is not None:
         return _between(_discrete(base), _discrete(problem))
     if isinstance(problem, FrictionProblem):
@@ -63,6 +77,11 @@ def path_of(
     if not motion.is_timed:
         return _between(problem.with_load(0.0).assemble(), problem.with_load(1.0).assemble())
     return _in_time(motion, interval)
+
+
+UNDER_LOAD: dict[type[Problem], Callable[..., FrictionPath | LoadPath]] = {  # by kind
+    LargeDeformation: _of_displacements,
+}
 
 
 def _in_time(motion: Motion, interval: tuple[float, float]) -> FrictionPath:

@@ -12,7 +12,7 @@ from pathlib import Path
 import click
 
 from ...analysis.certificates.uniqueness import Uniqueness, assess, quick_verdict
-from ...core.clock import Deadline, TimeLimit
+from ...core.clock import TimeLimit
 from ...core.errors import FileFormatError, InvalidInput, SingularOperator, UnsupportedForm
 from ...core.files import put
 from ...io import results as output
@@ -24,7 +24,8 @@ from ...problem.judge.measures import Criterion
 from ...problem.nitsche import NitscheProblem
 from ...problem.solution import FrictionSolution, Outcome
 from ...solvers import Iterate
-from .. import api
+from ...solvers.asked import Asked
+from ..api import solve_as_asked
 from ..model_solution import ModelSolution
 from .group import INTERRUPTED
 from .sources import open_source, with_flags
@@ -53,19 +54,17 @@ def run(
     place = check_folder(f"{opened.name}-results" if folder is None else folder)
     check_writable(json_copy, "--json")
     begin = None if start is None else _start(start, opened)
-    deadline = Deadline.after(settings.time_limit)
     silent = quiet or json_copy == "-"
     with _naming_culprits(source, opened, settings.method, start):
-        found = api.solve_any_form(
-            opened.target, settings.solver(), tolerance=settings.tolerance,
-            contact_tolerance=settings.contact_tolerance,
-            max_iterations=settings.max_iterations, time_limit=deadline,
-            patience=patience or None, criterion=Criterion(criterion),
-            callback=(lambda step, iterate: None) if silent else None, start=begin,
+        asked = Asked(
+            settings.tolerance, settings.contact_tolerance, settings.max_iterations,
+            settings.time_limit, (lambda step, iterate: None) if silent else None,
+            Criterion(criterion), patience or None, condense=True,
         )  # fmt: skip
+        found = solve_as_asked(opened.target, asked, begin, settings.solver())
     result = replace(_output(opened, found, settings.method), fclib_error=fclib_error,
                      figures="" if figures == "none" else figures)  # fmt: skip
-    left = None if settings.time_limit is None else deadline
+    left = None if settings.time_limit is None else asked.deadline
     verdict = _verdict(found, full_verdict, left)
     if verdict is not None:
         result = replace(result, uniqueness=record(verdict))

@@ -50,8 +50,8 @@ def contact_pairs(
                 fields.points[rows], fields.frames[rows], fields.gap[rows], fields.slip[rows],
                 fields.pressure[rows], fields.shear[rows], fields.node[rows],
             )  # fmt: skip
-            by_node = contact.nitsche is not None and model.dimension == 3
-            found.append(_at_nodes(pair, fields.weights[rows]) if by_node else pair)
+            crowded = model.dimension == 3 and len(np.unique(pair.node)) < len(rows)
+            found.append(_at_nodes(pair, fields.weights[rows]) if crowded else pair)
     return found
 
 

@@ -139,10 +139,7 @@ class Discretisation:
         out = self.K @ displacement - load - self.whole_H @ r.ravel()
         ends = np.cumsum([0, *(len(p.rows.nodes) for p in self.placed)])
         for placed, a, b in zip(self.placed, ends[:-1], ends[1:], strict=True):
-            if placed.nitsche is not None:
-                out -= placed.nitsche.symmetric_force(
-                    displacement, placed.rows.weights, r[a:b]
-                )  # fmt: skip
+            out -= placed.besides(displacement, r[a:b])
         return out
 
     def gathered(self, force: Array) -> Array:

@@ -31,6 +31,6 @@ OF_THE_START = (sliding_beyond_pairs, sliding_beyond_curvature)  # its pairs, no
 
 
 def model_warnings(model: Model, fields: ContactFields) -> tuple[ResultWarning, ...]:
-    """All warnings about a solved state of a model, in the order of CHECKS."""
-    checks = CHECKS if model.is_large else CHECKS + OF_THE_START
+    """All warnings about a solved state of a model, in the order of its checks."""
+    checks = model.formulation.doubts
     return tuple(warning for check in checks for warning in check(model, fields))

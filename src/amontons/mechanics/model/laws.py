@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +18,10 @@ from ...problem.law import (
     Kind,
     Law,
     Orthotropic,
+    Overclosure,
     Tied,
     Tresca,
+    VaryingCompliance,
     VaryingFriction,
     joined,
 )
@@ -34,16 +36,25 @@ TOUCHING = 1e-6  # gap, relative to the size of a node's area, up to which both 
 
 APART = 0.5  # the same, up to which sides may be tied
 SPRINGS = BONDS
-CHANGES = {"mu_across": "orthotropic friction", "mu": VaryingFriction.name} | dict.fromkeys(
-    SPRINGS, "compliance of contact"
-)  # numbers of laws that need both r and u
+NEEDS_FORCES = {  # numbers of laws that need both r and u, and why some formulations lack them
+    name: f"{what} needs contact forces, method 'nodal' or 'mortar', and small strains with "
+    "contact in the reference configuration"
+    for name, what in (("mu_across", "orthotropic friction"), ("mu", VaryingFriction.name),
+                       *((name, "compliance of contact") for name in SPRINGS))
+}  # fmt: skip
+NEEDS_THE_START = {  # the same of those that count from the undeformed state
+    name: f"{what} small strains and contact in the reference configuration"
+    for name, what in (("cohesion", "cohesion needs"), ("tied", "ties need"),
+                       ("clearance", "a given clearance needs"))
+}  # fmt: skip
 SLANT = 1e-6  # part of a direction in the tangent plane that is one
 
 
-def check_law(k: int, contact: Contact, dimension: int, *, large: bool) -> None:
+def check_law(k: int, contact: Contact, dimension: int, lacks: Mapping[str, str]) -> None:
     """Raise InvalidInput or UnsupportedLaw where contact k of a model can not have its law.
 
-    large: contact is found in the current configuration.
+    lacks: names of numbers that the model's formulation does not take, and why; "mu" is that
+    of a curve.
     """
     where = f"contact on {contact.slave!r}"
     given = contact.numbers
@@ -52,24 +63,13 @@ def check_law(k: int, contact: Contact, dimension: int, *, large: bool) -> None:
             "in 2D there is one direction to slide along; expected one coefficient",
             ("contacts", k, "mu_across"), where,
         )  # fmt: skip
-    if large and "cohesion" in given:
-        raise UnsupportedLaw(
-            "cohesion needs small strains and contact in the reference configuration",
-            ("contacts", k, "cohesion"), where,
-        )  # fmt: skip
-    if large and contact.tied:
-        raise UnsupportedLaw(
-            "ties need small strains and contact in the reference configuration",
-            ("contacts", k, "tied"), where,
-        )  # fmt: skip
-    if not (large or contact.nitsche is not None):
-        return
-    for name, what in CHANGES.items():
-        if name in given and (name != "mu" or isinstance(contact.mu, FrictionCurve)):
-            raise UnsupportedLaw(
-                f"{what} needs contact forces, method 'nodal' or 'mortar', and small strains "
-                "with contact in the reference configuration", ("contacts", k, name), where,
-            )  # fmt: skip
+    asked = {name for name, value in given.items()
+             if name != "mu" or isinstance(value, FrictionCurve)}  # fmt: skip
+    asked |= {"tied"} if contact.tied else set()
+    asked |= {"clearance"} if contact.clearance is not None else set()
+    for name, why in lacks.items():
+        if name in asked:
+            raise UnsupportedLaw(why, ("contacts", k, name), where)
 
 
 def law_of(contacts: Sequence[Contact], parts: Discretisation) -> Law:
@@ -94,8 +94,12 @@ def _law(contact: Contact, placed: Placed) -> Law:
     """The law of one pair of surfaces."""
     values = {
         name: (_stiff if name in SPRINGS else _values)(contact, name, placed)
-        for name, value in contact.numbers.items() if not isinstance(value, FrictionCurve)
+        for name, value in contact.numbers.items()
+        if not isinstance(value, FrictionCurve | Overclosure)
     }  # fmt: skip
+    if isinstance(contact.stiffness, Overclosure):
+        law = _law_of(contact, values, placed)
+        return VaryingCompliance(contact.stiffness, placed.rows.weights, law)
     if isinstance(contact.mu, FrictionCurve):
         values["mu"] = np.zeros(len(placed.rows.weights))
         law = _law_of(contact, values, placed)
@@ -164,8 +168,8 @@ def _values(contact: Contact, name: str, placed: Placed) -> Array:
     with within(name):
         given = scalar_at(
             value, placed.all_points, what,
-            each="slave node" if contact.nitsche is None else "Gauss point",
-        )  # fmt: skip
+            each=placed.each,
+        )
         if name in ("mu", "mu_across", "angle") or not callable(value):
             return given[placed.kept]
         # averaged as the gap is; dual functions may be negative

@@ -8,31 +8,24 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
-from ...core.errors import InvalidInput, UnsupportedForm, within
+from ...core.errors import InvalidInput, within
 from ...core.faces import Told
 from ...core.prepared import Prepared
 from ...core.words import helpful
-from ...linear import Direct
-from ...linear.grid_matrix import GridMatrix
 from ...problem.friction import FrictionProblem
 from ...problem.law import Law
 from ...problem.nitsche import NitscheProblem
 from ...problem.protocol import Problem
 from ...problem.solution import FrictionSolution
-from ..elements.hyperelasticity import is_hyperelastic
 from .assembly import Discretisation, discretise, locate
 from .balance import Imbalance, imbalance, in_words
-from .fields import ContactFields, recover_fields
+from .fields import ContactFields
+from .formulation import Formulation, formulation_of
 from .held import check_outside
-from .large_deformation import LargeDeformation, large_deformation
-from .large_fields import recover_large
-from .laws import check_law, law_of, rubs
+from .laws import law_of, rubs
 from .names import named_bodies, pair_names, tuple_of
-from .nitsche import nitsche_matrices, nitsche_problem
-from .nodal_forces import follows
-from .parts import FINITE, SMALL, Body, BodyForce, Contact, Fix, Load, NodalForce, Pressure
+from .parts import Body, Contact, Fix, Load, NodalForce
 from .rigid import Piece, check_held, loose_modes
 from .values import ScalarValue, is_number
 
@@ -73,11 +66,7 @@ class Model(Told):
         dims = {body.mesh.dim for body in self.bodies}
         if len(dims) > 1:
             raise InvalidInput("expected all in 2D or all in 3D, got both", ("bodies",))
-        if len({contact.nitsche is None for contact in self.contacts}) > 1:
-            raise InvalidInput(
-                "expected Nitsche's method in all of them or in none, got both", ("contacts",)
-            )
-        self._check_configurations()
+        self.formulation.check(self)
         object.__setattr__(self, "pair_names", pair_names(self.contacts))
         if not (is_number(self.load_factor) and np.isfinite(self.load_factor)):
             raise InvalidInput(
@@ -109,6 +98,11 @@ class Model(Told):
         """2 or 3."""
         return self.bodies[0].mesh.dim
 
+    @cached_property
+    def formulation(self) -> Formulation:
+        """What differs between models that find contact, or speak of its forces, otherwise."""
+        return formulation_of(self.bodies, self.contacts)
+
     @property
     def is_large(self) -> bool:
         """True where contact is found in the current configuration, and loads may follow.
@@ -116,44 +110,12 @@ class Model(Told):
         So it is with hyperelastic laws, whose strains are finite, and where contacts ask for
         it; linear elastic bodies keep their small strains.
         """
-        return self._is_hyperelastic or any(c.kinematics == FINITE for c in self.contacts)
-
-    @property
-    def _is_hyperelastic(self) -> bool:
-        return any(is_hyperelastic(body.material) for body in self.bodies)
+        return self.formulation.finds_contact_where_nodes_are
 
     @property
     def kind(self) -> type[Problem]:
         """The class of the `discrete_problem`."""
-        if self.is_large:
-            return LargeDeformation
-        return FrictionProblem if self.contacts[0].nitsche is None else NitscheProblem
-
-    def _check_configurations(self) -> None:
-        """Contacts of one kinematics, one that the bodies can have, and loads that fit."""
-        for k, contact in enumerate(self.contacts):
-            check_law(k, contact, self.dimension, large=self.is_large)
-        for k, contact in enumerate(self.contacts if self.is_large else ()):
-            at = ("contacts", k, "kinematics")
-            if contact.kinematics == SMALL and self._is_hyperelastic:
-                raise InvalidInput(
-                    "hyperelastic laws have contact in the current configuration, "
-                    "kinematics='finite', as by default; got 'small'",
-                    at, f"contact on {contact.slave!r}",
-                )  # fmt: skip
-            if contact.kinematics != FINITE and not self._is_hyperelastic:
-                raise InvalidInput(
-                    "expected one kinematics for all of them, got both 'small' and 'finite'",
-                    at, "contacts",
-                )  # fmt: skip
-        for k, load in enumerate(self.loads):
-            if follows(load) and not (self.is_large or isinstance(load, Pressure)):
-                is_body = isinstance(load, BodyForce)
-                what = "body force" if is_body else f"traction on {load.on!r}"
-                raise InvalidInput(
-                    "configuration 'current' needs large deformations: hyperelastic laws, or "
-                    "contacts with kinematics='finite'", ("loads", k, "configuration"), what,
-                )  # fmt: skip
+        return self.formulation.problem
 
     @property
     def discretisation(self) -> Discretisation:
@@ -170,32 +132,18 @@ class Model(Told):
         SingularOperator naming the body and the rigid modes that nothing can hold, and
         UnsupportedForm with Nitsche's method, which has no reactions for unknowns.
         """
-        problem = self._problem
-        if not isinstance(problem, FrictionProblem):
-            raise UnsupportedForm(problem.unfit)
-        return problem
+        return self.formulation.assembled(self)
 
     def discrete_problem(self) -> Problem:
         """What `solve` solves: as `assemble`, with Nitsche's method a NitscheProblem.
 
         With contact in the current configuration a LargeDeformation.
         """
-        return large_deformation(self) if self.is_large else self._problem
+        return self._problem
 
     @cached_property
-    def _problem(self) -> FrictionProblem | NitscheProblem:
-        if self.is_large:
-            raise UnsupportedForm(
-                "model: hyperelastic laws and contact in the current configuration have no one "
-                "linear problem; use solve(model), whose solution.problem is the tangent one, "
-                "or LinearElastic and contact of small kinematics"
-            )
-        parts = self.discretisation
-        w = self.load_factor * parts.carried
-        w[:, 0] += parts.gap
-        prescribed = self.load_factor * parts.prescribed
-        self.check_outside(prescribed)
-        return self._discrete(self.load_factor * parts.load, w, prescribed)
+    def _problem(self) -> Problem:
+        return self.formulation.at_load_factor(self)
 
     def check_outside(self, prescribed: Array, when: str = "") -> None:
         """Raise InvalidInput where supports push a node that they hold into the other side.
@@ -206,8 +154,7 @@ class Model(Told):
         for k, held in enumerate(placed.held for placed in parts.placed):
             if held is None:
                 continue
-            gap = (held.left_where_moved(prescribed, parts.is_fixed) if self.is_large
-                   else held.left(prescribed))  # fmt: skip
+            gap = self.formulation.left(held, prescribed, parts.is_fixed)
             with within("contacts", k):
                 check_outside(held, gap, self.bodies, self.supports, parts.offsets, when)
 
@@ -225,37 +172,7 @@ class Model(Told):
         w[:, 1:] -= before
         f = parts.gathered(load - parts.K @ prescribed)
         f = parts.with_driven(f, parts.M, prescribed) if parts.rigid is not None else f
-        return self._discrete(f, w, prescribed)
-
-    def _discrete(
-        self, f: Array, w: Array, prescribed: Array
-    ) -> FrictionProblem | NitscheProblem:
-        """The problem with a load f and local values w; shares its matrices with others.
-
-        prescribed (dofs,): the values on the fixed dofs that f and w contain already.
-        """
-        parts, law = self.discretisation, self.law
-        loose = self._loose_but_held(parts, law)
-        if self.contacts[0].nitsche is not None:
-            if parts.rigid is not None:
-                raise UnsupportedForm(
-                    "Nitsche's method takes the place of reactions by stresses, and a rigid "
-                    "body has none; use nodal or mortar contact", ("contacts", 0, "method"),
-                    "model",
-                )  # fmt: skip
-            matrices = self._shared.once(nitsche_matrices, (), parts, not loose)
-            return nitsche_problem(parts, matrices, f, w, prescribed, law, self.name)
-        guess, size = parts.continued(prescribed), None
-        if loose:
-            guess, size = _bonded(parts, f, w)
-        base = FrictionProblem.from_global(
-            parts.M,  # type: ignore[arg-type]  # operators as well
-            parts.H, f, w, law, near_nullspace=parts.near_nullspace,
-            levels=parts.levels, guess=guess, name=self.name,
-            load_scale=_load_size(parts, f, w), u_scale=size, structure=parts.structure,
-        )  # fmt: skip
-        first = self._shared.once(_first, (), base)
-        return replace(base, M=first.M, H=first.H, _shared=first._shared)  # one factor for all
+        return self.formulation.with_load(self, f, w, prescribed)
 
     @cached_property
     def law(self) -> Law:
@@ -270,7 +187,7 @@ class Model(Told):
         """
         parts = self.discretisation
         given = self.load_factor * parts.load if load is None else load
-        force = np.zeros_like(parts.load) if self.is_large else given
+        force = self.formulation.lasting(given)
         if self.law.cohesion.any():  # as `FrictionProblem.plain` has it
             tension = np.zeros_like(parts.carried)
             tension[:, 0] = self.law.cohesion
@@ -290,17 +207,15 @@ class Model(Told):
         """Pieces with the rigid modes that supports leave free."""
         return loose_modes(parts.parts, parts.is_fixed)
 
-    def _loose_but_held(self, parts: Discretisation, law: Law) -> bool:
+    @property
+    def rests_on_contact(self) -> bool:
         """True when contact alone holds a body; raises SingularOperator when nothing does."""
+        parts = self.discretisation
         acting = np.ones(parts.carried.shape, dtype=bool)
-        acting[:, 1:] = rubs(law)[:, None]
+        acting[:, 1:] = rubs(self.law)[:, None]
         loose = self._loose(parts)
         check_held(loose, parts.whole_H, parts.dofs, acting.ravel())
         return bool(loose)
-
-    def check_held(self) -> None:
-        """Raise SingularOperator for a body that neither supports nor contacts can hold."""
-        self._loose_but_held(self.discretisation, self.law)
 
     def with_mu(self, mu: ScalarValue) -> Model:
         """The same model with Coulomb friction mu in all contacts that are not tied."""
@@ -328,36 +243,4 @@ class Model(Told):
         With large deformations of its `large_deformation`, and frames of the deformed state.
         """
         surfaces = tuple(locate(self.bodies, c.slave) for c in self.contacts)
-        if self.is_large:
-            return recover_large(self, surfaces, solution)
-        return recover_fields(self, surfaces, solution)
-
-
-def _first(problem: FrictionProblem) -> FrictionProblem:
-    """The first problem of a model: others take its matrices, and what is made of them."""
-    return problem
-
-
-def _load_size(parts: Discretisation, f: Array, w: Array) -> float:
-    """Size of the load, also when only an overlap (gap < 0) loads the bodies: |M H overlap|."""
-    overlap = np.zeros_like(w)
-    overlap[:, 0] = np.minimum(w[:, 0], 0)
-    return float(
-        np.hypot(np.linalg.norm(f), np.linalg.norm(parts.M @ (parts.H @ overlap.ravel())))
-    )
-
-
-def _bonded(parts: Discretisation, f: Array, w: Array) -> tuple[Array, float]:
-    """v, and size of u, when springs as stiff as the nodes bond all contacts.
-
-    They replace those without contact, which do not exist where contact alone holds a body.
-    """
-    H, M = parts.H, parts.M
-    near = abs(H).T @ M.diagonal()
-    if parts.rigid is not None:  # between rigid bodies, which have none
-        near[near == 0] = near.max(initial=0.0) or 1.0
-    stiffness = sparse.diags_array(near)
-    stored = M.tocsc() if isinstance(M, GridMatrix) else M
-    bonded = sparse.csc_array(stored + H @ stiffness @ H.T)
-    v = Direct().factor(bonded).solve(f - H @ (stiffness @ w.ravel()))
-    return v, float(np.linalg.norm(H.T @ v + w.ravel()))
+        return self.formulation.recover(self, surfaces, solution)

@@ -72,16 +72,12 @@ class PairResult(Acting):
 def pair_results(model: Model, fields: ContactFields) -> dict[str, PairResult]:
     """The numbers of every contact pair of a solved model, by its name."""
     at = arms(model, fields.displacement)
-    r = np.column_stack([fields.pressure, fields.shear]) * fields.weights[:, None]
     starts = model.discretisation.offsets // model.dimension
     out = {}
     for name, (contact, placed, numbers) in zip(model.pair_names, pairs_of(model), strict=True):
         first = int(starts[placed.body])
-        if model.is_large:
-            wrench = Wrench.of(at[first + fields.node[numbers]], fields.force[numbers])
-        else:
-            forces = (placed.rows.H @ r[numbers].ravel()).reshape(-1, model.dimension)
-            wrench = Wrench.of(at[first : first + len(forces)], forces)
+        nodes, forces = model.formulation.forces_of_pair(placed, fields, numbers)
+        wrench = Wrench.of(at[first + nodes], forces)
         out[name] = _result(name, contact, placed, numbers, fields, wrench)
     return out
 

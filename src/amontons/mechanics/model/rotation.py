@@ -100,11 +100,10 @@ def large_rotation(model: Model, fields: ContactFields) -> list[ResultWarning]:
     others = f", and {far.size - 1} more by over {LIMIT:g}" if far.size > 1 else ""
     angle = min(float(turned[worst]), 89.9)
     stretch = 100 * (1 / np.cos(np.radians(angle)) - 1)
-    keep = "" if model.is_large else ", and keep loads and gaps where they were"
     return [ResultWarning(
         "large-rotation",
         f"body {fit.names[worst]!r} turns by {turned[worst]:.1f} degrees{others}: small "
-        f"strains stretch what turns, here by {stretch:.2g} %{keep}; "
+        f"strains stretch what turns, here by {stretch:.2g} %{model.formulation.keeps}; "
         "give the bodies a hyperelastic law such as NeoHookean (solve, quasi-static "
         f"steps), or trust the motion only up to some {LIMIT:g} degrees",
     )]  # fmt: skip

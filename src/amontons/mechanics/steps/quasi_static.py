@@ -25,9 +25,11 @@ from ...core.words import helpful
 from ...problem.friction import FrictionProblem
 from ...problem.law import VaryingFriction
 from ...problem.nitsche import NitscheProblem
+from ...problem.protocol import Problem
 from ...problem.solution import FrictionSolution
 from ..model import Model
 from ..model.diagnosis import with_diagnosis
+from ..model.large_deformation import LargeDeformation
 from ..model.reactions import support_forces
 from .energy import Energies, Forces, slow_energies
 from .large_steps import LargeSlowModel
@@ -67,10 +69,9 @@ class QuasiStatic:
 
     def prepare(self, model: Model, tolerance: float) -> SlowModel | LargeSlowModel:
         """The matrices of all steps; equilibrium at the end never creates energy."""
-        if self.crossing is not None and model.kind is NitscheProblem:
-            raise UnsupportedForm(f"crossing: {model.kind.unfit}")
-        kind = LargeSlowModel if model.is_large else SlowModel
-        return kind(model, self.crossing)
+        if self.crossing is not None and model.kind.no_path:
+            raise UnsupportedForm(f"crossing: {model.kind.no_path}")
+        return IN_TIME[model.kind](model, self.crossing)
 
 
 class SlowModel:
@@ -156,3 +157,8 @@ class SlowModel:
     def _forces(self, q: Array, load: Array, r: Array) -> Forces:
         inner, pushed = self.motion.parts.K @ q, self.motion.parts.whole_H @ r.ravel()
         return Forces(inner, load, pushed, float(0.5 * q @ inner), self.springs.energy(r))
+
+
+IN_TIME: dict[type[Problem], type[SlowModel | LargeSlowModel]] = {  # by `Model.kind`
+    FrictionProblem: SlowModel, NitscheProblem: SlowModel, LargeDeformation: LargeSlowModel,
+}  # fmt: skip

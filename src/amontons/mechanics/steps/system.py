@@ -14,9 +14,9 @@ from ...core.errors import InvalidInput
 from ..elements.mass import lumped, mass
 from ..model import Fix, Model
 from ..model.assembly import Discretisation
-from ..model.nodal_forces import nodal_forces, sampled
+from ..model.nodal_forces import sampled
 from ..model.parts import Load
-from ..model.supports import external_load, locate, prescribed_values
+from ..model.supports import locate, prescribed_values
 from .timed import depends_on_time, is_timed, part_at, steady
 
 if TYPE_CHECKING:
@@ -54,10 +54,8 @@ class Motion:
         return depends_on_time(self.model)
 
     def _of(self, loads: list[Load | None]) -> Any:
-        """Nodal forces of loads, None: of none; (dofs,), or `NodalForces` if `is_large`."""
-        if self.model.is_large:
-            return nodal_forces(self.body, loads)
-        return external_load(self.model.bodies, loads, self.parts.offsets)
+        """Nodal forces of loads, None: of none, as `Formulation.nodal_load` gives them."""
+        return self.model.formulation.nodal_load(self.body, loads)
 
     @cached_property
     def _steady_load(self) -> Any:

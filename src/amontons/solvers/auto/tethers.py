@@ -47,10 +47,7 @@ class Tethers:
         self, problem: FrictionProblem, start: Iterate, target: Target
     ) -> Iterates:
         """Iterates (r, v) of a global problem with a singular M, one for each step."""
-        stiffness = np.asarray(problem.M.diagonal(), dtype=float)
-        if not (stiffness > 0).any():
-            return
-        stiffness = np.where(stiffness > 0, stiffness, stiffness[stiffness > 0].mean())
+        stiffness = problem.diagonal
         r, v = start.r, np.zeros(problem.unknowns) if start.v is None else start.v
         share, last, errors = FIRST_SPRINGS, 1.0, [np.inf]
         for _ in range(STEPS):
