@@ -97,3 +97,8 @@ def helpful(thing: Thing) -> Thing:
     if is_class:
         thing.__init__ = called  # type: ignore[misc]
     return thing if is_class else called  # type: ignore[return-value]
+
+
+def shortened(pattern: str, letters: int = 60) -> str:
+    """A pattern of statuses, its end left out where it is long."""
+    return pattern if len(pattern) <= letters else f"{pattern[: letters - 1]}…"
