@@ -64,6 +64,8 @@ from .problem.law import (
     Coulomb as Coulomb, Mixed as Mixed,
     Orthotropic as Orthotropic, Tied as Tied, Tresca as Tresca,
     FrictionCurve as FrictionCurve, VaryingFriction as VaryingFriction,
+    ExponentialOverclosure as ExponentialOverclosure, OverclosureCurve as OverclosureCurve,
+    VaryingCompliance as VaryingCompliance,
 )
 from .problem.solution import (
     ContactStatus as ContactStatus, Convergence as Convergence,

@@ -20,6 +20,7 @@ from ..contact import (
     contact_nodes,
     mismatch,
     mortar_contact,
+    mortar_nodes,
     mortar_obstacle,
     nitsche_obstacle,
     nitsche_pair,
@@ -84,7 +85,7 @@ class Placed:
         """Facets of the master."""
         assert self.sides is not None
         _, _, mesh, name = self.sides
-        return Surface.of_corners(mesh.points, mesh.surface(name), name)
+        return Surface.on(mesh, name)
 
     @cached_property
     def narrowest(self) -> float:
@@ -100,6 +101,7 @@ def place(
     k = locate(bodies, contact.slave)[0]
     d = bodies[k].mesh.dim
     rows, H, met, points, terms = _met(bodies, contact, given, offsets)
+    rows = _cleared(contact, rows)
     kept = ~_has_held_normal(H, d, given.is_fixed) & _wanted(contact, points)[met]
     all_kept = met.copy()
     all_kept[met] = kept
@@ -107,6 +109,26 @@ def place(
     terms = None if terms is None else terms.at(kept)
     return Placed(k, all_kept, points, rows.at(kept), H[:, np.repeat(kept, d)], held, terms,
                   _sides(bodies, contact))  # fmt: skip
+
+
+def _cleared(contact: Contact, rows: ContactRows) -> ContactRows:
+    """The rows with the gap that the contact is said to have."""
+    value = contact.clearance
+    if value is None:
+        return rows
+    if not callable(value):
+        return replace(rows, gap=np.full(len(rows.gap), float(value)))
+
+    def gap(points: Array) -> Array:
+        found = np.asarray(value(points), dtype=float)
+        if found.shape not in ((), (len(points),)) or not np.isfinite(found).all():
+            raise InvalidInput(
+                f"contact on {contact.slave!r}: expected clearance to return ({len(points)},) "
+                f"finite numbers for points {points.shape}, got shape {found.shape}"
+            )
+        return np.broadcast_to(found, len(points)).astype(float)
+
+    return replace(rows, gap=rows.mean(gap))
 
 
 def _has_held_normal(H: sparse.csc_array, d: int, is_fixed: Mask) -> Mask:
@@ -136,6 +158,7 @@ def _held_nodes(
         except InvalidInput:
             return None  # no node faces the master: averages may still do
         H = _shifted(rows.H, first, total) + _shifted(on_master, int(offsets[j]), total)
+    rows = _cleared(contact, rows)
     held = _has_held_normal(sparse.csc_array(H), d, is_fixed) & _wanted(contact, rows.points)
     if not held.any():
         return None
@@ -160,8 +183,10 @@ def _met(
         return _met_by_nitsche(bodies, contact, contact.nitsche, offsets)
     k, surface = locate(bodies, contact.slave)
     slave, size = bodies[k].mesh, int(offsets[-1])
-    points = slave.points[contact_nodes(slave, surface)[0]]
-    mortar = contact.method == "mortar"
+    mortar = is_mortar(slave, surface, contact)
+    points = slave.points[
+        mortar_nodes(slave, surface) if mortar else contact_nodes(slave, surface)[0]
+    ]
     held, lasting = given.by_body(offsets, slave.dim)
     if contact.obstacle is not None:
         rows = nodal_contact(slave, surface, contact.obstacle)
@@ -182,6 +207,15 @@ def _met(
         rows, on_master, met = pair_contact(slave, surface, master, other)
     H = _shifted(rows.H, int(offsets[k]), size) + _shifted(on_master, int(offsets[j]), size)
     return rows, sparse.csc_array(H), met, points, None
+
+
+def is_mortar(mesh: Mesh, surface: str, contact: Contact) -> bool:
+    """Whether contacts are averages: asked for, or as corners of facets have no weight.
+
+    The weights of quadrilaterals with eight nodes are negative at their corners.
+    """
+    eight = any(facets.kind == "quad8" for facets in mesh.surface(surface))
+    return contact.method == "mortar" or (eight and contact.master is None)
 
 
 def _met_by_nitsche(

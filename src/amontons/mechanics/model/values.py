@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.arrays import LARGEST, number, real
-from ...core.errors import InvalidInput, shown
+from ...core.errors import InvalidInput, number_hint, shown
 from .timing import steady_value
 
 Array = NDArray[np.float64]
@@ -21,7 +21,8 @@ ScalarValue = ArrayLike | Callable[[Array], ArrayLike]
 def check_vector(value: object, what: str, *, free: bool = False) -> None:
     """Raise InvalidInput for what can be no vector, and for one number other than 0.
 
-    That could only be meant along every axis, which is hardly ever what is wanted.
+    That could only be meant along every axis, which is hardly ever what is wanted.  Also for
+    texts and for numbers that are none.
     """
     entries = list(value) if isinstance(value, list | tuple) else [value]
     if any(entry is ... for entry in entries):
@@ -35,6 +36,14 @@ def check_vector(value: object, what: str, *, free: bool = False) -> None:
             f"{what}: expected 0, a vector such as (0, 0, -1), or (0, -1) in 2D, or a function "
             f"of the position, got {shown(value)}"
         )
+    if isinstance(value, list | tuple):
+        for entry in value:
+            if isinstance(entry, str):
+                leave = "; None leaves a component free" if free else ""
+                raise InvalidInput(f"{what}: expected a number, got {shown(entry)}"
+                                   f"{number_hint(entry) or leave}")  # fmt: skip
+            if is_number(entry) and not np.isfinite(entry):
+                raise InvalidInput(f"{what}: expected a finite number, got {entry}")
     if is_number(value) and value != 0:
         leave = f"; (None, None, {value}) leaves the others free" if free else ""
         raise InvalidInput(
@@ -56,11 +65,15 @@ def pressure_of(value: object, on: str) -> float:
 def check_scalar(value: object, what: str) -> None:
     """Raise InvalidInput for a number below 0, or an array with one."""
     if isinstance(value, str):
-        raise InvalidInput(f"{what}: expected a number or a function, got the text {value!r}")
+        raise InvalidInput(f"{what}: expected a number or a function, got the text {value!r}"
+                           f"{number_hint(value)}")  # fmt: skip
     try:
         numbers = np.asarray(value, dtype=float)
     except (TypeError, ValueError):  # a function, or nothing of use, which `scalar_at` tells
         return
+    if not np.isfinite(numbers).all():
+        bad = numbers[~np.isfinite(numbers)].flat[0]
+        raise InvalidInput(f"{what}: expected finite numbers >= 0, got {bad}")
     if (numbers < 0).any():
         raise InvalidInput(f"{what}: expected numbers >= 0, got {numbers.min():g}")
 
