@@ -21,9 +21,17 @@ ScalarValue = ArrayLike | Callable[[Array], ArrayLike]
 def check_vector(value: object, what: str, *, free: bool = False) -> None:
     """Raise InvalidInput for what can be no vector, and for one number other than 0.
 
-    That could only be meant along every axis, which is hardly ever what is wanted.  Also for
+    It could only be meant along every axis, which is hardly ever what is wanted.  Also for
     texts and for numbers that are none.
     """
+    if isinstance(value, list | tuple):
+        for entry in value:
+            if isinstance(entry, str):
+                leave = "; None leaves a component free" if free else ""
+                raise InvalidInput(f"{what}: expected a number, got {shown(entry)}"
+                                   f"{number_hint(entry) or leave}")  # fmt: skip
+            if is_number(entry) and not np.isfinite(entry):
+                raise InvalidInput(f"{what}: expected a finite number, got {entry}")
     entries = list(value) if isinstance(value, list | tuple) else [value]
     if any(entry is ... for entry in entries):
         leave = ", None for a component that is free" if free else ""
@@ -36,14 +44,6 @@ def check_vector(value: object, what: str, *, free: bool = False) -> None:
             f"{what}: expected 0, a vector such as (0, 0, -1), or (0, -1) in 2D, or a function "
             f"of the position, got {shown(value)}"
         )
-    if isinstance(value, list | tuple):
-        for entry in value:
-            if isinstance(entry, str):
-                leave = "; None leaves a component free" if free else ""
-                raise InvalidInput(f"{what}: expected a number, got {shown(entry)}"
-                                   f"{number_hint(entry) or leave}")  # fmt: skip
-            if is_number(entry) and not np.isfinite(entry):
-                raise InvalidInput(f"{what}: expected a finite number, got {entry}")
     if is_number(value) and value != 0:
         leave = f"; (None, None, {value}) leaves the others free" if free else ""
         raise InvalidInput(
@@ -78,13 +78,17 @@ def check_scalar(value: object, what: str) -> None:
         raise InvalidInput(f"{what}: expected numbers >= 0, got {numbers.min():g}")
 
 
-def vector_at(value: VectorValue, points: Array, what: str, *, free: bool = False) -> Array:
-    """A vector value at points (n, dim): (n, dim); a free component (None) becomes NaN.
+def vector_at(
+    value: VectorValue, points: Array, what: str, *, free: bool = False, size: int | None = None
+) -> Array:
+    """A vector value at points (n, dim): (n, size); a free component (None) becomes NaN.
+
+    size: number of components, by default dim.
 
     Callables take one point x of shape (dim,): the whole value, or one component each; those
     of (x, t) are taken at t = 0.
     """
-    dim = points.shape[1]
+    dim = points.shape[1] if size is None else size
     value = steady_value(value)
     if callable(value):
         rows = [_row(value(x), dim, what, free) for x in points]
