@@ -67,7 +67,7 @@ def model_fields(
 
     starts = np.cumsum([0, *(len(body.mesh.points) for body in model.bodies)])
     pairs = list(zip(model.bodies, fields.displacement, strict=True))
-    stress = [_stress(body, moved) for body, moved in pairs]
+    stress = [body_stress(body, moved) for body, moved in pairs]
     centres, nodes = (np.concatenate(each) for each in zip(*stress, strict=True))
     record = getattr(solution, "solution", solution).convergence  # of a step in time, too
     converged = int(not record.stamp)
@@ -95,7 +95,7 @@ def model_fields(
     return ModelFields(meshes, point, cell, whole, record.stamp)
 
 
-def _stress(body: Body, moved: Array) -> tuple[Array, Array]:
+def body_stress(body: Body, moved: Array) -> tuple[Array, Array]:
     """Stress of cells and nodes at displacements (nodes, d); 0 in rigid bodies."""
     if isinstance(body.material, Rigid):
         return np.zeros((body.mesh.cell_count, 3, 3)), np.zeros((len(moved), 3, 3))
