@@ -55,8 +55,9 @@ _HOME = {
                          "read_mesh", "refined"),
     "mechanics.contact": ("LevelSet", "Nitsche", "Plane", "Sphere"),
     "mechanics.model": ("Body", "BodyForce", "CiarletGeymonat", "Contact", "ContactFields",
-                        "Fix", "LinearElastic", "Model", "NeoHookean", "NodalForce", "Pressure",
-                        "Rigid", "Traction", "distributed"),
+                        "Fix", "LinearElastic", "Model", "NeoHookean", "NodalForce",
+                        "OrthotropicElastic", "Pressure", "Rigid", "Temperature", "Traction",
+                        "distributed"),
 }  # fmt: skip
 _GONE = {
     "AlgebraicMultigrid": "GeometricMultigrid(levels=()), whose levels are then algebraic ones",

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 
 def tuple_of(name: str, values: object, kind: object) -> tuple:
     """The list `name` of a model, of objects of one kind; raises InvalidInput."""
-    wanted = getattr(kind, "__name__", "Traction, Pressure, BodyForce or NodalForce")
+    loads = "Traction, Pressure, BodyForce, NodalForce or Temperature"
+    wanted = getattr(kind, "__name__", loads)
     if isinstance(values, kind):  # type: ignore[arg-type]
         raise InvalidInput(f"{name}: expected a list of {wanted}, got one alone; write [it]")
     try:
