@@ -48,7 +48,8 @@ from .mechanics.model import (
     Body as Body, BodyForce as BodyForce, CiarletGeymonat as CiarletGeymonat,
     Contact as Contact, ContactFields as ContactFields, Fix as Fix,
     LinearElastic as LinearElastic, Model as Model, NeoHookean as NeoHookean,
-    NodalForce as NodalForce, Pressure as Pressure, Rigid as Rigid, Traction as Traction,
+    NodalForce as NodalForce, OrthotropicElastic as OrthotropicElastic, Pressure as Pressure,
+    Rigid as Rigid, Temperature as Temperature, Traction as Traction,
     distributed as distributed,
 )
 from .mechanics.ready.packings import SpherePacking as SpherePacking
@@ -64,6 +65,8 @@ from .problem.law import (
     Coulomb as Coulomb, Mixed as Mixed,
     Orthotropic as Orthotropic, Tied as Tied, Tresca as Tresca,
     FrictionCurve as FrictionCurve, VaryingFriction as VaryingFriction,
+    ExponentialOverclosure as ExponentialOverclosure, OverclosureCurve as OverclosureCurve,
+    VaryingCompliance as VaryingCompliance,
 )
 from .problem.solution import (
     ContactStatus as ContactStatus, Convergence as Convergence,

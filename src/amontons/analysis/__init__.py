@@ -6,7 +6,7 @@ from .basins.study import BasinRun, Basins
 from .certificates.critical_friction import CriticalFriction, Witness
 from .certificates.older_criteria import CriterionFriction
 from .certificates.opening import Existence, Opening
-from .certificates.uniqueness import Uniqueness, Verdict
+from .certificates.verdict import Uniqueness, Verdict
 from .grading import graded
 from .paths.cones import TangentCone
 from .paths.contact_rates import ContactRates

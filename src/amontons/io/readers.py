@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     from .case.settings import Settings
 
 GROUP = "amontons.readers"  # of entry points
-MESHES = (".msh", ".vtk", ".vtu", ".stp", ".step", ".brep", ".stl", ".med", ".unv", ".bdf")
+MESHES = (".msh", ".vtk", ".vtu", ".stp", ".step", ".iges", ".igs", ".brep", ".stl", ".med",
+          ".unv", ".bdf")  # fmt: skip
+PACKED = {".gz": "gunzip", ".zip": "unzip", ".xz": "unxz", ".bz2": "bunzip2"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,6 +171,8 @@ def format_of(path: Path) -> Format:
     hint = ""
     if path.suffix.lower() in MESHES:
         hint = f'; a mesh is named in a case file: [mesh] file = "{path.name}"'
+    elif path.suffix.lower() in PACKED:
+        hint = f"; unpack it first: {PACKED[path.suffix.lower()]} {path.name}"
     raise FileFormatError(
         f"{path}: expected {', '.join(most)} or {last}, this is {other}{hint}"
     )

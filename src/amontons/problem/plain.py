@@ -41,7 +41,7 @@ def plain_of(problem: FrictionProblem) -> FrictionProblem:
     """
     law = problem.law
     if law.give is not None:
-        problem = _with_give(problem, law.give)
+        problem = _with_give(_offset(problem), law.give)
     if law.cohesion.any():
         problem = _without_tension(problem)
     if law.stretch is not None:
@@ -98,6 +98,16 @@ def _with_give(problem: FrictionProblem, give: Array) -> FrictionProblem:
     assert problem.W is not None
     W = problem._shared.once(_softer, (problem.W, give), problem.W, give, problem.dimension)
     return replace(problem, W=W)
+
+
+def _offset(problem: FrictionProblem) -> FrictionProblem:
+    """The problem of u + o n."""
+    if not np.any(problem.law.offset):
+        return problem
+    name = "w" if problem.q is None else "q"
+    rows = np.array(getattr(problem, name))
+    rows[:, 0] += problem.law.offset
+    return replace(problem, **{name: read_only(rows)})
 
 
 def _with_springs(problem: FrictionProblem, give: Array) -> FrictionProblem:

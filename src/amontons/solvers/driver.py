@@ -19,7 +19,7 @@ from .changed_law import changed_law
 from .contract import Iterate, Solver, check_solver, fitted
 from .first_iterate import as_it_is, first_iterate, own_motion
 from .judging import Taken, Watch, finished, run
-from .varying_friction import varying_friction
+from .varying_law import varying_law
 
 QUICK = 300  # contacts up to which one iterate is no time to press Ctrl-C
 
@@ -94,7 +94,7 @@ def drive_as_asked(
         solver = solver.choice(problem)
     check_solver(solver)
     if problem.law.varies or problem.plain is not problem:
-        solved = varying_friction if problem.law.varies else changed_law
+        solved = varying_law if problem.law.varies else changed_law
         again = partial(drive_as_asked, solver=solver, taken=taken)
         return solved(problem, asked, start, again)
     asked.check_fits(problem)

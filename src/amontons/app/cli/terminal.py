@@ -43,11 +43,6 @@ def show_table(
     Console(width=wide, highlight=False).print(table)
 
 
-def shortened(pattern: str, letters: int = 60) -> str:
-    """A pattern of statuses, its end left out where it is long."""
-    return pattern if len(pattern) <= letters else f"{pattern[: letters - 1]}…"
-
-
 def say_when(model: Model | FrictionProblem | None) -> None:
     """Print at which time values of a model were taken that depend on it."""
     if model is None or isinstance(model, FrictionProblem):

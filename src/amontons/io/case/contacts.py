@@ -25,26 +25,33 @@ def read_contact(table: Table, bodies: Sequence[Body]) -> Contact:
     from ...mechanics.model.supports import locate
 
     table.only("slave", "obstacle", "master", "friction", "method", "kinematics",
-               "configuration", "name")  # fmt: skip
+               "configuration", "name", "clearance")  # fmt: skip
     method = _contact_method(table)
+    if isinstance(table.data.get("slave"), list):
+        raise table.error("slave", "expected one surface; write a table [[contact]] for each")
     slave = table.text("slave")
     for key in ("slave", "master"):
         if key in table.data:
             with table.blamed(key):
                 locate(bodies, table.text(key))
     if ("obstacle" in table.data) == ("master" in table.data):
-        raise table.error("", "expected either obstacle or master")
+        raise table.error("", "expected either obstacle = { plane = { normal = [0, 1] } } or "
+                          'master = "SURFACE"')  # fmt: skip
     numbers = _friction(table)
     found = configuration(table)  # older words for kinematics
     if "kinematics" in table.data:
         found["kinematics"] = table.choice("kinematics", ("small", "finite"))
+    if "clearance" in table.data:
+        found["clearance"] = _steady(table, "clearance")
     if "name" in table.data:
         found["name"] = table.text("name")
     with table.blamed():
         if "master" in table.data:
             master = table.text("master")
             return Contact(slave, master=master, **numbers, method=method, **found)
-        obstacle = _obstacle(table.table("obstacle"), bodies[0].mesh.dim)
+        words = "a table, such as { plane = { normal = [0, 1] } }"
+        given = table.as_table("obstacle", table.data["obstacle"], words)
+        obstacle = _obstacle(given, bodies[0].mesh.dim)
         return Contact(slave, obstacle, **numbers, method=method, **found)
 
 
@@ -80,6 +87,9 @@ def _scalars(table: Table, done: set[str]) -> dict[str, Any]:
     """The numbers that are a number or an expression, but for the keys that are done."""
     numbers: dict[str, Any] = {}
     for key in (key for key in table.data if key not in done):
+        if key == "stiffness" and isinstance(table.data[key], dict):
+            numbers[key] = _overclosure(table.table(key))
+            continue
         value = numbers[NUMBERS[key]] = _steady(table, key)
         if isinstance(value, float) and value < 0:
             raise table.error(key, f"expected a number >= 0, got {value}")
@@ -115,6 +125,20 @@ def _curve(table: Table) -> Any:
     table.need("mu", "coefficients, one for each pressure or speed")
     with table.blamed():
         return FrictionCurve(**{key: table.data[key] for key in table.data})
+
+
+def _overclosure(table: Table) -> Any:
+    """Pressure over overclosure, a table of both or the exponential law of p0 and c0."""
+    from ...problem.law import ExponentialOverclosure, OverclosureCurve
+
+    exponential = "p0" in table.data or "c0" in table.data
+    names = ("p0", "c0") if exponential else ("pressure", "overclosure")
+    table.only(*names)
+    for name in names:
+        table.need(name, "the numbers of a curve of pressure over overclosure")
+    with table.blamed():
+        kind: Any = ExponentialOverclosure if exponential else OverclosureCurve
+        return kind(**{key: table.data[key] for key in table.data})
 
 
 def _steady(table: Table, key: str) -> float | Expression:

@@ -254,7 +254,7 @@ def _lines(path: Path, place: str) -> list[str]:
     try:
         with path.open("rb") as file:
             packed = file.read(2) == PACKED
-        with (gzip.open(path) if packed else path.open("rb")) as file:
+        with gzip.open(path) if packed else path.open("rb") as file:
             data = file.read(LARGEST_FILE + 1)
     except (OSError, EOFError, gzip.BadGzipFile) as reason:
         raise FileFormatError(f"{before}{path}: can not be read: {reason}") from None

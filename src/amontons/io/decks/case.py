@@ -23,23 +23,14 @@ from ..case.evolution import Evolution
 from ..case.overrides import override_settings
 from ..case.settings import Settings
 from ..readers import Case
-from .cards import Card, Row, number, read_cards
-from .flat import Deck, Placed, flatten
+from .cards import Card, Row, read_cards
+from .contacts import Options, adjusted, read_contacts
+from .flat import Deck, flatten
 from .history import Course, History, Span, read_history
 from .keywords import sorted_out
-from .materials import Interaction, read_interactions, read_sections
+from .materials import read_sections
 from .meshing import Region
-from .scopes import Index, missing
-
-OPTIONS = ("allow", "hard")
-
-
-@dataclass(frozen=True)
-class Options:
-    """How a deck is read: cards that may be left out; hard: laws of overclosure too."""
-
-    allow: tuple[str, ...] = ()
-    hard: bool = False
+from .scopes import Index
 
 
 @dataclass
@@ -124,18 +115,19 @@ def _case(
     notes += _formulations(deck)
     found = Found()
     _name_nodes(region, history)
-    contacts = _contacts(deck, region, options, notes)
+    contacts = read_contacts(deck, region, options, notes)
     _name_faces(region, history)
     mesh, at = region.mesh(title)
+    mesh = adjusted(mesh, at, contacts, notes)
     _supports_and_loads(found, region, history, at, notes)
-    for contact, card in contacts:
-        found.add("contacts", contact, card)
+    for each in contacts:
+        found.add("contacts", each.contact(mesh), each.card)
     materials = {s.name: s.material.law(region.plane) for s in sections}
     make = partial(_model, [Body(mesh, materials)], found, title)
     evolution = Evolution(QuasiStatic(_step(history.spans)), history.until)
     case = Case(make(None), settings, title, path, evolution=evolution, key_of=found.line_of,
                 notes=tuple(notes))  # fmt: skip
-    if len(deck.steps) > 1 and any(contact.mu for contact, _ in contacts):
+    if len(deck.steps) > 1 and any(contact.mu for contact in found.contacts):
         return case  # friction remembers the steps before
     return replace(case, target=make(history.until), moving=case.target)
 
@@ -170,82 +162,6 @@ def _step(spans: Sequence[Span]) -> float:
         count = max(int(np.ceil((span.end - span.begin) / step - 1e-9)), 1)
         step = min(step, (span.end - span.begin) / count)
     return step
-
-
-# ------------------------------------------------------------------------------ contacts
-def _contacts(
-    deck: Deck, region: Region, options: Options, notes: list[str]
-) -> list[tuple[Contact, Card]]:
-    cards = [p.card for p in deck.model]
-    for step in deck.steps:
-        for placed in step:
-            if placed.card.keyword in ("CONTACTPAIR", "SURFACEINTERACTION"):
-                raise placed.card.error("stands in a step; expected before the first one")
-    interactions = read_interactions(cards)
-    out = []
-    for placed in deck.model:
-        card = placed.card
-        if card.keyword != "CONTACTPAIR":
-            continue
-        for option in ("ADJUST", "TIED", "HCRIT", "NOTHICKNESS"):
-            if option in card.options and card.options[option] not in ("0", "0.", "0.0"):
-                raise card.error(f"{option}: is not read")
-        name = card.name("INTERACTION")
-        if name not in interactions:
-            raise card.error(missing("surface interaction", name, interactions))
-        law = _law(interactions[name], options, notes)
-        for row in card.rows():
-            if len(row.fields) != 2:
-                raise row.error(
-                    f"*CONTACT PAIR: expected slave, master, got {len(row.fields)} names"
-                )
-            slave, master = (_surface(region, placed, text, row) for text in row.fields)
-            out.append((Contact(slave, master=master, **law), card))
-        if card.label("TYPE") in (None, "NODE TO SURFACE"):
-            notes.append(f"{card} (line {card.number}): NODE TO SURFACE is taken as mortar")
-    if not out:
-        raise InvalidInput("*CONTACT PAIR: missing, a deck without contact")
-    return out
-
-
-def _law(interaction: Interaction, options: Options, notes: list[str]) -> dict[str, Any]:
-    """Numbers of a contact; raises FileFormatError for a law of overclosure that is not read.
-
-    LINEAR: pressure over overclosure, the tension that it has far away is left out; HARD is
-    hard.  With the option `hard` all are.
-    """
-    numbers: dict[str, Any] = {"mu": interaction.friction, "cap": interaction.limit}
-    word, card = interaction.behaviour, interaction.behaviour_card or interaction.card
-    if options.hard:
-        if word != "HARD" or interaction.slope is not None:
-            text = f"{card} (line {card.number}): contact is taken as hard and rigid, as asked"
-            notes += [text] if text not in notes else []
-        return numbers
-    if word == "LINEAR":
-        for row in interaction.values[:1]:
-            numbers["stiffness"] = number(row.fields[0], row, "*SURFACE BEHAVIOR")
-        if not numbers.get("stiffness", 0.0) > 0:
-            raise card.error("expected a stiffness > 0, pressure over overclosure")
-    elif word != "HARD":
-        raise card.error(
-            f"{word}: this law of pressure over overclosure is not read, expected HARD or "
-            "LINEAR; --set deck.hard=true takes contact as hard and sticking as rigid"
-        )
-    if interaction.slope is not None and interaction.friction:
-        numbers["stick_stiffness"] = interaction.slope
-    return numbers
-
-
-def _surface(region: Region, placed: Placed, text: str, row: Row) -> str:
-    """Ask the mesh for a surface; returns its name there."""
-    faces, nodes = placed.scope.surface(text, row)
-    name = text.strip('"').upper()
-    if name not in region.facets:
-        if nodes is None:
-            region.add_faces(name, faces, row)
-        else:
-            region.add_covering(name, nodes, row)
-    return name
 
 
 # ------------------------------------------------------------------------------ history

@@ -263,9 +263,7 @@ def _held(row: Row) -> list[tuple[int, float]]:
         last = whole(row.fields[2], row, "*BOUNDARY: component")
     value = number(row.fields[3], row, "*BOUNDARY: value") if len(row.fields) > 3 else 0.0
     if not 1 <= first <= last <= ROTATIONS[-1]:
-        raise row.error(
-            f"*BOUNDARY: expected components from 1 to 3, got {first} to {last}"
-        )
+        raise row.error(f"*BOUNDARY: expected components from 1 to 3, got {first} to {last}")
     return [(k - 1, value) for k in range(first, last + 1) if k not in ROTATIONS]
 
 
@@ -339,5 +337,3 @@ def _distributed(history: History, each: Placed, span: Span, known: Amplitudes) 
         before = history.faces.get(key)
         course = _course(before[0] if before else Course(), value, span, card, known)
         history.faces[key] = (course, card, each.scope)
-
-

@@ -13,7 +13,7 @@ from .cards import Card
 READ = {
     "HEADING", "MATERIAL", "ELASTIC", "DENSITY", "SOLIDSECTION", "SURFACEINTERACTION",
     "SURFACEBEHAVIOR", "FRICTION", "CONTACTPAIR", "BOUNDARY", "AMPLITUDE", "STEP", "STATIC",
-    "CLOAD", "DLOAD", "DSLOAD",
+    "CLOAD", "DLOAD", "DSLOAD", "CLEARANCE",
 }  # fmt: skip
 OUTPUT = {
     "NODEPRINT", "NODEFILE", "NODEOUTPUT", "ELPRINT", "ELFILE", "ELEMENTOUTPUT", "CONTACTFILE",
@@ -44,7 +44,7 @@ MEANS = {  # what a card would have done
     "TEMPERATURE": "the bodies would grow and shrink",
     "CHANGEFRICTION": "friction would change", "MODELCHANGE": "parts would come and go",
     "CHANGESURFACEBEHAVIOR": "contact would change", "SPRING": "springs would act",
-    "CLEARANCE": "the gap would be another one", "GAP": "contact elements would act",
+    "GAP": "contact elements would act",
     "FREQUENCY": "vibrations would be computed", "BUCKLE": "buckling would be computed",
     "CONTACT": "surfaces in contact would be found",
 }  # fmt: skip

@@ -7,10 +7,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from ...core.errors import InvalidInput
 from ...mechanics.meshes import Cells, Facets, Mesh
 from ...mechanics.meshes.cells import CELLS, FACET_KIND
+from ...mechanics.meshes.surfaces import facet_normals
 from .cards import Card, Row
 from .flat import Deck
 from .materials import Section
@@ -18,6 +20,7 @@ from .scopes import Faces, Index
 from .shapes import SHAPES, side_of
 
 Array = NDArray[np.float64]
+FACING = 0.3  # cosine from which normals of two facets face each other
 
 
 @dataclass
@@ -99,6 +102,46 @@ class Region:
                     )
                 out.append(_facets(self.dim, block.nodes[own][:, sides[side]]))
 
+    def covers(self, nodes: Index) -> bool:
+        """Whether nodes are all those of some outer facets."""
+        marked = np.zeros(len(self.deck.points), dtype=bool)
+        marked[nodes] = True
+        left = marked.copy()
+        for facets in self._boundary():
+            left[facets.nodes[marked[facets.nodes].all(axis=1)]] = False
+        return not left.any()
+
+    def add_around(self, name: str, nodes: Index, master: Sequence[Facets], where: Row) -> None:
+        """Ask for the outer facets next to nodes that face the closest one of a master."""
+        points = self.deck.points
+        marked, other = np.zeros((2, len(points)), dtype=bool)
+        marked[nodes] = True
+        for facets in master:
+            other[facets.nodes] = True
+        sides = [
+            _centres(points, Facets(f.kind, f.nodes[other[f.nodes].all(axis=1)]), self.dim)
+            for f in self._boundary()
+        ]
+        centres, normals = (np.concatenate(x) for x in zip(*sides, strict=True))
+        tree, out = cKDTree(centres), []
+        for facets in self._boundary():
+            own = Facets(facets.kind, facets.nodes[marked[facets.nodes].any(axis=1)])
+            if not len(own.nodes):
+                continue
+            at, outward = _centres(points, own, self.dim)
+            facing = np.einsum("ij,ij->i", outward, normals[tree.query(at)[1]]) < -FACING
+            if facing.any():
+                out.append(Facets(own.kind, own.nodes[facing]))
+        covered = np.zeros(len(points), dtype=bool)
+        for facets in out:
+            covered[facets.nodes] = True
+        for node in nodes[~covered[nodes]][:1]:
+            raise where.error(
+                f"surface {name}: node {self.deck.node_name(int(node))} is on no outer facet "
+                "that faces the master; give the surface by element faces"
+            )
+        self.facets[name] = out
+
     def add_covering(self, name: str, nodes: Index, where: Card | Row) -> None:
         """Ask for the surface that nodes make: the outer facets all of whose nodes they are."""
         marked = np.zeros(len(self.deck.points), dtype=bool)
@@ -159,6 +202,14 @@ class Region:
         return mesh, at
 
 
+def _centres(points: Array, facets: Facets, dim: int) -> tuple[Array, Array]:
+    """Centres and outward unit normals of facets, (k, dim) each."""
+    corners = points[facets.nodes][..., :dim]
+    normal = facet_normals(points[:, :dim], facets)
+    size = np.linalg.norm(normal, axis=1, keepdims=True)
+    return corners.mean(axis=1), normal / np.where(size > 0, size, 1.0)
+
+
 def _facets(dim: int, nodes: Index) -> Facets:
     return Facets(FACET_KIND[dim, nodes.shape[1]], nodes)
 
@@ -172,5 +223,3 @@ def _joined(facets: Sequence[Facets]) -> list[Facets]:
         _, first = np.unique(corners, axis=0, return_index=True)
         out.append(Facets(kind, nodes[np.sort(first)]))
     return out
-
-

@@ -53,5 +53,8 @@ def lumped(consistent: sparse.csr_array) -> sparse.csr_array:
 
 def _density(material: LinearElastic, region: str) -> float:
     if material.density is None:
-        raise InvalidInput(f"material of region {region!r}: dynamics need its density")
+        raise InvalidInput(
+            f"material of region {region!r}: dynamics need its density, such as "
+            "LinearElastic(..., density=7.8e-9) in N, mm, s"
+        )
     return material.density

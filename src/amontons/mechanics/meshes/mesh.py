@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
@@ -14,6 +13,7 @@ from scipy import sparse
 
 from ...core.arrays import LARGEST, integers, read_only, real, squarable
 from ...core.errors import InvalidInput, shown
+from ...core.words import near
 from ...linear.levels import checked_levels
 from .cells import CELLS
 from .check import check_half_section, check_integration, check_repeated, checked_cells
@@ -185,6 +185,6 @@ def unknown(what: str, name: object, known: object) -> str:
     names = [str(k) for k in known]  # type: ignore[attr-defined]
     if not names:
         return f"{what} {name!r}: not found, there are no named {what}s"
-    near = difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
+    meant = near(name, names)
+    hint = f"; did you mean {meant!r}?" if meant else ""
     return f"{what} {name!r}: not found, known: {', '.join(sorted(names))}{hint}"

@@ -18,8 +18,10 @@ from ...problem.law import (
     Kind,
     Law,
     Orthotropic,
+    Overclosure,
     Tied,
     Tresca,
+    VaryingCompliance,
     VaryingFriction,
     joined,
 )
@@ -42,8 +44,9 @@ NEEDS_FORCES = {  # numbers of laws that need both r and u, and why some formula
 }  # fmt: skip
 NEEDS_THE_START = {  # the same of those that count from the undeformed state
     name: f"{what} small strains and contact in the reference configuration"
-    for name, what in (("cohesion", "cohesion needs"), ("tied", "ties need"))
-}
+    for name, what in (("cohesion", "cohesion needs"), ("tied", "ties need"),
+                       ("clearance", "a given clearance needs"))
+}  # fmt: skip
 SLANT = 1e-6  # part of a direction in the tangent plane that is one
 
 
@@ -63,6 +66,7 @@ def check_law(k: int, contact: Contact, dimension: int, lacks: Mapping[str, str]
     asked = {name for name, value in given.items()
              if name != "mu" or isinstance(value, FrictionCurve)}  # fmt: skip
     asked |= {"tied"} if contact.tied else set()
+    asked |= {"clearance"} if contact.clearance is not None else set()
     for name, why in lacks.items():
         if name in asked:
             raise UnsupportedLaw(why, ("contacts", k, name), where)
@@ -90,8 +94,12 @@ def _law(contact: Contact, placed: Placed) -> Law:
     """The law of one pair of surfaces."""
     values = {
         name: (_stiff if name in SPRINGS else _values)(contact, name, placed)
-        for name, value in contact.numbers.items() if not isinstance(value, FrictionCurve)
+        for name, value in contact.numbers.items()
+        if not isinstance(value, FrictionCurve | Overclosure)
     }  # fmt: skip
+    if isinstance(contact.stiffness, Overclosure):
+        law = _law_of(contact, values, placed)
+        return VaryingCompliance(contact.stiffness, placed.rows.weights, law)
     if isinstance(contact.mu, FrictionCurve):
         values["mu"] = np.zeros(len(placed.rows.weights))
         law = _law_of(contact, values, placed)

@@ -16,21 +16,15 @@ from numpy.typing import NDArray
 
 from ...core.arrays import number, real
 from ...core.errors import InvalidInput, shown
-from ...core.words import helpful
+from ...core.words import helpful, nearest
 from ...problem.law import (
-    CappedCoulomb,
-    Cohesive,
-    Compliant,
-    Coulomb,
     FrictionCurve,
     Law,
-    Orthotropic,
-    Tied,
-    Tresca,
-    VaryingFriction,
+    Overclosure,
 )
 from ..contact import Nitsche, Obstacle
 from .body import Body, Material
+from .law_numbers import numbers_of
 from .temperature import Temperature
 from .values import ScalarValue, VectorValue, check_scalar, check_vector
 
@@ -165,12 +159,15 @@ class Contact:
     cap), Cohesive(Coulomb(mu), cohesion), …, each one number or one per slave node.
     stiffness, stick_stiffness: contact that gives way (`problem.law.compliant`), pressure over
     overclosure and shear traction over elastic slip, stress / length, > 0; by default rigid.
+    stiffness may be an OverclosureCurve or ExponentialOverclosure (`problem.law.overclosure`).
     As a value Compliant(law, compliance, stick_compliance), which are their inverses.
     tied: the sides neither part nor slip (`problem.law.tied`), and keep the distance that they
     have in the undeformed state; with a stiffness an elastic bond.  As a value law=Tied().
     mu_across: orthotropic friction (`problem.law.orthotropic`), mu along `direction`, a vector
     in global axes seen in the tangent plane of each contact, mu_across across it; in 3D.
     where: a function of points (n, dim) -> (n,) bool that tells which slave nodes take part.
+    clearance: the gap of the undeformed sides, < 0 where they overlap, in the place of the one
+    that their meshes give: a number, or a function of points (n, dim) -> (n,).
     kinematics: "small", gap and normal are those of the undeformed bodies, or "finite", those
     where the nodes are now (nodal, obstacles only); by default "finite" with hyperelastic laws.
     configuration: the same in older words, "reference" or "current".
@@ -193,10 +190,11 @@ class Contact:
     mu_across: ScalarValue | None = None
     direction: Sequence[float] | None = None
     tied: bool = False
-    stiffness: ScalarValue | None = None
+    stiffness: ScalarValue | Overclosure | None = None
     stick_stiffness: ScalarValue | None = None
     angle: ScalarValue | None = None  # of the direction, from t1 to t2 of the contact frame
     name: str = ""
+    clearance: float | Callable[[Array], Array] | None = None
 
     def __post_init__(self, configuration: str | None, law: Law | None) -> None:
         if not isinstance(self.name, str) or not self.name.isprintable():
@@ -217,8 +215,12 @@ class Contact:
         if self.method is None:
             object.__setattr__(self, "method", "nodal" if self.master is None else "mortar")
         self._check_directions()
+        if self.clearance is not None and not callable(self.clearance):
+            given = number(f"clearance on {self.slave!r}", self.clearance)
+            object.__setattr__(self, "clearance", given)
         for name, value in self.numbers.items():
-            check_scalar(value, f"{name} on {self.slave!r}")
+            if not (name == "stiffness" and isinstance(value, Overclosure)):
+                check_scalar(value, f"{name} on {self.slave!r}")
         if self.method == "dual-mortar":
             object.__setattr__(self, "method", "mortar")
         if self.method == "nitsche":
@@ -226,17 +228,20 @@ class Contact:
         if not isinstance(self.method, Nitsche) and self.method not in METHODS:
             raise InvalidInput(
                 f"method: expected one of {', '.join(METHODS)}, got {self.method!r}"
+                f"{nearest(self.method, METHODS)}"
             )
         if self.where is not None and not callable(self.where):
             raise InvalidInput(
                 f"where: expected a function of points (n, dim) that returns (n,) of bool, got "
                 f"{shown(self.where)}"
             )
-        if self.master is None and (isinstance(self.obstacle, type) or not (
-            hasattr(self.obstacle, "gap") and hasattr(self.obstacle, "normals")
-        )):
+        if self.master is None and (
+            isinstance(self.obstacle, type)
+            or not (hasattr(self.obstacle, "gap") and hasattr(self.obstacle, "normals"))
+        ):
             raise InvalidInput(
-                f"obstacle: expected a Plane, Sphere or LevelSet, got {self.obstacle!r}"
+                f"obstacle: expected a Plane, Sphere or LevelSet, got {self.obstacle!r}; "
+                'another surface is master="NAME"'
             )
 
     def _check_law(self) -> None:
@@ -253,6 +258,12 @@ class Contact:
             raise InvalidInput(f"{where}: expected either mu or tresca (mu=0: no friction)")
         if self.cap is not None and self.mu is None:
             raise InvalidInput(f"{where}: cap goes with mu, not with tresca")
+        if isinstance(self.stiffness, Overclosure):
+            if self.tied or self.cohesion is not None or isinstance(self.mu, FrictionCurve):
+                raise InvalidInput(
+                    f"{where}: a curve of pressure over overclosure goes with one coefficient "
+                    "or stress of friction; expected no tie, cohesion or curve of mu"
+                )
 
     def _check_directions(self) -> None:
         given = (self.direction is not None) + (self.angle is not None)
@@ -312,45 +323,9 @@ class Contact:
             raise InvalidInput(
                 f"contact on {self.slave!r}: expected law or its numbers, got both"
             )
-        numbers = _numbers_of(law)
+        numbers = numbers_of(law)
         object.__setattr__(self, "tied", bool(law.tied.all() and len(law)))
         for name, value in numbers.items():
-            if not isinstance(value, FrictionCurve) and len(value) == 1:
+            if isinstance(value, np.ndarray) and len(value) == 1:
                 value = float(value[0])  # noqa: PLW2901
             object.__setattr__(self, name, value)
-
-
-def _numbers_of(law: Law) -> dict[str, Any]:
-    """The numbers of a law by the names that `Contact` has for them; raises InvalidInput."""
-    if isinstance(law, Compliant):
-        return _numbers_of(law.law) | _stiffnesses(law)
-    if isinstance(law, VaryingFriction):
-        return _numbers_of(law.inner) | {"mu": law.curve}
-    if isinstance(law, Cohesive):
-        return _numbers_of(law.law) | {"cohesion": law.cohesion}
-    if isinstance(law, Tied):
-        return {}
-    if isinstance(law, Coulomb):
-        return {"mu": law.mu}
-    if isinstance(law, Tresca):
-        return {"tresca": law.limit}
-    if isinstance(law, CappedCoulomb):
-        return {"mu": law.mu, "cap": law.cap}
-    if isinstance(law, Orthotropic):
-        return {"mu": law.mu1, "mu_across": law.mu2, "angle": law.angle}
-    raise InvalidInput(
-        "law: expected Coulomb, Tresca, CappedCoulomb, Orthotropic or Tied, with or without "
-        f"cohesion and compliance, got {shown(law)}"
-    )
-
-
-def _stiffnesses(law: Compliant) -> dict[str, Array]:
-    """Those of a compliance; none where it is zero."""
-    given = {"stiffness": law.compliance, "stick_stiffness": law.stick_compliance}
-    for values in given.values():
-        if values.any() and not values.all():
-            raise InvalidInput(
-                "law: expected a compliance > 0 at all nodes of a contact, or 0 at all; give "
-                "rigid nodes a Contact of their own (where=)"
-            )
-    return {name: 1 / values for name, values in given.items() if values.any()}

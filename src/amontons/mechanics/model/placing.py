@@ -101,6 +101,7 @@ def place(
     k = locate(bodies, contact.slave)[0]
     d = bodies[k].mesh.dim
     rows, H, met, points, terms = _met(bodies, contact, given, offsets)
+    rows = _cleared(contact, rows)
     kept = ~_has_held_normal(H, d, given.is_fixed) & _wanted(contact, points)[met]
     all_kept = met.copy()
     all_kept[met] = kept
@@ -108,6 +109,26 @@ def place(
     terms = None if terms is None else terms.at(kept)
     return Placed(k, all_kept, points, rows.at(kept), H[:, np.repeat(kept, d)], held, terms,
                   _sides(bodies, contact))  # fmt: skip
+
+
+def _cleared(contact: Contact, rows: ContactRows) -> ContactRows:
+    """The rows with the gap that the contact is said to have."""
+    value = contact.clearance
+    if value is None:
+        return rows
+    if not callable(value):
+        return replace(rows, gap=np.full(len(rows.gap), float(value)))
+
+    def gap(points: Array) -> Array:
+        found = np.asarray(value(points), dtype=float)
+        if found.shape not in ((), (len(points),)) or not np.isfinite(found).all():
+            raise InvalidInput(
+                f"contact on {contact.slave!r}: expected clearance to return ({len(points)},) "
+                f"finite numbers for points {points.shape}, got shape {found.shape}"
+            )
+        return np.broadcast_to(found, len(points)).astype(float)
+
+    return replace(rows, gap=rows.mean(gap))
 
 
 def _has_held_normal(H: sparse.csc_array, d: int, is_fixed: Mask) -> Mask:
@@ -137,6 +158,7 @@ def _held_nodes(
         except InvalidInput:
             return None  # no node faces the master: averages may still do
         H = _shifted(rows.H, first, total) + _shifted(on_master, int(offsets[j]), total)
+    rows = _cleared(contact, rows)
     held = _has_held_normal(sparse.csc_array(H), d, is_fixed) & _wanted(contact, rows.points)
     if not held.any():
         return None

@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...problem.law import Compliant, Law, VaryingFriction
+from ...problem.law import Compliant, Law, VaryingCompliance, VaryingFriction
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -34,19 +34,25 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Springs:
-    """C of contacts, rows (nc, d) of its diagonal, length per force; zero where rigid."""
+    """C of contacts, rows (nc, d) of its diagonal, length per force; zero where rigid.
+
+    curves: the law with curves of pressure over overclosure, None where all are straight; C is
+    then what it is as pressure begins.
+    """
 
     C: Array
+    curves: VaryingCompliance | None = None
 
     @classmethod
     def of(cls, law: Law, d: int) -> Springs:
         """Those of a law of forces."""
         give = np.zeros((len(law), 3)) if law.give is None else law.give
-        return cls(give[:, :d])
+        return cls(give[:, :d], law if isinstance(law, VaryingCompliance) else None)
 
     def at(self, contacts: Index) -> Springs:
         """Those of a selection of contacts, (k,)."""
-        return replace(self, C=self.C[contacts])
+        curves = None if self.curves is None else self.curves.at(contacts)
+        return Springs(self.C[contacts], curves)
 
     @property
     def presses(self) -> Mask:
@@ -63,8 +69,13 @@ class Springs:
         return slip + self.C[:, 1:] * force[:, 1:]
 
     def energy(self, force: Array) -> float:
-        """r . C r / 2 of forces (nc, d)."""
-        return 0.5 * float((self.C * force**2).sum())
+        """r . C r / 2 of forces (nc, d), along curves what they store."""
+        stored = 0.5 * self.C * force**2
+        if self.curves is not None:
+            stored[:, 0] = np.where(
+                self.curves.curved, self.curves.energy(force), stored[:, 0]
+            )
+        return float(stored.sum())
 
     def slipped(self, du: Array, before: Array, after: Array) -> Array:
         """du'_T, (nc, d-1), of motions du and forces of both ends of a step, (nc, d) each."""
@@ -83,10 +94,13 @@ class Springs:
                 law.curve, law.area * h, np.where(own, 1 / theta, 1.0), inner, law.pieces
             )
         scaled = law.scaled(h)
+        if isinstance(scaled, VaryingCompliance):
+            inner = self.of_impulses(law.inner, h, theta)  # type: ignore[attr-defined]
+            return replace(scaled, law=inner, length=scaled.length * theta * h)
         if not isinstance(scaled, Compliant):
             return scaled
-        give = (c / (theta * h) for c in (scaled.compliance, scaled.stick_compliance))
-        return Compliant(scaled.law, *give)
+        own = scaled.compliance, scaled.stick_compliance, scaled.offset
+        return Compliant(scaled.law, *(c / (theta * h) for c in own))
 
     def shifted(self, shifts: Array, mean: Array, open_: Array, stretch: Array) -> Array:
         """What is added to u1 in the law, (nc, d): `shifts` but for what springs do.

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...core.clock import NEVER, Deadline, check_seconds
-from ...core.errors import Interrupted, InvalidInput, NotConverged
+from ...core.errors import Interrupted, InvalidInput, NotConverged, shown
 from ...problem.friction import Form, FrictionProblem
 from ...problem.solution import FrictionSolution
 from ...solvers.contract import Iterate, Solver, check_at_least, check_solves, taken_by
@@ -56,6 +56,10 @@ def evolve(
         check_seconds(time_limit)
     if max_iterations is not None:
         check_at_least(1, max_iterations=max_iterations)
+    if not hasattr(method, "prepare"):
+        raise InvalidInput(
+            f"method: expected QuasiStatic(step) or MoreauJean(step), got {shown(method)}"
+        )
     prepared = method.prepare(model, tolerance)
     if solver is not None:
         check_solves(solver, model.kind)

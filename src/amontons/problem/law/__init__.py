@@ -7,9 +7,17 @@ from .coulomb import Coulomb
 from .law import Kind, Law
 from .mixed import Mixed, joined
 from .orthotropic import Orthotropic
+from .overclosure import (
+    ExponentialOverclosure,
+    Overclosure,
+    OverclosureCurve,
+    VaryingCompliance,
+)
 from .tied import Tied
 from .tresca import Tresca
 from .varying import FrictionCurve, VaryingFriction
 
-__all__ = ["CappedCoulomb", "Cohesive", "Compliant", "Coulomb", "FrictionCurve", "Kind", "Law",
-           "Mixed", "Orthotropic", "Tied", "Tresca", "VaryingFriction", "joined"]
+__all__ = ["CappedCoulomb", "Cohesive", "Compliant", "Coulomb", "ExponentialOverclosure",
+           "FrictionCurve", "Kind", "Law", "Mixed", "Orthotropic", "Overclosure",
+           "OverclosureCurve", "Tied", "Tresca", "VaryingCompliance", "VaryingFriction",
+           "joined"]

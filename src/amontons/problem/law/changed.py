@@ -1,6 +1,6 @@
 """Laws that are another law under a change of variables, contact by contact.
 
-    r = T s - c n,    u' = T (u + C r)      T = 1 in the normal, symmetric, > 0 in tangents
+    r = T s - c n,    u' = T (u + C r + o n)    T = 1 in the normal, symmetric, > 0 in tangents
 
 Without C r.u + c u_N = s.u', and always what the plain law says of (s, u') is said of (r, u):
 
@@ -10,7 +10,8 @@ Without C r.u + c u_N = s.u', and always what the plain law says of (s, u') is s
 is the same problem for s with another H or W and another load (`FrictionProblem.plain`), which
 all solvers take, and what is known of the plain law holds for it.  With a compliance C it is
 W + C that stands for W, or a spring at each contact in the global form.  c, a tension, is
-that of `cohesive`, T that of `orthotropic`, C that of `compliant`; a contact may have all.
+that of `cohesive`, T that of `orthotropic`, C and o, an offset of the gap, those of
+`compliant`; a contact may have all.
 """
 
 from __future__ import annotations
@@ -62,13 +63,18 @@ class Changed(Law):
         """u' = T (u + C r), (nc, d); without r, T u."""
         if self.give is not None and r is not None:
             u = u + self.give[:, : u.shape[1]] * r
+            u[:, 0] += self.offset
         return u if self.stretch is None else _tangents(self.stretch, np.array(u, dtype=float))
 
     def unstretched(self, u: Array, r: Array) -> Array:
         """u of u', (nc, d)."""
         if self.stretch is not None:
             u = _tangents(self._inverse, np.array(u, dtype=float))
-        return u if self.give is None else u - self.give[:, : u.shape[1]] * r
+        if self.give is None:
+            return u
+        u = u - self.give[:, : u.shape[1]] * r
+        u[:, 0] -= self.offset
+        return u
 
     def given(self, r: Array) -> Mask:
         """As of the plain law, at s."""

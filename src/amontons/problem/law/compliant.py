@@ -8,6 +8,7 @@ so that closed sides overlap by c r_N, u_N = -c r_N as it is told, and contacts 
 slipped elastically by -c_T r_T.  As u + C r = (W + C) r + q, a problem with compliance is one
 without it whose W has more on its diagonal: definite where c, c_T > 0, also where W is not.
 Its energy r.C r / 2 is stored in the contacts.  c -> 0 is the law without compliance.
+With an offset, the overclosure at which the pressure begins, it is u_N + c r_N + offset.
 
 c_T counts from the state in which u_T = 0; in steps one after the other, u_T is to count from
 the last u_T + c_T r_T (`mechanics.steps.springs`).
@@ -15,12 +16,12 @@ the last u_T + c_T r_T (`mechanics.steps.springs`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.arrays import read_only
+from ...core.arrays import read_only, real
 from ...core.errors import InvalidInput, shown
 from .changed import Changed
 from .law import INSIDE, Array, Law, per_contact, same_length
@@ -28,11 +29,15 @@ from .law import INSIDE, Array, Law, per_contact, same_length
 
 @dataclass(frozen=True, eq=False)
 class Compliant(Changed):
-    """A law whose contacts give way: compliance, stick_compliance (nc,) or a number, u / r."""
+    """A law whose contacts give way: compliance, stick_compliance (nc,) or a number, u / r.
+
+    offset: overclosure at which the pressure begins, (nc,) or a number, < 0 across a gap.
+    """
 
     law: Law
     compliance: Array
     stick_compliance: Array = 0.0  # type: ignore[assignment]
+    offset: Array = 0.0  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         if not isinstance(self.law, Law) or isinstance(self.law, Compliant):
@@ -52,6 +57,11 @@ class Compliant(Changed):
         object.__setattr__(self, "compliance", c)
         object.__setattr__(self, "stick_compliance", stick)
         object.__setattr__(self, "give", read_only(np.column_stack([c, stick, stick])))
+        offset = np.atleast_1d(real("offset", self.offset))
+        if len(offset) not in (1, len(c)) or not np.isfinite(offset).all():
+            raise InvalidInput(f"offset: expected one finite number or {len(c)} of them")
+        offset = np.broadcast_to(offset, len(c)).astype(float)
+        object.__setattr__(self, "offset", read_only(offset))
 
     @property
     def name(self) -> str:  # type: ignore[override]
@@ -75,20 +85,18 @@ class Compliant(Changed):
 
     def at(self, index: NDArray[np.integer]) -> Compliant:
         """The law of a selection of contacts."""
-        return Compliant(
-            self.law.at(index), self.compliance[index], self.stick_compliance[index]
-        )
+        return Compliant(self.law.at(index), self.compliance[index],
+                         self.stick_compliance[index], self.offset[index])  # fmt: skip
 
     def scaled(self, force: float | Array) -> Compliant:
         """The law in another unit of r."""
-        return Compliant(
-            self.law.scaled(force), self.compliance / force, self.stick_compliance / force
-        )
+        return Compliant(self.law.scaled(force), self.compliance / force,
+                         self.stick_compliance / force, self.offset)  # fmt: skip
 
     def with_mu(self, mu: Array) -> Compliant:
         """The law with other coefficients mu, (nc,)."""
-        return Compliant(self.law.with_mu(mu), self.compliance, self.stick_compliance)
+        return replace(self, law=self.law.with_mu(mu))
 
     def with_bounds(self, bounds: Array) -> Compliant:
         """The law with other bounds tau, (nc,)."""
-        return Compliant(self.law.with_bounds(bounds), self.compliance, self.stick_compliance)
+        return replace(self, law=self.law.with_bounds(bounds))

@@ -151,6 +151,7 @@ class Law:
     varies: ClassVar[bool] = False  # True where coefficients follow the state, see `varying`
     stretch: Array | None = None  # T of tangents, (nc, 2, 2), see `changed`
     give: Array | None = None  # diagonal of C, (nc, 3)
+    offset: Array | float = 0.0  # of the gap, (nc,), where there is a C
 
     @property
     def plain(self) -> Law:

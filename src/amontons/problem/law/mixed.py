@@ -9,13 +9,14 @@ from typing import ClassVar
 import numpy as np
 
 from ...core.arrays import read_only
-from ...core.errors import InvalidInput, shown
+from ...core.errors import InvalidInput, UnsupportedLaw, shown
 from .capped import CappedCoulomb
 from .changed import Stretched
 from .cohesive import Cohesive
 from .compliant import Compliant
 from .coulomb import Coulomb
 from .law import BOUND, MU, Array, Kind, Kinds, Law
+from .overclosure import VaryingCompliance, joined_compliances
 from .tied import Tied
 from .tresca import Tresca
 from .varying import VaryingFriction, joined_varying
@@ -41,6 +42,14 @@ def joined(laws: Sequence[Law]) -> Law:
     for law in laws:
         if not isinstance(law, Law):
             raise InvalidInput(f"law: expected Coulomb, Tresca, …, got {shown(law)}")
+    if any(isinstance(law, VaryingCompliance) for law in laws):
+        if any(isinstance(law, VaryingFriction) for law in laws):
+            raise UnsupportedLaw(
+                "friction over pressure or speed and a curve of pressure over overclosure in "
+                "one problem; expected curves of one of both"
+            )
+        inner = [law.inner if isinstance(law, VaryingCompliance) else law for law in laws]
+        return joined_compliances(laws, joined(inner))
     if any(law.varies for law in laws):
         inner = [law.inner if isinstance(law, VaryingFriction) else law for law in laws]
         return joined_varying(laws, joined(inner))
@@ -57,7 +66,8 @@ def joined(laws: Sequence[Law]) -> Law:
     if all(law.give is None for law in laws):
         return out
     give = [np.zeros((len(law), 3)) if law.give is None else law.give for law in laws]
-    return Compliant(out, *np.concatenate(give).T[:2])
+    offset = np.concatenate([np.broadcast_to(law.offset, len(law)) for law in laws])
+    return Compliant(out, *np.concatenate(give).T[:2], offset)
 
 
 def _stretch(law: Law) -> Array:

@@ -34,7 +34,8 @@ def solve_one(A: ArrayLike, b: ArrayLike, law: Law | float) -> tuple[Array, Arra
     own: Array = np.ascontiguousarray(A, dtype=float)
     given: Array = np.array(b, dtype=float)
     W = own if law.give is None else own + np.diag(law.give[0])
-    q = given - W @ (law.cohesion[0] * np.eye(3)[0])
+    shift = np.broadcast_to(law.offset, 1)[0] * np.eye(3)[0]
+    q = given + shift - W @ (law.cohesion[0] * np.eye(3)[0])
     T = np.column_stack([law.stretched(row[None])[0] for row in np.eye(3)])
     *found, state = solve_contact(
         np.ascontiguousarray(T @ W @ T), *(T @ q), law.kind[0], law.parameters[0], 0.0, 0.0

@@ -8,7 +8,7 @@ Stribeck curve).  `area` makes a pressure of r_N, `duration` a speed of u_T: 1 w
 velocities, the step where they are displacements.  What gives way (`compliant`) slips by u' =
 u + C r.
 
-No kernel knows this law: it is solved by an outer loop (`solvers.varying_friction`) over laws
+No kernel knows this law: it is solved by an outer loop (`solvers.varying_law`) over laws
 with fixed coefficients, those of `frozen` at a state.  The judge freezes them at the state that
 it judges, so that a loop which has not settled is not taken for a solution.  Where mu falls
 with the speed, or steeply with the pressure, there may be several solutions, or none that the

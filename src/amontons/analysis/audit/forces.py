@@ -1,0 +1,95 @@
+"""Nodal forces that displacements need, and how well they can be known.
+
+At displacements u the bodies need the forces K u.  Where neither a contact nor a support acts,
+they are those of the loads; elsewhere the difference is what contacts and supports give.  A
+displacement that was printed with few digits may be off by half a unit of its last one, which
+moves a force by at most |K| times that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ...mechanics.model.supports import external_load
+
+if TYPE_CHECKING:
+    from ...mechanics.model import Model
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+DOUBLE = 1e-15  # relative error of a displacement that was not printed
+QUADRATIC = 1.5  # strains and rotations of size g change stresses by up to this part of g^2
+
+
+@dataclass(frozen=True, eq=False)
+class NodalForces:
+    """Forces (dofs,) that contacts and supports give: K u less the loads.
+
+    bound (dofs,): by how much rounding of the displacements may have moved them; large (dofs,):
+    what small strains miss, where the answer is one of large ones.  blur (dofs,): of the
+    displacements.  work: u . K u, twice the elastic energy; is_held (dofs,): supports act.
+    """
+
+    missing: Array
+    bound: Array
+    large: Array
+    blur: Array
+    work: float
+    is_held: Mask
+    gradient: float
+
+    @property
+    def known(self) -> Array:
+        """All that a force may be off by, (dofs,)."""
+        return self.bound + self.large
+
+
+def nodal_forces(model: Model, u: Array, blur: Array, *, large: bool) -> NodalForces:
+    """The forces at displacements u (dofs,), known up to blur (dofs,), both lengths.
+
+    large: the displacements are those of large strains and rotations.
+    """
+    parts = model.discretisation
+    load = model.load_factor * external_load(model.bodies, model.loads, parts.offsets)
+    inner = parts.K @ u
+    held = np.zeros(parts.dofs, dtype=bool)
+    held[parts.held] = True
+    K = parts.stored_stiffness
+    sizes = sparse.csr_array((np.abs(K.data), K.indices, K.indptr), shape=K.shape)
+    bound = sizes @ np.maximum(blur, DOUBLE * np.abs(u))
+    points = np.concatenate([body.mesh.points for body in model.bodies])
+    gradient, change = _large(sizes, points, u)
+    return NodalForces(
+        inner - load, bound, change if large else np.zeros_like(bound), blur,
+        float(u @ inner), held, gradient,
+    )  # fmt: skip
+
+
+def _large(sizes: sparse.csr_array, points: Array, u: Array) -> tuple[float, Array]:
+    """Largest gradient of u between neighbours, and what its square may change of forces.
+
+    sizes (dofs, dofs): |K|; a stress of E g^2 where strain and rotation are g.
+    """
+    n, d = points.shape
+    counts = np.diff(sizes.indptr)
+    row = np.repeat(np.arange(n * d, dtype=np.int64), counts) // d
+    first = sizes.indices % d == 0
+    first &= np.repeat(np.arange(n * d) % d == 0, counts)
+    own, other = row[first], sizes.indices[first] // d
+    apart = own != other
+    own, other = own[apart], other[apart]
+    moved = u.reshape(n, d)
+    length = np.linalg.norm(points[own] - points[other], axis=1)
+    slope = np.linalg.norm(moved[own] - moved[other], axis=1) / np.where(length > 0, length, 1)
+    steepest = np.zeros(n)
+    np.maximum.at(steepest, own, slope)
+    distance = np.linalg.norm(points[row] - points[sizes.indices // d], axis=1)
+    unit = np.zeros(n * d)
+    np.add.at(unit, np.repeat(np.arange(n * d), counts), sizes.data * distance)
+    change = QUADRATIC * unit * np.repeat(steepest, d) ** 2
+    return float(steepest.max(initial=0.0)), change

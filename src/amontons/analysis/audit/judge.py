@@ -1,0 +1,358 @@
+"""The judge of an audit: balance of the whole, and the questions to every pair."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import InvalidInput, UnsupportedForm
+from ...mechanics.elements.elasticity import LinearElastic, materials_by_region
+from ...mechanics.elements.rigid import Rigid
+from ...mechanics.model.supports import external_load, locate
+from . import questions
+from .forces import NodalForces, nodal_forces
+from .laws import Give, Seen, approach_of, seen
+from .sides import Side, sides_of
+from .verdict import QUESTIONS, RIGHT, UNDECIDED, WRONG, Audit, Finding, PairAudit, joined
+
+if TYPE_CHECKING:
+    from ...mechanics.model import Model
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+BALANCED = 1e-4  # of the largest nodal force: imbalance that is none
+BLIND = 0.1  # the same, from which rounding hides the balance
+FORMULATED = 1e-2  # of it, above which elements with another formulation say nothing
+ACTION = 0.02  # of the pressure, by which both sides' forces may differ
+PLACED = 1e-6  # of the largest displacement: what supports hold is there
+NAMED = 10
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """Displacements to be judged, and what is known of where they come from.
+
+    displacement (nodes, d) of every body; blur, the same shapes: by how much each may be off;
+    before: displacements of the increment before, None without.  reactions (nc, d): contact
+    forces that the answer states, in the model's frames.  large: of large strains; other:
+    elements formulated otherwise, in words; time, until: of the answer and of the end.
+    names (nodes,): what its nodes are called.  one_way: loads grow along one straight way.
+    """
+
+    displacement: tuple[Array, ...]
+    blur: tuple[Array, ...] | None = None
+    before: tuple[Array, ...] | None = None
+    reactions: Array | None = None
+    large: bool = False
+    other: tuple[str, ...] = ()
+    time: float | None = None
+    until: float | None = None
+    names: Array | None = None
+    one_way: bool = True
+    notes: tuple[str, ...] = field(default=())
+
+
+def audit_answer(model: Model, answer: Answer, *, deck_law: bool = True) -> Audit:
+    """Judge an answer of a model; deck_law: stiffness that its contacts have is meant.
+
+    Raises InvalidInput for displacements that do not fit the model, UnsupportedForm for models
+    in large deformations or with Nitsche's method, which have no such forces.
+    """
+    if model.is_large or any(contact.nitsche is not None for contact in model.contacts):
+        raise UnsupportedForm(
+            "an audit needs small strains and nodal or mortar contact in the reference "
+            "configuration; for others `solution.convergence` is the judge's word"
+        )
+    u, blur = _whole(model, answer.displacement), _blur(model, answer)
+    forces = nodal_forces(model, u, blur, large=answer.large)
+    scale = _scale(model, forces)
+    every = sides_of(model, forces, u)
+    findings: dict[str, Finding] = {}
+    off = _on_no_contact(model)
+    findings["balance"] = _balance(model, forces, (u, scale), off, every, answer)
+    before = None if answer.before is None else _whole(model, answer.before)
+    pairs = tuple(
+        _pair(model, k, sides, (u, before), answer, deck_law=deck_law)
+        for k, sides in enumerate(every)
+    )
+    for name in QUESTIONS[1:]:
+        findings[name] = joined([p.findings[name] for p in pairs], list(model.pair_names))
+    if answer.reactions is not None:
+        findings["forces"] = _stated(model, every, answer.reactions, scale, answer)
+    if answer.until is not None and answer.time is not None:
+        findings["time"] = _time(answer.time, answer.until)
+    if findings["balance"].verdict is UNDECIDED and answer.other:
+        findings = {name: _only_bounded(name, f) for name, f in findings.items()}
+    body = float(np.max(forces.bound * off, initial=0.0)) / scale if scale > 0 else 0.0
+    return Audit(model.name or "model", findings, pairs, body, answer.displacement, model,
+                 _notes(answer, forces))  # fmt: skip
+
+
+def _notes(answer: Answer, forces: NodalForces) -> tuple[str, ...]:
+    notes = list(answer.notes)
+    if answer.large:
+        notes.append(f"large strains there, small ones here: displacements change by up to "
+                     f"{forces.gradient:.2g} of a length, which bounds what forces can tell")  # fmt: skip
+    notes += [f"{text}: their forces are only bounded" for text in answer.other]
+    return tuple(notes)
+
+
+def _whole(model: Model, displacement: Sequence[Array]) -> Array:
+    """(dofs,) of the displacements of all bodies, checked."""
+    if len(displacement) != len(model.bodies):
+        raise InvalidInput(
+            f"displacements: expected one array for each of {len(model.bodies)} bodies, got "
+            f"{len(displacement)}"
+        )
+    out = []
+    for body, values in zip(model.bodies, displacement, strict=True):
+        given = np.asarray(values, dtype=float)
+        if given.shape != body.mesh.points.shape:
+            raise InvalidInput(
+                f"displacements of body {body.name!r}: expected {body.mesh.points.shape}, a row "
+                f"for each node, got {given.shape}"
+            )
+        if not np.isfinite(given).all():
+            row = int(np.flatnonzero(~np.isfinite(given).all(axis=1))[0])
+            raise InvalidInput(
+                f"displacements of body {body.name!r}: node {row} has {given[row].tolist()}, "
+                "expected finite numbers"
+            )
+        out.append(given.ravel())
+    return np.concatenate(out)
+
+
+def _blur(model: Model, answer: Answer) -> Array:
+    if answer.blur is None:
+        return np.zeros(sum(body.mesh.points.size for body in model.bodies))
+    return _whole(model, answer.blur)
+
+
+def _scale(model: Model, forces: NodalForces) -> float:
+    """The largest force at a node, of contacts, supports or loads."""
+    d = model.dimension
+    load = external_load(model.bodies, model.loads, model.discretisation.offsets)
+    sizes = [np.linalg.norm(f.reshape(-1, d), axis=1).max(initial=0.0)
+             for f in (forces.missing, model.load_factor * load)]  # fmt: skip
+    return float(max(sizes))
+
+
+def _on_no_contact(model: Model) -> Mask:
+    """Dofs (dofs,) where neither supports nor contacts act."""
+    parts, d = model.discretisation, model.dimension
+    off = np.ones((parts.dofs // d, d), dtype=bool)
+    for contact in model.contacts:
+        for name in (contact.slave, contact.master):
+            if name is not None:
+                k, surface = locate(model.bodies, name)
+                nodes = model.bodies[k].mesh.surface_nodes(surface)
+                off[int(parts.offsets[k]) // d + nodes] = False
+    out = off.ravel()
+    out[parts.held] = False
+    return out
+
+
+# ------------------------------------------------------------------------------ balance
+def _balance(
+    model: Model, forces: NodalForces, state: tuple[Array, float], off: Mask,
+    every: Sequence[tuple[Side, ...]], answer: Answer,
+) -> Finding:  # fmt: skip
+    """Do inner forces balance loads off the contacts, and both sides of a pair each other?"""
+    u, scale = state
+    left = np.where(off, np.abs(forces.missing), 0.0)
+    over = np.where(off, left - forces.known, 0.0)
+    unit = scale if scale > 0 else 1.0
+    residual, excess = float(left.max(initial=0.0)) / unit, float(over.max(initial=0.0)) / unit
+    bound = float((forces.known * off).max(initial=0.0)) / unit
+    between, pair = _action(every, model)
+    moved, at = _misplaced(model, u, forces.blur)
+    numbers = {"residual": residual, "excess": excess, "bound": bound, "largest_force": scale,
+               "between_sides": between, "supports": moved}  # fmt: skip
+    name = _namer(model, answer)
+    if moved > PLACED:
+        text = (f"supports do not have the displacements that they prescribe: node {name(at)} "
+                f"is off by {moved:.2g} of the largest")  # fmt: skip
+        return Finding(WRONG, text, numbers, (name(at),))
+    if answer.other and max(residual, between) > FORMULATED:
+        text = (f"inner forces miss the loads by {residual:.1e} of the largest nodal force, "
+                "and the elements are formulated otherwise: forces can not be told")  # fmt: skip
+        return Finding(UNDECIDED, text, numbers)
+    if excess > BALANCED:
+        order = np.argsort(-over, kind="stable") // model.dimension
+        nodes = tuple(dict.fromkeys(name(int(n)) for n in order[: 4 * NAMED]))[:3]
+        text = (f"inner forces do not balance the loads off the contacts: by {residual:.2g} of "
+                f"the largest nodal force at node {nodes[0]}, where rounding explains "
+                f"{bound:.1g}")  # fmt: skip
+        return Finding(WRONG, text, numbers, nodes)
+    if between > ACTION:
+        text = f"the forces on both sides of pair {pair} differ by {between:.2g} of its force"
+        return Finding(WRONG, text, numbers)
+    if bound > BLIND:
+        text = (f"rounding of the displacements may move nodal forces by {bound:.2g} of the "
+                "largest: the balance can not be told; give more digits")  # fmt: skip
+        return Finding(UNDECIDED, text, numbers)
+    return Finding(RIGHT, f"holds to {residual:.1e} of the largest nodal force (rounding may "
+                   f"hide {bound:.1e})", numbers)  # fmt: skip
+
+
+def _action(every: Sequence[tuple[Side, ...]], model: Model) -> tuple[float, str]:
+    """Largest difference of the two sides' forces over the pressure, and its pair."""
+    worst, found = 0.0, ""
+    for sides, name in zip(every, model.pair_names, strict=True):
+        if len(sides) < 2 or not all(side.known.all() for side in sides):
+            continue
+        total = max(float(np.abs(side.r[:, 0]).sum()) for side in sides)
+        loose = sum(float(side.bound[:, 0].sum()) for side in sides)
+        off = float(np.linalg.norm(sides[0].force + sides[1].force)) - loose
+        if total > 0 and off / total > worst:
+            worst, found = off / total, name
+    return worst, found
+
+
+def _misplaced(model: Model, u: Array, blur: Array) -> tuple[float, int]:
+    """How far held dofs are from what supports prescribe, over the largest; the node."""
+    parts = model.discretisation
+    wanted = model.load_factor * parts.prescribed
+    size = max(float(np.abs(u).max(initial=0.0)), float(np.abs(wanted).max(initial=0.0)))
+    off = np.where(parts.is_fixed, np.abs(u - wanted) - 2 * blur, 0.0)
+    worst = int(off.argmax()) if len(off) else 0
+    return (float(max(off[worst], 0.0)) / size if size > 0 else 0.0), worst // model.dimension
+
+
+# ------------------------------------------------------------------------------ pairs
+def _pair(
+    model: Model, k: int, sides: tuple[Side, ...], moved: tuple[Array, Array | None],
+    answer: Answer, *, deck_law: bool,
+) -> PairAudit:  # fmt: skip
+    """One pair, from both sides."""
+    contact, (u, before) = model.contacts[k], moved
+    young = _softest(model, contact.slave, contact.master)
+    approach = max(approach_of(side, young) for side in sides)
+    give = Give(*(_inverse(contact.numbers.get(name)) for name in
+                  ("stiffness", "stick_stiffness")))  # fmt: skip
+    found: list[Seen] = []
+    for side in sides:
+        slip = side.slip if before is None else side.slip - side.slip_of(before)
+        one = seen(side, give, approach, slip)
+        if before is not None and answer.one_way:  # both are histories of one straight way
+            other = seen(side, give, approach, side.slip)
+            one = min(one, other, key=lambda s: (s.missing, s.impossible_share))
+        found.append(one)
+    views = tuple(found)
+    name, size = _namer(model, answer), float(np.abs(u).max(initial=0.0))
+    deck = deck_law and (give.normal > 0 or give.shear > 0)
+    findings = {
+        "penetration": questions.penetration(
+            views, approach, _side_length(model, contact.slave, contact.master), size, name,
+            deck=deck,
+        ),
+        "cone": questions.cone(views, name),
+        "status": questions.status(
+            views, approach, name, history=answer.one_way or before is not None, deck=deck
+        ),
+        "geometry": questions.geometry(views, approach),
+    }  # fmt: skip
+    return PairAudit(model.pair_names[k], contact.slave, contact.master, views, findings,
+                     approach)  # fmt: skip
+
+
+def _inverse(stiffness: Any) -> float:
+    """Length per traction of a stiffness that is one number; 0 without."""
+    return 1.0 / float(stiffness) if isinstance(stiffness, int | float) else 0.0
+
+
+def _softest(model: Model, *names: str | None) -> float:
+    """Smallest Young's modulus of cells at surfaces."""
+    found = []
+    for name in names:
+        if name is None:
+            continue
+        k, surface = locate(model.bodies, name)
+        body = model.bodies[k]
+        if isinstance(body.material, Rigid):
+            continue
+        on = np.zeros(len(body.mesh.points), dtype=bool)
+        on[body.mesh.surface_nodes(surface)] = True
+        laws = materials_by_region(body.mesh, body.material)
+        found += [
+            law.young for block in body.mesh.cells
+            if on[block.nodes].any() and isinstance(law := laws[block.region], LinearElastic)
+        ]  # fmt: skip
+    return min(found, default=np.inf)
+
+
+def _side_length(model: Model, *names: str | None) -> float:
+    """Shortest side of the facets of surfaces."""
+    shortest = np.inf
+    for name in names:
+        if name is None:
+            continue
+        k, surface = locate(model.bodies, name)
+        mesh = model.bodies[k].mesh
+        for block in mesh.surface(surface):
+            x = mesh.points[block.nodes]
+            sides = x - np.roll(x, 1, axis=1)
+            shortest = min(shortest, float(np.linalg.norm(sides, axis=2).min(initial=np.inf)))
+    return shortest if np.isfinite(shortest) else 0.0
+
+
+# ------------------------------------------------------------------------------ the rest
+def _namer(model: Model, answer: Answer) -> Any:
+    """What a node of the model is called."""
+    if answer.names is not None:
+        given = answer.names
+        return lambda node: str(given[node])
+    starts = model.discretisation.offsets // model.dimension
+    if len(model.bodies) == 1:
+        return str
+
+    def name(node: int) -> str:
+        k = int(np.searchsorted(starts, node, side="right")) - 1
+        return f"{model.bodies[k].name}:{node - int(starts[k])}"
+
+    return name
+
+
+def _stated(
+    model: Model, every: Sequence[tuple[Side, ...]], reactions: Array, scale: float,
+    answer: Answer,
+) -> Finding:  # fmt: skip
+    """Are the contact forces that the answer states those that its displacements need?"""
+    own = np.concatenate([sides[0].r for sides in every])
+    given = np.asarray(reactions, dtype=float)
+    if given.shape != own.shape:
+        raise InvalidInput(f"reactions: expected {own.shape}, a row for each contact, got "
+                           f"{given.shape}")  # fmt: skip
+    known = np.concatenate([sides[0].known for sides in every])
+    bound = np.concatenate([sides[0].bound for sides in every])
+    node = np.concatenate([sides[0].node for sides in every])
+    off = np.where(known, np.abs(given - own) - bound, 0.0).max(axis=1, initial=0.0)
+    worst = int(off.argmax()) if len(off) else 0
+    share = float(off[worst]) / scale if scale > 0 else float(off.max(initial=0.0))
+    numbers = {"difference": share}
+    if not share <= BALANCED:
+        name = _namer(model, answer)(int(node[worst]))
+        return Finding(WRONG, "the contact forces that it states are not those that its "
+                       f"displacements need: off by {share:.2g} of the largest nodal force at "
+                       f"node {name}", numbers, (name,))  # fmt: skip
+    return Finding(RIGHT, f"stated contact forces fit the displacements to {share:.1e}", numbers)
+
+
+def _time(time: float, until: float) -> Finding:
+    numbers = {"reached": time, "end": until}
+    if time < until * (1 - 1e-4):
+        return Finding(WRONG, f"the answer ends at t = {time:g}, the deck at {until:g}: it was "
+                       "stopped early", numbers)  # fmt: skip
+    return Finding(RIGHT, f"at the end, t = {time:g}", numbers)
+
+
+def _only_bounded(name: str, found: Finding) -> Finding:
+    """Forces of elements formulated otherwise say neither right nor wrong."""
+    if name in ("penetration", "time", "geometry") or found.verdict is UNDECIDED:
+        return found
+    return Finding(UNDECIDED, "not known, forces of these elements are only bounded; " +
+                   found.text, found.numbers, found.nodes)  # fmt: skip

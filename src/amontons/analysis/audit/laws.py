@@ -1,0 +1,213 @@
+"""Do the forces and motions of one side obey the law of hard contact, and by how much not?
+
+All deviations are lengths, weighted by the forces that act along them: a contact with the
+pressure force r_N > 0 should have the gap 0, one that slips by s the friction mu r_N against
+s.  With the approach of the pair, the length over which contact closes and flattens it,
+
+    share = sum |r_N gap| / (approach sum r_N),
+    missing = sum (mu r_N |s| + r_T . s)+ / sum mu r_N max(largest |s|, approach),
+
+the second that of de Saxce's bipotential: zero where friction is at its bound against the slip,
+or nothing slips.  Both are numbers without a unit, and about the error of the forces that
+contact hard and rigid would have.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .sides import Side
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+PRESSED = 0.02  # of the largest force per area, above which a contact carries load
+AWAY = 0.25  # of the approach: a contact that is so far open, inside or slid is no mistake
+RATIO = 0.1  # of mu: friction that is off its bound by more is off
+FLAT = 0.99  # length of the mean of unit normals from which a surface is flat
+
+
+@dataclass(frozen=True, eq=False)
+class Give:
+    """What the deck's own law gives way by: lengths per traction, 0 for hard and rigid."""
+
+    normal: float = 0.0
+    shear: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """How one side obeys the law; numbers without a unit but for lengths and forces.
+
+    overlap, missing: the shares above, overlap_flat that of the facets, *_deck those of the
+    deck's own law; hidden: part of the forces that rounding may have moved.  cone: friction
+    above its bound, over all pressure; tension: pull over all pressure.  deepest (length, <= 0:
+    none), at which node.  impossible: contacts whose status can not be, `why` (nc,) in words.
+    """
+
+    side: Side
+    pressed: Mask
+    overlap: float
+    overlap_flat: float
+    overlap_deck: float
+    missing: float
+    missing_deck: float
+    cone: float
+    tension: float
+    hidden: float
+    blurred: float
+    deepest: float
+    deepest_node: int
+    impossible: Mask
+    why: NDArray[np.object_]
+    impossible_share: float
+    slides: Mask
+
+
+def approach_of(side: Side, young: float) -> float:
+    """Length over which contact acts: what it closes, and how deep its pressure reaches."""
+    total = float(np.maximum(side.r[:, 0], 0.0).sum())
+    pressed = _pressed(side)
+    if not pressed.any() or not total > 0:
+        return float(np.abs(side.start_flat - side.flat).max(initial=0.0))
+    area = float(side.weight[pressed].sum())
+    d = side.points.shape[1]
+    size = float(np.ptp(side.points[pressed], axis=0).max(initial=0.0))
+    size = max(size, float(area ** (1.0 / (d - 1))))
+    closing = float((side.start_flat - side.flat)[pressed].max(initial=0.0))
+    opened = float((side.flat - side.start_flat)[pressed].max(initial=0.0))
+    return max(closing, opened, total / area * size / young)
+
+
+def _pressed(side: Side) -> Mask:
+    traction = side.r[:, 0] / side.weight
+    most = float(traction.max(initial=0.0))
+    return (traction > PRESSED * most) & (side.r[:, 0] > 2 * side.bound[:, 0])
+
+
+def seen(side: Side, give: Give, approach: float, slip: Array) -> Seen:
+    """Hold one side against its law; slip (nc, d-1): the motion that friction answers."""
+    r, weight = side.r, side.weight
+    normal, push = np.maximum(r[:, 0], 0.0), np.linalg.norm(r[:, 1:], axis=1)
+    if side.law.tied.any():
+        return _tied(side, give, approach)
+    total = float(normal.sum())
+    pressed = _pressed(side)
+    scale = approach * total
+    bound = side.law.bound(r)
+    rubs = side.known.all(axis=1) & side.known[:, :1].all(axis=1)
+    excess = np.maximum(push - bound - side.bound[:, 1:].max(axis=1, initial=0.0), 0.0) * rubs
+    pull = np.maximum(-r[:, 0] - side.bound[:, 0], 0.0)
+    shares = {}
+    for name, gap in (("curved", side.gap), ("flat", side.flat),
+                      ("deck", side.flat + give.normal * normal / weight)):  # fmt: skip
+        left = np.maximum(np.abs(gap) - side.blur, 0.0)
+        shares[name] = _over(float((normal * left).sum()), scale)
+    lost, hard = _missing(r, bound, slip, rubs, approach)
+    elastic = slip + give.shear * r[:, 1:] / weight[:, None]
+    soft = _missing(r, bound, elastic, rubs, approach)[1]
+    why = _statuses(side, pressed, bound, (push, slip, lost, rubs), approach)
+    bad = why != ""
+    carried = np.maximum(normal, total / max(len(normal), 1))
+    inside = np.minimum(side.gap, side.flat) if _is_curved(shares) else side.flat
+    worst = int(inside.argmin()) if len(inside) else 0
+    return Seen(
+        side, pressed, shares["curved"], shares["flat"], shares["deck"], hard, soft,
+        _over(float(excess.sum()), total), _over(float(pull.sum()), total),
+        _over(float(side.bound[:, 0].sum()), total), _over(float(side.blur.max(initial=0.0)),
+        approach), float(-inside.min(initial=0.0)), int(side.node[worst]), bad, why,
+        _over(float(carried[bad].sum()), float(carried.sum())),
+        pressed & rubs & (push >= (1 - RATIO) * bound),
+    )  # fmt: skip
+
+
+def _is_curved(shares: dict[str, float]) -> bool:
+    """True where the answer holds on the curved surfaces rather than on their facets."""
+    return shares["curved"] < shares["flat"]
+
+
+def _missing(
+    r: Array, bound: Array, slip: Array, rubs: Mask, approach: float
+) -> tuple[Array, float]:
+    """Work that friction should have taken, as a length of each contact; their share."""
+    length = np.linalg.norm(slip, axis=1)
+    work = np.maximum(bound * length + (r[:, 1:] * slip).sum(axis=1), 0.0) * rubs
+    able = (bound > 0) & rubs
+    lost = np.where(able, work / np.where(able, bound, 1.0), 0.0)
+    longest = float(length[able].max(initial=0.0))
+    return lost, _over(float(work.sum()), float(bound[able].sum()) * max(longest, approach))
+
+
+def _statuses(
+    side: Side, pressed: Mask, bound: Array, rubbing: tuple[Array, Array, Array, Mask],
+    approach: float,
+) -> NDArray[np.object_]:  # fmt: skip
+    """Why the status of a contact can not be, "" where it can."""
+    push, slip, lost, rubs = rubbing
+    off = 2 * side.bound[:, 0]
+    gap = np.where(np.abs(side.gap) < np.abs(side.flat), side.gap, side.flat)
+    traction = side.r[:, 0] / side.weight
+    most = float(np.abs(traction).max(initial=0.0))
+    far = AWAY * approach + side.blur
+    length = np.linalg.norm(slip, axis=1)
+    why = np.full(len(gap), "", dtype=object)
+    clear = push > bound * (1 + RATIO) + side.bound[:, 1:].max(axis=1, initial=0.0)
+    why[pressed & rubs & clear & (push > RATIO * bound.max(initial=0.0))] = "above the cone"
+    slipped = pressed & rubs & (length > far) & (lost > AWAY * length)
+    why[slipped] = "slips without the friction that it should have"
+    along = (side.r[:, 1:] * slip).sum(axis=1)
+    why[slipped & (along > 0) & (push > RATIO * bound)] = "friction drives it along"
+    why[pressed & (gap > far)] = "pressed, though open"
+    why[gap < -far] = "inside the other side"
+    why[(traction < -PRESSED * most) & (-side.r[:, 0] > off)] = "pulls"
+    return why
+
+
+def _tied(side: Side, give: Give, approach: float) -> Seen:
+    """A bond: neither gap nor slip, whatever the force."""
+    size = np.abs(side.r).sum(axis=1)
+    total = float(size.sum())
+    moved = np.linalg.norm(np.column_stack([side.gap, side.slip]), axis=1)
+    left = np.maximum(moved - side.blur, 0.0)
+    share = _over(float((size * left).sum()), approach * total)
+    why = np.full(len(size), "", dtype=object)
+    far = left > AWAY * approach if approach > 0 else left > side.blur
+    why[far] = "tied, and moved apart"
+    worst = int(left.argmax()) if len(left) else 0
+    return Seen(
+        side, size > 0, share, share, share if not give.normal else 0.0, 0.0, 0.0, 0.0, 0.0,
+        _over(float(side.bound.sum()), total), 0.0, float(left.max(initial=0.0)),
+        int(side.node[worst]), far, why, float(far.mean()) if len(far) else 0.0,
+        np.zeros(len(size), dtype=bool),
+    )  # fmt: skip
+
+
+def _over(part: float, whole: float) -> float:
+    """part / whole, 0 of nothing."""
+    return part / whole if whole > 0 else 0.0
+
+
+def pair_as_one(one: Seen, approach: float) -> tuple[float | None, float, float]:
+    """(share of friction that is missing, friction over its bound, slip) of a flat pair.
+
+    All contacts as one: resultants are known where forces at nodes are lost in rounding.  None
+    for a surface that is not flat, or an unknown law.
+    """
+    side = one.side
+    normals, area = side.frame[:, 0], side.weight
+    mean = (area[:, None] * normals).sum(axis=0) / area.sum()
+    if np.linalg.norm(mean) < FLAT or not side.known.all() or side.law.given(side.r).any():
+        return None, 0.0, 0.0
+    force = np.einsum("pk,pkc->c", side.r, side.frame)
+    slip = np.einsum("p,pk,pkc->c", area, side.slip, side.frame[:, 1:]) / area.sum()
+    normal = mean / np.linalg.norm(mean)
+    push = float(force @ normal)
+    shear = force - push * normal
+    mu = float((side.law.parameters[:, 0] * area).sum() / area.sum())
+    length, bound = float(np.linalg.norm(slip)), mu * max(push, 0.0)
+    work = max(bound * length + float(shear @ slip), 0.0)
+    share = _over(work, bound * max(length, approach))
+    return share, _over(float(np.linalg.norm(shear)), bound), length

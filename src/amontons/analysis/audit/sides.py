@@ -1,0 +1,207 @@
+"""Contact seen from one side: forces at its nodes, gaps and slips averaged around them.
+
+The side plays the slave of mortar contact, whatever discretisation the answer comes from.  A
+nodal force is the integral of the traction with the node's shape function; where facets are of
+second order, those of the nodes between corners are shared out to the corners, so that a
+pressure >= 0 gives forces >= 0.  Each pair is looked at from both sides: what an average over
+the large facets of one hides is seen from the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import lsqr
+
+from ...core.errors import AmontonsError
+from ...mechanics.meshes.cells import CELLS
+from ...mechanics.model.laws import law_of
+from ...mechanics.model.parts import Contact
+from ...mechanics.model.placing import Placed, place
+from ...mechanics.model.supports import Prescribed, locate
+from ...problem.law import Law
+
+if TYPE_CHECKING:
+    from ...mechanics.model import Model
+    from .forces import NodalForces
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+HELD = 0.1  # part of an axis along held components from which its force is not known
+FITTED = 1e-12  # accuracy of forces that several contacts share at a node
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """One pair from one side, nc contacts at its nodes.
+
+    contact: with this side as the slave; node (nc,): in the whole model; points (nc, d);
+    weight (nc,): area; frame (nc, d, d), rows n, t1(, t2), n into this side.  r (nc, d): force
+    on this side in the frame, known (nc, d) where no support acts too, bound (nc, d).
+    gap, flat (nc,): of the curved surfaces and of their facets; slip (nc, d-1); blur (nc,) of
+    both.  start, start_flat (nc,): gaps at zero displacement.  matrix (dofs, nc d): local
+    displacements are its transpose times those of the model.  law: that of these contacts.
+    """
+
+    contact: Contact
+    node: Index
+    points: Array
+    weight: Array
+    frame: Array
+    r: Array
+    known: Mask
+    bound: Array
+    gap: Array
+    flat: Array
+    slip: Array
+    blur: Array
+    start: Array
+    start_flat: Array
+    matrix: sparse.csc_array
+    law: Law
+
+    @property
+    def force(self) -> Array:
+        """On this side, (d,), of what is known."""
+        return np.einsum("pk,pkc->c", self.r, self.frame)
+
+    def moment(self) -> Array:
+        """Of these forces about the origin, (3,), in 2D (1,)."""
+        from ...mechanics.model.wrench import Wrench
+
+        return Wrench.of(self.points, np.einsum("pk,pkc->pc", self.r, self.frame)).moment
+
+    def slip_of(self, u: Array) -> Array:
+        """Tangential displacement (nc, d-1) of other displacements (dofs,)."""
+        return (self.matrix.T @ u).reshape(self.r.shape)[:, 1:]
+
+
+def sides_of(model: Model, forces: NodalForces, u: Array) -> list[tuple[Side, ...]]:
+    """Every contact from one or two sides; from the slave alone with an obstacle."""
+    placed = model.discretisation.placed
+    given = Prescribed.of(model.bodies, model.supports, model.discretisation.offsets)
+    turned = [_turned(model, contact, given) for contact in model.contacts]
+    firsts = _seen(model, model.contacts, placed, forces, u)
+    with_other = [k for k, pair in enumerate(turned) if pair is not None]
+    pairs = [turned[k] for k in with_other]
+    others = _seen(model, [p[0] for p in pairs if p], [p[1] for p in pairs if p], forces, u)
+    found: list[tuple[Side, ...]] = [(side,) for side in firsts]
+    for k, other in zip(with_other, others, strict=True):
+        found[k] = (*found[k], other)
+    return found
+
+
+def _turned(model: Model, contact: Contact, given: Prescribed) -> tuple[Contact, Placed] | None:
+    """The contact with its sides exchanged; None where there is one side, or none to be had."""
+    if contact.master is None or contact.nitsche is not None or contact.where is not None:
+        return None
+    new = replace(contact, slave=contact.master, master=contact.slave)
+    try:
+        return new, place(model.bodies, new, given, model.discretisation.offsets)
+    except AmontonsError:  # held all over, or no facet in front
+        return None
+
+
+def _seen(
+    model: Model, contacts: Sequence[Contact], placed: Sequence[Placed],
+    forces: NodalForces, u: Array,
+) -> list[Side]:  # fmt: skip
+    parts, d = model.discretisation, model.dimension
+    points = np.concatenate([body.mesh.points for body in model.bodies]).ravel()
+    pairs = [
+        _side(model, contact, one, forces, (u, points))
+        for contact, one in zip(contacts, placed, strict=True)
+    ]
+    if not _shared(model, contacts):
+        return pairs
+    whole = sparse.csr_array(sparse.hstack([p.H for p in placed], format="csr"))
+    rows = np.flatnonzero(~parts.is_fixed & (np.diff(whole.indptr) > 0))
+    size = float(np.abs(forces.missing[rows]).max(initial=0.0)) or 1.0
+    start = np.concatenate([side.r.ravel() for side in pairs]) / size
+    found = lsqr(whole[rows], forces.missing[rows] / size, x0=start, atol=FITTED, btol=FITTED,
+                 iter_lim=2000)[0] * size  # fmt: skip
+    ends = np.cumsum([side.r.size for side in pairs])[:-1]
+    return [
+        replace(side, r=np.where(side.known, part.reshape(-1, d), 0.0))
+        for side, part in zip(pairs, np.split(found, ends), strict=True)
+    ]
+
+
+def _side(
+    model: Model, contact: Contact, placed: Placed, forces: NodalForces,
+    moved: tuple[Array, Array],
+) -> Side:  # fmt: skip
+    """One pair as its slave sees it; moved: displacements and points, (dofs,) each."""
+    parts, d, rows = model.discretisation, model.dimension, placed.rows
+    first = int(parts.offsets[placed.body]) // d
+    node = first + rows.nodes
+    share = _to_corners(model, contact, placed, first)
+    held = parts.is_fixed.reshape(-1, d)
+    force = np.where(held, 0.0, forces.missing.reshape(-1, d))
+    nodal, blur = share @ force, share @ np.where(held, 0.0, forces.known.reshape(-1, d))
+    r = np.einsum("pkc,pc->pk", rows.frames, nodal)
+    known = np.abs(np.einsum("pkc,pc->pkc", rows.frames, held[node])).max(axis=2) < HELD
+    local = (placed.H.T @ moved[0]).reshape(-1, d)
+    start = np.zeros(len(node)) if contact.tied else rows.gap
+    flat = start if contact.obstacle is not None or contact.tied else _facets(placed, moved[1])
+    blurred = (abs(placed.H).T @ forces.blur).reshape(-1, d).max(axis=1, initial=0.0)
+    return Side(
+        contact, node, rows.points, rows.weights, rows.frames, np.where(known, r, 0.0), known,
+        np.einsum("pkc,pc->pk", np.abs(rows.frames), blur), start + local[:, 0],
+        flat + local[:, 0], local[:, 1:], blurred, start, flat, placed.H,
+        law_of([contact], replace(parts, placed=(placed,))),
+    )  # fmt: skip
+
+
+def _facets(placed: Placed, points: Array) -> Array:
+    """Gaps (nc,) of the facets themselves: the averages of points are linear in them."""
+    return np.asarray(placed.H.T @ points).reshape(-1, placed.rows.points.shape[1])[:, 0]
+
+
+def _to_corners(
+    model: Model, contact: Contact, placed: Placed, first: int
+) -> sparse.csr_array:  # fmt: skip
+    """Who takes the force of which node, (nc, nodes of the model)."""
+    total = model.discretisation.dofs // model.dimension
+    nodes = placed.rows.nodes
+    entries = [(first + nodes, first + nodes, np.ones(len(nodes)))]
+    if contact.method == "mortar":
+        k, surface = locate(model.bodies, contact.slave)
+        for block in model.bodies[k].mesh.surface(surface):
+            entries += _middles(block.kind, first + block.nodes)
+    to, of, value = (np.concatenate(column) for column in zip(*entries, strict=True))
+    whole = np.unique(np.stack([to, of]), axis=1, return_index=True)[1]  # middles of two facets
+    matrix = sparse.csr_array((value[whole], (to[whole], of[whole])), shape=(total, total))
+    return matrix[first + nodes]
+
+
+def _middles(kind: str, nodes: Index) -> list[tuple[Index, Index, Array]]:
+    """(corner, node between, share) of facets of second order: bilinear functions there."""
+    cell, count = CELLS[kind], len(nodes)
+    first = nodes.shape[1] - len(cell.parents)
+    return [
+        (nodes[:, corner], nodes[:, first + k], np.full(count, 1.0 / len(between)))
+        for k, between in enumerate(cell.parents)
+        for corner in between
+    ]
+
+
+def _shared(model: Model, contacts: Sequence[Contact]) -> bool:
+    """True where a node lies on more than one of all sides."""
+    seen: dict[tuple[int, int], int] = {}
+    for contact in contacts:
+        for name in (contact.slave, contact.master):
+            if name is None:
+                continue
+            k, surface = locate(model.bodies, name)
+            for node in model.bodies[k].mesh.surface_nodes(surface).tolist():
+                if seen.setdefault((k, node), 0):
+                    return True
+                seen[k, node] = 1
+    return False

@@ -1,0 +1,70 @@
+"""What an audit asks of a deck beyond its model: what nodes are called, and how loads grow."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .flat import Deck
+from .history import Course, History
+from .scopes import Index
+from .shapes import SHAPES
+
+if TYPE_CHECKING:
+    from ...mechanics.model import Model
+
+STRAIGHT = 1e-9  # part of a value by which a course may leave its straight line
+
+
+@dataclass(frozen=True, eq=False)
+class About:
+    """labels (nodes,): numbers of the mesh's nodes in the deck; are_unique: no two alike.
+
+    plane: "", "strain", "stress" or "axisymmetric"; other: types of elements that are
+    formulated otherwise, in words; large: NLGEOM; until: the end of the last step; one_way: all
+    loads grow in proportion; at: the model at a time.
+    """
+
+    labels: Index
+    are_unique: bool
+    plane: str
+    other: tuple[str, ...]
+    large: bool
+    until: float
+    one_way: bool
+    at: Callable[[float], Model]
+
+    @classmethod
+    def of(
+        cls, deck: Deck, history: History, numbers: Index, at: Callable[[float], Model]
+    ) -> About:
+        """Of a flat deck; numbers: of its nodes in the mesh, -1 for one without elements."""
+        labels = np.zeros(len(numbers), dtype=np.int64)
+        for names, _ in deck.point_labels:
+            labels[names.node_at] = names.node_labels
+        own = labels[numbers >= 0]
+        kinds = dict.fromkeys(block.kind for block in deck.blocks)
+        other = tuple(f"{k}: {SHAPES[k].note}" for k in kinds if SHAPES[k].note)
+        large = any(
+            "NLGEOM" in step[0].card.options and step[0].card.label("NLGEOM") != "NO"
+            for step in deck.steps
+        )
+        courses = [*history.supports.courses, *history.forces.courses]
+        courses += [course for course, _, _ in history.faces.values()]
+        courses += [course for course, _, _, _ in history.bodies.values()]
+        return cls(
+            own, len(np.unique(own)) == len(own), SHAPES[deck.blocks[0].kind].plane, other,
+            large, history.until, all(_is_ramp(c, history.until) for c in courses), at,
+        )  # fmt: skip
+
+
+def _is_ramp(course: Course, until: float) -> bool:
+    """True for a value that grows from 0 along one straight line until the end."""
+    wanted = np.array(course.times) / until * course.at(until)
+    inside = np.array(course.times) <= until
+    off = np.abs(np.array(course.values) - wanted)[inside].max(initial=0.0)
+    return bool(off <= STRAIGHT * max(abs(v) for v in course.values)) and course.times[0] <= 0

@@ -1,0 +1,325 @@
+"""Contact pairs of a deck: surfaces, laws, adjusted nodes and clearances.
+
+The slave comes first.  A slave surface of nodes that make no facets is met node by node, each
+with its share of the facets next to it that face the master; all else is mortar contact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from ...core.errors import InvalidInput
+from ...mechanics.contact import pair_contact
+from ...mechanics.meshes import Mesh
+from ...mechanics.model import Contact
+from ...problem.law import ExponentialOverclosure, OverclosureCurve
+from .cards import Card, Row, number
+from .flat import Deck, Placed
+from .materials import Interaction, read_interactions
+from .meshing import Region
+from .scopes import Index, missing
+
+Array = NDArray[np.float64]
+ASIDE = {"HCRIT", "NOTHICKNESS", "SMALLSLIDING", "EXTENSIONZONE", "GEOMETRICCORRECTION",
+         "SUPPLEMENTARYCONSTRAINTS", "WEIGHT", "TRACKING", "CPSET", "SMOOTH"}  # fmt: skip
+TABLE = 60  # points of the law with a tension far away
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a deck is read: cards that may be left out; hard: laws of overclosure too."""
+
+    allow: tuple[str, ...] = ()
+    hard: bool = False
+
+
+@dataclass
+class Pair:
+    """A contact pair of a deck: names of its surfaces in the mesh, its law, what is adjusted.
+
+    adjust: nodes of the slave at most so far from the master are put onto it, or nodes of the
+    deck that are; nodes: of the deck, those of the slave that take part, None for all.
+    """
+
+    slave: str
+    master: str
+    law: dict[str, Any]
+    card: Card
+    interaction: str
+    adjust: float | Index | None = None
+    nodes: Index | None = None
+    points: Array | None = None
+    clearance: float | None = None
+
+    def contact(self, mesh: Mesh) -> Contact:
+        """The contact of the model."""
+        if self.points is None:
+            return Contact(self.slave, master=self.master, clearance=self.clearance, **self.law)
+        return Contact(
+            self.slave, master=self.master, clearance=self.clearance, method="nodal",
+            where=partial(_near, self.points), **self.law,
+        )  # fmt: skip
+
+
+def _near(points: Array, x: Array) -> NDArray[np.bool_]:
+    """Which of x (n, dim) are among points (k, dim)."""
+    size = float(np.abs(points).max(initial=0.0)) or 1.0
+    return np.asarray(cKDTree(points).query(x)[0] <= 1e-9 * size)
+
+
+def read_contacts(deck: Deck, region: Region, options: Options, notes: list[str]) -> list[Pair]:
+    """The pairs of a deck; raises FileFormatError with file and line."""
+    for step in deck.steps:
+        for placed in step:
+            if placed.card.keyword in ("CONTACTPAIR", "SURFACEINTERACTION", "CLEARANCE"):
+                raise placed.card.error("stands in a step; expected before the first one")
+    interactions = read_interactions([p.card for p in deck.model])
+    pairs: list[Pair] = []
+    for placed in deck.model:
+        if placed.card.keyword == "CONTACTPAIR":
+            pairs += _pairs(placed, region, interactions, options, notes)
+        elif placed.card.keyword == "CLEARANCE":
+            _clear(placed, pairs, region)
+    if not pairs:
+        raise InvalidInput("*CONTACT PAIR: missing, a deck without contact")
+    return pairs
+
+
+def _pairs(
+    placed: Placed, region: Region, interactions: dict[str, Interaction], options: Options,
+    notes: list[str],
+) -> list[Pair]:  # fmt: skip
+    card = placed.card
+    if "TIED" in card.options:
+        raise card.error("TIED: is not read, expected *TIE")
+    name = card.name("INTERACTION")
+    if name not in interactions:
+        raise card.error(missing("surface interaction", name, interactions))
+    smooth = card.label("TYPE") in (None, "NODE TO SURFACE")
+    law = law_of(interactions[name], options, notes, nodal=smooth)
+    out = []
+    for row in card.rows():
+        names = [text for text in row.fields if text]
+        if len(names) == 1 and len(row.fields) <= 2:
+            raise row.error(
+                f"*CONTACT PAIR: {names[0]}: contact of a surface with itself is not read; "
+                "expected slave, master: two surfaces of what may meet"
+            )
+        if len(names) != 2:
+            raise row.error(
+                f"*CONTACT PAIR: expected slave, master, got {len(row.fields)} names"
+            )
+        master = _surface(region, placed, names[1], row)
+        pair = Pair("", master, law, card, name)
+        pair.slave, pair.nodes = _slave(region, placed, names[0], master, row)
+        pair.adjust = _adjust(placed)
+        out.append(pair)
+    if smooth and out:
+        what = "node by node" if out[0].nodes is not None else "mortar"
+        notes.append(f"{card} (line {card.number}): NODE TO SURFACE is taken as {what}")
+    return out
+
+
+def _adjust(placed: Placed) -> float | Index | None:
+    """The distance or the nodes of ADJUST."""
+    card = placed.card
+    value = card.options.get("ADJUST")
+    if value is None:
+        return None
+    row = Row(card.file, card.number, [])
+    try:
+        float(value)
+    except ValueError:
+        return placed.scope.nodes(value, row)
+    distance = number(value, row, f"{card}: ADJUST")
+    if distance < 0:
+        raise card.error(f"ADJUST: expected a distance >= 0 or a node set, got {value}")
+    return distance
+
+
+def _clear(placed: Placed, pairs: Sequence[Pair], region: Region) -> None:
+    """*CLEARANCE, MASTER=, SLAVE=, VALUE=: the gap of a pair, < 0 for an overlap."""
+    card = placed.card
+    master, slave = card.name("MASTER"), card.name("SLAVE")
+    if not card.options.get("VALUE"):
+        raise card.error("VALUE: missing, expected a gap, < 0 for an overlap")
+    row = Row(card.file, card.number, [])
+    value = number(card.options["VALUE"], row, f"{card}: VALUE")
+    found = [p for p in pairs if (p.slave, p.master) == (slave, master)]
+    if not found:
+        known = [f"{p.slave}, {p.master}" for p in pairs]
+        raise card.error(missing("contact pair", f"{slave}, {master}", known))
+    for pair in found:
+        pair.clearance = value
+
+
+# ---------------------------------------------------------------------------------- laws
+def law_of(
+    interaction: Interaction, options: Options, notes: list[str], *, nodal: bool = False
+) -> dict[str, Any]:
+    """Numbers of a contact; raises FileFormatError for a law of overclosure that is not read.
+
+    nodal: LINEAR has a tension far away, which bends the line where contact begins.
+    With the option `hard` all are hard and stick rigidly.
+    """
+    numbers: dict[str, Any] = {"mu": interaction.friction, "cap": interaction.limit}
+    word, card = interaction.behaviour, interaction.behaviour_card or interaction.card
+    if word not in LAWS:
+        raise card.error(
+            f"{word}: this law of pressure over overclosure is not read, expected one of "
+            f"{', '.join(LAWS)}; --set deck.hard=true takes contact as hard and rigid"
+        )
+    if options.hard:
+        if word != "HARD" or interaction.slope is not None:
+            text = f"{card} (line {card.number}): contact is taken as hard and rigid, as asked"
+            notes += [text] if text not in notes else []
+        return numbers if word != "TIED" else {"tied": True}
+    numbers |= LAWS[word](interaction, card, nodal)
+    if interaction.slope is not None and (interaction.friction or word == "TIED"):
+        numbers["stick_stiffness"] = interaction.slope
+    if word == "TIED":
+        numbers = {"tied": True} | {k: v for k, v in numbers.items() if k in BONDS}
+    said = f"{card} (line {card.number}): {word}"
+    if word != "HARD":
+        said += f", {_told(numbers)}"
+        notes += [said] if said not in notes else []
+    return numbers
+
+
+BONDS = ("stiffness", "stick_stiffness")
+
+
+def _told(numbers: dict[str, Any]) -> str:
+    """What of a law lets surfaces overlap or slip elastically, in words."""
+    stiffness = numbers.get("stiffness")
+    if stiffness is None:
+        words = "rigid"
+    elif isinstance(stiffness, float):
+        words = f"{stiffness:g} of pressure over overclosure"
+    else:
+        words = "a curve of pressure over overclosure"
+    slope = numbers.get("stick_stiffness")
+    return words + ("" if slope is None else f", {slope:g} of shear over elastic slip")
+
+
+def _values(interaction: Interaction, card: Card, least: int) -> tuple[list[float], Row]:
+    """The numbers of the first line of a *SURFACE BEHAVIOR."""
+    for row in interaction.values:
+        if len(row.fields) < least:
+            raise row.error(f"{card}: expected {least} numbers, got {len(row.fields)}")
+        return [number(text, row, str(card)) for text in row.fields], row
+    raise card.error(f"expected a line with {least} numbers, got none")
+
+
+def _linear(interaction: Interaction, card: Card, nodal: bool) -> dict[str, Any]:
+    """K, and for nodes the tension sigma that CalculiX has far away: a smooth corner.
+
+    There p = K d (1/2 + atan(d / e) / pi) with e = pi sigma / K, of which p >= 0 is read.
+    """
+    values, _ = _values(interaction, card, 1)
+    if not values[0] > 0:
+        raise card.error("expected a stiffness > 0, pressure over overclosure")
+    tension = values[1] if len(values) > 1 else 0.0
+    if not nodal or not tension > 0:
+        return {"stiffness": values[0]}
+    x = np.concatenate([[0.0], np.geomspace(1e-2, 1e4, TABLE)])
+    width = np.pi * tension / values[0]
+    pressure = np.pi * tension * x * (0.5 + np.arctan(x) / np.pi)
+    return {"stiffness": OverclosureCurve(pressure, width * x)}
+
+
+def _exponential(interaction: Interaction, card: Card, nodal: bool) -> dict[str, Any]:
+    """c0, p0 as CalculiX has them: a hundredth of p0 at the gap c0."""
+    values, row = _values(interaction, card, 2)
+    if not (values[0] > 0 and values[1] > 0):
+        raise row.error(f"{card}: expected c0 > 0 and p0 > 0, got {values[:2]}")
+    return {"stiffness": ExponentialOverclosure(values[1], values[0])}
+
+
+def _tabular(interaction: Interaction, card: Card, nodal: bool) -> dict[str, Any]:
+    """Lines of pressure, overclosure."""
+    rows = []
+    for row in interaction.values:
+        if len(row.fields) != 2:
+            raise row.error(f"{card}: expected pressure, overclosure, got {row.fields}")
+        rows.append([number(text, row, str(card)) for text in row.fields])
+    table = np.array(rows).reshape(-1, 2)
+    try:
+        return {"stiffness": OverclosureCurve(table[:, 0], table[:, 1])}
+    except InvalidInput as reason:
+        raise card.error(str(reason)) from None
+
+
+def _tied(interaction: Interaction, card: Card, nodal: bool) -> dict[str, Any]:
+    values, _ = _values(interaction, card, 1)
+    if not values[0] > 0:
+        raise card.error("expected a stiffness > 0, stress over the distance")
+    return {"stiffness": values[0]}
+
+
+LAWS = {"HARD": lambda *_: {}, "LINEAR": _linear, "EXPONENTIAL": _exponential,
+        "TABULAR": _tabular, "TIED": _tied}  # fmt: skip
+
+
+# ------------------------------------------------------------------------------- surfaces
+def _surface(region: Region, placed: Placed, text: str, row: Row) -> str:
+    """Ask the mesh for a surface; returns its name there."""
+    faces, nodes = placed.scope.surface(text, row)
+    name = text.strip('"').upper()
+    if name not in region.facets:
+        if nodes is None:
+            region.add_faces(name, faces, row)
+        else:
+            region.add_covering(name, nodes, row)
+    return name
+
+
+def _slave(
+    region: Region, placed: Placed, text: str, master: str, row: Row
+) -> tuple[str, Index | None]:
+    """The name of a slave surface in the mesh, and its nodes where they make no facets."""
+    _, nodes = placed.scope.surface(text, row)
+    name = text.strip('"').upper()
+    if nodes is None or name in region.facets or region.covers(nodes):
+        return _surface(region, placed, text, row), None
+    region.add_around(name, nodes, region.facets[master], row)
+    return name, nodes
+
+
+# ----------------------------------------------------------------------------- adjusting
+def adjusted(mesh: Mesh, at: Index, pairs: Sequence[Pair], notes: list[str]) -> Mesh:
+    """The mesh with slave nodes put onto their master where a pair asks for it.
+
+    at: number in the mesh of each node of the deck.  Also tells pairs of nodes where these are.
+    """
+    points = np.array(mesh.points)
+    for pair in pairs:
+        if pair.adjust is None:
+            continue
+        moved = replace(mesh, points=points)
+        rows, _, _ = pair_contact(moved, pair.slave, moved, pair.master)
+        if isinstance(pair.adjust, float):
+            chosen = rows.gap <= pair.adjust
+        else:
+            chosen = np.isin(rows.nodes, at[pair.adjust])
+        chosen &= rows.gap != 0.0
+        way = rows.gap[chosen]
+        points[rows.nodes[chosen]] -= way[:, None] * rows.frames[chosen, 0]
+        if len(way):
+            notes.append(
+                f"{pair.card} (line {pair.card.number}): {len(way)} slave nodes are put onto "
+                f"the master, at most {np.abs(way).max():.3g} away"
+            )
+    if not np.array_equal(points, mesh.points):
+        mesh = replace(mesh, points=points)
+    for pair in pairs:
+        if pair.nodes is not None:
+            pair.points = mesh.points[at[pair.nodes]]
+    return mesh
