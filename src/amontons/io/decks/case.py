@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ...core.errors import Address, AmontonsError, FileFormatError, InvalidInput
-from ...mechanics.model import BodyForce, Contact, Fix, Model, NodalForce, Pressure
+from ...mechanics.model import BodyForce, Contact, Fix, Model, NodalForce, Pressure, Temperature
 from ...mechanics.model.parts import Body
 from ...mechanics.steps import QuasiStatic
 from ..case.evolution import Evolution
@@ -122,7 +122,7 @@ def _case(
     _supports_and_loads(found, region, history, at, notes)
     for each in contacts:
         found.add("contacts", each.contact(mesh), each.card)
-    materials = {s.name: s.material.law(region.plane) for s in sections}
+    materials = {s.name: s.law(region.plane) for s in sections}
     make = partial(_model, [Body(mesh, materials)], found, title)
     evolution = Evolution(QuasiStatic(_step(history.spans)), history.until)
     case = Case(make(None), settings, title, path, evolution=evolution, key_of=found.line_of,
@@ -170,6 +170,8 @@ def _name_nodes(region: Region, history: History) -> None:
     for word, given in (("support", history.supports), ("force", history.forces)):
         for k, (nodes, _, _) in enumerate(given.groups(region.dim)):
             region.node_sets[f"{word} {k + 1}"] = nodes
+    for k, (nodes, _, _) in enumerate(history.heat.groups() if history.heat else ()):
+        region.node_sets[f"temperature {k + 1}"] = nodes
 
 
 def _name_faces(region: Region, history: History) -> None:
@@ -204,6 +206,15 @@ def _supports_and_loads(
             label = region.deck.node_name(int(nodes[at[nodes] < 0][0]))
             raise card.error(f"node {label}: belongs to no element, where does its force go?")
         found.add("loads", (NodalForce, name, [_scaled(c, share) for c in courses]), card)
+    grows = any(np.any(section.material.expansion) for section in region.sections)
+    for k, (nodes, change, card) in enumerate(history.heat.groups() if history.heat else ()):
+        if not grows:
+            notes.append(f"{card} (line {card.number}): no material has an *EXPANSION")
+            break
+        name = f"temperature {k + 1}"
+        _without_elements(region, name, nodes, at)
+        if len(region.node_sets[name]):
+            found.add("loads", (Temperature, name, change), card)
     for (name, label), (course, card, _) in history.faces.items():
         found.add("loads", (Pressure, _loaded(name, label), course), card)
     for name, (course, way, card, scope) in history.bodies.items():
@@ -244,6 +255,8 @@ def _model(bodies: list[Body], found: Found, title: str, time: float | None) -> 
     for kind, name, courses in found.loads:
         if kind is NodalForce:
             loads.append(NodalForce(name, [value(c) for c in courses]))
+        elif kind is Temperature:
+            loads.append(Temperature(value(courses), on=name))
         elif kind is Pressure:
             loads.append(Pressure(name, value(courses)))
         else:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from .cards import Card, Row, number, whole
 from .flat import Deck, Placed
+from .heat import Heat
 from .scopes import Index, Scope, missing
 
 Array = NDArray[np.float64]
@@ -103,6 +104,7 @@ class History:
     faces: dict[tuple[str, str], tuple[Course, Card, Scope]] = field(default_factory=dict)
     bodies: dict[str, tuple[Course, Array, Card, Scope]] = field(default_factory=dict)
     spans: list[Span] = field(default_factory=list)
+    heat: Heat | None = None
 
     @property
     def until(self) -> float:
@@ -115,6 +117,7 @@ def read_history(deck: Deck, before: Sequence[Placed], steps: Sequence[Sequence[
     """Follow the steps; raises FileFormatError with the line of what can not be followed."""
     shape = (len(deck.points), TRANSLATIONS)
     history = History(Prescribed(np.full(shape, FREE)), Prescribed(np.full(shape, FREE)))
+    history.heat = Heat.of(len(deck.points), before)
     amplitudes = _amplitudes([p.card for p in before])
     first = _span(steps[0], 0.0)
     for each in before:
@@ -197,8 +200,18 @@ def _follow(history: History, step: Sequence[Placed], span: Span, known: Amplitu
             _boundary(history, each, span, known, step=k)
         elif key == "CLOAD":
             _forces(history, each, span, known, given)
+        elif key == "TEMPERATURE" and history.heat is not None:
+            _heated(history.heat, each, span, known)
         elif key in ("DLOAD", "DSLOAD"):
             _distributed(history, each, span, known)
+
+
+def _heated(heat: Heat, each: Placed, span: Span, known: Amplitudes) -> None:
+    """Temperatures at nodes, from the first one or that of the step before."""
+    heat.give(
+        each, lambda value: Course((0.0,), (value,)),
+        lambda course, value: _course(course, value, span, each.card, known),
+    )  # fmt: skip
 
 
 def _cleared(history: History, step: Sequence[Placed], span: Span, k: int) -> None:

@@ -14,6 +14,7 @@ READ = {
     "HEADING", "MATERIAL", "ELASTIC", "DENSITY", "SOLIDSECTION", "SURFACEINTERACTION",
     "SURFACEBEHAVIOR", "FRICTION", "CONTACTPAIR", "BOUNDARY", "AMPLITUDE", "STEP", "STATIC",
     "CLOAD", "DLOAD", "DSLOAD", "CLEARANCE",
+    "EXPANSION", "TEMPERATURE", "ORIENTATION",
 }  # fmt: skip
 OUTPUT = {
     "NODEPRINT", "NODEFILE", "NODEOUTPUT", "ELPRINT", "ELFILE", "ELEMENTOUTPUT", "CONTACTFILE",
@@ -27,8 +28,7 @@ NUMERICS = {  # how another program iterates
     "HOURGLASSSTIFFNESS",
 }  # fmt: skip
 THERMAL = {  # without a change of temperature they change nothing
-    "EXPANSION", "CONDUCTIVITY", "SPECIFICHEAT", "PHYSICALCONSTANTS", "GAPCONDUCTANCE",
-    "INITIALCONDITIONS",
+    "CONDUCTIVITY", "SPECIFICHEAT", "PHYSICALCONSTANTS", "GAPCONDUCTANCE",
 }  # fmt: skip
 EMPTY = {"SYSTEM"}  # of no effect without an option
 MEANS = {  # what a card would have done
@@ -40,8 +40,7 @@ MEANS = {  # what a card would have done
     "RIGIDBODY": "a part would not deform", "COUPLING": "a surface would follow a node",
     "KINEMATIC": "a surface would follow a node",
     "DISTRIBUTING": "a force would be spread over a surface",
-    "ORIENTATION": "the axes of a material are turned", "DYNAMIC": "inertia would act",
-    "TEMPERATURE": "the bodies would grow and shrink",
+    "DYNAMIC": "inertia would act",
     "CHANGEFRICTION": "friction would change", "MODELCHANGE": "parts would come and go",
     "CHANGESURFACEBEHAVIOR": "contact would change", "SPRING": "springs would act",
     "GAP": "contact elements would act",
@@ -61,7 +60,7 @@ def sorted_out(cards: Iterable[Card], allowed: Sequence[str]) -> tuple[list[Card
     allow = {"".join(word.upper().split()).removeprefix("*") for word in allowed}
     for card in cards:
         key = card.keyword
-        if key in READ:
+        if key in READ or (key == "INITIALCONDITIONS" and card.label("TYPE") == "TEMPERATURE"):
             kept.append(card)
         elif key in OUTPUT | NUMERICS | EMPTY or _is_thermal(card):
             skipped.setdefault(str(card), []).append(card.number)
@@ -79,8 +78,6 @@ def sorted_out(cards: Iterable[Card], allowed: Sequence[str]) -> tuple[list[Card
 
 
 def _is_thermal(card: Card) -> bool:
-    if card.keyword == "INITIALCONDITIONS":
-        return card.label("TYPE") == "TEMPERATURE"
     return card.keyword in THERMAL
 
 

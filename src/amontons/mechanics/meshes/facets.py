@@ -20,8 +20,8 @@ class Cells:
     """Cells of one kind in one region: nodes (k, nodes per cell) in VTK order.
 
     integration: of the stiffness of small strains, "full", or "reduced", with fewer points:
-    2 per direction for quad8, quad9, hex20 and hex27, 2 for wedge, 9 for wedge15; or
-    "incompatible", bending modes inside of each quad or hex on its own.
+    1 for tri around an axis, 2 per direction for quad8, quad9, hex20 and hex27, 2 for wedge, 9
+    for wedge15; or "incompatible", bending modes inside of each quad or hex on its own.
     """
 
     kind: str
