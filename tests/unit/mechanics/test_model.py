@@ -195,7 +195,7 @@ def test_resultant_balances_supports_and_loads():
     inner = (K @ fields.displacement[0].ravel()).reshape(-1, 3)
     top = model.bodies[0].mesh.surface_nodes("top")
     external = np.array([2.0, 0.5, 2])
-    loads = external_load(model.bodies, model.loads, model.discretisation.offsets).reshape(
+    loads = external_load(model.bodies, model.loads, model.beside).reshape(
         -1, 3
     )
     np.testing.assert_allclose(loads.sum(axis=0), external)

@@ -51,6 +51,11 @@ class Elastic:
             raise self.card.error(str(reason)) from None
 
     @property
+    def grows(self) -> bool:
+        """Whether a change of temperature does anything."""
+        return bool(np.any(self.expansion))
+
+    @property
     def _three(self) -> tuple[Three, Three, Three]:
         """All constants, also of an isotropic material."""
         if self.shear is not None:

@@ -14,7 +14,8 @@ READ = {
     "HEADING", "MATERIAL", "ELASTIC", "DENSITY", "SOLIDSECTION", "SURFACEINTERACTION",
     "SURFACEBEHAVIOR", "FRICTION", "CONTACTPAIR", "BOUNDARY", "AMPLITUDE", "STEP", "STATIC",
     "CLOAD", "DLOAD", "DSLOAD", "CLEARANCE",
-    "EXPANSION", "TEMPERATURE", "ORIENTATION",
+    "EXPANSION", "TEMPERATURE", "ORIENTATION", "CHANGEFRICTION", "CHANGESURFACEBEHAVIOR",
+    "MODELCHANGE",
 }  # fmt: skip
 OUTPUT = {
     "NODEPRINT", "NODEFILE", "NODEOUTPUT", "ELPRINT", "ELFILE", "ELEMENTOUTPUT", "CONTACTFILE",
@@ -40,9 +41,7 @@ MEANS = {  # what a card would have done
     "RIGIDBODY": "a part would not deform", "COUPLING": "a surface would follow a node",
     "KINEMATIC": "a surface would follow a node",
     "DISTRIBUTING": "a force would be spread over a surface",
-    "DYNAMIC": "inertia would act",
-    "CHANGEFRICTION": "friction would change", "MODELCHANGE": "parts would come and go",
-    "CHANGESURFACEBEHAVIOR": "contact would change", "SPRING": "springs would act",
+    "DYNAMIC": "inertia would act", "SPRING": "springs would act",
     "GAP": "contact elements would act",
     "FREQUENCY": "vibrations would be computed", "BUCKLE": "buckling would be computed",
     "CONTACT": "surfaces in contact would be found",

@@ -196,7 +196,7 @@ class Region:
             name: tuple(Facets(f.kind, at[f.nodes]) for f in _joined(facets))
             for name, facets in self.facets.items()
         }
-        sets = {name: at[nodes] for name, nodes in self.node_sets.items()}
+        sets = {name: at[nodes][at[nodes] >= 0] for name, nodes in self.node_sets.items()}
         mesh = Mesh(points, tuple(cells), surfaces, name=title, node_sets=sets,
                     axisymmetric=self.plane == "axisymmetric")  # fmt: skip
         return mesh, at

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from ...core.errors import InvalidInput
 from ..meshes.cells import CELLS, FIRST
@@ -23,6 +23,9 @@ from .curvature import heights, slopes
 from .cuts import SIDES, Cuts, cuts, functions
 from .overlap import inside
 from .pairs import AROUND, BESIDE, DEEP, EDGEWISE, KINDS, MAX_NODES
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -224,6 +227,8 @@ def _joined(parts: list[Segments], slave: Surface, master: Surface) -> Segments:
 # -------------------------------------------------------------------- search
 def _candidates(slave: Surface, master: Surface) -> Iterator[tuple[Index, Index]]:
     """Pairs of facets that may face each other, a chunk of slave facets at a time."""
+    from scipy.spatial import cKDTree
+
     nodes = np.unique(master.nodes)
     normals = nodal_normals(master.points, master.blocks)[nodes]
     tree = cKDTree(master.points[nodes])

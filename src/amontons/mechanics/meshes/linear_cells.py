@@ -13,7 +13,8 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import roots_jacobi
+
+from .gauss import roots_jacobi
 
 Array = NDArray[np.float64]
 Facets = tuple[tuple[int, ...], ...]
@@ -176,7 +177,7 @@ _TET_FACETS = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
 
 def _in_pyramid() -> Rule:
     """Two points per direction: one could not hold all modes."""
-    height, weights = roots_jacobi(2, 2, 0)  # the square of the distance from the apex
+    height, weights = roots_jacobi(2, 2)  # the square of the distance from the apex
     points = [((1 - h) * x, (1 - h) * y, h)
               for h, x, y in product((1 + height) / 2, _TWO, _TWO)]  # fmt: skip
     return np.array(points), np.repeat(weights / 8, 4) / 4

@@ -13,8 +13,8 @@ from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import roots_jacobi
 
+from .gauss import roots_jacobi
 from .linear_cells import LINEAR, ReferenceCell, Rule
 
 Array = NDArray[np.float64]
@@ -72,7 +72,7 @@ def gauss(dim: int, simplex: bool, count: int = 3) -> tuple[Array, Array]:
     Points (count^dim, dim) and weights of the unit cube or simplex.
     """
     points, weights = [], []
-    rules = [roots_jacobi(count, dim - 1 - k if simplex else 0, 0) for k in range(dim)]
+    rules = [roots_jacobi(count, dim - 1 - k if simplex else 0) for k in range(dim)]
     for nodes in product(range(count), repeat=dim):
         at = np.array([(1 + rules[k][0][j]) / 2 for k, j in enumerate(nodes)])
         scale = [2.0 ** -(dim - k if simplex else 1) for k in range(dim)]

@@ -19,7 +19,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.optimize import linprog
 
 from ...problem.law import Law
 from ...problem.law.law import BOUND, COULOMB, MU
@@ -65,7 +64,8 @@ def imbalance(
             f"contact and friction alone hold {in_words(loose)}: perhaps they do not suffice"
         )
     texts = [
-        f"body {piece.name!r} gives way by {_motion_in_words(basis @ found[of == k])}"
+        f"body {piece.name!r} gives way by "
+        f"{_motion_in_words(piece.moving(basis @ found[of == k]))}"
         for k, (piece, basis) in enumerate(loose)
         if np.abs(found[of == k]).max() > SMALL * np.abs(found).max()
     ]
@@ -93,6 +93,8 @@ def _escape(local: Array, power: Array, law: Law, size: float) -> Array | None:
 
     local (nc d, k): displacements of the contacts; power (k,): work of the load over size.
     """
+    from scipy.optimize import linprog
+
     nc, k = len(law), len(power)
     d = len(local) // nc
     angle = 2 * np.pi * np.arange(CORNERS) / CORNERS

@@ -56,13 +56,17 @@ def check_scalar(value: object, what: str) -> None:
         raise InvalidInput(f"{what}: expected numbers >= 0, got {numbers.min():g}")
 
 
-def vector_at(value: VectorValue, points: Array, what: str, *, free: bool = False) -> Array:
-    """A vector value at points (n, dim): (n, dim); a free component (None) becomes NaN.
+def vector_at(
+    value: VectorValue, points: Array, what: str, *, free: bool = False, size: int | None = None
+) -> Array:
+    """A vector value at points (n, dim): (n, size); a free component (None) becomes NaN.
+
+    size: number of components, by default dim.
 
     Callables take one point x of shape (dim,): the whole value, or one component each; those
     of (x, t) are taken at t = 0.
     """
-    dim = points.shape[1]
+    dim = points.shape[1] if size is None else size
     value = steady_value(value)
     if callable(value):
         rows = [_row(value(x), dim, what, free) for x in points]
