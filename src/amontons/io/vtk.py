@@ -69,7 +69,7 @@ def model_fields(
     starts = np.cumsum([0, *(len(body.mesh.points) for body in model.bodies)])
     pairs = list(zip(model.bodies, fields.displacement, strict=True))
     warm = warming(model, getattr(solution, "time", None))
-    stress = [_stress(*pair, each) for pair, each in zip(pairs, warm, strict=True)]
+    stress = [body_stress(*pair, each) for pair, each in zip(pairs, warm, strict=True)]
     centres, nodes = (np.concatenate(each) for each in zip(*stress, strict=True))
     record = getattr(solution, "solution", solution).convergence  # of a step in time, too
     converged = int(not record.stamp)
@@ -97,7 +97,9 @@ def model_fields(
     return ModelFields(meshes, point, cell, whole, record.stamp)
 
 
-def _stress(body: Body, moved: Array, warm: Array | None) -> tuple[Array, Array]:
+def body_stress(
+    body: Body, moved: Array, warm: Array | None = None
+) -> tuple[Array, Array]:
     """Stress of cells and nodes at displacements (nodes, d); 0 in rigid bodies.
 
     warm (nodes,): change of temperature.

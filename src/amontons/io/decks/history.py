@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +24,8 @@ from .scopes import Index, Scope, missing
 
 Array = NDArray[np.float64]
 AT_ONCE = 1e-9  # share of a step in which a load that is there at once comes
-FREE, TRANSLATIONS = -1, 3
-ROTATIONS = range(4, 7)
+FREE, COMPONENTS = -1, 6
+TRANSLATIONS = 3
 HELD = {"ENCASTRE": (1, 2, 3), "PINNED": (1, 2, 3), "XSYMM": (1,), "YSYMM": (2,),
         "ZSYMM": (3,), "XASYMM": (2, 3), "YASYMM": (1, 3), "ZASYMM": (1, 2)}  # fmt: skip
 
@@ -95,7 +96,7 @@ class Span:
 
 @dataclass
 class Prescribed:
-    """Courses of displacements or forces, by number: `at` (nodes, 3), FREE where none is.
+    """Courses of displacements or forces, by number: `at` (nodes, 6), FREE where none is.
 
     before: the same of supports before OP=NEW took them away, for where they go on from.
     """
@@ -104,6 +105,13 @@ class Prescribed:
     before: Index | None = None
     courses: list[Course] = field(default_factory=list)
     cards: list[Card] = field(default_factory=list)
+
+    def of(
+        self, node: int, components: Sequence[int], held: Index | None = None
+    ) -> list[Course | None]:
+        """The courses of some components of a node, at the end or those of `held`."""
+        numbers = (self.at if held is None else held)[node, list(components)]
+        return [None if c == FREE else self.courses[c] for c in numbers]
 
     def groups(self, dim: int, held: Index | None = None) -> list[Group]:
         """Nodes with the same courses in all components, at the end or those of `held`."""
@@ -156,7 +164,7 @@ class History:
 def read_history(deck: Deck, before: Sequence[Placed], steps: Sequence[Sequence[Placed]]
                  ) -> History:  # fmt: skip
     """Follow the steps; raises FileFormatError with the line of what can not be followed."""
-    shape = (len(deck.points), TRANSLATIONS)
+    shape = (len(deck.points), COMPONENTS)
     history = History(Prescribed(np.full(shape, FREE)), Prescribed(np.full(shape, FREE)))
     history.heat = Heat.of(len(deck.points), before)
     amplitudes = _amplitudes([p.card for p in before])
@@ -244,17 +252,9 @@ def _follow(history: History, step: Sequence[Placed], span: Span, known: Amplitu
         elif key == "CLOAD":
             _forces(history, each, span, known, given)
         elif key == "TEMPERATURE" and history.heat is not None:
-            _heated(history.heat, each, span, known)
+            history.heat.give(each, Course, partial(_course, span=span, known=known))
         elif key in ("DLOAD", "DSLOAD"):
             _distributed(history, each, span, known)
-
-
-def _heated(heat: Heat, each: Placed, span: Span, known: Amplitudes) -> None:
-    """Temperatures at nodes, from the first one or that of the step before."""
-    heat.give(
-        each, lambda value: Course((0.0,), (value,)),
-        lambda course, value: _course(course, value, span, each.card, known),
-    )  # fmt: skip
 
 
 def _cleared(history: History, step: Sequence[Placed], span: Span, k: int) -> None:
@@ -323,9 +323,9 @@ def _held(row: Row) -> list[tuple[int, float]]:
     if len(row.fields) > 2 and row.fields[2]:
         last = whole(row.fields[2], row, "*BOUNDARY: component")
     value = number(row.fields[3], row, "*BOUNDARY: value") if len(row.fields) > 3 else 0.0
-    if not 1 <= first <= last <= ROTATIONS[-1]:
-        raise row.error(f"*BOUNDARY: expected components from 1 to 3, got {first} to {last}")
-    return [(k - 1, value) for k in range(first, last + 1) if k not in ROTATIONS]
+    if not 1 <= first <= last <= COMPONENTS:
+        raise row.error(f"*BOUNDARY: expected components from 1 to 6, got {first} to {last}")
+    return [(k - 1, value) for k in range(first, last + 1)]
 
 
 def _forces(history: History, each: Placed, span: Span, known: Amplitudes,
@@ -340,8 +340,8 @@ def _forces(history: History, each: Placed, span: Span, known: Amplitudes,
         if len(row.fields) < 3:
             raise row.error("*CLOAD: expected nodes, component, value")
         component = whole(row.fields[1], row, "*CLOAD: component") - 1
-        if not 0 <= component < TRANSLATIONS:
-            raise row.error(f"*CLOAD: expected a component from 1 to 3, got {component + 1}")
+        if not 0 <= component < COMPONENTS:
+            raise row.error(f"*CLOAD: expected a component from 1 to 6, got {component + 1}")
         value = number(row.fields[2], row, "*CLOAD: value")
         old, more = out.at[nodes, component], given[nodes, component]
         for before, adds in {(int(b), bool(a)) for b, a in zip(old, more, strict=True)}:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse import csgraph
 
 from ...core.errors import SingularOperator
 from ..meshes.mesh import Mesh
@@ -86,6 +85,8 @@ def _titles(mesh: Mesh, name: str, labels: NDArray[np.int32]) -> list[str]:
 
 def _labels(mesh: Mesh) -> NDArray[np.int32]:
     """Number of the connected piece of every node, (n,)."""
+    from scipy.sparse import csgraph
+
     links = [
         np.stack([np.repeat(b.nodes[:, 0], b.nodes.shape[1] - 1), b.nodes[:, 1:].ravel()])
         for b in mesh.cells
