@@ -46,7 +46,8 @@ class Heat:
     def give(self, each: Placed, start: Callable, follow: Callable) -> None:
         """*TEMPERATURE of a step.
 
-        start(times, values): a course; follow(course, value, card=): what this step makes of it.
+        start(times, values): a course; follow(course, value, card=): what this step makes of
+        it.
         """
         card = each.card
         for option in ("FILE", "BSTEP", "USER", "SUBMODEL"):
@@ -62,7 +63,8 @@ class Heat:
             keys = np.stack([self.at[nodes].astype(float), self.first[nodes]], axis=1)
             for old, first in np.unique(keys, axis=0):
                 same = (keys == (old, first)).all(axis=1)
-                before = start((0.0,), (float(first),)) if old == NONE else self.courses[int(old)]
+                is_new = old == NONE
+                before = start((0.0,), (float(first),)) if is_new else self.courses[int(old)]
                 self.courses.append(follow(before, value, card=card))
                 self.cards.append(card)
                 self.at[nodes[same]] = len(self.courses) - 1
