@@ -57,8 +57,9 @@ _HOME = {
     "mechanics.contact": ("LevelSet", "Nitsche", "Plane", "Sphere"),
     "mechanics.model": ("Axes", "Body", "BodyForce", "CiarletGeymonat", "Contact",
                         "ContactFields", "Coupling", "Equation", "Fix", "LinearElastic",
-                        "Model", "NeoHookean", "NodalForce", "Pressure", "Pretension",
-                        "Reference", "Rigid", "Spring", "Traction", "distributed"),
+                        "Model", "NeoHookean", "NodalForce", "OrthotropicElastic", "Pressure",
+                        "Pretension", "Reference", "Rigid", "Spring", "Temperature", "Traction",
+                        "distributed"),
 }  # fmt: skip
 _GONE = {
     "AlgebraicMultigrid": "GeometricMultigrid(levels=()), whose levels are then algebraic ones",

@@ -48,9 +48,10 @@ from .mechanics.model import (
     Axes as Axes, Body as Body, BodyForce as BodyForce, CiarletGeymonat as CiarletGeymonat,
     Contact as Contact, ContactFields as ContactFields, Coupling as Coupling,
     Equation as Equation, Fix as Fix, LinearElastic as LinearElastic, Model as Model,
-    NeoHookean as NeoHookean, NodalForce as NodalForce, Pressure as Pressure,
+    NeoHookean as NeoHookean, NodalForce as NodalForce,
+    OrthotropicElastic as OrthotropicElastic, Pressure as Pressure,
     Pretension as Pretension, Reference as Reference, Rigid as Rigid, Spring as Spring,
-    Traction as Traction, distributed as distributed,
+    Temperature as Temperature, Traction as Traction, distributed as distributed,
 )
 from .mechanics.ready.packings import SpherePacking as SpherePacking
 from .mechanics.ready.walls import Bond as Bond, Wall as Wall
