@@ -52,12 +52,13 @@ _HOME = {
                  "PathProblem", "PieceSolution", "RateEquation", "Solutions", "StepPath",
                  "Stop", "Switch", "Tangent", "TangentCone", "ThetaMethod", "Uniqueness",
                  "Verdict", "Witness", "graded", "performance_profile"),
-    "mechanics.meshes": ("Cells", "Facets", "Mesh", "box", "mesh_shape", "read_cad",
-                         "read_mesh", "refined"),
+    "mechanics.meshes": ("Cells", "Facets", "Mesh", "box", "mesh_shape", "opened",
+                         "read_cad", "read_mesh", "refined"),
     "mechanics.contact": ("LevelSet", "Nitsche", "Plane", "Sphere"),
-    "mechanics.model": ("Body", "BodyForce", "CiarletGeymonat", "Contact", "ContactFields",
-                        "Fix", "LinearElastic", "Model", "NeoHookean", "NodalForce", "Pressure",
-                        "Rigid", "Traction", "distributed"),
+    "mechanics.model": ("Axes", "Body", "BodyForce", "CiarletGeymonat", "Contact",
+                        "ContactFields", "Coupling", "Equation", "Fix", "LinearElastic",
+                        "Model", "NeoHookean", "NodalForce", "Pressure", "Pretension",
+                        "Reference", "Rigid", "Spring", "Traction", "distributed"),
 }  # fmt: skip
 _GONE = {
     "AlgebraicMultigrid": "GeometricMultigrid(levels=()), whose levels are then algebraic ones",

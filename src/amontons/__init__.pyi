@@ -42,14 +42,15 @@ from .mechanics.contact import (
 )
 from .mechanics.meshes import (
     Cells as Cells, Facets as Facets, Mesh as Mesh, box as box, mesh_shape as mesh_shape,
-    read_cad as read_cad, read_mesh as read_mesh, refined as refined,
+    opened as opened, read_cad as read_cad, read_mesh as read_mesh, refined as refined,
 )
 from .mechanics.model import (
-    Body as Body, BodyForce as BodyForce, CiarletGeymonat as CiarletGeymonat,
-    Contact as Contact, ContactFields as ContactFields, Fix as Fix,
-    LinearElastic as LinearElastic, Model as Model, NeoHookean as NeoHookean,
-    NodalForce as NodalForce, Pressure as Pressure, Rigid as Rigid, Traction as Traction,
-    distributed as distributed,
+    Axes as Axes, Body as Body, BodyForce as BodyForce, CiarletGeymonat as CiarletGeymonat,
+    Contact as Contact, ContactFields as ContactFields, Coupling as Coupling,
+    Equation as Equation, Fix as Fix, LinearElastic as LinearElastic, Model as Model,
+    NeoHookean as NeoHookean, NodalForce as NodalForce, Pressure as Pressure,
+    Pretension as Pretension, Reference as Reference, Rigid as Rigid, Spring as Spring,
+    Traction as Traction, distributed as distributed,
 )
 from .mechanics.ready.packings import SpherePacking as SpherePacking
 from .mechanics.ready.walls import Bond as Bond, Wall as Wall

@@ -110,7 +110,7 @@ def _six(stress: Array) -> Array:
 def _parts(model: Model) -> tuple[list[str], NDArray[np.int64]]:
     """Names of the connected parts of all bodies, and the part of every cell."""
     parts, d = model.discretisation.parts, model.dimension
-    of = np.empty(model.discretisation.dofs // d, dtype=np.int64)
+    of = np.empty(model.beside.first // d, dtype=np.int64)
     for k, part in enumerate(parts):
         of[part.dofs[::d] // d] = k
     starts = model.discretisation.offsets // d

@@ -14,22 +14,37 @@ from pathlib import Path
 from typing import Any
 
 from ...core.errors import Address, AmontonsError, FileFormatError, InvalidInput
-from ...mechanics.model import BodyForce, Fix, Model, NodalForce, Pressure
+from ...mechanics.model import (
+    BodyForce,
+    Fix,
+    Model,
+    NodalForce,
+    Pressure,
+    Reference,
+    Spring,
+)
+from ...mechanics.model.beside import Beside
+from ...mechanics.model.constraints import Constraint
 from ...mechanics.model.parts import Body
 from ...mechanics.steps import Schedule, Stage, State
 from ..case.evolution import Evolution
 from ..case.overrides import override_settings
 from ..case.settings import Settings
 from ..readers import Case
+from .axes import Turned
 from .cards import Card, Row, read_cards
 from .contacts import Options, adjusted, law_of, read_contacts
 from .flat import Deck, flatten
 from .history import Course, History, read_history
+from .joints import Joints, tied
 from .keywords import sorted_out
 from .materials import read_interactions, read_sections
 from .meshing import Region
 from .scopes import Index
+from .special import special_nodes
 from .stages import Held, check_removed, read_stages, times_of
+
+KINDS = ("supports", "loads", "contacts", "references", "constraints", "springs")
 
 
 @dataclass
@@ -37,9 +52,10 @@ class Found:
     """The parts of a model with the card that each comes from."""
 
     loads: list[Any] = field(default_factory=list)
-    cards: dict[str, list[Card]] = field(
-        default_factory=lambda: {"supports": [], "loads": [], "contacts": []}
-    )
+    references: list[Reference] = field(default_factory=list)
+    constraints: list[Constraint] = field(default_factory=list)
+    springs: list[Spring] = field(default_factory=list)
+    cards: dict[str, list[Card]] = field(default_factory=lambda: {key: [] for key in KINDS})
 
     def add(self, kind: str, part: Any, card: Card) -> None:
         """Add one part."""
@@ -109,6 +125,7 @@ def _case(
     path: Path, deck: Deck, settings: Settings, options: Options, notes: list[str]
 ) -> Case:
     sections = read_sections(deck, deck.model)
+    joints, turned = Joints.of(deck), Turned.of(deck)
     region = Region.of(deck, sections)
     history = read_history(deck, deck.model, deck.steps)
     title = _title(deck) or path.name.split(".")[0]
@@ -116,6 +133,7 @@ def _case(
     found = Found()
     interactions = read_interactions([p.card for p in deck.model])
     stages = read_stages(deck, history, interactions)
+    _joined(found, region, history, (joints, turned), stages)
     _name_nodes(region, history, stages)
     pairs = read_contacts(deck, region, interactions, notes)
     check_removed(stages, pairs, deck)
@@ -164,6 +182,31 @@ def _formulations(deck: Deck) -> list[str]:
 
 
 # ------------------------------------------------------------------------------ history
+def _joined(
+    found: Found, region: Region, history: History, given: tuple[Joints, Turned],
+    stages: Sequence[Held],
+) -> None:  # fmt: skip
+    """References, constraints and springs, and what supports and loads give to them."""
+    joints, turned = given
+    joints.name_surfaces(region)
+    at, share = region.numbering, 1.0 / region.thickness
+    axes, loads = special_nodes(history, stages, joints, turned, at, region.dim)
+    names = {int(n): part.name for part, nodes, _ in axes for n in nodes if len(nodes) == 1}
+    made = tied(joints, at, region.dim, share, names)
+    for part, _, card in axes:
+        found.add("constraints", part, card)
+    for kind in ("references", "constraints", "springs"):
+        for part, card in getattr(made, kind):
+            found.add(kind, part, card)
+    for number, name, courses, card in loads:
+        if number is None:
+            found.add("loads", (NodalForce, name, [_scaled(c, share) for c in courses]), card)
+            continue
+        stages[number].supports.append((name, courses))
+        if not number:
+            found.cards["supports"].append(card)
+
+
 def _name_nodes(region: Region, history: History, stages: Sequence[Held]) -> None:
     """Node sets of supports and forces: named after the line of their card."""
     for stage in stages:
@@ -251,9 +294,10 @@ def _model(
 ) -> Model:  # fmt: skip
     """The model of a stage at a time, or as it goes on in time where that is None."""
     value = partial(_value, time)
+    beside = Beside.of(bodies, found.references, found.constraints)
     supports = [
         Fix(name, [
-            None if c is None else stage.since(bodies[0].mesh, c, axis, state)
+            None if c is None else stage.since(beside, name, c, axis, state)
             if c.is_open and state is not None else value(c)
             for axis, c in enumerate(courses)
         ])
@@ -268,7 +312,10 @@ def _model(
         else:
             course, way = courses
             loads.append(BodyForce([value(_scaled(course, w)) for w in way], region=name))
-    return Model(bodies, supports, stage.contacts, loads, name=title)
+    return Model(
+        bodies, supports, stage.contacts, loads, name=title, references=found.references,
+        constraints=found.constraints, springs=found.springs,
+    )  # fmt: skip
 
 
 def _value(time: float | None, course: Course) -> Any:

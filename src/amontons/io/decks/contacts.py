@@ -29,6 +29,7 @@ from .scopes import Index, missing
 Array = NDArray[np.float64]
 ASIDE = {"HCRIT", "NOTHICKNESS", "SMALLSLIDING", "EXTENSIONZONE", "GEOMETRICCORRECTION",
          "SUPPLEMENTARYCONSTRAINTS", "WEIGHT", "TRACKING", "CPSET", "SMOOTH"}  # fmt: skip
+NEAR = 0.025  # of the size of a facet: a slave node that is tied without a tolerance
 TABLE = 60  # points of the law with a tension far away
 
 
@@ -61,9 +62,15 @@ class Pair:
     nodes: Index | None = None
     points: Array | None = None
     clearance: float | None = None
+    within: float | None = None
+    glued: Array | None = None
 
     def contact(self, law: dict[str, Any], far: float | None = None) -> Contact:
         """The contact of the model under a law; far: how far away one is that is removed."""
+        if self.glued is not None:
+            nodal = "mortar" if self.points is None else "nodal"
+            return Contact(self.slave, master=self.master, tied=True, method=nodal,
+                           where=partial(_near, self.glued))  # fmt: skip
         gap = self.clearance if far is None else far
         if self.points is None:
             return Contact(self.slave, master=self.master, clearance=gap, **law)
@@ -71,6 +78,18 @@ class Pair:
         return Contact(
             self.slave, master=self.master, clearance=gap, method="nodal", where=where, **law
         )
+
+
+    def glue(self, mesh: Mesh) -> None:
+        """Choose the nodes of a tie that are near enough; raises FileFormatError for none."""
+        rows, _, _ = pair_contact(mesh, self.slave, mesh, self.master)
+        near = np.abs(rows.gap) <= self.within
+        if not near.any():
+            raise self.card.error(
+                f"no node of {self.slave} is within {self.within:.3g} of {self.master}; give a "
+                "POSITION TOLERANCE"
+            )
+        self.glued = rows.points[near] if self.points is None else self.points
 
 
 def _near(points: Array, x: Array) -> NDArray[np.bool_]:
@@ -91,6 +110,8 @@ def read_contacts(
     for placed in deck.model:
         if placed.card.keyword == "CONTACTPAIR":
             pairs += _pairs(placed, region, interactions, notes)
+        elif placed.card.keyword == "TIE":
+            pairs += _ties(placed, region)
         elif placed.card.keyword == "CLEARANCE":
             _clear(placed, pairs, region)
     if not pairs:
@@ -128,6 +149,27 @@ def _pairs(
     if smooth and out:
         what = "node by node" if out[0].nodes is not None else "mortar"
         notes.append(f"{card} (line {card.number}): NODE TO SURFACE is taken as {what}")
+    return out
+
+
+def _ties(placed: Placed, region: Region) -> list[Pair]:
+    """*TIE: slave, master; nodes of the slave near the master are put onto it and glued."""
+    card = placed.card
+    for option in ("CYCLICSYMMETRY", "MULTISTAGE", "FLUIDPERIODIC"):
+        if option in card.options:
+            raise card.error(f"{option}: is not read")
+    out = []
+    for row in card.rows():
+        names = [text for text in row.fields if text]
+        if len(names) != 2:
+            raise row.error(f"{card}: expected slave, master, got {len(names)} names")
+        master = _surface(region, placed, names[1], row)
+        slave, nodes = _slave(region, placed, names[0], master, row)
+        given = card.options.get("POSITIONTOLERANCE")
+        within = (number(given, row, "POSITION TOLERANCE") if given
+                  else NEAR * region.facet_size(master))  # fmt: skip
+        adjust = None if card.label("ADJUST") == "NO" else within
+        out.append(Pair(slave, master, card, "", adjust=adjust, nodes=nodes, within=within))
     return out
 
 
@@ -326,4 +368,6 @@ def adjusted(mesh: Mesh, at: Index, pairs: Sequence[Pair], notes: list[str]) -> 
     for pair in pairs:
         if pair.nodes is not None:
             pair.points = mesh.points[at[pair.nodes]]
+        if pair.within is not None:
+            pair.glue(mesh)
     return mesh

@@ -22,8 +22,8 @@ from .scopes import Index, Scope, missing
 
 Array = NDArray[np.float64]
 AT_ONCE = 1e-9  # share of a step in which a load that is there at once comes
-FREE, TRANSLATIONS = -1, 3
-ROTATIONS = range(4, 7)
+FREE, COMPONENTS = -1, 6
+TRANSLATIONS = 3
 HELD = {"ENCASTRE": (1, 2, 3), "PINNED": (1, 2, 3), "XSYMM": (1,), "YSYMM": (2,),
         "ZSYMM": (3,), "XASYMM": (2, 3), "YASYMM": (1, 3), "ZASYMM": (1, 2)}  # fmt: skip
 
@@ -94,7 +94,7 @@ class Span:
 
 @dataclass
 class Prescribed:
-    """Courses of displacements or forces, by number: `at` (nodes, 3), FREE where none is.
+    """Courses of displacements or forces, by number: `at` (nodes, 6), FREE where none is.
 
     before: the same of supports before OP=NEW took them away, for where they go on from.
     """
@@ -103,6 +103,13 @@ class Prescribed:
     before: Index | None = None
     courses: list[Course] = field(default_factory=list)
     cards: list[Card] = field(default_factory=list)
+
+    def of(
+        self, node: int, components: Sequence[int], held: Index | None = None
+    ) -> list[Course | None]:
+        """The courses of some components of a node, at the end or those of `held`."""
+        numbers = (self.at if held is None else held)[node, list(components)]
+        return [None if c == FREE else self.courses[c] for c in numbers]
 
     def groups(self, dim: int, held: Index | None = None) -> list[Group]:
         """Nodes with the same courses in all components, at the end or those of `held`."""
@@ -153,7 +160,7 @@ class History:
 def read_history(deck: Deck, before: Sequence[Placed], steps: Sequence[Sequence[Placed]]
                  ) -> History:  # fmt: skip
     """Follow the steps; raises FileFormatError with the line of what can not be followed."""
-    shape = (len(deck.points), TRANSLATIONS)
+    shape = (len(deck.points), COMPONENTS)
     history = History(Prescribed(np.full(shape, FREE)), Prescribed(np.full(shape, FREE)))
     amplitudes = _amplitudes([p.card for p in before])
     first = _span(steps[0], 0.0)
@@ -309,9 +316,9 @@ def _held(row: Row) -> list[tuple[int, float]]:
     if len(row.fields) > 2 and row.fields[2]:
         last = whole(row.fields[2], row, "*BOUNDARY: component")
     value = number(row.fields[3], row, "*BOUNDARY: value") if len(row.fields) > 3 else 0.0
-    if not 1 <= first <= last <= ROTATIONS[-1]:
-        raise row.error(f"*BOUNDARY: expected components from 1 to 3, got {first} to {last}")
-    return [(k - 1, value) for k in range(first, last + 1) if k not in ROTATIONS]
+    if not 1 <= first <= last <= COMPONENTS:
+        raise row.error(f"*BOUNDARY: expected components from 1 to 6, got {first} to {last}")
+    return [(k - 1, value) for k in range(first, last + 1)]
 
 
 def _forces(history: History, each: Placed, span: Span, known: Amplitudes,
@@ -326,8 +333,8 @@ def _forces(history: History, each: Placed, span: Span, known: Amplitudes,
         if len(row.fields) < 3:
             raise row.error("*CLOAD: expected nodes, component, value")
         component = whole(row.fields[1], row, "*CLOAD: component") - 1
-        if not 0 <= component < TRANSLATIONS:
-            raise row.error(f"*CLOAD: expected a component from 1 to 3, got {component + 1}")
+        if not 0 <= component < COMPONENTS:
+            raise row.error(f"*CLOAD: expected a component from 1 to 6, got {component + 1}")
         value = number(row.fields[2], row, "*CLOAD: value")
         old, more = out.at[nodes, component], given[nodes, component]
         for before, adds in {(int(b), bool(a)) for b, a in zip(old, more, strict=True)}:

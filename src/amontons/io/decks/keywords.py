@@ -13,7 +13,8 @@ from .cards import Card
 READ = {
     "HEADING", "MATERIAL", "ELASTIC", "DENSITY", "SOLIDSECTION", "SURFACEINTERACTION",
     "SURFACEBEHAVIOR", "FRICTION", "CONTACTPAIR", "BOUNDARY", "AMPLITUDE", "STEP", "STATIC",
-    "CLOAD", "DLOAD", "DSLOAD", "CLEARANCE",
+    "CLOAD", "DLOAD", "DSLOAD", "EQUATION", "MPC", "TIE", "TRANSFORM", "COUPLING", "KINEMATIC",
+    "DISTRIBUTING", "RIGIDBODY", "PRE-TENSIONSECTION", "SPRING", "CLEARANCE",
     "CHANGEFRICTION", "CHANGESURFACEBEHAVIOR", "MODELCHANGE",
 }  # fmt: skip
 OUTPUT = {
@@ -33,17 +34,9 @@ THERMAL = {  # without a change of temperature they change nothing
 }  # fmt: skip
 EMPTY = {"SYSTEM"}  # of no effect without an option
 MEANS = {  # what a card would have done
-    "EQUATION": "nodes would move together", "MPC": "nodes would move together",
-    "TIE": "surfaces would be glued",
-    "TRANSFORM": "directions of supports and loads would be turned",
     "PLASTIC": "the material would yield", "HYPERELASTIC": "the material would be rubber",
-    "PRE-TENSIONSECTION": "a bolt would be tightened",
-    "RIGIDBODY": "a part would not deform", "COUPLING": "a surface would follow a node",
-    "KINEMATIC": "a surface would follow a node",
-    "DISTRIBUTING": "a force would be spread over a surface",
     "ORIENTATION": "the axes of a material are turned", "DYNAMIC": "inertia would act",
     "TEMPERATURE": "the bodies would grow and shrink",
-    "SPRING": "springs would act",
     "GAP": "contact elements would act",
     "FREQUENCY": "vibrations would be computed", "BUCKLE": "buckling would be computed",
     "CONTACT": "surfaces in contact would be found",

@@ -232,6 +232,6 @@ def _raw(path: str, names: Names, nodes: tuple[Index, NDArray], elements: Elemen
             )
         dim = DIMENSION.get(kind, 3)
         groups = tuple(names.get((dim, tag), str(tag)) for tag in physical)
-        nodes = order[place]
-        blocks.append(RawBlock(kind, nodes[:, ORDER[kind]] if kind in ORDER else nodes, groups))
+        named = order[place]
+        blocks.append(RawBlock(kind, named[:, ORDER[kind]] if kind in ORDER else named, groups))
     return RawMesh(points, blocks)

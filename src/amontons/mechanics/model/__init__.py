@@ -3,11 +3,13 @@
 from ..elements.elasticity import LinearElastic
 from ..elements.hyperelasticity import CiarletGeymonat, NeoHookean
 from ..elements.rigid import Rigid
+from .constraints import Axes, Coupling, Equation, Pretension, Reference, Spring
 from .fields import ContactFields
 from .model import Model
 from .parts import Body, BodyForce, Contact, Fix, NodalForce, Pressure, Traction
 from .processes import distributed
 
-__all__ = ["Body", "BodyForce", "CiarletGeymonat", "Contact", "ContactFields", "Fix",
-           "LinearElastic", "Model", "NeoHookean", "NodalForce", "Pressure", "Rigid",
-           "Traction", "distributed"]  # fmt: skip
+__all__ = ["Axes", "Body", "BodyForce", "CiarletGeymonat", "Contact", "ContactFields",
+           "Coupling", "Equation", "Fix", "LinearElastic", "Model", "NeoHookean", "NodalForce",
+           "Pressure", "Pretension", "Reference", "Rigid", "Spring", "Traction",
+           "distributed"]  # fmt: skip

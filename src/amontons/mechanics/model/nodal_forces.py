@@ -141,12 +141,11 @@ def nodal_forces(model: Model, loads: Sequence[Load | None]) -> NodalForces:
     """Of the loads of a model, each with its value at one time; None: left out."""
     moving = [load is not None and follows(load) for load in loads]
     dead = [None if moves else load for load, moves in zip(loads, moving, strict=True)]
-    offsets = model.discretisation.offsets
     terms = [
         (1.0, follower) for at, load in enumerate(loads) if load is not None and moving[at]
         for follower in _followers(model, load, at)
     ]  # fmt: skip
-    return NodalForces(external_load(model.bodies, dead, offsets), tuple(terms))
+    return NodalForces(external_load(model.bodies, dead, model.beside), tuple(terms))
 
 
 def _followers(model: Model, load: Load, at: int) -> list[Follower]:

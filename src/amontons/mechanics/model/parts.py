@@ -25,7 +25,7 @@ from ...problem.law import (
 from ..contact import Nitsche, Obstacle
 from .body import Body, Material
 from .law_numbers import numbers_of
-from .values import ScalarValue, VectorValue, check_scalar, check_vector
+from .values import ScalarValue, VectorValue, check_scalar, check_vector, pressure_of
 
 __all__ = ["Body", "BodyForce", "Contact", "Fix", "Load", "Material", "NodalForce", "Pressure",
            "Traction"]  # fmt: skip
@@ -84,7 +84,7 @@ class Pressure:
 
     def __post_init__(self) -> None:
         if not callable(self.value):
-            object.__setattr__(self, "value", number(f"pressure on {self.on!r}", self.value))
+            object.__setattr__(self, "value", pressure_of(self.value, self.on))
 
 
 @helpful
