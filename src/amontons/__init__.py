@@ -41,7 +41,7 @@ _HOME = {
     "io.case": ("read_case",),
     "io.series": ("export_xdmf",),
     "app.model_solution": ("ModelSolution",),
-    "core.warned": ("ResultWarning",),
+    "core.warned": ("DoubtWarning", "ResultWarning", "warn_of"),
     "app.api": ("solve",),
     "app.questions": ("all_solutions", "basins", "critical_friction", "diagram", "existence",
                       "first_order", "follow", "full_contact_friction", "multistart",

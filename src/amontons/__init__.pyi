@@ -28,7 +28,9 @@ from .core.errors import (
     NotWritten as NotWritten, SingularOperator as SingularOperator, TimeUp as TimeUp,
     UnsupportedForm as UnsupportedForm, UnsupportedLaw as UnsupportedLaw,
 )
-from .core.warned import ResultWarning as ResultWarning
+from .core.warned import (
+    DoubtWarning as DoubtWarning, ResultWarning as ResultWarning, warn_of as warn_of,
+)
 from .io.case import read_case as read_case
 from .io.checkpoint import (
     export_fclib as export_fclib, load_start as load_start, load_state as load_state,
