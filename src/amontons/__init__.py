@@ -38,7 +38,7 @@ _HOME = {
     "mechanics.steps": ("MoreauJean", "Passage", "QuasiStatic", "State", "TimeStep", "at_rest",
                         "evolve"),
     "io.checkpoint": ("export_fclib", "load_start", "load_state", "save_state"),
-    "io.case": ("read_case",),
+    "io.readers": ("read_case",),
     "io.series": ("export_xdmf",),
     "app.model_solution": ("ModelSolution",),
     "core.warned": ("DoubtWarning", "ResultWarning", "warn_of"),

@@ -37,6 +37,7 @@ from .io.checkpoint import (
     save_state as save_state,
 )
 from .io.fclib import read_fclib as read_fclib, write_fclib as write_fclib
+from .io.readers import read_case as read_case
 from .io.series import export_xdmf as export_xdmf
 from .linear import Direct as Direct, GeometricMultigrid as GeometricMultigrid, Petsc as Petsc
 from .mechanics.contact import (
