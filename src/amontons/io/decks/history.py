@@ -105,6 +105,16 @@ class Prescribed:
     before: Index | None = None
     courses: list[Course] = field(default_factory=list)
     cards: list[Card] = field(default_factory=list)
+    known: dict[tuple[Course, int], int] = field(default_factory=dict)
+
+    def number(self, course: Course, card: Card) -> int:
+        """The number of a course, the same for equal ones of one card."""
+        key = course, id(card)
+        if key not in self.known:
+            self.known[key] = len(self.courses)
+            self.courses.append(course)
+            self.cards.append(card)
+        return self.known[key]
 
     def of(
         self, node: int, components: Sequence[int], held: Index | None = None
@@ -269,6 +279,7 @@ def _cleared(history: History, step: Sequence[Placed], span: Span, k: int) -> No
         for number_ in np.unique(out.at[out.at != FREE]):
             old = out.courses[number_]
             out.courses[number_] = _course(old, 0.0, span, span.card, {})
+        out.known.clear()
     if {"DLOAD", "DSLOAD"} & new.keys():
         history.faces = {
             key: (_course(old, 0.0, span, span.card, {}), card, scope)
@@ -304,9 +315,7 @@ def _boundary(
                     course = course.then((span.begin, span.end), (stays, stays))
                 else:
                     course = _course(course, value, span, card, known)
-                out.courses.append(course)
-                out.cards.append(card)
-                out.at[nodes[old == before], component] = len(out.courses) - 1
+                out.at[nodes[old == before], component] = out.number(course, card)
 
 
 def _held(row: Row) -> list[tuple[int, float]]:
@@ -354,10 +363,8 @@ def _forces(history: History, each: Placed, span: Span, known: Amplitudes,
                 course = _course(before_it, course.last + value, span, card, known)
             else:
                 course = _course(course, value, span, card, known)
-            out.courses.append(course)
-            out.cards.append(card)
             chosen = nodes[(old == before) & (more == adds)]
-            out.at[chosen, component] = len(out.courses) - 1
+            out.at[chosen, component] = out.number(course, card)
         given[nodes, component] = True
 
 

@@ -25,6 +25,10 @@ KINDS = {
     "tetra10": "tet10", "hexahedron20": "hex20", "hexahedron27": "hex27",
 }  # fmt: skip
 CAD_SUFFIXES = (".step", ".stp", ".iges", ".igs", ".brep")
+EXPORTS = {
+    suffix: "; export it as .msh, .inp, .med or .vtu, which keep the names of groups"
+    for suffix in (".unv", ".bdf", ".nas", ".cdb", ".neu", ".k")
+}
 TAGS = ("gmsh:physical", "medit:ref", "cell_tags", "MaterialID", "region", "avsucd:material")
 
 
@@ -106,7 +110,7 @@ def _from_meshio(path: str) -> RawMesh:
         reason = " ".join(said.getvalue().split()) or str(error) or type(error).__name__
         raise FileFormatError(
             f"{path}: expected a mesh in gmsh 2.2 or 4.1 or another format of meshio, told by "
-            f"the suffix; {reason}"
+            f"the suffix; {reason}{EXPORTS.get(Path(path).suffix.lower(), '')}"
         ) from None
 
 
