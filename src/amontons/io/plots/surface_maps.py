@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Patches = Iterator[tuple[Array, NDArray[np.int64]]]  # polygons (k, 4, 2) and their nodes
-QUARTERS = {"quad9": ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3))}
+QUARTERS = {"quad9": ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3)),
+            "quad8": ((0, 4, 1, 5, 2, 6, 3, 7),)}  # fmt: skip
 HEAT = "YlOrRd"
 TINY = 1e-300  # instead of a largest pressure of 0
 KEY = 0.36  # inches of the key of the arrows below its panel
