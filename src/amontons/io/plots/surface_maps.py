@@ -91,7 +91,10 @@ def _node_patches(
     contact[pair.node] = np.arange(len(pair.node))
     for facets in pair.facets:
         cut = _thirds if facets.kind == "tri6" else _quarters
-        for table in QUARTERS.get(facets.kind, [slice(None)]):
+        tables = QUARTERS.get(facets.kind, [slice(None)])
+        if facets.kind == "quad8" and (contact[facets.nodes[:, 4:]] < 0).all():
+            tables = [slice(4)]  # nodal contact has none at the middles of sides
+        for table in tables:
             for patch, nodes in cut(points, facets.nodes[:, table]):
                 patches.append(patch)
                 owner.append(contact[nodes])
