@@ -38,7 +38,7 @@ _HOME = {
     "mechanics.steps": ("MoreauJean", "Passage", "QuasiStatic", "State", "TimeStep", "at_rest",
                         "evolve"),
     "io.checkpoint": ("export_fclib", "load_start", "load_state", "save_state"),
-    "io.case": ("read_case",),
+    "io.readers": ("read_case",),
     "io.series": ("export_xdmf",),
     "app.model_solution": ("ModelSolution",),
     "core.warned": ("DoubtWarning", "ResultWarning", "warn_of"),
@@ -57,8 +57,9 @@ _HOME = {
     "mechanics.contact": ("LevelSet", "Nitsche", "Plane", "Sphere"),
     "mechanics.model": ("Axes", "Body", "BodyForce", "CiarletGeymonat", "Contact",
                         "ContactFields", "Coupling", "Equation", "Fix", "LinearElastic",
-                        "Model", "NeoHookean", "NodalForce", "Pressure", "Pretension",
-                        "Reference", "Rigid", "Spring", "Traction", "distributed"),
+                        "Model", "NeoHookean", "NodalForce", "OrthotropicElastic", "Pressure",
+                        "Pretension", "Reference", "Rigid", "Spring", "Temperature", "Traction",
+                        "distributed"),
 }  # fmt: skip
 _GONE = {
     "AlgebraicMultigrid": "GeometricMultigrid(levels=()), whose levels are then algebraic ones",

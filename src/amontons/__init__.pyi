@@ -37,6 +37,7 @@ from .io.checkpoint import (
     save_state as save_state,
 )
 from .io.fclib import read_fclib as read_fclib, write_fclib as write_fclib
+from .io.readers import read_case as read_case
 from .io.series import export_xdmf as export_xdmf
 from .linear import Direct as Direct, GeometricMultigrid as GeometricMultigrid, Petsc as Petsc
 from .mechanics.contact import (
@@ -50,9 +51,10 @@ from .mechanics.model import (
     Axes as Axes, Body as Body, BodyForce as BodyForce, CiarletGeymonat as CiarletGeymonat,
     Contact as Contact, ContactFields as ContactFields, Coupling as Coupling,
     Equation as Equation, Fix as Fix, LinearElastic as LinearElastic, Model as Model,
-    NeoHookean as NeoHookean, NodalForce as NodalForce, Pressure as Pressure,
+    NeoHookean as NeoHookean, NodalForce as NodalForce,
+    OrthotropicElastic as OrthotropicElastic, Pressure as Pressure,
     Pretension as Pretension, Reference as Reference, Rigid as Rigid, Spring as Spring,
-    Traction as Traction, distributed as distributed,
+    Temperature as Temperature, Traction as Traction, distributed as distributed,
 )
 from .mechanics.ready.packings import SpherePacking as SpherePacking
 from .mechanics.ready.walls import Bond as Bond, Wall as Wall

@@ -99,7 +99,7 @@ def sides_of(model: Model, forces: NodalForces, u: Array) -> list[tuple[Side, ..
 
 def _turned(model: Model, contact: Contact, given: Prescribed) -> tuple[Contact, Placed] | None:
     """The contact with its sides exchanged; None where there is one side, or none to be had."""
-    if contact.master is None or contact.nitsche is not None or contact.where is not None:
+    if contact.master is None or contact.where is not None:
         return None
     new = replace(contact, slave=contact.master, master=contact.slave)
     try:

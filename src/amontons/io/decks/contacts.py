@@ -17,7 +17,10 @@ from scipy.spatial import cKDTree
 
 from ...core.errors import InvalidInput
 from ...mechanics.contact import pair_contact
+from ...mechanics.contact.pairs import project
 from ...mechanics.meshes import Mesh
+from ...mechanics.meshes.facets import linear_parts
+from ...mechanics.meshes.surfaces import nodal_normals
 from ...mechanics.model import Contact
 from ...problem.law import ExponentialOverclosure, OverclosureCurve
 from .cards import Card, Row, number
@@ -29,6 +32,7 @@ from .scopes import Index, missing
 Array = NDArray[np.float64]
 ASIDE = {"HCRIT", "NOTHICKNESS", "SMALLSLIDING", "EXTENSIONZONE", "GEOMETRICCORRECTION",
          "SUPPLEMENTARYCONSTRAINTS", "WEIGHT", "TRACKING", "CPSET", "SMOOTH"}  # fmt: skip
+ROUNDING = 1e-12  # of the coordinates: distances below are none
 NEAR = 0.025  # of the size of a facet: a slave node that is tied without a tolerance
 TABLE = 60  # points of the law with a tension far away
 
@@ -350,14 +354,14 @@ def adjusted(mesh: Mesh, at: Index, pairs: Sequence[Pair], notes: list[str]) -> 
         if pair.adjust is None:
             continue
         moved = replace(mesh, points=points)
-        rows, _, _ = pair_contact(moved, pair.slave, moved, pair.master)
+        nodes, gap, normals = _distances(moved, pair)
         if isinstance(pair.adjust, float):
-            chosen = rows.gap <= pair.adjust
+            chosen = gap <= pair.adjust
         else:
-            chosen = np.isin(rows.nodes, at[pair.adjust])
-        chosen &= rows.gap != 0.0
-        way = rows.gap[chosen]
-        points[rows.nodes[chosen]] -= way[:, None] * rows.frames[chosen, 0]
+            chosen = np.isin(nodes, at[pair.adjust])
+        chosen &= gap != 0.0
+        way = gap[chosen]
+        points[nodes[chosen]] -= way[:, None] * normals[chosen]
         if len(way):
             notes.append(
                 f"{pair.card} (line {pair.card.number}): {len(way)} slave nodes are put onto "
@@ -371,3 +375,18 @@ def adjusted(mesh: Mesh, at: Index, pairs: Sequence[Pair], notes: list[str]) -> 
         if pair.within is not None:
             pair.glue(mesh)
     return mesh
+
+
+def _distances(mesh: Mesh, pair: Pair) -> tuple[Index, Array, Array]:
+    """Slave nodes (k,) with a master in front of them, distances (k,) and normals (k, d)."""
+    if mesh.order == 1:
+        rows, _, _ = pair_contact(mesh, pair.slave, mesh, pair.master)
+        return rows.nodes, rows.gap, rows.frames[:, 0]
+    slave, master = (linear_parts(mesh.surface(name)) for name in (pair.slave, pair.master))
+    nodes = np.unique(np.concatenate([block.nodes.ravel() for block in slave]))
+    normals, x = nodal_normals(mesh.points, slave)[nodes], mesh.points[nodes]
+    hit = project(x, mesh.points, master, facing=normals, search=np.inf, own=nodes)
+    at = np.flatnonzero(hit.found)
+    gap = np.einsum("kc,kc->k", x[at] - hit.closest[at], hit.normal[at])
+    gap[np.abs(gap) < ROUNDING * np.abs(mesh.points).max()] = 0.0
+    return nodes[at], gap, hit.normal[at]

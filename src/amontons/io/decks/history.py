@@ -12,12 +12,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .cards import Card, Row, number, whole
 from .flat import Deck, Placed
+from .heat import Heat
 from .scopes import Index, Scope, missing
 
 Array = NDArray[np.float64]
@@ -103,6 +105,16 @@ class Prescribed:
     before: Index | None = None
     courses: list[Course] = field(default_factory=list)
     cards: list[Card] = field(default_factory=list)
+    known: dict[tuple[Course, int], int] = field(default_factory=dict)
+
+    def number(self, course: Course, card: Card) -> int:
+        """The number of a course, the same for equal ones of one card."""
+        key = course, id(card)
+        if key not in self.known:
+            self.known[key] = len(self.courses)
+            self.courses.append(course)
+            self.cards.append(card)
+        return self.known[key]
 
     def of(
         self, node: int, components: Sequence[int], held: Index | None = None
@@ -142,6 +154,7 @@ class History:
     faces: dict[tuple[str, str], tuple[Course, Card, Scope]] = field(default_factory=dict)
     bodies: dict[str, tuple[Course, Array, Card, Scope]] = field(default_factory=dict)
     spans: list[Span] = field(default_factory=list)
+    heat: Heat | None = None
     held: list[Index] = field(default_factory=list)
 
     @property
@@ -149,6 +162,7 @@ class History:
         """Times at which anything bends."""
         courses = [*self.supports.courses, *self.forces.courses]
         courses += [each[0] for each in (*self.faces.values(), *self.bodies.values())]
+        courses += self.heat.courses if self.heat else []
         return {t for course in courses for t in course.times}
 
     @property
@@ -162,6 +176,7 @@ def read_history(deck: Deck, before: Sequence[Placed], steps: Sequence[Sequence[
     """Follow the steps; raises FileFormatError with the line of what can not be followed."""
     shape = (len(deck.points), COMPONENTS)
     history = History(Prescribed(np.full(shape, FREE)), Prescribed(np.full(shape, FREE)))
+    history.heat = Heat.of(len(deck.points), before)
     amplitudes = _amplitudes([p.card for p in before])
     first = _span(steps[0], 0.0)
     for each in before:
@@ -246,6 +261,8 @@ def _follow(history: History, step: Sequence[Placed], span: Span, known: Amplitu
             _boundary(history, each, span, known, step=k)
         elif key == "CLOAD":
             _forces(history, each, span, known, given)
+        elif key == "TEMPERATURE" and history.heat is not None:
+            history.heat.give(each, Course, partial(_course, span=span, known=known))
         elif key in ("DLOAD", "DSLOAD"):
             _distributed(history, each, span, known)
 
@@ -262,6 +279,7 @@ def _cleared(history: History, step: Sequence[Placed], span: Span, k: int) -> No
         for number_ in np.unique(out.at[out.at != FREE]):
             old = out.courses[number_]
             out.courses[number_] = _course(old, 0.0, span, span.card, {})
+        out.known.clear()
     if {"DLOAD", "DSLOAD"} & new.keys():
         history.faces = {
             key: (_course(old, 0.0, span, span.card, {}), card, scope)
@@ -297,9 +315,7 @@ def _boundary(
                     course = course.then((span.begin, span.end), (stays, stays))
                 else:
                     course = _course(course, value, span, card, known)
-                out.courses.append(course)
-                out.cards.append(card)
-                out.at[nodes[old == before], component] = len(out.courses) - 1
+                out.at[nodes[old == before], component] = out.number(course, card)
 
 
 def _held(row: Row) -> list[tuple[int, float]]:
@@ -347,10 +363,8 @@ def _forces(history: History, each: Placed, span: Span, known: Amplitudes,
                 course = _course(before_it, course.last + value, span, card, known)
             else:
                 course = _course(course, value, span, card, known)
-            out.courses.append(course)
-            out.cards.append(card)
             chosen = nodes[(old == before) & (more == adds)]
-            out.at[chosen, component] = len(out.courses) - 1
+            out.at[chosen, component] = out.number(course, card)
         given[nodes, component] = True
 
 

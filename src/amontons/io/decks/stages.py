@@ -43,11 +43,12 @@ class Held:
 
     def name(self, groups: Sequence[Index], known: dict[str, Index]) -> None:
         """Name the node sets of groups of supports; those that are known keep their names."""
+        names = {own.tobytes(): name for name, own in known.items()
+                 if name.startswith("support")}  # fmt: skip
         for k, nodes in enumerate(groups):
-            same = [name for name, own in known.items()
-                    if name.startswith("support") and np.array_equal(own, nodes)]  # fmt: skip
+            same = names.get(nodes.tobytes())
             new = f"support {k + 1}" + (f" of stage {self.number + 1}" if self.number else "")
-            self.names.append(same[0] if same else new)
+            self.names.append(same or new)
             known[self.names[-1]] = nodes
 
     def contacts_of(
