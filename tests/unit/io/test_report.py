@@ -18,6 +18,8 @@ from amontons.io.report.page import STATIC
 from amontons.io.report.skin import Skin
 from amontons.io.report.states import Stage
 from amontons.io.units import Units
+from amontons.mechanics.elements import von_mises
+from amontons.mechanics.elements.nodal_stress import stress_of
 
 HOSTILE = "</script><script>alert(1)</script> <!-- & \" ' {{css}} \ud800 \x00 \u2028 µ Ü 接触"
 
@@ -73,6 +75,9 @@ def test_the_page_holds_the_numbers_of_the_solution(solution, tmp_path):
     assert np.allclose(pressure, solution.pressure, rtol=1e-6)
     assert np.array_equal(array(state["status"])[mine], solution.status)
     assert data["units"] == {"length": "mm", "force": "N", "time": "", "stress": "MPa"}
+    stress = stress_of(solution.model.bodies[0].mesh, solution.model.bodies[0].material,
+                       solution.displacement[0])[1]  # fmt: skip
+    assert np.allclose(array(state["stress"]), von_mises(stress)[node], rtol=1e-5)
     force = array(state["force"]).reshape(-1, 3).sum(axis=0)
     assert np.allclose(force, solution.resultant, rtol=1e-5)
 

@@ -13,6 +13,7 @@ from ...core.errors import InvalidInput, UnsupportedForm
 from ...mechanics.elements.elasticity import LinearElastic, materials_by_region
 from ...mechanics.elements.rigid import Rigid
 from ...mechanics.model.supports import external_load, locate
+from ...problem.friction import FrictionProblem
 from . import questions
 from .forces import NodalForces, nodal_forces
 from .laws import Give, Seen, approach_of, seen
@@ -62,7 +63,7 @@ def audit_answer(model: Model, answer: Answer, *, deck_law: bool = True) -> Audi
     Raises InvalidInput for displacements that do not fit the model, UnsupportedForm for models
     in large deformations or with Nitsche's method, which have no such forces.
     """
-    if model.is_large or any(contact.nitsche is not None for contact in model.contacts):
+    if model.kind is not FrictionProblem:
         raise UnsupportedForm(
             "an audit needs small strains and nodal or mortar contact in the reference "
             "configuration; for others `solution.convergence` is the judge's word"

@@ -10,6 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from numpy.typing import NDArray
 
+from ...mechanics.meshes.cells import CELLS
+from ...mechanics.meshes.facets import corner_facets
 from ...problem.solution import ContactStatus
 from .contact_pairs import ContactPair
 from .style import COLOURS, INK, round_below
@@ -90,6 +92,9 @@ def _node_patches(
     contact = np.full(len(points), -1)
     contact[pair.node] = np.arange(len(pair.node))
     for facets in pair.facets:
+        middles = facets.nodes[:, CELLS[facets.kind].corner_count :]
+        if (contact[middles] < 0).all():  # averages sit at corners
+            facets = corner_facets(facets)  # noqa: PLW2901
         cut = _thirds if facets.kind == "tri6" else _quarters
         for table in QUARTERS.get(facets.kind, [slice(None)]):
             for patch, nodes in cut(points, facets.nodes[:, table]):

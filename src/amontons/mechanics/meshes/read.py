@@ -18,6 +18,7 @@ from . import gmsh
 from .mesh import Mesh
 from .raw import RawBlock, RawMesh, to_mesh
 from .split import Glue, check_glue, split
+from .write import with_all_kinds
 
 KINDS = {
     "triangle": "tri", "tetra": "tet", "hexahedron": "hex", "triangle6": "tri6",
@@ -84,7 +85,7 @@ def file_head(path: Path) -> bytes:
 
 def _from_meshio(path: str) -> RawMesh:
     try:
-        import meshio
+        meshio = with_all_kinds()
     except ImportError as error:
         raise MissingDependency(
             f"{path}: this format needs the package meshio: python -m pip install meshio"

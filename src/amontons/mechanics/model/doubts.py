@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from ...core.warned import ResultWarning
+from .coefficients import like_percent
 from .fields import ContactFields
 from .loading import no_load
 from .locking import volumetric_locking
@@ -26,6 +27,7 @@ CHECKS: tuple[Check, ...] = (
     volumetric_locking,
     large_rotation,
     nodal_on_non_matching,
+    like_percent,
 )
 OF_THE_START = (sliding_beyond_pairs, sliding_beyond_curvature)  # its pairs, normals
 OF_MOTIONS = (large_rotation, *OF_THE_START)
