@@ -27,6 +27,7 @@ Mask = NDArray[np.bool_]
 PRESSED = 0.02  # of the largest force per area, above which a contact carries load
 AWAY = 0.25  # of the approach: a contact that is so far open, inside or slid is no mistake
 RATIO = 0.1  # of mu: friction that is off its bound by more is off
+INSIDE = "inside the other side"
 FLAT = 0.99  # length of the mean of unit normals from which a surface is flat
 
 
@@ -101,32 +102,33 @@ def seen(side: Side, give: Give, approach: float, slip: Array) -> Seen:
     rubs = side.known.all(axis=1) & side.known[:, :1].all(axis=1)
     excess = np.maximum(push - bound - side.bound[:, 1:].max(axis=1, initial=0.0), 0.0) * rubs
     pull = np.maximum(-r[:, 0] - side.bound[:, 0], 0.0)
-    shares = {}
-    for name, gap in (("curved", side.gap), ("flat", side.flat),
-                      ("deck", side.flat + give.normal * normal / weight)):  # fmt: skip
-        left = np.maximum(np.abs(gap) - side.blur, 0.0)
-        shares[name] = _over(float((normal * left).sum()), scale)
+    soft_gap = give.normal * normal / weight
+    views = {"curved": side.gap, "flat": side.flat, "points": side.points_gap}
+    shares = {name: _pressing(normal, gap, side.blur, scale) for name, gap in views.items()}
+    best = min(views, key=lambda name: shares[name])
+    gap = views[best]
+    deck = min(_pressing(normal, g + soft_gap, side.blur, scale) for g in views.values())
     lost, hard = _missing(r, bound, slip, rubs, approach)
     elastic = slip + give.shear * r[:, 1:] / weight[:, None]
     soft = _missing(r, bound, elastic, rubs, approach)[1]
-    why = _statuses(side, pressed, bound, (push, slip, lost, rubs), approach)
+    why = _statuses(side, (pressed, bound, gap), (push, slip, lost, rubs), approach)
     bad = why != ""
     carried = np.maximum(normal, total / max(len(normal), 1))
-    inside = np.minimum(side.gap, side.flat) if _is_curved(shares) else side.flat
-    worst = int(inside.argmin()) if len(inside) else 0
+    worst = int(gap.argmin()) if len(gap) else 0
     return Seen(
-        side, pressed, shares["curved"], shares["flat"], shares["deck"], hard, soft,
+        side, pressed, shares["curved"], min(shares["flat"], shares["points"]), deck, hard, soft,
         _over(float(excess.sum()), total), _over(float(pull.sum()), total),
         _over(float(side.bound[:, 0].sum()), total), _over(float(side.blur.max(initial=0.0)),
-        approach), float(-inside.min(initial=0.0)), int(side.node[worst]), bad, why,
-        _over(float(carried[bad].sum()), float(carried.sum())),
+        approach), max(-float(gap.min(initial=0.0)), 0.0), int(side.node[worst]), bad, why,
+        _over(float(carried[bad & (why != INSIDE)].sum()), float(carried.sum())),
         pressed & rubs & (push >= (1 - RATIO) * bound),
     )  # fmt: skip
 
 
-def _is_curved(shares: dict[str, float]) -> bool:
-    """True where the answer holds on the curved surfaces rather than on their facets."""
-    return shares["curved"] < shares["flat"]
+def _pressing(normal: Array, gap: Array, blur: Array, scale: float) -> float:
+    """Share of gaps (nc,) that pressure forces (nc,) have, over approach times pressure."""
+    left = np.maximum(np.abs(gap) - blur, 0.0)
+    return _over(float((normal * left).sum()), scale)
 
 
 def _missing(
@@ -142,13 +144,13 @@ def _missing(
 
 
 def _statuses(
-    side: Side, pressed: Mask, bound: Array, rubbing: tuple[Array, Array, Array, Mask],
-    approach: float,
+    side: Side, pressing: tuple[Mask, Array, Array],
+    rubbing: tuple[Array, Array, Array, Mask], approach: float,
 ) -> NDArray[np.object_]:  # fmt: skip
     """Why the status of a contact can not be, "" where it can."""
     push, slip, lost, rubs = rubbing
     off = 2 * side.bound[:, 0]
-    gap = np.where(np.abs(side.gap) < np.abs(side.flat), side.gap, side.flat)
+    pressed, bound, gap = pressing
     traction = side.r[:, 0] / side.weight
     most = float(np.abs(traction).max(initial=0.0))
     far = AWAY * approach + side.blur
@@ -161,7 +163,7 @@ def _statuses(
     along = (side.r[:, 1:] * slip).sum(axis=1)
     why[slipped & (along > 0) & (push > RATIO * bound)] = "friction drives it along"
     why[pressed & (gap > far)] = "pressed, though open"
-    why[gap < -far] = "inside the other side"
+    why[gap < -far] = INSIDE
     why[(traction < -PRESSED * most) & (-side.r[:, 0] > off)] = "pulls"
     return why
 

@@ -7,17 +7,18 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from .laws import AWAY, Seen, pair_as_one
+from .laws import INSIDE, Seen, pair_as_one
 from .verdict import RIGHT, UNDECIDED, WRONG, Finding
 
 Array = NDArray[np.float64]
-OVERLAP = 0.03  # share of the approach that gaps may keep where contact presses
+OVERLAP = 0.05  # share of the approach that gaps may keep where contact presses
 ONE_SIDED = 0.25  # the same as the worse side sees it, whose facets may be coarse
 MISSING = 0.05  # part of the work of friction
 CONE = 0.02  # friction above its bound, or tension, over all pressure
 IMPOSSIBLE = 0.05  # part of the load on contacts whose status can not be
 BULGE = 0.05  # share of the approach that facets may take from the curved surfaces
 HIDDEN = 0.3  # part of the contact forces that rounding may hide before they say nothing
+OFF = 0.1  # of the approach: facets this far off the surface spoil the pressure
 NAMED = 10
 Name = Callable[[int], str]
 
@@ -63,7 +64,7 @@ def _inside(seen: tuple[Seen, ...], *, deck: bool) -> float:
         return 0.0
     out = 0.0
     for one in seen:
-        deep = one.why == "inside the other side"
+        deep = one.why == INSIDE
         area = one.side.weight
         both = float(area[deep | one.pressed].sum())
         out = max(out, float(area[deep].sum()) / both if both > 0 else 0.0)
@@ -169,8 +170,8 @@ def geometry(seen: tuple[Seen, ...], approach: float) -> Finding:
     side, pressed = one.side, one.pressed
     traction = side.r[pressed, 0] / side.weight[pressed]
     numbers: dict = {
-        "initial_gap": _range(side.start[pressed]),
-        "initial_gap_of_facets": _range(side.start_flat[pressed]),
+        "initial_gap": _range(side.start),
+        "initial_gap_of_facets": _range(side.start_points),
         "pressure": _range(traction),
         "pressure_spread": float(traction.std() / traction.mean()) if len(traction) else 0.0,
         "share": min(s.overlap for s in seen),
@@ -178,15 +179,16 @@ def geometry(seen: tuple[Seen, ...], approach: float) -> Finding:
     bulge = float(np.abs(side.start - side.start_flat)[pressed].max(initial=0.0))
     numbers["facets_off"] = bulge / approach if approach > 0 else 0.0
     low, high = numbers["initial_gap_of_facets"] or (0.0, 0.0)
-    if numbers["share"] > BULGE and one.overlap_flat < numbers["share"] / 2:
-        depth = max(abs(low), abs(high), 1e-300)
+    least = min(abs(low), abs(high)) or 1e-300
+    if numbers["share"] > BULGE and numbers["facets_off"] > OFF:
         text = (
-            f"facets lie up to {bulge:.3g} off the curved surfaces that they stand for, "
+            f"facets lie {bulge:.3g} off the curved surfaces that they stand for, on average, "
             f"{numbers['facets_off']:.0%} of what contact closes: the initial gap is from "
-            f"{low:.4g} to {high:.4g} on facets, varying by {(high - low) / depth:.0%}, where "
+            f"{low:.4g} to {high:.4g} on facets, varying by {min((high - low) / least, 9.99):.0%}, where "
             f"the curved surfaces have {numbers['initial_gap'][0]:.4g} to "
             f"{numbers['initial_gap'][1]:.4g}; the pressure spreads by "
-            f"{numbers['pressure_spread']:.0%} of its mean. The contact laws hold on the "
+            f"{numbers['pressure_spread']:.0%} of its mean, from {traction.min():.3g} to "
+            f"{traction.max():.3g}. The contact laws hold on the "
             "facets, not on the shape; refine, match the meshes, or take the curved gap"
         )
         return Finding(WRONG, text, numbers)
@@ -198,4 +200,4 @@ def _range(values: Array) -> tuple[float, float] | None:
     return (float(values.min()), float(values.max())) if len(values) else None
 
 
-__all__ = ["AWAY", "cone", "geometry", "penetration", "status"]
+__all__ = ["cone", "geometry", "penetration", "status"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any
 
@@ -108,6 +108,15 @@ class Audit(Shown):
     def verdict(self) -> str:
         """right, wrong or undecided."""
         return worst(found.verdict for found in self.findings.values()).value
+
+    @property
+    def hard_model(self) -> Any:
+        """The model with contact hard and sticking rigid, for a solution beside."""
+        contacts = tuple(
+            replace(contact, stiffness=None, stick_stiffness=None)
+            for contact in self.model.contacts
+        )
+        return replace(self.model, contacts=contacts)
 
     @property
     def is_right(self) -> bool:

@@ -8,6 +8,7 @@ from ... import __version__
 from . import flags
 from .folders import results_folder
 from .group import Commands
+from .more_commands import audit, examples
 
 EPILOG = """\b
 Examples:
@@ -392,9 +393,5 @@ def run(**options: object) -> int:
     return run_case(**options)  # type: ignore[arg-type]
 
 
-@main.command()
-def examples() -> None:
-    """List the built-in examples: `amontons solve example:NAME`, in time `amontons run`."""
-    from .sources import list_examples
-
-    list_examples()
+main.add_command(audit)
+main.add_command(examples)

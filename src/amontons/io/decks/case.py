@@ -23,6 +23,7 @@ from ..case.evolution import Evolution
 from ..case.overrides import override_settings
 from ..case.settings import Settings
 from ..readers import Case
+from .about import About
 from .cards import Card, Row, read_cards
 from .contacts import Options, adjusted, read_contacts
 from .flat import Deck, flatten
@@ -126,7 +127,7 @@ def _case(
     make = partial(_model, [Body(mesh, materials)], found, title)
     evolution = Evolution(QuasiStatic(_step(history.spans)), history.until)
     case = Case(make(None), settings, title, path, evolution=evolution, key_of=found.line_of,
-                notes=tuple(notes))  # fmt: skip
+                notes=tuple(notes), about=About.of(deck, history, at, make))  # fmt: skip
     if len(deck.steps) > 1 and any(contact.mu for contact in found.contacts):
         return case  # friction remembers the steps before
     return replace(case, target=make(history.until), moving=case.target)
