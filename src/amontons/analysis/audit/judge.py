@@ -29,6 +29,7 @@ BLIND = 0.1  # the same, from which rounding hides the balance
 FORMULATED = 1e-2  # of it, above which elements with another formulation say nothing
 ACTION = 0.02  # of the pressure, by which both sides' forces may differ
 PLACED = 1e-6  # of the largest displacement: what supports hold is there
+ZERO = 1e-13  # of the forces that single displacements need: a sum of them that is none
 NAMED = 10
 
 
@@ -76,7 +77,7 @@ def audit_answer(model: Model, answer: Answer, *, deck_law: bool = True) -> Audi
     findings["balance"] = _balance(model, forces, (u, scale), off, every, answer)
     before = None if answer.before is None else _whole(model, answer.before)
     pairs = tuple(
-        _pair(model, k, sides, (u, before), answer, deck_law=deck_law)
+        _pair(model, k, sides, (u, before, scale), answer, deck_law=deck_law)
         for k, sides in enumerate(every)
     )
     for name in QUESTIONS[1:]:
@@ -165,7 +166,10 @@ def _balance(
     u, scale = state
     left = np.where(off, np.abs(forces.missing), 0.0)
     over = np.where(off, left - forces.known, 0.0)
-    unit = scale if scale > 0 else 1.0
+    if scale <= ZERO * forces.size:
+        return Finding(RIGHT, "no forces at all", {"residual": 0.0, "excess": 0.0, "bound": 0.0,
+                       "largest_force": 0.0, "between_sides": 0.0, "supports": 0.0})  # fmt: skip
+    unit = scale
     residual, excess = float(left.max(initial=0.0)) / unit, float(over.max(initial=0.0)) / unit
     bound = float((forces.known * off).max(initial=0.0)) / unit
     between, pair = _action(every, model)
@@ -225,21 +229,21 @@ def _misplaced(model: Model, u: Array, blur: Array) -> tuple[float, int]:
 
 # ------------------------------------------------------------------------------ pairs
 def _pair(
-    model: Model, k: int, sides: tuple[Side, ...], moved: tuple[Array, Array | None],
-    answer: Answer, *, deck_law: bool,
+    model: Model, k: int, sides: tuple[Side, ...],
+    moved: tuple[Array, Array | None, float], answer: Answer, *, deck_law: bool,
 ) -> PairAudit:  # fmt: skip
-    """One pair, from both sides."""
-    contact, (u, before) = model.contacts[k], moved
+    """One pair, from both sides; moved: displacements, those before, the largest force."""
+    contact, (u, before, scale) = model.contacts[k], moved
     young = _softest(model, contact.slave, contact.master)
-    approach = max(approach_of(side, young) for side in sides)
+    approach = max(approach_of(side, young, scale) for side in sides)
     give = Give(*(_inverse(contact.numbers.get(name)) for name in
                   ("stiffness", "stick_stiffness")))  # fmt: skip
     found: list[Seen] = []
     for side in sides:
         slip = side.slip if before is None else side.slip - side.slip_of(before)
-        one = seen(side, give, approach, slip)
+        one = seen(side, give, approach, slip, scale)
         if before is not None and answer.one_way:  # both are histories of one straight way
-            other = seen(side, give, approach, side.slip)
+            other = seen(side, give, approach, side.slip, scale)
             one = min(one, other, key=lambda s: (s.missing, s.impossible_share))
         found.append(one)
     views = tuple(found)

@@ -14,7 +14,7 @@ contact hard and rigid would have.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 PRESSED = 0.02  # of the largest force per area, above which a contact carries load
 AWAY = 0.25  # of the approach: a contact that is so far open, inside or slid is no mistake
+NOTHING = 1e-9  # of the largest nodal force: contact forces that are none
 RATIO = 0.1  # of mu: friction that is off its bound by more is off
 INSIDE = "inside the other side"
 FLAT = 0.99  # length of the mean of unit normals from which a surface is flat
@@ -68,10 +69,13 @@ class Seen:
     slides: Mask
 
 
-def approach_of(side: Side, young: float) -> float:
-    """Length over which contact acts: what it closes, and how deep its pressure reaches."""
+def approach_of(side: Side, young: float, force: float) -> float:
+    """Length over which contact acts: what it closes, and how deep its pressure reaches.
+
+    force: the largest at any node of the model, to tell what carries load.
+    """
     total = float(np.maximum(side.r[:, 0], 0.0).sum())
-    pressed = _pressed(side)
+    pressed = _pressed(side, force)
     if not pressed.any() or not total > 0:
         return float(np.abs(side.start_flat - side.flat).max(initial=0.0))
     area = float(side.weight[pressed].sum())
@@ -83,20 +87,33 @@ def approach_of(side: Side, young: float) -> float:
     return max(closing, opened, total / area * size / young)
 
 
-def _pressed(side: Side) -> Mask:
+def _pressed(side: Side, force: float) -> Mask:
     traction = side.r[:, 0] / side.weight
     most = float(traction.max(initial=0.0))
-    return (traction > PRESSED * most) & (side.r[:, 0] > 2 * side.bound[:, 0])
+    loaded = side.r[:, 0] > np.maximum(2 * side.bound[:, 0], NOTHING * force)
+    return (traction > PRESSED * most) & loaded
 
 
-def seen(side: Side, give: Give, approach: float, slip: Array) -> Seen:
-    """Hold one side against its law; slip (nc, d-1): the motion that friction answers."""
+def _carries_nothing(side: Side, force: float) -> bool:
+    """True where all forces of a side are rounding, and that rounding is small."""
+    size = np.abs(side.r).max(initial=0.0)
+    blind = float(side.bound.max(initial=0.0))
+    return bool(size <= max(2 * blind, NOTHING * force)) and blind <= RATIO * force
+
+
+def seen(side: Side, give: Give, approach: float, slip: Array, force: float) -> Seen:
+    """Hold one side against its law; slip (nc, d-1): the motion that friction answers.
+
+    force: the largest at any node of the model.
+    """
+    if _carries_nothing(side, force):
+        side = replace(side, r=np.zeros_like(side.r), bound=np.zeros_like(side.bound))
     r, weight = side.r, side.weight
     normal, push = np.maximum(r[:, 0], 0.0), np.linalg.norm(r[:, 1:], axis=1)
     if side.law.tied.any():
         return _tied(side, give, approach)
     total = float(normal.sum())
-    pressed = _pressed(side)
+    pressed = _pressed(side, force)
     scale = approach * total
     bound = side.law.bound(r)
     rubs = side.known.all(axis=1) & side.known[:, :1].all(axis=1)

@@ -44,7 +44,7 @@ def penetration(seen: tuple[Seen, ...], approach: float, element: float, moved: 
     inside = _inside(seen, deck=deck)
     wrong = min(shares) > OVERLAP or max(shares) > ONE_SIDED or inside > OVERLAP
     text = (
-        f"no overlap to speak of, at most {depth:.3g}" if depth <= 0 or not hit else
+        "no overlap" if depth <= 0 or not hit else
         f"deepest overlap {depth:.3g} at node {hit}, {numbers['deepest_over_element']:.2g} of "
         f"the smallest facet's side and {numbers['deepest_over_displacement']:.2g} of the "
         "largest displacement"
@@ -121,8 +121,10 @@ def status(
         if not deck and own < 0.5 * min(missing):
             text += (f", of which the deck's stick slope explains {1 - own / min(missing):.0%}: "
                      "what should stick creeps")  # fmt: skip
+    elif max(missing) > ONE_SIDED:
+        text = "friction and slip do not fit as the other side sees them"
     else:
-        text = "friction and slip do not fit"
+        text = "forces and motions do not fit"
     text += f"; the statuses of {count} contacts are impossible ({_reasons(seen)})"
     if not history and min(shares) <= IMPOSSIBLE:
         return Finding(UNDECIDED, "the loads do not grow along one straight way, and friction "
