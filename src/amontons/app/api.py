@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import logging
+import os
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, overload
 
 from ..core.clock import TimeLimit, compiling, now
-from ..core.errors import Interrupted, InvalidInput, NotConverged
+from ..core.errors import Interrupted, InvalidInput, NotConverged, clipped
 from ..core.words import helpful
 from ..problem.friction import FrictionProblem
 from ..problem.judge.measures import Criterion
@@ -124,7 +125,15 @@ def checked(problem: Any, name: str = "problem") -> FrictionProblem | Model:
         isinstance(problem, FrictionProblem) or hasattr(problem, "assemble")
     ):
         return problem
-    raise InvalidInput(f"{name}: expected a Model or a FrictionProblem, got {problem!r}")
+    hint = ""
+    if isinstance(problem, str | os.PathLike):
+        hint = f"; write read_case({os.fspath(problem)!r}).model"
+    elif hasattr(problem, "mesh") or hasattr(problem, "cells"):
+        hint = "; a Model has bodies, supports and contacts"
+    raise InvalidInput(
+        f"{name}: expected a Model or a FrictionProblem, got "
+        f"{clipped(repr(problem), 120)}{hint}"
+    )
 
 
 def _explained(found: FrictionSolution, model: Model) -> FrictionSolution:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..analysis.certificates.critical_friction import CriticalFriction
     from ..analysis.certificates.older_criteria import CriterionFriction
     from ..analysis.certificates.opening import Opening
-    from ..analysis.certificates.uniqueness import Uniqueness
+    from ..analysis.certificates.verdict import Uniqueness
     from ..analysis.paths.continuation import Continuation
     from ..analysis.paths.diagram import Diagram
     from ..analysis.paths.path import Branch, PathProblem

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from .errors import InvalidInput, shown
+from .errors import InvalidInput, number_hint, shown
 
 Array = NDArray[np.float64]
 AnyArray = TypeVar("AnyArray", bound=NDArray[Any])
@@ -74,7 +74,9 @@ def number(name: str, value: object, *, least: float = -LARGEST) -> float:
     try:
         found = real(name, value)
     except InvalidInput:
-        raise InvalidInput(f"{name}: expected a number, got {shown(value)}") from None
+        raise InvalidInput(
+            f"{name}: expected a number, got {shown(value)}{number_hint(value)}"
+        ) from None
     if found.ndim:
         raise InvalidInput(f"{name}: expected a number, got {shown(value)}")
     if not least <= found <= LARGEST:

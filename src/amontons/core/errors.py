@@ -6,6 +6,7 @@ turns into the words of its format.  Nothing is ever decided by the words of a m
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -54,6 +55,20 @@ def clipped(text: str, longest: int) -> str:
     tail = longest // 4
     head = longest - tail - 40
     return f"{text[:head]} … ({len(text) - head - tail} letters) … {text[len(text) - tail :]}"
+
+
+def number_hint(value: object) -> str:
+    """The end of a message about a text in the place of a number: what to write instead."""
+    text = value.strip() if isinstance(value, str) else ""
+    match = re.match(r"([-+]?\d+(?:[.,]\d*)?(?:[eE][-+]?\d+)?)\s*(.*)$", text)
+    if not match:
+        return ""
+    digits, rest = match[1].replace(",", "."), match[2]
+    if rest == "%":
+        return f"; write {float(digits) / 100:g} for {text}"
+    if rest:
+        return "; write a number without quotes, units by choice: N, m, Pa or N, mm, MPa"
+    return f"; write {digits}" + (", with a point" if "," in text else ", without quotes")
 
 
 def shown(value: object) -> str:

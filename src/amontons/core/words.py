@@ -19,8 +19,10 @@ SYNONYMS: dict[str, tuple[str, ...]] = {
     "youngs_modulus": ("young",), "elastic_modulus": ("young",), "modulus": ("young",),
     "nu": ("poisson",), "poisson_ratio": ("poisson",), "poissons_ratio": ("poisson",),
     "rho": ("density",), "mass_density": ("density",),
-    "mu": ("mu", "friction"), "friction": ("mu", "friction"), "coulomb": ("mu", "friction"),
-    "friction_coefficient": ("mu", "friction"), "coefficient": ("mu", "friction"),
+    "mu": ("mu", "coulomb", "friction"), "friction": ("mu", "friction"),
+    "coulomb": ("mu", "friction"),
+    "friction_coefficient": ("mu", "coulomb", "friction"),
+    "coefficient": ("mu", "coulomb", "friction"),
     "tau_max": ("cap",), "taumax": ("cap",), "tol": ("tolerance",), "eps": ("tolerance",),
     "rtol": ("tolerance",), "maxiter": ("max_iterations",), "max_iter": ("max_iterations",),
     "itermax": ("max_iterations",), "iterations": ("max_iterations",),
@@ -95,3 +97,8 @@ def helpful(thing: Thing) -> Thing:
     if is_class:
         thing.__init__ = called  # type: ignore[misc]
     return thing if is_class else called  # type: ignore[return-value]
+
+
+def shortened(pattern: str, letters: int = 60) -> str:
+    """A pattern of statuses, its end left out where it is long."""
+    return pattern if len(pattern) <= letters else f"{pattern[: letters - 1]}…"

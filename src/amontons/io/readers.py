@@ -28,7 +28,9 @@ if TYPE_CHECKING:
     from .decks.about import About
 
 GROUP = "amontons.readers"  # of entry points
-MESHES = (".msh", ".vtk", ".vtu", ".stp", ".step", ".brep", ".stl", ".med", ".unv", ".bdf")
+MESHES = (".msh", ".vtk", ".vtu", ".stp", ".step", ".iges", ".igs", ".brep", ".stl", ".med",
+          ".unv", ".bdf")  # fmt: skip
+PACKED = {".gz": "gunzip", ".zip": "unzip", ".xz": "unxz", ".bz2": "bunzip2"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,6 +173,8 @@ def format_of(path: Path) -> Format:
     hint = ""
     if path.suffix.lower() in MESHES:
         hint = f'; a mesh is named in a case file: [mesh] file = "{path.name}"'
+    elif path.suffix.lower() in PACKED:
+        hint = f"; unpack it first: {PACKED[path.suffix.lower()]} {path.name}"
     raise FileFormatError(
         f"{path}: expected {', '.join(most)} or {last}, this is {other}{hint}"
     )

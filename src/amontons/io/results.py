@@ -26,11 +26,13 @@ from ..solvers import METHODS
 if TYPE_CHECKING:
     from h5py import File
 
+    from ..analysis.certificates.verdict import Uniqueness
     from ..mechanics.model import ContactFields, Model
     from ..mechanics.steps import TimeStep
 
 Array = NDArray[np.float64]
 SCHEMA, RUN_SCHEMA = "amontons/solution/1", "amontons/run/1"
+VERDICT_SCHEMA = "amontons/uniqueness/1"
 LIBRARIES = ("amontons", "numpy", "scipy", "numba", "netgen-mesher")  # Netgen: CAD
 MOST_SETS = 12  # changes of sets that a summary shows; solution.json has all
 MOST_PAIRS = 8  # contact pairs that a summary tells one by one; solution.json has all
@@ -51,7 +53,7 @@ class Output:
     method: str = ""  # as on the command line; empty: the name of the solver's class
     assemble_seconds: float = 0.0
     from_fclib: bool = False
-    uniqueness: dict[str, Any] | None = None  # what is known about other solutions
+    uniqueness: Uniqueness | None = None  # what is known about other solutions
     warnings: tuple[ResultWarning, ...] = ()
     notes: tuple[str, ...] = ()  # what its file says and the model leaves out
     fclib_error: bool = False  # evaluate it also where that takes a factorisation of M
@@ -157,6 +159,7 @@ def summary(output: Output) -> dict[str, Any]:
         from .numbers import records
 
         numbers = records(output.model, output.fields)
+    verdict = None if output.uniqueness is None else verdict_record(output.uniqueness)
     data = {
         "schema": SCHEMA,
         "title": output.title or problem.name,
@@ -191,12 +194,17 @@ def summary(output: Output) -> dict[str, Any]:
         **numbers,
         "max_penetration": found.max_penetration,
         "max_cone_violation": found.max_cone_violation,
-        "uniqueness": output.uniqueness,
+        "uniqueness": verdict,
         "warnings": [warning.record for warning in output.warnings],
         "notes": list(output.notes),
         "versions": versions(),
     }
     return finite(data)
+
+
+def verdict_record(found: Uniqueness) -> dict[str, Any]:
+    """The record of a verdict on other solutions, schema amontons/uniqueness/1."""
+    return {"schema": VERDICT_SCHEMA, **found.record, "versions": versions()}
 
 
 def step_record(step: TimeStep, title: str, works: dict[str, float]) -> dict[str, Any]:

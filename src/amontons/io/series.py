@@ -30,6 +30,8 @@ KINDS = {  # name and number of XDMF, for all cells alike and for mixed ones
     "pyramid": ("Pyramid", 7), "wedge": ("Wedge", 8), "hex": ("Hexahedron", 9),
     "quad9": ("Quadrilateral_9", 0x23), "tri6": ("Triangle_6", 0x24),
     "tet10": ("Tetrahedron_10", 0x26), "hex27": ("Hexahedron_27", 0x32),
+    "quad8": ("Quadrilateral_8", 0x25), "wedge15": ("Wedge_15", 0x28),
+    "hex20": ("Hexahedron_20", 0x30),
 }  # fmt: skip
 TYPES = {1: "Scalar", 3: "Vector", 9: "Tensor"}  # by components
 FULL = (0, 3, 5, 3, 1, 4, 5, 4, 2)  # entries of a VTK tensor, row by row

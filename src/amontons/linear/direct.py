@@ -36,7 +36,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse import linalg as sparse_linalg
 
 from ..core.errors import InvalidInput, MissingDependency, SingularOperator
 from ..core.options import check_options
@@ -249,6 +248,8 @@ class _Corrected:
         return by_columns(self._one, b)
 
     def _one(self, b: Array) -> Array:
+        from scipy.sparse import linalg as sparse_linalg
+
         factor = sparse_linalg.LinearOperator(self.matrix.shape, self.solve, dtype=float)
         x, _ = sparse_linalg.gcrotmk(
             self.matrix, b, rtol=CORRECTED, atol=0.0, M=factor, m=CORRECTIONS, maxiter=2
@@ -339,6 +340,8 @@ def _mumps(matrix: sparse.csc_array, threads: int) -> tuple[Solve, float | None]
 
 
 def _superlu(matrix: sparse.csc_array, threads: int) -> tuple[Solve, float | None]:
+    from scipy.sparse import linalg as sparse_linalg
+
     with warnings.catch_warnings():
         warnings.simplefilter("error", sparse_linalg.MatrixRankWarning)
         factor = sparse_linalg.splu(sparse.csc_matrix(matrix), permc_spec="MMD_AT_PLUS_A")

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse import linalg as sparse_linalg
 
 from .level_matrix import LevelMatrix
 from .node_blocks import DEAD, NodeBlocks
@@ -272,6 +271,8 @@ def inverse_at_rest(A: Array, diagonal: Array, size: Array) -> Array:
 
 def _coarse_modes(levels: list[Level], nodes: Nodes, modes: Array | None) -> Array:
     """Near-nullspace at the nodes of the coarsest level, (3 count, k), by least squares."""
+    from scipy.sparse import linalg as sparse_linalg
+
     if modes is None:
         return np.tile(np.eye(3), (levels[-1].A.nodes, 1))
     values = np.stack(

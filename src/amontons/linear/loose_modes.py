@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 
 from .bodies import Bodies
 
@@ -19,6 +18,8 @@ def loose_modes(M: object, bodies: Bodies, modes: Array | None) -> Array:
     M: square, symmetric, positive semidefinite, its blocks being `bodies`; modes (n, k): rigid
     modes to choose from.  Without them only bodies of up to DENSE unknowns are examined.
     """
+    from scipy.linalg import eigh
+
     n = M.shape[0]  # type: ignore[attr-defined]
     found = [np.zeros((n, 0))]
     size = float(np.abs(M.diagonal()).max(initial=0.0))  # type: ignore[attr-defined]

@@ -15,9 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.linalg.lapack import dpstrf
 from scipy.sparse import csgraph
-from scipy.sparse.linalg import splu
 
 from ..core.clock import NEVER, Deadline
 from .dense import dense
@@ -71,6 +69,8 @@ def semidefinite_rank(matrix: sparse.sparray | Array, deadline: Deadline = NEVER
 
     Stored in full, so InvalidInput where it does not fit into memory.
     """
+    from scipy.linalg.lapack import dpstrf
+
     full = dense(matrix, 2)
     m = len(full)
     deadline.pay(float(m) ** 3 / 3)
@@ -125,6 +125,8 @@ def _components(A: sparse.csr_array) -> list[tuple[Index, Index]]:
 
 def _rank_of_part(A: sparse.csr_array, deadline: Deadline) -> tuple[int, int]:
     """(rank, least rank) of one part."""
+    from scipy.sparse.linalg import splu
+
     n, m = A.shape[0], A.shape[1]
     small, large = min(n, m), max(n, m)
     if small <= DENSE:

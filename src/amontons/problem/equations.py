@@ -32,13 +32,12 @@ from .judge.measures import Measure, Weakest
 from .judge.sharp import sharp_error
 from .matrices import entry_sizes
 from .plain import of_plain
-from .protocol import Form, Problem
+from .protocol import Form
 from .settling import Accepted, Motion, accepted_exactly
+from .stored import Matrices
 
 if TYPE_CHECKING:
-    from scipy import sparse
 
-    from ..core.arrays import Matrix
     from .solution import Obstruction
 
 Array = NDArray[np.float64]
@@ -46,15 +45,12 @@ JUDGE_FLOPS = 18, 60  # floating point operations of a judgement per block of W,
 ESTIMATED = 9_000  # unknowns of a mesh above which the size of u is taken from a coarse level
 
 
-class Equations(Problem):
+class Equations(Matrices):
     """The members of `FrictionProblem` that its data answer."""
 
     has_q = True
-    M: sparse.csc_array | None
-    H: sparse.csc_array | None
     f: Array | None
     w: Array | None
-    W: Matrix | None
     q: Array | None
     blur: Array | None
     load_scale: float | None
@@ -65,8 +61,8 @@ class Equations(Problem):
     def blocks(self) -> BlockRows:
         """W in rows of 3x3 blocks (Delassus form only)."""
         self._need(Form.DELASSUS)
-        W, d = self.W, self.dimension
-        assert W is not None
+        W: Any = self.W
+        d = self.dimension
         return self._shared.once(block_rows, (W,), W, d)
 
     @cached_property

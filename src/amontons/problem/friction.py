@@ -34,16 +34,14 @@ from ..core.clock import NEVER, Deadline
 from ..core.errors import InvalidInput, UnsupportedForm, UnsupportedLaw, shown
 from ..core.faces import Told
 from ..core.prepared import Prepared
-from ..linear import Factor
 from ..linear.blocks import BlockRows, block_part, block_rows
-from ..linear.bodies import Bodies
 from ..linear.grid_matrix import GridMatrix
 from ..linear.hierarchy import Hierarchy
 from ..linear.levels import Levels, checked_levels
 from .equations import Equations
 from .law import Coulomb, Law, Tresca
 from .law.coulomb import as_law
-from .matrices import OPERATORS, GlobalMatrices
+from .matrices import OPERATORS
 from .plain import check_dimension, plain_of
 from .protocol import Form
 from .structure import Structure
@@ -84,6 +82,27 @@ class FrictionProblem(Told, Equations):
     structure: Structure | None = field(default=None, repr=False)
     name: str = ""
     _shared: Prepared = field(default_factory=Prepared, repr=False)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.law, Law):
+            raise InvalidInput(
+                f"law: expected a law such as Coulomb(mu), got {shown(self.law)}; "
+                "FrictionProblem.from_global and from_delassus take numbers too"
+            )
+        name = "w" if self.W is None else "q"
+        wanted = ("M", "H", "f", "w") if self.W is None else ("W", "q")
+        missing = [each for each in wanted if getattr(self, each) is None]
+        if missing:
+            raise InvalidInput(
+                "expected M, H, f and w, see FrictionProblem.from_global, or W and q, see "
+                f"from_delassus; got no {missing[0]}", (), "FrictionProblem",
+            )  # fmt: skip
+        shape, nc = np.shape(getattr(self, name)), len(self.law)
+        if len(shape) != 2 or shape[0] != nc or shape[1] not in (2, 3):
+            raise InvalidInput(
+                f"{name}: expected shape ({nc}, 2) or ({nc}, 3), a row for each contact of the "
+                f"law, got {shape}; FrictionProblem.from_global and from_delassus check all"
+            )
 
     # ---------------------------------------------------------------- construction
     @classmethod
@@ -321,14 +340,6 @@ class FrictionProblem(Told, Equations):
         why = "it has a bound and no mu" if given else "expected Coulomb's"
         raise UnsupportedLaw(f"mu: this problem has {self.law.name}, {why}")
 
-    def _need(self, form: Form) -> None:
-        if self.form is not form:
-            raise UnsupportedForm(
-                f"this needs the {form.value} form, the problem is {self.form.value}"
-                + ("; use problem.condensed()" if form is Form.DELASSUS else "")
-            )
-
-    # ---------------------------------------------------------------- M and W
     def kept(self, make: Callable[[FrictionProblem], T]) -> T:
         """make(problem), of M, H or W alone, made once for all variants of this problem.
 
@@ -339,72 +350,6 @@ class FrictionProblem(Told, Equations):
     def fresh(self) -> FrictionProblem:
         """The same problem with nothing prepared: no factor, no W."""
         return replace(self, _shared=Prepared())
-
-    @cached_property
-    def matrices(self) -> GlobalMatrices:
-        """M and H with what is prepared of them (global form only)."""
-        self._need(Form.GLOBAL)
-        assert self.M is not None and self.H is not None
-        return GlobalMatrices(
-            self.M, self.H, self.dimension, self.near_nullspace, self.levels, self.structure,
-            self._shared,
-        )  # fmt: skip
-
-    def factor(self) -> Factor:
-        """M prepared for solves, made once and shared by all variants of this problem.
-
-        A sparse factor, equal bodies sharing one; conjugate gradients with multigrid where the
-        factor of a mesh would not fit into memory (more than DIRECT_LIMIT unknowns in one body,
-        near_nullspace given).
-        """
-        return self.matrices.factor()
-
-    @property
-    def bodies(self) -> Bodies:
-        """The blocks into which M falls apart (global form only)."""
-        return self.matrices.bodies
-
-    @property
-    def small_blocks(self) -> sparse.csc_array | None:
-        """M^-1 when M is block diagonal with small blocks (rigid bodies), else None."""
-        return self.matrices.small_blocks
-
-    def solve_M(self, b: Array) -> Array:
-        """M^-1 b, b of shape (n,) or (n, k)."""
-        return self.matrices.solve(b)
-
-    @property
-    def hierarchy(self) -> Hierarchy | None:
-        """Multigrid levels of M, made once; None where the unknowns do not come in nodes."""
-        return self.matrices.hierarchy
-
-    @property
-    def local_stiffness(self) -> Array:
-        """H_i^T D^-1 H_i, (nc, d, d), D the block diagonal of M: a cheap stand-in for W_ii."""
-        return self.matrices.local_stiffness / self._unit_stiffness
-
-    @property
-    def diagonal(self) -> Array:
-        """The diagonal of M, (n,), with what stands in for it where nothing deforms."""
-        return self.matrices.diagonal * self._unit_stiffness
-
-    @cached_property
-    def _unit_stiffness(self) -> float:
-        """1, or load by motion where M is 0 and has no stiffness to compare with."""
-        if self.M is None or isinstance(self.M, OPERATORS) or self.M.diagonal().any():
-            return 1.0
-        load, size = self.scales
-        return load / size if load > 0 and size > 0 else 1.0
-
-    @property
-    def condensing_is_cheap(self) -> bool:
-        """True when W is the best to solve with: it then also judges (`measure`).
-
-        For rigid bodies, small problems, and where it takes less work than CHEAP compressed W
-        and fits into memory; see `condensation` for the counts.  Not where a body is large and
-        its mesh has levels: contact multigrid then solves before W stands.
-        """
-        return self.form is Form.DELASSUS or self.matrices.condensing_is_cheap
 
 
 def _alone(problem: FrictionProblem) -> tuple[FrictionProblem, NDArray[np.int64]]:

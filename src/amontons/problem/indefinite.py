@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.linalg import eigh_tridiagonal
 
 from ..core.arrays import Matrix
 from .judge.measures import Measure
@@ -135,6 +134,8 @@ def _of_whole(problem: Equations) -> NegativeDirection | None:
 
 def _found(name: str, A: Matrix, owner: NDArray) -> NegativeDirection | None:
     """From the Ritz vector of the smallest Ritz value of the symmetric part of A (m, m)."""
+    from scipy.linalg import eigh_tridiagonal
+
     m = A.shape[0]
     if not m:
         return None

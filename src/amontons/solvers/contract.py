@@ -71,29 +71,6 @@ class Judgement(NamedTuple):
 Iterates = Generator[Iterate, Judgement | None, None]
 
 
-def sent(iterates: Iterator[Iterate], judgement: Judgement | None) -> Iterate | None:
-    """The next iterate of a solver that is told of its last one; None at the end.
-
-    judgement: None for the first.  An iterator that is no generator is not told.
-    """
-    send = getattr(iterates, "send", None)
-    try:
-        return next(iterates) if send is None else send(judgement)
-    except StopIteration:
-        return None
-
-
-def first_of(
-    iterates: Iterator[Iterate], count: float = np.inf
-) -> Generator[Iterate, Judgement | None, Iterate | None]:
-    """The first `count` iterates of a solver, told what is sent; returns the last of them."""
-    last, judged = None, None
-    while count > 0 and (iterate := sent(iterates, judged)) is not None:
-        judged = yield iterate
-        last, count = iterate, count - 1
-    return last
-
-
 @dataclass(frozen=True)
 class Target:
     """What the driver will ask for: a hint for stages that run inside one compiled call."""

@@ -8,7 +8,7 @@ WEAK_CONTACTS.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -23,7 +23,7 @@ from ..problem.protocol import Problem
 from ..problem.settling import Accepted
 from ..problem.solution import Convergence, FrictionSolution, Outcome, Step, StoppedBy
 from .asked import Asked
-from .contract import Breakdown, Iterate, Judgement, Solver, Target, sent
+from .contract import Breakdown, Iterate, Judgement, Solver, Target
 from .first_iterate import own_motion, with_motion
 
 Array = NDArray[np.float64]
@@ -93,6 +93,8 @@ class Watch:
         self.linear_iterations += iterate.linear_iterations
         seconds = now() - self.started
         self.flops = self._counted(iterate)
+        if self.asked.deadline.work is not None:  # a limit that counts operations
+            self.asked.deadline.spend(iterate.iterations * self.problem.operations)
         step = Step(
             self.iterations, error, self.linear_iterations, seconds, iterate.sets, self.flops,
             iterate.stage, iterate.own,
@@ -200,6 +202,29 @@ class Watch:
         return len(self.history) - self.mark[0] > self.asked.patience or self.blurred > BLURRED
 
 
+def sent(iterates: Iterator[Iterate], judgement: Judgement | None) -> Iterate | None:
+    """The next iterate of a solver that is told of its last one; None at the end.
+
+    judgement: None for the first.  An iterator that is no generator is not told.
+    """
+    send = getattr(iterates, "send", None)
+    try:
+        return next(iterates) if send is None else send(judgement)
+    except StopIteration:
+        return None
+
+
+def first_of(
+    iterates: Iterator[Iterate], count: float = np.inf
+) -> Generator[Iterate, Judgement | None, Iterate | None]:
+    """The first `count` iterates of a solver, told what is sent; returns the last of them."""
+    last, judged = None, None
+    while count > 0 and (iterate := sent(iterates, judged)) is not None:
+        judged = yield iterate
+        last, count = iterate, count - 1
+    return last
+
+
 def run(
     watching: Watching,
     watch: Watch,
@@ -252,10 +277,8 @@ def _once(
     """
     callback, limit = watch.asked.callback, watch.asked.max_iterations or np.inf
     try:
-        each = watch.problem.operations if target.deadline.work is not None else 0.0
         iterates, judged = iter(solver.iterates(watch.problem, start, target)), None
         while (iterate := sent(iterates, judged)) is not None:
-            target.deadline.spend(iterate.iterations * each)
             step = watch.judge(iterate)
             converged = watch.converged
             if not converged:

@@ -6,39 +6,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from block_case import block_case, command
 
 import amontons as am
-from amontons.app.cli import main
 from amontons.app.cli.locking import locked
 from amontons.core.clock import Deadline
 from amontons.io.case import read_case
 
 WALL = Path(__file__).resolve().parents[3] / "examples" / "wall" / "wall.toml"
 SMALL = ["--set", "wall.cells=[2,1,1]", "--set", "evolution.step=1e-3"]
-BLOCK = """
-[mesh]
-box = [2, 1]
-cells = [4, 2]
-[material.default]
-young = 100
-poisson = 0.2
-[[fix]]
-on = "top"
-value = ["0.01*t", "-0.02*min(1, 2*t)"]
-[[contact]]
-slave = "bottom"
-obstacle = { plane = { normal = [0, 1] } }
-friction = { coulomb = 0.4 }
-[evolution]
-kind = "quasi-static"
-step = 0.25
-until = 1
-"""
+BLOCK = block_case(
+    '["0.01*t", "-0.02*min(1, 2*t)"]', "{ coulomb = 0.4 }", length=2, cells=[4, 2],
+    poisson=0.2, step=0.25,
+)  # fmt: skip
 
 
 def run(*arguments):
-    return CliRunner().invoke(main, ["run", *map(str, arguments)])
+    return command("run", *arguments)
 
 
 def table(folder):

@@ -8,38 +8,21 @@ import h5py
 import meshio
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from block_case import block_case, command
 
 import amontons as am
-from amontons.app.cli import main, run_folder
+from amontons.app.cli import run_folder
 from amontons.io.case import read_case
 from amontons.io.checkpoint import load_checkpoint
 
-CASE = """
-title = "A shoe, there and back"
-[mesh]
-box = [2, 1]
-cells = [4, 2]
-[material.default]
-young = 100
-poisson = 0.2
-[[fix]]
-on = "top"
-value = ["0.05*sin(3*t)", "-0.02*min(1, 4*t)"]
-[[contact]]
-name = "shoe"
-slave = "bottom"
-obstacle = { plane = { normal = [0, 1] } }
-friction = { coulomb = 0.3 }
-[evolution]
-kind = "quasi-static"
-step = 0.125
-until = 2
-"""
+CASE = 'title = "A shoe, there and back"' + block_case(
+    '["0.05*sin(3*t)", "-0.02*min(1, 4*t)"]', "{ coulomb = 0.3 }", length=2, cells=[4, 2],
+    poisson=0.2, step=0.125, until=2,
+).replace("[[contact]]", '[[contact]]\nname = "shoe"')  # fmt: skip
 
 
 def run(*arguments):
-    done = CliRunner().invoke(main, ["run", *map(str, arguments), "--quiet"])
+    done = command("run", *arguments, "--quiet")
     assert done.exit_code == 0, done.output
     return done
 
@@ -161,10 +144,10 @@ def test_names_in_a_case_file(case, tmp_path):
                         "obstacle = { plane = { normal = [1, 0] } }\n"
                         "friction = { coulomb = 0 }\n[evolution]")  # fmt: skip
     case.write_text(text)
-    done = CliRunner().invoke(main, ["run", str(case), "-o", str(tmp_path / "out")])
+    done = command("run", case, "-o", tmp_path / "out")
     assert done.exit_code == 2
     assert "contact[1].name: expected names that differ, got 'shoe'" in done.stderr
     assert not (tmp_path / "out").exists()
     case.write_text(CASE.replace('name = "shoe"', "name = 3"))
-    done = CliRunner().invoke(main, ["run", str(case), "-o", str(tmp_path / "out")])
+    done = command("run", case, "-o", tmp_path / "out")
     assert "contact[0].name: expected a text, got 3" in done.stderr

@@ -400,3 +400,43 @@ def test_bad_cases(case, old, new, words):
         assert word in result.stderr.replace("\n", " ")
     assert "Traceback" not in result.stderr
     assert not (case.parent / "case-results").exists()
+
+
+# ----------------------------------------------------------------------- names by picture
+def test_info_of_a_part_numbers_its_faces(part, tmp_path):
+    picture = tmp_path / "faces.svg"
+    result = run("info", part, "--size", 0.5, "--picture", picture, "--json", "-")
+    assert result.exit_code == 0, result.stderr
+    data = json.loads(result.stdout)
+    assert list(data["surfaces"]).index("bottom") >= 0
+    assert data["surfaces"]["bottom"]["area"] == pytest.approx(2)
+    assert data["surfaces"]["bottom"]["middle"] == pytest.approx([1, 0.5, 0])
+    assert picture.stat().st_size > 10_000
+
+
+def test_every_outer_face_is_numbered_once_and_inner_ones_are_not():
+    from amontons.io.plots.surface_names import draw_surface_names
+
+    mesh = am.mesh_shape(two_blocks(), 0.5)
+    figure = draw_surface_names(mesh)
+    said = [text.get_text() for ax in figure.axes for text in ax.texts]
+    inner = [
+        k for k, name in enumerate(mesh.surfaces, 1)
+        if np.ptp(mesh.points[mesh.surface_nodes(name), 0]) == 0
+        and mesh.points[mesh.surface_nodes(name)[0], 0] == 1
+    ]
+    assert len(inner) == 1
+    assert sorted(said, key=int) == [
+        str(k) for k in range(1, len(mesh.surfaces) + 1) if k not in inner
+    ]  # opposite views: each face of a box is seen in one of them
+
+
+def test_info_refuses_what_does_not_fit(part, tmp_path):
+    (tmp_path / "a.msh").write_text("$MeshFormat")
+    for arguments, words in (
+        (("example:hild", "--picture", "a.png"), "only for mesh and CAD files"),
+        ((tmp_path / "a.msh", "--size", 1), "only for CAD files"),
+        ((part, "--picture", "a.gif"), "ends in .png"),
+    ):
+        result = run("info", *arguments)
+        assert result.exit_code == 2 and words in result.stderr

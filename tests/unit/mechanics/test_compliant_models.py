@@ -4,10 +4,9 @@ import json
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from block_case import block_case, command
 
 import amontons as am
-from amontons.app.cli import main
 from amontons.core.errors import UnsupportedLaw
 from amontons.solvers import METHODS
 
@@ -215,49 +214,31 @@ def test_what_has_no_reactions_refuses():
     assert "compliance" in am.uniqueness(model.assemble()).reason
 
 
-CASE = """
-[mesh]
-box = [1, 1]
-cells = 2
-[material.default]
-young = 1e7
-poisson = 0.0
-[[fix]]
-on = "top"
-value = ["0.02*t", "-0.02"]
-[[contact]]
-slave = "bottom"
-obstacle = { plane = { normal = [0, 1] } }
-friction = { coulomb = 0.3, stiffness = 50.0, stick_stiffness = "20 + 0*x" }
-[evolution]
-kind = "quasi-static"
-step = 0.25
-until = 1.0
-"""
+CASE = block_case(
+    '["0.02*t", "-0.02"]',
+    '{ coulomb = 0.3, stiffness = 50.0, stick_stiffness = "20 + 0*x" }', young=1e7, step=0.25,
+)  # fmt: skip
 
 
 def test_case_files_and_the_command_line(tmp_path):
     case = tmp_path / "case.toml"
     case.write_text(CASE)
 
-    def run(*arguments):
-        return CliRunner().invoke(main, [str(a) for a in arguments])
-
-    ran = run("run", case, "--output", tmp_path / "run")
+    ran = command("run", case, "--output", tmp_path / "run")
     assert ran.exit_code == 0, ran.output
     state = am.load_state(next((tmp_path / "run").glob("*.h5")))
     np.testing.assert_allclose(state.force.sum(axis=0), [1, -0.3], atol=1e-4)  # it slips
     case.write_text(CASE.replace("*t", "").partition("[evolution]")[0])
-    assert run("info", case, "--json", tmp_path / "facts.json").exit_code == 0
+    assert command("info", case, "--json", tmp_path / "facts.json").exit_code == 0
     facts = json.loads((tmp_path / "facts.json").read_text())
     assert facts["contact compliance"][1] == pytest.approx(1 / (50 * 0.25))
-    refused = run("convert", case, tmp_path / "a.hdf5")
+    refused = command("convert", case, tmp_path / "a.hdf5")
     assert refused.exit_code != 0
     assert "stores a coefficient of Coulomb friction" in refused.output
     for wrong, words in (("stiffness = 0", "expected a number > 0"),
                          ("stiffnes = 1", "stiffness")):  # fmt: skip
         case.write_text(CASE.replace("stiffness = 50.0", wrong))
-        told = run("solve", case)
+        told = command("solve", case)
         assert told.exit_code != 0
         assert words in told.output
 

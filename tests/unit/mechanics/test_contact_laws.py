@@ -4,10 +4,9 @@ import json
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from block_case import block_case, command
 
 import amontons as am
-from amontons.app.cli import main
 from amontons.core.errors import UnsupportedLaw
 
 YOUNG = 100.0
@@ -131,41 +130,22 @@ def test_large_deformations_take_caps_and_refuse_cohesion():
         am.Model([body], [], [am.Contact("bottom", floor, mu=0.3, cohesion=1.0)])
 
 
-CASE = """
-[mesh]
-box = [1, 1]
-cells = 4
-[material.default]
-young = 100.0
-poisson = 0.0
-[[fix]]
-on = "top"
-value = ["0.05*t", "0.01*t"]
-[[contact]]
-slave = "bottom"
-obstacle = { plane = { normal = [0, 1] } }
-friction = { coulomb = 0.3, cap = 0.2, cohesion = "2.0" }
-[evolution]
-kind = "quasi-static"
-step = 0.5
-until = 1.0
-"""
+CASE = block_case(
+    '["0.05*t", "0.01*t"]', '{ coulomb = 0.3, cap = 0.2, cohesion = "2.0" }', cells=4
+)
 
 
 def test_case_files_and_the_command_line(tmp_path):
     case = tmp_path / "case.toml"
     case.write_text(CASE)
 
-    def run(*arguments):
-        return CliRunner().invoke(main, [str(a) for a in arguments])
-
-    assert run("run", case, "--output", tmp_path / "run").exit_code == 0
+    assert command("run", case, "--output", tmp_path / "run").exit_code == 0
     case.write_text(CASE.replace("*t", "").partition("[evolution]")[0])
-    assert run("info", case, "--json", tmp_path / "facts.json").exit_code == 0
+    assert command("info", case, "--json", tmp_path / "facts.json").exit_code == 0
     facts = json.loads((tmp_path / "facts.json").read_text())
     assert facts["friction coefficient"] == [0.3, 0.3]
     assert facts["friction bound"][1] == pytest.approx(0.2 / 4)
     assert facts["cohesion"][1] == pytest.approx(2 / 4)
-    refused = run("convert", case, tmp_path / "a.hdf5")
+    refused = command("convert", case, tmp_path / "a.hdf5")
     assert refused.exit_code != 0
     assert "stores a coefficient of Coulomb friction" in refused.output

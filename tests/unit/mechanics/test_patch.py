@@ -1,10 +1,13 @@
 """Patch tests: a uniform stress passes between meshes that do not match, to rounding."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 import amontons as am
+from amontons.mechanics.meshes import second_order
 
 STEEL = am.LinearElastic(200.0, 0.3)
 EXACT = 1e-9  # what every method that claims it must reach
@@ -39,7 +42,9 @@ def gradient(stress, law):
     return G
 
 
-def errors(cells, kinds, method, *, shear=0.2, amount=0.0, seed=None, order=1, laws=None):
+def errors(  # noqa: PLR0913
+    cells, kinds, method, *, shear=0.2, amount=0.0, seed=None, order=1, laws=None, reduced=False
+):
     """Largest error of displacements, relative, and of contact tractions under a pressure 1.
 
     A slave block "a" on a master "b" with the same footprint; the stress is uniform, tractions
@@ -54,8 +59,13 @@ def errors(cells, kinds, method, *, shear=0.2, amount=0.0, seed=None, order=1, l
     for name, count, kind, low, law in zip("ab", cells, kinds, (0, -1), laws, strict=True):
         mesh = am.box((1.3, 0.9, 1)[:d - 1] + (1,), count, kind, origin=(0,) * (d - 1) + (low,))
         mesh = bent(mesh, amount) if amount else mesh
-        bodies.append(am.Body(am.Mesh(mesh.points @ R.T, mesh.cells, mesh.surfaces), law, name,
-                              order=order))  # fmt: skip
+        mesh = am.Mesh(mesh.points @ R.T, mesh.cells, mesh.surfaces)
+        if order == "serendipity":
+            mesh = second_order(mesh, serendipity=True)
+        if reduced:
+            cells_ = tuple(replace(b, integration="reduced") for b in mesh.cells)
+            mesh = replace(mesh, cells=cells_)
+        bodies.append(am.Body(mesh, law, name, order=mesh.order if order != 2 else 2))
         slopes[name] = R @ gradient(stress, law) @ R.T
     stress = R @ stress @ R.T
     normals = {"left": -R[:, 0], "right": R[:, 0], "front": -R[:, 1], "back": R[:, 1]}
@@ -119,6 +129,27 @@ def test_it_passes_between_materials_that_agree_along_the_surface(d, method):
 def test_nitsche_passes_it_with_second_order(cells, kinds, variant):
     assert max(errors(cells, kinds.split(), METHODS[variant], order=2)) < EXACT
     assert max(errors(cells, kinds.split(), METHODS[variant], order=2, amount=0.2)) < EXACT
+
+
+SECOND = [(CASES[0], 2), (CASES[1], 2), (CASES[2], 2), (CASES[15], 2), (CASES[16], 2),
+          (CASES[17], 2), (CASES[0], "serendipity"), (CASES[15], "serendipity"),
+          (CASES[17], "serendipity"), (CASES[18], "serendipity")]  # fmt: skip
+
+
+@pytest.mark.parametrize(("case", "order"), SECOND)
+@pytest.mark.parametrize("method", ["mortar", "nitsche"])
+def test_it_passes_second_order(case, order, method):
+    cells, kinds = case
+    for amount, seed in ((0.0, None), (0.2, 3)):
+        found = errors(cells, kinds.split(), method, order=order, amount=amount, seed=seed)
+        assert max(found) < EXACT
+
+
+@pytest.mark.parametrize("case", [CASES[0], CASES[15]])
+def test_it_passes_with_reduced_integration(case):
+    cells, kinds = case
+    found = errors(cells, kinds.split(), "mortar", order="serendipity", reduced=True)
+    assert max(found) < EXACT
 
 
 @pytest.mark.parametrize("d", [2, 3])

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from block_case import block_case, command
 
 import amontons as am
-from amontons.app.cli import main
 from amontons.core.errors import UnsupportedLaw
 
 YOUNG = 100.0
@@ -179,50 +178,29 @@ def test_what_does_not_go_with_ties_is_refused():
                  [am.Contact("bottom", floor, tied=True)])  # fmt: skip
 
 
-CASE = """
-[mesh]
-box = [1, 1]
-cells = 2
-[material.default]
-young = 100.0
-poisson = 0.0
-[[fix]]
-on = "top"
-value = [0, "0.02*t"]
-[[contact]]
-slave = "bottom"
-obstacle = { plane = { normal = [0, 1] } }
-friction = "tied"
-[evolution]
-kind = "quasi-static"
-step = 0.5
-until = 1.0
-"""
+CASE = block_case('[0, "0.02*t"]', '"tied"')
 
 
 def test_case_files_and_the_command_line(tmp_path):
     case = tmp_path / "case.toml"
 
-    def run(*arguments):
-        return CliRunner().invoke(main, [str(a) for a in arguments])
-
     for k, (words, pull) in enumerate({
         '"tied"': -2.0, "{ tied = true, stiffness = 100.0 }": -1.0
     }.items()):  # fmt: skip
         case.write_text(CASE.replace('"tied"', words))
-        ran = run("run", case, "--output", tmp_path / f"run{k}")
+        ran = command("run", case, "--output", tmp_path / f"run{k}")
         assert ran.exit_code == 0, ran.output
         state = am.load_state(next((tmp_path / f"run{k}").glob("*.h5")))
         assert state.force[:, 0].sum() == pytest.approx(pull)
     case.write_text(CASE.replace("*t", "").partition("[evolution]")[0])
-    assert run("info", case, "--json", tmp_path / "facts.json").exit_code == 0
+    assert command("info", case, "--json", tmp_path / "facts.json").exit_code == 0
     assert "Infinity" not in (tmp_path / "facts.json").read_text()
-    solved = run("solve", case, "--output", tmp_path / "out")
+    solved = command("solve", case, "--output", tmp_path / "out")
     assert solved.exit_code == 0, solved.output
     assert "Infinity" not in (tmp_path / "out" / "solution.json").read_text()
     for wrong, told in (('{ tied = false }', "expected true"), ('"glued"', "or 'tied'"),
                         ('{ tied = true, coulomb = 0.3 }', "coulomb")):  # fmt: skip
         case.write_text(CASE.replace('"tied"', wrong))
-        refused = run("solve", case)
+        refused = command("solve", case)
         assert refused.exit_code != 0
         assert told in refused.output

@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from block_case import block_case, command
 from scipy.integrate import solve_ivp
 
 import amontons as am
-from amontons.app.cli import main
 from amontons.core.errors import UnsupportedLaw
 
 YOUNG = 100.0
@@ -82,35 +81,17 @@ def test_what_has_no_reactions_refuses():
         block(OVER_SPEED, mu_across=0.3, direction=(1, 0, 0))
 
 
-CASE = """
-[mesh]
-box = [1, 1]
-cells = 2
-[material.default]
-young = 100.0
-poisson = 0.0
-[[fix]]
-on = "top"
-value = ["0.08*t", "-0.01"]
-[[contact]]
-slave = "bottom"
-obstacle = { plane = { normal = [0, 1] } }
-friction = { coulomb = { mu = [0.1, 0.5], speed = [0.0, 0.1] }, cap = 9.0 }
-[evolution]
-kind = "quasi-static"
-step = 0.5
-until = 3.0
-"""
+CASE = block_case(
+    '["0.08*t", "-0.01"]', "{ coulomb = { mu = [0.1, 0.5], speed = [0.0, 0.1] }, cap = 9.0 }",
+    until=3.0,
+)  # fmt: skip
 
 
 def test_case_files_and_the_command_line(tmp_path):
     case = tmp_path / "case.toml"
     case.write_text(CASE)
 
-    def run(*arguments):
-        return CliRunner().invoke(main, [str(a) for a in arguments])
-
-    ran = run("run", case, "--output", tmp_path / "run")
+    ran = command("run", case, "--output", tmp_path / "run")
     assert ran.exit_code == 0, ran.output
     state = am.load_state(next((tmp_path / "run").glob("*.h5")))
     np.testing.assert_allclose(state.force[:, 1] / state.force[:, 0], -0.42, rtol=1e-2)
@@ -119,10 +100,10 @@ def test_case_files_and_the_command_line(tmp_path):
         ("sped = [0.0, 0.1]", "sped"), ("speed = 'fast'", "speed"),
     ):  # fmt: skip
         case.write_text(CASE.replace("speed = [0.0, 0.1]", wrong))
-        refused = run("solve", case)
+        refused = command("solve", case)
         assert refused.exit_code != 0
         assert told in refused.output and "Traceback" not in refused.output
     case.write_text(CASE.replace("*t", "").partition("[evolution]")[0])
-    assert run("info", case).exit_code == 0
-    solved = run("solve", case, "--output", tmp_path / "out")
+    assert command("info", case).exit_code == 0
+    solved = command("solve", case, "--output", tmp_path / "out")
     assert solved.exit_code == 0, solved.output

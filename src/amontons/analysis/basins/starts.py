@@ -26,7 +26,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import linalg as sparse_linalg
 
 from ...core.arrays import real
 from ...core.errors import InvalidInput, UnsupportedForm, shown
@@ -98,6 +97,8 @@ class Drawing:
 
     def of_contacts(self) -> Array:
         """The smallest v, (n,), with random displacements of the contacts."""
+        from scipy.sparse import linalg as sparse_linalg
+
         H = self.problem.H
         assert H is not None
         size = self.displacement_size

@@ -22,7 +22,6 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
 from ...core.clock import Deadline
 from . import slip_arcs as arcs
@@ -164,6 +163,8 @@ class _Part:
 
     def _polish(self, angles: Array) -> None:
         """Nelder and Mead's search over theta, and over psi where it turns."""
+        from scipy.optimize import minimize
+
         free = len(angles) if self.turns else len(self.own)
 
         def value(x: Array) -> float:

@@ -7,8 +7,7 @@ was found), then a second solution.  What none of them settles is undecided, wit
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from enum import Enum
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
@@ -16,7 +15,6 @@ from numpy.typing import NDArray
 
 from ...core.clock import Deadline, TimeLimit, deadline_of, now
 from ...core.errors import InvalidInput, SingularOperator, TimeUp
-from ...core.faces import Told
 from ...linear.dense import dense
 from ...problem.friction import FrictionProblem
 from ...problem.law import Coulomb, Law, Tresca
@@ -27,11 +25,12 @@ from ..scaled import COPIES, UNRESOLVED, Scaled
 from ..solutions.discs.search import enumerate_discs
 from ..solutions.enumerate import PieceSolution, Solutions, enumerate_solutions
 from ..tolerances import SAME
-from .critical_friction import CriticalFriction, Witness, critical_friction
+from .critical_friction import CriticalFriction, critical_friction
 from .energy_bound import energy_bound
 from .one_load.answer import LoadCertificate, LoadOutcome
 from .one_load.certificate import certify_load
 from .status_pieces import friction_shape
+from .verdict import Uniqueness, Verdict
 
 Array = NDArray[np.float64]
 ENUMERATED = 25  # contacts up to which all solutions are looked for before a certificate
@@ -44,66 +43,6 @@ ABOVE = 1e-9  # relative, at which a friction is proved to be safe
 BOUNDS = 0.5  # part of the time for the bounds on the critical friction
 PENETRATES = 1e-6  # gap of a contact that can not react, relative to the load
 SAME_MOTION = " Reactions differ, the motion is the same."
-
-
-class Verdict(Enum):
-    """What is known; the value is the name in JSON files."""
-
-    UNIQUE_EVERY_LOAD = "unique_every_load"
-    UNIQUE_THIS_LOAD = "unique_this_load"
-    NOT_UNIQUE = "not_unique"
-    UNDECIDED = "undecided"
-
-    @property
-    def meaning(self) -> str:
-        """One sentence for the user."""
-        return _MEANING[self]
-
-
-_MEANING = {
-    Verdict.UNIQUE_EVERY_LOAD: "There is exactly one solution, whatever the load.",
-    Verdict.UNIQUE_THIS_LOAD: "For this load there is exactly one solution.",
-    Verdict.NOT_UNIQUE: "There is another solution for the same load.",
-    Verdict.UNDECIDED: "No other solution was found, and no proof that there is none.",
-}
-
-
-@dataclass(frozen=True, eq=False)
-class Uniqueness(Told):
-    """The verdict, and all that supports it.
-
-    friction: largest coefficient of the problem, of which lower and upper are bounds: below
-    lower every load has one solution (criterion: what proves it), from upper on some load has
-    several (witness).  solution, other: the one found, and a second one or None.  certificate:
-    of UNIQUE_THIS_LOAD at larger sizes.  critical: the bounds with all details.
-    resolution: of UNIQUE_THIS_LOAD, any other solution would differ by less; of NOT_UNIQUE, to
-    which both are known; relative to the largest reaction or, if that is larger, to what the
-    load can make.  0 for every load, None where nothing is known.
-    """
-
-    verdict: Verdict
-    friction: float
-    lower: float
-    upper: float
-    criterion: str
-    reason: str
-    witness: Witness | None = None
-    solution: FrictionSolution | None = None
-    other: PieceSolution | None = None
-    certificate: LoadCertificate | None = None
-    critical: CriticalFriction | None = None
-    seconds: float = 0.0
-    resolution: float | None = None
-
-    def __str__(self) -> str:
-        upper = "unknown" if np.isinf(self.upper) else f"{self.upper:.4g}"
-        bounds = f"critical friction between {self.lower:.4g} and {upper}"
-        if np.isinf(self.lower):
-            bounds = "any friction is safe"
-        return (
-            f"{self.verdict.value.replace('_', ' ')}: {self.verdict.meaning} {self.reason} "
-            f"(friction {self.friction:g}; {bounds})"
-        )
 
 
 def assess(

@@ -21,7 +21,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 
 from ..multipliers.rounding import EPSILON, gamma
 from ..statuses import States
@@ -218,6 +217,8 @@ def _inside(system: PieceSystem, y: Array, kernel: Array) -> tuple[Array, Array]
     Homogeneous in (t, scale), so that one linear program finds every slack that can be
     positive; those that can not reduce the dimension.
     """
+    from scipy.optimize import linprog
+
     plane = system.plane
     k = kernel.shape[1]
     G = system.L @ kernel

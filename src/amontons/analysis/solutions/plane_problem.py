@@ -13,7 +13,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
-from scipy.optimize import linprog
 
 from ..multipliers.rounding import EPSILON, gamma
 from ..scaled import Scaled, load_size, power_of_two
@@ -131,6 +130,8 @@ class PlaneProblem:
         (1 - 2 e |y| g) S <= 2 |y|_(W + e) |r|_(W + e), and |r|_(W + e)^2 <= Q S + e g^2 S^2
         by dissipation, g the largest |r| that S = 1 allows.
         """
+        from scipy.optimize import linprog
+
         W = (self.W + self.W.T) / 2
         if not self.contacts or np.abs(self.W - W).max() > SYMMETRIC:
             return np.inf

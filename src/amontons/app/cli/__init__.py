@@ -90,8 +90,7 @@ def solve(**options: object) -> int:
 @main.command(
     epilog="""\b
 Examples:
-  amontons info problem.hdf5
-  amontons info example:wall --set wall.cells=[4,2,2]
+  amontons info part.step --picture faces.png      which face has which name
   amontons info case.toml --json - | jq .contacts
 """
 )
@@ -100,6 +99,7 @@ Examples:
               help="Replace a value of the case.")  # fmt: skip
 @click.option("--time-limit", type=float, metavar="SECONDS",
               help="For ranks and existence. [the work of 20 s]")  # fmt: skip
+@flags.surfaces
 @click.option("--json", "json_copy", metavar="FILE",
               help="The same as JSON, with certificates; - prints it.")  # fmt: skip
 def info(**options: object) -> None:
@@ -108,7 +108,7 @@ def info(**options: object) -> None:
     It tells the rank of H (or W) with the degree of hyperstaticity, and whether solutions exist
     whatever the load, by a motion that opens all contacts or reactions that hold each other.
 
-    SOURCE is a TOML case file, an FCLib HDF5 file, or example:NAME.
+    SOURCE is a TOML case file, an FCLib HDF5 file, example:NAME, or a mesh or CAD file.
     """
     from .info import run
 

@@ -11,6 +11,7 @@ import click
 from ...analysis.basins.methods import BasinMethod, Maker, fields_of
 from ...analysis.basins.study import Basins
 from ...core.errors import InvalidInput
+from ...core.words import shortened
 from ...io.case import make_solver, method_class
 from ...io.case.overrides import split_override
 from ...io.results import FIGURES, to_json, versions
@@ -18,7 +19,7 @@ from .. import questions
 from .contestants import Contestant, contestants
 from .group import INTERRUPTED, UNFINISHED
 from .sources import open_source
-from .terminal import check_writable, deliver_json, say_when, shortened, show_table
+from .terminal import check_writable, deliver_json, say_when, show_table
 
 NITSCHE = "nitsche"
 

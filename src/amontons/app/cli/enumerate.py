@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis.solutions.enumerate import Solutions
+from ...core.words import shortened
 from ...io.readers import Case
 from ...io.results import FIGURES, to_json, versions
 from ...problem.friction import FrictionProblem
@@ -22,7 +23,6 @@ from .terminal import (
     deliver_json,
     report_folder,
     say_when,
-    shortened,
     show_table,
     write_report,
 )

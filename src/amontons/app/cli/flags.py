@@ -28,6 +28,17 @@ def axes(command: Command) -> Command:
     return across(up(figures(command)))
 
 
+def surfaces(command: Command) -> Command:
+    """Of what describes meshes: a picture of their surfaces."""
+    picture = click.option("--picture", metavar="FILE",
+                           help="Of a mesh or CAD file: its surfaces with numbers on them."
+                           )  # fmt: skip
+    size = click.option("--size", type=float, metavar="X",
+                        help="Of a CAD file: size of cells. [a 15th of its length]"
+                        )  # fmt: skip
+    return picture(size(command))
+
+
 def fclib_error(command: Command) -> Command:
     """The published error where it costs something."""
     return click.option(

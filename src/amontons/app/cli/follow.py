@@ -12,6 +12,7 @@ from ...analysis.paths.path import Branch, Event, EventKind, Stop
 from ...analysis.paths.quantities import csv_of
 from ...core.errors import InvalidInput
 from ...core.files import made, write_bytes
+from ...core.words import shortened
 from ...io.results import to_json, versions
 from .. import questions
 from .sources import open_source
@@ -19,7 +20,6 @@ from .terminal import (
     check_folder,
     check_writable,
     deliver_json,
-    shortened,
     show_table,
     write_report,
 )

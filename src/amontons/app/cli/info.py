@@ -21,6 +21,8 @@ from ...problem.nitsche import NitscheProblem
 from ...problem.protocol import Problem
 from ...solvers import METHODS
 from ...solvers.contract import taken_by
+from .info_mesh import is_mesh
+from .info_mesh import run as run_mesh
 from .sources import open_source
 from .terminal import check_writable, deliver_json, show_table
 
@@ -34,9 +36,15 @@ RANKS = 0.5  # part of it that the ranks may take
 
 def run(
     source: str, overrides: Sequence[str], json_copy: str | None,
-    time_limit: float | None = None,
+    time_limit: float | None = None, picture: str | None = None, size: float | None = None,
 ) -> None:  # fmt: skip
-    """Print the table, or the JSON."""
+    """Print the table, or the JSON; of a mesh or CAD file its surfaces."""
+    if is_mesh(source):
+        run_mesh(source, size, picture, json_copy)
+        return
+    for value, name in ((picture, "--picture"), (size, "--size")):
+        if value is not None:
+            raise InvalidInput(f"{name}: only for mesh and CAD files, whose surfaces it shows")
     check_writable(json_copy, "--json")
     if time_limit is not None:
         check_seconds(time_limit)

@@ -136,6 +136,7 @@ def _prepared(
     else:
         results = RunFolder(place, case, numbers, read.title, xdmf)
         start = at_rest(read.in_time)
+    results.notes = read.notes
     steps = evolve(
         read.in_time, read.evolution.method, until=read.evolution.until, start=start,
         solver=settings.solver(), tolerance=settings.tolerance,
@@ -260,7 +261,8 @@ def _report(film: Film, results: RunFolder, asked: _Run) -> None:
 
     table, case = results.table, asked.case
     note = asked.unfinished(float(table["time"][-1]))
-    page = run_page(film, table, case.title, case.units, note, asked.doubts.lines())
+    told = (*asked.doubts.lines(), *case.notes)
+    page = run_page(film, table, case.title, case.units, note, told)
     save_page(page, results.folder / REPORT)
 
 

@@ -50,8 +50,8 @@ class RunFolder:
     """A folder and what is in it: rows of the steps so far, indices of those with a VTK file.
 
     case: what decides the numbers; numbers: columns of pairs and supports; title: for files;
-    xdmf: write that too; saved: index of the
-    last state that is safe, -1 for none; record: what solution.json holds.
+    xdmf: write that too; saved: index of the last state that is safe, -1 for none; record: what
+    solution.json holds; notes: what the file of the case says and the model leaves out.
     """
 
     folder: Path
@@ -63,6 +63,7 @@ class RunFolder:
     pictures: list[int] = field(default_factory=list)
     saved: int = -1
     record: dict[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def add(self, step: TimeStep, seconds: float) -> None:
         """Take a step into the table."""
@@ -70,7 +71,7 @@ class RunFolder:
         counts = [int((step.status == status).sum()) for status in ContactStatus]
         jumped = step.passage is not None and step.passage.jumped
         jump = step.passage.folds[0] if jumped else np.nan
-        numbers = flat_values(step.pairs, step.supports) if self.numbers else []
+        numbers = _in_columns(step, self.numbers)
         self.rows.append((
             step.state.index, step.time, *counts, *(getattr(e, name) for name in WORKS),
             e.defect, record.iterations, record.error, seconds, jump, *numbers,
@@ -87,7 +88,7 @@ class RunFolder:
 
     def keep(self, step: TimeStep) -> None:
         """Write the checkpoint of a step, then the files that follow from it."""
-        self.record = step_record(step, self.title, self.works())
+        self.record = step_record(step, self.title, self.works()) | {"notes": [*self.notes]}
         self.save(step.state)
 
     def save(self, state: State) -> None:
@@ -132,6 +133,18 @@ def numbers_of(model: Model) -> tuple[str, ...]:
     """The columns of all pairs and supports; none where they are more than MOST_NUMBERS."""
     names = flat_columns(model.dimension, model.pair_names, support_names(model.supports))
     return names if len(names) <= MOST_NUMBERS else ()
+
+
+def _in_columns(step: TimeStep, columns: tuple[str, ...]) -> list[float]:
+    """The numbers of a step; NaN for supports that its stage does not have."""
+    if not columns:
+        return []
+    own = numbers_of(step.model)
+    values = flat_values(step.pairs, step.supports)
+    if own == columns:
+        return values
+    known = dict(zip(own, values, strict=False))
+    return [known.get(name, np.nan) for name in columns]
 
 
 def picture_name(index: int) -> str:

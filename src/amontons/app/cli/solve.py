@@ -11,7 +11,8 @@ from pathlib import Path
 
 import click
 
-from ...analysis.certificates.uniqueness import Uniqueness, assess, quick_verdict
+from ...analysis.certificates.uniqueness import assess, quick_verdict
+from ...analysis.certificates.verdict import Uniqueness
 from ...core.clock import TimeLimit
 from ...core.errors import FileFormatError, InvalidInput, SingularOperator, UnsupportedForm
 from ...core.files import put
@@ -30,7 +31,11 @@ from ..model_solution import ModelSolution
 from .group import INTERRUPTED
 from .sources import open_source, with_flags
 from .terminal import REPORT, check_folder, check_writable, say_notes, say_when
-from .uniqueness import brief, describe, record
+
+NOT_EXAMINED = (
+    "uniqueness: not examined, the problem is large or contact alone holds a body; ask with "
+    "--uniqueness"
+)
 
 
 def run(
@@ -62,19 +67,19 @@ def run(
             Criterion(criterion), patience or None, condense=True,
         )  # fmt: skip
         found = solve_as_asked(opened.target, asked, begin, settings.solver())
-    result = replace(_output(opened, found, settings.method), fclib_error=fclib_error,
-                     figures="" if figures == "none" else figures)  # fmt: skip
     left = None if settings.time_limit is None else asked.deadline
-    verdict = _verdict(found, full_verdict, left)
-    if verdict is not None:
-        result = replace(result, uniqueness=record(verdict))
+    result = replace(
+        _output(opened, found, settings.method), fclib_error=fclib_error,
+        figures="" if figures == "none" else figures,
+        uniqueness=_verdict(found, full_verdict, left),
+    )  # fmt: skip
     copy = None if json_copy in (None, "-") else Path(str(json_copy))
     more = {REPORT: partial(_page, units=opened.units)} if report else None
     output.save(result, place, copy, more)
     if json_copy == "-":
         click.echo(output.to_json(output.summary(result)), nl=False)
     elif not quiet:
-        _report(result, verdict, full_verdict, place)
+        _report(result, full_verdict, place)
     return _finish(found)
 
 
@@ -143,14 +148,14 @@ def _verdict(
     return quick_verdict(solution.problem)
 
 
-def _report(
-    result: output.Output, verdict: Uniqueness | None, full: bool, folder: Path
-) -> None:
+def _report(result: output.Output, full: bool, folder: Path) -> None:
     click.echo(output.describe(result))
     say_notes(result.notes)
     model = result.model
     if model is None or model.kind is FrictionProblem:
-        click.echo(describe(verdict) if full and verdict is not None else brief(verdict))
+        verdict = result.uniqueness
+        told = NOT_EXAMINED if verdict is None else verdict.in_full if full else verdict.brief
+        click.echo(told)
     say_when(model)
     click.echo(f"results in {folder}/")
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import click
 
 from ...core.errors import FileFormatError, InvalidInput
-from ...core.words import near_file, nearest
+from ...core.words import near, near_file, nearest
 from ...io.case import DATA, Settings, make_solver, method_class, read_case
 from ...io.case.overrides import override_settings
 from ...io.readers import Case, read
@@ -60,14 +60,21 @@ def check_is_plain(path: Path) -> None:
         mode = path.stat().st_mode
     except FileNotFoundError:
         hint = near_file(path)
-        if not hint and not path.suffix:
-            hint = "; built-in examples are written example:NAME"
+        if "*" in path.name:
+            hint = "; no name fits this pattern, write one out"
+        elif not hint and not path.suffix:
+            meant = near(path.name, examples())
+            one = f", such as example:{meant}" if meant else ""
+            hint = f"; built-in examples are written example:NAME{one}"
         raise FileFormatError(f"{shown}: no such file{hint}") from None
     except (OSError, ValueError) as reason:
         why = getattr(reason, "strerror", None) or reason
         raise FileFormatError(f"{shown}: can not be read: {why}") from None
     if stat.S_ISDIR(mode):
-        raise FileFormatError(f"{shown}: expected a case or FCLib file, this is a folder")
+        raise FileFormatError(
+            f"{shown}: expected a case or FCLib file, this is a folder; name the files in it, "
+            "such as folder/*.hdf5"
+        )
     if not stat.S_ISREG(mode):
         raise FileFormatError(
             f"{shown}: not a regular file; save what it gives to a file first"

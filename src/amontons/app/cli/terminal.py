@@ -9,8 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import click
-from rich.console import Console
-from rich.table import Table
 
 from ...core.errors import InvalidInput
 from ...core.files import made, write_bytes
@@ -32,6 +30,9 @@ def show_table(
     numbers: Literal["left", "right"] = "right",
 ) -> None:
     """Print a table on stdout; `numbers` is how all columns but the first are aligned."""
+    from rich.console import Console
+    from rich.table import Table
+
     table = Table(
         title=title, title_justify="left", title_style="bold", box=None, pad_edge=False
     )
@@ -41,11 +42,6 @@ def show_table(
         table.add_row(*row)
     wide = None if sys.stdout.isatty() else 200  # a file or a pipe needs no wrapping
     Console(width=wide, highlight=False).print(table)
-
-
-def shortened(pattern: str, letters: int = 60) -> str:
-    """A pattern of statuses, its end left out where it is long."""
-    return pattern if len(pattern) <= letters else f"{pattern[: letters - 1]}…"
 
 
 def say_when(model: Model | FrictionProblem | None) -> None:

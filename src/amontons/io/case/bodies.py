@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -93,14 +94,12 @@ def _materials(table: Table, names: list[str], meshes: list[Mesh]) -> list[Any]:
 
 def read_mesh_table(table: Table, path: Path) -> Mesh:
     """The mesh of a table [mesh]: a box, a mesh file or a CAD file, moved where it says so."""
-    from ...mechanics.meshes import Mesh
-
     mesh = _read_mesh(table, path)
     if "move" not in table.data:
         return mesh
     points = mesh.points + np.array(table.numbers("move", (mesh.dim,)))
     with table.blamed("move"):
-        return Mesh(points, mesh.cells, mesh.surfaces, mesh.grid, mesh.name, mesh.levels)
+        return replace(mesh, points=points)
 
 
 def _read_mesh(table: Table, path: Path) -> Mesh:

@@ -27,13 +27,16 @@ def read_contact(table: Table, bodies: Sequence[Body]) -> Contact:
     table.only("slave", "obstacle", "master", "friction", "method", "kinematics",
                "configuration", "name", "clearance")  # fmt: skip
     method = _contact_method(table)
+    if isinstance(table.data.get("slave"), list):
+        raise table.error("slave", "expected one surface; write a table [[contact]] for each")
     slave = table.text("slave")
     for key in ("slave", "master"):
         if key in table.data:
             with table.blamed(key):
                 locate(bodies, table.text(key))
     if ("obstacle" in table.data) == ("master" in table.data):
-        raise table.error("", "expected either obstacle or master")
+        raise table.error("", "expected either obstacle = { plane = { normal = [0, 1] } } or "
+                          'master = "SURFACE"')  # fmt: skip
     numbers = _friction(table)
     found = configuration(table)  # older words for kinematics
     if "kinematics" in table.data:
@@ -46,7 +49,9 @@ def read_contact(table: Table, bodies: Sequence[Body]) -> Contact:
         if "master" in table.data:
             master = table.text("master")
             return Contact(slave, master=master, **numbers, method=method, **found)
-        obstacle = _obstacle(table.table("obstacle"), bodies[0].mesh.dim)
+        words = "a table, such as { plane = { normal = [0, 1] } }"
+        given = table.as_table("obstacle", table.data["obstacle"], words)
+        obstacle = _obstacle(given, bodies[0].mesh.dim)
         return Contact(slave, obstacle, **numbers, method=method, **found)
 
 

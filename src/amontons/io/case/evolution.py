@@ -47,6 +47,9 @@ def read_evolution(table: Table, options: Continuation | None = None) -> Evoluti
 
         crossing = PathCrossing() if options is None else PathCrossing(options)
         values["crossing"] = crossing if values["crossing"] else None
+    if until < values["step"]:
+        raise table.error("until", f"expected at least the first step, {values['step']:g}, got "
+                          f"{until:g}; take smaller steps")  # fmt: skip
     return Evolution(method(**values), until)  # type: ignore[arg-type]
 
 

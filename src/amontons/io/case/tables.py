@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...core.arrays import LARGEST
-from ...core.errors import Address, FileFormatError, InvalidInput, dotted, shown
+from ...core.errors import Address, FileFormatError, InvalidInput, dotted, number_hint, shown
 from ...core.words import nearest
 
 LONGEST_TEXT = 500  # letters of a name or a title; expressions have a limit of their own
@@ -90,9 +90,7 @@ class Table:
     def as_number(self, key: str, value: Any) -> float:
         """A finite number, or a complaint about `key`."""
         if not isinstance(value, int | float) or isinstance(value, bool):
-            hint = ""
-            if isinstance(value, str) and value.strip()[:1].isdigit():
-                hint = "; without quotes, units and percent"
+            hint = number_hint(value)
             raise self.error(key, f"expected a number, got {shown(value)}{hint}")
         try:
             number = float(value)

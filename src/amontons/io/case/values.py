@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...core.errors import AmontonsError, InvalidInput, shown
+from ...core.errors import AmontonsError, InvalidInput, number_hint, shown
 from ...core.expressions import Expression
 from .tables import Table
 
 if TYPE_CHECKING:
     from ...mechanics.model import Body
+
+
+FREE = ("none", "null", "nan", "any")  # what users write for a free component
 
 
 def on_surface(
@@ -62,6 +65,8 @@ def vector(table: Table, key: str, dim: int, *, free: bool = False) -> list:
     if not isinstance(values, list) or len(values) != dim:
         alone = isinstance(values, int | float | str) and values != "free"
         write = f"; write {[*[0] * (dim - 1), values]}" if alone else ""
+        if isinstance(values, str) and values.count(",") == dim - 1:
+            write = f"; write [{values}] without quotes"
         raise table.error(key, f"expected a list of {dim} {words}, got {shown(values)}{write}")
     return [
         None if free and value == "free" else _entry(table, f"{key}[{k}]", value, dim)
@@ -84,4 +89,5 @@ def _entry(table: Table, key: str, value: Any, dim: int) -> float | Expression:
             raise InvalidInput(f"expression {value!r}: 'z' does not exist in 2D")
         return expression if expression.names else float(expression(np.zeros(3)))
     except AmontonsError as reason:
-        raise table.error(key, str(reason)) from None
+        hint = '; did you mean "free"?' if value.strip().lower() in FREE else number_hint(value)
+        raise table.error(key, f"{reason}{hint}") from None

@@ -7,40 +7,37 @@ law of pressure over overclosure do so only where the law is read.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ...core.errors import Address, AmontonsError, FileFormatError, InvalidInput
-from ...mechanics.model import BodyForce, Contact, Fix, Model, NodalForce, Pressure
+from ...mechanics.model import BodyForce, Fix, Model, NodalForce, Pressure
 from ...mechanics.model.parts import Body
-from ...mechanics.steps import QuasiStatic
+from ...mechanics.steps import Schedule, Stage, State
 from ..case.evolution import Evolution
 from ..case.overrides import override_settings
 from ..case.settings import Settings
 from ..readers import Case
 from .about import About
 from .cards import Card, Row, read_cards
-from .contacts import Options, adjusted, read_contacts
+from .contacts import Options, adjusted, law_of, read_contacts
 from .flat import Deck, flatten
-from .history import Course, History, Span, read_history
+from .history import Course, History, read_history
 from .keywords import sorted_out
-from .materials import read_sections
+from .materials import read_interactions, read_sections
 from .meshing import Region
 from .scopes import Index
+from .stages import Held, check_removed, read_stages, times_of
 
 
 @dataclass
 class Found:
     """The parts of a model with the card that each comes from."""
 
-    supports: list[Any] = field(default_factory=list)
     loads: list[Any] = field(default_factory=list)
-    contacts: list[Contact] = field(default_factory=list)
     cards: dict[str, list[Card]] = field(
         default_factory=lambda: {"supports": [], "loads": [], "contacts": []}
     )
@@ -84,11 +81,14 @@ def _settings(overrides: Sequence[str], method: str | None) -> tuple[Settings, O
         if name == "allow":
             words = value.strip().strip("[]").replace('"', "").split(",")
             values["allow"] = tuple(word.strip() for word in words if word.strip())
+        elif name == "increments" and value.strip().isdigit() and int(value) > 0:
+            values["increments"] = int(value)
         elif name == "hard" and value.strip().lower() in ("true", "false"):
             values["hard"] = value.strip().lower() == "true"
         else:
             raise InvalidInput(
-                f"--set {text}: expected deck.allow=[KEYWORD, ...] or deck.hard=true"
+                f"--set {text}: expected deck.allow=[KEYWORD, ...], deck.hard=true or "
+                "deck.increments=NUMBER, of each step"
             )
     return settings, Options(**values)
 
@@ -115,22 +115,31 @@ def _case(
     title = _title(deck) or path.name.split(".")[0]
     notes += _formulations(deck)
     found = Found()
-    _name_nodes(region, history)
-    contacts = read_contacts(deck, region, options, notes)
+    interactions = read_interactions([p.card for p in deck.model])
+    stages = read_stages(deck, history, interactions)
+    _name_nodes(region, history, stages)
+    pairs = read_contacts(deck, region, interactions, notes)
+    check_removed(stages, pairs, deck)
     _name_faces(region, history)
     mesh, at = region.mesh(title)
-    mesh = adjusted(mesh, at, contacts, notes)
-    _supports_and_loads(found, region, history, at, notes)
-    for each in contacts:
-        found.add("contacts", each.contact(mesh), each.card)
+    mesh = adjusted(mesh, at, pairs, notes)
+    _loads(found, region, history, at)
+    law = partial(law_of, options=options, notes=notes)
+    for stage in stages:
+        _supports(found, stage, region, history, at, notes)
+        stage.contacts = stage.contacts_of(pairs, mesh, law)
+    found.cards["contacts"] = [pair.card for pair in pairs]
     materials = {s.name: s.material.law(region.plane) for s in sections}
     make = partial(_model, [Body(mesh, materials)], found, title)
-    evolution = Evolution(QuasiStatic(_step(history.spans)), history.until)
-    case = Case(make(None), settings, title, path, evolution=evolution, key_of=found.line_of,
-                notes=tuple(notes), about=About.of(deck, history, at, make))  # fmt: skip
-    if len(deck.steps) > 1 and any(contact.mu for contact in found.contacts):
+    later = tuple(Stage(s.begin, partial(_of_state, make, s)) for s in stages[1:])
+    plan = Schedule(*times_of(history, options.increments, notes), stages=later)
+    case = Case(make(stages[0], None), settings, title, path,
+                evolution=Evolution(plan, history.until), key_of=found.line_of,
+                tables={"deck": {"cards": deck.digest}}, notes=tuple(notes),
+                about=About.of(deck, history, at, stages, make))  # fmt: skip
+    if later or (len(deck.steps) > 1 and any(c.mu for c in stages[0].contacts)):
         return case  # friction remembers the steps before
-    return replace(case, target=make(history.until), moving=case.target)
+    return replace(case, target=make(stages[0], history.until), moving=case.target)
 
 
 def _title(deck: Deck) -> str:
@@ -156,21 +165,14 @@ def _formulations(deck: Deck) -> list[str]:
     return notes
 
 
-def _step(spans: Sequence[Span]) -> float:
-    """The length of a step in time that meets the end of every step of the deck."""
-    step = min(span.increment for span in spans)
-    for span in spans:
-        count = max(int(np.ceil((span.end - span.begin) / step - 1e-9)), 1)
-        step = min(step, (span.end - span.begin) / count)
-    return step
-
-
 # ------------------------------------------------------------------------------ history
-def _name_nodes(region: Region, history: History) -> None:
+def _name_nodes(region: Region, history: History, stages: Sequence[Held]) -> None:
     """Node sets of supports and forces: named after the line of their card."""
-    for word, given in (("support", history.supports), ("force", history.forces)):
-        for k, (nodes, _, _) in enumerate(given.groups(region.dim)):
-            region.node_sets[f"{word} {k + 1}"] = nodes
+    for stage in stages:
+        groups = history.supports.groups(region.dim, stage.held)
+        stage.name([nodes for nodes, _, _ in groups], region.node_sets)
+    for k, (nodes, _, _) in enumerate(history.forces.groups(region.dim)):
+        region.node_sets[f"force {k + 1}"] = nodes
 
 
 def _name_faces(region: Region, history: History) -> None:
@@ -189,16 +191,22 @@ def _loaded(name: str, label: str) -> str:
     return f"pressure {name} {label}".strip()
 
 
-def _supports_and_loads(
-    found: Found, region: Region, history: History, at: Index, notes: list[str]
+def _supports(
+    found: Found, stage: Held, region: Region, history: History, at: Index, notes: list[str]
 ) -> None:
-    dim, share = region.dim, 1.0 / region.thickness
-    for k, (nodes, courses, card) in enumerate(history.supports.groups(dim)):
-        name = f"support {k + 1}"
+    groups = history.supports.groups(region.dim, stage.held)
+    for name, (nodes, courses, card) in zip(stage.names, groups, strict=True):
         if _without_elements(region, name, nodes, at):
-            notes.append(f"{card} (line {card.number}): nodes without elements are left out")
+            text = f"{card} (line {card.number}): nodes without elements are left out"
+            notes += [text] if text not in notes else []
         if len(region.node_sets[name]):
-            found.add("supports", (name, courses), card)
+            stage.supports.append((name, courses))
+            if not stage.number:
+                found.cards["supports"].append(card)
+
+
+def _loads(found: Found, region: Region, history: History, at: Index) -> None:
+    dim, share = region.dim, 1.0 / region.thickness
     for k, (nodes, courses, card) in enumerate(history.forces.groups(dim)):
         name = f"force {k + 1}"
         if _without_elements(region, name, nodes, at):
@@ -234,12 +242,24 @@ def _scaled(course: Course | None, factor: float) -> Course:
     return replace(course, values=tuple(factor * v for v in course.values))
 
 
-def _model(bodies: list[Body], found: Found, title: str, time: float | None) -> Model:
-    """The model at a time, or as it goes on in time where that is None."""
+def _of_state(make: Callable[..., Model], stage: Held, state: State) -> Model:
+    """The model of a stage that begins, or goes on, at a state."""
+    return make(stage, None, state)
+
+
+def _model(
+    bodies: list[Body], found: Found, title: str, stage: Held, time: float | None,
+    state: State | None = None,
+) -> Model:  # fmt: skip
+    """The model of a stage at a time, or as it goes on in time where that is None."""
     value = partial(_value, time)
     supports = [
-        Fix(name, [None if c is None else value(c) for c in courses])
-        for name, courses in found.supports
+        Fix(name, [
+            None if c is None else stage.since(bodies[0].mesh, c, axis, state)
+            if c.is_open and state is not None else value(c)
+            for axis, c in enumerate(courses)
+        ])
+        for name, courses in stage.supports
     ]  # fmt: skip
     loads: list[Any] = []
     for kind, name, courses in found.loads:
@@ -250,7 +270,7 @@ def _model(bodies: list[Body], found: Found, title: str, time: float | None) -> 
         else:
             course, way = courses
             loads.append(BodyForce([value(_scaled(course, w)) for w in way], region=name))
-    return Model(bodies, supports, found.contacts, loads, name=title)
+    return Model(bodies, supports, stage.contacts, loads, name=title)
 
 
 def _value(time: float | None, course: Course) -> Any:

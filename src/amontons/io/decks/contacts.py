@@ -22,7 +22,7 @@ from ...mechanics.model import Contact
 from ...problem.law import ExponentialOverclosure, OverclosureCurve
 from .cards import Card, Row, number
 from .flat import Deck, Placed
-from .materials import Interaction, read_interactions
+from .materials import Interaction
 from .meshing import Region
 from .scopes import Index, missing
 
@@ -34,10 +34,14 @@ TABLE = 60  # points of the law with a tension far away
 
 @dataclass(frozen=True)
 class Options:
-    """How a deck is read: cards that may be left out; hard: laws of overclosure too."""
+    """How a deck is read: cards that may be left out; hard: laws of overclosure too.
+
+    increments: of each step, in the place of what the deck says.
+    """
 
     allow: tuple[str, ...] = ()
     hard: bool = False
+    increments: int | None = None
 
 
 @dataclass
@@ -50,22 +54,23 @@ class Pair:
 
     slave: str
     master: str
-    law: dict[str, Any]
     card: Card
     interaction: str
+    nodal: bool = False
     adjust: float | Index | None = None
     nodes: Index | None = None
     points: Array | None = None
     clearance: float | None = None
 
-    def contact(self, mesh: Mesh) -> Contact:
-        """The contact of the model."""
+    def contact(self, law: dict[str, Any], far: float | None = None) -> Contact:
+        """The contact of the model under a law; far: how far away one is that is removed."""
+        gap = self.clearance if far is None else far
         if self.points is None:
-            return Contact(self.slave, master=self.master, clearance=self.clearance, **self.law)
+            return Contact(self.slave, master=self.master, clearance=gap, **law)
+        where = partial(_near, self.points)
         return Contact(
-            self.slave, master=self.master, clearance=self.clearance, method="nodal",
-            where=partial(_near, self.points), **self.law,
-        )  # fmt: skip
+            self.slave, master=self.master, clearance=gap, method="nodal", where=where, **law
+        )
 
 
 def _near(points: Array, x: Array) -> NDArray[np.bool_]:
@@ -74,17 +79,18 @@ def _near(points: Array, x: Array) -> NDArray[np.bool_]:
     return np.asarray(cKDTree(points).query(x)[0] <= 1e-9 * size)
 
 
-def read_contacts(deck: Deck, region: Region, options: Options, notes: list[str]) -> list[Pair]:
+def read_contacts(
+    deck: Deck, region: Region, interactions: dict[str, Interaction], notes: list[str]
+) -> list[Pair]:
     """The pairs of a deck; raises FileFormatError with file and line."""
     for step in deck.steps:
         for placed in step:
             if placed.card.keyword in ("CONTACTPAIR", "SURFACEINTERACTION", "CLEARANCE"):
                 raise placed.card.error("stands in a step; expected before the first one")
-    interactions = read_interactions([p.card for p in deck.model])
     pairs: list[Pair] = []
     for placed in deck.model:
         if placed.card.keyword == "CONTACTPAIR":
-            pairs += _pairs(placed, region, interactions, options, notes)
+            pairs += _pairs(placed, region, interactions, notes)
         elif placed.card.keyword == "CLEARANCE":
             _clear(placed, pairs, region)
     if not pairs:
@@ -93,9 +99,8 @@ def read_contacts(deck: Deck, region: Region, options: Options, notes: list[str]
 
 
 def _pairs(
-    placed: Placed, region: Region, interactions: dict[str, Interaction], options: Options,
-    notes: list[str],
-) -> list[Pair]:  # fmt: skip
+    placed: Placed, region: Region, interactions: dict[str, Interaction], notes: list[str]
+) -> list[Pair]:
     card = placed.card
     if "TIED" in card.options:
         raise card.error("TIED: is not read, expected *TIE")
@@ -103,7 +108,6 @@ def _pairs(
     if name not in interactions:
         raise card.error(missing("surface interaction", name, interactions))
     smooth = card.label("TYPE") in (None, "NODE TO SURFACE")
-    law = law_of(interactions[name], options, notes, nodal=smooth)
     out = []
     for row in card.rows():
         names = [text for text in row.fields if text]
@@ -117,7 +121,7 @@ def _pairs(
                 f"*CONTACT PAIR: expected slave, master, got {len(row.fields)} names"
             )
         master = _surface(region, placed, names[1], row)
-        pair = Pair("", master, law, card, name)
+        pair = Pair("", master, card, name, smooth)
         pair.slave, pair.nodes = _slave(region, placed, names[0], master, row)
         pair.adjust = _adjust(placed)
         out.append(pair)
@@ -162,7 +166,7 @@ def _clear(placed: Placed, pairs: Sequence[Pair], region: Region) -> None:
 
 # ---------------------------------------------------------------------------------- laws
 def law_of(
-    interaction: Interaction, options: Options, notes: list[str], *, nodal: bool = False
+    interaction: Interaction, *, options: Options, notes: list[str], nodal: bool = False
 ) -> dict[str, Any]:
     """Numbers of a contact; raises FileFormatError for a law of overclosure that is not read.
 

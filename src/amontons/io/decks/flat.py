@@ -7,6 +7,7 @@ cards of materials, interactions and steps are kept in their order.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -56,6 +57,7 @@ class Deck:
     steps: list[list[Placed]] = field(default_factory=list)
     top: Scope = field(default_factory=lambda: Scope(Names()))
     instances: dict[str, Names] = field(default_factory=dict)
+    digest: str = ""  # of all that is not in the mesh
     _points: list[Array] = field(default_factory=list)
     _count: int = 0
     _elements: int = 0
@@ -71,7 +73,7 @@ class Deck:
 
 def flatten(cards: Sequence[Card]) -> Deck:
     """The deck that cards make; raises FileFormatError with file and line."""
-    deck = Deck()
+    deck = Deck(digest=_digest(cards))
     parts: dict[str, list[Card]] = {}
     k = 0
     while k < len(cards):
@@ -99,6 +101,17 @@ def flatten(cards: Sequence[Card]) -> Deck:
                       *((n, n.node_at) for n in deck.instances.values())):  # fmt: skip
         deck.point_labels.append((names, np.sort(at)))
     return deck
+
+
+def _digest(cards: Sequence[Card]) -> str:
+    """A hash of all cards but those of the mesh, which has its own."""
+    whole = hashlib.sha256()
+    for card in cards:
+        whole.update(repr((card.keyword, sorted(card.options.items()))).encode())
+        if card.keyword not in ("NODE", "ELEMENT"):
+            for row in card.rows():
+                whole.update(repr(row.fields).encode())
+    return whole.hexdigest()
 
 
 def _inside(

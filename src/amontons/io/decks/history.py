@@ -3,7 +3,9 @@
 A value that a step gives is reached at its end along a straight line from what it was at its
 beginning, or follows an amplitude, or, with AMPLITUDE=STEP, is there at once.  It stays until
 another step says otherwise; OP=NEW takes all of its kind away that earlier steps gave.  Forces
-at one node in one step add up; a force of a later step takes the place of the one before.
+at one node in one step add up; a force of a later step takes the place of the one before.  A
+support that comes in a later step, or is FIXED, begins where its node is then, which is not
+known here: NaN.
 """
 
 from __future__ import annotations
@@ -34,8 +36,25 @@ class Course:
     values: tuple[float, ...] = (0.0,)
 
     def at(self, t: float) -> float:
-        """The value at a time."""
-        return float(np.interp(t, self.times, self.values))
+        """The value at a time; NaN where it goes on from what is not known here."""
+        found = float(np.interp(t, self.times, self.values))
+        return found if np.isfinite(found) or t not in self.times else self._given(t)
+
+    def _given(self, t: float) -> float:
+        return self.values[len(self.times) - 1 - self.times[::-1].index(t)]
+
+    @property
+    def is_open(self) -> bool:
+        """True where it begins, or is held, at what is not known here."""
+        return bool(np.isnan(self.values).any())
+
+    def since(self, t: float, value: float) -> Course:
+        """The course from a time on, at which it is known to be `value`."""
+        later = [(s, v) for s, v in zip(self.times, self.values, strict=True) if s > t]
+        ends = [(s, value if np.isnan(v) else v) for s, v in later]
+        begin = (t, self.at(t) if np.isfinite(self.at(t)) else value)
+        times, values = zip(begin, *ends, strict=True)
+        return Course(times, values)
 
     @property
     def last(self) -> float:
@@ -50,20 +69,22 @@ class Course:
     def then(self, times: Sequence[float], values: Sequence[float]) -> Course:
         """This course with more points, those at its end and after."""
         kept = [k for k, t in enumerate(self.times) if t < times[0]]
-        if not kept or self.times[-1] < times[0]:
-            return Course((*self.times, *times), (*self.values, *values))
         return Course((*(self.times[k] for k in kept), *times),
                       (*(self.values[k] for k in kept), *values))  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Span:
-    """A step: from when to when, the first increment that it asks for, and its options."""
+    """A step: from when to when, the first increment that it asks for, and its options.
+
+    direct: all increments are as the first one.
+    """
 
     begin: float
     end: float
     increment: float
     card: Card
+    direct: bool = False
 
     @property
     def at_once(self) -> bool:
@@ -73,18 +94,23 @@ class Span:
 
 @dataclass
 class Prescribed:
-    """Courses of displacements or forces, by number: `at` (nodes, 3), FREE where none is."""
+    """Courses of displacements or forces, by number: `at` (nodes, 3), FREE where none is.
+
+    before: the same of supports before OP=NEW took them away, for where they go on from.
+    """
 
     at: Index
+    before: Index | None = None
     courses: list[Course] = field(default_factory=list)
     cards: list[Card] = field(default_factory=list)
 
-    def groups(self, dim: int) -> list[tuple[Index, list[Course | None], Card]]:
-        """Nodes with the same courses in all components, (nodes, courses, card)."""
-        rows = np.flatnonzero((self.at[:, :dim] != FREE).any(axis=1))
+    def groups(self, dim: int, held: Index | None = None) -> list[Group]:
+        """Nodes with the same courses in all components, at the end or those of `held`."""
+        at = self.at if held is None else held
+        rows = np.flatnonzero((at[:, :dim] != FREE).any(axis=1))
         if not len(rows):
             return []
-        same, which = np.unique(self.at[rows, :dim], axis=0, return_inverse=True)
+        same, which = np.unique(at[rows, :dim], axis=0, return_inverse=True)
         which = which.ravel()
         out = []
         for k, numbers in enumerate(same):
@@ -94,15 +120,29 @@ class Prescribed:
         return out
 
 
+Group = tuple[Index, list[Course | None], Card]  # nodes, their courses, where they stand
+
+
 @dataclass
 class History:
-    """All that steps prescribe: supports, forces at nodes, loads on faces and in bodies."""
+    """All that steps prescribe: supports, forces at nodes, loads on faces and in bodies.
+
+    held: what `supports.at` is in each step.
+    """
 
     supports: Prescribed
     forces: Prescribed
     faces: dict[tuple[str, str], tuple[Course, Card, Scope]] = field(default_factory=dict)
     bodies: dict[str, tuple[Course, Array, Card, Scope]] = field(default_factory=dict)
     spans: list[Span] = field(default_factory=list)
+    held: list[Index] = field(default_factory=list)
+
+    @property
+    def corners(self) -> set[float]:
+        """Times at which anything bends."""
+        courses = [*self.supports.courses, *self.forces.courses]
+        courses += [each[0] for each in (*self.faces.values(), *self.bodies.values())]
+        return {t for course in courses for t in course.times}
 
     @property
     def until(self) -> float:
@@ -125,6 +165,7 @@ def read_history(deck: Deck, before: Sequence[Placed], steps: Sequence[Sequence[
         history.spans.append(span)
         amplitudes |= _amplitudes([p.card for p in step])
         _follow(history, step, span, amplitudes, k)
+        history.held.append(history.supports.at.copy())
     return history
 
 
@@ -141,7 +182,8 @@ def _span(step: Sequence[Placed], begin: float) -> Span:
         if not (increment > 0 and period > 0):
             raise row.error(f"*STATIC: expected times > 0, got {increment:g}, {period:g}")
         break
-    return Span(begin, begin + period, min(increment, period), card)
+    direct = "DIRECT" in static[0].options
+    return Span(begin, begin + period, min(increment, period), card, direct)
 
 
 def _amplitudes(cards: Sequence[Card]) -> dict[str, tuple[Array, Array, bool]]:
@@ -204,11 +246,10 @@ def _follow(history: History, step: Sequence[Placed], span: Span, known: Amplitu
 def _cleared(history: History, step: Sequence[Placed], span: Span, k: int) -> None:
     """What OP=NEW takes away; a load goes as it came, in a straight line."""
     new = {p.card.keyword: p.card for p in step if p.card.label("OP") == "NEW"}
-    if "BOUNDARY" in new and k:
-        raise new["BOUNDARY"].error(
-            "OP=NEW: supports that come or go between steps are not read; end with the step "
-            "before"
-        )
+    out = history.supports
+    out.before = out.at.copy() if "BOUNDARY" in new else None
+    if "BOUNDARY" in new:
+        out.at[:] = FREE
     if "CLOAD" in new:
         out = history.forces
         for number_ in np.unique(out.at[out.at != FREE]):
@@ -229,21 +270,27 @@ def _boundary(
     history: History, each: Placed, span: Span, known: Amplitudes, *, step: int
 ) -> None:
     card, out = each.card, history.supports
-    for option in ("FIXED", "USER", "SUBMODEL", "TYPE", "MASSFLOW"):
+    fixed = "FIXED" in card.options
+    for option in ("USER", "SUBMODEL", "TYPE", "MASSFLOW"):
         if option in card.options and card.label(option) != "DISPLACEMENT":
             raise card.error(f"{option}: is not read, expected prescribed displacements")
     for row in card.rows():
         nodes = each.scope.nodes(row.fields[0], row)
         for component, value in _held(row):
             old = out.at[nodes, component]
-            if step and (old == FREE).any():
-                raise row.error(
-                    "*BOUNDARY: a support that comes in a later step is not read; hold the "
-                    "same components in the first one"
-                )
+            if out.before is not None:
+                old = np.where(old == FREE, out.before[nodes, component], old)
             for before in np.unique(old):
-                course = Course() if before == FREE else out.courses[before]
-                out.courses.append(_course(course, value, span, card, known))
+                if before != FREE:
+                    course = out.courses[before]
+                else:  # in the first step bodies are where they were made
+                    course = Course((span.begin,), (np.nan,)) if step else Course()
+                if fixed:
+                    stays = course.at(span.begin)
+                    course = course.then((span.begin, span.end), (stays, stays))
+                else:
+                    course = _course(course, value, span, card, known)
+                out.courses.append(course)
                 out.cards.append(card)
                 out.at[nodes[old == before], component] = len(out.courses) - 1
 

@@ -14,6 +14,7 @@ READ = {
     "HEADING", "MATERIAL", "ELASTIC", "DENSITY", "SOLIDSECTION", "SURFACEINTERACTION",
     "SURFACEBEHAVIOR", "FRICTION", "CONTACTPAIR", "BOUNDARY", "AMPLITUDE", "STEP", "STATIC",
     "CLOAD", "DLOAD", "DSLOAD", "CLEARANCE",
+    "CHANGEFRICTION", "CHANGESURFACEBEHAVIOR", "MODELCHANGE",
 }  # fmt: skip
 OUTPUT = {
     "NODEPRINT", "NODEFILE", "NODEOUTPUT", "ELPRINT", "ELFILE", "ELEMENTOUTPUT", "CONTACTFILE",
@@ -42,8 +43,7 @@ MEANS = {  # what a card would have done
     "DISTRIBUTING": "a force would be spread over a surface",
     "ORIENTATION": "the axes of a material are turned", "DYNAMIC": "inertia would act",
     "TEMPERATURE": "the bodies would grow and shrink",
-    "CHANGEFRICTION": "friction would change", "MODELCHANGE": "parts would come and go",
-    "CHANGESURFACEBEHAVIOR": "contact would change", "SPRING": "springs would act",
+    "SPRING": "springs would act",
     "GAP": "contact elements would act",
     "FREQUENCY": "vibrations would be computed", "BUCKLE": "buckling would be computed",
     "CONTACT": "surfaces in contact would be found",

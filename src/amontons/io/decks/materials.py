@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ...core.errors import InvalidInput
 from ...mechanics.elements.elasticity import LinearElastic
@@ -11,7 +11,7 @@ from .cards import Card, Row, number
 from .flat import Deck, Placed
 from .scopes import Index, missing
 
-PLANES = {"": "strain", "strain": "strain", "stress": "stress"}
+PLANES = {"": "strain", "strain": "strain", "stress": "stress", "axisymmetric": "strain"}
 
 
 @dataclass(frozen=True)
@@ -144,6 +144,28 @@ def read_interactions(cards: Sequence[Card]) -> dict[str, Interaction]:
     return found
 
 
+def changed_interactions(
+    found: dict[str, Interaction], cards: Sequence[Card]
+) -> dict[str, Interaction]:
+    """The interactions as a step changes them, the same ones where it does not."""
+    out = dict(found)
+    current: Interaction | None = None
+    for card in cards:
+        if card.keyword in ("CHANGEFRICTION", "CHANGESURFACEBEHAVIOR"):
+            name = card.name("INTERACTION")
+            if name not in out:
+                raise card.error(missing("surface interaction", name, out))
+            current = out[name] = replace(out[name])
+        elif card.keyword in ("FRICTION", "SURFACEBEHAVIOR"):
+            if current is None:
+                raise card.error(
+                    "stands in a step; expected *CHANGE FRICTION or *CHANGE SURFACE BEHAVIOR "
+                    "with the interaction before it"
+                )
+            (_behaviour if card.keyword == "SURFACEBEHAVIOR" else _friction)(current, card)
+    return out
+
+
 def _behaviour(interaction: Interaction, card: Card) -> None:
     word = card.label("PRESSURE-OVERCLOSURE") or "HARD"
     if "NOSEPARATION" in card.options:
@@ -164,6 +186,7 @@ def _friction(interaction: Interaction, card: Card) -> None:
     if values[0] < 0:
         raise row.error(f"*FRICTION: expected a coefficient >= 0, got {values[0]:g}")
     interaction.friction = values[0]
+    interaction.slope = interaction.limit = None
     if len(values) > 1 and values[1] > 0 and "SLIPTOLERANCE" not in card.options:
         interaction.slope = values[1]
     if card.options.get("TAUMAX"):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,6 @@ from .shapes import SHAPES, side_of
 
 Array = NDArray[np.float64]
 FACING = 0.3  # cosine from which normals of two facets face each other
-NOT_YET = {"quad8": "8-node quadrilaterals", "hex20": "20-node bricks"}
 
 
 @dataclass
@@ -55,10 +54,6 @@ class Region:
         first = deck.blocks[0]
         for block in deck.blocks:
             shape = SHAPES[block.kind]
-            if shape.plane == "axisymmetric":
-                raise block.card.error("axisymmetric elements are not read")
-            if shape.cell in NOT_YET:
-                raise block.card.error(f"{NOT_YET[shape.cell]} are not read")
             if shape.plane != SHAPES[first.kind].plane:
                 raise block.card.error(
                     f"expected elements of one kind, got {first.kind} and {block.kind}"
@@ -78,8 +73,11 @@ class Region:
 
     @property
     def thickness(self) -> float:
-        """Of all sections in 2D; raises FileFormatError where they differ."""
-        if not self.plane:
+        """Of all sections in 2D; raises FileFormatError where they differ.
+
+        1 for axisymmetric elements, whose forces are those of the whole body.
+        """
+        if self.plane in ("", "axisymmetric"):
             return 1.0
         for section in self.sections[1:]:
             if section.thickness != self.sections[0].thickness:
@@ -173,7 +171,8 @@ class Region:
         for block in self.deck.blocks:
             own = self.section_of[block.first : block.first + len(block.nodes)]
             out += [
-                Cells(SHAPES[block.kind].cell, block.nodes[own == k], self.sections[k].name)
+                Cells(SHAPES[block.kind].cell, block.nodes[own == k], self.sections[k].name,
+                      SHAPES[block.kind].integration)
                 for k in np.unique(own)
             ]
         return out
@@ -192,13 +191,14 @@ class Region:
             if np.ptp(points[:, 2]):
                 raise InvalidInput("*NODE: plane elements with nodes at several z")
             points = points[:, :2]
-        cells = [Cells(c.kind, at[c.nodes], c.region) for c in self._cells()]
+        cells = [replace(c, nodes=at[c.nodes]) for c in self._cells()]
         surfaces = {
             name: tuple(Facets(f.kind, at[f.nodes]) for f in _joined(facets))
             for name, facets in self.facets.items()
         }
-        sets = {name: at[nodes] for name, nodes in self.node_sets.items()}
-        mesh = Mesh(points, tuple(cells), surfaces, name=title, node_sets=sets)
+        sets = {name: at[nodes][at[nodes] >= 0] for name, nodes in self.node_sets.items()}
+        mesh = Mesh(points, tuple(cells), surfaces, name=title, node_sets=sets,
+                    axisymmetric=self.plane == "axisymmetric")  # fmt: skip
         return mesh, at
 
 

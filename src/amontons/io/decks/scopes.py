@@ -7,13 +7,13 @@ written, or else of the assembly.  A deck without parts has one place for all.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.words import near
 from .cards import Row
 
 Index = NDArray[np.int64]
@@ -117,8 +117,8 @@ class Scope:
 def missing(what: str, text: str, known: Iterable[str]) -> str:
     """The words for a name that is not there, with those that are near."""
     names = sorted(set(known))
-    near = difflib.get_close_matches(text.upper(), names, n=1, cutoff=0.6)
-    hint = f"; did you mean {near[0]}?" if near else ""
+    meant = near(text, names)
+    hint = f"; did you mean {meant}?" if meant else ""
     if len(names) > 12:
         names = [*names[:12], f"... ({len(names)} in all)"]
     return f"{what} {text}: not found, known: {', '.join(names) or 'none'}{hint}"

@@ -1,8 +1,8 @@
 """Element types of decks: the cell they are, what they assume, and the nodes of their sides.
 
 Sides are numbered as CalculiX and Abaqus do, from S1; nodes are those of the deck's element.
-Integration: ours is the full rule of each cell; where a deck asks for another one, a result
-differs by that, which `note` says.
+Integration is that of the type, but for first order with one point, which has motions without
+energy: there it is full, and `note` says so.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ class Shape:
 
     cell: kind of our mesh; nodes: how many the deck gives; plane: "" in 3D, else "strain",
     "stress" or "axisymmetric"; sides: nodes of each, corners first; note: what the type means
-    beyond the cell.
+    beyond the cell; integration: as in `Cells`.
     """
 
     cell: str
@@ -26,6 +26,7 @@ class Shape:
     sides: tuple[tuple[int, ...], ...]
     plane: str = ""
     note: str = ""
+    integration: str = "full"
 
 
 TRI = ((0, 1), (1, 2), (2, 0))
@@ -40,7 +41,11 @@ HEX20 = (
     (1, 5, 6, 2, 17, 13, 18, 9), (2, 6, 7, 3, 18, 14, 19, 10), (3, 7, 4, 0, 19, 15, 16, 11),
 )  # fmt: skip
 WEDGE = ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0))
-REDUCED = "reduced integration there, full here"
+WEDGE15 = (
+    (0, 1, 2, 6, 7, 8), (3, 5, 4, 11, 10, 9), (0, 3, 4, 1, 12, 9, 13, 6),
+    (1, 4, 5, 2, 13, 10, 14, 7), (2, 5, 3, 0, 14, 11, 12, 8),
+)  # fmt: skip
+REDUCED = "one point of integration there, full here: no motions without energy"
 INCOMPATIBLE = "incompatible modes there, none here"
 
 
@@ -52,18 +57,25 @@ def _planes() -> dict[str, Shape]:
             ("8", "quad8", 8, QUAD8),
         ):  # fmt: skip
             found[prefix + name] = Shape(cell, nodes, sides, plane)
-            if name in ("4", "8"):
-                found[f"{prefix}{name}R"] = Shape(cell, nodes, sides, plane, REDUCED)
+            if name == "8":
+                found[f"{prefix}8R"] = Shape(cell, nodes, sides, plane, "", "reduced")
             if name == "4":
-                found[f"{prefix}4I"] = Shape(cell, nodes, sides, plane, INCOMPATIBLE)
+                found[f"{prefix}4R"] = Shape(cell, nodes, sides, plane, REDUCED)
+                found[f"{prefix}4I"] = (
+                    Shape(cell, nodes, sides, plane, INCOMPATIBLE) if plane == "axisymmetric"
+                    else Shape(cell, nodes, sides, plane, "", "incompatible")
+                )  # fmt: skip
     return found
 
 
 SHAPES = {
     "C3D4": Shape("tet", 4, TET), "C3D10": Shape("tet10", 10, TET10),
     "C3D8": Shape("hex", 8, HEX), "C3D8R": Shape("hex", 8, HEX, note=REDUCED),
-    "C3D8I": Shape("hex", 8, HEX, note=INCOMPATIBLE), "C3D6": Shape("wedge", 6, WEDGE),
-    "C3D20": Shape("hex20", 20, HEX20), "C3D20R": Shape("hex20", 20, HEX20, note=REDUCED),
+    "C3D8I": Shape("hex", 8, HEX, integration="incompatible"),
+    "C3D6": Shape("wedge", 6, WEDGE, integration="reduced"),
+    "C3D15": Shape("wedge15", 15, WEDGE15, integration="reduced"),
+    "C3D20": Shape("hex20", 20, HEX20),
+    "C3D20R": Shape("hex20", 20, HEX20, integration="reduced"),
 } | _planes()  # fmt: skip
 
 

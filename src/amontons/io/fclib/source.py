@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import FileFormatError
 from ...core.files import check_is_regular
+from ...core.words import near_file
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -25,7 +26,7 @@ def check_is_file(path: Path) -> None:
         if path.is_dir():
             raise FileFormatError(f"{path}: expected an FCLib HDF5 file, this is a folder")
         if not path.exists():
-            raise FileFormatError(f"{path}: no such file")
+            raise FileFormatError(f"{path}: no such file{near_file(Path(path))}")
         with path.open("rb") as file:
             empty = not file.read(1)
     except OSError as reason:

@@ -15,7 +15,7 @@ import numpy as np
 from ...analysis.basins.study import Basins
 from ...analysis.certificates.critical_friction import CriticalFriction
 from ...analysis.certificates.opening import Opening
-from ...analysis.certificates.uniqueness import Uniqueness
+from ...analysis.certificates.verdict import Uniqueness
 from ...analysis.paths.diagram import Diagram
 from ...analysis.paths.path import Branch
 from ...analysis.solutions.enumerate import Solutions

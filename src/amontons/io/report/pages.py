@@ -58,7 +58,7 @@ def solve_page(output: Output, units: Units, title: str = "") -> Page:
         headline=_counted(found),
         outcome=outcome_words(record), stamp=record.stamp, verdict=verdict_words(verdict),
         facts=[result_table(output, units), judged_table(output), cost_table(output)],
-        warnings=tuple(f"{w.message} [{w.name}]" for w in output.warnings),
+        warnings=(*(f"{w.message} [{w.name}]" for w in output.warnings), *output.notes),
         tables=pairs_table(output, units),
         charts=[c for c in charts if c], stage=stage, states=states or [], units=units,
     )  # fmt: skip

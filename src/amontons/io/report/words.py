@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.certificates.uniqueness import Uniqueness, Verdict
+from ...analysis.certificates.verdict import Uniqueness, Verdict
 from ...mechanics.model.pairs import pair_results
 from ...problem.judge.measures import Measure
 from ...problem.solution import TELLING, Convergence
@@ -30,17 +30,12 @@ ASK = ("Ask with “amontons solve … --uniqueness”, “amontons uniqueness �
        "am.uniqueness(model).")  # fmt: skip
 
 
-def verdict_words(record: Uniqueness | dict[str, Any] | None) -> tuple[str, str]:
-    """Title and text of a verdict, as an object or as solution.json has it; None: not asked."""
-    if record is None:
+def verdict_words(found: Uniqueness | None) -> tuple[str, str]:
+    """Title and text of a verdict; None: not asked."""
+    if found is None:
         return "Not asked", f"Whether there are other solutions has not been examined. {ASK}"
-    if isinstance(record, Uniqueness):
-        record = {"verdict": record.verdict.value, "reason": record.reason}
-    verdict = Verdict(record["verdict"])
-    text = record["reason"]
-    if verdict is Verdict.UNDECIDED:
-        text = f"{text} {ASK}"
-    return TITLES[verdict], text
+    ask = f" {ASK}" if found.verdict is Verdict.UNDECIDED else ""
+    return TITLES[found.verdict], f"{found.reason}{ask}"
 
 
 def outcome_words(record: Convergence) -> str:

@@ -9,7 +9,8 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import roots_jacobi, roots_legendre
+
+from ..meshes.gauss import roots_jacobi, roots_legendre
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -76,7 +77,7 @@ def quadrature(corners: Array, count: Index, points: int) -> tuple[Index, Array,
 def triangle_rule(points: int) -> tuple[Array, Array]:
     """Points (q, 2) and weights (q,) on the unit triangle: Gauss rules folded to its corner."""
     along, first = roots_legendre(points)
-    across, second = roots_jacobi(points, 1, 0)
+    across, second = roots_jacobi(points, 1)
     s, t = np.meshgrid((1 + along) / 2, (1 + across) / 2, indexing="ij")
     at = np.stack([s * (1 - t), t], axis=-1).reshape(-1, 2)
     return at, (first[:, None] * second).ravel() / 8

@@ -16,14 +16,15 @@ solid mechanics", Comput. Methods Appl. Mech. Engrg. 193 (2004) 601-629.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..elements.traces import FacetPoints
-from ..meshes.cells import CELLS, SECOND
+from ..meshes.cells import CELLS, LINEAR
+from ..meshes.surfaces import outward
 from .clipping import clip, line_rule, quadrature
 from .geometry import frames
 from .pairs import KINDS, shapes
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+SIDES = (*KINDS, "line3", "tri6", "quad8", "quad9")  # with the functions of displacements
 AFFINE = 1e-9  # sides of a parallelogram differ by less, relative to its size
 NEWTON = 30  # steps to the reference point of a quadrilateral
 BENT_POINTS = 5  # points per direction on parts of bent quadrilaterals, before correction
@@ -64,9 +66,11 @@ def cuts(
     points: per direction, at least as many as shape functions need; these many by default.
     """
     axes = frames(slave.normal[of])[:, 1:]
-    for n in np.unique(slave.corners[of]):
-        for m in np.unique(master.corners[facet]):
-            both = (slave.corners[of] == n) & (master.corners[facet] == m)
+    for one in np.unique(slave.kind[of]):
+        for other in np.unique(master.kind[facet]):
+            both = (slave.kind[of] == one) & (master.kind[facet] == other)
+            kinds = (SIDES[one], SIDES[other])
+            n, m = (CELLS[kind].corner_count for kind in kinds)
             s, t, e = of[both], facet[both], axes[both]
             origin = slave.centre[s][:, None]
             x = np.einsum("kac,kec->kae", slave.points[slave.nodes[s, :n]] - origin, e)
@@ -75,14 +79,36 @@ def cuts(
                 axis=1
             )
             x, y, s, t = x[near], y[near], s[near], t[near]
-            kinds = (_functions(n, slave.order), _functions(m, master.order))
             if n == 2:
-                yield s, t, _on_lines(x, y, points or 3)
+                least = 4 if "line3" in kinds else 3
+                yield s, t, _measured(slave, s, _on_lines(x, y, points or least))
                 continue
             straight = _is_affine(x) & _is_affine(y)
             for chosen, rule in ((straight, _straight_cuts), (~straight, _bent_cuts)):
                 if chosen.any():
-                    yield s[chosen], t[chosen], rule(x[chosen], y[chosen], kinds, points)
+                    found = rule(x[chosen], y[chosen], kinds, points)
+                    yield s[chosen], t[chosen], _measured(slave, s[chosen], found)
+
+
+def _measured(slave: Surface, of: Index, cut: Cuts) -> Cuts:
+    """Weights of areas of the slave's facets (k,) themselves, around an axis or curved."""
+    if not (slave.curved or slave.axisymmetric) or not len(cut.pair):
+        return cut
+    facet, weight = of[cut.pair], cut.weight
+    cell = CELLS[SIDES[slave.kind[of[0]]]]
+    t, q, e = cut.at.shape
+    at, row = cut.at.reshape(-1, e), np.repeat(facet, q)
+    x = slave.points[slave.all[row, : cell.nodes]]
+    if slave.curved:
+        flat = LINEAR[KINDS[cell.corner_count - 2]]
+        true = np.linalg.norm(outward(cell.jacobians(x, at)), axis=1)
+        plane = outward(flat.jacobians(x[:, : cell.corner_count], at))
+        plane = np.einsum("rc,rc->r", plane, slave.normal[row])
+        weight = weight * (true / plane).reshape(t, q)
+    if slave.axisymmetric:
+        r = np.einsum("ra,ra->r", cell.shape(at), x[:, :, 0])
+        weight = weight * (2 * np.pi * r).reshape(t, q)
+    return replace(cut, weight=weight)
 
 
 def points_on(
@@ -103,12 +129,6 @@ def points_on(
     return FacetPoints(slaves, at, weight), masters, opposite
 
 
-def _functions(corners: int, order: int) -> str:
-    """Kind of facet with the shape functions of its displacement."""
-    kind = KINDS[corners - 2]
-    return kind if order == 1 else SECOND[kind]
-
-
 def _on_lines(x: Array, y: Array, points: int) -> Cuts:
     """Overlaps of lines x with lines y, (k, 2, 1)."""
     x, y = x[:, :, 0], y[:, :, 0]
@@ -124,16 +144,19 @@ def _on_lines(x: Array, y: Array, points: int) -> Cuts:
 
 def _straight_cuts(x: Array, y: Array, kinds: tuple[str, str], points: int | None) -> Cuts:
     """Parts of triangles and parallelograms: the rule is exact for polynomials."""
-    degree = 4 if "quad9" in kinds else 2
+    second = [kind for kind in kinds if kind not in KINDS]
+    least = 3 if any(kind.startswith("quad") for kind in second) else 2
     corners, count = clip(y[:, ::-1], x)  # seen from the slave, the master turns the other way
-    pair, where, weight = quadrature(corners, count, max(points or 3, degree // 2 + 1))
+    wanted = points or (4 if second else 3)  # products with functions of first order
+    pair, where, weight = quadrature(corners, count, max(wanted, least))
     return Cuts(pair, reference(x[pair], where), reference(y[pair], where), weight)
 
 
 def _bent_cuts(x: Array, y: Array, kinds: tuple[str, str], points: int | None) -> Cuts:
     """Parts of other quadrilaterals, with corrected weights."""
     corners, count = clip(y[:, ::-1], x)
-    least = BENT_POINTS if "quad9" in kinds else 3  # per triangle more than conditions
+    many = "quad9" in kinds or "quad8" in kinds
+    least = BENT_POINTS if many else 3  # per triangle more than conditions
     pair, where, weight = quadrature(corners, count, max(points or BENT_POINTS, least))
     at, opposite = reference(x[pair], where), reference(y[pair], where)
     both = _both(kinds, at, opposite)

@@ -42,8 +42,8 @@ class Mismatch:
 def mismatch(slave: Mesh, surface: str, master: Mesh, master_surface: str) -> Mismatch:
     """Mismatch of the pairs of `pair_contact`, all slave nodes in its order."""
     nodes, _, hit = meeting(slave, surface, master, master_surface)
-    over = Surface.of_corners(slave.points, slave.surface(surface), surface)
-    under = Surface.of_corners(master.points, master.surface(master_surface), master_surface)
+    over = Surface.on(slave, surface)
+    under = Surface.on(master, master_surface)
     behind = np.linalg.norm(bulge(under, hit.facet, hit.shape), axis=1) * hit.found
     met = in_front(over, under, master, joined=slave is master)
     if not len(met.slave):
@@ -55,7 +55,9 @@ def mismatch(slave: Mesh, surface: str, master: Mesh, master_surface: str) -> Mi
     wanted = _summed(other, where.weight[:, None] * psi, len(master.points))
     given = (covered[nodes] * hit.found)[:, None] * hit.shape
     arriving = _summed(hit.nodes, given, len(master.points))
-    whole = nodal_weights(master.points, master.surface(master_surface))
+    whole = nodal_weights(
+        master.points, master.surface(master_surface), axisymmetric=master.axisymmetric
+    )
     off = np.abs(arriving - wanted) / np.where(whole > 0, whole, 1.0)
     worst = (off[other] * (psi > COUNTS)).max(axis=1)[:, None] * (phi > COUNTS)
     force = np.zeros(len(slave.points))

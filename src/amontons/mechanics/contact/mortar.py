@@ -33,14 +33,24 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...core.errors import within
-from ..meshes.cells import CELLS
-from ..meshes.facets import Facets
+from ..elements.cell_matrices import around
+from ..meshes.cells import CELLS, FIRST
+from ..meshes.facets import Facets, corner_facets
 from ..meshes.mesh import Mesh
-from ..meshes.surfaces import nodal_normals, nodal_weights
+from ..meshes.surfaces import nodal_normals, nodal_weights, outward
 from .clipping import line_rule, square_rule, triangle_rule
 from .curvature import heights
+from .cuts import SIDES
 from .dual import dual_functions, nodes_with_multiplier
 from .geometry import Obstacle, frames
+from .held_averages import (
+    NO_MOTION,
+    at_end,
+    held_along,
+    held_together,
+    lasting_values,
+    within_free,
+)
 from .nodal import ContactRows, Field, check_exterior, contact_nodes
 from .overlap import check_different, not_facing
 from .pairs import KINDS, MAX_NODES
@@ -49,13 +59,10 @@ from .segments import Segments, Surface, in_front
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
-NO_MOTION = 0.1  # free part of an averaged normal below which supports hold the node in it
 EXACT = 1e-9  # the same for the normals of obstacles
 HARDLY = 0.1  # covered part of a node's weight below which it gets no multiplier
 AROUND = 0.7  # cosine between normals below which a facet lies around an edge
 ROUNDING = 1e-14  # averages below this are zeros with rounding errors
-SAME = 1e-12  # prescribed values that differ by less, relative to the largest, agree
-IN_PLANE = 1e-6  # of the surface's, or a facet's, size: how far a plane's nodes lie from it
 COVERED = 1e-6  # part of a facet that may be missing where it faces the other side as a whole
 RULES = {"line": line_rule(4), "tri": triangle_rule(4), "quad": square_rule(4)}
 
@@ -69,19 +76,19 @@ def mortar_obstacle(
     found, (slave nodes,): nodes with a multiplier; only these have rows.
     """
     check_exterior(mesh, surface)
-    slave = Surface.of(mesh.points, mesh.surface(surface), surface)
+    slave = Surface.on(mesh, surface)
     n, dim = mesh.points.shape
     normals = np.zeros((n, dim))
     on = np.unique(slave.nodes)
     with within("obstacle"):
         normals[on] = obstacle.normals(mesh.points[on])
-        mass, moment = _against(slave, obstacle)
-    without = _held(normals, held, EXACT)
-    average = _Average.of(slave, np.arange(len(slave.nodes)), mass, without)
+        mass, own, moment = _against(slave, obstacle)
+    without = held_along(normals, held, EXACT)
+    average = _Average.of(slave, np.arange(len(slave.nodes)), mass, own, without)
     nodes = average.nodes
     gap = average.of_moments(np.arange(len(moment)), moment[:, :, None])[:, 0]
     rows = average.rows(frames(normals[nodes]), gap, None)
-    return rows, np.isin(contact_nodes(mesh, surface)[0], nodes)
+    return rows, np.isin(mortar_nodes(mesh, surface), nodes)
 
 
 def mortar_contact(
@@ -106,30 +113,41 @@ def mortar_contact(
     check_exterior(slave, surface)
     check_exterior(master, master_surface, "master")
     check_different(slave, surface, master, master_surface)
-    over = Surface.of(slave.points, slave.surface(surface), surface)
-    under = Surface.of(master.points, master.surface(master_surface), master_surface)
+    over, under = Surface.on(slave, surface), Surface.on(master, master_surface)
     parts = in_front(over, under, master, joined=slave is master)
     if not len(parts.slave):
         raise not_facing(slave, surface, master, master_surface)
     facets, of = np.unique(parts.slave, return_inverse=True)
     normals = -_normals(over, facets)
     mass = np.zeros((len(facets), MAX_NODES, MAX_NODES))
+    own: Array | None = None
     np.add.at(mass, of, parts.mass)
-    average = _Average.of(over, facets, mass, _held(normals, held, NO_MOTION))
+    if over.is_second:
+        own = np.zeros((len(facets), *parts.own.shape[1:]))
+        np.add.at(own, of, parts.own)
+    average = _Average.of(over, facets, mass, own, held_along(normals, held, NO_MOTION))
     across = average.onto(parts, of, under)
-    fixed = _held_together(
-        average.nodes, across, (slave.points, _values(lasting, slave)),
-        (master.points, _values(master_lasting, master)), _at_end(over),
+    fixed = held_together(
+        average.nodes, across, (slave.points, lasting_values(lasting, slave)),
+        (master.points, lasting_values(master_lasting, master)), at_end(over),
     )  # fmt: skip
-    axes = frames(_within(normals[average.nodes], fixed))
+    axes = frames(within_free(normals[average.nodes], fixed))
     apart = average.onto_slave @ slave.points - across @ master.points
     apart += average.of_moments(of, parts.bulge)
     gap = np.einsum("pc,pc->p", axes[:, 0], apart)
     size = max(np.abs(mesh.points).max(initial=0.0) for mesh in (slave, master))
     gap[np.abs(gap) < ROUNDING * size] = 0.0
     rows = average.rows(axes, gap, fixed)
-    found = np.isin(contact_nodes(slave, surface)[0], average.nodes)
+    found = np.isin(mortar_nodes(slave, surface), average.nodes)
     return rows, -coupled_columns(across, axes, fixed), found
+
+
+def mortar_nodes(mesh: Mesh, surface: str) -> Index:
+    """Nodes of a surface that can get a multiplier: all, of second order those at corners."""
+    facets = mesh.surface(surface)
+    if all(block.kind in KINDS for block in facets):
+        return contact_nodes(mesh, surface)[0]
+    return np.unique(np.concatenate([corner_facets(block).nodes.ravel() for block in facets]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,23 +168,34 @@ class _Average:
     onto_slave: sparse.csr_array
 
     @classmethod
-    def of(cls, surface: Surface, facets: Index, mass: Array, held: Mask) -> _Average:
-        """From int phi phi (f, 4, 4) on some facets (f,); held (n,): no multiplier wanted."""
+    def of(
+        cls, surface: Surface, facets: Index, mass: Array, own: Array | None, held: Mask
+    ) -> _Average:
+        """From int phi phi (f, 4, 4) on some facets (f,); held (n,): no multiplier wanted.
+
+        own (f, 4, w): int phi N with the functions of displacements of second order, else None.
+        """
         n = len(surface.points)
         nodes, real = surface.nodes[facets], surface.real[facets]
-        whole = nodal_weights(surface.points, surface.blocks)
+        whole = nodal_weights(
+            surface.points, surface.blocks, axisymmetric=surface.axisymmetric
+        )
         reached = _scatter(n, nodes, mass.sum(axis=2)) / np.where(whole > 0, whole, 1.0)
         kept = nodes_with_multiplier(nodes, real, held, reached < HARDLY, reached)
         psi = dual_functions(mass, kept[nodes] & real, real)
         chosen = np.unique(nodes[kept[nodes] & real])
-        product = _between(nodes, psi @ mass, nodes, (n, n))[chosen]
         weights = _scatter(n, nodes, np.einsum("faa->fa", psi @ mass))[chosen]
+        if own is not None:
+            product = _between(nodes, psi @ own, surface.all[facets], (n, n))[chosen]
+            onto = _cleaned(product, weights)
+            return cls(surface, facets, mass, chosen, weights, psi, onto)
+        product = _between(nodes, psi @ mass, nodes, (n, n))[chosen]
         extra = product @ sparse.diags_array(np.where(kept, 0.0, 1.0))
-        own = sparse.csr_array(
+        itself = sparse.csr_array(
             (np.ones(len(chosen)), (np.arange(len(chosen)), chosen)), shape=(len(chosen), n)
         )
         return cls(surface, facets, mass, chosen, weights, psi,
-                   own + _cleaned(extra, weights))  # fmt: skip
+                   itself + _cleaned(extra, weights))  # fmt: skip
 
     @property
     def points(self) -> Array:
@@ -185,8 +214,8 @@ class _Average:
         at_nodes[used] = field(self.points[used])
         moments = np.einsum("fab,fb->fa", self.mass, at_nodes[self.facet_nodes])
         exact = np.zeros((len(self.surface.nodes), MAX_NODES))
-        for of, phi, area, x in _gauss_points(self.surface):
-            exact[of, : len(phi)] += (area * field(phi @ x))[:, None] * phi
+        for of, phi, _, area, x in _gauss_points(self.surface):
+            exact[of, : len(phi)] += (area * field(x))[:, None] * phi
         covered = self.mass.sum(axis=(1, 2))
         whole = covered > (1 - COVERED) * self.surface.area[self.facets]
         moments[whole] = exact[self.facets[whole]]
@@ -198,7 +227,7 @@ class _Average:
         """Averages of the master's nodal values, (nc, n_master); of: facet of every segment."""
         shape = (len(self.points), len(master.points))
         moments = self.psi[of] @ parts.cross
-        product = _between(self.facet_nodes[of], moments, master.nodes[parts.master], shape)
+        product = _between(self.facet_nodes[of], moments, master.all[parts.master], shape)
         return _cleaned(product[self.nodes], self.weights)
 
     def of_moments(self, of: Index, moments: Array) -> Array:
@@ -249,99 +278,63 @@ def _normals(slave: Surface, facets: Index) -> Array:
     length = np.linalg.norm(first, axis=1)
     along = np.einsum("fac,fc->fa", first[slave.nodes], slave.normal)
     turned = ((along < AROUND * length[slave.nodes]) & slave.real).any(axis=1) & ~facing
+    if slave.curved:
+        return _curved_normals(slave, ~turned)
     blocks = np.split(turned, np.cumsum([len(b.nodes) for b in slave.blocks])[:-1])
     kept = [Facets(b.kind, b.nodes[~out]) for b, out in zip(slave.blocks, blocks, strict=True)]
     return nodal_normals(slave.points, tuple(kept))
 
 
-def _against(slave: Surface, obstacle: Obstacle) -> tuple[Array, Array]:
-    """int phi phi (f, 4, 4) and int g phi (f, 4) of whole facets, g the obstacle's gap."""
-    mass = np.zeros((len(slave.nodes), MAX_NODES, MAX_NODES))
-    moment = np.zeros((len(slave.nodes), MAX_NODES))
-    for of, phi, area, x in _gauss_points(slave):
-        n = len(phi)
-        mass[of, :n, :n] += area[:, None, None] * np.outer(phi, phi)
-        height = heights(np.broadcast_to(phi, (len(of), 1, n)), slave.slopes[of, :n], x)
-        gap = obstacle.gap(phi @ x + height * slave.normal[of])
-        moment[of, :n] += (area * gap)[:, None] * phi
-    return mass, moment
+def _curved_normals(slave: Surface, counts: Mask) -> Array:
+    """Unit normals at corners, (n, dim), means of those of the curved facets that count (f,).
 
-
-def _gauss_points(side: Surface) -> Iterator[tuple[Index, Array, Array, Array]]:
-    """Point after point: facets (k,), shape functions (a,), weights (k,), corners (k, a, d)."""
-    for n in np.unique(side.corners):
-        cell, of = CELLS[KINDS[n - 2]], np.flatnonzero(side.corners == n)
-        x = side.points[side.nodes[of, :n]]
-        for at, weight in zip(*RULES[cell.kind], strict=True):
-            jac = cell.jacobians(x, at)
-            area = weight * np.sqrt(np.linalg.det(np.swapaxes(jac, 1, 2) @ jac))
-            yield of, cell.shape(at), area, x
-
-
-# -------------------------------------------------------------------- supports
-def _values(lasting: Array | None, mesh: Mesh) -> Array:
-    return np.full(mesh.points.shape, np.nan) if lasting is None else lasting
-
-
-def _held(normals: Array, held: Mask | None, threshold: float) -> Mask:
-    """Nodes (n,) that supports hold in the direction of their normal; held (n, dim)."""
-    free = np.ones(normals.shape, dtype=bool) if held is None else ~held
-    return np.linalg.norm(normals * free, axis=1) < threshold
-
-
-def _held_together(
-    nodes: Index, across: sparse.csr_array, slave: tuple[Array, Array],
-    master: tuple[Array, Array], at_end: Mask,
-) -> Mask:  # fmt: skip
-    """Components (nc, d) held for good to one value at the slave and at what lies opposite.
-
-    slave, master: points and lasting values, (n, d) each.  All nodes opposite are held so, or
-    those on the plane at which the slave ends (at_end (n, d)) and which stays a plane, as one
-    of symmetry: there the mirror image of the others brings their average to the same value.
+    At the corners themselves: averages with shape functions of second order are none.
     """
-    contact, node = across.tocoo().coords
-    own, (x, values), (y, others) = nodes[contact], slave, master
-    size = np.nanmax(np.abs(np.concatenate([values, others, np.zeros_like(others[:1])])))
-    with np.errstate(invalid="ignore"):
-        agree = np.abs(values[own] - others[node]) <= SAME * size
-    near = IN_PLANE * float(np.ptp(x[nodes], axis=0).max())
-    in_plane = np.abs(x[own] - y[node]) <= near
-    every = np.ones((len(nodes), x.shape[1]), dtype=bool)
-    some, beside = np.zeros_like(every), np.zeros_like(every)
-    np.logical_and.at(every, contact, agree)
-    np.logical_or.at(some, contact, agree)
-    np.logical_or.at(beside, contact, agree & in_plane)
-    mirror = beside & at_end[nodes]
-    for k in range(x.shape[1]):
-        for first in _planes(x[nodes[mirror[:, k]], k], near):
-            on = np.abs(x[:, k] - first) <= near
-            if np.nanmax(values[on, k]) - np.nanmin(values[on, k]) > SAME * size:
-                mirror[on[nodes], k] = False
-    return some & (every | mirror)
+    total = np.zeros(slave.points.shape)
+    for number in np.unique(slave.kind):
+        cell = CELLS[SIDES[number]]
+        nodes = slave.all[(slave.kind == number) & counts, : cell.nodes]
+        for k, at in enumerate(cell.corners[: cell.corner_count]):
+            np.add.at(total, nodes[:, k], outward(cell.jacobians(slave.points[nodes], at)))
+    length = np.linalg.norm(total, axis=1)
+    return total / np.where(length > 0, length, 1.0)[:, None]
 
 
-def _planes(coordinates: Array, near: float) -> Array:
-    """One coordinate of each group of them that are as near."""
-    ordered = np.unique(coordinates)
-    return ordered[np.diff(ordered, prepend=-np.inf) > near]
+def _against(slave: Surface, obstacle: Obstacle) -> tuple[Array, Array | None, Array]:
+    """int phi phi (f, 4, 4), int phi N (f, 4, w), int g phi (f, 4): whole facets, g the gap.
+
+    The second is None of first order.
+    """
+    mass = np.zeros((len(slave.nodes), MAX_NODES, MAX_NODES))
+    own = np.zeros((len(slave.nodes), MAX_NODES, slave.all.shape[1]))
+    moment = np.zeros((len(slave.nodes), MAX_NODES))
+    for of, phi, whole, area, x in _gauss_points(slave):
+        n, corners = len(phi), slave.points[slave.nodes[of, : len(phi)]]
+        mass[of, :n, :n] += area[:, None, None] * np.outer(phi, phi)
+        own[of, :n, : len(whole)] += area[:, None, None] * np.outer(phi, whole)
+        height = heights(
+            np.broadcast_to(phi, (len(of), 1, n)), slave.slopes[of, :n], corners
+        )
+        gap = obstacle.gap(x + height * slave.normal[of])
+        moment[of, :n] += (area * gap)[:, None] * phi
+    return mass, own if slave.is_second else None, moment
 
 
-def _at_end(side: Surface) -> Mask:
-    """Components (n, d) in which all facets of a node lie on one side of it."""
-    x = side.points[side.nodes]  # padded by the last: minima and maxima stay
-    low, high = np.full(side.points.shape, np.inf), np.full(side.points.shape, -np.inf)
-    np.minimum.at(low, side.nodes, np.broadcast_to(x.min(axis=1, keepdims=True), x.shape))
-    np.maximum.at(high, side.nodes, np.broadcast_to(x.max(axis=1, keepdims=True), x.shape))
-    near = IN_PLANE * np.maximum(high - low, 0.0).max(axis=1, keepdims=True)
-    return (side.points <= low + near) | (side.points >= high - near)
+def _gauss_points(side: Surface) -> Iterator[tuple[Index, Array, Array, Array, Array]]:
+    """Point after point: facets (k,), functions, weights (k,) and places (k, d).
 
-
-def _within(normals: Array, fixed: Mask) -> Array:
-    """Unit normals without their fixed components (nc, d), where something is left of them."""
-    inside = normals * ~fixed
-    length = np.linalg.norm(inside, axis=1)
-    able = length > NO_MOTION
-    return np.where(able[:, None], inside / np.where(able, length, 1.0)[:, None], normals)
+    Functions of the corners (a,), and of displacements (w,).
+    """
+    for number in np.unique(side.kind):
+        cell, of = CELLS[SIDES[number]], np.flatnonzero(side.kind == number)
+        first = CELLS[FIRST.get(cell.kind, cell.kind)]
+        x = side.points[side.all[of, : cell.nodes]]
+        for at, weight in zip(*RULES[first.kind], strict=True):
+            jac, shape = cell.jacobians(x, at), cell.shape(at)
+            area = weight * np.sqrt(np.linalg.det(np.swapaxes(jac, 1, 2) @ jac))
+            where = shape @ x
+            area = area * around(where, axisymmetric=side.axisymmetric)
+            yield of, first.shape(at), shape, area, where
 
 
 # -------------------------------------------------------------------- sums over facets

@@ -99,7 +99,8 @@ def contact_nodes(mesh: Mesh, surface: str) -> tuple[Index, Array]:
 
     It is zero at the corners of triangles of second order; only their middles get contacts.
     """
-    weights = nodal_weights(mesh.points, mesh.surface(surface))
+    facets = mesh.surface(surface)
+    weights = nodal_weights(mesh.points, facets, axisymmetric=mesh.axisymmetric)
     nodes = np.flatnonzero(weights > 0)
     return nodes, weights[nodes]
 

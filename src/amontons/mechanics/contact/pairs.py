@@ -19,7 +19,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.spatial import cKDTree
 
 from ...core.errors import InvalidInput
 from ..meshes.facets import Facets
@@ -242,6 +241,8 @@ def _reach(
 
     Among the AROUND closest; where none of them counts, the distance to the last of them.
     """
+    from scipy.spatial import cKDTree
+
     nodes = np.unique(np.concatenate([block.nodes.ravel() for block in surface]))
     distance, which = cKDTree(coordinates[nodes]).query(points, k=min(AROUND, len(nodes)))
     distance, near = distance.reshape(len(points), -1), nodes[which].reshape(len(points), -1)
@@ -280,6 +281,8 @@ def _candidates(
     points: Array, coordinates: Array, facets: Facets, reach: Array
 ) -> tuple[Index, Index]:
     """Pairs (point, facet) with the facet's centre within reach."""
+    from scipy.spatial import cKDTree
+
     tree = cKDTree(coordinates[facets.nodes].mean(axis=1))
     lists = tree.query_ball_point(points, reach * (1 + 1e-9), return_sorted=True)
     counts = np.array([len(found) for found in lists], dtype=np.int64)

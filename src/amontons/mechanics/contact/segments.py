@@ -8,19 +8,24 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from ...core.errors import InvalidInput
+from ..meshes.cells import CELLS
+from ..meshes.check import is_straight
 from ..meshes.facets import Facets, corner_facets
 from ..meshes.mesh import Mesh
 from ..meshes.surfaces import facet_areas, facet_normals, nodal_normals
 from .curvature import heights, slopes
-from .cuts import Cuts, cuts, functions
+from .cuts import SIDES, Cuts, cuts, functions
 from .overlap import inside
 from .pairs import AROUND, BESIDE, DEEP, EDGEWISE, KINDS, MAX_NODES
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -28,6 +33,7 @@ Mask = NDArray[np.bool_]
 FLAT_FACET = 1e-12  # area, relative to the square of the longest side, of a degenerate facet
 SLIVER = 1e-8  # part of a facet; biorthogonal functions on less are lost in rounding
 TWICE = 1e-6  # coverage above 1 by less is rounding
+TWICE_CURVED = 1e-2  # the same where areas are no polynomials
 CHUNK = 2000  # slave facets at a time, for memory
 
 
@@ -37,7 +43,10 @@ class Surface:
 
     corners (f,): how many are real; centre, normal (f, dim), outward; radius, area (f,);
     slopes (f, 4, dim): of the curved surface that the facets stand for, see `curvature`.
-    order: 1, or 2 for displacements of second order on them.
+    Of second order these are the facets between corners, and all (f, w) their nodes with those
+    in between, else the corners again; kind (f,): place in SIDES.  curved: nodes in between
+    lie elsewhere than in the middle, they tell the surface, and slopes are zero.  axisymmetric:
+    areas go around the axis.
     """
 
     points: Array
@@ -49,63 +58,92 @@ class Surface:
     area: Array
     slopes: Array
     blocks: tuple[Facets, ...]
-    order: int = 1
+    all: Index
+    kind: Index
+    curved: bool = False
+    axisymmetric: bool = False
 
     @classmethod
-    def of(cls, points: Array, facets: tuple[Facets, ...], name: str) -> Surface:
-        """The table; raises InvalidInput for facets of second order or without area."""
-        if other := {block.kind for block in facets} - set(KINDS):
-            raise InvalidInput(
-                f"surface {name!r}: expected facets of first order, got {other.pop()!r}; take "
-                'order = 1 and finer cells, or method="nitsche"'
-            )
-        return cls.of_corners(points, facets, name)
-
-    @classmethod
-    def of_corners(cls, points: Array, facets: tuple[Facets, ...], name: str) -> Surface:
-        """The table of the corners of facets of any order, whose sides are straight."""
-        order = 2 if {block.kind for block in facets} - set(KINDS) else 1
-        blocks = tuple(corner_facets(block) for block in facets if len(block.nodes))
-        nodes = np.concatenate([_padded(block.nodes) for block in blocks])
+    def of(
+        cls, points: Array, facets: tuple[Facets, ...], name: str, *, axisymmetric: bool = False
+    ) -> Surface:
+        """The table; raises InvalidInput for facets without area."""
+        given = tuple(block for block in facets if len(block.nodes))
+        blocks = tuple(corner_facets(block) for block in given)
+        nodes = np.concatenate([_padded(block.nodes, MAX_NODES) for block in blocks])
         corners = np.concatenate([np.full(len(b.nodes), b.nodes.shape[1]) for b in blocks])
-        area = np.concatenate([facet_areas(points, block) for block in blocks])
         normal = np.concatenate([facet_normals(points, block) for block in blocks])
         length = np.linalg.norm(normal, axis=1)
         x = points[nodes]
         real = np.arange(MAX_NODES) < corners[:, None]
         centre = np.einsum("fa,fac->fc", real / corners[:, None], x)
         radius = np.linalg.norm(x - centre[:, None], axis=2).max(axis=1)
-        power = points.shape[1] - 1
-        bad = np.flatnonzero(np.minimum(area, length) <= FLAT_FACET * radius**power)
-        if bad.size:
-            where = nodes[bad[0], : corners[bad[0]]]
-            raise InvalidInput(
-                f"surface {name!r}: the facet with nodes {where.tolist()} near "
-                f"{centre[bad[0]].tolist()} has no area; {bad.size} such facets, expected none"
-            )
+        area = np.concatenate([facet_areas(points, block) for block in blocks])
+        _check_areas(name, (nodes, corners, centre), np.minimum(area, length), radius)
         normal = normal / length[:, None]
-        curved = slopes(points, blocks, nodes, real, normal)
-        return cls(points, nodes, corners, centre, normal, radius, area, curved, blocks, order)
+        curved = not all(is_straight(CELLS[b.kind], points[b.nodes]) for b in given)
+        bent = np.zeros((*nodes.shape, points.shape[1]))
+        if not curved:
+            bent = slopes(points, blocks, nodes, real, normal)
+        if curved or axisymmetric:
+            area = np.concatenate(
+                [facet_areas(points, b, axisymmetric=axisymmetric) for b in given]
+            )
+        width = max(MAX_NODES, *(b.nodes.shape[1] for b in given))
+        return cls(
+            points, nodes, corners, centre, normal, radius, area, bent, blocks,
+            np.concatenate([_padded(b.nodes, width) for b in given]),
+            np.concatenate([np.full(len(b.nodes), SIDES.index(b.kind)) for b in given]),
+            curved, axisymmetric,
+        )  # fmt: skip
+
+    @classmethod
+    def on(cls, mesh: Mesh, name: str) -> Surface:
+        """The same of a named surface of a mesh."""
+        return cls.of(
+            mesh.points, mesh.surface(name), name, axisymmetric=mesh.axisymmetric
+        )
 
     @property
     def real(self) -> Mask:
         """Which slots of nodes are real, (f, 4)."""
         return np.arange(MAX_NODES) < self.corners[:, None]
 
+    @property
+    def is_second(self) -> bool:
+        """Whether displacements have nodes between the corners."""
+        return bool(self.kind.max(initial=0) >= len(KINDS))
+
+
+def _check_areas(
+    name: str, table: tuple[Index, Index, Array], area: Array, radius: Array
+) -> None:
+    """Raise InvalidInput where facets, table: nodes, corners and centre, have no area (f,)."""
+    nodes, corners, centre = table
+    bad = np.flatnonzero(area <= FLAT_FACET * radius ** (centre.shape[1] - 1))
+    if bad.size:
+        where = nodes[bad[0], : corners[bad[0]]]
+        raise InvalidInput(
+            f"surface {name!r}: the facet with nodes {where.tolist()} near "
+            f"{centre[bad[0]].tolist()} has no area; {bad.size} such facets, expected none"
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Segments:
     """Integrals on k segments: facets slave, master (k,); a, b are slots of their nodes.
 
-    mass (k, a, b): int phi_a phi_b; cross (k, a, b): int phi_a phi_b^master; bulge (k, a, dim):
-    int phi_a times how far the curved slave lies outside of its facet, less the same of the
-    master, as vectors; area (k,); gap (k,): mean distance of the facets along the slave's
-    normal, < 0 where they overlap.
+    mass (k, a, b): int phi_a phi_b of the corners; own (k, a, w): int phi_a N_b with the shape
+    functions N of the slave's displacement, of first order phi; cross (k, a, w): the same of
+    the master's; bulge (k, a, dim): int phi_a times how far the curved slave lies outside of
+    its facet, less the same of the master, as vectors; area (k,); gap (k,): mean distance of
+    the facets along the slave's normal, < 0 where they overlap.
     """
 
     slave: Index
     master: Index
     mass: Array
+    own: Array
     cross: Array
     bulge: Array
     area: Array
@@ -129,7 +167,7 @@ def segments(slave: Surface, master: Surface, *, joined: bool = False) -> Segmen
             chunk, facet = chunk[apart], facet[apart]
         for of, opposite, parts in cuts(slave, master, chunk, facet):
             found.append(_summed(slave, master, of, opposite, parts))
-    every = _joined(found, slave.points.shape[1])
+    every = _joined(found, slave, master)
     reached = np.bincount(every.slave, every.area, minlength=len(slave.nodes))
     return every.at((reached > SLIVER * slave.area)[every.slave])
 
@@ -158,19 +196,24 @@ def nearest(slave: Surface, every: Segments) -> Segments:
     first = np.ones(len(order), dtype=bool)
     first[1:] = np.diff(every.slave[order]) > 0
     before = np.maximum.accumulate(np.where(first, covered - area, 0.0))
-    kept = covered - before <= (1 + TWICE) * slave.area[every.slave[order]]
+    spare = TWICE_CURVED if slave.curved else TWICE
+    kept = covered - before <= (1 + spare) * slave.area[every.slave[order]]
     return every.at(np.sort(order[kept]))
 
 
-def _padded(nodes: Index) -> Index:
-    missing = MAX_NODES - nodes.shape[1]
+def _padded(nodes: Index, width: int) -> Index:
+    missing = width - nodes.shape[1]
     return np.concatenate([nodes, np.repeat(nodes[:, -1:], missing, axis=1)], axis=1)
 
 
-def _joined(parts: list[Segments], dim: int) -> Segments:
-    none, square = np.zeros(0, dtype=np.int64), np.zeros((0, MAX_NODES, MAX_NODES))
+def _joined(parts: list[Segments], slave: Surface, master: Surface) -> Segments:
+    none, dim = np.zeros(0, dtype=np.int64), slave.points.shape[1]
+    square, own, cross = (
+        np.zeros((0, MAX_NODES, w))
+        for w in (MAX_NODES, slave.all.shape[1], master.all.shape[1])
+    )
     empty = Segments(
-        none, none, square, square, np.zeros((0, MAX_NODES, dim)), np.zeros(0), np.zeros(0)
+        none, none, square, own, cross, np.zeros((0, MAX_NODES, dim)), np.zeros(0), np.zeros(0)
     )
     every = [empty, *parts]
     return Segments(
@@ -181,6 +224,8 @@ def _joined(parts: list[Segments], dim: int) -> Segments:
 # -------------------------------------------------------------------- search
 def _candidates(slave: Surface, master: Surface) -> Iterator[tuple[Index, Index]]:
     """Pairs of facets that may face each other, a chunk of slave facets at a time."""
+    from scipy.spatial import cKDTree
+
     nodes = np.unique(master.nodes)
     normals = nodal_normals(master.points, master.blocks)[nodes]
     tree = cKDTree(master.points[nodes])
@@ -227,26 +272,41 @@ def _summed(
 ) -> Segments:
     """Integrals of the pairs that have a segment."""
     pair, weight = parts.pair, parts.weight
-    sides = ((slave, of, parts.at), (master, facet, parts.opposite))
     phi, psi = (
         functions(KINDS[side.corners[which].max(initial=2) - 2], at)
-        for side, which, at in sides
+        for side, which, at in ((slave, of, parts.at), (master, facet, parts.opposite))
     )
-    k, n, m = len(of), phi.shape[2], psi.shape[2]
-    mass, cross = np.zeros((k, MAX_NODES, MAX_NODES)), np.zeros((k, MAX_NODES, MAX_NODES))
+    k, n = len(of), phi.shape[2]
+    mass = np.zeros((k, MAX_NODES, MAX_NODES))
     bulge = np.zeros((k, MAX_NODES, slave.points.shape[1]))
     weighted = np.swapaxes(weight[:, :, None] * phi, 1, 2)
     np.add.at(mass[:, :n, :n], pair, weighted @ phi)
-    np.add.at(cross[:, :n, :m], pair, weighted @ psi)
+    own = _with(slave, of, pair, weighted, phi, parts.at) if slave.is_second else mass
+    cross = _with(master, facet, pair, weighted, psi, parts.opposite)
     for side, facets, values, sign in ((slave, of, phi, 1), (master, facet, psi, -1)):
-        outside = _outside(side, facets[pair], values)
-        np.add.at(bulge[:, :n], pair, sign * (weighted @ outside))
+        if not side.curved:
+            outside = _outside(side, facets[pair], values)
+            np.add.at(bulge[:, :n], pair, sign * (weighted @ outside))
     area = mass.sum(axis=(1, 2))
-    on_slave = np.einsum("ka,kac->kc", mass.sum(axis=2), slave.points[slave.nodes[of]])
-    on_master = np.einsum("kb,kbc->kc", cross.sum(axis=1), master.points[master.nodes[facet]])
+    on_slave = np.einsum("ka,kac->kc", own.sum(axis=1), slave.points[slave.all[of]])
+    on_master = np.einsum("kb,kbc->kc", cross.sum(axis=1), master.points[master.all[facet]])
     gap = np.einsum("kc,kc->k", on_master - on_slave, slave.normal[of])
     gap /= np.where(area > 0, area, 1.0)
-    return Segments(of, facet, mass, cross, bulge, area, gap).at(area > 0)
+    return Segments(of, facet, mass, own, cross, bulge, area, gap).at(area > 0)
+
+
+def _with(
+    side: Surface, facets: Index, pair: Index, weighted: Array, phi: Array, at: Array
+) -> Array:
+    """Sums (k, 4, w) of weighted (t, n, q) with the displacement's functions of facets (k,).
+
+    phi (t, q, a): functions of first order there, at (t, q, dim - 1).
+    """
+    out = np.zeros((len(facets), MAX_NODES, side.all.shape[1]))
+    kind = SIDES[int(side.kind[facets].max(initial=0))] if len(facets) else "line"
+    values = phi if kind in KINDS else functions(kind, at)
+    np.add.at(out[:, : weighted.shape[1], : values.shape[2]], pair, weighted @ values)
+    return out
 
 
 def _outside(side: Surface, facets: Index, values: Array) -> Array:
@@ -257,7 +317,10 @@ def _outside(side: Surface, facets: Index, values: Array) -> Array:
 
 
 def bulge(side: Surface, facet: Index, shape: Array) -> Array:
-    """Vectors (q, dim) from points of facets (q,) to the curved surface; shape (q, 4): phi."""
+    """Vectors (q, dim) from points of facets (q,) to the curved surface; shape (q, 4): phi.
+
+    They are zero where nodes between the corners tell the surface.
+    """
     out = np.zeros((len(facet), side.points.shape[1]))
     for n in np.unique(side.corners[facet]):
         mine = side.corners[facet] == n

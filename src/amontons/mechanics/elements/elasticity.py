@@ -2,6 +2,7 @@
 
 Small strains: sigma = lame_lambda tr(eps) I + 2 shear eps.  In 2D plane strain, or plane stress
 with lame_lambda replaced by 2 lame_lambda shear / (lame_lambda + 2 shear); unit thickness.
+Axisymmetric meshes, without twist: all is of the whole body, around the axis once.
 Degrees of freedom are interleaved: node * dim + component.
 """
 
@@ -24,6 +25,7 @@ from ..meshes.facets import Cells
 from ..meshes.linear_cells import Rule
 from ..meshes.mesh import Mesh, unknown
 from .cell_loops import stiffness_inplace
+from .cell_matrices import add_blocks, around, cell_stiffness, rule_of
 from .pattern import node_pattern
 
 Array = NDArray[np.float64]
@@ -134,14 +136,19 @@ def stiffness(
     """Stiffness matrix (n dim, n dim) in blocks of dim x dim, force per length.
 
     Exactly symmetric.  Integrated exactly where the sides of quadrilaterals and hexahedra are
-    parallel; otherwise with mesh.order + 1 Gauss points per direction.
+    parallel; otherwise with mesh.order + 1 Gauss points per direction, and with fewer where
+    cells ask for reduced integration.  Axisymmetric meshes: of the whole body around the axis.
     """
     by_region = materials_by_region(mesh, material)
     pointers, columns = node_pattern(mesh.cells, len(mesh.points))
     blocks = np.zeros((len(columns), mesh.dim, mesh.dim))
     for cells in mesh.cells:
-        moduli = by_region[cells.region].moduli(mesh.dim)
-        geometry = geometry_of(mesh, cells, CELLS[cells.kind].stiffness)
+        law = by_region[cells.region]
+        if mesh.axisymmetric or cells.integration == "incompatible":
+            add_blocks(blocks, (pointers, columns), cell_stiffness(mesh, cells, law))
+            continue
+        geometry = geometry_of(mesh, cells, rule_of(mesh, cells))
+        moduli = law.moduli(mesh.dim)
         stiffness_inplace(*geometry, moduli, pointers, columns, blocks, (1.0,) * mesh.dim)
     return sparse.bsr_array((blocks, columns, pointers), shape=(mesh.points.size,) * 2)
 
@@ -168,6 +175,8 @@ def body_load(mesh: Mesh, force: Array, region: str | None = None) -> Array:
         for at, weight in zip(*cell.gauss, strict=True):
             shape = cell.shape(at)
             volume = weight * determinant(cell.jacobians(coordinates, at))
+            where = np.einsum("a,kac->kc", shape, coordinates)
+            volume = volume * around(where, axisymmetric=mesh.axisymmetric)
             value = np.einsum("a,kac->kc", shape, force[block.nodes]) * volume[:, None]
             for local, share in enumerate(shape):
                 np.add.at(load, block.nodes[:, local], share * value)
@@ -178,16 +187,31 @@ def cell_stress(mesh: Mesh, material: LinearElastic | Materials, displacement: A
     """Stress at the centre of every cell, (cells, 3, 3), in the order of mesh.cells.
 
     displacement (n, dim).  In 2D the third row holds the stress across the plane: zero in plane
-    stress, poisson (s_xx + s_yy) in plane strain.
+    stress, poisson (s_xx + s_yy) in plane strain, that around the axis in axisymmetric meshes.
     """
     by_region = materials_by_region(mesh, material)
     parts = []
     for block in mesh.cells:
         cell, law = CELLS[block.kind], by_region[block.region]
-        slopes = cell.gradients(mesh.points[block.nodes], cell.centre)
-        gradient = np.einsum("kac,kad->kcd", displacement[block.nodes], slopes)
+        x, u = mesh.points[block.nodes], displacement[block.nodes]
+        gradient = np.einsum("kac,kad->kcd", u, cell.gradients(x, cell.centre))
+        if mesh.axisymmetric:
+            shape = cell.shape(cell.centre)
+            gradient = with_hoop(gradient, x[:, :, 0] @ shape, u[:, :, 0] @ shape)
         parts.append(law.stress(gradient))
     return np.concatenate(parts)
+
+
+def with_hoop(gradient: Array, r: Array, u: Array) -> Array:
+    """Gradients (k, 3, 3) in r, z and around of gradients (k, 2, 2) at radii r (k,).
+
+    u (k,): radial displacements; on the axis u / r is its slope.
+    """
+    out = np.zeros((len(gradient), 3, 3))
+    out[:, :2, :2] = gradient
+    off = r > 0
+    out[:, 2, 2] = np.where(off, u / np.where(off, r, 1.0), gradient[:, 0, 0])
+    return out
 
 
 def von_mises(stress: Array) -> Array:

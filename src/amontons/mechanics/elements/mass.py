@@ -12,6 +12,7 @@ from ...core.errors import InvalidInput
 from ..meshes.cells import CELLS
 from ..meshes.check import determinant
 from ..meshes.mesh import Mesh
+from .cell_matrices import around
 from .elasticity import LinearElastic, materials_by_region
 
 Array = NDArray[np.float64]
@@ -27,6 +28,8 @@ def mass(mesh: Mesh, material: LinearElastic | Mapping[str, LinearElastic]) -> s
         for at, weight in zip(*cell.gauss, strict=True):
             shape = cell.shape(at)
             volume = weight * determinant(cell.jacobians(mesh.points[nodes], at))
+            where = np.einsum("a,kac->kc", shape, mesh.points[nodes])
+            volume = volume * around(where, axisymmetric=mesh.axisymmetric)
             local += density * volume[:, None, None] * np.outer(shape, shape)
         rows = np.broadcast_to(nodes[:, :, None], local.shape)
         columns = np.broadcast_to(nodes[:, None, :], local.shape)
@@ -50,5 +53,8 @@ def lumped(consistent: sparse.csr_array) -> sparse.csr_array:
 
 def _density(material: LinearElastic, region: str) -> float:
     if material.density is None:
-        raise InvalidInput(f"material of region {region!r}: dynamics need its density")
+        raise InvalidInput(
+            f"material of region {region!r}: dynamics need its density, such as "
+            "LinearElastic(..., density=7.8e-9) in N, mm, s"
+        )
     return material.density

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...core.errors import InvertedCells
 from ..meshes.cells import CELLS, ReferenceCell
 from .cell_loops import nodal_gradients_inplace
-from .elasticity import cell_stress, geometry_of, materials_by_region
+from .elasticity import cell_stress, geometry_of, materials_by_region, with_hoop
 from .hyperelasticity import cauchy_stress, is_hyperelastic
 
 if TYPE_CHECKING:
@@ -47,8 +47,11 @@ def _at_nodes(mesh: Mesh, material: Any, displacement: Array, at_centres: Array)
                 points, nodes, slopes, _ = geometry_of(mesh, cells, rule)
                 nodal_gradients_inplace(u, points, nodes, slopes, gradient, volume, unit)
         at = np.flatnonzero(volume)
+        mean = gradient[at] / volume[at, None, None]
+        if mesh.axisymmetric:
+            mean = with_hoop(mean, mesh.points[at, 0], u[at, 0])
         try:
-            stress = law.stress(gradient[at] / volume[at, None, None])
+            stress = law.stress(mean)
         except InvertedCells:  # at corners, though no cell is at its centre
             return _mean_of_centres(mesh, at_centres)
         total[at] += volume[at, None, None] * stress

@@ -30,7 +30,8 @@ class SurfacePoints:
     """Points of a surface; q points, tables padded with weight zero.
 
     points (q, dim); weights (q,), area; normals (q, dim), unit, outwards; nodes, shape (q, a):
-    of the facet; cell_nodes (q, b), slopes (q, b, dim): of the cell behind it, 1 / length;
+    of the facet; cell_nodes (q, b), slopes (q, b, dim), 1 / length: of the cell behind it;
+    hoop (q, b), 1 / length: strain around an axis by radial displacements, zero without one;
     lame_lambda, shear (q,): of that cell; stiffness (q,), stress per length: the smallest c
     with  int_F |sigma nu|^2 <= c int_T sigma : epsilon  for all displacements of the cell T
     with the facet F, or an upper bound of it.
@@ -43,6 +44,7 @@ class SurfacePoints:
     shape: Array
     cell_nodes: Index
     slopes: Array
+    hoop: Array
     lame_lambda: Array
     shear: Array
     stiffness: Array
@@ -60,7 +62,9 @@ class SurfacePoints:
         slope_n = np.einsum("qbc,qc->qb", self.slopes, self.normals)
         slope_k = np.einsum("qbc,qkc->qbk", self.slopes, axes)
         along = np.einsum("qkc,qc->qk", axes, self.normals)
-        values = np.einsum("q,qbc,qk->qbck", self.lame_lambda, self.slopes, along)
+        dilated = self.slopes.copy()
+        dilated[:, :, 0] += self.hoop
+        values = np.einsum("q,qbc,qk->qbck", self.lame_lambda, dilated, along)
         values += np.einsum("q,qb,qkc->qbck", self.shear, slope_n, axes)
         values += np.einsum("q,qbk,qc->qbck", self.shear, slope_k, self.normals)
         return node_columns(self.cell_nodes, values, size)
@@ -95,7 +99,12 @@ def gauss_points(mesh: Mesh, surface: str, count: int) -> FacetPoints:
     for facets in mesh.surface(surface):
         side, k = CELLS[facets.kind], len(facets.nodes)
         at, weight = gauss(side.dim, side.corner_count == 3, count)
-        area = [np.linalg.norm(facet_normals(mesh.points, facets, x), axis=1) for x in at]
+        area = [
+            np.linalg.norm(
+                facet_normals(mesh.points, facets, x, axisymmetric=mesh.axisymmetric), axis=1
+            )
+            for x in at
+        ]
         weights = (weight * np.stack(area, axis=1)).ravel()
         parts.append((np.repeat(np.arange(before, before + k), len(at)),
                       np.tile(at, (k, 1)), weights))  # fmt: skip
@@ -188,12 +197,16 @@ def _points(  # noqa: PLR0913
     inside = phi @ cell.corners[local]  # of the cell
     own = block.nodes[cells[row]]
     slopes = cell.gradient(inside) @ np.linalg.inv(cell.jacobians(mesh.points[own], inside))
+    hoop = np.zeros(own.shape)
+    if mesh.axisymmetric:
+        behind = cell.shape(inside)
+        hoop = behind / np.einsum("qb,qb->q", behind, mesh.points[own, 0])[:, None]
     lame, shear = law.lame_lambda(mesh.dim), law.shear
     stiffness = (lame + 2 * shear) * _trace_constant(mesh, facets, block, cells)
     return SurfacePoints(
         np.einsum("qa,qac->qc", phi, x), where.weight,
         normal / np.linalg.norm(normal, axis=1)[:, None], facets.nodes[row], phi, own, slopes,
-        np.full(len(row), lame), np.full(len(row), shear), stiffness[row],
+        hoop, np.full(len(row), lame), np.full(len(row), shear), stiffness[row],
     )  # fmt: skip
 
 

@@ -28,7 +28,7 @@ MIRROR = {
     "wedge": [0, 2, 1, 3, 5, 4],
     "pyramid": [0, 3, 2, 1, 4],
 }
-for _kind in ("tri6", "quad9", "tet10", "hex27"):
+for _kind in ("tri6", "quad9", "tet10", "hex27", "quad8", "hex20", "wedge15"):
     _corners, _parents = MIRROR[FIRST[_kind]], [set(p) for p in CELLS[_kind].parents]
     MIRROR[_kind] = _corners + [
         len(_corners) + _parents.index({_corners[k] for k in p}) for p in _parents
@@ -52,7 +52,6 @@ def checked_cells(points: Array, kind: str, nodes: ArrayLike, region: str) -> In
             f"{kind} cells: expected node numbers 0..{len(points) - 1}, "
             f"got {table.min()}..{table.max()}"
         )
-    _check_straight(cell, points[table], region)
     low, high = _determinants(cell, points[table])
     turned = high < -FLAT
     table[turned] = table[np.flatnonzero(turned)[:, None], MIRROR[kind]]
@@ -86,17 +85,41 @@ def check_repeated(points: Array, blocks: Sequence[Cells]) -> None:
         )
 
 
-def _check_straight(cell: ReferenceCell, coordinates: Array, region: str) -> None:
-    """Nodes between corners must be in the middle: contact and levels need straight sides."""
+def check_integration(block: Cells) -> None:
+    """Raise InvalidInput for an integration that cells of this kind do not have."""
+    known = ["full"]
+    if CELLS[block.kind].reduced is not None:
+        known.append("reduced")
+    if block.kind in ("quad", "hex"):
+        known.append("incompatible")
+    if block.integration not in known:
+        raise InvalidInput(
+            f"{block.kind} cells: integration: expected {' or '.join(known)}, got "
+            f"{block.integration!r}"
+        )
+
+
+def check_half_section(points: Array) -> None:
+    """Raise InvalidInput for points that are no half section (r, z) of a body of revolution."""
+    if points.shape[1] != 2:
+        raise InvalidInput("axisymmetric: expected a mesh in 2D, of points (r, z), got 3D")
+    least = int(points[:, 0].argmin())
+    if points[least, 0] < 0:
+        raise InvalidInput(
+            "axisymmetric: expected points (r, z) with r >= 0, one half of the section; got "
+            f"r = {points[least, 0]:.6g} at points[{least}]"
+        )
+
+
+def is_straight(cell: ReferenceCell, coordinates: Array) -> bool:
+    """Whether all nodes between corners (k, nodes, dim) are in the middle."""
     first = cell.corner_count
     size = np.ptp(coordinates, axis=1).max(initial=0.0)
-    for k, parents in enumerate(cell.parents):
-        off = coordinates[:, first + k] - coordinates[:, list(parents)].mean(axis=1)
-        if np.abs(off).max() > STRAIGHT * size:
-            raise InvalidInput(
-                f"{cell.kind} cells: expected straight sides, nodes in the middle; region "
-                f"{region!r} has others"
-            )
+    return all(
+        np.abs(coordinates[:, first + k] - coordinates[:, list(parents)].mean(axis=1)).max(
+            initial=0.0) <= STRAIGHT * size
+        for k, parents in enumerate(cell.parents)
+    )  # fmt: skip
 
 
 def _determinants(cell: ReferenceCell, coordinates: Array) -> tuple[Array, Array]:
@@ -104,6 +127,8 @@ def _determinants(cell: ReferenceCell, coordinates: Array) -> tuple[Array, Array
     size = np.ptp(coordinates, axis=1).max(axis=1)
     scale = np.where(size > 0, size, 1.0) ** cell.dim
     where = cell.gauss[0] if cell.kind == "pyramid" else cell.corners
+    if cell.order == 2 and not is_straight(cell, coordinates):
+        where = np.concatenate([where, cell.gauss[0]])
     values = np.stack([determinant(cell.jacobians(coordinates, x)) for x in where])
     return values.min(axis=0) / scale, values.max(axis=0) / scale
 

@@ -17,11 +17,17 @@ Index = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Cells of one kind in one region: nodes (k, nodes per cell) in VTK order."""
+    """Cells of one kind in one region: nodes (k, nodes per cell) in VTK order.
+
+    integration: of the stiffness of small strains, "full", or "reduced", with fewer points:
+    2 per direction for quad8, quad9, hex20 and hex27, 2 for wedge, 9 for wedge15; or
+    "incompatible", bending modes inside of each quad or hex on its own.
+    """
 
     kind: str
     nodes: Index
     region: str = "default"
+    integration: str = "full"
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,15 @@ KINDS = {1: ("line", 2), 2: ("tri", 3), 3: ("quad", 4), 4: ("tet", 4), 5: ("hex"
          11: ("tet10", 10), 12: ("hex27", 27), 13: ("wedge18", 18), 14: ("pyramid14", 14),
          15: ("vertex", 1), 16: ("quad8", 8), 17: ("hex20", 20), 18: ("wedge15", 15),
          19: ("pyramid13", 13)}  # fmt: skip
-DIMENSION = {"vertex": 0, "line": 1, "tri": 2, "quad": 2}
+ORDER = {  # of gmsh's nodes, in the places of ours: edges and faces come in another order
+    "tet10": (0, 1, 2, 3, 4, 5, 6, 7, 9, 8),
+    "hex20": (*range(8), 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15),
+    "hex27": (*range(8), 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15,
+              22, 23, 21, 24, 20, 25, 26),
+    "wedge15": (*range(6), 6, 9, 7, 12, 14, 13, 8, 10, 11),
+}  # fmt: skip
+DIMENSION = {"vertex": 0, "line": 1, "tri": 2, "quad": 2, "line3": 1, "tri6": 2, "quad8": 2,
+             "quad9": 2}  # fmt: skip
 Names = dict[tuple[int, int], str]
 
 
@@ -224,5 +232,6 @@ def _raw(path: str, names: Names, nodes: tuple[Index, NDArray], elements: Elemen
             )
         dim = DIMENSION.get(kind, 3)
         groups = tuple(names.get((dim, tag), str(tag)) for tag in physical)
-        blocks.append(RawBlock(kind, order[place], groups))
+        nodes = order[place]
+        blocks.append(RawBlock(kind, nodes[:, ORDER[kind]] if kind in ORDER else nodes, groups))
     return RawMesh(points, blocks)

@@ -13,7 +13,8 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import roots_jacobi
+
+from .gauss import roots_jacobi
 
 Array = NDArray[np.float64]
 Facets = tuple[tuple[int, ...], ...]
@@ -29,6 +30,8 @@ class ReferenceCell:
     gauss: points (k, dim) and weights (k,), exact for the integrals of shape functions;
     stiffness: the same for products of two gradients, exact where the Jacobian is constant.
     parents: of every node that is no corner, the corners that it is the middle of.
+    reduced: fewer points for products of gradients, with which a regular mesh still has no
+    motion without energy but the rigid ones; None where there are no fewer.
     """
 
     kind: str
@@ -40,6 +43,7 @@ class ReferenceCell:
     gauss: Rule
     stiffness: Rule
     parents: tuple[tuple[int, ...], ...] = ()
+    reduced: Rule | None = None
 
     @property
     def nodes(self) -> int:
@@ -148,6 +152,7 @@ _TRI = (np.array([[1, 1], [4, 1], [1, 4]]) / 6, np.full(3, 1 / 6))
 _A, _B = (5 - np.sqrt(5)) / 20, (5 + 3 * np.sqrt(5)) / 20
 _TET = (np.vstack([np.full(3, _A), _A + (_B - _A) * np.eye(3)]), np.full(4, 1 / 24))
 _WEDGE = (np.array([[*p, z] for p in _TRI[0] for z in _TWO]), np.full(6, 1 / 12))
+_ON_AXIS = (np.array([[1 / 3, 1 / 3, z] for z in _TWO]), np.full(2, 1 / 4))
 _PYRAMID = (np.array([[0.375, 0.375, 0.25]]), np.full(1, 1 / 3))
 _ONE_IN_TRI = (np.full((1, 2), 1 / 3), np.array([1 / 2]))
 _ONE_IN_TET = (np.full((1, 3), 1 / 4), np.array([1 / 6]))
@@ -172,7 +177,7 @@ _TET_FACETS = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
 
 def _in_pyramid() -> Rule:
     """Two points per direction: one could not hold all modes."""
-    height, weights = roots_jacobi(2, 2, 0)  # the square of the distance from the apex
+    height, weights = roots_jacobi(2, 2)  # the square of the distance from the apex
     points = [((1 - h) * x, (1 - h) * y, h)
               for h, x, y in product((1 + height) / 2, _TWO, _TWO)]  # fmt: skip
     return np.array(points), np.repeat(weights / 8, 4) / 4
@@ -184,11 +189,13 @@ def _cell(
     parts: tuple[Array, Callable, Callable],
     gauss: Rule,
     stiffness: Rule | None = None,
+    reduced: Rule | None = None,
 ) -> ReferenceCell:
     """stiffness: by default the points of `gauss`."""
     corners, *functions = parts
     rules = (gauss, stiffness or gauss)
-    return ReferenceCell(kind, corners.shape[1], corners, facets, *functions, *rules)
+    return ReferenceCell(kind, corners.shape[1], corners, facets, *functions, *rules,
+                         reduced=reduced)  # fmt: skip
 
 
 LINEAR = {
@@ -199,7 +206,7 @@ LINEAR = {
         _cell("quad", _QUAD_FACETS, _tensor(_SQUARE), _QUAD),
         _cell("tet", _TET_FACETS, _simplex(3), _TET, _ONE_IN_TET),
         _cell("hex", _HEX_FACETS, _tensor(_CUBE), _HEX),
-        _cell("wedge", _WEDGE_FACETS, _wedge(), _WEDGE),
+        _cell("wedge", _WEDGE_FACETS, _wedge(), _WEDGE, reduced=_ON_AXIS),
         _cell("pyramid", _PYRAMID_FACETS, _pyramid(), _PYRAMID, _in_pyramid()),
     )
 }

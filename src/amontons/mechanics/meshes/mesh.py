@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from copy import copy
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,9 +13,10 @@ from scipy import sparse
 
 from ...core.arrays import LARGEST, integers, read_only, real, squarable
 from ...core.errors import InvalidInput, shown
+from ...core.words import near
 from ...linear.levels import checked_levels
 from .cells import CELLS
-from .check import check_repeated, checked_cells
+from .check import check_half_section, check_integration, check_repeated, checked_cells
 from .facets import Cells, Facets, boundary, oriented
 
 Array = NDArray[np.float64]
@@ -34,6 +35,8 @@ class Mesh:
     next coarser mesh), levels[1] leads from the one after that to it, and so on; every coarse
     node is a node of this mesh.  `box`, `refined` and `second_order` fill them.
     node_sets: name -> numbers of points, which may be held and loaded as surfaces are.
+    axisymmetric: the points are (r, z) with r >= 0, one half of the section of a body of
+    revolution about r = 0; all integrals go around it once, see `turned`.
     """
 
     points: Array
@@ -43,6 +46,7 @@ class Mesh:
     name: str = ""
     levels: tuple[sparse.csr_array, ...] = ()
     node_sets: dict[str, Index] = field(default_factory=dict)
+    axisymmetric: bool = False
 
     def __post_init__(self) -> None:
         points = real("points", self.points)
@@ -56,13 +60,17 @@ class Mesh:
         for name, facets in self.surfaces.items():
             _check_parts(f"surface {name!r}", facets, Facets)
         blocks = tuple(
-            Cells(b.kind, checked_cells(points, b.kind, b.nodes, b.region), b.region)
+            replace(b, nodes=checked_cells(points, b.kind, b.nodes, b.region))
             for b in self.cells
             if len(b.nodes)
         )
         object.__setattr__(self, "cells", blocks)
         self._check_use()
         check_repeated(points, blocks)
+        for block in blocks:
+            check_integration(block)
+        if self.axisymmetric:
+            check_half_section(self.points)
         surfaces = {k: oriented(blocks, v, k, points) for k, v in self.surfaces.items()}
         object.__setattr__(self, "surfaces", surfaces)
         object.__setattr__(self, "levels", checked_levels(self.levels, len(points)))
@@ -145,6 +153,18 @@ class Mesh:
             return self.node_sets[name]
         return np.unique(np.concatenate([b.nodes.ravel() for b in self.surface(name)]))
 
+    def turned(self) -> Mesh:
+        """The same mesh as half of the section of a body of revolution, see `axisymmetric`.
+
+        Raises InvalidInput in 3D, and for points with r < 0.
+        """
+        if self.axisymmetric:
+            return self
+        check_half_section(self.points)
+        other = copy(self)
+        object.__setattr__(other, "axisymmetric", True)
+        return other
+
     def bounding_box(self) -> tuple[Array, Array]:
         """Smallest and largest coordinates, each (dim,)."""
         return self.points.min(axis=0), self.points.max(axis=0)
@@ -165,6 +185,6 @@ def unknown(what: str, name: object, known: object) -> str:
     names = [str(k) for k in known]  # type: ignore[attr-defined]
     if not names:
         return f"{what} {name!r}: not found, there are no named {what}s"
-    near = difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
+    meant = near(name, names)
+    hint = f"; did you mean {meant!r}?" if meant else ""
     return f"{what} {name!r}: not found, known: {', '.join(sorted(names))}{hint}"

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...core.errors import InvalidInput
-from .cells import CELLS, SECOND
+from .cells import CELLS, SECOND, SERENDIPITY
 from .facets import Cells, Facets
 from .mesh import Mesh
 
@@ -19,36 +19,39 @@ Parents = tuple[tuple[int, ...], ...]
 INSIDE = 1e-9  # rounding of a sum of weights
 
 
-def second_order(mesh: Mesh) -> Mesh:
+def second_order(mesh: Mesh, *, serendipity: bool = False) -> Mesh:
     """The same mesh with nodes also in the middle of edges, quadrilaterals and hexahedra.
 
+    serendipity: on edges only, as most codes have it: quad8, hex20 and wedge15.
     Sides stay straight.  The points of the mesh keep their numbers, the new ones follow.  The
     given mesh is the first of its coarser `levels`.  A mesh of second order is returned as it
     is.
     """
     if mesh.order == 2:
         return mesh
+    seconds = SERENDIPITY if serendipity else SECOND
     for block in mesh.cells:
-        if block.kind not in SECOND:
+        if block.kind not in seconds:
             raise InvalidInput(
                 f"order: expected 1 for a mesh with {block.kind} cells, got 2 (which exists "
-                f"for {', '.join(kind for kind in SECOND if kind != 'line')})"
+                f"for {', '.join(kind for kind in seconds if kind != 'line')})"
             )
     blocks = [*mesh.cells, *(facets for group in mesh.surfaces.values() for facets in group)]
-    parents = {first: CELLS[second].parents for first, second in SECOND.items()}
+    parents = {first: CELLS[second].parents for first, second in seconds.items()}
     prolongation, tables = with_middles(len(mesh.points), blocks, parents)
     cells = tuple(
-        Cells(SECOND[b.kind], nodes, b.region)
+        Cells(seconds[b.kind], nodes, b.region)
         for b, nodes in zip(mesh.cells, tables, strict=False)
     )
     rest = iter(tables[len(mesh.cells) :])
     surfaces = {
-        name: tuple(Facets(SECOND[facets.kind], next(rest)) for facets in group)
+        name: tuple(Facets(seconds[facets.kind], next(rest)) for facets in group)
         for name, group in mesh.surfaces.items()
     }
     points = prolongation @ mesh.points
     return Mesh(points, cells, surfaces, name=mesh.name, levels=(prolongation, *mesh.levels),
-                node_sets=carried(mesh.node_sets, prolongation))  # fmt: skip
+                node_sets=carried(mesh.node_sets, prolongation),
+                axisymmetric=mesh.axisymmetric)  # fmt: skip
 
 
 def carried(sets: Mapping[str, Index], prolongation: sparse.csr_array) -> dict[str, Index]:

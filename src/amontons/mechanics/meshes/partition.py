@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,6 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...core.errors import InvalidInput, MissingDependency
-from .facets import Cells
 from .mesh import Mesh
 
 Index = NDArray[np.int64]
@@ -64,11 +64,11 @@ def extract(mesh: Mesh, wanted: NDArray[np.bool_]) -> tuple[Mesh, Index]:
         first = last
     used = np.unique(np.concatenate([nodes.ravel() for _, nodes in blocks]))
     cells = tuple(
-        Cells(block.kind, np.searchsorted(used, nodes), block.region)
+        replace(block, nodes=np.searchsorted(used, nodes))
         for block, nodes in blocks
         if len(nodes)
     )
-    return Mesh(mesh.points[used], cells), used
+    return Mesh(mesh.points[used], cells, axisymmetric=mesh.axisymmetric), used
 
 
 def _pymetis() -> Any:

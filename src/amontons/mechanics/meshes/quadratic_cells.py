@@ -1,7 +1,9 @@
-"""Reference cells of second order: nodes at the corners and at the middles, Lagrange shapes.
+"""Reference cells of second order: nodes at the corners and at the middles.
 
-Nodes in VTK order: corners, middles of edges, of quadrilateral faces, of the hexahedron.  Sides
-are straight: every node sits at the mean of its parents, the corners that it lies between.
+Nodes in VTK order: corners, middles of edges, of quadrilateral faces, of the hexahedron.  On
+the reference cell every node sits at the mean of its parents, the corners that it lies between.
+The serendipity cells quad8, hex20 and wedge15 have nodes at corners and edges only; all others
+have all polynomials of degree 2 in every direction, or in all.
 """
 
 from __future__ import annotations
@@ -11,8 +13,8 @@ from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import roots_jacobi
 
+from .gauss import roots_jacobi
 from .linear_cells import LINEAR, ReferenceCell, Rule
 
 Array = NDArray[np.float64]
@@ -24,18 +26,29 @@ _TET = (*_TRI, (0, 3), (1, 3), (2, 3))
 _HEX = (*_QUAD, (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7),
         (0, 3, 7, 4), (1, 2, 6, 5), (0, 1, 5, 4), (3, 2, 6, 7), (0, 1, 2, 3), (4, 5, 6, 7),
         tuple(range(8)))  # fmt: skip
+_WEDGE = (*_TRI, (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5))
 PARENTS = {"line3": ((0, 1),), "tri6": _TRI, "quad9": (*_QUAD, (0, 1, 2, 3)), "tet10": _TET,
-           "hex27": _HEX}  # fmt: skip
-FIRST = {"line3": "line", "tri6": "tri", "quad9": "quad", "tet10": "tet", "hex27": "hex"}
-SECOND = {first: second for second, first in FIRST.items()}
+           "hex27": _HEX, "quad8": _QUAD, "hex20": _HEX[:12], "wedge15": _WEDGE}  # fmt: skip
+SECOND = {"line": "line3", "tri": "tri6", "quad": "quad9", "tet": "tet10", "hex": "hex27"}
+SERENDIPITY = SECOND | {"quad": "quad8", "hex": "hex20", "wedge": "wedge15"}
+FIRST = {second: first for table in (SECOND, SERENDIPITY) for first, second in table.items()}
 
 
-def _lagrange(nodes: Array, simplex: bool) -> tuple[Callable, Callable]:
-    """Shape functions that are 1 at one node each, of degree 2 in all or in each direction."""
+def _powers(kind: str, dim: int) -> Array:
+    """Exponents of the monomials of a cell, (nodes, dim)."""
+    every = list(product(range(3), repeat=dim))
+    if kind in ("tri6", "tet10"):
+        every = [p for p in every if sum(p) <= 2]
+    elif kind in ("quad8", "hex20"):
+        every = [p for p in every if p.count(2) <= 1]
+    elif kind == "wedge15":  # of degree 2 in all where linear along the axis, else 1
+        every = [p for p in every if p[0] + p[1] <= (2 if p[2] < 2 else 1)]
+    return np.array(every)
+
+
+def _lagrange(nodes: Array, powers: Array) -> tuple[Callable, Callable]:
+    """Shape functions of these monomials that are 1 at one node each."""
     dim = nodes.shape[1]
-    powers = np.array([
-        p for p in product(range(3), repeat=dim) if not simplex or sum(p) <= 2
-    ])  # fmt: skip
     lower = np.maximum(powers - 1, 0)
 
     def monomials(x: Array) -> Array:
@@ -59,7 +72,7 @@ def gauss(dim: int, simplex: bool, count: int = 3) -> tuple[Array, Array]:
     Points (count^dim, dim) and weights of the unit cube or simplex.
     """
     points, weights = [], []
-    rules = [roots_jacobi(count, dim - 1 - k if simplex else 0, 0) for k in range(dim)]
+    rules = [roots_jacobi(count, dim - 1 - k if simplex else 0) for k in range(dim)]
     for nodes in product(range(count), repeat=dim):
         at = np.array([(1 + rules[k][0][j]) / 2 for k, j in enumerate(nodes)])
         scale = [2.0 ** -(dim - k if simplex else 1) for k in range(dim)]
@@ -84,21 +97,43 @@ def _in_tet() -> Rule:
     return np.vstack(barycentric)[:, 1:], weights / weights.sum() / 6
 
 
+def _in_wedge(points: tuple[Rule, Rule]) -> Rule:
+    """Points in a triangle times points on a line."""
+    (triangle, area), (line, length) = points
+    at = [[*p, *z] for p in triangle for z in line]
+    return np.array(at), np.outer(area, length).ravel()
+
+
+def _rules(kind: str, first: ReferenceCell) -> tuple[Rule, Rule, Rule]:
+    """Points for shape functions, for products of gradients, and fewer of the latter."""
+    if kind == "wedge15":
+        few = _in_wedge((LINEAR["tri"].gauss, gauss(1, False)))
+        full = _in_wedge((gauss(2, True), gauss(1, False)))
+        return full, full, few
+    simplex = first.kind in ("tri", "tet")
+    rule = _in_tet() if kind == "tet10" else gauss(first.dim, simplex)
+    return rule, first.gauss if simplex else rule, first.gauss
+
+
 def _cell(kind: str) -> ReferenceCell:
     first, parents = LINEAR[FIRST[kind]], PARENTS[kind]
     middles = [first.corners[list(p)].mean(axis=0) for p in parents]
     nodes = np.vstack([first.corners, middles])
-    simplex = FIRST[kind] in ("tri", "tet")
-    shape, gradient = _lagrange(nodes, simplex)
-    facets = tuple(_facet(facet, parents, len(first.corners)) for facet in first.facets)
-    rule = _in_tet() if kind == "tet10" else gauss(first.dim, simplex)
-    return ReferenceCell(kind, first.dim, nodes, facets, shape, gradient, rule,
-                         first.gauss if simplex else rule, parents)  # fmt: skip
+    shape, gradient = _lagrange(nodes, _powers(kind, first.dim))
+    whole = any(len(p) > 2 for p in parents)
+    facets = tuple(
+        _facet(facet, parents, len(first.corners), whole) for facet in first.facets
+    )
+    rule, stiffness, reduced = _rules(kind, first)
+    return ReferenceCell(kind, first.dim, nodes, facets, shape, gradient, rule, stiffness,
+                         parents, reduced)  # fmt: skip
 
 
-def _facet(corners: tuple[int, ...], parents: Parents, first: int) -> tuple[int, ...]:
-    """Nodes of one side, in the order of its own kind."""
-    kind = {1: None, 2: "line3", 3: "tri6", 4: "quad9"}[len(corners)]
+def _facet(
+    corners: tuple[int, ...], parents: Parents, first: int, whole: bool
+) -> tuple[int, ...]:
+    """Nodes of one side, in the order of its own kind; whole: sides have a node inside."""
+    kind = {1: None, 2: "line3", 3: "tri6", 4: "quad9" if whole else "quad8"}[len(corners)]
     place = {frozenset(p): first + k for k, p in enumerate(parents)}
     wanted = PARENTS[kind] if kind else ()
     return (*corners, *(place[frozenset(corners[j] for j in p)] for p in wanted))

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import FileFormatError, InvalidInput
-from .cells import LINEAR
+from .cells import CELLS
 from .facets import Cells, Facets, boundary
 from .mesh import Mesh
 
@@ -51,7 +51,7 @@ def to_mesh(raw: RawMesh, path: str) -> Mesh:
     used = np.unique(np.concatenate([c.nodes.ravel() for c in cells]))
     number = np.full(len(points), -1)
     number[used] = np.arange(len(used))
-    cells = tuple(Cells(c.kind, number[c.nodes], c.region) for c in cells)
+    cells = tuple(replace(c, nodes=number[c.nodes]) for c in cells)
     surfaces = _surfaces([b for b in named if _dim(b.kind) == dim - 1], number, path)
     for name, nodes in raw.node_sets.items():
         facets = _spanned(cells, number[nodes], len(used))
@@ -64,17 +64,18 @@ def to_mesh(raw: RawMesh, path: str) -> Mesh:
 
 
 def _dim(kind: str) -> int:
-    return LINEAR[kind].dim if kind in LINEAR else 0
+    return CELLS[kind].dim if kind in CELLS else 0
 
 
 def _dimension(raw: RawMesh, path: str) -> tuple[int, Array]:
     """(2, points without z) for plane meshes, (3, points) where there are solid cells."""
     kinds = {b.kind for b in raw.blocks if len(b.nodes)}
-    known = {*LINEAR, "vertex"}
+    known = {*CELLS, "vertex"}
     if kinds - known:
         raise FileFormatError(
-            f"{path}: expected elements of first order ({', '.join(sorted(known))}), "
-            f"got {', '.join(sorted(kinds - known))}; in gmsh set Mesh.ElementOrder = 1"
+            f"{path}: expected elements {', '.join(sorted(known))}, got "
+            f"{', '.join(sorted(kinds - known))}; in gmsh set Mesh.ElementOrder = 1, or with "
+            "wedges and ElementOrder = 2 also Mesh.SecondOrderIncomplete = 1"
         )
     top = max((_dim(kind) for kind in kinds), default=0)
     if top < 2:

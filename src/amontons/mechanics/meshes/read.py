@@ -19,7 +19,10 @@ from .mesh import Mesh
 from .raw import RawBlock, RawMesh, to_mesh
 from .split import Glue, check_glue, split
 
-KINDS = {"triangle": "tri", "tetra": "tet", "hexahedron": "hex"}
+KINDS = {
+    "triangle": "tri", "tetra": "tet", "hexahedron": "hex", "triangle6": "tri6",
+    "tetra10": "tet10", "hexahedron20": "hex20", "hexahedron27": "hex27",
+}  # fmt: skip
 CAD_SUFFIXES = (".step", ".stp", ".iges", ".igs", ".brep")
 TAGS = ("gmsh:physical", "medit:ref", "cell_tags", "MaterialID", "region", "avsucd:material")
 
@@ -27,6 +30,7 @@ TAGS = ("gmsh:physical", "medit:ref", "cell_tags", "MaterialID", "region", "avsu
 def read_mesh(path: str | os.PathLike[str], *, glue: Glue = True) -> Mesh:
     """The mesh in a file: gmsh 2.2 or 4.1, or any format that meshio reads.
 
+    Of second order too, with sides curved as in the file.
     Groups of the highest dimension become regions, groups one dimension lower surfaces, also
     named node sets (Abaqus NSET).  Groups without a name go by their number.  A mesh of plane
     cells with constant z is a mesh in 2D.  Raises FileFormatError naming file and line.

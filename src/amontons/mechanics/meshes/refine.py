@@ -55,7 +55,7 @@ def _once(mesh: Mesh) -> Mesh:
     prolongation, tables = with_middles(len(mesh.points), blocks, MIDDLES)
     points = prolongation @ mesh.points
     cells = tuple(
-        Cells(kind, nodes, block.region)
+        Cells(kind, nodes, block.region, block.integration if kind == block.kind else "full")
         for block, table in zip(mesh.cells, tables, strict=False)
         for kind, nodes in _children(block.kind, table, points)
     )
@@ -69,7 +69,8 @@ def _once(mesh: Mesh) -> Mesh:
         for name, group in mesh.surfaces.items()
     }
     return Mesh(points, cells, surfaces, name=mesh.name, levels=(prolongation, *mesh.levels),
-                node_sets=carried(mesh.node_sets, prolongation))  # fmt: skip
+                node_sets=carried(mesh.node_sets, prolongation),
+                axisymmetric=mesh.axisymmetric)  # fmt: skip
 
 
 def _children(kind: str, table: Index, points: Array) -> list[tuple[str, Index]]:

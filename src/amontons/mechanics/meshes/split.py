@@ -7,7 +7,7 @@ the surface between them nodes of its own, at the same places.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from scipy import sparse
 
 from ...core.errors import InvalidInput
 from .cells import CELLS, FACET_KIND
-from .facets import Cells, Facets
+from .facets import Facets
 from .mesh import Mesh, unknown
 
 Index = NDArray[np.int64]
@@ -140,7 +140,7 @@ def _taken_apart(mesh: Mesh, tables: Mapping[int, _Sides], *, everywhere: bool) 
     ])  # fmt: skip
     number, origin = _copies(mesh, tables, corners, first, everywhere)
     cells = tuple(
-        Cells(b.kind, number[at : at + b.nodes.size].reshape(b.nodes.shape), b.region)
+        replace(b, nodes=number[at : at + b.nodes.size].reshape(b.nodes.shape))
         for at, b in zip(starts, mesh.cells, strict=False)
     )
     surfaces: dict[str, list[Facets]] = {}
@@ -150,7 +150,7 @@ def _taken_apart(mesh: Mesh, tables: Mapping[int, _Sides], *, everywhere: bool) 
             facets = Facets(FACET_KIND[mesh.dim, side.size], new[rows])
             surfaces.setdefault(name, []).append(facets)
     return Mesh(mesh.points[origin], cells, {k: tuple(v) for k, v in surfaces.items()},
-                name=mesh.name)  # fmt: skip
+                name=mesh.name, axisymmetric=mesh.axisymmetric)  # fmt: skip
 
 
 def _copies(

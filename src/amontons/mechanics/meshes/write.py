@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 CELL_TYPES = {
     "tri": "triangle", "quad": "quad", "tet": "tetra", "hex": "hexahedron", "wedge": "wedge",
     "pyramid": "pyramid", "tri6": "triangle6", "quad9": "quad9", "tet10": "tetra10",
-    "hex27": "hexahedron27",
+    "hex27": "hexahedron27", "quad8": "quad8", "hex20": "hexahedron20", "wedge15": "wedge15",
 }  # fmt: skip
 
 

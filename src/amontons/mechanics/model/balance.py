@@ -19,7 +19,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.optimize import linprog
 
 from ...problem.law import Law
 from ...problem.law.law import BOUND, COULOMB, MU
@@ -93,6 +92,8 @@ def _escape(local: Array, power: Array, law: Law, size: float) -> Array | None:
 
     local (nc d, k): displacements of the contacts; power (k,): work of the load over size.
     """
+    from scipy.optimize import linprog
+
     nc, k = len(law), len(power)
     d = len(local) // nc
     angle = 2 * np.pi * np.arange(CORNERS) / CORNERS

@@ -178,6 +178,11 @@ class Moved(Formulation):
     def check(self, model: Model) -> None:
         """Loads may follow; raises InvalidInput where kinematics do not fit laws, or differ."""
         by_law = has_finite_strains(model.bodies)
+        if model.axisymmetric:
+            raise InvalidInput(
+                "axisymmetric bodies have contact of small kinematics; expected no "
+                "kinematics='finite'", ("contacts", 0, "kinematics"), "contacts",
+            )  # fmt: skip
         for k, contact in enumerate(model.contacts):
             check_law(k, contact, model.dimension, self.lacks)
         for k, contact in enumerate(model.contacts):

@@ -66,6 +66,9 @@ class Model(Told):
         dims = {body.mesh.dim for body in self.bodies}
         if len(dims) > 1:
             raise InvalidInput("expected all in 2D or all in 3D, got both", ("bodies",))
+        if len({body.axisymmetric for body in self.bodies}) > 1:
+            raise InvalidInput("expected all axisymmetric or none of them, got both",
+                               ("bodies",))  # fmt: skip
         self.formulation.check(self)
         object.__setattr__(self, "pair_names", pair_names(self.contacts))
         if not (is_number(self.load_factor) and np.isfinite(self.load_factor)):
@@ -102,6 +105,11 @@ class Model(Told):
     def formulation(self) -> Formulation:
         """What differs between models that find contact, or speak of its forces, otherwise."""
         return formulation_of(self.bodies, self.contacts)
+
+    @property
+    def axisymmetric(self) -> bool:
+        """Whether the bodies are half sections of bodies of revolution, see `Body`."""
+        return self.bodies[0].axisymmetric
 
     @property
     def is_large(self) -> bool:

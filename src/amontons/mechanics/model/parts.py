@@ -7,7 +7,7 @@ Surfaces are named as in the mesh; "body.surface" where several bodies know the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import InitVar, dataclass
 from typing import Any
 
@@ -16,67 +16,24 @@ from numpy.typing import NDArray
 
 from ...core.arrays import number, real
 from ...core.errors import InvalidInput, shown
-from ...core.words import helpful
+from ...core.words import helpful, nearest
 from ...problem.law import (
     FrictionCurve,
     Law,
     Overclosure,
 )
 from ..contact import Nitsche, Obstacle
-from ..elements.elasticity import LinearElastic, materials_by_region
-from ..elements.hyperelasticity import CiarletGeymonat, NeoHookean
-from ..elements.rigid import Rigid
-from ..meshes.mesh import Mesh
-from ..meshes.order import second_order
+from .body import Body, Material
 from .law_numbers import numbers_of
 from .values import ScalarValue, VectorValue, check_scalar, check_vector
 
+__all__ = ["Body", "BodyForce", "Contact", "Fix", "Load", "Material", "NodalForce", "Pressure",
+           "Traction"]  # fmt: skip
 Array = NDArray[np.float64]
-Material = LinearElastic | NeoHookean | CiarletGeymonat
 BONDS = ("stiffness", "stick_stiffness")  # numbers of a law that ties have too
 METHODS = ("nodal", "mortar", "nitsche")  # "dual-mortar" is another name of the second
 REFERENCE, CURRENT = CONFIGURATIONS = ("reference", "current")
 SMALL, FINITE = KINEMATICS = ("small", "finite")
-
-
-@helpful
-@dataclass(frozen=True, eq=False)
-class Body:
-    """A mesh and its material: LinearElastic, NeoHookean or CiarletGeymonat, or one per region.
-
-    The last two mean finite strains, of all bodies of the model.  Rigid, of the whole body: it
-    moves without deforming, and its mesh only says where it is touched, held and loaded.
-
-    order: 1 or 2, degree of the displacement.  With 2 the mesh becomes one of second order, see
-    `second_order`: its points are then all nodes.
-    """
-
-    mesh: Mesh
-    material: Material | Rigid | Mapping[str, Material]
-    name: str = ""
-    order: int = 1
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.mesh, Mesh):
-            raise InvalidInput(f"mesh: expected a Mesh (see box, read_mesh), got {self.mesh!r}")
-        if not isinstance(self.material, Material | Rigid | Mapping):
-            raise InvalidInput(
-                "material: expected LinearElastic, NeoHookean, CiarletGeymonat or Rigid, or a "
-                f"dict region -> one of the first three, got {self.material!r}"
-            )
-        if self.order not in (1, 2):
-            raise InvalidInput(f"order: expected 1 or 2, got {self.order!r}")
-        if self.order == 2:
-            object.__setattr__(self, "mesh", second_order(self.mesh))
-        object.__setattr__(self, "order", self.mesh.order)
-        laws = materials_by_region(self.mesh, self.material)
-        if isinstance(self.material, Mapping):
-            for region, law in laws.items():
-                if not isinstance(law, Material):
-                    raise InvalidInput(
-                        f"material of region {region!r}: expected LinearElastic, NeoHookean or "
-                        f"CiarletGeymonat, got {law!r}"
-                    )
 
 
 @helpful
@@ -270,6 +227,7 @@ class Contact:
         if not isinstance(self.method, Nitsche) and self.method not in METHODS:
             raise InvalidInput(
                 f"method: expected one of {', '.join(METHODS)}, got {self.method!r}"
+                f"{nearest(self.method, METHODS)}"
             )
         if self.where is not None and not callable(self.where):
             raise InvalidInput(
@@ -281,7 +239,8 @@ class Contact:
             or not (hasattr(self.obstacle, "gap") and hasattr(self.obstacle, "normals"))
         ):
             raise InvalidInput(
-                f"obstacle: expected a Plane, Sphere or LevelSet, got {self.obstacle!r}"
+                f"obstacle: expected a Plane, Sphere or LevelSet, got {self.obstacle!r}; "
+                'another surface is master="NAME"'
             )
 
     def _check_law(self) -> None:

@@ -20,6 +20,7 @@ from ..contact import (
     contact_nodes,
     mismatch,
     mortar_contact,
+    mortar_nodes,
     mortar_obstacle,
     nitsche_obstacle,
     nitsche_pair,
@@ -84,7 +85,7 @@ class Placed:
         """Facets of the master."""
         assert self.sides is not None
         _, _, mesh, name = self.sides
-        return Surface.of_corners(mesh.points, mesh.surface(name), name)
+        return Surface.on(mesh, name)
 
     @cached_property
     def narrowest(self) -> float:
@@ -182,8 +183,10 @@ def _met(
         return _met_by_nitsche(bodies, contact, contact.nitsche, offsets)
     k, surface = locate(bodies, contact.slave)
     slave, size = bodies[k].mesh, int(offsets[-1])
-    points = slave.points[contact_nodes(slave, surface)[0]]
-    mortar = contact.method == "mortar"
+    mortar = is_mortar(slave, surface, contact)
+    points = slave.points[
+        mortar_nodes(slave, surface) if mortar else contact_nodes(slave, surface)[0]
+    ]
     held, lasting = given.by_body(offsets, slave.dim)
     if contact.obstacle is not None:
         rows = nodal_contact(slave, surface, contact.obstacle)
@@ -204,6 +207,15 @@ def _met(
         rows, on_master, met = pair_contact(slave, surface, master, other)
     H = _shifted(rows.H, int(offsets[k]), size) + _shifted(on_master, int(offsets[j]), size)
     return rows, sparse.csc_array(H), met, points, None
+
+
+def is_mortar(mesh: Mesh, surface: str, contact: Contact) -> bool:
+    """Whether contacts are averages: asked for, or as corners of facets have no weight.
+
+    The weights of quadrilaterals with eight nodes are negative at their corners.
+    """
+    eight = any(facets.kind == "quad8" for facets in mesh.surface(surface))
+    return contact.method == "mortar" or (eight and contact.master is None)
 
 
 def _met_by_nitsche(

@@ -15,6 +15,7 @@ from ..meshes.mesh import Mesh
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 RANK = 1e-9  # singular values below this part of the largest possible one count as zero
+ALONG_AXIS = [1]  # the only mode of axisymmetric bodies without strain
 UNNAMED = "default"  # the region of cells without a name
 NAMES = {
     2: ("translation along x", "translation along y", "rotation in the plane"),
@@ -25,11 +26,15 @@ NAMES = {
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """A connected part of a body: name, dofs (k,) in the whole model, modes (k, 3 or 6)."""
+    """A connected part of a body: name, dofs (k,) in the whole model, modes (k, 3 or 6).
+
+    rigid: which of the modes strain nothing, None for all.
+    """
 
     name: str
     dofs: Index
     modes: Array
+    rigid: list[int] | None = None
 
 
 def pieces(mesh: Mesh, name: str, offset: int) -> list[Piece]:
@@ -40,7 +45,8 @@ def pieces(mesh: Mesh, name: str, offset: int) -> list[Piece]:
     for label, title in enumerate(titles):
         nodes = np.flatnonzero(labels == label)
         dofs = offset + (nodes[:, None] * mesh.dim + np.arange(mesh.dim)).ravel()
-        out.append(Piece(title, dofs, rigid_modes(mesh.points[nodes])))
+        rigid = ALONG_AXIS if mesh.axisymmetric else None
+        out.append(Piece(title, dofs, rigid_modes(mesh.points[nodes]), rigid))
     return out
 
 
@@ -99,7 +105,10 @@ def loose_modes(parts: list[Piece], fixed: NDArray[np.bool_]) -> list[tuple[Piec
     """Pieces with the modes that supports leave free: bases (6, k), orthonormal, k > 0."""
     out = []
     for piece in parts:
-        basis = _null_space(piece.modes[fixed[piece.dofs]])
+        held = piece.modes[fixed[piece.dofs]]
+        basis = _null_space(held if piece.rigid is None else held[:, piece.rigid])
+        if piece.rigid is not None:
+            basis = np.eye(held.shape[1])[:, piece.rigid] @ basis
         if basis.shape[1]:
             out.append((piece, basis))
     return out

@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 
 from ...core.errors import InvalidInput, within
 from ..elements.elasticity import body_load
-from ..elements.moved_loads import pressure_forces
 from ..meshes.mesh import Mesh, unknown
-from ..meshes.surfaces import surface_load
+from ..meshes.surfaces import pressure_load, surface_load
 from .parts import Body, BodyForce, Fix, Load, NodalForce, Pressure, Traction
 from .timing import lasting
 from .values import component_at, vector_at
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+ON_AXIS = 1e-12  # of the largest radius, up to which a node is on the axis
 SAME = 1e-12  # prescribed values that differ by less, relative to the largest, agree
 
 
@@ -74,8 +74,13 @@ def locate(bodies: Sequence[Body], on: str, *, sets: bool = False) -> tuple[int,
 def prescribed_values(
     bodies: Sequence[Body], supports: Sequence[Fix], offsets: Index
 ) -> Array:
-    """Prescribed displacement of every dof, NaN where it is free, (dofs,)."""
+    """Prescribed displacement of every dof, NaN where it is free, (dofs,).
+
+    Nodes on the axis of an axisymmetric body stay on it.
+    """
     values = np.full(int(offsets[-1]), np.nan)
+    for body, first in zip(bodies, offsets[:-1], strict=True):
+        values[first + 2 * on_axis(body.mesh)] = 0.0
     for at, support in enumerate(supports):
         k, surface = locate(bodies, support.on, sets=True)
         mesh = bodies[k].mesh
@@ -87,6 +92,13 @@ def prescribed_values(
             _check_agreement(values[dofs], given, mesh.points[nodes], what)
         values[dofs] = np.where(np.isnan(given), values[dofs], given)
     return values
+
+
+def on_axis(mesh: Mesh) -> Index:
+    """Nodes (k,) on the axis of an axisymmetric mesh; none of others."""
+    if not mesh.axisymmetric:
+        return np.zeros(0, dtype=np.int64)
+    return np.flatnonzero(mesh.points[:, 0] <= ON_AXIS * mesh.points[:, 0].max())
 
 
 def _check_agreement(old: Array, new: Array, points: Array, what: str) -> None:
@@ -144,21 +156,18 @@ def _drawn(mesh: Mesh, surface: str, load: Traction) -> Array:
     with within("value"):
         what = f"traction on {load.on!r}"
         traction[nodes] = vector_at(load.value, mesh.points[nodes], what)
-    return surface_load(mesh.points, facets, traction)
+    return surface_load(mesh.points, facets, traction, axisymmetric=mesh.axisymmetric)
 
 
 def _pressed(mesh: Mesh, surface: str, load: Pressure) -> Array:
     """Nodal forces (n, dim) of a pressure."""
-    out, nodes = np.zeros_like(mesh.points), mesh.surface_nodes(surface)
-    density = np.zeros(len(out))
+    nodes, density = mesh.surface_nodes(surface), np.zeros(len(mesh.points))
     with within("value"):
         what = f"pressure on {load.on!r}"
         density[nodes] = component_at(load.value, mesh.points[nodes], what)
-    for facets in mesh.surface(surface):
-        x = mesh.points[facets.nodes]
-        forces, _ = pressure_forces(facets.kind, x, density[facets.nodes], np.zeros_like(x))
-        np.add.at(out, facets.nodes, forces)
-    return out
+    return pressure_load(
+        mesh.points, mesh.surface(surface), density, axisymmetric=mesh.axisymmetric
+    )
 
 
 def _add_body_force(

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.arrays import LARGEST, number, real
-from ...core.errors import InvalidInput, shown
+from ...core.errors import InvalidInput, number_hint, shown
 from .timing import steady_value
 
 Array = NDArray[np.float64]
@@ -21,8 +21,17 @@ ScalarValue = ArrayLike | Callable[[Array], ArrayLike]
 def check_vector(value: object, what: str, *, free: bool = False) -> None:
     """Raise InvalidInput for one number other than 0 in the place of a vector.
 
-    It could only be meant along every axis, which is hardly ever what is wanted.
+    It could only be meant along every axis, which is hardly ever what is wanted.  Also for
+    texts and for numbers that are none.
     """
+    if isinstance(value, list | tuple):
+        for entry in value:
+            if isinstance(entry, str):
+                leave = "; None leaves a component free" if free else ""
+                raise InvalidInput(f"{what}: expected a number, got {shown(entry)}"
+                                   f"{number_hint(entry) or leave}")  # fmt: skip
+            if is_number(entry) and not np.isfinite(entry):
+                raise InvalidInput(f"{what}: expected a finite number, got {entry}")
     if is_number(value) and value != 0:
         leave = f"; (None, None, {value}) leaves the others free" if free else ""
         raise InvalidInput(
@@ -34,11 +43,15 @@ def check_vector(value: object, what: str, *, free: bool = False) -> None:
 def check_scalar(value: object, what: str) -> None:
     """Raise InvalidInput for a number below 0, or an array with one."""
     if isinstance(value, str):
-        raise InvalidInput(f"{what}: expected a number or a function, got the text {value!r}")
+        raise InvalidInput(f"{what}: expected a number or a function, got the text {value!r}"
+                           f"{number_hint(value)}")  # fmt: skip
     try:
         numbers = np.asarray(value, dtype=float)
     except (TypeError, ValueError):  # a function, or nothing of use, which `scalar_at` tells
         return
+    if not np.isfinite(numbers).all():
+        bad = numbers[~np.isfinite(numbers)].flat[0]
+        raise InvalidInput(f"{what}: expected finite numbers >= 0, got {bad}")
     if (numbers < 0).any():
         raise InvalidInput(f"{what}: expected numbers >= 0, got {numbers.min():g}")
 

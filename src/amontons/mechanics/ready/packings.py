@@ -20,7 +20,6 @@ from itertools import count, product
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.spatial import cKDTree
 
 from ...core.errors import InvalidInput
 from ...problem.friction import FrictionProblem
@@ -98,6 +97,8 @@ class SpherePacking:
     @cached_property
     def pairs(self) -> Index:
         """Bodies in contact, (nc, 2): slave and master; a master below 0 is floor or wall."""
+        from scipy.spatial import cKDTree
+
         c, r = self._placed
         near = cKDTree(c).query_pairs(2.01 * r.max(), output_type="ndarray")
         gap = np.linalg.norm(c[near[:, 0]] - c[near[:, 1]], axis=1) - r[near].sum(axis=1)

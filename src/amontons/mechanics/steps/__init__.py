@@ -4,6 +4,7 @@ from .energy import Energies
 from .moreau_jean import MoreauJean
 from .passage import Passage
 from .quasi_static import QuasiStatic
+from .schedule import Schedule, Stage
 from .state import State, TimeStep, at_rest
 from .stepping import evolve
 
@@ -12,6 +13,8 @@ __all__ = [
     "MoreauJean",
     "Passage",
     "QuasiStatic",
+    "Schedule",
+    "Stage",
     "State",
     "TimeStep",
     "at_rest",

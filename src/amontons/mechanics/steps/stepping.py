@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...core.clock import NEVER, Deadline, check_seconds
-from ...core.errors import Interrupted, InvalidInput, NotConverged
+from ...core.errors import Interrupted, InvalidInput, NotConverged, shown
 from ...problem.friction import Form, FrictionProblem
 from ...problem.solution import FrictionSolution
 from ...solvers.contract import Iterate, Solver, check_at_least, check_solves, taken_by
@@ -17,6 +17,7 @@ from ...solvers.driver import drive
 from ..model import Model
 from .moreau_jean import Local, MoreauJean
 from .quasi_static import QuasiStatic
+from .schedule import Schedule, Stage, carried_over
 from .state import State, TimeStep, at_rest
 from .system import Motion
 
@@ -56,7 +57,12 @@ def evolve(
         check_seconds(time_limit)
     if max_iterations is not None:
         check_at_least(1, max_iterations=max_iterations)
-    prepared = method.prepare(model, tolerance)
+    if not hasattr(method, "prepare"):
+        raise InvalidInput(
+            f"method: expected QuasiStatic(step) or MoreauJean(step), got {shown(method)}"
+        )
+    own = _stage_of(start, method)
+    prepared = method.prepare(model if own is None else own.model(start), tolerance)  # type: ignore[arg-type]
     if solver is not None:
         check_solves(solver, model.kind)
     state = start if start is not None else at_rest(model)
@@ -70,7 +76,7 @@ def evolve(
             start=first, max_iterations=max_iterations, time_limit=left,
         )  # fmt: skip
 
-    def advanced(state: State, time: float) -> TimeStep:
+    def advanced(state: State, time: float, prepared: Any) -> TimeStep:
         limit = deadline if time_limit is None else deadline.within(time_limit)
 
         def solve(
@@ -92,14 +98,30 @@ def evolve(
 
         return prepared.advance(state, time, solve, limit)
 
-    def steps(state: State) -> Iterator[TimeStep]:
-        first = state.time - state.index * method.step
+    def steps(state: State, now: Any) -> Iterator[TimeStep]:
+        first, near = state.time - state.index * method.step, WHOLE * method.step
+        stage = own
         while not at_end(state.time, until, method.step):
-            step = advanced(state, first + (state.index + 1) * method.step)
+            time = first + (state.index + 1) * method.step
+            if isinstance(method, Schedule):
+                time = method.after(state.time, near) or time
+                begun = method.stage_at(state.time, near)
+                if begun is not None and begun is not stage:
+                    later = method.prepare(begun.model(state), tolerance)
+                    state = carried_over(state, now.motion, later.motion)
+                    stage, now = begun, later
+            step = advanced(state, time, now)
             state = step.state
             yield step
 
-    return steps(state)
+    return steps(state, prepared)
+
+
+def _stage_of(start: State | None, method: MoreauJean | QuasiStatic) -> Stage | None:
+    """The stage to which a state belongs; None for the first one."""
+    if start is None or not isinstance(method, Schedule):
+        return None
+    return method.stage_at(start.time - 2 * WHOLE * method.step, WHOLE * method.step)
 
 
 def at_end(time: float, until: float, step: float) -> bool:

@@ -56,10 +56,9 @@ from ..contract import (
     Solver,
     Target,
     check_at_least,
-    first_of,
-    sent,
     taken_by,
 )
+from ..judging import first_of, sent
 from ..multigrid.cycles import ContactMultigrid
 from ..newton.functions import NaturalMap
 from ..newton.nitsche import robust_iterates

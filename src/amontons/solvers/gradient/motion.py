@@ -16,7 +16,6 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse import linalg as sparse_linalg
 
 from ...core.errors import SingularOperator, UnsupportedForm
 from ...linear import Direct
@@ -259,6 +258,8 @@ class _Modes(_Identity):
 
 def _largest(product: Callable[[Array], Array], size: int) -> float:
     """Largest eigenvalue of a positive semidefinite operator, from above."""
+    from scipy.sparse import linalg as sparse_linalg
+
     if size == 0:
         return 0.0
     if size <= DENSE:

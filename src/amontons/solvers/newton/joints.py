@@ -20,7 +20,6 @@ from threading import local
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import linalg as sparse_linalg
 
 from ...linear.blocks import BlockRows, block_part
 from ...linear.multifrontal import FrontLU, Fronts
@@ -148,6 +147,8 @@ class Joints:
         self, law: _Scaled, b: Single, tolerance: float, limit: int
     ) -> tuple[Single, int, bool]:
         """x with |(A + B W) x - b| <= tolerance |b|, iterations, and whether it holds."""
+        from scipy.sparse import linalg as sparse_linalg
+
         kept, count = self.memory.kept, 0
         assert kept is not None
 

@@ -38,9 +38,8 @@ from ..contract import (
     Target,
     check_at_least,
     check_positive,
-    first_of,
-    sent,
 )
+from ..judging import first_of, sent
 
 Array = NDArray[np.float64]
 MEMORY = 5  # values of |F| of which the largest counts in the line search

@@ -32,7 +32,6 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse import linalg as sparse_linalg
 
 from ...core.errors import InvalidInput, SingularOperator
 from ...core.options import check_options
@@ -270,6 +269,8 @@ class SchurComplement:
 
     def step(self, state: State, linearised: Linearised, forcing: float) -> tuple[State, int]:
         """GMRES to the relative tolerance `forcing`, preconditioned from the right."""
+        from scipy.sparse import linalg as sparse_linalg
+
         F, A, B = linearised
         D, E = block_diagonal(A), block_diagonal(B)
         try:

@@ -1,0 +1,148 @@
+"""What is known about other solutions: the verdict, its words and its plain data."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+import numpy as np
+
+from ...core.faces import Told
+from ...core.words import shortened
+from ...problem.solution import FrictionSolution
+from ..solutions.enumerate import PieceSolution
+from .critical_friction import CriticalFriction, Witness
+from .one_load.answer import LoadCertificate
+
+
+class Verdict(Enum):
+    """What is known; the value is the name in JSON files."""
+
+    UNIQUE_EVERY_LOAD = "unique_every_load"
+    UNIQUE_THIS_LOAD = "unique_this_load"
+    NOT_UNIQUE = "not_unique"
+    UNDECIDED = "undecided"
+
+    @property
+    def meaning(self) -> str:
+        """One sentence for the user."""
+        return _MEANING[self]
+
+
+_MEANING = {
+    Verdict.UNIQUE_EVERY_LOAD: "There is exactly one solution, whatever the load.",
+    Verdict.UNIQUE_THIS_LOAD: "For this load there is exactly one solution.",
+    Verdict.NOT_UNIQUE: "There is another solution for the same load.",
+    Verdict.UNDECIDED: "No other solution was found, and no proof that there is none.",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Uniqueness(Told):
+    """The verdict, and all that supports it.
+
+    friction: largest coefficient of the problem, of which lower and upper are bounds: below
+    lower every load has one solution (criterion: what proves it), from upper on some load has
+    several (witness).  solution, other: the one found, and a second one or None.  certificate:
+    of UNIQUE_THIS_LOAD at larger sizes.  critical: the bounds with all details.
+    resolution: of UNIQUE_THIS_LOAD, any other solution would differ by less; of NOT_UNIQUE, to
+    which both are known; relative to the largest reaction or, if that is larger, to what the
+    load can make.  0 for every load, None where nothing is known.
+    """
+
+    verdict: Verdict
+    friction: float
+    lower: float
+    upper: float
+    criterion: str
+    reason: str
+    witness: Witness | None = None
+    solution: FrictionSolution | None = None
+    other: PieceSolution | None = None
+    certificate: LoadCertificate | None = None
+    critical: CriticalFriction | None = None
+    seconds: float = 0.0
+    resolution: float | None = None
+
+    def __str__(self) -> str:
+        upper = "unknown" if np.isinf(self.upper) else f"{self.upper:.4g}"
+        bounds = f"critical friction between {self.lower:.4g} and {upper}"
+        if np.isinf(self.lower):
+            bounds = "any friction is safe"
+        return (
+            f"{self.verdict.value.replace('_', ' ')}: {self.verdict.meaning} {self.reason} "
+            f"(friction {self.friction:g}; {bounds})"
+        )
+
+    @property
+    def in_full(self) -> str:
+        """The verdict in a few lines, as the command line shows it."""
+        lines = [
+            f"{self.verdict.value.replace('_', ' ')}: {self.verdict.meaning}",
+            self.reason,
+            f"friction {self.friction:g}",
+        ]
+        if self.criterion == "given friction":
+            return "\n".join(lines[:2])
+        if math.isinf(self.lower):
+            lines.append("every load has one solution at any friction")
+        else:
+            safe = f"below {self.lower:.5g} (proved by {self.criterion})"
+            lines.append(
+                f"every load has one solution {safe}" if self.lower > 0
+                else "no friction is proved to be safe for every load"
+            )
+        if self.witness is not None:
+            lines.append(
+                f"some loads have several from {self.upper:.5g} on: the linear piece of "
+                f"pattern {shortened(self.witness.pattern)} is singular there"
+            )
+        lines += _comparison(self.critical)
+        if self.other is not None:
+            lines.append(f"another solution: {shortened(self.other.pattern)}, error "
+                         f"{self.other.error:.1e}")  # fmt: skip
+        return "\n".join(lines)
+
+    @property
+    def brief(self) -> str:
+        """One line with the cheap part of it."""
+        if self.verdict is Verdict.UNIQUE_EVERY_LOAD:
+            return f"uniqueness: one solution for every load. {self.reason}"
+        return f"uniqueness: not settled. {self.reason} Ask with --uniqueness"
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """Plain data, as JSON files have it."""
+        w, s, both = self.witness, self.other, self.critical
+        witness = None if w is None else {
+            "friction": w.friction, "pattern": w.pattern,
+            "coefficients": w.coefficients.tolist(), "null_vector": w.null_vector.tolist(),
+            "residual": w.residual,
+        }  # fmt: skip
+        other = None if s is None else {
+            "pattern": s.pattern, "r": s.r.tolist(), "u": s.u.tolist(), "error": s.error,
+            "distance": s.distance,
+        }  # fmt: skip
+        comparison = None if both is None else {
+            "p_matrix": both.p_matrix, "full_contact": both.full_contact,
+        }  # fmt: skip
+        return {"verdict": self.verdict.value, "reason": self.reason,
+                "friction": self.friction, "lower": self.lower, "upper": self.upper,
+                "criterion": self.criterion, "witness": witness, "other": other,
+                "comparison": comparison, "resolution": self.resolution,
+                "seconds": self.seconds}  # fmt: skip
+
+
+def _comparison(bounds: CriticalFriction | None) -> list[str]:
+    if bounds is None:
+        return []
+    lines = []
+    if bounds.p_matrix is not None and math.isfinite(bounds.p_matrix):
+        lines.append(f"for comparison, the P-matrix criterion: {bounds.p_matrix:.5g}")
+    if bounds.full_contact is not None and math.isfinite(bounds.full_contact):
+        lines.append(
+            f"for comparison, full contact only: {bounds.full_contact:.5g}, which is not safe"
+        )
+    return lines
