@@ -41,7 +41,8 @@ class Answer:
     before: displacements of the increment before, None without.  reactions (nc, d): contact
     forces that the answer states, in the model's frames.  large: of large strains; other:
     elements formulated otherwise, in words; time, until: of the answer and of the end.
-    names (nodes,): what its nodes are called.  one_way: loads grow along one straight way.
+    names (nodes,): what its nodes are called.
+    tolerance: imbalance, over the largest nodal force, that another formulation explains.  one_way: loads grow along one straight way.
     """
 
     displacement: tuple[Array, ...]
@@ -54,6 +55,7 @@ class Answer:
     until: float | None = None
     names: Array | None = None
     one_way: bool = True
+    tolerance: float = 0.0
     notes: tuple[str, ...] = field(default=())
 
 
@@ -181,7 +183,9 @@ def _balance(
         text = (f"supports do not have the displacements that they prescribe: node {name(at)} "
                 f"is off by {moved:.2g} of the largest")  # fmt: skip
         return Finding(WRONG, text, numbers, (name(at),))
-    if answer.other and max(residual, between) > FORMULATED:
+    if excess <= answer.tolerance and between <= max(ACTION, answer.tolerance):
+        excess = between = 0.0
+    if answer.other and max(excess, between) > FORMULATED and not answer.tolerance:
         text = (f"inner forces miss the loads by {residual:.1e} of the largest nodal force, "
                 "and the elements are formulated otherwise: forces can not be told")  # fmt: skip
         return Finding(UNDECIDED, text, numbers)
@@ -235,15 +239,16 @@ def _pair(
     """One pair, from both sides; moved: displacements, those before, the largest force."""
     contact, (u, before, scale) = model.contacts[k], moved
     young = _softest(model, contact.slave, contact.master)
-    approach = max(approach_of(side, young, scale) for side in sides)
+    lengths = [approach_of(side, young, scale) for side in sides]
+    approach, sheared = (max(each) for each in zip(*lengths, strict=True))
     give = Give(*(_inverse(contact.numbers.get(name)) for name in
                   ("stiffness", "stick_stiffness")))  # fmt: skip
     found: list[Seen] = []
     for side in sides:
         slip = side.slip if before is None else side.slip - side.slip_of(before)
-        one = seen(side, give, approach, slip, scale)
+        one = seen(side, give, approach, sheared, slip, scale)
         if before is not None and answer.one_way:  # both are histories of one straight way
-            other = seen(side, give, approach, side.slip, scale)
+            other = seen(side, give, approach, sheared, side.slip, scale)
             one = min(one, other, key=lambda s: (s.missing, s.impossible_share))
         found.append(one)
     views = tuple(found)
@@ -256,7 +261,7 @@ def _pair(
         ),
         "cone": questions.cone(views, name),
         "status": questions.status(
-            views, approach, name, history=answer.one_way or before is not None, deck=deck
+            views, sheared, name, history=answer.one_way or before is not None, deck=deck
         ),
         "geometry": questions.geometry(views, approach),
     }  # fmt: skip

@@ -96,7 +96,7 @@ def _ratio(one: Seen) -> float:
 
 
 def status(
-    seen: tuple[Seen, ...], approach: float, name: Name, *, history: bool, deck: bool
+    seen: tuple[Seen, ...], sheared: float, name: Name, *, history: bool, deck: bool
 ) -> Finding:  # fmt: skip
     """Is everything that slips held back by the friction that it should have?
 
@@ -109,7 +109,7 @@ def status(
                "missing_by_deck_law": min(one.missing_deck for one in seen),
                "impossible": count, "impossible_share": min(shares)}  # fmt: skip
     if min(one.hidden for one in seen) > HIDDEN:
-        return _as_one(seen, approach, numbers)
+        return _as_one(seen, sheared, numbers)
     wrong = min(missing) > MISSING or max(missing) > ONE_SIDED or min(shares) > IMPOSSIBLE
     if not wrong:
         few = f"; {count} contacts at the margin are not" if count else ""
@@ -133,9 +133,9 @@ def status(
     return Finding(WRONG if history else UNDECIDED, text, numbers, _nodes(seen, name, None))
 
 
-def _as_one(seen: tuple[Seen, ...], approach: float, numbers: dict) -> Finding:
+def _as_one(seen: tuple[Seen, ...], sheared: float, numbers: dict) -> Finding:
     """Where forces at nodes say nothing: the pair as one contact, if it is flat."""
-    share, ratio, slid = pair_as_one(seen[0], approach)
+    share, ratio, slid = pair_as_one(seen[0], sheared)
     if share is not None and share > MISSING:
         text = (f"the pair slips by {slid:.3g} as a whole, with {1 - ratio:.0%} less friction "
                 "than that takes: it should stick, or friction should be at its bound; forces "

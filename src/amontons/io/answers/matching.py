@@ -7,6 +7,7 @@ sides of it.  What is asked for is the mean of both.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ...core.errors import FileFormatError
+from .frd import Results
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -54,9 +56,7 @@ def check_points(path: Path, points: Array, wanted: Array, names: Array) -> None
 
 def by_place(path: Path, points: Array, wanted: Array, plane: str) -> tuple[Index, Index]:
     """Pairs (node wanted, row of the file) of points (n, 3) for nodes (m, d); all have one."""
-    flat = points[:, : wanted.shape[1]].copy()
-    if plane == "axisymmetric":
-        flat = np.column_stack([np.hypot(points[:, 0], points[:, 2]), points[:, 1]])
+    flat = _flat(points, wanted.shape[1], plane)
     size = float(np.abs(wanted).max(initial=0.0)) or 1.0
     distance, node = cKDTree(wanted).query(flat)
     rows = np.flatnonzero(distance <= NEAR * size)
@@ -75,6 +75,45 @@ def by_place(path: Path, points: Array, wanted: Array, plane: str) -> tuple[Inde
                 f"{path}: has {left} nodes that the model lacks: it is the result of another one"
             )
     return node, rows
+
+
+def by_element(
+    path: Path, found: Results, wanted: Array, cells: Sequence[tuple[Index, Index]], plane: str
+) -> tuple[Index, Index]:
+    """Pairs (node wanted, row of the file) by elements of the same number.
+
+    cells: numbers (k,) of elements and their nodes (k, n).  Two bodies that touch have nodes at
+    one place, which only their elements tell apart.
+    """
+    order = np.argsort(found.labels)
+    labels, flat = found.labels[order], _flat(found.points, wanted.shape[1], plane)[order]
+    near = NEAR * (float(np.abs(wanted).max(initial=0.0)) or 1.0)
+    node: list[Index] = []
+    rows: list[Index] = []
+    for numbers, nodes in cells:
+        for number, own in zip(numbers.tolist(), nodes, strict=True):
+            given = np.array(found.elements.get(number, []), dtype=np.int64)
+            at = np.minimum(np.searchsorted(labels, given), len(labels) - 1)
+            off = np.abs(flat[at][None] - wanted[own][:, None]).max(axis=2, initial=0.0)
+            which, slot = np.nonzero(off <= near)
+            node.append(own[which])
+            rows.append(order[at[slot]])
+    pairs = np.unique(np.stack([np.concatenate(node), np.concatenate(rows)]), axis=1)
+    missing = np.setdiff1d(np.arange(len(wanted)), pairs[0])
+    if missing.size:
+        raise FileFormatError(
+            f"{path}: the elements of the deck have other nodes there: none at "
+            f"{wanted[missing[0]].tolist()}, and {missing.size} of {len(wanted)} lack; it is "
+            "the result of another deck"
+        )
+    return pairs[0], pairs[1]
+
+
+def _flat(points: Array, dim: int, plane: str) -> Array:
+    """Points (n, 3) in the plane of a model, (n, dim)."""
+    if plane == "axisymmetric":
+        return np.column_stack([np.hypot(points[:, 0], points[:, 2]), points[:, 1]])
+    return points[:, :dim]
 
 
 def mean_of(pairs: tuple[Index, Index], points: Array, values: Array, count: int, plane: str

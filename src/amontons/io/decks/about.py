@@ -29,7 +29,8 @@ class About:
 
     plane: "", "strain", "stress" or "axisymmetric"; other: types of elements that are
     formulated otherwise, in words; large: NLGEOM; until: the end of the last step; one_way: all
-    loads grow in proportion; at: the model at a time.
+    loads grow in proportion; at: the model at a time.  cells: numbers (k,) of elements in the deck
+    and their nodes (k, n) in the mesh.
     """
 
     labels: Index
@@ -40,6 +41,7 @@ class About:
     until: float
     one_way: bool
     at: Callable[[float], Model]
+    cells: tuple[tuple[Index, Index], ...]
 
     @classmethod
     def of(
@@ -67,8 +69,19 @@ class About:
             own, len(np.unique(own)) == len(own), SHAPES[deck.blocks[0].kind].plane, other,
             large, history.until, 
             len(stages) == 1 and all(_is_ramp(c, history.until) for c in courses),
-            partial(_at, tuple(stages), make),
+            partial(_at, tuple(stages), make), _cells(deck, numbers),
         )  # fmt: skip
+
+
+def _cells(deck: Deck, numbers: Index) -> tuple[tuple[Index, Index], ...]:
+    """Elements of every block: what the deck calls them, and their nodes in the mesh."""
+    labels = np.zeros(sum(len(block.nodes) for block in deck.blocks), dtype=np.int64)
+    for names in {id(n): n for n, _ in deck.point_labels}.values():
+        labels[names.element_at] = names.element_labels
+    return tuple(
+        (labels[block.first : block.first + len(block.nodes)], numbers[block.nodes])
+        for block in deck.blocks
+    )
 
 
 def _at(stages: Sequence[Held], make: Callable[[Held, float], Model], time: float) -> Model:
