@@ -1,4 +1,4 @@
-"""`audit`: is what somebody gives for the displacements of a model true?"""
+"""`audit`: whether what somebody gives for the displacements of a model is true."""
 
 from __future__ import annotations
 

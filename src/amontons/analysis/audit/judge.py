@@ -42,7 +42,8 @@ class Answer:
     forces that the answer states, in the model's frames.  large: of large strains; other:
     elements formulated otherwise, in words; time, until: of the answer and of the end.
     names (nodes,): what its nodes are called.
-    tolerance: imbalance, over the largest nodal force, that another formulation explains.  one_way: loads grow along one straight way.
+    tolerance: imbalance, over the largest nodal force, that another formulation explains.
+    one_way: loads grow along one straight way.
     """
 
     displacement: tuple[Array, ...]
@@ -98,8 +99,10 @@ def audit_answer(model: Model, answer: Answer, *, deck_law: bool = True) -> Audi
 def _notes(answer: Answer, forces: NodalForces) -> tuple[str, ...]:
     notes = list(answer.notes)
     if answer.large:
-        notes.append(f"large strains there, small ones here: displacements change by up to "
-                     f"{forces.gradient:.2g} of a length, which bounds what forces can tell")  # fmt: skip
+        notes.append(
+            "large strains there, small ones here: displacements change by up to "
+            f"{forces.gradient:.2g} of a length, which bounds what forces can tell"
+        )
     notes += [f"{text}: their forces are only bounded" for text in answer.other]
     return tuple(notes)
 
@@ -116,8 +119,8 @@ def _whole(model: Model, displacement: Sequence[Array]) -> Array:
         given = np.asarray(values, dtype=float)
         if given.shape != body.mesh.points.shape:
             raise InvalidInput(
-                f"displacements of body {body.name!r}: expected {body.mesh.points.shape}, a row "
-                f"for each node, got {given.shape}"
+                f"displacements of body {body.name!r}: expected {body.mesh.points.shape}, a "
+                f"row for each node, got {given.shape}"
             )
         if not np.isfinite(given).all():
             row = int(np.flatnonzero(~np.isfinite(given).all(axis=1))[0])
@@ -164,13 +167,13 @@ def _balance(
     model: Model, forces: NodalForces, state: tuple[Array, float], off: Mask,
     every: Sequence[tuple[Side, ...]], answer: Answer,
 ) -> Finding:  # fmt: skip
-    """Do inner forces balance loads off the contacts, and both sides of a pair each other?"""
+    """Whether inner forces balance the loads off the contacts, and both sides each other."""
     u, scale = state
     left = np.where(off, np.abs(forces.missing), 0.0)
     over = np.where(off, left - forces.known, 0.0)
     if scale <= ZERO * forces.size:
-        return Finding(RIGHT, "no forces at all", {"residual": 0.0, "excess": 0.0, "bound": 0.0,
-                       "largest_force": 0.0, "between_sides": 0.0, "supports": 0.0})  # fmt: skip
+        names = ("residual", "excess", "bound", "largest_force", "between_sides", "supports")
+        return Finding(RIGHT, "no forces at all", dict.fromkeys(names, 0.0))
     unit = scale
     residual, excess = float(left.max(initial=0.0)) / unit, float(over.max(initial=0.0)) / unit
     bound = float((forces.known * off).max(initial=0.0)) / unit
@@ -186,8 +189,10 @@ def _balance(
     if excess <= answer.tolerance and between <= max(ACTION, answer.tolerance):
         excess = between = 0.0
     if answer.other and max(excess, between) > FORMULATED and not answer.tolerance:
-        text = (f"inner forces miss the loads by {residual:.1e} of the largest nodal force, "
-                "and the elements are formulated otherwise: forces can not be told")  # fmt: skip
+        text = (
+            f"inner forces miss the loads by {residual:.1e} of the largest nodal force, and "
+            "the elements are formulated otherwise: forces can not be told"
+        )
         return Finding(UNDECIDED, text, numbers)
     if excess > BALANCED:
         order = np.argsort(-over, kind="stable") // model.dimension
@@ -330,7 +335,7 @@ def _stated(
     model: Model, every: Sequence[tuple[Side, ...]], reactions: Array, scale: float,
     answer: Answer,
 ) -> Finding:  # fmt: skip
-    """Are the contact forces that the answer states those that its displacements need?"""
+    """Whether the contact forces that it states are those that its displacements need."""
     own = np.concatenate([sides[0].r for sides in every])
     given = np.asarray(reactions, dtype=float)
     if given.shape != own.shape:
@@ -348,7 +353,8 @@ def _stated(
         return Finding(WRONG, "the contact forces that it states are not those that its "
                        f"displacements need: off by {share:.2g} of the largest nodal force at "
                        f"node {name}", numbers, (name,))  # fmt: skip
-    return Finding(RIGHT, f"stated contact forces fit the displacements to {share:.1e}", numbers)
+    text = f"stated contact forces fit the displacements to {share:.1e}"
+    return Finding(RIGHT, text, numbers)
 
 
 def _time(time: float, until: float) -> Finding:

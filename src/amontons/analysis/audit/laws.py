@@ -1,4 +1,4 @@
-"""Do the forces and motions of one side obey the law of hard contact, and by how much not?
+"""How far forces and motions of one side are from the law of hard contact.
 
 All deviations are lengths, weighted by the forces that act along them: a contact with the
 pressure force r_N > 0 should have the gap 0, one that slips by s the friction mu r_N against
@@ -7,10 +7,10 @@ s.  With the approach of the pair, the length over which contact closes and flat
     share = sum |r_N gap| / (approach sum r_N),
     missing = sum (mu r_N |s| + r_T . s)+ / sum mu r_N max(largest |s|, sheared),
 
-the second that of de Saxce's bipotential: zero where friction is at its bound against the slip,
-or nothing slips; sheared is the length by
-which friction at its bound shears what it acts on.  Both are numbers without a unit, and about the error of the forces that
-contact hard and rigid would have.
+the second that of de Saxce's bipotential: zero where friction is at its bound against the
+slip, or nothing slips; sheared is the length by which friction at its bound shears what it acts
+on.  Both are numbers without a unit, and about the error of the forces that contact hard and
+rigid would have.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ def seen(  # noqa: PLR0913
     pressed = _pressed(side, force)
     scale = approach * total
     bound = side.law.bound(r)
-    rubs = side.known.all(axis=1) & side.known[:, :1].all(axis=1)
+    rubs: Mask = np.asarray(side.known.all(axis=1))
     excess = np.maximum(push - bound - side.bound[:, 1:].max(axis=1, initial=0.0), 0.0) * rubs
     pull = np.maximum(-r[:, 0] - side.bound[:, 0], 0.0)
     soft_gap = give.normal * normal / weight
@@ -141,7 +141,8 @@ def seen(  # noqa: PLR0913
     carried = np.maximum(normal, total / max(len(normal), 1))
     worst = int(gap.argmin()) if len(gap) else 0
     return Seen(
-        side, pressed, shares["curved"], min(shares["flat"], shares["points"]), deck, hard, soft,
+        side, pressed, shares["curved"], min(shares["flat"], shares["points"]), deck,
+        hard, soft,
         _over(float(excess.sum()), total), _over(float(pull.sum()), total),
         _over(float(side.bound[:, 0].sum()), total), _over(float(side.blur.max(initial=0.0)),
         approach), max(-float(gap.min(initial=0.0)), 0.0), int(side.node[worst]), bad, why,

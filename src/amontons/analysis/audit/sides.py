@@ -25,7 +25,6 @@ from ...mechanics.model.parts import Contact
 from ...mechanics.model.placing import Placed, place
 from ...mechanics.model.supports import Prescribed, locate
 from ...problem.law import Law
-
 from .points import PointGaps, point_gaps
 
 if TYPE_CHECKING:

@@ -88,7 +88,7 @@ QUESTIONS = ("balance", "penetration", "cone", "status", "geometry")
 
 @dataclass(frozen=True, eq=False)
 class Audit(Shown):
-    """The verdict on displacements of a model: is this the answer of the contact problem?
+    """The verdict on displacements of a model as the answer of its contact problem.
 
     findings: of the questions balance, penetration, cone, status, geometry, and time where an
     answer has one; rounding_bound: part of the largest nodal force that the digits of the

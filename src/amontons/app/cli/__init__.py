@@ -75,6 +75,7 @@ Examples:
               "part of it is always done.")  # fmt: skip
 @flags.fclib_error
 @flags.figures
+@flags.frd
 @click.option("--quiet", is_flag=True, help="No progress, no summary.")
 def solve(**options: object) -> int:
     """Solve a problem and write the results.
@@ -120,6 +121,7 @@ def info(**options: object) -> None:
 Examples:
   amontons convert global.hdf5 local.hdf5 --form local
   amontons convert case.toml problem.hdf5
+  amontons convert cube-results cube.frd      displacements, stresses, contact for cgx, PrePoMax
 """
 )
 @click.argument("source")
@@ -129,7 +131,7 @@ Examples:
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
               help="Replace a value of the case.")  # fmt: skip
 def convert(**options: object) -> None:
-    """Write a problem as an FCLib file, in either form.
+    """Write a problem as an FCLib file, in either form, or results as .frd or .dat.
 
     SOURCE is a TOML case file, an FCLib HDF5 file, a results folder, or example:NAME.
     """

@@ -27,8 +27,8 @@ Exit codes: 0 right, 1 wrong or undecided, 2 it can not be read or belongs to an
               help="Judge the state at that time, against the loads of then. [the last]"
               )  # fmt: skip
 @click.option("--law", type=click.Choice(["hard", "own"]),
-              help="hard: contact neither overlaps nor creeps while it sticks; own: it may give "
-              "way as its stiffness says. [hard for decks, own for cases]")  # fmt: skip
+              help="hard: contact neither overlaps nor creeps while it sticks; own: it may "
+              "give way as its stiffness says. [hard for decks, own for cases]")  # fmt: skip
 @click.option("--solve", is_flag=True, help="Solve the model too, and put the forces beside.")
 @click.option("--json", "json_copy", metavar="FILE", help="The same as JSON; - prints it.")
 @click.option("--picture", metavar="FILE",

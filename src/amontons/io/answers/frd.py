@@ -40,7 +40,7 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """Nodes with their points (n, 3), the blocks of a file in their order, nodes of elements."""
+    """Nodes with their points (n, 3), blocks in their order, nodes of elements."""
 
     path: Path
     labels: Index
@@ -52,7 +52,8 @@ class Results:
         """All blocks of a name; raises FileFormatError that tells what there is without one."""
         found = [block for block in self.blocks if block.name == name]
         if not found:
-            known = ", ".join(dict.fromkeys(block.name for block in self.blocks)) or "no results"
+            names = dict.fromkeys(block.name for block in self.blocks)
+            known = ", ".join(names) or "no results"
             raise FileFormatError(
                 f"{self.path}: holds no displacements (block {name}), but {known}; ask for "
                 "them in the deck: *NODE FILE with U"
@@ -113,7 +114,7 @@ def _check_text(path: Path, at: int, line: str) -> None:
 
 
 def _components(lines: list[str], at: int) -> tuple[int, int]:
-    """Where the values begin, and how many components are printed (not those made of others)."""
+    """Where the values begin, and how many components are printed, not made of others."""
     used = 0
     while at < len(lines) and lines[at].startswith(" -5"):
         made = lines[at][33:38].strip()
@@ -132,7 +133,8 @@ def _elements(path: Path, lines: list[str], at: int, found: dict[int, list[int]]
                 label = int(line[3:13])
                 found[label] = []
             else:
-                found[label] += [int(line[k : k + 10]) for k in range(3, len(line.rstrip()), 10)]
+                ends = range(3, len(line.rstrip()), 10)
+                found[label] += [int(line[k : k + 10]) for k in ends]
         except (ValueError, KeyError):
             raise FileFormatError(
                 f"{path}: line {at + 1}: expected an element or its nodes, got {line[:40]!r}"

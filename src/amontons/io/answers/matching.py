@@ -24,7 +24,7 @@ MOVED = 5e-2  # of it: by how much nodes may have been moved onto the master bef
 
 
 def by_label(path: Path, labels: Index, wanted: Index) -> Index:
-    """Rows of a table with sorted or unsorted labels for the nodes wanted; all must be there."""
+    """Rows of a table with any order of labels for the nodes wanted; all must be there."""
     order = np.argsort(labels, kind="stable")
     at = np.searchsorted(labels[order], wanted)
     at = np.minimum(at, len(labels) - 1)
@@ -40,7 +40,7 @@ def by_label(path: Path, labels: Index, wanted: Index) -> Index:
     return rows
 
 
-def check_points(path: Path, points: Array, wanted: Array, names: Array) -> None:
+def check_points(path: Path, points: Array, wanted: Array, names: Index) -> None:
     """Raise FileFormatError where nodes lie elsewhere than in the deck, (n, d) both."""
     size = float(np.ptp(wanted, axis=0).max(initial=0.0)) or 1.0
     far = np.linalg.norm(points[:, : wanted.shape[1]] - wanted, axis=1)
@@ -72,7 +72,7 @@ def by_place(path: Path, points: Array, wanted: Array, plane: str) -> tuple[Inde
         left = len(points) - len(rows)
         if left:
             raise FileFormatError(
-                f"{path}: has {left} nodes that the model lacks: it is the result of another one"
+                f"{path}: has {left} nodes that the model lacks: it is that of another one"
             )
     return node, rows
 

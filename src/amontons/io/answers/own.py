@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,7 +27,7 @@ def read_own(path: Path, model: Model) -> Answer:
                     f"{path}: holds no displacements of bodies: a discrete problem, or no "
                     "results of a model"
                 )
-            group = file["displacement"]
+            group: Any = file["displacement"]
             moved = []
             for body in model.bodies:
                 if body.name not in group:
@@ -36,7 +36,8 @@ def read_own(path: Path, model: Model) -> Answer:
                         f"{', '.join(group)}: it is the result of another model"
                     )
                 moved.append(np.asarray(group[body.name], dtype=float))
-            r = np.asarray(file["r"], dtype=float) if "r" in file else None
+            given: Any = file["r"] if "r" in file else None
+            r = None if given is None else np.asarray(given, dtype=float)
     except OSError as reason:
         raise FileFormatError(f"{path}: can not be read as HDF5: {reason}") from None
     for body, values in zip(model.bodies, moved, strict=True):

@@ -52,7 +52,7 @@ def read_answer(path: Path, case: Case, time: float | None = None) -> tuple[Mode
     if suffix in (".h5", ".hdf5"):
         from .own import read_own
 
-        return case.model, read_own(path, case.model)
+        return _at_end(case), _named(read_own(path, case.model), case)
     digits = {".frd": frd.DIGITS, ".dat": dat.DIGITS}.get(suffix)
     tables = _tables(path, suffix, case)
     at = _chosen(path, tables, time)
@@ -60,18 +60,28 @@ def read_answer(path: Path, case: Case, time: float | None = None) -> tuple[Mode
     return _model_and_answer(case, table, before, digits, wanted=time)
 
 
+def _at_end(case: Case) -> Model:
+    """The model at the end of its loads."""
+    return case.model if case.about is None else case.about.at(case.about.until)
+
+
+def _named(answer: Answer, case: Case) -> Answer:
+    names = None if case.about is None else case.about.labels.astype(str)
+    return replace(answer, names=names)
+
+
 def _model_and_answer(
     case: Case, table: Table, before: Table | None, digits: int | None, wanted: float | None
 ) -> tuple[Model, Answer]:  # fmt: skip
-    about, model = case.about, case.model
-    counts = [len(body.mesh.points) for body in model.bodies]
+    about = case.about
+    counts = [len(body.mesh.points) for body in case.model.bodies]
     answer = Answer(
         _split(table.values, counts),
         blur=_split(half_units(table.values, digits), counts),
         before=None if before is None else _split(before.values, counts),
     )
     if about is None or table.time is None:
-        return model, answer
+        return _at_end(case), _named(answer, case)
     until = about.until
     reached = min(table.time, until)
     return about.at(reached), replace(

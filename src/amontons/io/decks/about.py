@@ -8,7 +8,6 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.errors import InvalidInput
 from .flat import Deck
@@ -29,8 +28,8 @@ class About:
 
     plane: "", "strain", "stress" or "axisymmetric"; other: types of elements that are
     formulated otherwise, in words; large: NLGEOM; until: the end of the last step; one_way: all
-    loads grow in proportion; at: the model at a time.  cells: numbers (k,) of elements in the deck
-    and their nodes (k, n) in the mesh.
+    loads grow in proportion; at: the model at a time.  cells: numbers (k,) of elements in the
+    deck and their nodes (k, n) in the mesh.
     """
 
     labels: Index
