@@ -56,6 +56,7 @@ from ...problem.solution import FrictionSolution
 from ...solvers.contract import Iterate
 from ..model import Model
 from ..model.reactions import support_forces
+from .bolts import lock_times
 from .energy import Energies
 from .rubbing import rubbed
 from .springs import Springs
@@ -108,6 +109,11 @@ class MoreauJean:
         """The matrices of all steps; tolerance of their solves."""
         if model.kind.no_inertia:
             raise UnsupportedForm(f"model: {model.kind.no_inertia}")
+        for name in lock_times(model):
+            raise UnsupportedForm(
+                f"pretension {name!r}: bolts are locked in quasi-static steps only; tighten "
+                "them so, and begin the dynamics from that state with Fix on its length"
+            )
         return MovingModel(self, model, tolerance)
 
 
@@ -208,7 +214,8 @@ class MovingModel:
             columns = _rows_of(active, w.shape[1])
             H = sparse.csc_array(self.base.H[:, columns])  # type: ignore[index]
             structure = self.base.structure and self.base.structure.at(active)
-            problem = replace(self.base, H=H, law=self.law.at(active), structure=structure)
+            law = self.law.at(active)
+            problem = replace(self.base, H=H, w=w, law=law, structure=structure)
             self._last_active = (active, problem)
         return replace(self._last_active[1], f=f, w=w)
 
