@@ -43,6 +43,8 @@ _HOME = {
     "app.model_solution": ("ModelSolution",),
     "core.warned": ("DoubtWarning", "ResultWarning", "warn_of"),
     "app.api": ("solve",),
+    "app.audit": ("audit",),
+    "analysis.audit.verdict": ("Audit",),
     "app.questions": ("all_solutions", "basins", "critical_friction", "diagram", "existence",
                       "first_order", "follow", "full_contact_friction", "multistart",
                       "p_matrix_friction", "uniqueness"),

@@ -12,8 +12,10 @@ from .analysis import (
     ThetaMethod as ThetaMethod, Uniqueness as Uniqueness, Verdict as Verdict,
     Witness as Witness, graded as graded, performance_profile as performance_profile,
 )
+from .analysis.audit.verdict import Audit as Audit
 from .analysis.paths.path_crossing import PathCrossing as PathCrossing
 from .app.api import solve as solve
+from .app.audit import audit as audit
 from .app.model_solution import ModelSolution as ModelSolution
 from .app.questions import (
     all_solutions as all_solutions, basins as basins, critical_friction as critical_friction,

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from ..mechanics.model import Model
     from .case.evolution import Evolution
     from .case.settings import Settings
+    from .decks.about import About
 
 GROUP = "amontons.readers"  # of entry points
 MESHES = (".msh", ".vtk", ".vtu", ".stp", ".step", ".iges", ".igs", ".brep", ".stl", ".med",
@@ -41,7 +42,7 @@ class Case:
     overrides; key_of: the words of the file for an address in the model.  moving: the model
     as it goes on in time, where `target` is its state at the end, which can be solved for at
     once.  notes: what the file says and the case leaves out, in words.  units: what they are
-    called.
+    called.  about: what an audit asks of a deck.
     """
 
     target: Model | FrictionProblem
@@ -54,6 +55,7 @@ class Case:
     moving: Model | None = None
     notes: tuple[str, ...] = ()
     units: Units = Units()
+    about: About | None = None
 
     @property
     def name(self) -> str:

@@ -19,6 +19,12 @@ def figures(command: Command) -> Command:
     return chosen(none(command))
 
 
+def frd(command: Command) -> Command:
+    """Of a solve: results for the viewers of CalculiX too."""
+    text = "Write solution.frd too, for cgx and PrePoMax."
+    return click.option("--frd", is_flag=True, help=text)(command)
+
+
 def axes(command: Command) -> Command:
     """Of commands that draw branches: what over what, and in which format."""
     known = '"r_N 3", "sum r_T", "force x", "displacement y SURFACE", norm, arclength'

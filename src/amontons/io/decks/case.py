@@ -32,6 +32,7 @@ from ..case.evolution import Evolution
 from ..case.overrides import override_settings
 from ..case.settings import Settings
 from ..readers import Case
+from .about import About
 from .axes import Turned
 from .cards import Card, Row, read_cards
 from .contacts import Options, adjusted, law_of, read_contacts
@@ -153,7 +154,8 @@ def _case(
     plan = Schedule(*times_of(history, options.increments, notes), stages=later)
     case = Case(make(stages[0], None), settings, title, path,
                 evolution=Evolution(plan, history.until), key_of=found.line_of,
-                tables={"deck": {"cards": deck.digest}}, notes=tuple(notes))  # fmt: skip
+                tables={"deck": {"cards": deck.digest}}, notes=tuple(notes),
+                about=About.of(deck, history, at, stages, make))  # fmt: skip
     if later or (len(deck.steps) > 1 and any(c.mu for c in stages[0].contacts)):
         return case  # friction remembers the steps before
     return replace(case, target=make(stages[0], history.until), moving=case.target)

@@ -6,6 +6,7 @@ import contextlib
 import io
 import os
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -84,6 +85,11 @@ def file_head(path: Path) -> bytes:
 
 
 def _from_meshio(path: str) -> RawMesh:
+    return mesh_of_meshio(Path(path), _raw)
+
+
+def mesh_of_meshio(path: Path, use: Callable[[Any], Any] = lambda mesh: mesh) -> Any:
+    """What `use` makes of the mesh that meshio reads; raises FileFormatError, said by it."""
     try:
         meshio = with_all_kinds()
     except ImportError as error:
@@ -100,9 +106,8 @@ def _from_meshio(path: str) -> RawMesh:
             warnings.catch_warnings(),
         ):
             warnings.simplefilter("ignore")
-            check_file(Path(path))
-            found = meshio.read(path)
-            return _raw(found)
+            check_file(path)
+            return use(meshio.read(path))
     except FileFormatError:
         raise
     # A broken file makes meshio's forty parsers raise anything, or leave the interpreter.
