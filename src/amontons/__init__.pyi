@@ -31,7 +31,6 @@ from .core.errors import (
 from .core.warned import (
     DoubtWarning as DoubtWarning, ResultWarning as ResultWarning, warn_of as warn_of,
 )
-from .io.case import read_case as read_case
 from .io.checkpoint import (
     export_fclib as export_fclib, load_start as load_start, load_state as load_state,
     save_state as save_state,

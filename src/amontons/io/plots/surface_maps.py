@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Patches = Iterator[tuple[Array, NDArray[np.int64]]]  # polygons (k, 4, 2) and their nodes
-QUARTERS = {"quad9": ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3))}
+QUARTERS = {"quad9": ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3)),
+            "quad8": ((0, 4, 1, 5, 2, 6, 3, 7),)}  # fmt: skip
 HEAT = "YlOrRd"
 TINY = 1e-300  # instead of a largest pressure of 0
 KEY = 0.36  # inches of the key of the arrows below its panel
@@ -96,7 +97,10 @@ def _node_patches(
         if (contact[middles] < 0).all():  # averages sit at corners
             facets = corner_facets(facets)  # noqa: PLW2901
         cut = _thirds if facets.kind == "tri6" else _quarters
-        for table in QUARTERS.get(facets.kind, [slice(None)]):
+        tables = QUARTERS.get(facets.kind, [slice(None)])
+        if facets.kind == "quad8" and (contact[facets.nodes[:, 4:]] < 0).all():
+            tables = [slice(4)]  # nodal contact has none at the middles of sides
+        for table in tables:
             for patch, nodes in cut(points, facets.nodes[:, table]):
                 patches.append(patch)
                 owner.append(contact[nodes])
