@@ -15,12 +15,16 @@ GROUPS = {
     "Solve": (
         "The verb, what it takes and what it returns.",
         "solve drive FrictionProblem Form FrictionSolution ModelSolution ContactStatus "
-        "Convergence Outcome Criterion Iterate ResultWarning",
+        "Convergence Outcome Criterion Iterate ResultWarning DoubtWarning warn_of",
     ),
     "Models": (
         "Bodies on meshes, supports, loads and contacts.",
-        "Model Body LinearElastic NeoHookean CiarletGeymonat Rigid Fix Traction Pressure "
-        "BodyForce NodalForce Contact ContactFields Nitsche Plane Sphere LevelSet distributed",
+        "Model Body LinearElastic OrthotropicElastic NeoHookean CiarletGeymonat Rigid Fix Traction Pressure "
+        "BodyForce NodalForce Temperature Contact ContactFields Nitsche Plane Sphere LevelSet distributed",
+    ),
+    "Constraints": (
+        "Linear constraints between nodes, surfaces and bodies; bolts and springs.",
+        "Equation Coupling Reference Pretension opened Axes Spring",
     ),
     "Meshes": (
         "Meshes that are built in, read from files, or made from shapes.",

@@ -174,7 +174,7 @@ def read_case(
     text = os.fspath(path)
     named = (each for each in FORMATS if text.lower().endswith(each.suffixes))
     found = FORMATS[0] if text.startswith("example:") else next(named, FORMATS[0])
-    return found.read(Path(path) if found is not FORMATS[0] else path, overrides, method)
+    return found.read(Path(path), overrides, method)
 
 
 def format_of(path: Path) -> Format:
