@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ...core.errors import InvalidInput
-from ...mechanics.contact import pair_contact
-from ...mechanics.meshes import Mesh
+from ...mechanics.contact.pairs import pair_contact, project
+from ...mechanics.meshes import Facets, Mesh
+from ...mechanics.meshes.cells import CELLS, FACET_KIND
+from ...mechanics.meshes.surfaces import nodal_normals
 from ...mechanics.model import Contact
 from ...problem.law import ExponentialOverclosure, OverclosureCurve
 from .cards import Card, Row, number
@@ -79,7 +81,6 @@ class Pair:
             self.slave, master=self.master, clearance=gap, method="nodal", where=where, **law
         )
 
-
     def glue(self, mesh: Mesh) -> None:
         """Choose the nodes of a tie that are near enough; raises FileFormatError for none."""
         rows, _, _ = pair_contact(mesh, self.slave, mesh, self.master)
@@ -108,6 +109,8 @@ def read_contacts(
                 raise placed.card.error("stands in a step; expected before the first one")
     pairs: list[Pair] = []
     for placed in deck.model:
+        if placed.card.keyword in ("CHANGEFRICTION", "CHANGESURFACEBEHAVIOR", "MODELCHANGE"):
+            raise placed.card.error("stands before the first *STEP; expected in one")
         if placed.card.keyword == "CONTACTPAIR":
             pairs += _pairs(placed, region, interactions, notes)
         elif placed.card.keyword == "TIE":
@@ -340,6 +343,25 @@ def _slave(
 
 
 # ----------------------------------------------------------------------------- adjusting
+def _before_master(mesh: Mesh, points: Array, pair: Pair) -> tuple[Index, Array, Array]:
+    """Slave nodes with a master facet before them, their gaps, and the normals of that.
+
+    Facets of second order are taken by their corners, nodes between them as the others.
+    """
+    facets = mesh.surface(pair.slave)
+    nodes = np.unique(np.concatenate([block.nodes.ravel() for block in facets]))
+    flat = tuple(
+        Facets(FACET_KIND[mesh.dim, count], block.nodes[:, :count])
+        for block in mesh.surface(pair.master)
+        for count in [CELLS[block.kind].corner_count]
+    )
+    facing = nodal_normals(points, facets)[nodes]
+    hit = project(points[nodes], points, flat, facing=facing, own=nodes)
+    found, normals = hit.found, hit.normal[hit.found]
+    nodes = nodes[found]
+    return nodes, np.einsum("ij,ij->i", points[nodes] - hit.closest[found], normals), normals
+
+
 def adjusted(mesh: Mesh, at: Index, pairs: Sequence[Pair], notes: list[str]) -> Mesh:
     """The mesh with slave nodes put onto their master where a pair asks for it.
 
@@ -349,15 +371,14 @@ def adjusted(mesh: Mesh, at: Index, pairs: Sequence[Pair], notes: list[str]) -> 
     for pair in pairs:
         if pair.adjust is None:
             continue
-        moved = replace(mesh, points=points)
-        rows, _, _ = pair_contact(moved, pair.slave, moved, pair.master)
+        nodes, gap, normals = _before_master(mesh, points, pair)
         if isinstance(pair.adjust, float):
-            chosen = rows.gap <= pair.adjust
+            chosen = gap <= pair.adjust
         else:
-            chosen = np.isin(rows.nodes, at[pair.adjust])
-        chosen &= rows.gap != 0.0
-        way = rows.gap[chosen]
-        points[rows.nodes[chosen]] -= way[:, None] * rows.frames[chosen, 0]
+            chosen = np.isin(nodes, at[pair.adjust])
+        chosen &= gap != 0.0
+        way = gap[chosen]
+        points[nodes[chosen]] -= way[:, None] * normals[chosen]
         if len(way):
             notes.append(
                 f"{pair.card} (line {pair.card.number}): {len(way)} slave nodes are put onto "

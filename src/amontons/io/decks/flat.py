@@ -7,14 +7,14 @@ cards of materials, interactions and steps are kept in their order.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from .cards import Card, Row, number, whole
+from .cards import Card, Row, digest_of, number, whole
 from .scopes import Index, Names, Scope, missing
 from .shapes import SHAPES
 
@@ -77,7 +77,7 @@ class Deck:
 
 def flatten(cards: Sequence[Card]) -> Deck:
     """The deck that cards make; raises FileFormatError with file and line."""
-    deck = Deck(digest=_digest(cards))
+    deck = Deck(digest=digest_of(cards))
     parts: dict[str, list[Card]] = {}
     k = 0
     while k < len(cards):
@@ -105,17 +105,6 @@ def flatten(cards: Sequence[Card]) -> Deck:
                       *((n, n.node_at) for n in deck.instances.values())):  # fmt: skip
         deck.point_labels.append((names, np.sort(at)))
     return deck
-
-
-def _digest(cards: Sequence[Card]) -> str:
-    """A hash of all cards but those of the mesh, which has its own."""
-    whole = hashlib.sha256()
-    for card in cards:
-        whole.update(repr((card.keyword, sorted(card.options.items()))).encode())
-        if card.keyword not in ("NODE", "ELEMENT"):
-            for piece in card.pieces:
-                whole.update(piece.text.encode())
-    return whole.hexdigest()
 
 
 def _inside(
@@ -163,8 +152,7 @@ def _assemble(deck: Deck, cards: Sequence[Card], parts: dict[str, list[Card]]) -
 def _motion(card: Card) -> Callable[[Array], Array]:
     """How an instance stands: translated, then turned about an axis by an angle in degrees."""
     rows = [row for row in card.rows() if any(row.fields)]
-    shift, turn = np.zeros(WIDTH), np.eye(WIDTH)
-    about = np.zeros(WIDTH)
+    shift, about, turn = np.zeros(WIDTH), np.zeros(WIDTH), np.eye(WIDTH)
     for row in rows[:2]:
         values = [number(text, row, "instance") for text in row.fields]
         if len(values) <= WIDTH:
@@ -184,9 +172,7 @@ def _rotation(axis: Array, angle: float, row: Row) -> Array:
     size = float(np.linalg.norm(axis))
     if not size:
         raise row.error("instance: the two points of the axis are one")
-    x, y, z = axis / size
-    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(WIDTH) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K)
+    return np.asarray(Rotation.from_rotvec(angle / size * axis).as_matrix())
 
 
 # --------------------------------------------------------------------------------- cards

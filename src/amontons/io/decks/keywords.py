@@ -54,12 +54,12 @@ def sorted_out(cards: Iterable[Card], allowed: Sequence[str]) -> tuple[list[Card
     allow = {"".join(word.upper().split()).removeprefix("*") for word in allowed}
     for card in cards:
         key = card.keyword
-        if key in READ:
+        if key in allow:
+            notes.append(f"AT YOUR RISK: {card} (line {card.number}) is left out{_would(key)}")
+        elif key in READ:
             kept.append(card)
         elif key in OUTPUT | NUMERICS | EMPTY or _is_thermal(card):
             skipped.setdefault(str(card), []).append(card.number)
-        elif key in allow:
-            notes.append(f"AT YOUR RISK: {card} (line {card.number}) is left out{_would(key)}")
         else:
             raise card.error(
                 f"changes the answer and is not read{_would(key)}; without it the result is "
