@@ -19,8 +19,9 @@ GROUPS = {
     ),
     "Models": (
         "Bodies on meshes, supports, loads and contacts.",
-        "Model Body LinearElastic OrthotropicElastic NeoHookean CiarletGeymonat Rigid Fix Traction Pressure "
-        "BodyForce NodalForce Temperature Contact ContactFields Nitsche Plane Sphere LevelSet distributed",
+        "Model Body LinearElastic OrthotropicElastic NeoHookean CiarletGeymonat Rigid Fix "
+        "Traction Pressure BodyForce NodalForce Temperature Contact ContactFields Nitsche "
+        "Plane Sphere LevelSet distributed",
     ),
     "Constraints": (
         "Linear constraints between nodes, surfaces and bodies; bolts and springs.",

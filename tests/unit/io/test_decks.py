@@ -339,6 +339,8 @@ def test_amplitudes_and_loads_that_go(tmp_path):
         (("*END STEP", "*TEMPERATURE, OP=NEW\nNALL, 20.\n*END STEP"), "OP=NEW: is not read"),
         (("*BOUNDARY\n1,", "*GAP\n1.\n*BOUNDARY\n1,"),
          "GAP: changes the answer and is not read .*contact elements"),
+        (("*BOUNDARY\n1,", "*MODEL CHANGE\nLOWER\n*BOUNDARY\n1,"),
+         "MODEL CHANGE: stands before the first"),
         (("*END STEP", "*STEP"), "has not ended"),
         (("*NODE,", "1, 2\n*NODE,"), "deck.inp:1: expected a keyword"),
         (("*MATERIAL, NAME=STEEL\n", ""), "stands before the first"),

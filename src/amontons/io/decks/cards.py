@@ -9,10 +9,11 @@ file, whose first lines may be data of the card before.  A file may be packed (.
 from __future__ import annotations
 
 import gzip
+import hashlib
 import itertools
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -313,3 +314,14 @@ def _text(path: Path, place: str) -> str:
         raise FileFormatError(f"{before}{path}: expected text, this is a binary file")
     text = text.removeprefix("\ufeff")
     return text if "\r" not in text else text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def digest_of(cards: Sequence[Card]) -> str:
+    """A hash of all cards but those of the mesh, which has its own."""
+    whole = hashlib.sha256()
+    for card in cards:
+        whole.update(repr((card.keyword, sorted(card.options.items()))).encode())
+        if card.keyword not in ("NODE", "ELEMENT"):
+            for piece in card.pieces:
+                whole.update(piece.text.encode())
+    return whole.hexdigest()

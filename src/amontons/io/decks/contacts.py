@@ -83,7 +83,6 @@ class Pair:
             self.slave, master=self.master, clearance=gap, method="nodal", where=where, **law
         )
 
-
     def glue(self, mesh: Mesh) -> None:
         """Choose the nodes of a tie that are near enough; raises FileFormatError for none."""
         rows, _, _ = pair_contact(mesh, self.slave, mesh, self.master)
@@ -112,6 +111,8 @@ def read_contacts(
                 raise placed.card.error("stands in a step; expected before the first one")
     pairs: list[Pair] = []
     for placed in deck.model:
+        if placed.card.keyword in ("CHANGEFRICTION", "CHANGESURFACEBEHAVIOR", "MODELCHANGE"):
+            raise placed.card.error("stands before the first *STEP; expected in one")
         if placed.card.keyword == "CONTACTPAIR":
             pairs += _pairs(placed, region, interactions, notes)
         elif placed.card.keyword == "TIE":

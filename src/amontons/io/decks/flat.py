@@ -7,14 +7,13 @@ cards of materials, interactions and steps are kept in their order.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .cards import Card, Row, number, whole
+from .cards import Card, Row, digest_of, number, whole
 from .placement import motion
 from .scopes import Index, Names, Scope, missing
 from .shapes import SHAPES
@@ -78,7 +77,7 @@ class Deck:
 
 def flatten(cards: Sequence[Card]) -> Deck:
     """The deck that cards make; raises FileFormatError with file and line."""
-    deck = Deck(digest=_digest(cards))
+    deck = Deck(digest=digest_of(cards))
     parts: dict[str, list[Card]] = {}
     k = 0
     while k < len(cards):
@@ -106,17 +105,6 @@ def flatten(cards: Sequence[Card]) -> Deck:
                       *((n, n.node_at) for n in deck.instances.values())):  # fmt: skip
         deck.point_labels.append((names, np.sort(at)))
     return deck
-
-
-def _digest(cards: Sequence[Card]) -> str:
-    """A hash of all cards but those of the mesh, which has its own."""
-    whole = hashlib.sha256()
-    for card in cards:
-        whole.update(repr((card.keyword, sorted(card.options.items()))).encode())
-        if card.keyword not in ("NODE", "ELEMENT"):
-            for piece in card.pieces:
-                whole.update(piece.text.encode())
-    return whole.hexdigest()
 
 
 def _inside(

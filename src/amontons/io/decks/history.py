@@ -124,19 +124,18 @@ class Prescribed:
         return [None if c == FREE else self.courses[c] for c in numbers]
 
     def groups(self, dim: int, held: Index | None = None) -> list[Group]:
-        """Nodes with the same courses in all components, at the end or those of `held`."""
+        """Nodes with the same courses, at the end or those of `held`, by their first node."""
         at = self.at if held is None else held
         rows = np.flatnonzero((at[:, :dim] != FREE).any(axis=1))
         if not len(rows):
             return []
         same, which = np.unique(at[rows, :dim], axis=0, return_inverse=True)
-        which = which.ravel()
-        out = []
+        out, which = [], which.ravel()
         for k, numbers in enumerate(same):
             courses = [None if c == FREE else self.courses[c] for c in numbers]
             card = self.cards[max(numbers)]
             out.append((rows[which == k], courses, card))
-        return out
+        return sorted(out, key=lambda group: int(group[0][0]))
 
 
 Group = tuple[Index, list[Course | None], Card]  # nodes, their courses, where they stand

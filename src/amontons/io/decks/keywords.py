@@ -53,12 +53,12 @@ def sorted_out(cards: Iterable[Card], allowed: Sequence[str]) -> tuple[list[Card
     allow = {"".join(word.upper().split()).removeprefix("*") for word in allowed}
     for card in cards:
         key = card.keyword
-        if key in READ or (key == "INITIALCONDITIONS" and card.label("TYPE") == "TEMPERATURE"):
+        if key in allow:
+            notes.append(f"AT YOUR RISK: {card} (line {card.number}) is left out{_would(key)}")
+        elif key in READ or _is_first_temperature(card):
             kept.append(card)
         elif key in OUTPUT | NUMERICS | EMPTY or _is_thermal(card):
             skipped.setdefault(str(card), []).append(card.number)
-        elif key in allow:
-            notes.append(f"AT YOUR RISK: {card} (line {card.number}) is left out{_would(key)}")
         else:
             raise card.error(
                 f"changes the answer and is not read{_would(key)}; without it the result is "
@@ -76,3 +76,7 @@ def _is_thermal(card: Card) -> bool:
 
 def _would(key: str) -> str:
     return f" ({MEANS[key]})" if key in MEANS else ""
+
+
+def _is_first_temperature(card: Card) -> bool:
+    return card.keyword == "INITIALCONDITIONS" and card.label("TYPE") == "TEMPERATURE"
