@@ -376,16 +376,32 @@ def test_a_cut_file(tmp_path):
         read(tmp_path / "deck.inp.gz")
 
 
-def test_a_risk_that_is_taken_is_said_in_the_result(tmp_path, monkeypatch):
+@pytest.mark.parametrize("risk", [("--set", "deck.allow=gap"), ("--allow", "gap")])
+def test_a_risk_that_is_taken_is_said_in_the_result(tmp_path, monkeypatch, risk):
     monkeypatch.chdir(tmp_path)
     text = DECK.replace("*BOUNDARY\n1,", "*GAP\n1.\n*BOUNDARY\n1,")
     (tmp_path / "deck.inp").write_text(text.replace("*END STEP", "*NODE PRINT\nU\n*END STEP"))
-    done = CliRunner().invoke(main, ["solve", "deck.inp", "--set", "deck.allow=gap"])
+    done = CliRunner().invoke(main, ["solve", "deck.inp", *risk])
     assert done.exit_code == 0, done.output
     assert "AT YOUR RISK: *GAP" in done.output
     notes = json.loads((tmp_path / "deck-results" / "solution.json").read_text())["notes"]
     assert any("AT YOUR RISK" in note for note in notes)
     assert any("NODE PRINT" in note and "skipped" in note for note in notes)
+
+
+def test_hard_contact_is_one_word_on_the_command_line(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    soft = PRESSED.replace("OVERCLOSURE=HARD", "OVERCLOSURE=LINEAR\n800.")
+    (tmp_path / "deck.inp").write_text(soft)
+    said = {}
+    for words in ((), ("--hard",)):
+        asked = ["solve", "deck.inp", "--no-figures", *words, "--json", "found.json"]
+        done = CliRunner().invoke(main, asked)
+        assert done.exit_code == 0, done.output
+        notes = json.loads((tmp_path / "found.json").read_text())["notes"]
+        said[words] = [note for note in notes if "taken as hard" in note]
+    assert said[()] == []
+    assert len(said["--hard",]) == 1
 
 
 # ------------------------------------------------------------------- node sets of meshes

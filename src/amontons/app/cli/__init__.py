@@ -77,6 +77,7 @@ Examples:
 @flags.figures
 @flags.frd
 @click.option("--quiet", is_flag=True, help="No progress, no summary.")
+@flags.of_decks
 def solve(**options: object) -> int:
     """Solve a problem and write the results.
 
@@ -103,6 +104,7 @@ Examples:
 @flags.surfaces
 @click.option("--json", "json_copy", metavar="FILE",
               help="The same as JSON, with certificates; - prints it.")  # fmt: skip
+@flags.of_decks
 def info(**options: object) -> None:
     """Say what a problem is: sizes, rank, density, friction, scales, methods that fit.
 
@@ -130,6 +132,7 @@ Examples:
               help="local: W, q; global: M, H, f, w. [the form it has]")  # fmt: skip
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
               help="Replace a value of the case.")  # fmt: skip
+@flags.of_decks
 def convert(**options: object) -> None:
     """Write a problem as an FCLib file, in either form, or results as .frd or .dat.
 
@@ -204,6 +207,7 @@ Exit codes: 0 the list is complete, 1 there may be others, 2 bad input.
 @click.option("--picture", metavar="FILE",
               help="Draw the solutions side by side: .png, .svg or .pdf.")  # fmt: skip
 @results_folder("name of the source with -results", only_report=True)
+@flags.of_decks
 def enumerate_solutions(**options: object) -> int:
     """Find all solutions of a problem with Coulomb friction, and prove that these are all.
 
@@ -260,6 +264,7 @@ Exit codes: 0 all runs are made, 1 the time was over before, 2 bad input, 130 in
 @click.option("--picture", metavar="FILE",
               help="Draw what was found: .png, .svg or .pdf.")  # fmt: skip
 @click.option("--quiet", is_flag=True, help="No progress, no tables.")
+@flags.of_decks
 def basins(**options: object) -> int:
     """Find out which solution each method finds, from many starts, over its parameters.
 
@@ -290,6 +295,7 @@ Exit codes: 0 settled, either way, 1 undecided, 2 bad input.
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
               help="Replace a value of the case.")  # fmt: skip
 @click.option("--json", "json_copy", metavar="FILE", help="The same as JSON; - prints it.")
+@flags.of_decks
 def uniqueness(**options: object) -> int:
     """Say whether a problem has one solution: for every load, for this load, or several.
 
@@ -337,6 +343,7 @@ Exit codes: 0 every branch has come to its end, 1 one was given up, 2 bad input.
               help="A copy of follow.json; - prints it and nothing else.")  # fmt: skip
 @flags.axes
 @click.option("--quiet", is_flag=True, help="No summary.")
+@flags.of_decks
 def follow(**options: object) -> int:
     """Follow the solutions while the load or the friction changes: folds, events, branches.
 
@@ -383,6 +390,7 @@ has been made is saved, go on with --restart.
 @click.option("--restart", is_flag=True,
               help="Go on from the state in DIR, of the same case, after any end.")  # fmt: skip
 @click.option("--quiet", is_flag=True, help="No progress, no summary.")
+@flags.of_decks
 def run(**options: object) -> int:
     """Follow a case in time: dynamics, or quasi-static steps.
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
+from functools import wraps
 from typing import Any
 
 import click
@@ -55,3 +57,26 @@ def fclib_error(command: Command) -> Command:
         help="Put the published FCLib error into solution.json also where it takes a "
         "factorisation; it is for comparison only.",
     )(command)  # fmt: skip
+
+
+def of_decks(command: Command) -> Command:
+    """Of what reads decks: what to leave out, and contact as hard as it can be.
+
+    Stands next to the function: its settings join those of --set.
+    """
+
+    @wraps(command)
+    def with_settings(
+        *, allow: tuple[str, ...], hard: bool, overrides: tuple[str, ...], **options: Any
+    ) -> Any:
+        given = [f"deck.allow={json.dumps(allow)}"] if allow else []
+        given += ["deck.hard=true"] if hard else []
+        return command(overrides=(*overrides, *given), **options)
+
+    allowed = click.option("--allow", multiple=True, metavar="KEYWORD",
+                           help="Of a deck: go on without this keyword, at your risk, which "
+                           "every result says; may be repeated.")  # fmt: skip
+    rigid = click.option("--hard", is_flag=True,
+                         help="Of a deck: hard contact and rigid sticking, whatever stiffness "
+                         "it gives.")  # fmt: skip
+    return allowed(rigid(with_settings))

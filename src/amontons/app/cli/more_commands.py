@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from . import flags
 from .folders import results_folder
 
 
@@ -35,6 +36,7 @@ Exit codes: 0 right, 1 wrong or undecided, 2 it can not be read or belongs to an
               help="Draw where it is wrong: .png, .svg or .pdf.")  # fmt: skip
 @results_folder("name of the result with -audit", only_report=True)
 @click.option("--quiet", is_flag=True, help="The exit code alone.")
+@flags.of_decks
 def audit(**options: object) -> int:
     """Say whether a contact result is true, of another program or of ours.
 

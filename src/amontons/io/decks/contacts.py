@@ -225,7 +225,7 @@ def law_of(
     if word not in LAWS:
         raise card.error(
             f"{word}: this law of pressure over overclosure is not read, expected one of "
-            f"{', '.join(LAWS)}; --set deck.hard=true takes contact as hard and rigid"
+            f"{', '.join(LAWS)}; --hard takes contact as hard and rigid"
         )
     if options.hard:
         if word != "HARD" or interaction.slope is not None:

@@ -1,6 +1,6 @@
 """Which keywords of a deck are read, which say nothing about the answer, and which change it.
 
-A card that changes the answer and is not read is an error; `--set deck.allow=[KEYWORD]` goes on
+A card that changes the answer and is not read is an error; `--allow KEYWORD` goes on
 without it at the user's risk, which every result then says.
 """
 
@@ -62,7 +62,7 @@ def sorted_out(cards: Iterable[Card], allowed: Sequence[str]) -> tuple[list[Card
         else:
             raise card.error(
                 f"changes the answer and is not read{_would(key)}; without it the result is "
-                f"that of another model: --set deck.allow={key} takes this risk"
+                f"that of another model: --allow {key} takes this risk"
             )
     for name, lines in skipped.items():
         where = ", ".join(map(str, lines[:4])) + (", ..." if len(lines) > 4 else "")
