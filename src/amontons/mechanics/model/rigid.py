@@ -10,6 +10,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from ...core.errors import SingularOperator
+from ..elements.given import GivenMatrices
 from ..meshes.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -37,8 +38,8 @@ class Piece:
     rigid: list[int] | None = None
 
 
-def pieces(mesh: Mesh, name: str, offset: int) -> list[Piece]:
-    """Connected pieces of a mesh whose dofs start at `offset`."""
+def pieces(mesh: Mesh, name: str, offset: int, material: object = None) -> list[Piece]:
+    """Connected pieces of a mesh whose dofs start at `offset`; material: of its body."""
     labels = _labels(mesh)
     titles = _titles(mesh, name, labels)
     out = []
@@ -46,7 +47,10 @@ def pieces(mesh: Mesh, name: str, offset: int) -> list[Piece]:
         nodes = np.flatnonzero(labels == label)
         dofs = offset + (nodes[:, None] * mesh.dim + np.arange(mesh.dim)).ravel()
         rigid = ALONG_AXIS if mesh.axisymmetric else None
-        out.append(Piece(title, dofs, rigid_modes(mesh.points[nodes]), rigid))
+        modes = rigid_modes(mesh.points[nodes])
+        if isinstance(material, GivenMatrices):
+            rigid = material.resisted(modes, dofs - offset)
+        out.append(Piece(title, dofs, modes, rigid))
     return out
 
 

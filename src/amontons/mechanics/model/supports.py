@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import InvalidInput, within
 from ..elements.elasticity import body_load
+from ..elements.given import GivenMatrices
 from ..meshes.mesh import Mesh, unknown
 from ..meshes.surfaces import pressure_load, surface_load
 from .parts import Body, BodyForce, Fix, Load, NodalForce, Pressure, Traction
@@ -115,13 +116,17 @@ def _check_agreement(old: Array, new: Array, points: Array, what: str) -> None:
 
 
 def external_load(
-    bodies: Sequence[Body], loads: Sequence[Load | None], offsets: Index
+    bodies: Sequence[Body], loads: Sequence[Load | None], offsets: Index, *, own: bool = True
 ) -> Array:
     """Nodal forces of loads on the undeformed bodies, (dofs,).
 
     None stands for a load of the model that is left out, so that others keep their address.
+    own: with the loads that bodies of other programs bring.
     """
     out = np.zeros(int(offsets[-1]))
+    for k, body in enumerate(bodies):
+        if own and isinstance(body.material, GivenMatrices):
+            out[offsets[k] : offsets[k + 1]] += body.material.load
     for at, load in enumerate(loads):
         with within("loads", at):
             if isinstance(load, BodyForce):

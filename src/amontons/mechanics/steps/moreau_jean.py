@@ -208,7 +208,8 @@ class MovingModel:
             columns = _rows_of(active, w.shape[1])
             H = sparse.csc_array(self.base.H[:, columns])  # type: ignore[index]
             structure = self.base.structure and self.base.structure.at(active)
-            problem = replace(self.base, H=H, law=self.law.at(active), structure=structure)
+            law = self.law.at(active)
+            problem = replace(self.base, H=H, w=w, law=law, structure=structure)
             self._last_active = (active, problem)
         return replace(self._last_active[1], f=f, w=w)
 
