@@ -19,7 +19,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 LIST = HERE / "signatures.txt"
-LIMIT = 120.0  # seconds of a command
+LIMIT = 300.0  # seconds of a command
 AMONTONS = [sys.executable, "-m", "amontons"]
 EXAMPLES = (
     "block brake cube cylinder dome hertz hild one-contact release slab spheres tower tresca "

@@ -20,7 +20,7 @@ GROUPS = {
     "Models": (
         "Bodies on meshes, supports, loads and contacts.",
         "Model Body LinearElastic NeoHookean CiarletGeymonat Rigid Fix Traction Pressure "
-        "BodyForce Contact ContactFields Nitsche Plane Sphere LevelSet distributed",
+        "BodyForce NodalForce Contact ContactFields Nitsche Plane Sphere LevelSet distributed",
     ),
     "Meshes": (
         "Meshes that are built in, read from files, or made from shapes.",
@@ -28,7 +28,8 @@ GROUPS = {
     ),
     "Friction laws": (
         "Laws of contact as values, one for all contacts or one each.",
-        "Coulomb Tresca CappedCoulomb Cohesive Orthotropic Compliant Mixed",
+        "Coulomb Tresca CappedCoulomb Cohesive Orthotropic Compliant Tied VaryingFriction "
+        "FrictionCurve VaryingCompliance OverclosureCurve ExponentialOverclosure Mixed",
     ),
     "Questions": (
         "Is it the only solution, which others are there, and where do they go?",
@@ -48,7 +49,7 @@ GROUPS = {
         "evolve QuasiStatic MoreauJean TimeStep State Passage at_rest save_state load_state "
         "load_start export_fclib",
     ),
-    "Files": ("What is read and written.", "read_case read_fclib write_fclib"),
+    "Files": ("What is read and written.", "read_case read_fclib write_fclib export_xdmf"),
     "Ready-made problems": (
         "Walls of blocks and packings of spheres.", "Wall Bond SpherePacking",
     ),

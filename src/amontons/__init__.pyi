@@ -28,13 +28,15 @@ from .core.errors import (
     NotWritten as NotWritten, SingularOperator as SingularOperator, TimeUp as TimeUp,
     UnsupportedForm as UnsupportedForm, UnsupportedLaw as UnsupportedLaw,
 )
-from .core.warned import ResultWarning as ResultWarning
-from .io.case import read_case as read_case
+from .core.warned import (
+    DoubtWarning as DoubtWarning, ResultWarning as ResultWarning, warn_of as warn_of,
+)
 from .io.checkpoint import (
     export_fclib as export_fclib, load_start as load_start, load_state as load_state,
     save_state as save_state,
 )
 from .io.fclib import read_fclib as read_fclib, write_fclib as write_fclib
+from .io.readers import read_case as read_case
 from .io.series import export_xdmf as export_xdmf
 from .linear import Direct as Direct, GeometricMultigrid as GeometricMultigrid, Petsc as Petsc
 from .mechanics.contact import (
@@ -42,14 +44,16 @@ from .mechanics.contact import (
 )
 from .mechanics.meshes import (
     Cells as Cells, Facets as Facets, Mesh as Mesh, box as box, mesh_shape as mesh_shape,
-    read_cad as read_cad, read_mesh as read_mesh, refined as refined,
+    opened as opened, read_cad as read_cad, read_mesh as read_mesh, refined as refined,
 )
 from .mechanics.model import (
-    Body as Body, BodyForce as BodyForce, CiarletGeymonat as CiarletGeymonat,
-    Contact as Contact, ContactFields as ContactFields, Fix as Fix,
-    LinearElastic as LinearElastic, Model as Model, NeoHookean as NeoHookean,
-    NodalForce as NodalForce, Pressure as Pressure, Rigid as Rigid, Traction as Traction,
-    distributed as distributed,
+    Axes as Axes, Body as Body, BodyForce as BodyForce, CiarletGeymonat as CiarletGeymonat,
+    Contact as Contact, ContactFields as ContactFields, Coupling as Coupling,
+    Equation as Equation, Fix as Fix, LinearElastic as LinearElastic, Model as Model,
+    NeoHookean as NeoHookean, NodalForce as NodalForce,
+    OrthotropicElastic as OrthotropicElastic, Pressure as Pressure,
+    Pretension as Pretension, Reference as Reference, Rigid as Rigid, Spring as Spring,
+    Temperature as Temperature, Traction as Traction, distributed as distributed,
 )
 from .mechanics.ready.packings import SpherePacking as SpherePacking
 from .mechanics.ready.walls import Bond as Bond, Wall as Wall

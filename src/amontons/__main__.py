@@ -1,5 +1,6 @@
 """`amontons` and `python -m amontons` are the command line."""
 
+import gc
 import os
 import signal
 import sys
@@ -18,6 +19,7 @@ def run() -> None:
         sys.exit(130)
     finally:  # all is done: what Python still clears away is nothing to interrupt
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+        gc.freeze()  # nor to search for cycles, which takes as long as a small solve
 
 
 if __name__ == "__main__":

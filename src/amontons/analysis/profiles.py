@@ -26,6 +26,11 @@ def performance_profile(times: ArrayLike) -> tuple[Array, Array]:
     >>> tau.tolist(), rho.tolist()
     ([1.0, 2.0, 3.0], [[0.5, 0.5, 1.0], [0.5, 1.0, 1.0]])
     """
+    if any(value is None for value in np.ravel(np.asarray(times, dtype=object))):
+        raise InvalidInput(
+            "times: expected numbers, got None, as the record of a method that does not count "
+            "its operations (`Convergence.flops`) has it; compare seconds, or leave it out"
+        )
     table = real("times", times)
     if table.ndim != 2 or not table.size:
         raise InvalidInput(f"times: expected shape (problems, methods), got {table.shape}")

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from ..mechanics.model import ContactFields, Model
     from ..mechanics.model.pairs import PairResult
     from ..mechanics.model.reactions import SupportResult
+    from ..mechanics.model.references import ReferenceResult
 
 OF_SOLUTION = (
     "problem", "r", "u", "v", "status", "sliding", "margin", "convergence", "converged",
@@ -75,11 +76,20 @@ class ModelSolution(Shown):
         return support_results(self.model, self.fields)
 
     @cached_property
+    def references(self) -> dict[str, ReferenceResult]:
+        """Displacement, rotation, force and moment of every reference and bolt, by its name."""
+        from ..mechanics.model.references import reference_results
+
+        return reference_results(self.model, self.fields)
+
+    @cached_property
     def warnings(self) -> tuple[ResultWarning, ...]:
         """Reasons to doubt a result that has converged, each with a name."""
         from ..mechanics.model.doubts import model_warnings
 
-        return self.solution.warnings + model_warnings(self.model, self.fields)
+        return self.solution.warnings + model_warnings(
+            self.model, self.fields, self.solution.converged
+        )
 
     def __str__(self) -> str:
         return output.describe(self.output)

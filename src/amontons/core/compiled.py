@@ -11,93 +11,74 @@ become of the functions that it calls.  So all kernels are kept under a digest o
 from __future__ import annotations
 
 import atexit
+import logging
 import os
 import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from functools import cache, cached_property
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numba
 from numba.core import config
-from numba.core.caching import FunctionCache, _Cache
-from numba.core.dispatcher import Dispatcher
-from numba.core.sigutils import normalize_signature
 
-from . import clock
-from .shipped import PACKAGE, name_of, shipped, sources
-from .spelling import spelled
+from .source_digest import PACKAGE, sources
 
-RECORD = os.environ.get("AMONTONS_RECORD_KERNELS", "")  # a file, see docs/startup.md
 MARK = b"njit("  # in every file with kernels
 ROOT = 0  # whose folders anybody may trust
+STRANGE = f"numba {numba.__version__} is not one that kernels in the package can be read with"
 PATIENCE = 30 * 24 * 3600.0  # seconds after which kernels of another version may go
 Function = Callable[..., Any]
+logger = logging.getLogger(__name__)
 
 
 def njit(*, cache: bool = True, **options: Any) -> Callable[[Function], Function]:
     """`numba.njit` with the same options; its results come with the package, or are kept."""
 
     def decorate(function: Function) -> Function:
+        kind = _kind() if cache else None
         made = numba.njit(**options)(function)
-        if cache and isinstance(made, Dispatcher):  # numba can be switched off
-            made._cache = Kept(function)
+        if kind and hasattr(made, "_cache"):
+            made._cache = kind(function, _in_our_folder)
+        elif cache and hasattr(made, "enable_caching"):  # not where numba is switched off
+            with _in_our_folder():
+                made.enable_caching()
         return made
 
     return decorate
 
 
-class Kept(_Cache):
-    """Where numba looks for what it has compiled: first in the package, then in our folder."""
+@cache
+def _kind() -> Any:
+    """The class that finds kernels; None where parts of this numba have other names."""
+    try:
+        from .kept import Kept
 
-    def __init__(self, function: Function) -> None:
-        self.function = function
-
-    @cached_property
-    def own(self) -> FunctionCache:
-        """Numba's cache in our folder, made when it is asked for: most never are."""
-        with _kept_in(_folder()):
-            return FunctionCache(self.function)
-
-    @property
-    def cache_path(self) -> Any:
-        """The folder in which new results are kept."""
-        return self.own.cache_path
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """What was compiled for these types, None where nothing was."""
-        types, _ = normalize_signature(sig)
-        if RECORD and not clock.compiles():
-            _record(self.function, types)
-        found = shipped().result(name_of(self.function, types), target_context)
-        return self.own.load_overload(sig, target_context) if found is None else found
-
-    def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep a result where there is room for it; on a full disk it is compiled again."""
-        with suppress(OSError):
-            self.own.save_overload(sig, data)
-
-    def enable(self) -> None:
-        """Numba's switch, of which nothing here makes use."""
-
-    disable = flush = enable
+        Kept(_kind, _in_our_folder)  # all that numba asks of a cache is there
+    except (ImportError, AttributeError, TypeError) as reason:
+        logger.warning("%s: %s", STRANGE, reason)
+        return None
+    return Kept
 
 
-def _record(function: Function, types: Sequence[Any]) -> None:
-    """Note that a function was called with these types, a line for each process and call."""
-    with open(RECORD, "a", encoding="utf-8") as file:
-        file.write(f"{function.__module__} {function.__qualname__} {spelled(types)}\n")
+def why_compiling() -> str:
+    """Why a kernel is compiled that could have come with the package."""
+    if _kind() is None:
+        return STRANGE
+    from .shipped import shipped
+
+    return shipped().why_not or "not all come with the package"
 
 
 @contextmanager
-def _kept_in(folder: str) -> Iterator[None]:
+def _in_our_folder() -> Iterator[None]:
     """Numba asks where to keep a function when it meets the function, not when it compiles."""
     before = config.CACHE_DIR
-    config.CACHE_DIR = folder
+    config.CACHE_DIR = _folder()
     try:
         yield
     finally:

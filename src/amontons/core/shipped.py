@@ -4,7 +4,7 @@ The file is for one Python, one numba, one kind of processor and the very source
 Where any of them differs, or the file is damaged, nothing of it is used and kernels compile.
 
 It holds numba's own compile results, as numba's cache on disk does; parts of numba that are
-not public are used here, in `compiled.py` and nowhere else (docs/startup.md lists them).
+not public are used here, in `kept.py` and nowhere else (docs/startup.md lists them).
 
     b"amontons kernels" | length of the head, 8 bytes | head, JSON | the kernels, one by one
 
@@ -19,7 +19,6 @@ import hashlib
 import importlib
 import json
 import logging
-import os
 import pickle
 import sys
 from collections.abc import Mapping, Sequence
@@ -35,25 +34,11 @@ from numba.core.compiler import CompileResult
 from numba.core.environment import Environment, lookup_environment
 from numba.core.runtime.nrt import rtsys
 
-PACKAGE = Path(__file__).resolve().parents[1]
+from .source_digest import PACKAGE, sources
+
 FILE = PACKAGE / "kernels.bin"
 START = b"amontons kernels"
 logger = logging.getLogger(__name__)
-
-
-def sources(package: Path = PACKAGE, mark: bytes = b"") -> str:
-    """Sixteen letters that change with any file of the package that has this mark in it."""
-    found, above = hashlib.sha256(), str(package)
-    paths = [os.path.join(folder, name) for folder, _, names in os.walk(above)
-             for name in names if name.endswith(".py")]  # fmt: skip
-    for path in sorted(paths):  # without pathlib, which takes longer than reading
-        with open(path, "rb") as file:
-            text = file.read().replace(b"\r\n", b"\n")
-        if mark in text:
-            name = os.path.relpath(path, above).replace(os.sep, "/")
-            found.update(f"{name} {len(text)} ".encode())
-            found.update(text)
-    return found.hexdigest()[:16]
 
 
 def here() -> dict[str, str]:

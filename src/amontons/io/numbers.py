@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..mechanics.model.pairs import PairResult, pair_results
 from ..mechanics.model.reactions import SupportResult, support_results
+from ..mechanics.model.references import reference_results
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,12 +23,13 @@ SCALARS = ("area", "largest_pressure", "slip_net", "slip_accumulated", "friction
 
 
 def records(model: Model, fields: ContactFields) -> dict[str, Any]:
-    """`pairs`, `supports` and `load` of solution.json."""
+    """`pairs`, `supports`, `load` and `references` of solution.json."""
     pairs, supports = pair_results(model, fields), support_results(model, fields)
     return {
         "pairs": [pair.record for pair in pairs.values()],
         "supports": [support.record for support in supports.values()],
         "load": fields.load.record,
+        "references": [one.record for one in reference_results(model, fields).values()],
     }
 
 

@@ -9,6 +9,7 @@ which names a `Format`.
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -155,6 +156,23 @@ FORMATS = (
 def read(path: Path, overrides: Sequence[str] = (), method: str | None = None) -> Case:
     """The case in a file of any known format; raises FileFormatError for other files."""
     return format_of(path).read(path, overrides, method)
+
+
+def read_case(
+    path: str | os.PathLike[str], overrides: Sequence[str] = (), method: str | None = None
+) -> Case:
+    """The case in a case file, an FCLib file or a deck; `.model` of it can be solved.
+
+    path: also "example:NAME", a case that comes with amontons.  overrides such as
+    "mesh.cells=32" replace single values.  method: solver in place of that of the case, before
+    the overrides; options that the case has for another one go with it.  What has the suffix
+    of no other format is read as TOML.  Raises FileFormatError naming the file, the key or
+    line, what was found and what was expected.
+    """
+    text = os.fspath(path)
+    named = (each for each in FORMATS if text.lower().endswith(each.suffixes))
+    found = FORMATS[0] if text.startswith("example:") else next(named, FORMATS[0])
+    return found.read(Path(path) if found is not FORMATS[0] else path, overrides, method)
 
 
 def format_of(path: Path) -> Format:

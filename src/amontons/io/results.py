@@ -154,7 +154,9 @@ def summary(output: Output) -> dict[str, Any]:
     contacts = {"total": problem.contacts, **found.counts, "sliding": int(found.sliding.sum())}
     asked = output.fclib_error or problem.knows_q
     resultant = None if output.fields is None else output.fields.resultant.tolist()
-    numbers: dict[str, Any] = {"pairs": None, "supports": None, "load": None}
+    numbers: dict[str, Any] = {
+        "pairs": None, "supports": None, "load": None, "references": None,
+    }  # fmt: skip
     if output.model is not None and output.fields is not None:
         from .numbers import records
 

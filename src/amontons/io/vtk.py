@@ -16,6 +16,7 @@ from ..mechanics.elements.nodal_stress import stress_of
 from ..mechanics.elements.rigid import Rigid
 from ..mechanics.meshes import Mesh
 from ..mechanics.meshes.write import write_meshes
+from ..mechanics.model.temperature import warming
 from .contact_fields import contact_fields
 
 if TYPE_CHECKING:
@@ -68,7 +69,8 @@ def model_fields(
 
     starts = np.cumsum([0, *(len(body.mesh.points) for body in model.bodies)])
     pairs = list(zip(model.bodies, fields.displacement, strict=True))
-    stress = [_stress(body, moved) for body, moved in pairs]
+    warm = warming(model, getattr(solution, "time", None))
+    stress = [body_stress(*pair, each) for pair, each in zip(pairs, warm, strict=True)]
     centres, nodes = (np.concatenate(each) for each in zip(*stress, strict=True))
     record = getattr(solution, "solution", solution).convergence  # of a step in time, too
     converged = int(not record.stamp)
@@ -99,11 +101,16 @@ def model_fields(
     return ModelFields(meshes, point, cell, whole, record.stamp)
 
 
-def _stress(body: Body, moved: Array) -> tuple[Array, Array]:
-    """Stress of cells and nodes at displacements (nodes, d); 0 without a law."""
+def body_stress(
+    body: Body, moved: Array, warm: Array | None = None
+) -> tuple[Array, Array]:
+    """Stress of cells and nodes at displacements (nodes, d); 0 without a law.
+
+    warm (nodes,): change of temperature.
+    """
     if isinstance(body.material, Rigid | GivenMatrices):
         return np.zeros((body.mesh.cell_count, 3, 3)), np.zeros((len(moved), 3, 3))
-    return stress_of(body.mesh, body.material, moved)
+    return stress_of(body.mesh, body.material, moved, warm)
 
 
 def _six(stress: Array) -> Array:
@@ -114,7 +121,7 @@ def _six(stress: Array) -> Array:
 def _parts(model: Model) -> tuple[list[str], NDArray[np.int64]]:
     """Names of the connected parts of all bodies, and the part of every cell."""
     parts, d = model.discretisation.parts, model.dimension
-    of = np.empty(model.discretisation.dofs // d, dtype=np.int64)
+    of = np.empty(model.beside.first // d, dtype=np.int64)
     for k, part in enumerate(parts):
         of[part.dofs[::d] // d] = k
     starts = model.discretisation.offsets // d

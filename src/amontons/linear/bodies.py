@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
 from .base import LinearSolver
 from .direct import Direct, checked
@@ -39,6 +38,8 @@ class Bodies:
     @classmethod
     def of(cls, matrix: sparse.csc_array, body: NDArray[np.integer] | None = None) -> Bodies:
         """The bodies of a square matrix (n, n); body (n,): their numbers, if known."""
+        from scipy.sparse.csgraph import connected_components
+
         if body is None:
             count, label = connected_components(matrix, directed=False)
         else:

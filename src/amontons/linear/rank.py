@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse import csgraph
 
 from ..core.clock import NEVER, Deadline
 from .dense import dense
@@ -109,6 +108,8 @@ def _peeled(A: sparse.csr_array) -> tuple[int, sparse.csr_array]:
 
 def _components(A: sparse.csr_array) -> list[tuple[Index, Index]]:
     """Rows and columns of the parts of A that do not touch, those without entries left out."""
+    from scipy.sparse import csgraph
+
     n = A.shape[0]
     graph = sparse.block_array([[None, A], [A.T, None]], format="csr") if A.nnz else None
     if graph is None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
 from ..core.errors import SingularOperator
 
@@ -20,6 +19,8 @@ def block_diagonal_inverse(matrix: sparse.csc_array) -> sparse.csc_array | None:
 
     Raises SingularOperator naming the unknowns of a block that can not be inverted.
     """
+    from scipy.sparse.csgraph import connected_components
+
     n = matrix.shape[0]
     if n == 0:
         return sparse.csc_array((0, 0))

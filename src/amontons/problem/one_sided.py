@@ -22,7 +22,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
 from .friction import Form, FrictionProblem
 from .structure import Structure
@@ -177,6 +176,8 @@ def _preference(
     M: sparse.csc_array, H: sparse.csr_array, d: int, row: Index, contact: Index
 ) -> Index:
     """Minus how many rows the same two bodies have on the body of this row, (k,)."""
+    from scipy.sparse.csgraph import connected_components
+
     bodies, body = connected_components(M, directed=False)
     entries = H.tocoo()
     of, on = entries.coords[1] // d, entries.coords[0]

@@ -23,6 +23,11 @@ def test_units_do_not_matter():
         np.testing.assert_allclose(a, b)
 
 
+def test_what_is_not_counted_is_no_failure():
+    with pytest.raises(InvalidInput, match="does not count its operations"):
+        performance_profile([[1.0, None], [2.0, 3.0]])
+
+
 @pytest.mark.parametrize("times", [[1.0, 2.0], [[0.0]], [[-1.0, 1.0]], np.zeros((0, 2))])
 def test_refused(times):
     with pytest.raises(InvalidInput, match="times"):

@@ -23,6 +23,16 @@ def block(value=0.0, loads=(), *, gap=0.0, **options):
     )
 
 
+def test_warnings_of_python_are_for_those_who_ask():
+    solution = am.solve(block())  # silent: any warning fails a test
+    with pytest.warns(am.DoubtWarning, match=r"\[no-load\]") as told:
+        am.warn_of(solution)
+    assert [one.filename for one in told] == [__file__]
+    am.warn_of(am.solve(block((0, -0.01))))
+    with pytest.raises(am.DoubtWarning):
+        am.warn_of(solution)  # pytest turns them into errors here
+
+
 @pytest.mark.parametrize(
     "model",
     [
@@ -129,3 +139,38 @@ def test_the_region_that_locks_is_named():
     )
     (warning,) = am.solve(model).warnings
     assert "region 'seal' of body 'ring'" in warning.message
+
+
+def rubbing(mu, **law):
+    body = am.Body(am.box((1, 1), 2), am.LinearElastic(100, 0.3))
+    contact = am.Contact("bottom", am.Plane((0, 1)), mu=mu, name="shoe", **law)
+    return am.Model([body], [am.Fix("top", (0.01, -0.02))], [contact])
+
+
+@pytest.mark.parametrize(("mu", "meant"), [(30.0, "0.3 if it is meant in percent, 0.577"),
+                                           (150.0, "1.5 if it is meant in percent, or tie")])
+def test_friction_in_percent_or_degrees_is_doubted(mu, meant):
+    found = am.solve(rubbing(mu))
+    (warning,) = found.warnings
+    assert warning.name == "friction-like-percent"
+    assert "'shoe'" in warning.message
+    assert meant in warning.message
+    assert warning.contacts == (0, 1, 2)
+
+
+@pytest.mark.parametrize("contact", [
+    {"mu": 1.5}, {"mu": 4.0}, {"mu": 10.0}, {"mu": 1e6}, {"mu": 200.0},
+    {"mu": lambda x: 4 + x[:, 0]},
+])  # fmt: skip
+def test_friction_of_surfaces_and_of_those_that_never_slip_is_not(contact):
+    assert am.solve(rubbing(**contact)).warnings == ()
+
+
+def test_only_the_pair_with_odd_friction_is_named():
+    body = am.Body(am.box((1, 1), 2), am.LinearElastic(100, 0.3))
+    pairs = [am.Contact("bottom", am.Plane((0, 1)), mu=20, cap=1.0),
+             am.Contact("right", am.Plane((-1, 0), (1, 0)), tresca=30.0)]  # fmt: skip
+    model = am.Model([body], [am.Fix("top", (-0.01, -0.02))], pairs)
+    (warning,) = am.solve(model).warnings
+    assert "'bottom'" in warning.message
+    assert len(warning.contacts) == 3

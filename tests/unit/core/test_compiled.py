@@ -113,3 +113,33 @@ def test_numba_itself_is_left_as_it_was():
     before = config.CACHE_DIR
     compiled.njit(cache=True)(lambda x: x)
     assert before == config.CACHE_DIR
+
+
+@pytest.mark.parametrize("change", [
+    "import numba.core.caching as part; del part._Cache",
+    "import numba.core.runtime.nrt as part; del part.rtsys",
+])  # fmt: skip
+def test_kernels_work_and_are_kept_with_a_numba_whose_parts_have_other_names(tmp_path, change):
+    code = f"""
+import logging, sys
+logging.basicConfig(stream=sys.stdout, format="%(message)s")
+{change}
+from amontons.core.compiled import njit, why_compiling
+@njit(error_model="numpy")
+def twice(x):
+    return 2 * x
+assert twice(2.0) == 4.0
+print(why_compiling(), sum(twice.stats.cache_misses.values()), twice.stats.cache_path, sep="|")
+"""
+    script = tmp_path / "kernel.py"
+    script.write_text(code)
+    variables = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "there")}
+    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True,
+                          check=True, env=variables)  # fmt: skip
+    *said, last = done.stdout.splitlines()
+    why, misses, folder = last.split("|")
+    assert "can be read with" in why and why in said[0]
+    assert int(misses) == 1
+    assert list(Path(folder).glob("kernel*.nbi"))
+    assert str(tmp_path / "there") in folder
+    assert done.stderr == ""

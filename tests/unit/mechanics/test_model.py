@@ -195,7 +195,7 @@ def test_resultant_balances_supports_and_loads():
     inner = (K @ fields.displacement[0].ravel()).reshape(-1, 3)
     top = model.bodies[0].mesh.surface_nodes("top")
     external = np.array([2.0, 0.5, 2])
-    loads = external_load(model.bodies, model.loads, model.discretisation.offsets).reshape(
+    loads = external_load(model.bodies, model.loads, model.beside).reshape(
         -1, 3
     )
     np.testing.assert_allclose(loads.sum(axis=0), external)
@@ -275,6 +275,20 @@ def test_parts_of_one_mesh_are_told_apart():
 
 
 # ------------------------------------------------------------------ bad input
+@pytest.mark.parametrize(("make", "words"), [
+    (lambda: am.Fix("top", ...), "fix on 'top': got '...'.*None for a component that is free"),
+    (lambda: am.Fix("top", (..., 0)), "fix on 'top': got '...'"),
+    (lambda: am.Traction("top", (0, ...)), "axis, or 0 for all"),
+    (lambda: am.Fix("top", {"y": 0}), "fix on 'top': expected 0, a vector"),
+    (lambda: am.Pressure("top", (0, -1)), "against the normal.*is a Traction"),
+    (lambda: am.Pressure("top", np.ones(3)), "is a Traction"),
+    (lambda: am.Pressure("top", "1"), "pressure on 'top': expected a number, got '1'"),
+])  # fmt: skip
+def test_what_is_no_value_is_refused_where_it_is_given(make, words):
+    with pytest.raises(am.InvalidInput, match=words):
+        make()
+
+
 MESH2 = am.box((2, 1), (4, 2))
 
 

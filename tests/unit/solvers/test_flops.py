@@ -136,6 +136,30 @@ def test_record_adds_iterates_and_judgements():
     assert history[-1] == found.convergence.flops
 
 
+@pytest.mark.parametrize("size", [1, 2, 5, 20])
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_the_portfolio_counts_its_sweeps(size, dimension):
+    """At least the plain sweeps and judgements that its record shows."""
+    problem = random_delassus(3, size, dimension)
+    record = am.solve(problem).convergence
+    assert {step.stage for step in record.history} <= {"", "Anderson Gauss-Seidel"}
+    assert record.flops is not None
+    own = sweeps.CONTACT_FLOPS + local_contact.EXACT_FLOPS
+    each = 18 * size * (size - 1) + own * size
+    told = record.iterations * each + len(record.history) * problem.judge_flops
+    assert told <= record.flops <= 3 * told + 5000 * size
+    assert (np.diff([step.flops for step in record.history]) > 0).all()
+
+
+def test_the_portfolio_counts_like_the_sweeps_that_it_makes():
+    """Anderson's sweeps by the portfolio, in another order, cost what they cost alone."""
+    problem = random_delassus(3, 20)
+    sweep = am.solve(problem, am.GaussSeidel(anderson_depth=10, batch=40)).convergence
+    auto = am.solve(problem).convergence
+    a, b = (found.flops / found.iterations for found in (sweep, auto))
+    assert a == pytest.approx(b, rel=0.1)
+
+
 def test_methods_that_do_not_count_say_so():
     found = am.solve(random_delassus(1, 3), am.SmoothingNewton())
     assert found.convergence.flops is None

@@ -55,7 +55,7 @@ def nodal_forces(model: Model, u: Array, blur: Array, *, large: bool) -> NodalFo
     large: the displacements are those of large strains and rotations.
     """
     parts = model.discretisation
-    load = model.load_factor * external_load(model.bodies, model.loads, parts.offsets)
+    load = model.load_factor * external_load(model.bodies, model.loads, parts.beside)
     inner = parts.K @ u
     held = np.zeros(parts.dofs, dtype=bool)
     held[parts.held] = True

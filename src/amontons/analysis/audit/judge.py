@@ -14,6 +14,7 @@ from ...mechanics.elements.elasticity import LinearElastic, materials_by_region
 from ...mechanics.elements.given import GivenMatrices
 from ...mechanics.elements.rigid import Rigid
 from ...mechanics.model.supports import external_load, locate
+from ...problem.friction import FrictionProblem
 from . import questions
 from .forces import NodalForces, nodal_forces
 from .laws import Give, Seen, approach_of, seen
@@ -63,7 +64,7 @@ def audit_answer(model: Model, answer: Answer, *, deck_law: bool = True) -> Audi
     Raises InvalidInput for displacements that do not fit the model, UnsupportedForm for models
     in large deformations or with Nitsche's method, which have no such forces.
     """
-    if model.is_large or any(contact.nitsche is not None for contact in model.contacts):
+    if model.kind is not FrictionProblem:
         raise UnsupportedForm(
             "an audit needs small strains and nodal or mortar contact in the reference "
             "configuration; for others `solution.convergence` is the judge's word"
@@ -136,7 +137,7 @@ def _blur(model: Model, answer: Answer) -> Array:
 def _scale(model: Model, forces: NodalForces) -> float:
     """The largest force at a node, of contacts, supports or loads."""
     d = model.dimension
-    load = external_load(model.bodies, model.loads, model.discretisation.offsets)
+    load = external_load(model.bodies, model.loads, model.beside)
     sizes = [np.linalg.norm(f.reshape(-1, d), axis=1).max(initial=0.0)
              for f in (forces.missing, model.load_factor * load)]  # fmt: skip
     return float(max(sizes))

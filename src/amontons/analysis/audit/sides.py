@@ -85,7 +85,7 @@ class Side:
 def sides_of(model: Model, forces: NodalForces, u: Array) -> list[tuple[Side, ...]]:
     """Every contact from one or two sides; from the slave alone with an obstacle."""
     placed = model.discretisation.placed
-    given = Prescribed.of(model.bodies, model.supports, model.discretisation.offsets)
+    given = Prescribed.of(model.bodies, model.supports, model.discretisation.beside)
     turned = [_turned(model, contact, given) for contact in model.contacts]
     firsts = _seen(model, model.contacts, placed, forces, u)
     with_other = [k for k, pair in enumerate(turned) if pair is not None]
@@ -99,11 +99,11 @@ def sides_of(model: Model, forces: NodalForces, u: Array) -> list[tuple[Side, ..
 
 def _turned(model: Model, contact: Contact, given: Prescribed) -> tuple[Contact, Placed] | None:
     """The contact with its sides exchanged; None where there is one side, or none to be had."""
-    if contact.master is None or contact.nitsche is not None or contact.where is not None:
+    if contact.master is None or contact.where is not None:
         return None
     new = replace(contact, slave=contact.master, master=contact.slave)
     try:
-        return new, place(model.bodies, new, given, model.discretisation.offsets)
+        return new, place(model.bodies, new, given, model.discretisation.eliminated)
     except AmontonsError:  # held all over, or no facet in front
         return None
 

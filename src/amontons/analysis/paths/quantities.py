@@ -180,7 +180,7 @@ def _displacement(asked: _Asked, axis: str, surface: str) -> Array:
         if getattr(solution, "v", None) is None:
             raise asked.wrong("the points of this branch have no displacements")
         supports = [part_at(support, point.parameter) for support in model.supports]
-        prescribed = prescribed_values(model.bodies, supports, parts.offsets)  # type: ignore[arg-type]
+        prescribed = prescribed_values(model.bodies, supports, parts.beside)  # type: ignore[arg-type]
         factor = point.parameter if grows else model.load_factor
         whole = parts.spread(solution.v, factor * prescribed)
         own = whole[parts.offsets[body] : parts.offsets[body + 1]].reshape(-1, model.dimension)

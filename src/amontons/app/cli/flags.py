@@ -36,7 +36,10 @@ def surfaces(command: Command) -> Command:
     size = click.option("--size", type=float, metavar="X",
                         help="Of a CAD file: size of cells. [a 15th of its length]"
                         )  # fmt: skip
-    return picture(size(command))
+    apart = click.option("--no-glue", is_flag=True,
+                         help="Of a CAD file: each solid by itself, as with glue = false."
+                         )  # fmt: skip
+    return picture(size(apart(command)))
 
 
 def fclib_error(command: Command) -> Command:

@@ -71,10 +71,9 @@ def _say_compiling() -> None:
     """Say once on a terminal what takes some seconds; in time reported it is apart anyway."""
     if not sys.stderr.isatty():
         return
-    from ...core.shipped import shipped
+    from ...core.compiled import why_compiling
 
-    why = shipped().why_not or "not all come with the package"
-    _say_line(f"compiling kernels once, some seconds ({why})")
+    _say_line(f"compiling kernels once, some seconds ({why_compiling()})")
 
 
 def _say_line(text: str) -> None:

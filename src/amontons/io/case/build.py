@@ -19,11 +19,12 @@ from ..units import UNIT_NAMES, Units
 from .bodies import read_bodies, read_material
 from .contacts import read_contact, refuse_repeated
 from .evolution import Evolution, read_evolution, read_wall
+from .joints import TABLES, read_joints
 from .keys import key_of
 from .overrides import apply_overrides, check_depth
 from .settings import GENERAL, LIMITS, Settings, make_solver, method_class
 from .tables import Table
-from .values import configuration, on_named, on_surface, pressure_on, vector
+from .values import configuration, on_named, on_surface, pressure_on, temperature_of, vector
 
 if TYPE_CHECKING:
     from ...mechanics.model import Model
@@ -37,7 +38,8 @@ SLIPS = {  # values that are no TOML, and what is meant
 }
 LARGEST_FILE = 2**24  # bytes of a case file; meshes stand in files of their own
 TOP = ("title", "mesh", "wall", "material", "fix", "traction", "pressure", "body_force",
-       "contact", "solver", "continuation", "evolution", "units")  # fmt: skip
+       "temperature", "contact", "solver", "continuation", "evolution", "units",
+       *TABLES)  # fmt: skip
 
 
 def read_case(
@@ -131,6 +133,8 @@ def _model(top: Table, path: Path, title: str) -> Model:
         if body.mesh.dim != dim:
             raise top.error(f"mesh[{k}]", f"expected a mesh in {dim}D as the first, got "
                             f"one in {body.mesh.dim}D")  # fmt: skip
+    joints = read_joints(top, bodies)
+    bodies = joints.bodies
     fixes = [on_surface(Fix, table, bodies, free=True) for table in top.tables("fix")]
     loads: list = [
         on_surface(Traction, table, bodies, "configuration") for table in top.tables("traction")
@@ -141,12 +145,17 @@ def _model(top: Table, path: Path, title: str) -> Model:
         region = table.text("region") if "region" in table.data else None
         value = vector(table, "value", dim)
         loads.append(BodyForce(value, region=region, **configuration(table)))
+    loads += [temperature_of(table, bodies) for table in top.tables("temperature")]
     if "contact" not in top.data:
         raise top.error("contact", "missing, expected at least one table [[contact]]")
     contacts = [read_contact(table, bodies) for table in top.tables("contact")]
     refuse_repeated(top)
     with top.blamed("contact", partial(key_of, tables=top.data)):
-        return Model(bodies, supports=fixes, contacts=contacts, loads=loads, name=title)
+        return Model(
+            bodies, supports=[*fixes, *joints.supports], contacts=contacts,
+            loads=[*loads, *joints.loads], name=title, references=joints.references,
+            constraints=joints.constraints, springs=joints.springs,
+        )  # fmt: skip
 
 
 def _wall_model(top: Table, title: str) -> Model:
@@ -154,6 +163,9 @@ def _wall_model(top: Table, title: str) -> Model:
     from ...mechanics.model import BodyForce, Fix, Traction
 
     for key in ("mesh", "contact"):
+        if key in top.data:
+            raise top.error(key, "not with [wall], which makes its meshes and contacts")
+    for key in ("temperature", *TABLES):
         if key in top.data:
             raise top.error(key, "not with [wall], which makes its meshes and contacts")
     if "pressure" in top.data:

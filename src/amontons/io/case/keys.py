@@ -6,7 +6,8 @@ from typing import Any
 
 from ...core.errors import Address, dotted
 
-LOADS = ("traction", "pressure", "body_force")  # in the order in which a model has them
+# in the order in which a model has them
+LOADS = ("traction", "pressure", "body_force", "temperature")
 FRICTION = {"mu": "coulomb", "mu_across": "coulomb", "direction": "direction",
             "tresca": "tresca", "cap": "cap", "cohesion": "cohesion",
             "stiffness": "stiffness", "stick_stiffness": "stick_stiffness"}  # fmt: skip
@@ -24,12 +25,27 @@ def key_of(at: Address, tables: dict[str, Any]) -> str:
         several = rest[:1] if isinstance(tables.get("mesh"), list) else ()
         return "material" if "material" in rest else dotted(("mesh", *several))
     if part == "supports":
+        if rest and int(rest[0]) >= len(tables.get("fix", ())):
+            return "pretension" if "pretension" in tables else "reference"
         return dotted(("fix", *rest))
+    if part in ("references", "springs"):
+        return dotted((part.removesuffix("s"), *rest[:1]))
+    if part == "constraints":
+        return _constraint_key(int(rest[0]) if rest else 0, tables)
     if part == "contacts":
         inner = [key for name in rest[1:] for key in _contact_keys(name)]
         return dotted(("contact", *rest[:1], *inner))
     if part == "loads" and rest:
         return _load_key(int(rest[0]), tuple(rest[1:]), tables)
+    return ""
+
+
+def _constraint_key(number: int, tables: dict[str, Any]) -> str:
+    for kind in ("coupling", "equation", "pretension"):
+        count = len(tables.get(kind, ()))
+        if number < count:
+            return dotted((kind, number))
+        number -= count
     return ""
 
 

@@ -9,10 +9,13 @@ file, whose first lines may be data of the card before.  A file may be packed (.
 from __future__ import annotations
 
 import gzip
+import itertools
 import re
-from collections.abc import Iterator, Sequence
+import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,17 +26,24 @@ from ...core.files import check_is_regular
 DEEPEST = 32  # files that include one another
 LARGEST_FILE = 2**33  # bytes, unpacked
 OPTION = re.compile(r'((?:[^,"]|"[^"]*")*)(?:,|$)')  # up to a comma outside of quotes
-GAP = re.compile(r",[ \t]*,")  # a field that is left out
+REMARK = re.compile(r"^[ \t]*\*\*.*\n?", re.MULTILINE)
+NEWLINE, COMMA = b"\n,"
+LONGEST = 80  # letters of a number with blanks
 PACKED = b"\x1f\x8b"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Piece:
     """Data lines as they stand in a file, the first of them with its number there."""
 
     file: Path
     start: int
-    lines: Sequence[str]
+    text: str
+
+    @property
+    def lines(self) -> list[str]:
+        """The lines."""
+        return self.text.split("\n")
 
 
 @dataclass(frozen=True)
@@ -94,30 +104,57 @@ class Card:
                         del fields[-1]  # a comma at the end
                     yield Row(piece.file, piece.start + k, fields)
 
-    def table(self, width: int | None) -> NDArray[np.float64] | None:
-        """Numbers (rows, width) if every line has so many numbers, else None; for large tables.
+    def table(self, width: int | None, kind: type = np.float64) -> NDArray[Any] | None:
+        """Numbers (rows, width) of regular data lines, else None; for large tables.
 
-        width None: lines of any length, (numbers, 1).  What is wrong with data is found line
-        by line.
+        Regular: a row on each line, or on so many lines with as many numbers each as the ones
+        before.  width None: lines of any length, (numbers, 1).  What is wrong with data is
+        found line by line.  kind: of the numbers, float64 or int64.
         """
-        lines = [line for piece in self.pieces for line in piece.lines]
-        lines = [text for line in lines if (text := line.strip()) and text[:2] != "**"]
-        text = "\n".join(lines)
-        if GAP.search(text):
+        text = "\n".join(piece.text for piece in self.pieces)
+        if "*" in text:
+            text = REMARK.sub("", text)
+        text = text.strip()
+        if not text or not text.isascii():
             return None
-        if width is not None and any(
-            line.count(",") - line.endswith(",") != width - 1 for line in lines
-        ):
+        if width is not None and not _is_even(text, width):
             return None
-        words = text.replace(",", " ").split()
+        text = text.replace(",\n", "\n").removesuffix(",").replace("\n", ",")
+        found = _numbers(text, kind)
+        if found is None and kind is np.float64:
+            found = _numbers(text.upper().replace("D", "E"), kind)
         width = width or 1
-        if not words or len(words) != width * (len(words) // width):
+        if found is None or len(found) % width:
             return None
+        return found.reshape(-1, width)
+
+
+def _is_even(text: str, width: int) -> bool:
+    """Whether lines repeat the same numbers of fields, which make rows of `width`."""
+    first: list[int] = []
+    for line in text[: LONGEST * width].split("\n"):
+        first.append(line.count(",") + (not line.endswith(",")))
+        if sum(first) >= width:
+            break
+    if sum(first) != width:
+        return False
+    data = np.frombuffer(text.encode("ascii") + b"\n", dtype=np.uint8)
+    ends = np.flatnonzero(data == NEWLINE)
+    if len(ends) % len(first):
+        return False
+    before = np.searchsorted(np.flatnonzero(data == COMMA), ends)
+    fields = np.diff(before, prepend=0) + (data[ends - 1] != COMMA)
+    return bool((fields.reshape(-1, len(first)) == first).all())
+
+
+def _numbers(text: str, kind: type) -> NDArray[Any] | None:
+    """Numbers with commas between; None where anything else stands there."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
         try:
-            numbers = np.array(words, dtype=np.float64)
-        except ValueError:
+            return np.fromstring(text, dtype=kind, sep=",")
+        except (DeprecationWarning, ValueError):
             return None
-        return numbers.reshape(-1, width)
 
 
 def split(text: str) -> list[str]:
@@ -170,44 +207,51 @@ def _read(path: Path, cards: list[Card], within: tuple[Path, ...], place: str) -
         raise FileFormatError(f"{place}: {path} includes itself")
     if len(within) >= DEEPEST:
         raise FileFormatError(f"{place}: more than {DEEPEST} files include one another")
-    lines = _lines(path, place)
-    starts = [k for k, line in enumerate(lines) if _is_keyword(line)]
-    first = starts[0] if starts else len(lines)
-    _append(cards, path, 0, lines[:first])
-    k = 0
-    while k < len(starts):
-        at = starts[k]
-        text, used = _joined(lines, at)
-        card = _card(text, path, at + 1)
-        while k + 1 < len(starts) and starts[k + 1] < at + used:
-            k += 1
-        end = starts[k + 1] if k + 1 < len(starts) else len(lines)
+    text = _text(path, place)
+    starts = [0, *_keywords(text), len(text)]
+    _append(cards, path, 1, text[: starts[1]])
+    number, last = 1, 0
+    for begin, end in itertools.pairwise(starts[1:]):
+        number += text.count("\n", last, begin)
+        last = begin
+        line, used = _joined(text, begin, end)
+        card = _card(line, path, number)
         if card.keyword == "INCLUDE":
             _include(card, path, cards, (*within, resolved))
         else:
             cards.append(card)
-        _append(cards, path, at + used, lines[at + used : end])
-        k += 1
+        if used < end:
+            after = number + text.count("\n", begin, used)
+            _append(cards, path, after, text[used:end].removesuffix("\n"))
 
 
-def _is_keyword(line: str) -> bool:
-    text = line.lstrip()
-    return text.startswith("*") and not text.startswith("**")
+def _keywords(text: str) -> list[int]:
+    """Where the lines with keywords begin."""
+    found, at = [], text.find("*")
+    while at >= 0:
+        begin = text.rfind("\n", 0, at) + 1
+        end = text.find("\n", at)
+        if not text[begin:at].strip() and text[at + 1 : at + 2] != "*":
+            found.append(begin)
+        at = text.find("*", end) if end >= 0 else -1
+    return found
 
 
-def _joined(lines: Sequence[str], at: int) -> tuple[str, int]:
-    """A keyword line with those that continue it, and how many they are."""
-    text, used = lines[at].strip(), 1
-    while text.endswith(",") and at + used < len(lines):
-        more = lines[at + used].strip()
-        if _is_keyword(more):
-            break
-        used += 1
+def _joined(text: str, begin: int, stop: int) -> tuple[str, int]:
+    """A keyword line with those up to `stop` that continue it, and where data begin."""
+    end = text.find("\n", begin, stop)
+    end = stop if end < 0 else end
+    line = text[begin:end].strip()
+    while line.endswith(",") and end < stop:
+        after = text.find("\n", end + 1, stop)
+        after = stop if after < 0 else after
+        more = text[end + 1 : after].strip()
+        end = after
         if not more.startswith("**"):
-            text += more
+            line += more
             if not more:
                 break
-    return text.rstrip(","), used
+    return line.rstrip(","), min(end + 1, stop)
 
 
 def _card(text: str, path: Path, at: int) -> Card:
@@ -232,21 +276,22 @@ def _include(card: Card, path: Path, cards: list[Card], within: tuple[Path, ...]
     _read(path.parent / name, cards, within, f"{path}:{card.number}: {card}")
 
 
-def _append(cards: list[Card], path: Path, start: int, lines: Sequence[str]) -> None:
+def _append(cards: list[Card], path: Path, start: int, text: str) -> None:
     """Give data lines to the last card."""
     if cards:
-        cards[-1].pieces.append(Piece(path, start + 1, lines))
+        if text:
+            cards[-1].pieces.append(Piece(path, start, text))
         return
-    for k, line in enumerate(lines):
+    for k, line in enumerate(text.split("\n")):
         if line.strip() and not line.lstrip().startswith("**"):
             raise FileFormatError(
-                f"{path}:{start + k + 1}: expected a keyword (*NODE, *HEADING, ...), got "
+                f"{path}:{start + k}: expected a keyword (*NODE, *HEADING, ...), got "
                 f"{shown(line.strip())}"
             )
 
 
-def _lines(path: Path, place: str) -> list[str]:
-    """The lines of a file, packed or not."""
+def _text(path: Path, place: str) -> str:
+    """What is in a file, packed or not, lines ending as in Python."""
     before = f"{place}: " if place else ""
     if not path.exists():
         raise FileFormatError(f"{before}{path}: no such file")
@@ -266,4 +311,5 @@ def _lines(path: Path, place: str) -> list[str]:
         text = data.decode("latin-1")  # remarks and names of old programs
     if "\0" in text:
         raise FileFormatError(f"{before}{path}: expected text, this is a binary file")
-    return text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    text = text.removeprefix("\ufeff")
+    return text if "\r" not in text else text.replace("\r\n", "\n").replace("\r", "\n")

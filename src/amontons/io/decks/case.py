@@ -14,22 +14,38 @@ from pathlib import Path
 from typing import Any
 
 from ...core.errors import Address, AmontonsError, FileFormatError, InvalidInput
-from ...mechanics.model import BodyForce, Fix, Model, NodalForce, Pressure
+from ...mechanics.model import (
+    BodyForce,
+    Fix,
+    Model,
+    NodalForce,
+    Pressure,
+    Reference,
+    Spring,
+    Temperature,
+)
+from ...mechanics.model.beside import Beside
+from ...mechanics.model.constraints import Constraint
 from ...mechanics.model.parts import Body
 from ...mechanics.steps import Schedule, Stage, State
 from ..case.evolution import Evolution
 from ..case.overrides import override_settings
 from ..case.settings import Settings
 from ..readers import Case
+from .axes import Turned
 from .cards import Card, Row, read_cards
 from .contacts import Options, adjusted, law_of, read_contacts
 from .flat import Deck, flatten
 from .history import Course, History, read_history
+from .joints import Joints, tied
 from .keywords import sorted_out
 from .materials import read_interactions, read_sections
 from .meshing import Region
 from .scopes import Index
+from .special import special_nodes
 from .stages import Held, check_removed, read_stages, times_of
+
+KINDS = ("supports", "loads", "contacts", "references", "constraints", "springs")
 
 
 @dataclass
@@ -37,9 +53,10 @@ class Found:
     """The parts of a model with the card that each comes from."""
 
     loads: list[Any] = field(default_factory=list)
-    cards: dict[str, list[Card]] = field(
-        default_factory=lambda: {"supports": [], "loads": [], "contacts": []}
-    )
+    references: list[Reference] = field(default_factory=list)
+    constraints: list[Constraint] = field(default_factory=list)
+    springs: list[Spring] = field(default_factory=list)
+    cards: dict[str, list[Card]] = field(default_factory=lambda: {key: [] for key in KINDS})
 
     def add(self, kind: str, part: Any, card: Card) -> None:
         """Add one part."""
@@ -109,6 +126,7 @@ def _case(
     path: Path, deck: Deck, settings: Settings, options: Options, notes: list[str]
 ) -> Case:
     sections = read_sections(deck, deck.model)
+    joints, turned = Joints.of(deck), Turned.of(deck)
     region = Region.of(deck, sections)
     history = read_history(deck, deck.model, deck.steps)
     title = _title(deck) or path.name.split(".")[0]
@@ -116,19 +134,20 @@ def _case(
     found = Found()
     interactions = read_interactions([p.card for p in deck.model])
     stages = read_stages(deck, history, interactions)
+    _joined(found, region, history, (joints, turned), stages)
     _name_nodes(region, history, stages)
     pairs = read_contacts(deck, region, interactions, notes)
     check_removed(stages, pairs, deck)
     _name_faces(region, history)
     mesh, at = region.mesh(title)
     mesh = adjusted(mesh, at, pairs, notes)
-    _loads(found, region, history, at)
+    _loads(found, region, history, at, notes)
     law = partial(law_of, options=options, notes=notes)
     for stage in stages:
         _supports(found, stage, region, history, at, notes)
         stage.contacts = stage.contacts_of(pairs, mesh, law)
     found.cards["contacts"] = [pair.card for pair in pairs]
-    materials = {s.name: s.material.law(region.plane) for s in sections}
+    materials = {s.name: s.law(region.plane) for s in sections}
     make = partial(_model, [Body(mesh, materials)], found, title)
     later = tuple(Stage(s.begin, partial(_of_state, make, s)) for s in stages[1:])
     plan = Schedule(*times_of(history, options.increments, notes), stages=later)
@@ -164,6 +183,31 @@ def _formulations(deck: Deck) -> list[str]:
 
 
 # ------------------------------------------------------------------------------ history
+def _joined(
+    found: Found, region: Region, history: History, given: tuple[Joints, Turned],
+    stages: Sequence[Held],
+) -> None:  # fmt: skip
+    """References, constraints and springs, and what supports and loads give to them."""
+    joints, turned = given
+    joints.name_surfaces(region)
+    at, share = region.numbering, 1.0 / region.thickness
+    axes, loads = special_nodes(history, stages, joints, turned, at, region.dim)
+    names = {int(n): part.name for part, nodes, _ in axes for n in nodes if len(nodes) == 1}
+    made = tied(joints, at, region.dim, share, names)
+    for part, _, card in axes:
+        found.add("constraints", part, card)
+    for kind in ("references", "constraints", "springs"):
+        for part, card in getattr(made, kind):
+            found.add(kind, part, card)
+    for number, name, courses, card in loads:
+        if number is None:
+            found.add("loads", (NodalForce, name, [_scaled(c, share) for c in courses]), card)
+            continue
+        stages[number].supports.append((name, courses))
+        if not number:
+            found.cards["supports"].append(card)
+
+
 def _name_nodes(region: Region, history: History, stages: Sequence[Held]) -> None:
     """Node sets of supports and forces: named after the line of their card."""
     for stage in stages:
@@ -171,6 +215,8 @@ def _name_nodes(region: Region, history: History, stages: Sequence[Held]) -> Non
         stage.name([nodes for nodes, _, _ in groups], region.node_sets)
     for k, (nodes, _, _) in enumerate(history.forces.groups(region.dim)):
         region.node_sets[f"force {k + 1}"] = nodes
+    for k, (nodes, _, _) in enumerate(history.heat.groups() if history.heat else ()):
+        region.node_sets[f"temperature {k + 1}"] = nodes
 
 
 def _name_faces(region: Region, history: History) -> None:
@@ -203,7 +249,9 @@ def _supports(
                 found.cards["supports"].append(card)
 
 
-def _loads(found: Found, region: Region, history: History, at: Index) -> None:
+def _loads(
+    found: Found, region: Region, history: History, at: Index, notes: list[str]
+) -> None:
     dim, share = region.dim, 1.0 / region.thickness
     for k, (nodes, courses, card) in enumerate(history.forces.groups(dim)):
         name = f"force {k + 1}"
@@ -211,6 +259,15 @@ def _loads(found: Found, region: Region, history: History, at: Index) -> None:
             label = region.deck.node_name(int(nodes[at[nodes] < 0][0]))
             raise card.error(f"node {label}: belongs to no element, where does its force go?")
         found.add("loads", (NodalForce, name, [_scaled(c, share) for c in courses]), card)
+    grows = any(section.material.grows for section in region.sections)
+    for k, (nodes, change, card) in enumerate(history.heat.groups() if history.heat else ()):
+        if not grows:
+            notes.append(f"{card} (line {card.number}): no material has an *EXPANSION")
+            break
+        name = f"temperature {k + 1}"
+        _without_elements(region, name, nodes, at)
+        if len(region.node_sets[name]):
+            found.add("loads", (Temperature, name, change), card)
     for (name, label), (course, card, _) in history.faces.items():
         found.add("loads", (Pressure, _loaded(name, label), course), card)
     for name, (course, way, card, scope) in history.bodies.items():
@@ -251,9 +308,10 @@ def _model(
 ) -> Model:  # fmt: skip
     """The model of a stage at a time, or as it goes on in time where that is None."""
     value = partial(_value, time)
+    beside = Beside.of(bodies, found.references, found.constraints)
     supports = [
         Fix(name, [
-            None if c is None else stage.since(bodies[0].mesh, c, axis, state)
+            None if c is None else stage.since(beside, name, c, axis, state)
             if c.is_open and state is not None else value(c)
             for axis, c in enumerate(courses)
         ])
@@ -263,12 +321,17 @@ def _model(
     for kind, name, courses in found.loads:
         if kind is NodalForce:
             loads.append(NodalForce(name, [value(c) for c in courses]))
+        elif kind is Temperature:
+            loads.append(Temperature(value(courses), on=name))
         elif kind is Pressure:
             loads.append(Pressure(name, value(courses)))
         else:
             course, way = courses
             loads.append(BodyForce([value(_scaled(course, w)) for w in way], region=name))
-    return Model(bodies, supports, stage.contacts, loads, name=title)
+    return Model(
+        bodies, supports, stage.contacts, loads, name=title, references=found.references,
+        constraints=found.constraints, springs=found.springs,
+    )  # fmt: skip
 
 
 def _value(time: float | None, course: Course) -> Any:

@@ -17,7 +17,10 @@ from scipy.spatial import cKDTree
 
 from ...core.errors import InvalidInput
 from ...mechanics.contact import pair_contact
+from ...mechanics.contact.pairs import project
 from ...mechanics.meshes import Mesh
+from ...mechanics.meshes.facets import linear_parts
+from ...mechanics.meshes.surfaces import nodal_normals
 from ...mechanics.model import Contact
 from ...problem.law import ExponentialOverclosure, OverclosureCurve
 from .cards import Card, Row, number
@@ -29,6 +32,8 @@ from .scopes import Index, missing
 Array = NDArray[np.float64]
 ASIDE = {"HCRIT", "NOTHICKNESS", "SMALLSLIDING", "EXTENSIONZONE", "GEOMETRICCORRECTION",
          "SUPPLEMENTARYCONSTRAINTS", "WEIGHT", "TRACKING", "CPSET", "SMOOTH"}  # fmt: skip
+ROUNDING = 1e-12  # of the coordinates: distances below are none
+NEAR = 0.025  # of the size of a facet: a slave node that is tied without a tolerance
 TABLE = 60  # points of the law with a tension far away
 
 
@@ -61,9 +66,15 @@ class Pair:
     nodes: Index | None = None
     points: Array | None = None
     clearance: float | None = None
+    within: float | None = None
+    glued: Array | None = None
 
     def contact(self, law: dict[str, Any], far: float | None = None) -> Contact:
         """The contact of the model under a law; far: how far away one is that is removed."""
+        if self.glued is not None:
+            nodal = "mortar" if self.points is None else "nodal"
+            return Contact(self.slave, master=self.master, tied=True, method=nodal,
+                           where=partial(_near, self.glued))  # fmt: skip
         gap = self.clearance if far is None else far
         if self.points is None:
             return Contact(self.slave, master=self.master, clearance=gap, **law)
@@ -71,6 +82,18 @@ class Pair:
         return Contact(
             self.slave, master=self.master, clearance=gap, method="nodal", where=where, **law
         )
+
+
+    def glue(self, mesh: Mesh) -> None:
+        """Choose the nodes of a tie that are near enough; raises FileFormatError for none."""
+        rows, _, _ = pair_contact(mesh, self.slave, mesh, self.master)
+        near = np.abs(rows.gap) <= self.within
+        if not near.any():
+            raise self.card.error(
+                f"no node of {self.slave} is within {self.within:.3g} of {self.master}; give a "
+                "POSITION TOLERANCE"
+            )
+        self.glued = rows.points[near] if self.points is None else self.points
 
 
 def _near(points: Array, x: Array) -> NDArray[np.bool_]:
@@ -91,6 +114,8 @@ def read_contacts(
     for placed in deck.model:
         if placed.card.keyword == "CONTACTPAIR":
             pairs += _pairs(placed, region, interactions, notes)
+        elif placed.card.keyword == "TIE":
+            pairs += _ties(placed, region)
         elif placed.card.keyword == "CLEARANCE":
             _clear(placed, pairs, region)
     if not pairs:
@@ -128,6 +153,27 @@ def _pairs(
     if smooth and out:
         what = "node by node" if out[0].nodes is not None else "mortar"
         notes.append(f"{card} (line {card.number}): NODE TO SURFACE is taken as {what}")
+    return out
+
+
+def _ties(placed: Placed, region: Region) -> list[Pair]:
+    """*TIE: slave, master; nodes of the slave near the master are put onto it and glued."""
+    card = placed.card
+    for option in ("CYCLICSYMMETRY", "MULTISTAGE", "FLUIDPERIODIC"):
+        if option in card.options:
+            raise card.error(f"{option}: is not read")
+    out = []
+    for row in card.rows():
+        names = [text for text in row.fields if text]
+        if len(names) != 2:
+            raise row.error(f"{card}: expected slave, master, got {len(names)} names")
+        master = _surface(region, placed, names[1], row)
+        slave, nodes = _slave(region, placed, names[0], master, row)
+        given = card.options.get("POSITIONTOLERANCE")
+        within = (number(given, row, "POSITION TOLERANCE") if given
+                  else NEAR * region.facet_size(master))  # fmt: skip
+        adjust = None if card.label("ADJUST") == "NO" else within
+        out.append(Pair(slave, master, card, "", adjust=adjust, nodes=nodes, within=within))
     return out
 
 
@@ -308,14 +354,14 @@ def adjusted(mesh: Mesh, at: Index, pairs: Sequence[Pair], notes: list[str]) -> 
         if pair.adjust is None:
             continue
         moved = replace(mesh, points=points)
-        rows, _, _ = pair_contact(moved, pair.slave, moved, pair.master)
+        nodes, gap, normals = _distances(moved, pair)
         if isinstance(pair.adjust, float):
-            chosen = rows.gap <= pair.adjust
+            chosen = gap <= pair.adjust
         else:
-            chosen = np.isin(rows.nodes, at[pair.adjust])
-        chosen &= rows.gap != 0.0
-        way = rows.gap[chosen]
-        points[rows.nodes[chosen]] -= way[:, None] * rows.frames[chosen, 0]
+            chosen = np.isin(nodes, at[pair.adjust])
+        chosen &= gap != 0.0
+        way = gap[chosen]
+        points[nodes[chosen]] -= way[:, None] * normals[chosen]
         if len(way):
             notes.append(
                 f"{pair.card} (line {pair.card.number}): {len(way)} slave nodes are put onto "
@@ -326,4 +372,21 @@ def adjusted(mesh: Mesh, at: Index, pairs: Sequence[Pair], notes: list[str]) -> 
     for pair in pairs:
         if pair.nodes is not None:
             pair.points = mesh.points[at[pair.nodes]]
+        if pair.within is not None:
+            pair.glue(mesh)
     return mesh
+
+
+def _distances(mesh: Mesh, pair: Pair) -> tuple[Index, Array, Array]:
+    """Slave nodes (k,) with a master in front of them, distances (k,) and normals (k, d)."""
+    if mesh.order == 1:
+        rows, _, _ = pair_contact(mesh, pair.slave, mesh, pair.master)
+        return rows.nodes, rows.gap, rows.frames[:, 0]
+    slave, master = (linear_parts(mesh.surface(name)) for name in (pair.slave, pair.master))
+    nodes = np.unique(np.concatenate([block.nodes.ravel() for block in slave]))
+    normals, x = nodal_normals(mesh.points, slave)[nodes], mesh.points[nodes]
+    hit = project(x, mesh.points, master, facing=normals, search=np.inf, own=nodes)
+    at = np.flatnonzero(hit.found)
+    gap = np.einsum("kc,kc->k", x[at] - hit.closest[at], hit.normal[at])
+    gap[np.abs(gap) < ROUNDING * np.abs(mesh.points).max()] = 0.0
+    return nodes[at], gap, hit.normal[at]

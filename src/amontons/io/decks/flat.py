@@ -15,10 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cards import Card, Row, number, whole
+from .placement import motion
 from .scopes import Index, Names, Scope, missing
 from .shapes import SHAPES
 
 Array = NDArray[np.float64]
+SPRINGS = {"SPRINGA": 2, "SPRING1": 1, "SPRING2": 2}  # spring elements, and their nodes
 WIDTH = 3  # coordinates of a node
 ENDS = {"PART": "ENDPART", "INSTANCE": "ENDINSTANCE", "ASSEMBLY": "ENDASSEMBLY",
         "STEP": "ENDSTEP"}  # fmt: skip
@@ -47,7 +49,8 @@ class Deck:
     """All of a deck, flat.
 
     points (n, 3); point_labels: what the deck calls each node, element_labels each element;
-    model: cards before the first step; steps: those of each step, with *STEP in front.
+    model: cards before the first step; steps: those of each step, with *STEP in front;
+    springs: by set, type and nodes of spring elements; doubled: new node -> that at its place.
     """
 
     points: Array = field(default_factory=lambda: np.zeros((0, WIDTH)))
@@ -57,6 +60,8 @@ class Deck:
     steps: list[list[Placed]] = field(default_factory=list)
     top: Scope = field(default_factory=lambda: Scope(Names()))
     instances: dict[str, Names] = field(default_factory=dict)
+    springs: dict[str, list[tuple[str, Index]]] = field(default_factory=dict)
+    doubled: dict[int, int] = field(default_factory=dict)
     digest: str = ""  # of all that is not in the mesh
     _points: list[Array] = field(default_factory=list)
     _count: int = 0
@@ -109,8 +114,8 @@ def _digest(cards: Sequence[Card]) -> str:
     for card in cards:
         whole.update(repr((card.keyword, sorted(card.options.items()))).encode())
         if card.keyword not in ("NODE", "ELEMENT"):
-            for row in card.rows():
-                whole.update(repr(row.fields).encode())
+            for piece in card.pieces:
+                whole.update(piece.text.encode())
     return whole.hexdigest()
 
 
@@ -152,37 +157,8 @@ def _assemble(deck: Deck, cards: Sequence[Card], parts: dict[str, list[Card]]) -
         before = len(deck._points)
         for each in (*parts[part], *inner):
             _take(deck, each, scope)
-        move = _motion(card)
+        move = motion(card)
         deck._points[before:] = [move(points) for points in deck._points[before:]]
-
-
-def _motion(card: Card) -> Callable[[Array], Array]:
-    """How an instance stands: translated, then turned about an axis by an angle in degrees."""
-    rows = [row for row in card.rows() if any(row.fields)]
-    shift, turn = np.zeros(WIDTH), np.eye(WIDTH)
-    about = np.zeros(WIDTH)
-    for row in rows[:2]:
-        values = [number(text, row, "instance") for text in row.fields]
-        if len(values) <= WIDTH:
-            shift[: len(values)] = values
-        elif len(values) == 7:
-            about = np.array(values[:3])
-            turn = _rotation(np.array(values[3:6]) - about, np.deg2rad(values[6]), row)
-        else:
-            raise row.error(
-                "instance: expected a translation (3 numbers) or an axis and an angle (7), "
-                f"got {len(values)}"
-            )
-    return lambda points: (points + shift - about) @ turn.T + about
-
-
-def _rotation(axis: Array, angle: float, row: Row) -> Array:
-    size = float(np.linalg.norm(axis))
-    if not size:
-        raise row.error("instance: the two points of the axis are one")
-    x, y, z = axis / size
-    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(WIDTH) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K)
 
 
 # --------------------------------------------------------------------------------- cards
@@ -231,9 +207,11 @@ def _node(row: Row) -> list[float]:
 
 def _no_doubles(labels: Index, before: Index, card: Card, what: str) -> None:
     """Raise FileFormatError for a number that is given twice."""
+    again = labels[before >= 0]
+    if not len(again) and (np.diff(labels) > 0).all():
+        return
     found, counts = np.unique(labels, return_counts=True)
     twice = found[counts > 1]
-    again = labels[before >= 0]
     if not len(twice) and not len(again):
         return
     label = int(twice[0] if len(twice) else again[0])
@@ -248,14 +226,16 @@ def _no_doubles(labels: Index, before: Index, card: Card, what: str) -> None:
 
 def _elements(deck: Deck, card: Card, scope: Scope) -> None:
     kind = card.name("TYPE")
+    if kind in SPRINGS:
+        _springs(deck, card, scope, kind)
+        return
     if kind not in SHAPES:
         raise card.error(f"TYPE={kind}: {missing('element type', kind, SHAPES)}")
     width = 1 + SHAPES[kind].nodes
-    table = card.table(width)
-    if table is None or not _regular(table.ravel()):
-        table = _element_rows(card, width)
-    whole_numbers = table.astype(np.int64)
-    labels, nodes = whole_numbers[:, 0], whole_numbers[:, 1:]
+    table = card.table(width, np.int64)
+    if table is None or (table.size and table.min() <= 0):
+        table = _element_rows(card, width).astype(np.int64)
+    labels, nodes = table[:, 0], table[:, 1:]
     known = scope.own.nodes(nodes.ravel()).reshape(nodes.shape)
     if (known < 0).any():
         k, n = np.argwhere(known < 0)[0]
@@ -266,6 +246,15 @@ def _elements(deck: Deck, card: Card, scope: Scope) -> None:
     deck._elements += len(labels)
     scope.own.add_elements(labels, at)
     _named(scope.own.element_sets, card.label("ELSET"), at)
+
+
+def _springs(deck: Deck, card: Card, scope: Scope, kind: str) -> None:
+    """Spring elements: known by the set of their card alone."""
+    table = _element_rows(card, 1 + SPRINGS[kind]).astype(np.int64)[:, 1:]
+    known = scope.own.nodes(table.ravel()).reshape(table.shape)
+    if (known < 0).any():
+        raise card.error(f"node {table[known < 0][0]} is not there")
+    deck.springs.setdefault(card.name("ELSET"), []).append((kind, known))
 
 
 def _at_element(card: Card, label: int, text: str) -> None:

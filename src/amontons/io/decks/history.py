@@ -12,18 +12,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .cards import Card, Row, number, whole
 from .flat import Deck, Placed
+from .heat import Heat
 from .scopes import Index, Scope, missing
 
 Array = NDArray[np.float64]
 AT_ONCE = 1e-9  # share of a step in which a load that is there at once comes
-FREE, TRANSLATIONS = -1, 3
-ROTATIONS = range(4, 7)
+FREE, COMPONENTS = -1, 6
+TRANSLATIONS = 3
 HELD = {"ENCASTRE": (1, 2, 3), "PINNED": (1, 2, 3), "XSYMM": (1,), "YSYMM": (2,),
         "ZSYMM": (3,), "XASYMM": (2, 3), "YASYMM": (1, 3), "ZASYMM": (1, 2)}  # fmt: skip
 
@@ -94,7 +96,7 @@ class Span:
 
 @dataclass
 class Prescribed:
-    """Courses of displacements or forces, by number: `at` (nodes, 3), FREE where none is.
+    """Courses of displacements or forces, by number: `at` (nodes, 6), FREE where none is.
 
     before: the same of supports before OP=NEW took them away, for where they go on from.
     """
@@ -103,6 +105,23 @@ class Prescribed:
     before: Index | None = None
     courses: list[Course] = field(default_factory=list)
     cards: list[Card] = field(default_factory=list)
+    known: dict[tuple[Course, int], int] = field(default_factory=dict)
+
+    def number(self, course: Course, card: Card) -> int:
+        """The number of a course, the same for equal ones of one card."""
+        key = course, id(card)
+        if key not in self.known:
+            self.known[key] = len(self.courses)
+            self.courses.append(course)
+            self.cards.append(card)
+        return self.known[key]
+
+    def of(
+        self, node: int, components: Sequence[int], held: Index | None = None
+    ) -> list[Course | None]:
+        """The courses of some components of a node, at the end or those of `held`."""
+        numbers = (self.at if held is None else held)[node, list(components)]
+        return [None if c == FREE else self.courses[c] for c in numbers]
 
     def groups(self, dim: int, held: Index | None = None) -> list[Group]:
         """Nodes with the same courses in all components, at the end or those of `held`."""
@@ -135,6 +154,7 @@ class History:
     faces: dict[tuple[str, str], tuple[Course, Card, Scope]] = field(default_factory=dict)
     bodies: dict[str, tuple[Course, Array, Card, Scope]] = field(default_factory=dict)
     spans: list[Span] = field(default_factory=list)
+    heat: Heat | None = None
     held: list[Index] = field(default_factory=list)
 
     @property
@@ -142,6 +162,7 @@ class History:
         """Times at which anything bends."""
         courses = [*self.supports.courses, *self.forces.courses]
         courses += [each[0] for each in (*self.faces.values(), *self.bodies.values())]
+        courses += self.heat.courses if self.heat else []
         return {t for course in courses for t in course.times}
 
     @property
@@ -153,8 +174,9 @@ class History:
 def read_history(deck: Deck, before: Sequence[Placed], steps: Sequence[Sequence[Placed]]
                  ) -> History:  # fmt: skip
     """Follow the steps; raises FileFormatError with the line of what can not be followed."""
-    shape = (len(deck.points), TRANSLATIONS)
+    shape = (len(deck.points), COMPONENTS)
     history = History(Prescribed(np.full(shape, FREE)), Prescribed(np.full(shape, FREE)))
+    history.heat = Heat.of(len(deck.points), before)
     amplitudes = _amplitudes([p.card for p in before])
     first = _span(steps[0], 0.0)
     for each in before:
@@ -239,6 +261,8 @@ def _follow(history: History, step: Sequence[Placed], span: Span, known: Amplitu
             _boundary(history, each, span, known, step=k)
         elif key == "CLOAD":
             _forces(history, each, span, known, given)
+        elif key == "TEMPERATURE" and history.heat is not None:
+            history.heat.give(each, Course, partial(_course, span=span, known=known))
         elif key in ("DLOAD", "DSLOAD"):
             _distributed(history, each, span, known)
 
@@ -255,6 +279,7 @@ def _cleared(history: History, step: Sequence[Placed], span: Span, k: int) -> No
         for number_ in np.unique(out.at[out.at != FREE]):
             old = out.courses[number_]
             out.courses[number_] = _course(old, 0.0, span, span.card, {})
+        out.known.clear()
     if {"DLOAD", "DSLOAD"} & new.keys():
         history.faces = {
             key: (_course(old, 0.0, span, span.card, {}), card, scope)
@@ -290,9 +315,7 @@ def _boundary(
                     course = course.then((span.begin, span.end), (stays, stays))
                 else:
                     course = _course(course, value, span, card, known)
-                out.courses.append(course)
-                out.cards.append(card)
-                out.at[nodes[old == before], component] = len(out.courses) - 1
+                out.at[nodes[old == before], component] = out.number(course, card)
 
 
 def _held(row: Row) -> list[tuple[int, float]]:
@@ -309,9 +332,9 @@ def _held(row: Row) -> list[tuple[int, float]]:
     if len(row.fields) > 2 and row.fields[2]:
         last = whole(row.fields[2], row, "*BOUNDARY: component")
     value = number(row.fields[3], row, "*BOUNDARY: value") if len(row.fields) > 3 else 0.0
-    if not 1 <= first <= last <= ROTATIONS[-1]:
-        raise row.error(f"*BOUNDARY: expected components from 1 to 3, got {first} to {last}")
-    return [(k - 1, value) for k in range(first, last + 1) if k not in ROTATIONS]
+    if not 1 <= first <= last <= COMPONENTS:
+        raise row.error(f"*BOUNDARY: expected components from 1 to 6, got {first} to {last}")
+    return [(k - 1, value) for k in range(first, last + 1)]
 
 
 def _forces(history: History, each: Placed, span: Span, known: Amplitudes,
@@ -326,8 +349,8 @@ def _forces(history: History, each: Placed, span: Span, known: Amplitudes,
         if len(row.fields) < 3:
             raise row.error("*CLOAD: expected nodes, component, value")
         component = whole(row.fields[1], row, "*CLOAD: component") - 1
-        if not 0 <= component < TRANSLATIONS:
-            raise row.error(f"*CLOAD: expected a component from 1 to 3, got {component + 1}")
+        if not 0 <= component < COMPONENTS:
+            raise row.error(f"*CLOAD: expected a component from 1 to 6, got {component + 1}")
         value = number(row.fields[2], row, "*CLOAD: value")
         old, more = out.at[nodes, component], given[nodes, component]
         for before, adds in {(int(b), bool(a)) for b, a in zip(old, more, strict=True)}:
@@ -340,10 +363,8 @@ def _forces(history: History, each: Placed, span: Span, known: Amplitudes,
                 course = _course(before_it, course.last + value, span, card, known)
             else:
                 course = _course(course, value, span, card, known)
-            out.courses.append(course)
-            out.cards.append(card)
             chosen = nodes[(old == before) & (more == adds)]
-            out.at[chosen, component] = len(out.courses) - 1
+            out.at[chosen, component] = out.number(course, card)
         given[nodes, component] = True
 
 

@@ -13,8 +13,10 @@ from .cards import Card
 READ = {
     "HEADING", "MATERIAL", "ELASTIC", "DENSITY", "SOLIDSECTION", "SURFACEINTERACTION",
     "SURFACEBEHAVIOR", "FRICTION", "CONTACTPAIR", "BOUNDARY", "AMPLITUDE", "STEP", "STATIC",
-    "CLOAD", "DLOAD", "DSLOAD", "CLEARANCE",
-    "CHANGEFRICTION", "CHANGESURFACEBEHAVIOR", "MODELCHANGE",
+    "CLOAD", "DLOAD", "DSLOAD", "EQUATION", "MPC", "TIE", "TRANSFORM", "COUPLING", "KINEMATIC",
+    "DISTRIBUTING", "RIGIDBODY", "PRE-TENSIONSECTION", "SPRING", "CLEARANCE",
+    "CHANGEFRICTION", "CHANGESURFACEBEHAVIOR", "MODELCHANGE", "EXPANSION", "TEMPERATURE",
+    "ORIENTATION",
 }  # fmt: skip
 OUTPUT = {
     "NODEPRINT", "NODEFILE", "NODEOUTPUT", "ELPRINT", "ELFILE", "ELEMENTOUTPUT", "CONTACTFILE",
@@ -28,22 +30,12 @@ NUMERICS = {  # how another program iterates
     "HOURGLASSSTIFFNESS",
 }  # fmt: skip
 THERMAL = {  # without a change of temperature they change nothing
-    "EXPANSION", "CONDUCTIVITY", "SPECIFICHEAT", "PHYSICALCONSTANTS", "GAPCONDUCTANCE",
-    "INITIALCONDITIONS",
+    "CONDUCTIVITY", "SPECIFICHEAT", "PHYSICALCONSTANTS", "GAPCONDUCTANCE",
 }  # fmt: skip
 EMPTY = {"SYSTEM"}  # of no effect without an option
 MEANS = {  # what a card would have done
-    "EQUATION": "nodes would move together", "MPC": "nodes would move together",
-    "TIE": "surfaces would be glued",
-    "TRANSFORM": "directions of supports and loads would be turned",
     "PLASTIC": "the material would yield", "HYPERELASTIC": "the material would be rubber",
-    "PRE-TENSIONSECTION": "a bolt would be tightened",
-    "RIGIDBODY": "a part would not deform", "COUPLING": "a surface would follow a node",
-    "KINEMATIC": "a surface would follow a node",
-    "DISTRIBUTING": "a force would be spread over a surface",
-    "ORIENTATION": "the axes of a material are turned", "DYNAMIC": "inertia would act",
-    "TEMPERATURE": "the bodies would grow and shrink",
-    "SPRING": "springs would act",
+    "DYNAMIC": "inertia would act",
     "GAP": "contact elements would act",
     "FREQUENCY": "vibrations would be computed", "BUCKLE": "buckling would be computed",
     "CONTACT": "surfaces in contact would be found",
@@ -61,7 +53,7 @@ def sorted_out(cards: Iterable[Card], allowed: Sequence[str]) -> tuple[list[Card
     allow = {"".join(word.upper().split()).removeprefix("*") for word in allowed}
     for card in cards:
         key = card.keyword
-        if key in READ:
+        if key in READ or (key == "INITIALCONDITIONS" and card.label("TYPE") == "TEMPERATURE"):
             kept.append(card)
         elif key in OUTPUT | NUMERICS | EMPTY or _is_thermal(card):
             skipped.setdefault(str(card), []).append(card.number)
@@ -79,8 +71,6 @@ def sorted_out(cards: Iterable[Card], allowed: Sequence[str]) -> tuple[list[Card
 
 
 def _is_thermal(card: Card) -> bool:
-    if card.keyword == "INITIALCONDITIONS":
-        return card.label("TYPE") == "TEMPERATURE"
     return card.keyword in THERMAL
 
 

@@ -142,6 +142,14 @@ class Region:
             )
         self.facets[name] = out
 
+    def facet_size(self, name: str) -> float:
+        """The mean length of a side of the facets of a surface."""
+        sizes = []
+        for facets in self.facets[name]:
+            x = self.deck.points[facets.nodes[:, : CELLS[facets.kind].corner_count]]
+            sizes.append(np.linalg.norm(x - np.roll(x, 1, axis=1), axis=2).ravel())
+        return float(np.concatenate(sizes).mean())
+
     def add_covering(self, name: str, nodes: Index, where: Card | Row) -> None:
         """Ask for the surface that nodes make: the outer facets all of whose nodes they are."""
         marked = np.zeros(len(self.deck.points), dtype=bool)
@@ -177,16 +185,21 @@ class Region:
             ]
         return out
 
+    @property
+    def numbering(self) -> Index:
+        """The number in the mesh of each node of the deck, -1 for one without elements."""
+        used = np.zeros(len(self.deck.points), dtype=bool)
+        for block in self.deck.blocks:
+            used[block.nodes] = True
+        return np.where(used, np.cumsum(used) - 1, -1)
+
     def mesh(self, title: str) -> tuple[Mesh, Index]:
         """The mesh, and the number in it of each node of the deck, -1 for one without elements.
 
         Raises FileFormatError that names a surface without outer facets.
         """
-        used = np.zeros(len(self.deck.points), dtype=bool)
-        for block in self.deck.blocks:
-            used[block.nodes] = True
-        at = np.where(used, np.cumsum(used) - 1, -1)
-        points = self.deck.points[used]
+        at = self.numbering
+        points = self.deck.points[at >= 0]
         if self.dim == 2:
             if np.ptp(points[:, 2]):
                 raise InvalidInput("*NODE: plane elements with nodes at several z")

@@ -17,6 +17,7 @@ from ...core.words import near
 from .cards import Row
 
 Index = NDArray[np.int64]
+DENSE = 4  # numbers up to the largest, for each that is there, at which a table pays
 Faces = list[tuple[Index, str]]  # elements, and the side of each: S1, SPOS, ... or "" for all
 
 
@@ -126,11 +127,17 @@ def missing(what: str, text: str, known: Iterable[str]) -> str:
 
 def _merged(labels: Index, at: Index, more: Index, more_at: Index) -> tuple[Index, Index]:
     labels, at = np.concatenate([labels, more]), np.concatenate([at, more_at])
+    if (np.diff(labels) > 0).all():
+        return labels, at
     order = np.argsort(labels, kind="stable")
     return labels[order], at[order]
 
 
 def _found(labels: Index, at: Index, wanted: Index) -> Index:
+    if len(labels) and len(wanted) > len(labels) > labels[-1] // DENSE:
+        table = np.full(int(labels[-1]) + 2, -1)  # the last for all that are too large
+        table[labels] = at
+        return table[np.clip(wanted, 0, len(table) - 1)]
     place = np.searchsorted(labels, wanted)
     place = np.minimum(place, max(len(labels) - 1, 0))
     if not len(labels):

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...mechanics.meshes import Mesh
 from ...mechanics.model import Contact
+from ...mechanics.model.beside import Beside
 from ...mechanics.steps import State
 from .cards import Card
 from .contacts import Pair
@@ -42,11 +43,12 @@ class Held:
 
     def name(self, groups: Sequence[Index], known: dict[str, Index]) -> None:
         """Name the node sets of groups of supports; those that are known keep their names."""
+        names = {own.tobytes(): name for name, own in known.items()
+                 if name.startswith("support")}  # fmt: skip
         for k, nodes in enumerate(groups):
-            same = [name for name, own in known.items()
-                    if name.startswith("support") and np.array_equal(own, nodes)]  # fmt: skip
+            same = names.get(nodes.tobytes())
             new = f"support {k + 1}" + (f" of stage {self.number + 1}" if self.number else "")
-            self.names.append(same[0] if same else new)
+            self.names.append(same or new)
             known[self.names[-1]] = nodes
 
     def contacts_of(
@@ -56,18 +58,21 @@ class Held:
         far = AWAY * float(np.ptp(mesh.points, axis=0).max())
         return [
             pair.contact(
-                law(self.interactions[pair.interaction], nodal=pair.nodal),
+                {} if pair.within is not None
+                else law(self.interactions[pair.interaction], nodal=pair.nodal),
                 far if (pair.slave, pair.master) in self.removed else None,
             )
             for pair in pairs
         ]
 
     def since(
-        self, mesh: Mesh, course: Course, axis: int, state: State
+        self, beside: Beside, name: str, course: Course, axis: int, state: State
     ) -> Callable[[NDArray[np.float64], float], float]:
-        """A course that goes on from where nodes are at a state."""
-        moved = state.displacement[: mesh.points.size].reshape(mesh.points.shape)
-        known = {x.tobytes(): u[axis] for x, u in zip(mesh.points, moved, strict=True)}
+        """A course that goes on from where nodes are at a state, or what is beside them."""
+        entry = beside.named(name)
+        dofs, points = beside.nodes(name) if entry is None else (entry.dofs, entry.points)
+        moved = state.displacement[dofs]
+        known = {x.tobytes(): u[axis] for x, u in zip(points, moved, strict=True)}
         begin = state.time
 
         def value(x: NDArray[np.float64], t: float) -> float:

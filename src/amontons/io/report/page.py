@@ -24,7 +24,7 @@ from .states import Stage, State, largest_forces
 STATIC = files("amontons.io.report") / "static"
 SCRIPTS = ("format.js", "charts.js", "bodies.js", "camera.js", "view.js", "page.js")
 FULL_NUMBERS = 250_000  # numbers of all states up to which they keep 32 bits
-FIELDS = ("status", "pressure", "shear", "slip", "gap", "displacement")
+FIELDS = ("status", "pressure", "shear", "slip", "gap", "displacement", "von Mises stress")
 TOKEN = re.compile(r"\{\{(\w+)\}\}")
 
 
@@ -80,7 +80,9 @@ class Page:
 
     @property
     def _numbers(self) -> int:
-        return sum(s.moved.size + len(s.values) * s.status.size for s in self.states)
+        return sum(
+            s.moved.size + s.stress.size + len(s.values) * s.status.size for s in self.states
+        )
 
     @property
     def _stamp(self) -> str:
@@ -151,7 +153,7 @@ class Page:
             "counts": state.counts, "moved": packer.floats(state.moved),
             "status": packer.signs(state.status),
             "values": {name: packer.floats(array) for name, array in state.values.items()},
-            "force": packer.floats(state.force[arrows]),
+            "force": packer.floats(state.force[arrows]), "stress": packer.floats(state.stress),
         }  # fmt: skip
 
 

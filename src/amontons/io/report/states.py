@@ -10,7 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...linear.blocks import spatial
+from ...mechanics.elements import von_mises
+from ...mechanics.model.temperature import warming
 from ..contact_fields import SLAVE, contact_fields
+from ..vtk import body_stress
 from .skin import Skin
 
 if TYPE_CHECKING:
@@ -27,7 +30,8 @@ MOST_ARROWS = 2000  # forces that are drawn, the largest
 class State:
     """One state: moved (V, 3) per vertex of the skin; status (C,) and values {field: (C,)}.
 
-    C: the contact vertices of the skin, both sides, `Stage.contacts`.  force (V, 3) on both.
+    C: the contact vertices of the skin, both sides, `Stage.contacts`.  force (V, 3) on both;
+    stress (V,), von Mises.
     label: what it is, in words; parameter: time, load or friction; stamp: as of the solution.
     """
 
@@ -35,6 +39,7 @@ class State:
     status: NDArray[np.int8]
     values: dict[str, Array]
     force: NDArray[np.float32]
+    stress: NDArray[np.float32]
     label: str = ""
     parameter: float = 0.0
     stamp: str = ""
@@ -55,7 +60,7 @@ class Stage:
 
     def most(self, wanted: int) -> int:
         """How many states a page can hold, 2 to `wanted`."""
-        each = 3 * len(self.skin.points) + 8 * len(self.contacts)
+        each = 4 * len(self.skin.points) + 8 * len(self.contacts)
         return max(2, min(wanted, MOST_NUMBERS // each))
 
     def state(self, fields: ContactFields, solution: Any, **words: Any) -> State:
@@ -71,13 +76,17 @@ class Stage:
         at = skin.whole
         mine = at[self.contacts]
         moved = spatial(np.concatenate(fields.displacement))[at]
+        warm = warming(model, getattr(solution, "time", None))
+        parts = zip(model.bodies, fields.displacement, warm, strict=True)
+        stress = von_mises(np.concatenate([body_stress(*part)[1] for part in parts]))
         told = getattr(solution, "solution", solution)
         counts = {name: int((solution.status == k).sum())
                   for k, name in enumerate(("open", "slip", "stick"))}  # fmt: skip
         return State(
             moved.astype(np.float32), status[mine].astype(np.int8),
             {name: array[mine] for name, array in values.items()},
-            force[at].astype(np.float32), stamp=told.convergence.stamp,
+            force[at].astype(np.float32),
+            stress[at].astype(np.float32), stamp=told.convergence.stamp,
             counts=counts, **words,
         )  # fmt: skip
 

@@ -56,8 +56,8 @@ def result_table(output: Output, units: Units) -> Table:
         rows.append(["largest pressure", with_unit(f"{largest:.5g}", units.stress)])
         moved = max(np.linalg.norm(u, axis=1).max(initial=0.0) for u in fields.displacement)
         rows.append(["largest displacement", with_unit(f"{moved:.5g}", units.length)])
-        rows.append(["largest penetration",
-                     with_unit(f"{found.max_penetration:.2g}", units.length)])  # fmt: skip
+        depth = f"{found.max_penetration + 0.0:.2g}"  # no -0
+        rows.append(["largest penetration", with_unit(depth, units.length)])
     return Table("Result", ("", ""), rows)
 
 
@@ -113,7 +113,7 @@ def cost_table(output: Output) -> Table:
         ["solving", _seconds(record.seconds - setup)],
     ]
     if record.compiling >= TELLING:
-        rows.append(["compiling, once", _seconds(record.compiling)])
+        rows.append(["preparing kernels", _seconds(record.compiling)])
     rows += version_rows()
     return Table("How it was solved", ("", ""), rows)
 

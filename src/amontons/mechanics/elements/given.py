@@ -150,7 +150,7 @@ def _ordered(name: str, matrix: Any, order: Index, mesh: Mesh) -> sparse.csr_arr
 
 
 def _check_free(K: sparse.csr_array, mesh: Mesh, rows: Any) -> None:
-    """Raise InvalidInput unless K lets the body move as a whole: else rows are in another order."""
+    """Raise InvalidInput unless K lets go of the body: else its rows are in another order."""
     if _lets_go(K, mesh):
         return
     fits = [

@@ -4,9 +4,10 @@ from .box import box
 from .cad import mesh_shape, read_cad
 from .facets import Cells, Facets
 from .mesh import Mesh
+from .opened import opened
 from .order import second_order
 from .read import is_cad, read_mesh
 from .refine import refined
 
-__all__ = ["Cells", "Facets", "Mesh", "box", "is_cad", "mesh_shape", "read_cad", "read_mesh",
-           "refined", "second_order"]  # fmt: skip
+__all__ = ["Cells", "Facets", "Mesh", "box", "is_cad", "mesh_shape", "opened", "read_cad",
+           "read_mesh", "refined", "second_order"]  # fmt: skip

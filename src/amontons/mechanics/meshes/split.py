@@ -160,6 +160,8 @@ def _copies(
 
     everywhere: regions that share an edge or a node only come apart there, too.
     """
+    from scipy.sparse import csgraph
+
     at_cut = np.zeros(len(mesh.points), dtype=bool)
     one, two = [], []
     for side in tables.values():
@@ -176,7 +178,7 @@ def _copies(
         at_cut |= _shared_by_regions(mesh)
     a, b = (np.concatenate([t.ravel() for t in tables_]) for tables_ in (one, two))
     graph = sparse.coo_array((np.ones(len(a), np.int8), (a, b)), shape=(len(corners),) * 2)
-    _, part = sparse.csgraph.connected_components(graph, directed=False)
+    _, part = csgraph.connected_components(graph, directed=False)
     key = np.where(at_cut[corners], part, -1)
     pairs = np.stack([corners, key], axis=1)
     found, number = np.unique(pairs, axis=0, return_inverse=True)

@@ -20,11 +20,14 @@ from ..elements.elasticity import LinearElastic, stiffness
 from ..elements.given import GivenMatrices
 from ..elements.rigid import Rigid
 from ..meshes.box import box
+from .beside import Beside
+from .constraint_rows import spring_stiffness
+from .constraints import Constraint, Reference, Spring
+from .elimination import Elimination
 from .held import check_outside
 from .parts import Body, Contact, Fix, Load
 from .placing import Placed, place
 from .rigid import Piece, near_nullspace, pieces
-from .rigid_bodies import RigidBodies
 from .supports import Prescribed, external_load, locate
 
 Array = NDArray[np.float64]
@@ -35,15 +38,28 @@ GRID_FROM = 50_000  # dofs of a box of equal cells from which its stiffness is n
 
 
 @dataclass(frozen=True, eq=False)
+class Ties:
+    """What ties degrees of freedom of a model: references, constraints, springs."""
+
+    references: Sequence[Reference] = ()
+    constraints: Sequence[Constraint] = ()
+    springs: Sequence[Spring] = ()
+
+
+NO_TIES = Ties()
+
+
+@dataclass(frozen=True, eq=False)
 class Discretisation:
     """All arrays of a model at load factor 1, whatever the friction.
 
     K (dofs, dofs): stiffness of the whole model, an operator for one large box; free, fixed:
     its dofs; prescribed (dofs,), load (n,): force on the unknowns with the prescribed values
-    lifted in; rigid: the bodies that do not deform, None without, when the unknowns (n,) are
-    the free dofs; gap (nc,); carried (nc, d): part of the local displacement that the
-    supports prescribe; levels: prolongations of the free dofs from coarser meshes, finest first
-    (none where K is an operator, which has its own); nodal_levels: of the nodes, body by body.
+    lifted in; eliminated: rigid bodies and constraints, None without, when the unknowns (n,)
+    are the free dofs; beside: dofs that are no nodes, by name; gap (nc,); carried (nc, d):
+    part of the local displacement that the supports prescribe; levels: prolongations of the
+    free dofs from coarser meshes, finest first (none where K is an operator, which has its
+    own); nodal_levels: of the nodes, body by body.
     """
 
     offsets: Index
@@ -61,11 +77,12 @@ class Discretisation:
     whole_H: sparse.csc_array
     levels: Levels = ()
     nodal_levels: tuple[Levels, ...] = ()
-    rigid: RigidBodies | None = None
+    eliminated: Elimination | None = None
+    beside: Beside = None  # type: ignore[assignment]  # always given
 
     def continued(self, prescribed: Array) -> Array | None:
         """Prescribed values (dofs,) continued into the bodies, (n,); None without levels."""
-        if not any(self.nodal_levels) or self.rigid is not None:
+        if not any(self.nodal_levels) or self.eliminated is not None:
             return None
         counts = np.diff(self.offsets) // self.placed[0].rows.points.shape[1]
         return continued(
@@ -105,18 +122,18 @@ class Discretisation:
 
     @property
     def near_nullspace(self) -> Array | None:
-        """Rigid modes on the free dofs, (n, k); None with rigid bodies."""
-        if self.rigid is not None:
+        """Rigid modes on the free dofs, (n, k); None with constraints."""
+        if self.eliminated is not None:
             return None
         return near_nullspace(self.parts, self.free, self.dofs)
 
     @cached_property
     def structure(self) -> Structure | None:
-        """Nodes and bodies of the unknowns, slaves of the contacts; None with rigid bodies."""
-        if self.rigid is not None:
+        """Nodes and bodies of the unknowns, slaves of the contacts; None with constraints."""
+        if self.eliminated is not None:
             return None
         d = self.carried.shape[1]
-        piece = np.empty(self.dofs // d, dtype=np.int32)
+        piece = np.empty(int(self.offsets[-1]) // d, dtype=np.int32)
         for k, part in enumerate(self.parts):
             piece[part.dofs[::d] // d] = k
         slave = [self.offsets[p.body] // d + p.rows.nodes for p in self.placed]
@@ -125,15 +142,15 @@ class Discretisation:
     # ------------------------------------------------------------------ unknowns
     @property
     def unknowns(self) -> int:
-        """Of the discrete problem: free dofs, and the motions of rigid bodies."""
-        return len(self.free) if self.rigid is None else len(self.rigid.driven)
+        """Of the discrete problem: free dofs, or what constraints and rigid bodies leave."""
+        return len(self.free) if self.eliminated is None else len(self.eliminated.driven)
 
     @cached_property
     def held(self) -> Index:
-        """Dofs with forces of supports, or those that keep a body rigid, which do no work."""
-        if self.rigid is None:
+        """Dofs with forces of supports, or of constraints, which do no work."""
+        if self.eliminated is None:
             return self.fixed
-        return np.union1d(self.fixed, self.rigid.dofs)
+        return np.union1d(self.fixed, self.eliminated.dofs)
 
     def missing(self, displacement: Array, load: Array, r: Array) -> Array:
         """Forces (dofs,) that loads (dofs,) and reactions r (nc, d) leave to supports."""
@@ -145,40 +162,40 @@ class Discretisation:
 
     def gathered(self, force: Array) -> Array:
         """Forces on the unknowns (n, ...) of nodal forces (dofs, ...), none on driven ones."""
-        return force[self.free] if self.rigid is None else self.rigid.spread.T @ force
+        return force[self.free] if self.eliminated is None else self.eliminated.gathered(force)
 
     def reduced(self, whole: sparse.csr_array) -> sparse.csc_array:
         """A matrix (dofs, dofs) in the unknowns, (n, n)."""
-        if self.rigid is not None:
-            return self.rigid.matrix(whole)
+        if self.eliminated is not None:
+            return self.eliminated.matrix(whole)
         return sparse.csc_array(whole[self.free][:, self.free])
 
     def with_driven(self, force: Array, M: Any, prescribed: Array) -> Array:
         """Forces (n,) with those that give driven unknowns of M their prescribed values."""
-        if self.rigid is None:
+        if self.eliminated is None:
             return force
-        values = self.rigid.driven_values(prescribed)
-        return np.where(self.rigid.driven, M.diagonal() * values, force)
+        values = self.eliminated.driven_values(prescribed)
+        return np.where(self.eliminated.driven, M.diagonal() * values, force)
 
     def spread(self, v: Array, prescribed: Array) -> Array:
         """Values of all dofs (dofs,) of unknowns v (n,), and what is prescribed, completed."""
-        if self.rigid is not None:
-            return prescribed + self.rigid.spread @ v
+        if self.eliminated is not None:
+            return prescribed + self.eliminated.spread @ v
         out = prescribed.copy()
         out[self.free] = v
         return out
 
     def moved(self, displacement: Array) -> bool:
         """Whether any dof has gone where supports alone do not bring it, (dofs,)."""
-        if self.rigid is None:
+        if self.eliminated is None:
             return bool(displacement[self.free].any())
-        held = self.rigid.completed(np.where(self.is_fixed, displacement, 0.0))
+        held = self.eliminated.completed(np.where(self.is_fixed, displacement, 0.0))
         size = np.abs(displacement).max(initial=0.0)
         return bool(np.abs(displacement - held).max(initial=0.0) > SAME_PLACE * size)
 
     def completed(self, prescribed: Array) -> Array:
-        """Prescribed values (dofs,), continued over rigid bodies."""
-        return prescribed if self.rigid is None else self.rigid.completed(prescribed)
+        """Prescribed values (dofs,), continued over what they move."""
+        return prescribed if self.eliminated is None else self.eliminated.completed(prescribed)
 
 
 def discretise(
@@ -187,43 +204,40 @@ def discretise(
     loads: Sequence[Load],
     contacts: Sequence[Contact],
     given_K: DistributedMatrix | None = None,
+    ties: Ties = NO_TIES,
 ) -> Discretisation:
     """Assemble everything that depends on neither friction nor load factor; K unless given."""
-    offsets = np.cumsum([0, *(body.mesh.points.size for body in bodies)])
-    given = Prescribed.of(bodies, supports, offsets)
+    beside = Beside.of(bodies, ties.references, ties.constraints)
+    offsets = beside.offsets
+    given = Prescribed.of(bodies, supports, beside)
     is_fixed = given.is_fixed
-    rigid = RigidBodies.of(bodies, offsets, is_fixed)
+    springs = spring_stiffness(ties.springs, beside)
+    sprung = np.unique(springs.indices).astype(np.int64)
+    eliminated = Elimination.of(beside, ties.constraints, is_fixed, sprung)
     fixed = np.flatnonzero(is_fixed)
-    free = np.flatnonzero(~is_fixed) if rigid is None else rigid.free
-    if not (free.size if rigid is None else (~rigid.driven).any()):
+    free = np.flatnonzero(~is_fixed)
+    if not (free.size if eliminated is None else (~eliminated.driven).any()):
         text = "every degree of freedom is fixed, nothing left to solve"
         raise InvalidInput(text, ("supports",))
-    K = _stiffness(bodies) if given_K is None else given_K
+    stored = eliminated is not None or springs.nnz > 0
+    K = _stiffness(bodies, beside, springs, stored=stored) if given_K is None else given_K
     prescribed = np.where(is_fixed, given.values, 0.0)
-    if rigid is not None:
-        prescribed = rigid.completed(prescribed)
-    placed = _placed(bodies, contacts, given, offsets)
+    if eliminated is not None:
+        prescribed = eliminated.completed(prescribed)
+    placed = _placed(bodies, contacts, given, eliminated)
     _check_once(bodies, contacts, placed)
-    whole_H = sparse.csc_array(sparse.hstack([p.H for p in placed], format="csc"))
+    whole_H = _of_all([p.H for p in placed], beside)
     if not whole_H.shape[1]:
         for k, held in enumerate(p.held for p in placed):
             with within("contacts", k):
                 if held is not None:
-                    check_outside(held, held.left(prescribed), bodies, supports, offsets, "")
+                    gap = held.left(prescribed)
+                    check_outside(held, gap, bodies, supports, offsets, "")
         text = "every slave node is fixed by a support, no contact is left"
         raise InvalidInput(text, ("contacts",))
-    load = external_load(bodies, loads, offsets)
+    load = external_load(bodies, loads, beside)
     d = bodies[0].mesh.dim
-    if rigid is not None:
-        assert not isinstance(K, GridMatrix | DistributedMatrix)  # of bodies that all deform
-        M, H = rigid.matrix(K), sparse.csc_array(rigid.spread.T @ whole_H)
-        force = rigid.spread.T @ (load - K @ prescribed)
-        load = np.where(rigid.driven, M.diagonal() * rigid.driven_values(prescribed), force)
-    else:
-        operator = isinstance(K, GridMatrix | DistributedMatrix)
-        M = K.on(free) if operator else sparse.csc_array(K[free][:, free])
-        H = sparse.csc_array(whole_H.tocsr()[free])
-        load = (load - K @ prescribed)[free]
+    M, H, load = _unknowns(K, whole_H, load, prescribed, free, eliminated)
     return Discretisation(
         offsets, K, free, fixed, prescribed, M=M, H=H, load=load,
         gap=np.concatenate([
@@ -239,23 +253,49 @@ def discretise(
         ],
         whole_H=whole_H,
         levels=()
-        if not sparse.issparse(K) or rigid is not None  # operators have their own, or none
+        if not sparse.issparse(K) or eliminated is not None  # operators have their own, or none
         else free_levels(
             [b.mesh.levels for b in bodies], [len(b.mesh.points) for b in bodies], d, is_fixed
         ),
         nodal_levels=tuple(body.mesh.levels for body in bodies),
-        rigid=rigid,
+        eliminated=eliminated, beside=beside,
     )  # fmt: skip
 
 
+def _unknowns(
+    K: Any, whole_H: sparse.csc_array, load: Array, prescribed: Array, free: Index,
+    eliminated: Elimination | None,
+) -> tuple[Any, sparse.csc_array, Array]:  # fmt: skip
+    """M, H and the load on the unknowns."""
+    if eliminated is not None:
+        M = eliminated.matrix(K)
+        force = eliminated.gathered(load) - eliminated.spread.T @ (K @ prescribed)
+        values = M.diagonal() * eliminated.driven_values(prescribed)
+        H = sparse.csc_array(eliminated.spread.T @ whole_H)
+        return M, H, np.where(eliminated.driven, values, force)
+    operator = isinstance(K, GridMatrix | DistributedMatrix)
+    M = K.on(free) if operator else sparse.csc_array(K[free][:, free])
+    return M, sparse.csc_array(whole_H.tocsr()[free]), (load - K @ prescribed)[free]
+
+
+def _of_all(blocks: list[sparse.csc_array], beside: Beside) -> sparse.csc_array:
+    """Columns of all contacts on all dofs, those beside the nodes too."""
+    H = sparse.csc_array(sparse.hstack(blocks, format="csc"))
+    if not beside.count:
+        return H
+    none = sparse.csc_array((beside.count, H.shape[1]))
+    return sparse.csc_array(sparse.vstack([H, none], format="csc"))
+
+
 def _placed(
-    bodies: Sequence[Body], contacts: Sequence[Contact], given: Prescribed, offsets: Index
-) -> tuple[Placed, ...]:
+    bodies: Sequence[Body], contacts: Sequence[Contact], given: Prescribed,
+    eliminated: Elimination | None,
+) -> tuple[Placed, ...]:  # fmt: skip
     """All contacts; errors tell which one could not be placed."""
     found = []
     for k, contact in enumerate(contacts):
         with within("contacts", k):
-            found.append(place(bodies, contact, given, offsets))
+            found.append(place(bodies, contact, given, eliminated))
     return tuple(found)
 
 
@@ -271,15 +311,20 @@ def _local(
     return out.reshape(-1, d)
 
 
-def _stiffness(bodies: Sequence[Body]) -> sparse.csr_array | GridMatrix:
-    """Of all bodies: stored, or an operator for one large box."""
-    grid = _grid(bodies)
+def _stiffness(
+    bodies: Sequence[Body], beside: Beside, springs: sparse.csr_array, *, stored: bool
+) -> sparse.csr_array | GridMatrix:
+    """Of all bodies and springs: stored, or an operator for one large box."""
+    grid = None if stored else _grid(bodies)
     if grid is not None:
         return grid
     parts = [_stiffness_of(body) for body in bodies]
-    if len(parts) == 1:
+    if len(parts) == 1 and not stored:
         return parts[0]
-    return sparse.csr_array(sparse.block_diag(parts, format="csr"))
+    if beside.count:
+        parts.append(sparse.csr_array((beside.count, beside.count)))
+    whole = sparse.csr_array(sparse.block_diag(parts, format="csr"))
+    return sparse.csr_array(whole + springs) if springs.nnz else whole
 
 
 def _stiffness_of(body: Body) -> sparse.csr_array:

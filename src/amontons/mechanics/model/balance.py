@@ -64,7 +64,8 @@ def imbalance(
             f"contact and friction alone hold {in_words(loose)}: perhaps they do not suffice"
         )
     texts = [
-        f"body {piece.name!r} gives way by {_motion_in_words(basis @ found[of == k])}"
+        f"body {piece.name!r} gives way by "
+        f"{_motion_in_words(piece.moving(basis @ found[of == k]))}"
         for k, (piece, basis) in enumerate(loose)
         if np.abs(found[of == k]).max() > SMALL * np.abs(found).max()
     ]

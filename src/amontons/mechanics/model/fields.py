@@ -16,6 +16,7 @@ from ..meshes import Facets
 from .assembly import Discretisation
 from .parts import Body
 from .reactions import arms, support_forces
+from .references import ReferenceFields, beside_wrench, reference_fields
 from .supports import external_load
 from .wrench import Wrench
 
@@ -39,7 +40,7 @@ class ContactFields:
     pair the body and the facets of its slave surface, for plots.  status (nc,): ContactStatus.
     What has slid: slid (nc, d-1), net, path (nc,), the length of the way, friction_work (nc,),
     energy that it took.  reaction: forces of supports at the nodes, (nodes, dim) per body;
-    load: resultant of all loads.
+    load: resultant of all loads.  references: of what is beside the nodes, None without.
     """
 
     displacement: tuple[Array, ...]
@@ -61,6 +62,7 @@ class ContactFields:
     friction_work: Array
     reaction: tuple[Array, ...]
     load: Wrench
+    references: ReferenceFields | None = None
 
 
 def recover_fields(
@@ -80,9 +82,9 @@ def recover_fields(
             "solution: holds no displacements; solve the global form, model.assemble()"
         )
     whole = parts.spread(solution.v, model.load_factor * parts.prescribed)
-    load = model.load_factor * external_load(bodies, model.loads, parts.offsets)
+    load = model.load_factor * external_load(bodies, model.loads, parts.beside)
     displacement = by_body(bodies, parts, whole)
-    rest = parts.missing(whole, load, solution.r)
+    held = support_forces(parts, parts.missing(whole, load, solution.r))
     weights = np.concatenate([r.weights for r in rows])
     force = forces(rows, solution.r)
     traction = solution.r / weights[:, None]
@@ -94,8 +96,9 @@ def recover_fields(
         body=np.concatenate([np.full(len(p.rows.nodes), p.body) for p in parts.placed]),
         node=np.concatenate([r.nodes for r in rows]),
         facets=tuple((k, bodies[k].mesh.surface(name)) for k, name in surfaces),
-        reaction=by_body(bodies, parts, support_forces(parts, rest)),
+        reaction=by_body(bodies, parts, held),
         load=load_wrench(model, displacement, load), status=solution.status,
+        references=reference_fields(parts, whole, held, load),
         **at_once(solution),
     )  # fmt: skip
 
@@ -118,7 +121,8 @@ def at_once(solution: FrictionSolution) -> dict[str, Array]:
 def load_wrench(model: Model, displacement: Sequence[Array], load: Array) -> Wrench:
     """The resultant of nodal loads (dofs,)."""
     at = arms(model, displacement)
-    return Wrench.of(at, load.reshape(at.shape))
+    of_nodes = Wrench.of(at, load[: at.size].reshape(at.shape))
+    return of_nodes + beside_wrench(model.beside, load)
 
 
 def by_body(

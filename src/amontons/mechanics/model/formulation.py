@@ -97,7 +97,7 @@ class Formulation(ABC):
 
         own: with the loads that bodies of other programs bring.
         """
-        return external_load(model.bodies, loads, model.discretisation.offsets, own=own)
+        return external_load(model.bodies, loads, model.beside, own=own)
 
     def lasting(self, force: Array) -> Array:
         """The part of a load (n,) of which can be proved whether contact can hold it."""
@@ -161,11 +161,11 @@ class Stresses(Formulation):
     ) -> NitscheProblem:
         """The problem in displacements alone."""
         parts, held = model.discretisation, not model.rests_on_contact
-        if parts.rigid is not None:
+        if parts.eliminated is not None:
             raise UnsupportedForm(
-                "Nitsche's method takes the place of reactions by stresses, and a rigid "
-                "body has none; use nodal or mortar contact", ("contacts", 0, "method"),
-                "model",
+                "Nitsche's method takes the place of reactions by stresses, which rigid bodies "
+                "and constraints do not give; use nodal or mortar contact",
+                ("contacts", 0, "method"), "model",
             )  # fmt: skip
         matrices = model._shared.once(nitsche_matrices, (), parts, held)
         return nitsche_problem(parts, matrices, f, w, prescribed, model.law, model.name)
@@ -188,6 +188,13 @@ class Moved(Formulation):
                 "axisymmetric bodies have contact of small kinematics; expected no "
                 "kinematics='finite'", ("contacts", 0, "kinematics"), "contacts",
             )  # fmt: skip
+        for name in ("references", "constraints", "springs"):
+            if getattr(model, name):
+                raise UnsupportedForm(
+                    "small strains alone have constraints, springs and references, not "
+                    "hyperelastic laws and contacts with kinematics='finite'", (name, 0),
+                    "model",
+                )  # fmt: skip
         for k, contact in enumerate(model.contacts):
             check_law(k, contact, model.dimension, self.lacks)
         for k, contact in enumerate(model.contacts):
@@ -285,7 +292,7 @@ def _bonded(parts: Discretisation, f: Array, w: Array) -> tuple[Array, float]:
     """
     H, M = parts.H, parts.M
     near = abs(H).T @ M.diagonal()
-    if parts.rigid is not None:  # between rigid bodies, which have none
+    if parts.eliminated is not None:  # between rigid bodies, which have none
         near[near == 0] = near.max(initial=0.0) or _load_by_length(parts, f)
     stiffness = sparse.diags_array(near)
     stored = M.tocsc() if isinstance(M, GridMatrix) else M

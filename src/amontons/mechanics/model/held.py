@@ -59,7 +59,7 @@ class HeldNodes:
 
     def left(self, prescribed: Array) -> Array:
         """Gaps (k,) under prescribed displacements (dofs,) that are zero on free dofs."""
-        return self.gap + self.normal.T @ prescribed
+        return self.gap + self.normal.T @ prescribed[: self.normal.shape[0]]
 
     def left_where_moved(self, prescribed: Array, is_fixed: NDArray[np.bool_]) -> Array:
         """The same at finite strains: at their new places, if all their components are held."""
@@ -96,7 +96,10 @@ def _names(dof: int, bodies: Sequence[Body], supports: Sequence[Fix], offsets: I
     node = (dof - int(offsets[body])) // mesh.dim
     found = []
     for support in supports:
-        k, surface = locate(bodies, support.on, sets=True)
+        try:
+            k, surface = locate(bodies, support.on, sets=True)
+        except InvalidInput:  # beside the nodes
+            continue
         if k == body and node in mesh.surface_nodes(surface):
             found.append(f"fix on {support.on!r}")
     return ", ".join(dict.fromkeys(found))

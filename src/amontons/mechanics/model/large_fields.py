@@ -57,5 +57,5 @@ def recover_large(
         facets=tuple((k, model.bodies[k].mesh.surface(name)) for k, name in surfaces),
         reaction=by_body(model.bodies, linear, held),
         load=load_wrench(model, displacement, load), status=solution.status,
-        **at_once(solution),
+        references=None, **at_once(solution),
     )  # fmt: skip

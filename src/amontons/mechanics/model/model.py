@@ -18,14 +18,17 @@ from ...problem.law import Law
 from ...problem.nitsche import NitscheProblem
 from ...problem.protocol import Problem
 from ...problem.solution import FrictionSolution
-from .assembly import Discretisation, discretise, locate
+from .assembly import Discretisation, Ties, discretise, locate
 from .balance import Imbalance, imbalance, in_words
+from .beside import Beside
+from .constraints import Constraint, Reference, Spring
 from .fields import ContactFields
 from .formulation import Formulation, formulation_of
 from .held import check_outside
+from .joined import joined_loose
 from .laws import law_of, rubs
 from .names import named_bodies, pair_names, tuple_of
-from .parts import Body, Contact, Fix, Load, NodalForce
+from .parts import Body, Contact, Fix, Load, NodalForce, Temperature
 from .rigid import Piece, check_held, loose_modes
 from .values import ScalarValue, is_number
 
@@ -43,7 +46,9 @@ class Model(Told):
     Gaps and normals are taken once in the reference configuration, unless the contacts or
     hyperelastic laws say otherwise: then where the nodes are, see `is_large`.  load_factor
     multiplies the loads and the prescribed displacements, not the gaps.  pair_names: of the
-    contacts, their own or those of their slaves, all different.
+    contacts, their own or those of their slaves, all different.  references, constraints,
+    springs: points beside the bodies, what ties degrees of freedom to one another, and linear
+    springs between them.
     """
 
     bodies: Sequence[Body]
@@ -52,12 +57,17 @@ class Model(Told):
     loads: Sequence[Load] = ()
     load_factor: float = 1.0
     name: str = ""
+    references: Sequence[Reference] = ()
+    constraints: Sequence[Constraint] = ()
+    springs: Sequence[Spring] = ()
     pair_names: tuple[str, ...] = field(default=(), init=False, repr=False)
+    beside: Beside = field(default=None, init=False, repr=False)  # type: ignore[assignment]
     _shared: Prepared = field(default_factory=Prepared, init=False, repr=False)
 
     def __post_init__(self) -> None:
         for name, kind in (("bodies", Body), ("supports", Fix), ("contacts", Contact),
-                           ("loads", Load)):  # fmt: skip
+                           ("loads", Load), ("references", Reference), ("springs", Spring),
+                           ("constraints", Constraint)):  # fmt: skip
             object.__setattr__(self, name, tuple_of(name, getattr(self, name), kind))
         if not self.bodies:
             raise InvalidInput("expected at least one, got none", ("bodies",))
@@ -76,6 +86,8 @@ class Model(Told):
                 f"expected a finite number, got {self.load_factor!r}", ("load_factor",)
             )
         object.__setattr__(self, "bodies", named_bodies(self.bodies))
+        object.__setattr__(self, "beside", Beside.of(self.bodies, self.references,
+                                                     self.constraints))  # fmt: skip
         for part, fields in SURFACES.items():
             for k, item in enumerate(getattr(self, part)):
                 for name in (name for name in fields if hasattr(item, name)):
@@ -85,11 +97,13 @@ class Model(Told):
     def _check_surface(self, part: object, field: str) -> None:
         """Raise InvalidInput for a surface that no body has, or more than one."""
         name, optional = getattr(part, field), field == "master"
-        if name is None and optional:
+        if name is None and (optional or isinstance(part, Temperature)):
             return
         if not isinstance(name, str):
             raise InvalidInput(f"surface: expected a name, got {name!r}")
-        sets = isinstance(part, Fix | NodalForce)
+        sets = isinstance(part, Fix | NodalForce | Temperature)
+        if sets and self.beside.named(name) is not None:
+            return
         k, surface = locate(self.bodies, name, sets=sets)
         if not sets:
             self.bodies[k].mesh.surface(surface)
@@ -128,8 +142,9 @@ class Model(Told):
     @property
     def discretisation(self) -> Discretisation:
         """Matrices at load factor 1, assembled once and shared by variants of this model."""
+        ties = Ties(self.references, self.constraints, self.springs)
         return self._shared.once(
-            discretise, (), self.bodies, self.supports, self.loads, self.contacts
+            discretise, (), self.bodies, self.supports, self.loads, self.contacts, None, ties
         )
 
     def assemble(self) -> FrictionProblem:
@@ -179,7 +194,7 @@ class Model(Told):
         w[:, 0] += parts.gap
         w[:, 1:] -= before
         f = parts.gathered(load - parts.K @ prescribed)
-        f = parts.with_driven(f, parts.M, prescribed) if parts.rigid is not None else f
+        f = parts.with_driven(f, parts.M, prescribed) if parts.eliminated is not None else f
         return self.formulation.with_load(self, f, w, prescribed)
 
     @cached_property
@@ -213,6 +228,9 @@ class Model(Told):
 
     def _loose(self, parts: Discretisation) -> list[tuple[Piece, Array]]:
         """Pieces with the rigid modes that supports leave free."""
+        if parts.eliminated is not None and not parts.eliminated.only_rigid:
+            return self._shared.once(joined_loose, (), parts.parts, parts.eliminated,
+                                     parts.is_fixed)  # fmt: skip
         return loose_modes(parts.parts, parts.is_fixed)
 
     @property

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def tuple_of(name: str, values: object, kind: object) -> tuple:
     """The list `name` of a model, of objects of one kind; raises InvalidInput."""
-    wanted = getattr(kind, "__name__", "Traction, Pressure, BodyForce or NodalForce")
+    wanted = getattr(kind, "__name__", _either(kind))
     if isinstance(values, kind):  # type: ignore[arg-type]
         raise InvalidInput(f"{name}: expected a list of {wanted}, got one alone; write [it]")
     try:
@@ -26,6 +26,12 @@ def tuple_of(name: str, values: object, kind: object) -> tuple:
         if not isinstance(item, kind):  # type: ignore[arg-type]
             raise InvalidInput(f"{name}: expected {wanted}, got {item!r}")
     return items
+
+
+def _either(kind: object) -> str:
+    """The classes of a union in words."""
+    *names, last = [each.__name__ for each in getattr(kind, "__args__", (object,))]
+    return f"{', '.join(names)} or {last}"
 
 
 def named_bodies(bodies: Sequence[Body]) -> tuple[Body, ...]:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import within
 from ..elements.moved_loads import Pair, pressure_forces, traction_forces, volume_forces
-from .parts import CURRENT, BodyForce, Load, Pressure, Traction
+from .parts import CURRENT, BodyForce, Load, Pressure, Temperature, Traction
 from .supports import external_load, locate
 from .values import component_at, is_number, vector_at
 
@@ -141,12 +141,11 @@ def nodal_forces(model: Model, loads: Sequence[Load | None]) -> NodalForces:
     """Of the loads of a model, each with its value at one time; None: left out."""
     moving = [load is not None and follows(load) for load in loads]
     dead = [None if moves else load for load, moves in zip(loads, moving, strict=True)]
-    offsets = model.discretisation.offsets
     terms = [
         (1.0, follower) for at, load in enumerate(loads) if load is not None and moving[at]
         for follower in _followers(model, load, at)
     ]  # fmt: skip
-    return NodalForces(external_load(model.bodies, dead, offsets), tuple(terms))
+    return NodalForces(external_load(model.bodies, dead, model.beside), tuple(terms))
 
 
 def _followers(model: Model, load: Load, at: int) -> list[Follower]:
@@ -161,6 +160,7 @@ def _followers(model: Model, load: Load, at: int) -> list[Follower]:
         ]  # fmt: skip
         what, kernel = "body force", volume_forces
     else:
+        assert not isinstance(load, Temperature)  # it does not follow
         k, surface = locate(model.bodies, load.on)
         blocks = [(facets.kind, facets.nodes + starts[k])
                   for facets in model.bodies[k].mesh.surface(surface)]  # fmt: skip
@@ -172,7 +172,7 @@ def _followers(model: Model, load: Load, at: int) -> list[Follower]:
         with within("loads", at, "value"):
             if isinstance(load, Pressure):
                 return component_at(load.value, x, what)
-            return vector_at(load.value, x, what)
+            return vector_at(load.value, x, what)  # type: ignore[arg-type]  # no temperature
 
     uniform = _is_uniform(load.value)
     return [Follower(kind, nodes, X, kernel, density, uniform) for kind, nodes in blocks]

@@ -33,6 +33,7 @@ from ..elements.given import GivenMatrices
 from ..elements.rigid import Rigid
 from ..meshes.mesh import Mesh
 from ..meshes.surfaces import facet_normals
+from .elimination import Elimination
 from .held import HeldNodes
 from .parts import Body, Contact
 from .supports import Prescribed, locate
@@ -96,20 +97,35 @@ class Placed:
 
 
 def place(
-    bodies: Sequence[Body], contact: Contact, given: Prescribed, offsets: Index
-) -> Placed:
+    bodies: Sequence[Body], contact: Contact, given: Prescribed,
+    eliminated: Elimination | None = None,
+) -> Placed:  # fmt: skip
     """Contacts of one pair without those whose normal the supports prescribe."""
     k = locate(bodies, contact.slave)[0]
-    d = bodies[k].mesh.dim
+    d, offsets = bodies[k].mesh.dim, _offsets(bodies)
+    held_dofs = _immovable(given, int(offsets[-1]), eliminated)
     rows, H, met, points, terms = _met(bodies, contact, given, offsets)
     rows = _cleared(contact, rows)
-    kept = ~_has_held_normal(H, d, given.is_fixed) & _wanted(contact, points)[met]
+    kept = ~_has_held_normal(H, d, held_dofs) & _wanted(contact, points)[met]
     all_kept = met.copy()
     all_kept[met] = kept
-    held = _held_nodes(bodies, contact, given.is_fixed, offsets)
+    held = _held_nodes(bodies, contact, held_dofs, offsets)
     terms = None if terms is None else terms.at(kept)
     return Placed(k, all_kept, points, rows.at(kept), H[:, np.repeat(kept, d)], held, terms,
                   _sides(bodies, contact))  # fmt: skip
+
+
+def _offsets(bodies: Sequence[Body]) -> Index:
+    return np.cumsum([0, *(body.mesh.points.size for body in bodies)])
+
+
+def _immovable(given: Prescribed, dofs: int, eliminated: Elimination | None) -> Mask:
+    """Dofs of nodes that supports prescribe, by themselves or through constraints."""
+    fixed = given.is_fixed[:dofs]
+    if eliminated is None or eliminated.only_rigid:
+        return fixed
+    moves = np.diff(eliminated.spread.tocsr().indptr)[:dofs] > 0
+    return fixed | ~moves
 
 
 def _cleared(contact: Contact, rows: ContactRows) -> ContactRows:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..elements.hyperelasticity import is_hyperelastic
 from .names import support_names
+from .references import beside_wrench
 from .supports import prescribed_values
 from .wrench import Acting, Wrench
 
@@ -47,12 +48,10 @@ class SupportResult(Acting):
 
 def support_forces(parts: Discretisation, rest: Array) -> Array:
     """Forces of supports on all dofs (dofs,), of inner - load - pushed there, (dofs,)."""
+    if parts.eliminated is not None:
+        return parts.eliminated.held_by(rest)
     out = np.zeros_like(rest)
     out[parts.fixed] = rest[parts.fixed]
-    if parts.rigid is not None:
-        out[parts.rigid.dofs] = 0.0
-        for body in parts.rigid.bodies:
-            out[body.at] = body.held_by(rest[body.dofs])
     return out
 
 
@@ -69,13 +68,19 @@ def arms(model: Model, displacement: Sequence[Array]) -> Array:
 
 def support_results(model: Model, fields: ContactFields) -> dict[str, SupportResult]:
     """The force of every support of a solved model, by its name."""
-    parts = model.discretisation
+    beside = model.beside
     at, whole = arms(model, fields.displacement), np.concatenate(fields.reaction)
-    left, out = np.ones(whole.size, dtype=bool), {}
+    left, out = np.ones(beside.total, dtype=bool), {}
+    others = np.zeros(0) if fields.references is None else fields.references.reaction
     for name, support in zip(support_names(model.supports), model.supports, strict=True):
-        held = ~np.isnan(prescribed_values(model.bodies, (support,), parts.offsets)) & left
+        held = ~np.isnan(prescribed_values(model.bodies, (support,), beside)) & left
         left &= ~held
-        nodes = np.flatnonzero(held.reshape(whole.shape).any(axis=1))
-        forces = np.where(held.reshape(whole.shape)[nodes], whole[nodes], 0.0)
-        out[name] = SupportResult(name, support.on, Wrench.of(at[nodes], forces))
+        of_nodes = held[: whole.size].reshape(whole.shape)
+        nodes = np.flatnonzero(of_nodes.any(axis=1))
+        wrench = Wrench.of(at[nodes], np.where(of_nodes[nodes], whole[nodes], 0.0))
+        if beside.count:
+            own = np.zeros(beside.total)
+            own[beside.first :] = np.where(held[beside.first :], others, 0.0)
+            wrench = wrench + beside_wrench(beside, own)
+        out[name] = SupportResult(name, support.on, wrench)
     return out

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse import csgraph
 
 from ...core.errors import SingularOperator
 from ..elements.given import GivenMatrices
@@ -30,12 +29,21 @@ class Piece:
     """A connected part of a body: name, dofs (k,) in the whole model, modes (k, 3 or 6).
 
     rigid: which of the modes strain nothing, None for all.
+    members: where constraints join several, those; modes are then theirs side by side.
     """
 
     name: str
     dofs: Index
     modes: Array
     rigid: list[int] | None = None
+    members: tuple[Piece, ...] = ()
+
+    def moving(self, motion: Array) -> Array:
+        """Of a motion (modes, ...) the part of the member that moves most, (3 or 6, ...)."""
+        if not self.members:
+            return motion
+        parts = np.split(motion, len(self.members))
+        return parts[int(np.argmax([np.abs(part).max(initial=0.0) for part in parts]))]
 
 
 def pieces(mesh: Mesh, name: str, offset: int, material: object = None) -> list[Piece]:
@@ -81,6 +89,8 @@ def _titles(mesh: Mesh, name: str, labels: NDArray[np.int32]) -> list[str]:
 
 def _labels(mesh: Mesh) -> NDArray[np.int32]:
     """Number of the connected piece of every node, (n,)."""
+    from scipy.sparse import csgraph
+
     links = [
         np.stack([np.repeat(b.nodes[:, 0], b.nodes.shape[1] - 1), b.nodes[:, 1:].ravel()])
         for b in mesh.cells
@@ -110,7 +120,7 @@ def loose_modes(parts: list[Piece], fixed: NDArray[np.bool_]) -> list[tuple[Piec
     out = []
     for piece in parts:
         held = piece.modes[fixed[piece.dofs]]
-        basis = _null_space(held if piece.rigid is None else held[:, piece.rigid])
+        basis = null_space(held if piece.rigid is None else held[:, piece.rigid])
         if piece.rigid is not None:
             basis = np.eye(held.shape[1])[:, piece.rigid] @ basis
         if basis.shape[1]:
@@ -128,14 +138,15 @@ def check_held(
     if not loose:
         return
     motion, spread = rigid_motions(loose, dofs)
-    left = _null_space((H.T @ motion)[acting])
+    left = null_space((H.T @ motion)[acting])
     if not left.shape[1]:
         return
     texts = []
     for k, (piece, basis) in enumerate(loose):
         modes = basis @ left[spread == k]
         if np.abs(modes).max(initial=0.0) > 1e-6:
-            texts.append(f"body {piece.name!r} is free to move: {describe(modes)}")
+            words = describe(piece.moving(modes))
+            texts.append(f"body {piece.name!r} is free to move: {words}")
     raise SingularOperator(
         "; ".join(texts) + "; hold it with a support (Fix), friction or another contact",
         ("supports",), "",
@@ -179,7 +190,7 @@ def near_nullspace(parts: list[Piece], free: Index, dofs: int) -> Array:
     return out[free]
 
 
-def _null_space(matrix: Array) -> Array:
+def null_space(matrix: Array) -> Array:
     """Orthonormal basis (columns) of the null space of matrix (rows, k)."""
     k = matrix.shape[1]
     if not matrix.shape[0]:

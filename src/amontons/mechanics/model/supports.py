@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +12,16 @@ from numpy.typing import NDArray
 from ...core.errors import InvalidInput, within
 from ..elements.elasticity import body_load
 from ..elements.given import GivenMatrices
+from ..elements.thermal import thermal_load
 from ..meshes.mesh import Mesh, unknown
 from ..meshes.surfaces import pressure_load, surface_load
 from .parts import Body, BodyForce, Fix, Load, NodalForce, Pressure, Traction
+from .temperature import Temperature, changes, check_expansion
 from .timing import lasting
 from .values import component_at, vector_at
+
+if TYPE_CHECKING:
+    from .beside import Beside
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -35,12 +41,12 @@ class Prescribed:
 
     @classmethod
     def of(
-        cls, bodies: Sequence[Body], supports: Sequence[Fix], offsets: Index
+        cls, bodies: Sequence[Body], supports: Sequence[Fix], beside: Beside
     ) -> Prescribed:
         """Of all supports of a model, those of (x, t) at t = 0 unless they have a time."""
-        values = prescribed_values(bodies, supports, offsets)
+        values = with_held(prescribed_values(bodies, supports, beside), beside)
         same = tuple(replace(s, value=lasting(s.value)) for s in supports)
-        return cls(values, prescribed_values(bodies, same, offsets))
+        return cls(values, with_held(prescribed_values(bodies, same, beside), beside))
 
     @property
     def is_fixed(self) -> NDArray[np.bool_]:
@@ -49,8 +55,9 @@ class Prescribed:
 
     def by_body(self, offsets: Index, dim: int) -> tuple[list[NDArray[np.bool_]], list[Array]]:
         """Which components are prescribed, and lasting values: of every body (nodes, dim)."""
-        held = np.split(self.is_fixed.reshape(-1, dim), offsets[1:-1] // dim)
-        return held, np.split(self.lasting.reshape(-1, dim), offsets[1:-1] // dim)
+        held = self.is_fixed[: offsets[-1]].reshape(-1, dim)
+        lasting = self.lasting[: offsets[-1]].reshape(-1, dim)
+        return np.split(held, offsets[1:-1] // dim), np.split(lasting, offsets[1:-1] // dim)
 
 
 def locate(bodies: Sequence[Body], on: str, *, sets: bool = False) -> tuple[int, str]:
@@ -72,25 +79,30 @@ def locate(bodies: Sequence[Body], on: str, *, sets: bool = False) -> tuple[int,
     raise InvalidInput(unknown("surface", on, dict.fromkeys(names)))
 
 
+def with_held(values: Array, beside: Beside) -> Array:
+    """Prescribed values (dofs,) with 0 for what is held without a support."""
+    for entry in beside.entries.values():
+        if entry.held:
+            values[entry.dofs] = np.where(np.isnan(values[entry.dofs]), 0.0, values[entry.dofs])
+    return values
+
+
 def prescribed_values(
-    bodies: Sequence[Body], supports: Sequence[Fix], offsets: Index
+    bodies: Sequence[Body], supports: Sequence[Fix], beside: Beside
 ) -> Array:
     """Prescribed displacement of every dof, NaN where it is free, (dofs,).
 
     Nodes on the axis of an axisymmetric body stay on it.
     """
-    values = np.full(int(offsets[-1]), np.nan)
-    for body, first in zip(bodies, offsets[:-1], strict=True):
+    values = np.full(beside.total, np.nan)
+    for body, first in zip(bodies, beside.offsets[:-1], strict=False):
         values[first + 2 * on_axis(body.mesh)] = 0.0
     for at, support in enumerate(supports):
-        k, surface = locate(bodies, support.on, sets=True)
-        mesh = bodies[k].mesh
-        nodes = mesh.surface_nodes(surface)
-        dofs = offsets[k] + nodes[:, None] * mesh.dim + np.arange(mesh.dim)
+        dofs, points = _pointed(bodies, support.on, beside)
         what = f"fix on {support.on!r}"
         with within("supports", at, "value"):
-            given = vector_at(support.value, mesh.points[nodes], what, free=True)
-            _check_agreement(values[dofs], given, mesh.points[nodes], what)
+            given = vector_at(support.value, points, what, free=True, size=dofs.shape[1])
+            _check_agreement(values[dofs], given, points, what)
         values[dofs] = np.where(np.isnan(given), values[dofs], given)
     return values
 
@@ -100,6 +112,18 @@ def on_axis(mesh: Mesh) -> Index:
     if not mesh.axisymmetric:
         return np.zeros(0, dtype=np.int64)
     return np.flatnonzero(mesh.points[:, 0] <= ON_AXIS * mesh.points[:, 0].max())
+
+
+def _pointed(bodies: Sequence[Body], on: str, beside: Beside) -> tuple[Index, Array]:
+    """Dofs (k, components) and points (k, dim) under a name, of nodes or beside them."""
+    entry = beside.named(on)
+    if entry is not None:
+        return entry.dofs, entry.points
+    k, surface = locate(bodies, on, sets=True)
+    mesh = bodies[k].mesh
+    nodes = mesh.surface_nodes(surface)
+    dofs = beside.offsets[k] + nodes[:, None] * mesh.dim + np.arange(mesh.dim)
+    return dofs, mesh.points[nodes]
 
 
 def _check_agreement(old: Array, new: Array, points: Array, what: str) -> None:
@@ -116,14 +140,15 @@ def _check_agreement(old: Array, new: Array, points: Array, what: str) -> None:
 
 
 def external_load(
-    bodies: Sequence[Body], loads: Sequence[Load | None], offsets: Index, *, own: bool = True
+    bodies: Sequence[Body], loads: Sequence[Load | None], beside: Beside, *, own: bool = True
 ) -> Array:
     """Nodal forces of loads on the undeformed bodies, (dofs,).
 
     None stands for a load of the model that is left out, so that others keep their address.
     own: with the loads that bodies of other programs bring.
     """
-    out = np.zeros(int(offsets[-1]))
+    out, offsets = np.zeros(beside.total), beside.offsets
+    _add_temperature(out, bodies, loads, offsets)
     for k, body in enumerate(bodies):
         if own and isinstance(body.material, GivenMatrices):
             out[offsets[k] : offsets[k + 1]] += body.material.load
@@ -132,8 +157,8 @@ def external_load(
             if isinstance(load, BodyForce):
                 _add_body_force(out, bodies, load, offsets)
             elif isinstance(load, NodalForce):
-                _add_nodal_force(out, bodies, load, offsets)
-            elif load is not None:
+                _add_nodal_force(out, bodies, load, beside)
+            elif load is not None and not isinstance(load, Temperature):
                 k, surface = locate(bodies, load.on)
                 mesh = bodies[k].mesh
                 part = (_pressed(mesh, surface, load) if isinstance(load, Pressure)
@@ -142,15 +167,33 @@ def external_load(
     return out
 
 
-def _add_nodal_force(
-    out: Array, bodies: Sequence[Body], load: NodalForce, offsets: Index
+def _add_temperature(
+    out: Array, bodies: Sequence[Body], loads: Sequence[Load | None], offsets: Index
 ) -> None:
-    k, name = locate(bodies, load.on, sets=True)
-    mesh = bodies[k].mesh
-    nodes = mesh.surface_nodes(name)
+    """Forces of all changes of temperature."""
+    where = [at for at, load in enumerate(loads) if isinstance(load, Temperature)]
+    if not where:
+        return
+    with within("loads", where[0]):
+        check_expansion(bodies)
+        for k, change in enumerate(changes(bodies, loads)):
+            if change is not None and isinstance(bodies[k].material, GivenMatrices):
+                raise InvalidInput(
+                    f"temperature: body {bodies[k].name!r} has a given K; give "
+                    "the forces of its temperature as load of Body.from_matrix"
+                )
+            if change is not None:
+                part = thermal_load(bodies[k].mesh, bodies[k].material, change)
+                out[offsets[k] : offsets[k + 1]] += part.ravel()
+
+
+def _add_nodal_force(
+    out: Array, bodies: Sequence[Body], load: NodalForce, beside: Beside
+) -> None:
+    dofs, points = _pointed(bodies, load.on, beside)
     with within("value"):
-        force = vector_at(load.value, mesh.points[nodes], f"nodal force on {load.on!r}")
-    dofs = offsets[k] + nodes[:, None] * mesh.dim + np.arange(mesh.dim)
+        what = f"nodal force on {load.on!r}"
+        force = vector_at(load.value, points, what, size=dofs.shape[1])
     np.add.at(out, dofs, force)
 
 

@@ -19,7 +19,7 @@ ScalarValue = ArrayLike | Callable[[Array], ArrayLike]
 
 
 def check_vector(value: object, what: str, *, free: bool = False) -> None:
-    """Raise InvalidInput for one number other than 0 in the place of a vector.
+    """Raise InvalidInput for what can be no vector, and for one number other than 0.
 
     It could only be meant along every axis, which is hardly ever what is wanted.  Also for
     texts and for numbers that are none.
@@ -32,12 +32,34 @@ def check_vector(value: object, what: str, *, free: bool = False) -> None:
                                    f"{number_hint(entry) or leave}")  # fmt: skip
             if is_number(entry) and not np.isfinite(entry):
                 raise InvalidInput(f"{what}: expected a finite number, got {entry}")
+    entries = list(value) if isinstance(value, list | tuple) else [value]
+    if any(entry is ... for entry in entries):
+        leave = ", None for a component that is free" if free else ""
+        raise InvalidInput(
+            f"{what}: got '...', which stands for nothing here; write a number for each "
+            f"axis{leave}, or 0 for all of them"
+        )
+    if not (is_number(value) or callable(value) or isinstance(value, Sequence | np.ndarray)):
+        raise InvalidInput(
+            f"{what}: expected 0, a vector such as (0, 0, -1), or (0, -1) in 2D, or a function "
+            f"of the position, got {shown(value)}"
+        )
     if is_number(value) and value != 0:
         leave = f"; (None, None, {value}) leaves the others free" if free else ""
         raise InvalidInput(
             f"{what}: expected a vector or 0, got the number {value}, which would count along "
             f"every axis; write (0, 0, {value}), or (0, {value}) in 2D{leave}"
         )
+
+
+def pressure_of(value: object, on: str) -> float:
+    """The number that a pressure on a surface is; raises InvalidInput for anything else."""
+    if isinstance(value, list | tuple | np.ndarray) and np.size(value) > 1:  # type: ignore[arg-type]
+        raise InvalidInput(
+            f"pressure on {on!r}: expected a number, which acts against the normal, got "
+            f"{shown(value)}; a force per area with a direction is a Traction"
+        )
+    return number(f"pressure on {on!r}", value)
 
 
 def check_scalar(value: object, what: str) -> None:
@@ -56,13 +78,17 @@ def check_scalar(value: object, what: str) -> None:
         raise InvalidInput(f"{what}: expected numbers >= 0, got {numbers.min():g}")
 
 
-def vector_at(value: VectorValue, points: Array, what: str, *, free: bool = False) -> Array:
-    """A vector value at points (n, dim): (n, dim); a free component (None) becomes NaN.
+def vector_at(
+    value: VectorValue, points: Array, what: str, *, free: bool = False, size: int | None = None
+) -> Array:
+    """A vector value at points (n, dim): (n, size); a free component (None) becomes NaN.
+
+    size: number of components, by default dim.
 
     Callables take one point x of shape (dim,): the whole value, or one component each; those
     of (x, t) are taken at t = 0.
     """
-    dim = points.shape[1]
+    dim = points.shape[1] if size is None else size
     value = steady_value(value)
     if callable(value):
         rows = [_row(value(x), dim, what, free) for x in points]

@@ -32,6 +32,10 @@ class Wrench:
         d = arms.shape[1]
         return cls(forces.sum(axis=0), cross(arms, forces).sum(axis=0), np.zeros(d))
 
+    def __add__(self, other: Wrench) -> Wrench:
+        same = other.about(self.point)
+        return Wrench(self.force + same.force, self.moment + same.moment, self.point)
+
     def about(self, point: Sequence[float] | Array) -> Wrench:
         """The same forces, their moment about another point (d,); raises InvalidInput."""
         at = finite("point", point, 1)

@@ -56,6 +56,7 @@ from ...problem.solution import FrictionSolution
 from ...solvers.contract import Iterate
 from ..model import Model
 from ..model.reactions import support_forces
+from .bolts import lock_times
 from .energy import Energies
 from .rubbing import rubbed
 from .springs import Springs
@@ -108,6 +109,11 @@ class MoreauJean:
         """The matrices of all steps; tolerance of their solves."""
         if model.kind.no_inertia:
             raise UnsupportedForm(f"model: {model.kind.no_inertia}")
+        for name in lock_times(model):
+            raise UnsupportedForm(
+                f"pretension {name!r}: bolts are locked in quasi-static steps only; tighten "
+                "them so, and begin the dynamics from that state with Fix on its length"
+            )
         return MovingModel(self, model, tolerance)
 
 

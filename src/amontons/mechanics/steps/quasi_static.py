@@ -31,6 +31,7 @@ from ..model import Model
 from ..model.diagnosis import with_diagnosis
 from ..model.large_deformation import LargeDeformation
 from ..model.reactions import support_forces
+from .bolts import Tightened, lock_times
 from .energy import Energies, Forces, slow_energies
 from .large_steps import LargeSlowModel
 from .moreau_jean import Solve
@@ -67,18 +68,24 @@ class QuasiStatic:
                 f"crossing: expected PathCrossing() or None, got {self.crossing!r}"
             )
 
-    def prepare(self, model: Model, tolerance: float) -> SlowModel | LargeSlowModel:
+    def prepare(self, model: Model, tolerance: float) -> SlowModel | LargeSlowModel | Tightened:
         """The matrices of all steps; equilibrium at the end never creates energy."""
         if self.crossing is not None and model.kind.no_path:
             raise UnsupportedForm(f"crossing: {model.kind.no_path}")
-        return IN_TIME[model.kind](model, self.crossing)
+        prepared = IN_TIME[model.kind](model, self.crossing)
+        if isinstance(prepared, SlowModel) and lock_times(model):
+            return Tightened(prepared)
+        return prepared
 
 
 class SlowModel:
     """A model without inertia; `advance` makes one step."""
 
-    def __init__(self, model: Model, crossing: Crossing | None = None) -> None:
-        self.motion, self.crossing = Motion(model), crossing
+    def __init__(
+        self, model: Model, crossing: Crossing | None = None,
+        lengths: dict[str, float] | None = None,
+    ) -> None:  # fmt: skip
+        self.motion, self.crossing = Motion(model, lengths or {}), crossing
         parts = self.motion.parts
         self.springs = Springs.of(self.motion.body.law, parts.carried.shape[1])
 

@@ -21,7 +21,8 @@ from ..model.doubts import model_warnings
 from ..model.fields import by_body, load_wrench
 from ..model.pairs import PairResult, pair_results
 from ..model.reactions import SupportResult, support_results
-from ..model.supports import locate, prescribed_values
+from ..model.references import ReferenceResult, reference_fields, reference_results
+from ..model.supports import locate, prescribed_values, with_held
 from ..model.values import VectorValue, check_vector, vector_at
 from .energy import Energies
 from .passage import Passage
@@ -79,7 +80,7 @@ class State:
         return not (self.displacement.any() or self.force.any())
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class TimeStep(Shown):
     """One step: the state after it, its discrete problem's solution, its energies.
 
@@ -161,6 +162,8 @@ class TimeStep(Shown):
             status=self.status, slid=self.state.slid, path=self.state.path,
             friction_work=self.state.friction_work, reaction=self._split(self.reaction),
             load=load_wrench(self.model, self.displacement, self.load),
+            references=reference_fields(self.model.discretisation, self.state.displacement,
+                                        self.reaction, self.load),
         )  # fmt: skip
 
     @cached_property
@@ -174,9 +177,16 @@ class TimeStep(Shown):
         return support_results(self.model, self.fields)
 
     @cached_property
+    def references(self) -> dict[str, ReferenceResult]:
+        """Displacement, rotation and force of every reference and bolt, by its name."""
+        return reference_results(self.model, self.fields)
+
+    @cached_property
     def warnings(self) -> tuple[ResultWarning, ...]:
         """Reasons to doubt a step that has converged, each with a name."""
-        return self.solution.warnings + model_warnings(self.model, self.fields)
+        return self.solution.warnings + model_warnings(
+            self.model, self.fields, self.solution.converged
+        )
 
     @property
     def _force(self) -> Array:
@@ -225,12 +235,13 @@ def at_rest(
         for value, name in ((displacement, "displacement"), (velocity, "velocity"))
     )
     v[parts.fixed] = 0.0
-    if parts.rigid is not None:
-        v = parts.rigid.nearest(v, np.zeros_like(v))
+    if parts.eliminated is not None:
+        v = parts.eliminated.nearest(v, np.zeros_like(v))
     supports: tuple[Fix, ...] = tuple(part_at(s, time) for s in model.supports)  # type: ignore[misc]
-    q[parts.fixed] = prescribed_values(model.bodies, supports, parts.offsets)[parts.fixed]
-    if parts.rigid is not None:
-        q = parts.rigid.nearest(q, np.where(parts.is_fixed, q, 0.0))
+    values = with_held(prescribed_values(model.bodies, supports, parts.beside), parts.beside)
+    q[parts.fixed] = values[parts.fixed]
+    if parts.eliminated is not None:
+        q = parts.eliminated.nearest(q, np.where(parts.is_fixed, q, 0.0))
     u = parts.local(q)
     return State(0, time, q, v, np.zeros_like(u), u[:, 1:])
 
@@ -241,6 +252,7 @@ def _at_nodes(model: Model, value: object, name: str) -> Array:
     for body, own in zip(model.bodies, _one_each(value, len(model.bodies)), strict=True):
         check_vector(own, name)
         out.append(vector_at(own, body.mesh.points, name).ravel())
+    out.append(np.zeros(model.beside.count))
     return np.concatenate(out)
 
 

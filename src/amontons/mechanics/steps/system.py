@@ -16,7 +16,7 @@ from ..model import Fix, Model
 from ..model.assembly import Discretisation
 from ..model.nodal_forces import sampled
 from ..model.parts import Load
-from ..model.supports import locate, prescribed_values
+from ..model.supports import locate, prescribed_values, with_held
 from .timed import depends_on_time, is_timed, part_at, steady
 
 if TYPE_CHECKING:
@@ -32,10 +32,12 @@ BENT = 1e-9  # departure from a straight line in time, relative, that a load may
 class Motion:
     """Loads and prescribed displacements of a model as functions of time.
 
-    model: as the user gave it; only its steady form, `body`, is assembled.
+    model: as the user gave it; only its steady form, `body`, is assembled.  lengths: of locked
+    bolts, which neither time nor load factor changes.
     """
 
     model: Model
+    lengths: dict[str, float] = field(default_factory=dict)
     _loads: dict[float, Any] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
@@ -88,7 +90,7 @@ class Motion:
 
         Raises InvalidInput where it pushes a node that supports hold into what it meets.
         """
-        return self._checked(self._displaced(t), t)
+        return self._checked(self._displaced(t) + self._kept, t)
 
     def applied(self, t: float) -> tuple[Any, Array]:
         """(nodal forces as `load`, prescribed displacement (dofs,)) at time t.
@@ -96,7 +98,15 @@ class Motion:
         Where nothing depends on time all grow with it as load factor.  Raises as `prescribed`.
         """
         factor = 1.0 if self.is_timed else t
-        return factor * self.load(t), self._checked(factor * self._displaced(t), t)
+        return factor * self.load(t), self._checked(factor * self._displaced(t) + self._kept, t)
+
+    @cached_property
+    def _kept(self) -> Array:
+        """What locked bolts prescribe, (dofs,)."""
+        out, entries = np.zeros(self.parts.dofs), self.model.beside.entries
+        for name, length in self.lengths.items():
+            out[entries[name].dofs] = length
+        return self.parts.completed(out) if self.lengths else out
 
     def _checked(self, prescribed: Array, t: float) -> Array:
         self.body.check_outside(prescribed, f" at t = {t:.6g}")
@@ -140,7 +150,8 @@ class Motion:
 
     def _prescribed(self, t: float) -> Array:
         supports: tuple[Fix, ...] = tuple(part_at(s, t) for s in self.model.supports)  # type: ignore[misc]
-        values = prescribed_values(self.model.bodies, supports, self.parts.offsets)
+        beside = self.parts.beside
+        values = with_held(prescribed_values(self.model.bodies, supports, beside), beside)
         changed = np.flatnonzero(np.isnan(values) == self.parts.is_fixed)
         if changed.size:
             raise InvalidInput(self._comes_or_goes(int(changed[0]), t), ("supports",), "")
@@ -149,18 +160,25 @@ class Motion:
     def _comes_or_goes(self, dof: int, t: float) -> str:
         """What to say of a dof that is free at t and was held at time 0, or the other way."""
         bodies, offsets, d = self.model.bodies, self.parts.offsets, self.model.dimension
-        k = int(np.searchsorted(offsets, dof, side="right")) - 1
-        node, axis = divmod(dof - int(offsets[k]), d)
-        mesh = bodies[k].mesh
-        names = [s.on for s in self.model.supports
-                 if is_timed(s.value) and (found := locate(bodies, s.on, sets=True))[0] == k
-                 and node in mesh.surface_nodes(found[1])]  # fmt: skip
+        beside = self.model.beside
+        if dof >= beside.first:
+            names = [name for name, entry in beside.entries.items() if dof in entry.dofs]
+            place = beside.where(dof)
+        else:
+            k = int(np.searchsorted(offsets, dof, side="right")) - 1
+            node, axis = divmod(dof - int(offsets[k]), d)
+            mesh = bodies[k].mesh
+            names = [s.on for s in self.model.supports
+                     if is_timed(s.value) and beside.named(s.on) is None
+                     and (found := locate(bodies, s.on, sets=True))[0] == k
+                     and node in mesh.surface_nodes(found[1])]  # fmt: skip
+            place = f"component {axis} at {mesh.points[node].tolist()}"
         held = bool(self.parts.is_fixed[dof])
         before, now = ("held", "free") if held else ("free", "held")
         return (
-            f"fix on {', '.join(map(repr, names))}: component {axis} at "
-            f"{mesh.points[node].tolist()} is {before} at t = 0 and {now} at t = {t:.6g}; a "
-            "support holds the same components at all times; for one that comes or goes begin "
+            f"fix on {', '.join(map(repr, names))}: {place} is {before} at t = 0 and {now} at "
+            f"t = {t:.6g}; a support holds the same components at all times; for one that "
+            "comes or goes begin "
             "another evolution, of a model with other supports, from the state (start=)"
         )
 
@@ -178,6 +196,8 @@ class Inertia:
 
     def __post_init__(self) -> None:
         blocks = [mass(b.mesh, b.material) for b in self.model.bodies]  # type: ignore[arg-type]
+        if count := self.model.beside.count:
+            blocks.append(sparse.csr_array((count, count)))  # references have no mass
         M = sparse.csr_array(sparse.block_diag(blocks, format="csr"))
         M = lumped(M) if self.is_lumped else M
         K = self.model.discretisation.stored_stiffness

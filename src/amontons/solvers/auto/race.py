@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...problem.friction import FrictionProblem
 from ...problem.judge.measures import natural_error
-from ..sweeps.kernels import Sweep, sweep_data, sweeps_inplace, watch_for
+from ..sweeps.kernels import Sweep, counted, sweep_data, sweeps_inplace, watch_for
 
 Array = NDArray[np.float64]
 RELAXATIONS = (1.6, 1.3, 0.9)
@@ -39,7 +40,7 @@ class Race:
     """Tracks of one problem, all from the same reaction, (nc, 3)."""
 
     def __init__(self, problem: FrictionProblem, r: Array) -> None:
-        self.kernel_data = problem.kernel_data
+        self.kernel_data, self.judge_flops = problem.kernel_data, problem.judge_flops
         first = sweep_data(problem)
         self.tracks = [Track(w, first._replace(relaxation=w), r.copy()) for w in RELAXATIONS]
         self.alone = ALONE
@@ -50,13 +51,17 @@ class Race:
         for track in self.tracks:
             track.r, track.error, track.done = r.copy(), math.inf, 0
 
-    def run(self, sweeps: int, goal: float) -> tuple[Track, int]:
-        """Some sweeps of one track, at most until its error, unit of u, is `goal`."""
+    def run(self, sweeps: int, goal: float) -> tuple[Track, int, float]:
+        """Some sweeps of one track, at most until its error, unit of u, is `goal`.
+
+        Returns the track, the sweeps and their floating point operations.
+        """
         track = self._next()
-        count = sweeps_inplace(track.data, track.r, sweeps, watch_for(goal))
+        run = partial(sweeps_inplace, track.data, track.r, sweeps, watch_for(goal))
+        count, flops = counted(track.data, run)
         track.done += count
         track.error = natural_error(*self.kernel_data, track.r)
-        return track, count
+        return track, count, flops + self.judge_flops
 
     def _next(self) -> Track:
         """The track whose turn it is."""

@@ -27,6 +27,7 @@ from ..sweeps.kernels import Acceleration, watch_for
 from .state import State
 
 Array = NDArray[np.float64]
+SWEEPS = "Anderson Gauss-Seidel"  # name of the stages
 DEPTH = 10  # past sweeps that Anderson acceleration combines
 CHUNK = 40  # sweeps between two looks at their rate
 LOOK = 0.1  # the same beside joints, part of Newton's cost
@@ -85,8 +86,8 @@ def sweeps_at_joints(state: State, stage: Stage, turn: int) -> Iterator[Iterate]
     spent, last = 0.0, state.error
     while True:
         newton = joints.newton_cost(math.log10(max(min(state.error / state.goal, 1e12), 1.0)))
-        count = memory.sweep(int(np.clip(LOOK * newton / cost, 5, CHUNK)), watch)
-        yield state.offer(memory.r.copy(), count, "Anderson Gauss-Seidel", watch[2])
+        count, flops = memory.sweep(int(np.clip(LOOK * newton / cost, 5, CHUNK)), watch)
+        yield state.offer(memory.r.copy(), count, SWEEPS, flops, watch[2])
         spent += cost * count
         promise = cost * state.sweeps_left(last, count)
         last = state.latest
@@ -117,7 +118,7 @@ def _inexact(
     patience = Patience(stage.patience)
     try:
         for iterate in solver.iterates(state.problem, state.iterate(r), state.target):
-            found = state.offer(spatial(iterate.r), 1, name)
+            found = state.offer(spatial(iterate.r), 1, name, iterate.flops)
             yield replace(found, linear_iterations=iterate.linear_iterations)
             if patience.over(state.latest):
                 return
@@ -132,8 +133,8 @@ def accelerated_sweeps(state: State, stage: Stage, turn: int) -> Iterator[Iterat
     done, state.spent, last = 0, 0.0, state.error
     watch = watch_for(state.goal)
     while done < stage.steps:
-        count = memory.sweep(max(CHUNK, done // 4), watch)
-        yield state.offer(memory.r.copy(), count, "Anderson Gauss-Seidel", watch[2])
+        count, flops = memory.sweep(max(CHUNK, done // 4), watch)
+        yield state.offer(memory.r.copy(), count, SWEEPS, flops, watch[2])
         done, state.spent = done + count, state.spent + state.accelerated_cost * count
         promise = state.accelerated_cost * state.sweeps_left(last, count)
         last, newton = state.latest, state.newton_cost()
@@ -174,10 +175,10 @@ def matching_sweeps(state: State, stage: Stage, turn: int) -> Iterator[Iterate]:
 
 def _relaxed(state: State, sweeps: int) -> Iterate:
     """Sweeps of the race between relaxations (see `Race`)."""
-    track, count = state.race.run(sweeps, state.goal)
-    return state.offer(
-        track.r.copy(), count, f"Gauss-Seidel, relaxation {track.relaxation:g}", track.error
-    )
+    race = state.race  # which begins with sweeps of its own
+    track, count, flops = race.run(sweeps, state.goal)
+    name = f"Gauss-Seidel, relaxation {track.relaxation:g}"
+    return state.offer(track.r.copy(), count, name, flops, track.error)
 
 
 # ---------------------------------------------------------------- Newton and others
@@ -238,7 +239,7 @@ def semismooth_newton(state: State, stage: Stage, turn: int) -> Iterator[Iterate
             state.problem, state.iterate(state.r), state.target
         )
         for iterate in islice(newton, stage.steps):
-            yield state.offer(spatial(iterate.r), 1, "semismooth Newton")
+            yield state.offer(spatial(iterate.r), 1, "semismooth Newton", iterate.flops)
     except (Breakdown, SingularOperator):
         return
 
@@ -259,9 +260,8 @@ def methods_alone(state: State, stage: Stage, turn: int) -> Iterator[Iterate]:
         patience = Patience(most)
         try:
             for iterate in solver.iterates(state.problem, start, state.target):
-                yield state.offer(
-                    spatial(iterate.r), iterate.iterations, type(solver).__name__
-                )
+                name = type(solver).__name__
+                yield state.offer(spatial(iterate.r), iterate.iterations, name, iterate.flops)
                 if patience.over(state.latest):
                     break
         except (Breakdown, SingularOperator):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from ..newton.inexact import InexactNewton
 from ..newton.joints import Joints
 from ..newton.semismooth import Condensed, SemismoothNewton
 from ..newton.smoothing import Workspace
-from ..sweeps.kernels import SweepOrder, sweep_data, sweeps_inplace, watch_for
+from ..sweeps.kernels import SweepOrder, counted, sweep_data, sweeps_inplace, watch_for
 from .race import Race
 
 Array = NDArray[np.float64]
@@ -47,10 +47,12 @@ class State:
     latest: float = math.inf  # of the last reaction tried
     spent: float = 0.0  # cost of the accelerated sweeps
     budget: float = 0.0  # cost of Newton steps not yet matched by sweeps
+    unsaid: float = 0.0  # operations that no iterate has told yet
 
     def __post_init__(self) -> None:
         self.start = self.r
-        self.error = self.judge(self.r) if np.count_nonzero(self.r) else math.inf
+        if np.count_nonzero(self.r):
+            self.error, self.unsaid = self.judge(self.r), self.problem.judge_flops
         self.goal = self.target.tolerance * self.problem.q_norm
         self.data = sweep_data(self.problem, order=SweepOrder.APPROACH)
 
@@ -76,7 +78,8 @@ class State:
     def race(self) -> Race:
         """Over-relaxed sweeps from the first point: accelerated ones keep the slow modes."""
         r = spatial(self.start)
-        sweeps_inplace(self.data, r, FIRST_SWEEPS, watch_for(0.0))
+        run = partial(sweeps_inplace, self.data, r, FIRST_SWEEPS, watch_for(0.0))
+        self.unsaid += counted(self.data, run)[1]
         return Race(self.problem, r)
 
     @cached_property
@@ -134,14 +137,27 @@ class State:
         """Error of r, (nc, 3), unit of u."""
         return natural_error(*self.problem.kernel_data, r)
 
-    def offer(self, x: Array, iterations: int, stage: str, error: float = math.inf) -> Iterate:
-        """Keep x if it is better, and hand out the best; error of x, unit of u, if known."""
-        self.latest = error = error if error < math.inf else self.judge(x)
+    def offer(
+        self, x: Array, iterations: int, stage: str, flops: float | None = None,
+        error: float = math.inf,
+    ) -> Iterate:  # fmt: skip
+        """Keep x if it is better, and hand out the best.
+
+        flops: floating point operations that x took, None where they are not counted; error of
+        x, unit of u, if known.
+        """
+        if error == math.inf:
+            error = self.judge(x)
+            flops = None if flops is None else flops + self.problem.judge_flops
+        self.latest = error
         if error < self.error:
             self.r, self.error = x, error
+        if flops is not None:
+            flops, self.unsaid = flops + self.unsaid, 0.0
         return Iterate(
-            self.r[:, : self.problem.dimension].copy(), iterations=iterations, stage=stage
-        )
+            self.r[:, : self.problem.dimension].copy(), iterations=iterations, stage=stage,
+            flops=flops,
+        )  # fmt: skip
 
     def iterate(self, r: Array) -> Iterate:
         """A start for other solvers from r, (nc, 3)."""

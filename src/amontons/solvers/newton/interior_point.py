@@ -275,7 +275,7 @@ class InteriorPoint:
             slip = sliding_speed(problem, r[:, :d])
             if self.sweeps:
                 memory = Acceleration(data, r, DEPTH)
-                count = memory.sweep(self.sweeps, watch_for(goal))
+                count, _ = memory.sweep(self.sweeps, watch_for(goal))
                 yield Iterate(
                     memory.r[:, :d].copy(), iterations=count, stage=f"sweeps after {STAGE}"
                 )

@@ -25,7 +25,6 @@ contact frottant dans les systèmes de multi-corps flexibles", CSMA 2017.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from functools import partial
@@ -44,8 +43,8 @@ from .kernels import (
     Acceleration,
     Sweep,
     SweepOrder,
+    counted,
     sweep_data,
-    sweep_flops,
     sweeps_inplace,
     sweeps_until_inplace,
     watch_for,
@@ -129,23 +128,12 @@ class GaussSeidel:
         if self.anderson_depth:
             memory = Acceleration(data, r, self.anderson_depth)
             while True:
-                (done, _), flops = _counted(data, partial(memory.sweep, self.batch, never))
-                flops += done * memory.flops
+                done, flops = memory.sweep(self.batch, never)
                 yield Iterate(memory.r[:, :d].copy(), iterations=done, flops=flops)
         while True:
             run = partial(sweeps_inplace, data, r, self.batch, never)
-            (done, _), flops = _counted(data, run)
+            done, flops = counted(data, run)
             yield Iterate(r[:, :d].copy(), iterations=done, flops=flops)
-
-
-def _counted(
-    data: Sweep, run: Callable[[], int | tuple[int, float]]
-) -> tuple[tuple[int, float], float]:
-    """What a call returns, the sweeps made being first, and their floating point operations."""
-    before = float(data.work[0])
-    found = run()
-    done, change = found if isinstance(found, tuple) else (found, math.nan)
-    return (done, change), sweep_flops(data, done, float(data.work[0]) - before)
 
 
 def _adaptive(
@@ -156,7 +144,7 @@ def _adaptive(
     sweeps, tau = FIRST, target.tolerance
     while True:
         run = partial(sweeps_until_inplace, data, r, before, sweeps, tau)
-        (done, change), flops = _counted(data, run)
+        (done, change), flops = counted(data, run)
         flops += CHANGE_FLOPS * done * r.size
         iterate = Iterate(r[:, :d].copy(), iterations=done, flops=flops)
         error = target.error(problem, iterate, (yield iterate))

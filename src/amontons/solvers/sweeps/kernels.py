@@ -19,15 +19,18 @@ on real problems that takes 0.5 to 1.3 times the sweeps of the stored order, 0.8
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, NamedTuple
+from functools import partial
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numba import uint64
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
+from ...problem.equations import JUDGE_FLOPS
 from ...problem.friction import FrictionProblem
 from ...problem.judge.measures import natural_error
 from ...problem.law.law import COULOMB, MU
@@ -44,6 +47,7 @@ from .local_contact import (
 )
 
 Array = NDArray[np.float64]
+T = TypeVar("T", int, tuple[int, float])
 EXACT, NEWTON = int(LocalSolver.EXACT), int(LocalSolver.NEWTON)
 GOLDEN = 0.6180339887498949
 SLOWEST = 1e-9  # approach, relative to the fastest, below which contacts count as alike
@@ -78,7 +82,7 @@ class Sweep(NamedTuple):
     relaxation: float
     close: float  # relative change at which iterations on one contact end
     steps: int  # of them at most
-    work: Any  # (1,) floating point operations of iterations on single contacts, added up
+    work: Any  # (1,) floating point operations on single contacts and of judgements, added up
 
 
 def sweep_data(
@@ -111,6 +115,14 @@ def sweep_flops(s: Sweep, sweeps: int, local: float) -> float:
     nc = len(s.order)
     own = CONTACT_FLOPS + (EXACT_FLOPS if s.local == EXACT else 0.0)
     return sweeps * (BLOCK_FLOPS * (len(s.indices) - nc) + own * nc) + local
+
+
+def counted(s: Sweep, run: Callable[[], T]) -> tuple[T, float]:
+    """What a call returns, sweeps made or (sweeps made, …), and their operations."""
+    before = float(s.work[0])
+    found = run()
+    done = found[0] if isinstance(found, tuple) else found
+    return found, sweep_flops(s, done, float(s.work[0]) - before)
 
 
 @njit(cache=True, error_model="numpy")
@@ -173,6 +185,8 @@ def _content(s, r, change, watch):
     """True when the error is at most watch[0]; see `watch_for`."""
     if not change <= watch[1]:
         return False
+    if watch[0] > 0.0:
+        s.work[0] += JUDGE_FLOPS[0] * len(s.indices) + JUDGE_FLOPS[1] * len(s.kind)
     error = natural_error(s.indptr, s.indices, s.data, s.q, s.kind, s.parameters, s.rho, r)
     if error <= watch[0]:
         watch[2] = error
@@ -340,8 +354,10 @@ class Acceleration:
         """Floating point operations of a sweep beyond the sweep itself."""
         return self.r.size * (8.0 + 4.0 * self.depth) + self.depth**3 / 3
 
-    def sweep(self, sweeps: int, watch: Array) -> int:
-        """Go on for `sweeps` sweeps or until the judge is content; sweeps done."""
-        return anderson_inplace(
-            self.data, self.r, self.x, self.history, self.gram, self.count, sweeps, watch
-        )
+    def sweep(self, sweeps: int, watch: Array) -> tuple[int, float]:
+        """Go on for `sweeps` sweeps or until the judge is content; sweeps done, operations."""
+        done, flops = counted(self.data, partial(
+            anderson_inplace, self.data, self.r, self.x, self.history, self.gram, self.count,
+            sweeps, watch,
+        ))  # fmt: skip
+        return done, flops + done * self.flops

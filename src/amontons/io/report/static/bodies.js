@@ -1,5 +1,6 @@
 // The bodies of one state as meshes of three.js: deformed and coloured on the graphics card.
 
+const EVERYWHERE = ["displacement", "von Mises stress"]; // fields of all nodes, not of contacts alone
 const VERTEX = `
   attribute vec3 move; attribute vec3 aside; attribute float value; attribute vec4 kind;
   uniform float scale; uniform float lift;
@@ -59,7 +60,7 @@ class Shared {
     this.zones = view.zones.map((z) => ({ ...z, pieces: array(z.pieces), masterPieces: array(z.masterPieces),
       rigidPoints: array(z.rigidPoints), rigidPieces: array(z.rigidPieces) }));
     this.place = new Map(Array.from(this.contacts, (vertex, k) => [vertex, k]));
-    this.states = view.states.map((s) => ({ ...s, moved: array(s.moved), status: array(s.status), force: array(s.force),
+    this.states = view.states.map((s) => ({ ...s, moved: array(s.moved), status: array(s.status), force: array(s.force), stress: array(s.stress),
       values: Object.fromEntries(Object.entries(s.values).map(([name, place]) => [name, array(place)])) }));
     this.uniforms = { scale: { value: 1 }, map: { value: mapTexture() }, range: { value: new THREE.Vector2(0, 1) },
       statusColour: { value: STATUSES.map((name) => new THREE.Color().setStyle(colourOf(name), THREE.LinearSRGBColorSpace)) } };
@@ -158,8 +159,9 @@ class Bodies {
     const u = state.moved;
     if (field === "displacement")
       for (let k = 0; k < this.value.count; k++) this.value.array[k] = Math.hypot(u[3 * k], u[3 * k + 1], u[3 * k + 2]);
+    if (field === "von Mises stress") this.value.array.set(state.stress);
     this.value.needsUpdate = true;
-    for (const mesh of this.solids) mesh.material.uniforms.how.value = field === "displacement" ? 2 : 0;
+    for (const mesh of this.solids) mesh.material.uniforms.how.value = EVERYWHERE.includes(field) ? 2 : 0;
     for (const zone of this.zones) for (const side of [zone.slave, zone.master]) side?.show(state, field, this.value.array);
   }
 
@@ -232,8 +234,8 @@ class Zone {
       for (let c = 0; c < 3; c++) move.array[3 * k + c] = state.moved[3 * v + c];
       const at = place.get(v), status = at === undefined ? -1 : state.status[at];
       for (let c = 0; c < 3; c++) kind.array[4 * k + c] = status === c ? 1 : 0;
-      kind.array[4 * k + 3] = status < 0 && field !== "displacement" ? 1 : 0;
-      value.array[k] = field === "displacement" ? everywhere[v] : numbers && at !== undefined ? numbers[at] : 0;
+      kind.array[4 * k + 3] = status < 0 && !EVERYWHERE.includes(field) ? 1 : 0;
+      value.array[k] = EVERYWHERE.includes(field) ? everywhere[v] : numbers && at !== undefined ? numbers[at] : 0;
     });
     for (const attribute of [move, value, kind]) attribute.needsUpdate = true;
     this.mesh.material.uniforms.how.value = field === "status" ? 1 : 2;

@@ -89,7 +89,7 @@ function axes(svg, data, { X, Y, x0, x1, y0, y1 }) {
   for (const level of data.lines || []) svg.append(
     make("line", { x1: LEFT, x2: WIDE - RIGHT, y1: Y(level.y), y2: Y(level.y), stroke: "var(--alarm)",
       "stroke-dasharray": "5 4" }),
-    make("text", { x: WIDE - RIGHT - 4, y: Y(level.y) - 4, "text-anchor": "end", style: "fill:var(--alarm)" }, level.name));
+    make("text", { x: LEFT + 4, y: Y(level.y) - 4, style: "fill:var(--alarm)" }, level.name));
 }
 
 function drawSeries(svg, series, X, Y, y0) {
@@ -117,8 +117,44 @@ function drawSeries(svg, series, X, Y, y0) {
 /** The names of the series and of the marks, below the chart. */
 function names(data) {
   const legend = make("div", { class: "names" });
-  if (data.series.length > 1) for (const s of data.series.slice(0, 12)) legend.append(
+  if (data.series.length > 1) for (const s of data.series.filter((one) => one.name).slice(0, 12)) legend.append(
     make("span", {}, make("i", { style: `border-color:${seriesColour(s.colour)}` }), ` ${s.name}`));
   for (const name of new Set((data.marks || []).map((m) => m.name))) legend.append(make("span", {}, `○ ${name}`));
   return legend;
+}
+
+/** Vertices along the lines of a zone in 2D, in order, as parts that hang together: [vertex, length so far]. */
+function along(pieces, points) {
+  const next = new Map(), ends = new Set(), parts = [];
+  for (let k = 0; k < pieces.length; k += 2) { next.set(pieces[k], pieces[k + 1]); ends.add(pieces[k + 1]); }
+  const at = (v, c) => points[3 * v + c];
+  let length = 0;
+  for (const start of [...[...next.keys()].filter((v) => !ends.has(v)), ...next.keys()]) {
+    if (!next.has(start)) continue;
+    const part = [[start, length]];
+    for (let v = start; next.has(v);) {
+      const to = next.get(v);
+      next.delete(v);
+      length += Math.hypot(at(to, 0) - at(v, 0), at(to, 1) - at(v, 1));
+      part.push([to, length]);
+      v = to;
+    }
+    parts.push(part);
+  }
+  const all = parts.flat(), backward = all.length && at(all[all.length - 1][0], 0) < at(all[0][0], 0);
+  return backward ? parts.map((part) => part.map(([v, s]) => [v, length - s])) : parts;
+}
+
+/** Pressure and shear along the slave of a zone in 2D, and the status of its contacts. */
+function zoneChart(view, zone) {
+  const { shared, state, data } = view, parts = along(zone.pieces, shared.points), series = [], statuses = [[], [], []];
+  for (const [k, name] of ["pressure", "shear"].entries()) parts.forEach((part, j) => {
+    const known = part.filter(([v]) => state.status[shared.place.get(v)] >= 0);
+    series.push({ name: j ? "" : name, colour: 2 + k, x: known.map(([, s]) => s), y: known.map(([v]) => state.values[name][shared.place.get(v)]) });
+  });
+  for (const [v, s] of parts.flat()) statuses[state.status[shared.place.get(v)]]?.push(s);
+  statuses.forEach((x, k) => { if (x.length) series.push({ name: STATUSES[k], colour: STATUSES[k], dots: true, x, y: x.map(() => 0) }); });
+  view.curve = series;
+  return drawChart({ title: `Contact: ${zone.slave}`, x: withUnit("length along it", data.units.length),
+    y: withUnit("stress", data.units.stress), series }, null);
 }

@@ -30,7 +30,7 @@ function tools() {
     box.addEventListener("change", () => { view.wanted[name] = box.checked; if (name === "zone") view.buildPanes(); else view.refresh(); });
     bar.append(make("label", {}, box, label));
   }
-  if (!view.flat && DATA.by !== "solution" && view.shared.zones.length > 1) bar.append(make("label", {}, "Pair",
+  if (DATA.by !== "solution" && view.shared.zones.length > 1) bar.append(make("label", {}, "Pair",
     make("select", { id: "pair", onchange: (event) => { view.zone = event.target.selectedIndex; view.buildPanes(); } },
       ...view.shared.zones.map((z) => make("option", {}, `${z.slave} on ${z.master}`)))));
   if (!view.flat) sides(bar);
@@ -92,6 +92,16 @@ function contactTable() {
   view.listeners.push(fill);
 }
 
+/** In 2D the contact zone is a curve; it follows the state and the pair that are shown. */
+function zoneCurve() {
+  if (!view.flat || DATA.by === "solution" || !view.shared.zones.length) return;
+  const place = make("div", { id: "zone" });
+  (DATA.by ? byId("charts") : byId("beside")).prepend(place);
+  const draw = () => place.replaceChildren(zoneChart(view, view.shared.zones[view.zone || 0]));
+  view.listeners.push(draw);
+  byId("pair")?.addEventListener("change", draw);
+}
+
 theme();
 const array = await unpack(byId("arrays").textContent).catch(() => null);
 if (DATA.view) {
@@ -114,6 +124,7 @@ if (view) {
   tools();
   steps(charts);
   contactTable();
+  zoneCurve();
   view.step(view.index);
 }
 window.report = { data: DATA, view }; // for those who look closer, and for tests

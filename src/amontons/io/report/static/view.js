@@ -1,6 +1,6 @@
 // The view: panes with bodies and contact zones, what they show, and the node that is picked.
 
-const UNIT_OF = { pressure: "stress", shear: "stress", slip: "length", gap: "length", displacement: "length" };
+const UNIT_OF = { pressure: "stress", shear: "stress", slip: "length", gap: "length", displacement: "length", "von Mises stress": "stress" };
 const PALETTE = { light: [0xcdd8e4, 0xe6d9c8, 0xd3e3d2, 0xe3d3df, 0xdcdcc4, 0xcfe0e3], dark: [0x5d6b7a, 0x7a6a55, 0x5a7459, 0x745f70, 0x6f6f52, 0x56707a] };
 const NEAR = 14; // pixels within which a click takes a node
 const LONGEST = 0.16; // arrow of the largest force, relative to the bodies
@@ -41,6 +41,7 @@ class View {
       }
     }
     this.ranges.displacement = [0, this.largest.moved];
+    this.ranges["von Mises stress"] = [0, this.shared.states.reduce((most, s) => s.stress.reduce((a, b) => Math.max(a, b), most), 0)];
     for (const range of Object.values(this.ranges)) if (range[1] - range[0] <= 0) range[1] = range[0] + 1;
   }
 
@@ -113,7 +114,13 @@ class View {
     for (let k = 0; k < points.length; k += 3) box.expandByPoint(at.fromArray(points, k));
     const up = this.flat ? new THREE.Vector3(0, 1, 0) : new THREE.Vector3(0, 0, 1);
     const from = this.flat ? new THREE.Vector3(0, 0, 1) : new THREE.Vector3(0.75, -1.2, 0.62);
-    box.expandByScalar(0.04 * this.view.size); // deformed, and with arrows
+    const { force, moved } = this.state || this.shared.states[0], tail = new THREE.Vector3();
+    this.shared.arrows.forEach((v, k) => { // room for the deformed, and for arrows
+      at.set(...[0, 1, 2].map((c) => points[3 * v + c] + this.scale * moved[3 * v + c]));
+      if (this.largest.force > 0) at.addScaledVector(tail.fromArray(force, 3 * k), (-LONGEST * this.view.size) / this.largest.force);
+      box.expandByPoint(at);
+    });
+    box.expandByScalar(0.04 * this.view.size);
     return new Eye(box, from, up, 1.1);
   }
 
@@ -274,6 +281,7 @@ class View {
     for (const [k, state] of shown.entries()) {
       if (shown.length > 1) rows.push([state.label, ""]);
       rows.push(["displacement", this.vector(state.moved, v, "length")]);
+      rows.push(["von Mises stress", `${text(state.stress[v])} ${this.data.units.stress}`]);
       const at = this.shared.place.get(v);
       if (at === undefined || state.status[at] < 0) { if (!k) rows.push(["contact", "none here"]); continue; }
       rows.push(["status", STATUSES[state.status[at]]]);

@@ -1,0 +1,62 @@
+"""Where a compiled function is looked for, by parts of numba that are not public."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, suppress
+from functools import cached_property
+from typing import Any
+
+from numba.core.caching import FunctionCache, _Cache
+from numba.core.sigutils import normalize_signature
+
+from . import clock
+from .shipped import name_of, shipped
+from .spelling import spelled
+
+RECORD = os.environ.get("AMONTONS_RECORD_KERNELS", "")  # a file, see docs/startup.md
+Function = Callable[..., Any]
+InFolder = Callable[[], AbstractContextManager[None]]
+
+
+class Kept(_Cache):
+    """Where numba looks for what it has compiled: first in the package, then in our folder."""
+
+    def __init__(self, function: Function, in_folder: InFolder) -> None:
+        self.function, self.in_folder = function, in_folder
+
+    @cached_property
+    def own(self) -> FunctionCache:
+        """Numba's cache in our folder, made when it is asked for: most never are."""
+        with self.in_folder():
+            return FunctionCache(self.function)
+
+    @property
+    def cache_path(self) -> Any:
+        """The folder in which new results are kept."""
+        return self.own.cache_path
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """What was compiled for these types, None where nothing was."""
+        types, _ = normalize_signature(sig)
+        if RECORD and not clock.compiles():
+            _record(self.function, types)
+        found = shipped().result(name_of(self.function, types), target_context)
+        return self.own.load_overload(sig, target_context) if found is None else found
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep a result where there is room for it; on a full disk it is compiled again."""
+        with suppress(OSError):
+            self.own.save_overload(sig, data)
+
+    def enable(self) -> None:
+        """Numba's switch, of which nothing here makes use."""
+
+    disable = flush = enable
+
+
+def _record(function: Function, types: Sequence[Any]) -> None:
+    """Note that a function was called with these types, a line for each process and call."""
+    with open(RECORD, "a", encoding="utf-8") as file:
+        file.write(f"{function.__module__} {function.__qualname__} {spelled(types)}\n")
