@@ -15,7 +15,8 @@ COPIES = DOCS / "outside"
 PATTERNS = (
     "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md", "examples/README.md",
     "benchmarks/results/*.md", "benchmarks/results/*.png", "reproduce/*/README.md",
-    "reproduce/*/results/*.md", "reproduce/*/results/*.png",
+    "reproduce/*/results/*.md", "reproduce/*/results/*.png", "verify/README.md",
+    "verify/results/*.png",
 )  # fmt: skip
 LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\((?!\w+:|#)([^)\s]+)\)")
 

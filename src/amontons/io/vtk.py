@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..linear.blocks import spatial
 from ..mechanics.elements import von_mises
+from ..mechanics.elements.given import GivenMatrices
 from ..mechanics.elements.nodal_stress import stress_of
 from ..mechanics.elements.rigid import Rigid
 from ..mechanics.meshes import Mesh
@@ -59,7 +60,7 @@ def model_fields(
     At nodes displacement, reaction (force of supports), stress and von_mises (means of the
     cells around, by volume), and the fields of `contact_fields`.  In cells stress, von_mises at
     the centre, body (number of the connected part), region, CONVERGED.  Stresses have the six
-    entries xx, yy, zz, xy, yz, xz; zero in rigid bodies.
+    entries xx, yy, zz, xy, yz, xz; zero in rigid bodies and those with a given K.
 
     Of the whole: CONVERGED, 0 or 1, ERROR, TimeValue of a step, and what names say: `body 0:
     bracket`, `region 0: steel`, `title: …`, `version: …`.
@@ -90,6 +91,9 @@ def model_fields(
         whole["TimeValue"] = float(solution.time)  # as ParaView calls it
     whole |= {f"body {k}: {name}": k for k, name in enumerate(names)}
     whole |= {f"region {k}: {name}": k for k, name in enumerate(regions)}
+    for body in model.bodies:
+        if isinstance(body.material, GivenMatrices):
+            whole[f"no stress, given K: {body.name}"] = 1
     if title or model.name:
         whole[f"title: {title or model.name}"] = 1
     whole[f"version: amontons {versions().get('amontons', '')}".rstrip()] = 1
@@ -100,11 +104,11 @@ def model_fields(
 def body_stress(
     body: Body, moved: Array, warm: Array | None = None
 ) -> tuple[Array, Array]:
-    """Stress of cells and nodes at displacements (nodes, d); 0 in rigid bodies.
+    """Stress of cells and nodes at displacements (nodes, d); 0 without a law.
 
     warm (nodes,): change of temperature.
     """
-    if isinstance(body.material, Rigid):
+    if isinstance(body.material, Rigid | GivenMatrices):
         return np.zeros((body.mesh.cell_count, 3, 3)), np.zeros((len(moved), 3, 3))
     return stress_of(body.mesh, body.material, moved, warm)
 

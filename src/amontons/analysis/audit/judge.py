@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import InvalidInput, UnsupportedForm
 from ...mechanics.elements.elasticity import LinearElastic, materials_by_region
+from ...mechanics.elements.given import GivenMatrices
 from ...mechanics.elements.rigid import Rigid
 from ...mechanics.model.supports import external_load, locate
 from ...problem.friction import FrictionProblem
@@ -293,7 +294,7 @@ def _softest(model: Model, *names: str | None) -> float:
             continue
         k, surface = locate(model.bodies, name)
         body = model.bodies[k]
-        if isinstance(body.material, Rigid):
+        if isinstance(body.material, Rigid | GivenMatrices):
             continue
         on = np.zeros(len(body.mesh.points), dtype=bool)
         on[body.mesh.surface_nodes(surface)] = True

@@ -14,12 +14,19 @@ from ..meshes.check import determinant
 from ..meshes.mesh import Mesh
 from .cell_matrices import around
 from .elasticity import LinearElastic, materials_by_region
+from .given import GivenMatrices
 
 Array = NDArray[np.float64]
 
 
-def mass(mesh: Mesh, material: LinearElastic | Mapping[str, LinearElastic]) -> sparse.csr_array:
-    """Consistent mass matrix (n dim, n dim): integrals of density N_a N_b."""
+def mass(
+    mesh: Mesh, material: LinearElastic | GivenMatrices | Mapping[str, LinearElastic]
+) -> sparse.csr_array:
+    """Consistent mass matrix (n dim, n dim): integrals of density N_a N_b, or the given one."""
+    if isinstance(material, GivenMatrices):
+        if material.mass is None:
+            raise InvalidInput("mass: dynamics need it, give Body.from_matrix(..., mass=M)")
+        return material.mass
     blocks: list[NDArray] = [np.zeros((3, 0))]
     for region, kind, nodes in ((b.region, b.kind, b.nodes) for b in mesh.cells):
         density = _density(materials_by_region(mesh, material)[region], region)

@@ -17,6 +17,7 @@ from ...linear.grid_matrix import GridMatrix
 from ...linear.levels import Levels, continued, free_levels
 from ...problem.structure import Structure
 from ..elements.elasticity import LinearElastic, stiffness
+from ..elements.given import GivenMatrices
 from ..elements.rigid import Rigid
 from ..meshes.box import box
 from .beside import Beside
@@ -248,7 +249,7 @@ def discretise(
         parts=[
             piece
             for k, body in enumerate(bodies)
-            for piece in pieces(body.mesh, body.name, int(offsets[k]))
+            for piece in pieces(body.mesh, body.name, int(offsets[k]), body.material)
         ],
         whole_H=whole_H,
         levels=()
@@ -330,6 +331,8 @@ def _stiffness_of(body: Body) -> sparse.csr_array:
     """Of one body; a rigid one resists by its unknowns, not by stiffness."""
     if isinstance(body.material, Rigid):
         return sparse.csr_array((body.mesh.points.size,) * 2)
+    if isinstance(body.material, GivenMatrices):
+        return body.material.K
     return stiffness(body.mesh, body.material).tocsr()
 
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from ...core.errors import InvalidInput, shown
 from ...core.words import helpful
 from ..elements.elasticity import LinearElastic, materials_by_region
+from ..elements.given import GivenMatrices
 from ..elements.hyperelasticity import CiarletGeymonat, NeoHookean
 from ..elements.orthotropic import OrthotropicElastic
 from ..elements.rigid import Rigid
@@ -34,7 +36,7 @@ class Body:
     """
 
     mesh: Mesh
-    material: Material | Rigid | Mapping[str, Material]
+    material: Material | Rigid | GivenMatrices | Mapping[str, Material]
     name: str = ""
     order: int = 1
     axisymmetric: bool = False
@@ -42,7 +44,7 @@ class Body:
     def __post_init__(self) -> None:
         if not isinstance(self.mesh, Mesh):
             raise InvalidInput(f"mesh: expected a Mesh (see box, read_mesh), got {self.mesh!r}")
-        if not isinstance(self.material, Material | Rigid | Mapping):
+        if not isinstance(self.material, Material | Rigid | GivenMatrices | Mapping):
             raise InvalidInput(
                 "material: expected LinearElastic, OrthotropicElastic, NeoHookean, "
                 "CiarletGeymonat or Rigid, or a dict region -> one of the first four, got "
@@ -53,6 +55,8 @@ class Body:
         if self.order == 2:
             object.__setattr__(self, "mesh", second_order(self.mesh))
         object.__setattr__(self, "order", self.mesh.order)
+        if isinstance(self.material, GivenMatrices):
+            self.material.check(self.mesh)
         laws = materials_by_region(self.mesh, self.material)
         self._turn(laws.values())
         if isinstance(self.material, Mapping):
@@ -63,6 +67,28 @@ class Body:
                         f"OrthotropicElastic, NeoHookean or CiarletGeymonat, got {law!r}"
                     )
 
+    @classmethod
+    def from_matrix(  # noqa: PLR0913  # what another program has of a body
+        cls, mesh: Mesh, K: Any, *, load: Any = None, mass: Any = None, rows: Any = "nodes",
+        held: bool = False, name: str = "",
+    ) -> Body:  # fmt: skip
+        """A body whose stiffness another program has assembled: any element, shell or tangent.
+
+        mesh: its nodes, cells and surfaces; cells say which facets a surface has, and are not
+        integrated but for tractions and body forces.  Surfaces in contact have the shape
+        functions of the mesh.
+        K, mass (dofs, dofs): sparse or dense, symmetric, force per length and mass; dynamics
+        need the mass.  load (dofs,): forces besides those of the model.  dofs = nodes * dim.
+        rows: the order of their rows, "nodes" (x1 y1 z1 x2 …; scikit-fem's vector elements,
+        dolfinx, CalculiX), "components" (x1 x2 …, y1 y2 …; NGSolve's VectorH1) or a table
+        (nodes, dim) with the row of every component, such as scikit-fem's nodal_dofs.T.
+        held: True where supports are in K already; a free K is checked to let go of rigid
+        motions, which tells a wrong order of rows.
+
+        Raises InvalidInput for other sizes, asymmetry, numbers that are not finite, and for a
+        K that resists rigid motions without held.
+        """
+        return cls(mesh, GivenMatrices.of(mesh, K, load, mass, rows, held), name)
 
     def _turn(self, laws: Iterable[object]) -> None:
         """Make the mesh axisymmetric where that is asked for; laws: its materials."""

@@ -90,9 +90,14 @@ class Formulation(ABC):
         raise UnsupportedForm(self.problem.unfit)
 
     # ---------------------------------------------------------------- loads and supports
-    def nodal_load(self, model: Model, loads: Sequence[Load | None]) -> Any:
-        """Nodal forces of loads, None: of none; (dofs,), or `NodalForces` that may follow."""
-        return external_load(model.bodies, loads, model.beside)
+    def nodal_load(
+        self, model: Model, loads: Sequence[Load | None], *, own: bool = True
+    ) -> Any:
+        """Nodal forces of loads, None: of none; (dofs,), or `NodalForces` that may follow.
+
+        own: with the loads that bodies of other programs bring.
+        """
+        return external_load(model.bodies, loads, model.beside, own=own)
 
     def lasting(self, force: Array) -> Array:
         """The part of a load (n,) of which can be proved whether contact can hold it."""
@@ -222,7 +227,9 @@ class Moved(Formulation):
             "or LinearElastic and contact of small kinematics"
         )
 
-    def nodal_load(self, model: Model, loads: Sequence[Load | None]) -> NodalForces:
+    def nodal_load(
+        self, model: Model, loads: Sequence[Load | None], *, own: bool = True
+    ) -> NodalForces:
         """Nodal forces, also those that follow."""
         return nodal_forces(model, loads)
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ...core.warned import ResultWarning
 from ..elements.elasticity import LinearElastic, materials_by_region
+from ..elements.given import GivenMatrices
 from ..elements.orthotropic import OrthotropicElastic
 from ..elements.rigid import Rigid
 from ..meshes.cells import CELLS
@@ -42,7 +43,7 @@ def volumetric_locking(model: Model, fields: ContactFields) -> list[ResultWarnin
     """A warning for each region that is much too stiff, with the estimated factor."""
     out = []
     for body in model.bodies:
-        if body.mesh.order > 1 or isinstance(body.material, Rigid):
+        if body.mesh.order > 1 or isinstance(body.material, Rigid | GivenMatrices):
             continue
         for region, law in materials_by_region(body.mesh, body.material).items():  # type: ignore[arg-type]
             if not _nearly_incompressible(law, model.dimension):

@@ -18,6 +18,7 @@ from scipy import sparse
 from ...core.errors import UnsupportedForm
 from ..contact.current import CurrentContact
 from ..contact.current_pairs import Meetings, ObstaclePair
+from ..elements.given import GivenMatrices
 from ..elements.hyperelasticity import HyperelasticBody, is_hyperelastic
 from ..elements.linear_body import LinearBody
 from ..elements.rigid import Rigid
@@ -171,6 +172,11 @@ def _check_supported(model: Model) -> None:
             raise UnsupportedForm(
                 f"{what} is rigid, and contact of finite kinematics needs bodies that deform",
                 at, "",
+            )  # fmt: skip
+        if isinstance(body.material, GivenMatrices):
+            raise UnsupportedForm(
+                f"{what} has a given K, and contact of finite kinematics needs bodies with a "
+                "law; give its contacts kinematics='small'", at, "",
             )  # fmt: skip
         if not (asked or is_hyperelastic(body.material)):
             raise UnsupportedForm(

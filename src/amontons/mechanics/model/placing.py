@@ -29,6 +29,7 @@ from ..contact import (
 )
 from ..contact.segments import Surface
 from ..elements.elasticity import LinearElastic, materials_by_region
+from ..elements.given import GivenMatrices
 from ..elements.rigid import Rigid
 from ..meshes.mesh import Mesh
 from ..meshes.surfaces import facet_normals
@@ -240,7 +241,7 @@ def _met_by_nitsche(
     """The same for the Gauss points of Nitsche's method."""
     k, surface = locate(bodies, contact.slave)
     body, first, size = bodies[k], int(offsets[k]), int(offsets[-1])
-    laws = [body.material] if isinstance(body.material, Rigid) else (
+    laws = [body.material] if isinstance(body.material, Rigid | GivenMatrices) else (
         materials_by_region(body.mesh, body.material).values()
     )
     if not all(isinstance(law, LinearElastic) for law in laws):

@@ -21,6 +21,7 @@ from ...core.errors import UnsupportedForm
 from ...linear.distributed import DistributedMatrix, Share
 from ...linear.petsc import Petsc, mpi, petsc
 from ..elements.elasticity import stiffness
+from ..elements.given import GivenMatrices
 from ..elements.rigid import Rigid
 from ..meshes.partition import extract, partition
 from .assembly import Discretisation, discretise
@@ -45,6 +46,10 @@ def distributed(
     InvalidInput for more processes than cells, UnsupportedForm when contact alone holds a
     body, and on the first process what `work` raises.
     """
+    if any(isinstance(body.material, GivenMatrices) for body in model.bodies):
+        raise UnsupportedForm(
+            "model: several processes assemble their own cells, and a body has a given K"
+        )
     if any(isinstance(body.material, Rigid) for body in model.bodies):
         raise UnsupportedForm("model: several processes need bodies that deform, none is Rigid")
     petsc()
@@ -86,7 +91,7 @@ def _share(bodies: Sequence[Body], comm: Any) -> Share:
         if mine.any():
             mesh, used = extract(body.mesh, mine)
             material = body.material
-            assert not isinstance(material, Rigid)
+            assert not isinstance(material, Rigid | GivenMatrices)
             if isinstance(material, Mapping):
                 material = {region: material[region] for region in mesh.regions}
             parts.append(stiffness(mesh, material).tocsr())

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...core.errors import SingularOperator
+from ..elements.given import GivenMatrices
 from ..meshes.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -45,8 +46,8 @@ class Piece:
         return parts[int(np.argmax([np.abs(part).max(initial=0.0) for part in parts]))]
 
 
-def pieces(mesh: Mesh, name: str, offset: int) -> list[Piece]:
-    """Connected pieces of a mesh whose dofs start at `offset`."""
+def pieces(mesh: Mesh, name: str, offset: int, material: object = None) -> list[Piece]:
+    """Connected pieces of a mesh whose dofs start at `offset`; material: of its body."""
     labels = _labels(mesh)
     titles = _titles(mesh, name, labels)
     out = []
@@ -54,7 +55,10 @@ def pieces(mesh: Mesh, name: str, offset: int) -> list[Piece]:
         nodes = np.flatnonzero(labels == label)
         dofs = offset + (nodes[:, None] * mesh.dim + np.arange(mesh.dim)).ravel()
         rigid = ALONG_AXIS if mesh.axisymmetric else None
-        out.append(Piece(title, dofs, rigid_modes(mesh.points[nodes]), rigid))
+        modes = rigid_modes(mesh.points[nodes])
+        if isinstance(material, GivenMatrices):
+            rigid = material.resisted(modes, dofs - offset)
+        out.append(Piece(title, dofs, modes, rigid))
     return out
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import InvalidInput, within
 from ..elements.elasticity import body_load
+from ..elements.given import GivenMatrices
 from ..elements.thermal import thermal_load
 from ..meshes.mesh import Mesh, unknown
 from ..meshes.surfaces import pressure_load, surface_load
@@ -139,14 +140,18 @@ def _check_agreement(old: Array, new: Array, points: Array, what: str) -> None:
 
 
 def external_load(
-    bodies: Sequence[Body], loads: Sequence[Load | None], beside: Beside
+    bodies: Sequence[Body], loads: Sequence[Load | None], beside: Beside, *, own: bool = True
 ) -> Array:
     """Nodal forces of loads on the undeformed bodies, (dofs,).
 
     None stands for a load of the model that is left out, so that others keep their address.
+    own: with the loads that bodies of other programs bring.
     """
     out, offsets = np.zeros(beside.total), beside.offsets
     _add_temperature(out, bodies, loads, offsets)
+    for k, body in enumerate(bodies):
+        if own and isinstance(body.material, GivenMatrices):
+            out[offsets[k] : offsets[k + 1]] += body.material.load
     for at, load in enumerate(loads):
         with within("loads", at):
             if isinstance(load, BodyForce):
@@ -172,6 +177,11 @@ def _add_temperature(
     with within("loads", where[0]):
         check_expansion(bodies)
         for k, change in enumerate(changes(bodies, loads)):
+            if change is not None and isinstance(bodies[k].material, GivenMatrices):
+                raise InvalidInput(
+                    f"temperature: body {bodies[k].name!r} has a given K; give "
+                    "the forces of its temperature as load of Body.from_matrix"
+                )
             if change is not None:
                 part = thermal_load(bodies[k].mesh, bodies[k].material, change)
                 out[offsets[k] : offsets[k + 1]] += part.ravel()

@@ -55,9 +55,9 @@ class Motion:
         """True when a load or a support depends on time."""
         return depends_on_time(self.model)
 
-    def _of(self, loads: list[Load | None]) -> Any:
+    def _of(self, loads: list[Load | None], *, own: bool = True) -> Any:
         """Nodal forces of loads, None: of none, as `Formulation.nodal_load` gives them."""
-        return self.model.formulation.nodal_load(self.body, loads)
+        return self.model.formulation.nodal_load(self.body, loads, own=own)
 
     @cached_property
     def _steady_load(self) -> Any:
@@ -73,7 +73,7 @@ class Motion:
         if not any(moving):
             return self._steady_load
         if t not in self._loads:
-            forces = self._of(moving)  # type: ignore[arg-type]
+            forces = self._of(moving, own=False)  # type: ignore[arg-type]
             for old in list(self._loads)[:-1]:
                 del self._loads[old]
             self._loads[t] = self._steady_load + forces

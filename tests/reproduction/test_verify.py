@@ -1,0 +1,49 @@
+"""The verification manual: its cheapest cases, and that it can fail."""
+
+import json
+from dataclasses import replace
+
+import pytest
+from click.testing import CliRunner
+
+from verify.__main__ import CASES, main
+from verify.case import Case, Value, run
+
+
+@pytest.mark.parametrize("name", ["wedge", "slope", "wall"])
+def test_cheap_cases_pass(name):
+    outcome = run(replace(CASES[name], sizes=CASES[name].sizes[:1]))
+    assert outcome.passed, [(v.name, v.error) for v in outcome.last]
+
+
+def test_fracture_and_press_fit_come_closer_with_the_mesh():
+    for name, sizes in (("fracture", (4, 8)), ("press-fit", (2, 4))):
+        outcome = run(replace(CASES[name], sizes=sizes))
+        for value in outcome.last:
+            first, last = outcome.errors(value.name)
+            assert last <= max(first, value.known)
+            assert last < 0.2
+
+
+def off(by, order=1.0):
+    return Case("off", "Off", "", "", lambda n: [Value("x", 1 + by / n, 1.0)], (1, 2), (),
+                order)  # fmt: skip
+
+
+def test_a_case_fails_where_it_is_wrong_or_comes_no_closer():
+    assert run(off(0.01)).passed
+    assert not run(off(0.03)).passed
+    assert not run(off(0.01, order=None)).passed
+    assert not run(replace(off(0), compute=lambda n: [Value("x", 1 + 1e-3 * n, 1.0)])).passed
+    assert not run(replace(off(0), compute=lambda n: [Value("x", float("nan"), 1.0)])).passed
+    assert run(off(0.01)).order("x") == pytest.approx(1.0)
+
+
+def test_the_command_says_so_in_its_exit_code(tmp_path, monkeypatch):
+    monkeypatch.setitem(CASES, "off", off(0.03))
+    found = CliRunner().invoke(main, ["off", "--results", str(tmp_path)])
+    assert found.exit_code == 1
+    assert "FAIL  off" in found.output
+    assert json.loads((tmp_path / "results/results.json").read_text())["off"]["passed"] is False
+    assert "FAIL" in (tmp_path / "README.md").read_text()
+    assert CliRunner().invoke(main, ["wedges"]).exit_code == 2
