@@ -11,6 +11,7 @@ from pathlib import Path
 DOCS = Path(__file__).parent
 sys.path.insert(0, str(DOCS / "_extensions"))
 sys.path.insert(0, str(DOCS.parent / "src"))
+sys.path.append(str(DOCS.parent))  # the package `reproduce`, for pages of the gallery
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # the same pictures and times on any machine
 
 from gallery_settings import gallery_settings  # noqa: E402  beside this file

@@ -3,7 +3,8 @@
     python tests/report_pictures.py [-o FOLDER] [EXAMPLE | CASE | REPORT.html ...]
 
 Solves every built-in example (or those named, cases and decks too), opens their reports in a
-headless Chromium and takes a picture of each page, light and dark, and of the view in every colour.
+headless Chromium and takes pictures: of each page, light and dark, and of the view in all its
+colours.
 """
 
 import argparse
@@ -48,7 +49,8 @@ def shoot(browser, name, path, folder, scheme, colours):
     for value in choices if colours else ():
         page.select_option("#field", value)
         page.evaluate(SETTLED)
-        page.locator("#view").screenshot(path=folder / f"{name}-{value.replace(" ", "-")}.png")
+        target = folder / f"{name}-{value.replace(' ', '-')}.png"
+        page.locator("#view").screenshot(path=target)
     page.close()
 
 

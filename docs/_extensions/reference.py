@@ -15,12 +15,17 @@ GROUPS = {
     "Solve": (
         "The verb, what it takes and what it returns.",
         "solve drive FrictionProblem Form FrictionSolution ModelSolution ContactStatus "
-        "Convergence Outcome Criterion Iterate ResultWarning",
+        "Convergence Outcome Criterion Iterate ResultWarning DoubtWarning warn_of",
     ),
     "Models": (
         "Bodies on meshes, supports, loads and contacts.",
-        "Model Body LinearElastic NeoHookean CiarletGeymonat Rigid Fix Traction Pressure "
-        "BodyForce Contact ContactFields Nitsche Plane Sphere LevelSet distributed",
+        "Model Body LinearElastic OrthotropicElastic NeoHookean CiarletGeymonat Rigid Fix "
+        "Traction Pressure BodyForce NodalForce Temperature Contact ContactFields Nitsche "
+        "Plane Sphere LevelSet distributed",
+    ),
+    "Constraints": (
+        "Linear constraints between nodes, surfaces and bodies; bolts and springs.",
+        "Equation Coupling Reference Pretension opened Axes Spring",
     ),
     "Meshes": (
         "Meshes that are built in, read from files, or made from shapes.",
@@ -28,7 +33,8 @@ GROUPS = {
     ),
     "Friction laws": (
         "Laws of contact as values, one for all contacts or one each.",
-        "Coulomb Tresca CappedCoulomb Cohesive Orthotropic Compliant Mixed",
+        "Coulomb Tresca CappedCoulomb Cohesive Orthotropic Compliant Tied VaryingFriction "
+        "FrictionCurve VaryingCompliance OverclosureCurve ExponentialOverclosure Mixed",
     ),
     "Questions": (
         "Is it the only solution, which others are there, and where do they go?",
@@ -48,7 +54,7 @@ GROUPS = {
         "evolve QuasiStatic MoreauJean TimeStep State Passage at_rest save_state load_state "
         "load_start export_fclib",
     ),
-    "Files": ("What is read and written.", "read_case read_fclib write_fclib"),
+    "Files": ("What is read and written.", "read_case read_fclib write_fclib export_xdmf"),
     "Ready-made problems": (
         "Walls of blocks and packings of spheres.", "Wall Bond SpherePacking",
     ),

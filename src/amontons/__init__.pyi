@@ -12,8 +12,10 @@ from .analysis import (
     ThetaMethod as ThetaMethod, Uniqueness as Uniqueness, Verdict as Verdict,
     Witness as Witness, graded as graded, performance_profile as performance_profile,
 )
+from .analysis.audit.verdict import Audit as Audit
 from .analysis.paths.path_crossing import PathCrossing as PathCrossing
 from .app.api import solve as solve
+from .app.audit import audit as audit
 from .app.model_solution import ModelSolution as ModelSolution
 from .app.questions import (
     all_solutions as all_solutions, basins as basins, critical_friction as critical_friction,
@@ -28,13 +30,15 @@ from .core.errors import (
     NotWritten as NotWritten, SingularOperator as SingularOperator, TimeUp as TimeUp,
     UnsupportedForm as UnsupportedForm, UnsupportedLaw as UnsupportedLaw,
 )
-from .core.warned import ResultWarning as ResultWarning
-from .io.case import read_case as read_case
+from .core.warned import (
+    DoubtWarning as DoubtWarning, ResultWarning as ResultWarning, warn_of as warn_of,
+)
 from .io.checkpoint import (
     export_fclib as export_fclib, load_start as load_start, load_state as load_state,
     save_state as save_state,
 )
 from .io.fclib import read_fclib as read_fclib, write_fclib as write_fclib
+from .io.readers import read_case as read_case
 from .io.series import export_xdmf as export_xdmf
 from .linear import Direct as Direct, GeometricMultigrid as GeometricMultigrid, Petsc as Petsc
 from .mechanics.contact import (
@@ -48,9 +52,10 @@ from .mechanics.model import (
     Axes as Axes, Body as Body, BodyForce as BodyForce, CiarletGeymonat as CiarletGeymonat,
     Contact as Contact, ContactFields as ContactFields, Coupling as Coupling,
     Equation as Equation, Fix as Fix, LinearElastic as LinearElastic, Model as Model,
-    NeoHookean as NeoHookean, NodalForce as NodalForce, Pressure as Pressure,
+    NeoHookean as NeoHookean, NodalForce as NodalForce,
+    OrthotropicElastic as OrthotropicElastic, Pressure as Pressure,
     Pretension as Pretension, Reference as Reference, Rigid as Rigid, Spring as Spring,
-    Traction as Traction, distributed as distributed,
+    Temperature as Temperature, Traction as Traction, distributed as distributed,
 )
 from .mechanics.ready.packings import SpherePacking as SpherePacking
 from .mechanics.ready.walls import Bond as Bond, Wall as Wall

@@ -12,16 +12,12 @@ Between two bodies the gap is an average with dual functions of the slave,
 
 # %%
 # The meshes of this problem lie beside its reproduction in full, in ``reproduce/hueeber2008``: 104 nodes, here refined once.
-import sys
-from pathlib import Path
-
 import matplotlib.pyplot as plt
 import numpy as np
 
 import amontons as am
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[3]))  # the root of the repository
-from reproduce.hueeber2008.shell import model
+from reproduce.hueeber2008.shell import model  # run with PYTHONPATH=. at the root of the repository
 
 solutions = {mu: am.solve(model(1, mu)) for mu in (0.2, 0.4, 0.6)}
 for mu, solution in solutions.items():

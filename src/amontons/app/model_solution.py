@@ -87,7 +87,9 @@ class ModelSolution(Shown):
         """Reasons to doubt a result that has converged, each with a name."""
         from ..mechanics.model.doubts import model_warnings
 
-        return self.solution.warnings + model_warnings(self.model, self.fields)
+        return self.solution.warnings + model_warnings(
+            self.model, self.fields, self.solution.converged
+        )
 
     def __str__(self) -> str:
         return output.describe(self.output)

@@ -23,6 +23,10 @@ class Told:
 
     __slots__ = ()
 
+    def __repr__(self) -> str:
+        """Its kind and the first line of its words: arrays are asked for by name."""
+        return f"<{type(self).__name__}: {str(self).partition(chr(10))[0]}>"
+
     def _repr_html_(self) -> str:
         return _face("html")(self)
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 
 @dataclass(frozen=True)
@@ -26,3 +28,22 @@ class ResultWarning:
     def record(self) -> dict[str, Any]:
         """For JSON: name, message, contacts."""
         return {"name": self.name, "message": self.message, "contacts": list(self.contacts)}
+
+
+class DoubtWarning(UserWarning):
+    """The category under which `warn_of` issues the warnings of a result."""
+
+
+class _Doubted(Protocol):
+    @property
+    def warnings(self) -> Sequence[ResultWarning]: ...
+
+
+def warn_of(result: _Doubted) -> None:
+    """Issue the warnings of a result as warnings of Python, of category `DoubtWarning`.
+
+    Nothing does so by itself: a warning is part of its result, and whether it matters is for
+    the caller to say.  With `warnings.simplefilter("error", am.DoubtWarning)` the first raises.
+    """
+    for doubt in result.warnings:
+        warnings.warn(f"{doubt.message} [{doubt.name}]", DoubtWarning, stacklevel=2)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..linear.blocks import spatial
+from ..mechanics.meshes.cells import CELLS
 from ..mechanics.model.matching import pairs_of
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 OFF = -1  # CSTATUS of nodes that are no contact; the other contact fields are zero there
 SLAVE, MASTER = 1, 2  # CSIDE, added up where a node is both
 NONE = 1e-9  # weight of a node in a contact that is none
@@ -95,9 +97,11 @@ def contact_fields(
             everywhere[:] = OFF
         everywhere[nodes] = values
         out[name] = everywhere
+    known = np.zeros(starts[-1], dtype=bool)
+    known[nodes] = True
     for name, values in out.items():
-        if values.dtype.kind == "f" and values.ndim == 1:
-            out[name] = _with_corners(values, fields, starts)
+        if values.ndim == 1:
+            out[name] = _filled(values, fields, starts, known)
     return out
 
 
@@ -189,15 +193,29 @@ def _gathered(combine: np.ufunc, values: NDArray, index: Index) -> NDArray:
     return out
 
 
-def _with_corners(values: Array, fields: ContactFields, starts: Index) -> Array:
-    """Values (n,) with means at corners of triangles of second order: no contacts there."""
-    total, count = np.zeros_like(values), np.zeros_like(values)
+def _filled(values: Array, fields: ContactFields, starts: Index, known: Mask) -> Array:
+    """Values (n,) with those between at nodes of second order that have no contact.
+
+    They are corners of triangles in nodal contact, and middles where contacts sit at corners.
+    Numbers become means, states the largest of both.  known (n,): nodes with a contact.
+    """
+    is_state = values.dtype.kind != "f"
+    total, count = np.zeros_like(values), np.zeros(len(values), dtype=np.int64)
     for body, blocks in fields.facets:
         for facets in blocks:
+            cell, nodes = CELLS[facets.kind], facets.nodes + starts[body]
+            between = {cell.corner_count + k: list(p) for k, p in enumerate(cell.parents)}
             if facets.kind == "tri6":
-                nodes = facets.nodes + starts[body]
-                for k in range(3):
-                    sides = nodes[:, [3 + k, 3 + (k - 1) % 3]]
-                    np.add.at(total, nodes[:, k], values[sides].mean(axis=1))
-                    np.add.at(count, nodes[:, k], 1)
-    return np.where(count > 0, total / np.maximum(count, 1), values)
+                between |= {k: [3 + k, 3 + (k - 1) % 3] for k in range(3)}
+            for k, ends in between.items():
+                here = ~known[nodes[:, k]] & known[nodes[:, ends]].all(axis=1)
+                at, around = nodes[here, k], values[nodes[here][:, ends]]
+                if is_state:
+                    total[at] = np.maximum(total[at], around.max(axis=1))
+                else:
+                    np.add.at(total, at, around.mean(axis=1))
+                np.add.at(count, at, 1)
+    met = count > 0
+    if is_state:
+        return np.where(met, total, values)
+    return np.where(met, total / np.maximum(count, 1), values)

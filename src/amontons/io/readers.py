@@ -9,6 +9,7 @@ which names a `Format`.
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from ..mechanics.model import Model
     from .case.evolution import Evolution
     from .case.settings import Settings
+    from .decks.about import About
 
 GROUP = "amontons.readers"  # of entry points
 MESHES = (".msh", ".vtk", ".vtu", ".stp", ".step", ".iges", ".igs", ".brep", ".stl", ".med",
@@ -40,7 +42,7 @@ class Case:
     overrides; key_of: the words of the file for an address in the model.  moving: the model
     as it goes on in time, where `target` is its state at the end, which can be solved for at
     once.  notes: what the file says and the case leaves out, in words.  units: what they are
-    called.
+    called.  about: what an audit asks of a deck.
     """
 
     target: Model | FrictionProblem
@@ -53,6 +55,7 @@ class Case:
     moving: Model | None = None
     notes: tuple[str, ...] = ()
     units: Units = Units()
+    about: About | None = None
 
     @property
     def name(self) -> str:
@@ -155,6 +158,23 @@ FORMATS = (
 def read(path: Path, overrides: Sequence[str] = (), method: str | None = None) -> Case:
     """The case in a file of any known format; raises FileFormatError for other files."""
     return format_of(path).read(path, overrides, method)
+
+
+def read_case(
+    path: str | os.PathLike[str], overrides: Sequence[str] = (), method: str | None = None
+) -> Case:
+    """The case in a case file, an FCLib file or a deck; `.model` of it can be solved.
+
+    path: also "example:NAME", a case that comes with amontons.  overrides such as
+    "mesh.cells=32" replace single values.  method: solver in place of that of the case, before
+    the overrides; options that the case has for another one go with it.  What has the suffix
+    of no other format is read as TOML.  Raises FileFormatError naming the file, the key or
+    line, what was found and what was expected.
+    """
+    text = os.fspath(path)
+    named = (each for each in FORMATS if text.lower().endswith(each.suffixes))
+    found = FORMATS[0] if text.startswith("example:") else next(named, FORMATS[0])
+    return found.read(Path(path), overrides, method)
 
 
 def format_of(path: Path) -> Format:

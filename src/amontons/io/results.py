@@ -65,9 +65,9 @@ Writer = Callable[[Output, Path], None]
 
 # ------------------------------------------------------------------------------- choosing
 def write(output: Output, path: str | os.PathLike[str]) -> None:
-    """Write one file; the suffix decides: .vtu, .h5 (or .hdf5), .json, .csv."""
+    """Write one file; the suffix decides: .vtu, .h5 (or .hdf5), .json, .csv, .frd, .dat."""
     writers = {".vtu": write_vtu, ".h5": write_h5, ".hdf5": write_h5, ".json": write_json,
-               ".csv": write_csv}  # fmt: skip
+               ".csv": write_csv, ".frd": write_frd, ".dat": write_frd}  # fmt: skip
     suffix = Path(path).suffix.lower()
     if suffix not in writers:
         raise InvalidInput(
@@ -75,6 +75,13 @@ def write(output: Output, path: str | os.PathLike[str]) -> None:
         )
     with replacing(path) as temporary:
         writers[suffix](output, temporary)
+
+
+def write_frd(output: Output, path: Path, labels: NDArray[np.int64] | None = None) -> None:
+    """Write results as CalculiX does, .frd or .dat; labels (nodes,): numbers of nodes."""
+    from .answers.write import Shown, write_answer
+
+    write_answer(path, Shown.of(output, labels))
 
 
 def expect_picture(path: str | os.PathLike[str]) -> None:

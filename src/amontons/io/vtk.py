@@ -15,6 +15,7 @@ from ..mechanics.elements.nodal_stress import stress_of
 from ..mechanics.elements.rigid import Rigid
 from ..mechanics.meshes import Mesh
 from ..mechanics.meshes.write import write_meshes
+from ..mechanics.model.temperature import warming
 from .contact_fields import contact_fields
 
 if TYPE_CHECKING:
@@ -67,7 +68,8 @@ def model_fields(
 
     starts = np.cumsum([0, *(len(body.mesh.points) for body in model.bodies)])
     pairs = list(zip(model.bodies, fields.displacement, strict=True))
-    stress = [body_stress(body, moved) for body, moved in pairs]
+    warm = warming(model, getattr(solution, "time", None))
+    stress = [body_stress(*pair, each) for pair, each in zip(pairs, warm, strict=True)]
     centres, nodes = (np.concatenate(each) for each in zip(*stress, strict=True))
     record = getattr(solution, "solution", solution).convergence  # of a step in time, too
     converged = int(not record.stamp)
@@ -95,11 +97,16 @@ def model_fields(
     return ModelFields(meshes, point, cell, whole, record.stamp)
 
 
-def body_stress(body: Body, moved: Array) -> tuple[Array, Array]:
-    """Stress of cells and nodes at displacements (nodes, d); 0 in rigid bodies."""
+def body_stress(
+    body: Body, moved: Array, warm: Array | None = None
+) -> tuple[Array, Array]:
+    """Stress of cells and nodes at displacements (nodes, d); 0 in rigid bodies.
+
+    warm (nodes,): change of temperature.
+    """
     if isinstance(body.material, Rigid):
         return np.zeros((body.mesh.cell_count, 3, 3)), np.zeros((len(moved), 3, 3))
-    return stress_of(body.mesh, body.material, moved)
+    return stress_of(body.mesh, body.material, moved, warm)
 
 
 def _six(stress: Array) -> Array:

@@ -87,7 +87,7 @@ class Step(NamedTuple):
     own: tuple[float, ...] = ()  # errors since the last, by the method's own measure; unjudged
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Convergence(Shown):
     """The record of a solve."""
 
@@ -158,7 +158,7 @@ class Convergence(Shown):
         return f"{text} ({self.detail})" if self.detail else text
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FrictionSolution(Shown):
     """Reactions and velocities of a discrete problem, and what they mean.
 

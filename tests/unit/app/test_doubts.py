@@ -23,6 +23,16 @@ def block(value=0.0, loads=(), *, gap=0.0, **options):
     )
 
 
+def test_warnings_of_python_are_for_those_who_ask():
+    solution = am.solve(block())  # silent: any warning fails a test
+    with pytest.warns(am.DoubtWarning, match=r"\[no-load\]") as told:
+        am.warn_of(solution)
+    assert [one.filename for one in told] == [__file__]
+    am.warn_of(am.solve(block((0, -0.01))))
+    with pytest.raises(am.DoubtWarning):
+        am.warn_of(solution)  # pytest turns them into errors here
+
+
 @pytest.mark.parametrize(
     "model",
     [

@@ -16,7 +16,7 @@ on = "bottom"
 value = [0, 0, 0]
 [[contact]]
 slave = "left"
-obstacle = { kind = "plane", normal = [1, 0, 0], point = [-5, 0, 0] }
+obstacle = { plane = { normal = [1, 0, 0], point = [-5, 0, 0] } }
 friction = { coulomb = 0.2 }
 """
 BOLT = """

@@ -18,6 +18,9 @@ from amontons.io.report.page import STATIC
 from amontons.io.report.skin import Skin
 from amontons.io.report.states import Stage
 from amontons.io.units import Units
+from amontons.mechanics.elements import von_mises
+from amontons.mechanics.elements.nodal_stress import stress_of
+from amontons.mechanics.meshes import second_order
 
 HOSTILE = "</script><script>alert(1)</script> <!-- & \" ' {{css}} \ud800 \x00 \u2028 µ Ü 接触"
 
@@ -73,6 +76,9 @@ def test_the_page_holds_the_numbers_of_the_solution(solution, tmp_path):
     assert np.allclose(pressure, solution.pressure, rtol=1e-6)
     assert np.array_equal(array(state["status"])[mine], solution.status)
     assert data["units"] == {"length": "mm", "force": "N", "time": "", "stress": "MPa"}
+    stress = stress_of(solution.model.bodies[0].mesh, solution.model.bodies[0].material,
+                       solution.displacement[0])[1]  # fmt: skip
+    assert np.allclose(array(state["stress"]), von_mises(stress)[node], rtol=1e-5)
     force = array(state["force"]).reshape(-1, 3).sum(axis=0)
     assert np.allclose(force, solution.resultant, rtol=1e-5)
 
@@ -98,6 +104,20 @@ def test_the_skin_covers_all_kinds_of_cells(kind, order):
     corners = skin.points[skin.triangles]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert np.isclose(np.linalg.norm(normal, axis=1).sum() / 2, 6.0 if dim == 3 else 1.0)
+
+
+@pytest.mark.parametrize("kind", ["quad", "hex"])
+def test_the_skin_covers_serendipity_cells(kind):
+    dim = 2 if kind == "quad" else 3
+    mesh = second_order(am.box((1,) * dim, cells=(2,) * dim, kind=kind), serendipity=True)
+    body = am.Body(mesh, am.LinearElastic(young=1, poisson=0.3))
+    contact = am.Contact("bottom", am.Plane(normal=np.eye(dim)[-1]), mu=0.1, method="nitsche")
+    skin = Skin(am.Model([body], supports=[am.Fix("top", 0)], contacts=[contact]))
+    corners = skin.points[skin.triangles]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert np.isclose(np.linalg.norm(normal, axis=1).sum() / 2, 6.0 if dim == 3 else 1.0)
+    volume = np.einsum("ic,ic->", normal, corners[:, 0]) / 6
+    assert dim == 2 or np.isclose(volume, 1.0)  # outwards
 
 
 @pytest.mark.parametrize("method", ["mortar", "nodal"])

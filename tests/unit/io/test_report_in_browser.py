@@ -132,13 +132,34 @@ def test_every_example_has_a_page_that_turns(name, tmp_path, opened):
     pane.press("0")
     assert changes(page, lambda: set_slider(page, "scale", 100))
     set_slider(page, "scale", 0)
-    for field in ("pressure", "shear", "slip", "gap", "displacement"):
+    for field in ("pressure", "shear", "slip", "gap", "displacement", "von Mises stress"):
         page.select_option("#field", field)
         assert field in page.locator("#legend").inner_text()
     assert changes(page, lambda: page.select_option("#field", "status"))
     click_node(page, page.evaluate("window.report.view.shared.contacts[0]"))
     numbers = page.locator("#numbers").inner_text()
     assert "node" in numbers and "displacement" in numbers
+
+
+def test_in_2d_pressure_and_shear_are_curves_along_the_contact(tmp_path, opened):
+    block = am.Body(am.box((2, 1), cells=(8, 4)), am.LinearElastic(young=200, poisson=0.3))
+    floor = am.Plane(normal=(0, 1))
+    model = am.Model([block], [am.Fix("top", (0.02, -0.02))],
+                     [am.Contact("bottom", floor, mu=0.3), am.Contact("left", am.Plane(
+                         point=(-0.001, 0), normal=(1, 0)), mu=0.3)])  # fmt: skip
+    solution = am.solve(model)
+    page = opened(report(solution, tmp_path / "block.html", units="mm,N"))
+    chart = page.locator("#zone svg")
+    assert "in MPa over length along it in mm" in chart.get_attribute("aria-label")
+    drawn = page.evaluate("window.report.view.curve")
+    assert [one["name"] for one in drawn[:2]] == ["pressure", "shear"]
+    fields, here = solution.fields, solution.fields.frames[:, 0, 1] > 0.5  # of the floor
+    order = np.argsort(block.mesh.points[fields.node[here], 0])
+    assert np.allclose(drawn[0]["x"], np.linspace(0, 2, 9), atol=1e-6)
+    assert np.allclose(drawn[0]["y"], fields.pressure[here][order], rtol=1e-5, atol=1e-8)
+    before = page.locator("#zone figcaption").inner_text()
+    page.select_option("#pair", index=1)
+    assert page.locator("#zone figcaption").inner_text() != before
 
 
 @pytest.fixture(scope="module")

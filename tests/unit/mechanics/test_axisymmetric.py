@@ -214,3 +214,33 @@ def test_what_is_refused():
     moved = am.Contact("top", am.Plane((0, -1), (0, 1)), mu=0.1, kinematics="finite")
     with pytest.raises(am.InvalidInput, match="contact of small kinematics"):
         am.Model(both[:1], contacts=[moved])
+
+
+def quarter(low, high, cells, law, name, order):
+    """A quarter of a tube in 3D; of second order its sides are curved."""
+    mesh = am.box((high - low, np.pi / 2, 5.0), cells, origin=(low, 0, 0))
+    mesh = second_order(mesh, serendipity=True) if order == 2 else mesh
+    r, angle, z = mesh.points.T
+    points = np.column_stack([r * np.cos(angle), r * np.sin(angle), z])
+    points[np.abs(points) < 1e-12] = 0
+    mesh = am.Mesh(points, mesh.cells, mesh.surfaces)
+    return am.Body(mesh, law, name, order=order)
+
+
+@pytest.mark.parametrize(("order", "method", "error"), [
+    (1, "mortar", 0.01), (2, "mortar", 0.02), (2, "nitsche", 1e-3),
+])  # fmt: skip
+def test_press_fit_beside_in_3d(order, method, error):
+    """Facets of 15 degrees; with mortar a normal at each node, not everywhere."""
+    law = am.LinearElastic(210e3, 0.0)
+    bodies = [quarter(10, 20.0025, (2, 6, 1), law, "shaft", order),
+              quarter(20, 30, (2, 6, 1), law, "hub", order)]  # fmt: skip
+    held = [am.Fix(f"{body}.{side}", [0 if axis == k else None for k in range(3)])
+            for body in ("shaft", "hub")
+            for side, axis in (("front", 1), ("back", 0), ("bottom", 2))]  # fmt: skip
+    pair = am.Contact("shaft.right", master="hub.left", mu=0.1, method=method)
+    solution = am.solve(am.Model(bodies, held, [pair]))
+    weights = solution.fields.weights
+    assert weights.sum() == pytest.approx(np.pi / 2 * 20 * 5, rel=5e-3 if order == 1 else 2e-4)
+    mean = (solution.pressure * weights).sum() / weights.sum()
+    assert mean == pytest.approx(LAME, rel=error)

@@ -431,12 +431,49 @@ def test_every_outer_face_is_numbered_once_and_inner_ones_are_not():
     ]  # opposite views: each face of a box is seen in one of them
 
 
+def test_info_tells_which_faces_bond_and_how_to_open_them(tmp_path):
+    path = tmp_path / "two.step"
+    two_blocks().WriteStep(str(path))
+    data = json.loads(run("info", path, "--size", 0.5, "--json", "-").stdout)
+    bonds = [n for n, each in data["surfaces"].items() if each["between"]]
+    assert len(bonds) == 1 and data["surfaces"][bonds[0]]["area"] == pytest.approx(1)
+    assert data["surfaces"][bonds[0]]["between"] == ["steel", "copper"]
+    said = run("info", path, "--size", 0.5).stdout
+    assert f"glue = {{ {bonds[0]} = false }}" in said and "--no-glue" in said
+    opened = am.read_cad(path, 0.5, glue={bonds[0]: False})
+    assert {f"{bonds[0]}-steel", f"{bonds[0]}-copper"} <= set(opened.surfaces)
+
+
+def test_info_without_glue_has_the_names_that_glue_false_gives(tmp_path):
+    block_on_plate().WriteStep(str(tmp_path / "two.step"))
+    said = run("info", tmp_path / "two.step", "--size", 0.7, "--no-glue", "--json", "-")
+    apart = am.read_cad(tmp_path / "two.step", 0.7, glue=False)
+    assert list(json.loads(said.stdout)["surfaces"]) == list(apart.surfaces)
+    assert "top-cube" in apart.surfaces
+
+
+def test_a_number_stands_where_its_face_is_seen():
+    """The middle of a plate's top is under the block that stands on it."""
+    from amontons.io.plots.surface_names import draw_surface_names
+
+    plate, cube = Box((0, 0, 0), (2, 2, 1)), Box((0.5, 0.5, 1), (1.5, 1.5, 2))
+    plate.faces.Max(Z).name, cube.faces.Max(Z).name = "shelf", "top"
+    mesh = am.mesh_shape(Compound([plate, cube]), 0.3)
+    number = str(list(mesh.surfaces).index("shelf") + 1)
+    (spot,) = [text for text in draw_surface_names(mesh).axes[0].texts
+               if text.get_text() == number]  # fmt: skip
+    x, y, z = spot.get_position_3d()
+    assert z == pytest.approx(1) and not (0.5 < x < 1.5 and 0.5 < y < 1.5)
+    assert not (x < 1.5 and y > 0.5)  # behind the block, seen from x > 0 and y < 0
+
+
 def test_info_refuses_what_does_not_fit(part, tmp_path):
     (tmp_path / "a.msh").write_text("$MeshFormat")
     for arguments, words in (
         (("example:hild", "--picture", "a.png"), "only for mesh and CAD files"),
         ((tmp_path / "a.msh", "--size", 1), "only for CAD files"),
         ((part, "--picture", "a.gif"), "ends in .png"),
+        ((tmp_path / "a.msh", "--no-glue"), "only for CAD files"),
     ):
         result = run("info", *arguments)
         assert result.exit_code == 2 and words in result.stderr

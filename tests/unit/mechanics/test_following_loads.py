@@ -289,7 +289,7 @@ def test_what_can_not_be_is_said():
         model(mesh, [LOADS["traction"]], am.LinearElastic(1, 0.3))
     with pytest.raises(am.InvalidInput, match="body force.*large deformations"):
         model(mesh, [LOADS["body force"]], am.LinearElastic(1, 0.3))
-    with pytest.raises(am.InvalidInput, match="Pressure, BodyForce or NodalForce"):
+    with pytest.raises(am.InvalidInput, match="Pressure, BodyForce, NodalForce or Temperature"):
         model(mesh, ["right"])
     with pytest.raises(am.InvalidInput, match="surface 'rigth'"):
         model(mesh, [am.Pressure("rigth", 1.0)])

@@ -231,3 +231,15 @@ def test_no_contacts_at_all(W):
 def test_a_law_may_be_given_instead_of_numbers():
     law = Coulomb([0.3])
     assert FrictionProblem.from_delassus(np.eye(2), [[0, 0]], law).law is law
+
+
+@pytest.mark.parametrize(("given", "words"), [
+    ({"W": np.eye(4), "q": np.zeros(4)}, r"q: expected shape \(2, 2\) or \(2, 3\).*got \(4,\)"),
+    ({"W": np.eye(4), "q": np.zeros((3, 2))}, r"got \(3, 2\)"),
+    ({"W": np.eye(4)}, "got no q"),
+    ({}, "got no M"),
+    ({"W": np.eye(4), "q": np.zeros((2, 2)), "law": 0.3}, "law: expected a law.*got 0.3"),
+])  # fmt: skip
+def test_what_is_no_problem_is_refused_when_it_is_made(given, words):
+    with pytest.raises(InvalidInput, match=words):
+        FrictionProblem(**({"law": Coulomb([0.3, 0.3])} | given))

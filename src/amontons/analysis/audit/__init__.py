@@ -1,4 +1,4 @@
-"""Audits: is what another program, or our own, gives for displacements true?
+"""Audits of what another program, or our own, gives for displacements.
 
 From displacements follow the forces that bodies need (`forces`), from these the forces of
 contacts, seen from both sides (`sides`); they are held against the laws of hard contact

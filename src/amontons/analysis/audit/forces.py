@@ -33,6 +33,7 @@ class NodalForces:
     bound (dofs,): by how much rounding of the displacements may have moved them; large (dofs,):
     what small strains miss, where the answer is one of large ones.  blur (dofs,): of the
     displacements.  work: u . K u, twice the elastic energy; is_held (dofs,): supports act.
+    gradient: largest one of the displacements; size: largest force that they need one by one.
     """
 
     missing: Array
@@ -42,6 +43,7 @@ class NodalForces:
     work: float
     is_held: Mask
     gradient: float
+    size: float
 
     @property
     def known(self) -> Array:
@@ -55,7 +57,7 @@ def nodal_forces(model: Model, u: Array, blur: Array, *, large: bool) -> NodalFo
     large: the displacements are those of large strains and rotations.
     """
     parts = model.discretisation
-    load = model.load_factor * external_load(model.bodies, model.loads, parts.offsets)
+    load = model.load_factor * external_load(model.bodies, model.loads, parts.beside)
     inner = parts.K @ u
     held = np.zeros(parts.dofs, dtype=bool)
     held[parts.held] = True
@@ -67,6 +69,7 @@ def nodal_forces(model: Model, u: Array, blur: Array, *, large: bool) -> NodalFo
     return NodalForces(
         inner - load, bound, change if large else np.zeros_like(bound), blur,
         float(u @ inner), held, gradient,
+        float((sizes @ np.abs(u)).max(initial=0.0)),
     )  # fmt: skip
 
 

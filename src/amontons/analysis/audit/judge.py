@@ -13,6 +13,7 @@ from ...core.errors import InvalidInput, UnsupportedForm
 from ...mechanics.elements.elasticity import LinearElastic, materials_by_region
 from ...mechanics.elements.rigid import Rigid
 from ...mechanics.model.supports import external_load, locate
+from ...problem.friction import FrictionProblem
 from . import questions
 from .forces import NodalForces, nodal_forces
 from .laws import Give, Seen, approach_of, seen
@@ -29,6 +30,7 @@ BLIND = 0.1  # the same, from which rounding hides the balance
 FORMULATED = 1e-2  # of it, above which elements with another formulation say nothing
 ACTION = 0.02  # of the pressure, by which both sides' forces may differ
 PLACED = 1e-6  # of the largest displacement: what supports hold is there
+ZERO = 1e-13  # of the forces that single displacements need: a sum of them that is none
 NAMED = 10
 
 
@@ -40,7 +42,9 @@ class Answer:
     before: displacements of the increment before, None without.  reactions (nc, d): contact
     forces that the answer states, in the model's frames.  large: of large strains; other:
     elements formulated otherwise, in words; time, until: of the answer and of the end.
-    names (nodes,): what its nodes are called.  one_way: loads grow along one straight way.
+    names (nodes,): what its nodes are called.
+    tolerance: imbalance, over the largest nodal force, that another formulation explains.
+    one_way: loads grow along one straight way.
     """
 
     displacement: tuple[Array, ...]
@@ -53,6 +57,7 @@ class Answer:
     until: float | None = None
     names: Array | None = None
     one_way: bool = True
+    tolerance: float = 0.0
     notes: tuple[str, ...] = field(default=())
 
 
@@ -62,10 +67,15 @@ def audit_answer(model: Model, answer: Answer, *, deck_law: bool = True) -> Audi
     Raises InvalidInput for displacements that do not fit the model, UnsupportedForm for models
     in large deformations or with Nitsche's method, which have no such forces.
     """
-    if model.is_large or any(contact.nitsche is not None for contact in model.contacts):
+    if model.kind is not FrictionProblem:
         raise UnsupportedForm(
             "an audit needs small strains and nodal or mortar contact in the reference "
             "configuration; for others `solution.convergence` is the judge's word"
+        )
+    if model.discretisation.dofs != sum(body.mesh.points.size for body in model.bodies):
+        raise UnsupportedForm(
+            "an audit needs the displacements of all unknowns, and those of reference points "
+            "(couplings, rigid bodies, pretension) are in no file of results"
         )
     u, blur = _whole(model, answer.displacement), _blur(model, answer)
     forces = nodal_forces(model, u, blur, large=answer.large)
@@ -76,7 +86,7 @@ def audit_answer(model: Model, answer: Answer, *, deck_law: bool = True) -> Audi
     findings["balance"] = _balance(model, forces, (u, scale), off, every, answer)
     before = None if answer.before is None else _whole(model, answer.before)
     pairs = tuple(
-        _pair(model, k, sides, (u, before), answer, deck_law=deck_law)
+        _pair(model, k, sides, (u, before, scale), answer, deck_law=deck_law)
         for k, sides in enumerate(every)
     )
     for name in QUESTIONS[1:]:
@@ -95,8 +105,10 @@ def audit_answer(model: Model, answer: Answer, *, deck_law: bool = True) -> Audi
 def _notes(answer: Answer, forces: NodalForces) -> tuple[str, ...]:
     notes = list(answer.notes)
     if answer.large:
-        notes.append(f"large strains there, small ones here: displacements change by up to "
-                     f"{forces.gradient:.2g} of a length, which bounds what forces can tell")  # fmt: skip
+        notes.append(
+            "large strains there, small ones here: displacements change by up to "
+            f"{forces.gradient:.2g} of a length, which bounds what forces can tell"
+        )
     notes += [f"{text}: their forces are only bounded" for text in answer.other]
     return tuple(notes)
 
@@ -113,8 +125,8 @@ def _whole(model: Model, displacement: Sequence[Array]) -> Array:
         given = np.asarray(values, dtype=float)
         if given.shape != body.mesh.points.shape:
             raise InvalidInput(
-                f"displacements of body {body.name!r}: expected {body.mesh.points.shape}, a row "
-                f"for each node, got {given.shape}"
+                f"displacements of body {body.name!r}: expected {body.mesh.points.shape}, a "
+                f"row for each node, got {given.shape}"
             )
         if not np.isfinite(given).all():
             row = int(np.flatnonzero(~np.isfinite(given).all(axis=1))[0])
@@ -135,7 +147,7 @@ def _blur(model: Model, answer: Answer) -> Array:
 def _scale(model: Model, forces: NodalForces) -> float:
     """The largest force at a node, of contacts, supports or loads."""
     d = model.dimension
-    load = external_load(model.bodies, model.loads, model.discretisation.offsets)
+    load = external_load(model.bodies, model.loads, model.discretisation.beside)
     sizes = [np.linalg.norm(f.reshape(-1, d), axis=1).max(initial=0.0)
              for f in (forces.missing, model.load_factor * load)]  # fmt: skip
     return float(max(sizes))
@@ -161,11 +173,14 @@ def _balance(
     model: Model, forces: NodalForces, state: tuple[Array, float], off: Mask,
     every: Sequence[tuple[Side, ...]], answer: Answer,
 ) -> Finding:  # fmt: skip
-    """Do inner forces balance loads off the contacts, and both sides of a pair each other?"""
+    """Whether inner forces balance the loads off the contacts, and both sides each other."""
     u, scale = state
     left = np.where(off, np.abs(forces.missing), 0.0)
     over = np.where(off, left - forces.known, 0.0)
-    unit = scale if scale > 0 else 1.0
+    if scale <= ZERO * forces.size:
+        names = ("residual", "excess", "bound", "largest_force", "between_sides", "supports")
+        return Finding(RIGHT, "no forces at all", dict.fromkeys(names, 0.0))
+    unit = scale
     residual, excess = float(left.max(initial=0.0)) / unit, float(over.max(initial=0.0)) / unit
     bound = float((forces.known * off).max(initial=0.0)) / unit
     between, pair = _action(every, model)
@@ -177,9 +192,13 @@ def _balance(
         text = (f"supports do not have the displacements that they prescribe: node {name(at)} "
                 f"is off by {moved:.2g} of the largest")  # fmt: skip
         return Finding(WRONG, text, numbers, (name(at),))
-    if answer.other and max(residual, between) > FORMULATED:
-        text = (f"inner forces miss the loads by {residual:.1e} of the largest nodal force, "
-                "and the elements are formulated otherwise: forces can not be told")  # fmt: skip
+    if excess <= answer.tolerance and between <= max(ACTION, answer.tolerance):
+        excess = between = 0.0
+    if answer.other and max(excess, between) > FORMULATED and not answer.tolerance:
+        text = (
+            f"inner forces miss the loads by {residual:.1e} of the largest nodal force, and "
+            "the elements are formulated otherwise: forces can not be told"
+        )
         return Finding(UNDECIDED, text, numbers)
     if excess > BALANCED:
         order = np.argsort(-over, kind="stable") // model.dimension
@@ -225,21 +244,22 @@ def _misplaced(model: Model, u: Array, blur: Array) -> tuple[float, int]:
 
 # ------------------------------------------------------------------------------ pairs
 def _pair(
-    model: Model, k: int, sides: tuple[Side, ...], moved: tuple[Array, Array | None],
-    answer: Answer, *, deck_law: bool,
+    model: Model, k: int, sides: tuple[Side, ...],
+    moved: tuple[Array, Array | None, float], answer: Answer, *, deck_law: bool,
 ) -> PairAudit:  # fmt: skip
-    """One pair, from both sides."""
-    contact, (u, before) = model.contacts[k], moved
+    """One pair, from both sides; moved: displacements, those before, the largest force."""
+    contact, (u, before, scale) = model.contacts[k], moved
     young = _softest(model, contact.slave, contact.master)
-    approach = max(approach_of(side, young) for side in sides)
+    lengths = [approach_of(side, young, scale) for side in sides]
+    approach, sheared = (max(each) for each in zip(*lengths, strict=True))
     give = Give(*(_inverse(contact.numbers.get(name)) for name in
                   ("stiffness", "stick_stiffness")))  # fmt: skip
     found: list[Seen] = []
     for side in sides:
         slip = side.slip if before is None else side.slip - side.slip_of(before)
-        one = seen(side, give, approach, slip)
+        one = seen(side, give, approach, sheared, slip, scale)
         if before is not None and answer.one_way:  # both are histories of one straight way
-            other = seen(side, give, approach, side.slip)
+            other = seen(side, give, approach, sheared, side.slip, scale)
             one = min(one, other, key=lambda s: (s.missing, s.impossible_share))
         found.append(one)
     views = tuple(found)
@@ -252,7 +272,7 @@ def _pair(
         ),
         "cone": questions.cone(views, name),
         "status": questions.status(
-            views, approach, name, history=answer.one_way or before is not None, deck=deck
+            views, sheared, name, history=answer.one_way or before is not None, deck=deck
         ),
         "geometry": questions.geometry(views, approach),
     }  # fmt: skip
@@ -321,7 +341,7 @@ def _stated(
     model: Model, every: Sequence[tuple[Side, ...]], reactions: Array, scale: float,
     answer: Answer,
 ) -> Finding:  # fmt: skip
-    """Are the contact forces that the answer states those that its displacements need?"""
+    """Whether the contact forces that it states are those that its displacements need."""
     own = np.concatenate([sides[0].r for sides in every])
     given = np.asarray(reactions, dtype=float)
     if given.shape != own.shape:
@@ -339,7 +359,8 @@ def _stated(
         return Finding(WRONG, "the contact forces that it states are not those that its "
                        f"displacements need: off by {share:.2g} of the largest nodal force at "
                        f"node {name}", numbers, (name,))  # fmt: skip
-    return Finding(RIGHT, f"stated contact forces fit the displacements to {share:.1e}", numbers)
+    text = f"stated contact forces fit the displacements to {share:.1e}"
+    return Finding(RIGHT, text, numbers)
 
 
 def _time(time: float, until: float) -> Finding:

@@ -1,20 +1,21 @@
-"""Do the forces and motions of one side obey the law of hard contact, and by how much not?
+"""How far forces and motions of one side are from the law of hard contact.
 
 All deviations are lengths, weighted by the forces that act along them: a contact with the
 pressure force r_N > 0 should have the gap 0, one that slips by s the friction mu r_N against
 s.  With the approach of the pair, the length over which contact closes and flattens it,
 
     share = sum |r_N gap| / (approach sum r_N),
-    missing = sum (mu r_N |s| + r_T . s)+ / sum mu r_N max(largest |s|, approach),
+    missing = sum (mu r_N |s| + r_T . s)+ / sum mu r_N max(largest |s|, sheared),
 
-the second that of de Saxce's bipotential: zero where friction is at its bound against the slip,
-or nothing slips.  Both are numbers without a unit, and about the error of the forces that
-contact hard and rigid would have.
+the second that of de Saxce's bipotential: zero where friction is at its bound against the
+slip, or nothing slips; sheared is the length by which friction at its bound shears what it acts
+on.  Both are numbers without a unit, and about the error of the forces that contact hard and
+rigid would have.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,10 @@ Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 PRESSED = 0.02  # of the largest force per area, above which a contact carries load
 AWAY = 0.25  # of the approach: a contact that is so far open, inside or slid is no mistake
+NOTHING = 1e-9  # of the largest nodal force: contact forces that are none
+FAIR = 0.02  # share of gaps at points with which an answer holds contact there
 RATIO = 0.1  # of mu: friction that is off its bound by more is off
+INSIDE = "inside the other side"
 FLAT = 0.99  # length of the mean of unit normals from which a surface is flat
 
 
@@ -67,70 +71,94 @@ class Seen:
     slides: Mask
 
 
-def approach_of(side: Side, young: float) -> float:
-    """Length over which contact acts: what it closes, and how deep its pressure reaches."""
+def approach_of(side: Side, young: float, force: float) -> tuple[float, float]:
+    """Lengths over which contact and friction act.
+
+    The first is what contact closes, or how deep its pressure reaches; the second how far
+    friction shears, mu times the latter.  force: the largest at any node of the model, to tell
+    what carries load.
+    """
     total = float(np.maximum(side.r[:, 0], 0.0).sum())
-    pressed = _pressed(side)
+    pressed = _pressed(side, force)
     if not pressed.any() or not total > 0:
-        return float(np.abs(side.start_flat - side.flat).max(initial=0.0))
+        return float(np.abs(side.start_flat - side.flat).max(initial=0.0)), 0.0
     area = float(side.weight[pressed].sum())
     d = side.points.shape[1]
     size = float(np.ptp(side.points[pressed], axis=0).max(initial=0.0))
     size = max(size, float(area ** (1.0 / (d - 1))))
-    closing = float((side.start_flat - side.flat)[pressed].max(initial=0.0))
-    opened = float((side.flat - side.start_flat)[pressed].max(initial=0.0))
-    return max(closing, opened, total / area * size / young)
+    closing = float(np.abs(side.start_flat - side.flat)[pressed].max(initial=0.0))
+    deep = total / area * size / young
+    bound = float(side.law.bound(side.r)[pressed].sum()) / total
+    return max(closing, deep), bound * deep
 
 
-def _pressed(side: Side) -> Mask:
+def _pressed(side: Side, force: float) -> Mask:
     traction = side.r[:, 0] / side.weight
     most = float(traction.max(initial=0.0))
-    return (traction > PRESSED * most) & (side.r[:, 0] > 2 * side.bound[:, 0])
+    loaded = side.r[:, 0] > np.maximum(2 * side.bound[:, 0], NOTHING * force)
+    return (traction > PRESSED * most) & loaded
 
 
-def seen(side: Side, give: Give, approach: float, slip: Array) -> Seen:
-    """Hold one side against its law; slip (nc, d-1): the motion that friction answers."""
+def _carries_nothing(side: Side, force: float) -> bool:
+    """True where all forces of a side are rounding, and that rounding is small."""
+    size = np.abs(side.r).max(initial=0.0)
+    blind = float(side.bound.max(initial=0.0))
+    return bool(size <= max(2 * blind, NOTHING * force)) and blind <= RATIO * force
+
+
+def seen(  # noqa: PLR0913
+    side: Side, give: Give, approach: float, sheared: float, slip: Array, force: float
+) -> Seen:  # fmt: skip
+    """Hold one side against its law; slip (nc, d-1): the motion that friction answers.
+
+    sheared: the length over which friction acts; force: the largest at any node of the model.
+    """
+    if _carries_nothing(side, force):
+        side = replace(side, r=np.zeros_like(side.r), bound=np.zeros_like(side.bound))
     r, weight = side.r, side.weight
     normal, push = np.maximum(r[:, 0], 0.0), np.linalg.norm(r[:, 1:], axis=1)
     if side.law.tied.any():
         return _tied(side, give, approach)
     total = float(normal.sum())
-    pressed = _pressed(side)
+    pressed = _pressed(side, force)
     scale = approach * total
     bound = side.law.bound(r)
-    rubs = side.known.all(axis=1) & side.known[:, :1].all(axis=1)
+    rubs: Mask = np.asarray(side.known.all(axis=1))
     excess = np.maximum(push - bound - side.bound[:, 1:].max(axis=1, initial=0.0), 0.0) * rubs
     pull = np.maximum(-r[:, 0] - side.bound[:, 0], 0.0)
-    shares = {}
-    for name, gap in (("curved", side.gap), ("flat", side.flat),
-                      ("deck", side.flat + give.normal * normal / weight)):  # fmt: skip
-        left = np.maximum(np.abs(gap) - side.blur, 0.0)
-        shares[name] = _over(float((normal * left).sum()), scale)
-    lost, hard = _missing(r, bound, slip, rubs, approach)
+    soft_gap = give.normal * normal / weight
+    views = {"curved": side.gap, "flat": side.flat, "points": side.points_gap}
+    shares = {name: _pressing(normal, gap, side.blur, scale) for name, gap in views.items()}
+    best = min(views, key=lambda name: shares[name])
+    best = "points" if shares["points"] <= FAIR else best
+    gap = views[best]
+    deck = min(_pressing(normal, g + soft_gap, side.blur, scale) for g in views.values())
+    lost, hard = _missing(r, bound, slip, rubs, sheared)
     elastic = slip + give.shear * r[:, 1:] / weight[:, None]
-    soft = _missing(r, bound, elastic, rubs, approach)[1]
-    why = _statuses(side, pressed, bound, (push, slip, lost, rubs), approach)
+    soft = _missing(r, bound, elastic, rubs, sheared)[1]
+    why = _statuses(side, (pressed, bound, gap), (push, slip, lost, rubs), (approach, sheared))
     bad = why != ""
     carried = np.maximum(normal, total / max(len(normal), 1))
-    inside = np.minimum(side.gap, side.flat) if _is_curved(shares) else side.flat
-    worst = int(inside.argmin()) if len(inside) else 0
+    worst = int(gap.argmin()) if len(gap) else 0
     return Seen(
-        side, pressed, shares["curved"], shares["flat"], shares["deck"], hard, soft,
+        side, pressed, shares["curved"], min(shares["flat"], shares["points"]), deck,
+        hard, soft,
         _over(float(excess.sum()), total), _over(float(pull.sum()), total),
         _over(float(side.bound[:, 0].sum()), total), _over(float(side.blur.max(initial=0.0)),
-        approach), float(-inside.min(initial=0.0)), int(side.node[worst]), bad, why,
-        _over(float(carried[bad].sum()), float(carried.sum())),
+        approach), max(-float(gap.min(initial=0.0)), 0.0), int(side.node[worst]), bad, why,
+        _over(float(carried[bad & (why != INSIDE)].sum()), float(carried.sum())),
         pressed & rubs & (push >= (1 - RATIO) * bound),
     )  # fmt: skip
 
 
-def _is_curved(shares: dict[str, float]) -> bool:
-    """True where the answer holds on the curved surfaces rather than on their facets."""
-    return shares["curved"] < shares["flat"]
+def _pressing(normal: Array, gap: Array, blur: Array, scale: float) -> float:
+    """Share of gaps (nc,) that pressure forces (nc,) have, over approach times pressure."""
+    left = np.maximum(np.abs(gap) - blur, 0.0)
+    return _over(float((normal * left).sum()), scale)
 
 
 def _missing(
-    r: Array, bound: Array, slip: Array, rubs: Mask, approach: float
+    r: Array, bound: Array, slip: Array, rubs: Mask, sheared: float
 ) -> tuple[Array, float]:
     """Work that friction should have taken, as a length of each contact; their share."""
     length = np.linalg.norm(slip, axis=1)
@@ -138,30 +166,30 @@ def _missing(
     able = (bound > 0) & rubs
     lost = np.where(able, work / np.where(able, bound, 1.0), 0.0)
     longest = float(length[able].max(initial=0.0))
-    return lost, _over(float(work.sum()), float(bound[able].sum()) * max(longest, approach))
+    return lost, _over(float(work.sum()), float(bound[able].sum()) * max(longest, sheared))
 
 
 def _statuses(
-    side: Side, pressed: Mask, bound: Array, rubbing: tuple[Array, Array, Array, Mask],
-    approach: float,
+    side: Side, pressing: tuple[Mask, Array, Array],
+    rubbing: tuple[Array, Array, Array, Mask], lengths: tuple[float, float],
 ) -> NDArray[np.object_]:  # fmt: skip
     """Why the status of a contact can not be, "" where it can."""
     push, slip, lost, rubs = rubbing
     off = 2 * side.bound[:, 0]
-    gap = np.where(np.abs(side.gap) < np.abs(side.flat), side.gap, side.flat)
+    pressed, bound, gap = pressing
     traction = side.r[:, 0] / side.weight
     most = float(np.abs(traction).max(initial=0.0))
-    far = AWAY * approach + side.blur
+    far, slid = (AWAY * length + side.blur for length in lengths)
     length = np.linalg.norm(slip, axis=1)
     why = np.full(len(gap), "", dtype=object)
     clear = push > bound * (1 + RATIO) + side.bound[:, 1:].max(axis=1, initial=0.0)
     why[pressed & rubs & clear & (push > RATIO * bound.max(initial=0.0))] = "above the cone"
-    slipped = pressed & rubs & (length > far) & (lost > AWAY * length)
+    slipped = pressed & rubs & (length > slid) & (lost > AWAY * length)
     why[slipped] = "slips without the friction that it should have"
     along = (side.r[:, 1:] * slip).sum(axis=1)
     why[slipped & (along > 0) & (push > RATIO * bound)] = "friction drives it along"
     why[pressed & (gap > far)] = "pressed, though open"
-    why[gap < -far] = "inside the other side"
+    why[gap < -far] = INSIDE
     why[(traction < -PRESSED * most) & (-side.r[:, 0] > off)] = "pulls"
     return why
 

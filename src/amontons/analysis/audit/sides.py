@@ -25,6 +25,7 @@ from ...mechanics.model.parts import Contact
 from ...mechanics.model.placing import Placed, place
 from ...mechanics.model.supports import Prescribed, locate
 from ...problem.law import Law
+from .points import PointGaps, point_gaps
 
 if TYPE_CHECKING:
     from ...mechanics.model import Model
@@ -47,6 +48,8 @@ class Side:
     gap, flat (nc,): of the curved surfaces and of their facets; slip (nc, d-1); blur (nc,) of
     both.  start, start_flat (nc,): gaps at zero displacement.  matrix (dofs, nc d): local
     displacements are its transpose times those of the model.  law: that of these contacts.
+    start_points (nc,): gap of the node itself to the facet before it at zero displacement;
+    points_gap (nc,): the smallest one now at points around each.
     """
 
     contact: Contact
@@ -65,6 +68,8 @@ class Side:
     start_flat: Array
     matrix: sparse.csc_array
     law: Law
+    start_points: Array
+    points_gap: Array
 
     @property
     def force(self) -> Array:
@@ -87,10 +92,12 @@ def sides_of(model: Model, forces: NodalForces, u: Array) -> list[tuple[Side, ..
     placed = model.discretisation.placed
     given = Prescribed.of(model.bodies, model.supports, model.discretisation.beside)
     turned = [_turned(model, contact, given) for contact in model.contacts]
-    firsts = _seen(model, model.contacts, placed, forces, u)
+    near = [point_gaps(model, contact, u) for contact in model.contacts]
+    firsts = _seen(model, model.contacts, placed, forces, u, near)
     with_other = [k for k, pair in enumerate(turned) if pair is not None]
     pairs = [turned[k] for k in with_other]
-    others = _seen(model, [p[0] for p in pairs if p], [p[1] for p in pairs if p], forces, u)
+    others = _seen(model, [p[0] for p in pairs if p], [p[1] for p in pairs if p], forces, u,
+                   [near[k] for k in with_other])  # fmt: skip
     found: list[tuple[Side, ...]] = [(side,) for side in firsts]
     for k, other in zip(with_other, others, strict=True):
         found[k] = (*found[k], other)
@@ -99,7 +106,7 @@ def sides_of(model: Model, forces: NodalForces, u: Array) -> list[tuple[Side, ..
 
 def _turned(model: Model, contact: Contact, given: Prescribed) -> tuple[Contact, Placed] | None:
     """The contact with its sides exchanged; None where there is one side, or none to be had."""
-    if contact.master is None or contact.nitsche is not None or contact.where is not None:
+    if contact.master is None or contact.where is not None:
         return None
     new = replace(contact, slave=contact.master, master=contact.slave)
     try:
@@ -110,13 +117,13 @@ def _turned(model: Model, contact: Contact, given: Prescribed) -> tuple[Contact,
 
 def _seen(
     model: Model, contacts: Sequence[Contact], placed: Sequence[Placed],
-    forces: NodalForces, u: Array,
+    forces: NodalForces, u: Array, near: Sequence[PointGaps | None],
 ) -> list[Side]:  # fmt: skip
     parts, d = model.discretisation, model.dimension
     points = np.concatenate([body.mesh.points for body in model.bodies]).ravel()
     pairs = [
-        _side(model, contact, one, forces, (u, points))
-        for contact, one in zip(contacts, placed, strict=True)
+        _side(model, contact, one, forces, (u, points), gaps)
+        for contact, one, gaps in zip(contacts, placed, near, strict=True)
     ]
     if not _shared(model, contacts):
         return pairs
@@ -135,14 +142,14 @@ def _seen(
 
 def _side(
     model: Model, contact: Contact, placed: Placed, forces: NodalForces,
-    moved: tuple[Array, Array],
+    moved: tuple[Array, Array], near: PointGaps | None,
 ) -> Side:  # fmt: skip
     """One pair as its slave sees it; moved: displacements and points, (dofs,) each."""
     parts, d, rows = model.discretisation, model.dimension, placed.rows
     first = int(parts.offsets[placed.body]) // d
     node = first + rows.nodes
     share = _to_corners(model, contact, placed, first)
-    held = parts.is_fixed.reshape(-1, d)
+    held = forces.is_held.reshape(-1, d)  # by supports or constraints
     force = np.where(held, 0.0, forces.missing.reshape(-1, d))
     nodal, blur = share @ force, share @ np.where(held, 0.0, forces.known.reshape(-1, d))
     r = np.einsum("pkc,pc->pk", rows.frames, nodal)
@@ -150,12 +157,18 @@ def _side(
     local = (placed.H.T @ moved[0]).reshape(-1, d)
     start = np.zeros(len(node)) if contact.tied else rows.gap
     flat = start if contact.obstacle is not None or contact.tied else _facets(placed, moved[1])
+    at_points = [flat, flat + local[:, 0]]
+    if near is not None and not contact.tied:
+        at_points = [
+            np.where(np.isfinite(gap[node]), gap[node], mean)
+            for gap, mean in zip((near.start, near.now), at_points, strict=True)
+        ]
     blurred = (abs(placed.H).T @ forces.blur).reshape(-1, d).max(axis=1, initial=0.0)
     return Side(
         contact, node, rows.points, rows.weights, rows.frames, np.where(known, r, 0.0), known,
         np.einsum("pkc,pc->pk", np.abs(rows.frames), blur), start + local[:, 0],
         flat + local[:, 0], local[:, 1:], blurred, start, flat, placed.H,
-        law_of([contact], replace(parts, placed=(placed,))),
+        law_of([contact], replace(parts, placed=(placed,))), *at_points,
     )  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any
 
@@ -88,7 +88,7 @@ QUESTIONS = ("balance", "penetration", "cone", "status", "geometry")
 
 @dataclass(frozen=True, eq=False)
 class Audit(Shown):
-    """The verdict on displacements of a model: is this the answer of the contact problem?
+    """The verdict on displacements of a model as the answer of its contact problem.
 
     findings: of the questions balance, penetration, cone, status, geometry, and time where an
     answer has one; rounding_bound: part of the largest nodal force that the digits of the
@@ -108,6 +108,15 @@ class Audit(Shown):
     def verdict(self) -> str:
         """right, wrong or undecided."""
         return worst(found.verdict for found in self.findings.values()).value
+
+    @property
+    def hard_model(self) -> Any:
+        """The model with contact hard and sticking rigid, for a solution beside."""
+        contacts = tuple(
+            replace(contact, stiffness=None, stick_stiffness=None)
+            for contact in self.model.contacts
+        )
+        return replace(self.model, contacts=contacts)
 
     @property
     def is_right(self) -> bool:

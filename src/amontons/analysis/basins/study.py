@@ -49,7 +49,7 @@ class BasinRun:
     nearest: str = ""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Basins(Shown):
     """What `basins` found; complete: the solutions are all that there are, with proof.
 

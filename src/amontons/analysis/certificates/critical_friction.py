@@ -67,7 +67,7 @@ class Witness:
         return f"the pattern {self.pattern} is singular at friction {self.friction:.6g}"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class CriticalFriction(Told):
     """Bounds on the critical friction, lower <= mu_* <= upper, in terms of t (largest mu).
 

@@ -82,7 +82,7 @@ _MEANING = {
 }
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Opening(Told):
     """The verdict with its certificate.
 

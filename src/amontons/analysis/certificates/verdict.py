@@ -39,7 +39,7 @@ _MEANING = {
 }
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Uniqueness(Told):
     """The verdict, and all that supports it.
 

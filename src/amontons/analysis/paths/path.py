@@ -101,7 +101,7 @@ class PathProblem(Protocol):
         ...
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Branch(Shown):
     """A solution curve as a table: points in order, the events on it, and why it ends.
 

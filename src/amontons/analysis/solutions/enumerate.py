@@ -86,7 +86,7 @@ class Proof:
     multipliers: Array
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Solutions(Shown):
     """What `all_solutions` found; complete: every other pattern was excluded by a proof.
 

@@ -8,6 +8,7 @@ from ... import __version__
 from . import flags
 from .folders import results_folder
 from .group import Commands
+from .more_commands import audit, examples
 
 EPILOG = """\b
 Examples:
@@ -74,6 +75,7 @@ Examples:
               "part of it is always done.")  # fmt: skip
 @flags.fclib_error
 @flags.figures
+@flags.frd
 @click.option("--quiet", is_flag=True, help="No progress, no summary.")
 def solve(**options: object) -> int:
     """Solve a problem and write the results.
@@ -119,6 +121,7 @@ def info(**options: object) -> None:
 Examples:
   amontons convert global.hdf5 local.hdf5 --form local
   amontons convert case.toml problem.hdf5
+  amontons convert cube-results cube.frd      displacements, stresses, contact for cgx, PrePoMax
 """
 )
 @click.argument("source")
@@ -128,7 +131,7 @@ Examples:
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
               help="Replace a value of the case.")  # fmt: skip
 def convert(**options: object) -> None:
-    """Write a problem as an FCLib file, in either form.
+    """Write a problem as an FCLib file, in either form, or results as .frd or .dat.
 
     SOURCE is a TOML case file, an FCLib HDF5 file, a results folder, or example:NAME.
     """
@@ -392,9 +395,5 @@ def run(**options: object) -> int:
     return run_case(**options)  # type: ignore[arg-type]
 
 
-@main.command()
-def examples() -> None:
-    """List the built-in examples: `amontons solve example:NAME`, in time `amontons run`."""
-    from .sources import list_examples
-
-    list_examples()
+main.add_command(audit)
+main.add_command(examples)

@@ -1,9 +1,10 @@
-"""`amontons convert`: a problem as an FCLib file, in the form one wants."""
+"""`amontons convert`: a problem as an FCLib file, in the form one wants; results as .frd."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from pathlib import Path
 
 import click
 
@@ -18,6 +19,9 @@ SUFFIXES = (".hdf5", ".h5")
 
 def run(source: str, target: str, form: str | None, overrides: Sequence[str]) -> None:
     """Read, condense if asked to, write."""
+    if target.lower().endswith((".frd", ".dat")):
+        _viewed(source, target, overrides)
+        return
     check_writable(target, "target", SUFFIXES)
     opened = open_source(source, overrides)
     if os.path.exists(target) and opened.path is not None and os.path.samefile(
@@ -38,3 +42,24 @@ def run(source: str, target: str, form: str | None, overrides: Sequence[str]) ->
     about = texts.get("description", b"").decode("utf-8", "surrogateescape")
     write_fclib(problem, target, title=title, description=about)
     click.echo(f"{target}: {wanted.value} form, {problem.contacts} contacts")
+
+
+def _viewed(source: str, target: str, overrides: Sequence[str]) -> None:
+    """Results as files of CalculiX: of a results folder, a .vtu of ours, or solved now."""
+    from ...core.files import replacing
+    from ...io.answers.write import Shown, write_answer
+
+    check_writable(target, "target")
+    path = Path(source)
+    path = path / "solution.vtu" if os.path.isdir(path) else path
+    if path.suffix.lower() != ".vtu" or not path.is_file():
+        raise InvalidInput(
+            f"{source}: expected results with a solution.vtu, of `amontons solve {source} -o "
+            f"{path.stem}-results`"
+        )
+    if overrides:
+        raise InvalidInput("--set: results have no keys to replace")
+    shown = Shown.of_vtu(path)
+    with replacing(target) as temporary:
+        write_answer(temporary, shown)
+    click.echo(f"{target}: displacements of {len(shown.points)} nodes")

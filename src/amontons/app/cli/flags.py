@@ -19,6 +19,12 @@ def figures(command: Command) -> Command:
     return chosen(none(command))
 
 
+def frd(command: Command) -> Command:
+    """Of a solve: results for the viewers of CalculiX too."""
+    text = "Write solution.frd too, for cgx and PrePoMax."
+    return click.option("--frd", is_flag=True, help=text)(command)
+
+
 def axes(command: Command) -> Command:
     """Of commands that draw branches: what over what, and in which format."""
     known = '"r_N 3", "sum r_T", "force x", "displacement y SURFACE", norm, arclength'
@@ -36,7 +42,10 @@ def surfaces(command: Command) -> Command:
     size = click.option("--size", type=float, metavar="X",
                         help="Of a CAD file: size of cells. [a 15th of its length]"
                         )  # fmt: skip
-    return picture(size(command))
+    apart = click.option("--no-glue", is_flag=True,
+                         help="Of a CAD file: each solid by itself, as with glue = false."
+                         )  # fmt: skip
+    return picture(size(apart(command)))
 
 
 def fclib_error(command: Command) -> Command:

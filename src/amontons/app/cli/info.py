@@ -37,13 +37,15 @@ RANKS = 0.5  # part of it that the ranks may take
 def run(
     source: str, overrides: Sequence[str], json_copy: str | None,
     time_limit: float | None = None, picture: str | None = None, size: float | None = None,
+    no_glue: bool = False,
 ) -> None:  # fmt: skip
     """Print the table, or the JSON; of a mesh or CAD file its surfaces."""
     if is_mesh(source):
-        run_mesh(source, size, picture, json_copy)
+        run_mesh(source, size, picture, json_copy, glue=not no_glue)
         return
-    for value, name in ((picture, "--picture"), (size, "--size")):
-        if value is not None:
+    asked = {"--picture": picture is not None, "--size": size is not None, "--no-glue": no_glue}
+    for name, given in asked.items():
+        if given:
             raise InvalidInput(f"{name}: only for mesh and CAD files, whose surfaces it shows")
     check_writable(json_copy, "--json")
     if time_limit is not None:

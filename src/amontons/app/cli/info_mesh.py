@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 from ...core.errors import InvalidInput
 from ...io.readers import MESHES
 from ...io.results import to_json
-from ...mechanics.meshes import Mesh, is_cad, read_cad, read_mesh
+from ...mechanics.meshes import Facets, Mesh, is_cad, read_cad, read_mesh
 from ...mechanics.meshes.surfaces import facet_areas
 from .sources import check_is_plain
 from .terminal import check_writable, deliver_json, show_table
@@ -25,23 +26,27 @@ def is_mesh(source: str) -> bool:
 
 
 def run(
-    source: str, size: float | None, picture: str | None, json_copy: str | None
+    source: str, size: float | None, picture: str | None, json_copy: str | None,
+    glue: bool = True,
 ) -> None:  # fmt: skip
     """Print names, areas and middles of all surfaces, and draw them with their numbers."""
     check_writable(json_copy, "--json")
     check_writable(picture, "--picture", FIGURES)
     check_is_plain(Path(source))
-    mesh = _read(source, size)
+    mesh = _read(source, size, glue)
     facts = describe(mesh)
     if json_copy != "-":
         surfaces = facts["surfaces"]
         rows = [
-            [str(k), name, f"{each['area']:.4g}", _point(each["middle"])]
+            [str(k), name, f"{each['area']:.4g}", _point(each["middle"]),
+             " and ".join(each["between"])]
             for k, (name, each) in enumerate(surfaces.items(), 1)
         ]
         kinds = f"{mesh.dim}D, {len(mesh.points)} points, regions {', '.join(mesh.regions)}"
         area = "area" if mesh.dim == 3 else "length"
-        show_table(f"{source}: {kinds}", ["", "surface", area, "middle"], rows, "left")
+        show_table(source, ["", "surface", area, "middle", "between"], rows, "left")
+        print(kinds)
+        print(*_bonds(facts, glue and is_cad(source)), sep="\n", end="")
     if picture is not None:
         from ...io.plots.saving import save_figure
         from ...io.plots.surface_names import draw_surface_names
@@ -59,21 +64,46 @@ def describe(mesh: Mesh) -> dict[str, Any]:
         areas = np.concatenate([facet_areas(mesh.points, f) for f in blocks])
         middles = np.concatenate([mesh.points[f.nodes].mean(axis=1) for f in blocks])
         surfaces[name] = {"area": float(areas.sum()),
-                          "middle": (areas @ middles / areas.sum()).tolist()}  # fmt: skip
+                          "middle": (areas @ middles / areas.sum()).tolist(),
+                          "between": _between(mesh, blocks)}  # fmt: skip
     return {"dimension": mesh.dim, "points": len(mesh.points), "cells": mesh.cell_count,
             "low": low.tolist(), "high": high.tolist(), "regions": list(mesh.regions),
             "surfaces": surfaces}  # fmt: skip
 
 
-def _read(source: str, size: float | None) -> Mesh:
+def _between(mesh: Mesh, blocks: Sequence[Facets]) -> list[str]:
+    """Regions that a surface bonds: those that have all its nodes, where there are two."""
+    nodes = np.unique(np.concatenate([facets.nodes.ravel() for facets in blocks]))
+    found: dict[str, list[np.ndarray]] = {}
+    for cells in mesh.cells:
+        found.setdefault(cells.region, []).append(cells.nodes.ravel())
+    having = [name for name, parts in found.items()
+              if np.isin(nodes, np.concatenate(parts)).all()]  # fmt: skip
+    return having if len(having) > 1 else []
+
+
+def _bonds(facts: dict[str, Any], is_glued: bool) -> list[str]:
+    """What to know of surfaces that bond regions, in lines."""
+    bonds = [name for name, each in facts["surfaces"].items() if each["between"]]
+    if not bonds:
+        return []
+    keys = ", ".join(f"{name} = false" for name in bonds)
+    lines = [f"bonded; for contact there write glue = {{ {keys} }} under [mesh]"]
+    if is_glued:
+        lines[0] += ";\nwith glue = false faces count anew, as --no-glue shows"
+    return [*lines, ""]
+
+
+def _read(source: str, size: float | None, glue: bool) -> Mesh:
     if not is_cad(source):
-        if size is not None:
-            raise InvalidInput("--size: only for CAD files, a mesh file has its cells")
+        for given, name in ((size is not None, "--size"), (not glue, "--no-glue")):
+            if given:
+                raise InvalidInput(f"{name}: only for CAD files, a mesh file has its cells")
         return read_mesh(source)
     if size is not None:
-        return read_cad(source, size)
+        return read_cad(source, size, glue=glue)
     low, high = read_cad(source, COARSE).bounding_box()
-    return read_cad(source, float((high - low).max()) / CELLS_ALONG)
+    return read_cad(source, float((high - low).max()) / CELLS_ALONG, glue=glue)
 
 
 COARSE = 1e6  # mm: cells as large as the part allows

@@ -44,7 +44,7 @@ def run(
     json_copy: str | None, quiet: bool, full_verdict: bool,
     contact_tolerance: float | None = None, patience: int = 500, criterion: str = "judge",
     start: str | None = None, fclib_error: bool = False, figures: str = "png",
-    report: bool = False,
+    report: bool = False, frd: bool = False,
 ) -> int:  # fmt: skip
     """Solve and write; returns the exit code."""
     opened = open_source(source, overrides, method)
@@ -74,7 +74,10 @@ def run(
         uniqueness=_verdict(found, full_verdict, left),
     )  # fmt: skip
     copy = None if json_copy in (None, "-") else Path(str(json_copy))
-    more = {REPORT: partial(_page, units=opened.units)} if report else None
+    more = {REPORT: partial(_page, units=opened.units)} if report else {}
+    if frd and result.model is not None:
+        labels = opened.about.labels if opened.about is not None else None
+        more["solution.frd"] = partial(output.write_frd, labels=labels)
     output.save(result, place, copy, more)
     if json_copy == "-":
         click.echo(output.to_json(output.summary(result)), nl=False)

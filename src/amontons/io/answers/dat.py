@@ -1,4 +1,4 @@
-"""Tables of CalculiX, `.dat`: displacements that `*NODE PRINT` has printed, with seven digits."""
+"""Tables of CalculiX, `.dat`: displacements that `*NODE PRINT` prints, with seven digits."""
 
 from __future__ import annotations
 

@@ -22,7 +22,8 @@ HEAD, WIDTH = 13, 12  # columns before the values of a node, and of each value
 SHORT = 8  # columns before the values where nodes have five digits
 DIGITS = 6
 MOST = 6  # values in one line
-MODEL, NODES, RESULT, NAME = "    1C", "    2C", "  100C", " -4"
+MODEL, NODES, ELEMENTS = "    1C", "    2C", "    3C"
+RESULT, NAME = "  100C", " -4"
 BINARY = ("2", "3")
 
 
@@ -39,18 +40,20 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """Nodes with their points (n, 3), and the blocks of a file in their order."""
+    """Nodes with their points (n, 3), blocks in their order, nodes of elements."""
 
     path: Path
     labels: Index
     points: Array
     blocks: list[Block] = field(default_factory=list)
+    elements: dict[int, list[int]] = field(default_factory=dict)
 
     def named(self, name: str) -> list[Block]:
         """All blocks of a name; raises FileFormatError that tells what there is without one."""
         found = [block for block in self.blocks if block.name == name]
         if not found:
-            known = ", ".join(dict.fromkeys(block.name for block in self.blocks)) or "no results"
+            names = dict.fromkeys(block.name for block in self.blocks)
+            known = ", ".join(names) or "no results"
             raise FileFormatError(
                 f"{self.path}: holds no displacements (block {name}), but {known}; ask for "
                 "them in the deck: *NODE FILE with U"
@@ -74,6 +77,8 @@ def read_frd(path: Path) -> Results:
             _check_text(path, at, line)
             at, labels, points = _table(path, lines, at + 1, 3)
             found = Results(path, labels, points, blocks)
+        elif line.startswith(ELEMENTS) and found is not None:
+            at = _elements(path, lines, at + 1, found.elements)
         elif line.startswith("    1PSTEP"):
             step, at = _whole(line[48:60]), at + 1
         elif line.startswith(RESULT):
@@ -109,13 +114,33 @@ def _check_text(path: Path, at: int, line: str) -> None:
 
 
 def _components(lines: list[str], at: int) -> tuple[int, int]:
-    """Where the values begin, and how many components are printed (not those made of others)."""
+    """Where the values begin, and how many components are printed, not made of others."""
     used = 0
     while at < len(lines) and lines[at].startswith(" -5"):
         made = lines[at][33:38].strip()
         used += made != "1"
         at += 1
     return at, max(used, 1)
+
+
+def _elements(path: Path, lines: list[str], at: int, found: dict[int, list[int]]) -> int:
+    """Fill in the nodes of every element, by its number; the line after them."""
+    label = 0
+    while at < len(lines) and not lines[at].startswith(" -3"):
+        line = lines[at]
+        try:
+            if line.startswith(" -1"):
+                label = int(line[3:13])
+                found[label] = []
+            else:
+                ends = range(3, len(line.rstrip()), 10)
+                found[label] += [int(line[k : k + 10]) for k in ends]
+        except (ValueError, KeyError):
+            raise FileFormatError(
+                f"{path}: line {at + 1}: expected an element or its nodes, got {line[:40]!r}"
+            ) from None
+        at += 1
+    return at + 1
 
 
 def _table(path: Path, lines: list[str], at: int, width: int) -> tuple[int, Index, Array]:

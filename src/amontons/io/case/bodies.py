@@ -21,10 +21,12 @@ if TYPE_CHECKING:
     from ...mechanics.meshes import Mesh
     from ...mechanics.model.parts import Body, Material
 
-NUMBERS = ("young", "poisson", "density")
-GENERAL = ("name", "order", "move")  # keys of every mesh
+NUMBERS = ("young", "poisson", "density", "expansion")
+GENERAL = ("name", "order", "move", "axisymmetric")  # keys of every mesh
 LAWS = {  # of materials, with their keys
-    "linear-elastic": ("young", "poisson", "plane", "density"),
+    "linear-elastic": ("young", "poisson", "plane", "density", "expansion"),
+    "orthotropic-elastic": ("young", "poisson", "shear", "axes", "plane", "density",
+                            "expansion"),
     "neo-hookean": ("young", "poisson"), "ciarlet-geymonat": ("young", "poisson", "a"),
     "rigid": ("density",),
 }  # fmt: skip
@@ -51,6 +53,12 @@ def read_bodies(top: Table, path: Path) -> list[Body]:
         order = table.whole("order", 1)
         if order not in (1, 2):
             raise table.error("order", f"expected 1 or 2, got {order}")
+        around = table.data.get("axisymmetric", False)
+        if not isinstance(around, bool):
+            raise table.error("axisymmetric", f"expected true or false, got {shown(around)}")
+        if around:
+            with table.blamed("axisymmetric"):
+                mesh = mesh.turned()  # noqa: PLW2901
         with top.blamed("material"):
             bodies.append(Body(mesh, law, name, order))
     return bodies
@@ -203,6 +211,9 @@ def read_material(table: Table) -> Material | Rigid:
     if law == "rigid":
         with table.blamed():
             return Rigid(density)
+    plane = table.choice("plane", ("strain", "stress"), "strain")
+    if law == "orthotropic-elastic":
+        return _orthotropic(table, plane, density)
     young, poisson = table.number("young"), table.number("poisson")
     with table.blamed():
         if law == "neo-hookean":
@@ -212,5 +223,21 @@ def read_material(table: Table) -> Material | Rigid:
                 young, poisson, table.number("a") if "a" in table.data else None
             )
         return LinearElastic(
-            young, poisson, table.choice("plane", ("strain", "stress"), "strain"), density
+            young, poisson, plane, density, table.number("expansion", 0.0)
         )
+
+
+def _orthotropic(table: Table, plane: str, density: float | None) -> Material:
+    from ...mechanics.model import OrthotropicElastic
+
+    young, poisson, shear = (table.numbers(k, (3,)) for k in ("young", "poisson", "shear"))
+    expansion: Any = 0.0
+    if "expansion" in table.data:
+        several = isinstance(table.data["expansion"], list)
+        expansion = table.numbers("expansion", (3,)) if several else table.number("expansion")
+    given = table.data.get("axes")
+    with table.blamed():
+        if given is None:
+            return OrthotropicElastic(young, poisson, shear, plane=plane, density=density,
+                                      expansion=expansion)  # fmt: skip
+        return OrthotropicElastic(young, poisson, shear, given, plane, density, expansion)

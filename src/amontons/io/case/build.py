@@ -24,7 +24,7 @@ from .keys import key_of
 from .overrides import apply_overrides, check_depth
 from .settings import GENERAL, LIMITS, Settings, make_solver, method_class
 from .tables import Table
-from .values import configuration, on_named, on_surface, pressure_on, vector
+from .values import configuration, on_named, on_surface, pressure_on, temperature_of, vector
 
 if TYPE_CHECKING:
     from ...mechanics.model import Model
@@ -38,7 +38,8 @@ SLIPS = {  # values that are no TOML, and what is meant
 }
 LARGEST_FILE = 2**24  # bytes of a case file; meshes stand in files of their own
 TOP = ("title", "mesh", "wall", "material", "fix", "traction", "pressure", "body_force",
-       "contact", "solver", "continuation", "evolution", "units", *TABLES)  # fmt: skip
+       "temperature", "contact", "solver", "continuation", "evolution", "units",
+       *TABLES)  # fmt: skip
 
 
 def read_case(
@@ -144,6 +145,7 @@ def _model(top: Table, path: Path, title: str) -> Model:
         region = table.text("region") if "region" in table.data else None
         value = vector(table, "value", dim)
         loads.append(BodyForce(value, region=region, **configuration(table)))
+    loads += [temperature_of(table, bodies) for table in top.tables("temperature")]
     if "contact" not in top.data:
         raise top.error("contact", "missing, expected at least one table [[contact]]")
     contacts = [read_contact(table, bodies) for table in top.tables("contact")]
@@ -163,7 +165,7 @@ def _wall_model(top: Table, title: str) -> Model:
     for key in ("mesh", "contact"):
         if key in top.data:
             raise top.error(key, "not with [wall], which makes its meshes and contacts")
-    for key in TABLES:
+    for key in ("temperature", *TABLES):
         if key in top.data:
             raise top.error(key, "not with [wall], which makes its meshes and contacts")
     if "pressure" in top.data:

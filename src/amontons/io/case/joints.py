@@ -108,9 +108,11 @@ def _pretension(table: Table, made: Joints) -> None:
     if ("force" in table.data) == ("length" in table.data):
         raise table.error("", "expected either force, > 0 in tension, or length")
     if "force" in table.data:
-        made.loads.append(NodalForce(name, [scalar(table, "force")]))
+        force: Any = [scalar(table, "force")]
+        made.loads.append(NodalForce(name, force))
     else:
-        made.supports.append(Fix(name, [scalar(table, "length")]))
+        length: Any = [scalar(table, "length")]
+        made.supports.append(Fix(name, length))
 
 
 def _opened(table: Table, made: Joints, name: str) -> tuple[str, str]:

@@ -6,7 +6,8 @@ from typing import Any
 
 from ...core.errors import Address, dotted
 
-LOADS = ("traction", "pressure", "body_force")  # in the order in which a model has them
+# in the order in which a model has them
+LOADS = ("traction", "pressure", "body_force", "temperature")
 FRICTION = {"mu": "coulomb", "mu_across": "coulomb", "direction": "direction",
             "tresca": "tresca", "cap": "cap", "cohesion": "cohesion",
             "stiffness": "stiffness", "stick_stiffness": "stick_stiffness"}  # fmt: skip

@@ -72,7 +72,9 @@ def method_class(method: str) -> type:
         return _checked(load(method), method)
     others = installed(GROUP)
     if method not in others:
-        raise InvalidInput(f"unknown method '{method}'{nearest(method, [*METHODS, *others])}")
+        own = "; one of your own is package.module:Class"
+        known = nearest(method, [*METHODS, *others])
+        raise InvalidInput(f"unknown method '{method}'{known}{own if 'known' in known else ''}")
     return _checked(loaded(others[method]), method)
 
 

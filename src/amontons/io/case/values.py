@@ -58,6 +58,22 @@ def pressure_on(table: Table, bodies: Sequence[Body]) -> Any:
     return Pressure(name, value)
 
 
+def temperature_of(table: Table, bodies: Sequence[Body]) -> Any:
+    """The change of temperature of a table [[temperature]]."""
+    from ...mechanics.model import Temperature
+    from ...mechanics.model.supports import locate
+
+    table.only("value", "region", "on")
+    given = table.need("value", "a number or an expression")
+    value: Any = _entry(table, "value", given, bodies[0].mesh.dim)
+    where = {key: table.text(key) for key in ("region", "on") if key in table.data}
+    if "on" in where:
+        with table.blamed("on"):
+            locate(bodies, where["on"], sets=True)
+    with table.blamed():
+        return Temperature(value, **where)
+
+
 def vector(table: Table, key: str, dim: int, *, free: bool = False) -> list:
     """One number, expression or, for supports, "free" (None) per component."""
     words = "numbers or expressions" + (' or "free"' if free else "")

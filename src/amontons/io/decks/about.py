@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...core.errors import InvalidInput
 from .flat import Deck
 from .history import Course, History
 from .scopes import Index
 from .shapes import SHAPES
+from .stages import Held
 
 if TYPE_CHECKING:
     from ...mechanics.model import Model
@@ -25,7 +28,8 @@ class About:
 
     plane: "", "strain", "stress" or "axisymmetric"; other: types of elements that are
     formulated otherwise, in words; large: NLGEOM; until: the end of the last step; one_way: all
-    loads grow in proportion; at: the model at a time.
+    loads grow in proportion; at: the model at a time.  cells: numbers (k,) of elements in the
+    deck and their nodes (k, n) in the mesh.
     """
 
     labels: Index
@@ -36,12 +40,17 @@ class About:
     until: float
     one_way: bool
     at: Callable[[float], Model]
+    cells: tuple[tuple[Index, Index], ...]
 
     @classmethod
     def of(
-        cls, deck: Deck, history: History, numbers: Index, at: Callable[[float], Model]
-    ) -> About:
-        """Of a flat deck; numbers: of its nodes in the mesh, -1 for one without elements."""
+        cls, deck: Deck, history: History, numbers: Index, stages: Sequence[Held],
+        make: Callable[[Held, float], Model],
+    ) -> About:  # fmt: skip
+        """Of a flat deck; numbers: of its nodes in the mesh, -1 for one without elements.
+
+        make: the model of a stage at a time.
+        """
         labels = np.zeros(len(numbers), dtype=np.int64)
         for names, _ in deck.point_labels:
             labels[names.node_at] = names.node_labels
@@ -57,8 +66,32 @@ class About:
         courses += [course for course, _, _, _ in history.bodies.values()]
         return cls(
             own, len(np.unique(own)) == len(own), SHAPES[deck.blocks[0].kind].plane, other,
-            large, history.until, all(_is_ramp(c, history.until) for c in courses), at,
+            large, history.until, 
+            len(stages) == 1 and all(_is_ramp(c, history.until) for c in courses),
+            partial(_at, tuple(stages), make), _cells(deck, numbers),
         )  # fmt: skip
+
+
+def _cells(deck: Deck, numbers: Index) -> tuple[tuple[Index, Index], ...]:
+    """Elements of every block: what the deck calls them, and their nodes in the mesh."""
+    labels = np.zeros(sum(len(block.nodes) for block in deck.blocks), dtype=np.int64)
+    for names in {id(n): n for n, _ in deck.point_labels}.values():
+        labels[names.element_at] = names.element_labels
+    return tuple(
+        (labels[block.first : block.first + len(block.nodes)], numbers[block.nodes])
+        for block in deck.blocks
+    )
+
+
+def _at(stages: Sequence[Held], make: Callable[[Held, float], Model], time: float) -> Model:
+    """The model at a time, that of the stage which ends there where two meet."""
+    begun = [stage for stage in stages if stage.begin < time] or list(stages[:1])
+    if any(c is not None and c.is_open for _, courses in begun[-1].supports for c in courses):
+        raise InvalidInput(
+            "the deck holds nodes where a step has brought them (FIXED, or a support that "
+            "comes later): an audit of its state at the end needs to know where that is"
+        )
+    return make(begun[-1], time)
 
 
 def _is_ramp(course: Course, until: float) -> bool:

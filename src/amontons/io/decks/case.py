@@ -22,6 +22,7 @@ from ...mechanics.model import (
     Pressure,
     Reference,
     Spring,
+    Temperature,
 )
 from ...mechanics.model.beside import Beside
 from ...mechanics.model.constraints import Constraint
@@ -31,6 +32,7 @@ from ..case.evolution import Evolution
 from ..case.overrides import override_settings
 from ..case.settings import Settings
 from ..readers import Case
+from .about import About
 from .axes import Turned
 from .cards import Card, Row, read_cards
 from .contacts import Options, adjusted, law_of, read_contacts
@@ -140,19 +142,20 @@ def _case(
     _name_faces(region, history)
     mesh, at = region.mesh(title)
     mesh = adjusted(mesh, at, pairs, notes)
-    _loads(found, region, history, at)
+    _loads(found, region, history, at, notes)
     law = partial(law_of, options=options, notes=notes)
     for stage in stages:
         _supports(found, stage, region, history, at, notes)
         stage.contacts = stage.contacts_of(pairs, mesh, law)
     found.cards["contacts"] = [pair.card for pair in pairs]
-    materials = {s.name: s.material.law(region.plane) for s in sections}
+    materials = {s.name: s.law(region.plane) for s in sections}
     make = partial(_model, [Body(mesh, materials)], found, title)
     later = tuple(Stage(s.begin, partial(_of_state, make, s)) for s in stages[1:])
     plan = Schedule(*times_of(history, options.increments, notes), stages=later)
     case = Case(make(stages[0], None), settings, title, path,
                 evolution=Evolution(plan, history.until), key_of=found.line_of,
-                tables={"deck": {"cards": deck.digest}}, notes=tuple(notes))  # fmt: skip
+                tables={"deck": {"cards": deck.digest}}, notes=tuple(notes),
+                about=About.of(deck, history, at, stages, make))  # fmt: skip
     if later or (len(deck.steps) > 1 and any(c.mu for c in stages[0].contacts)):
         return case  # friction remembers the steps before
     return replace(case, target=make(stages[0], history.until), moving=case.target)
@@ -214,6 +217,8 @@ def _name_nodes(region: Region, history: History, stages: Sequence[Held]) -> Non
         stage.name([nodes for nodes, _, _ in groups], region.node_sets)
     for k, (nodes, _, _) in enumerate(history.forces.groups(region.dim)):
         region.node_sets[f"force {k + 1}"] = nodes
+    for k, (nodes, _, _) in enumerate(history.heat.groups() if history.heat else ()):
+        region.node_sets[f"temperature {k + 1}"] = nodes
 
 
 def _name_faces(region: Region, history: History) -> None:
@@ -246,7 +251,9 @@ def _supports(
                 found.cards["supports"].append(card)
 
 
-def _loads(found: Found, region: Region, history: History, at: Index) -> None:
+def _loads(
+    found: Found, region: Region, history: History, at: Index, notes: list[str]
+) -> None:
     dim, share = region.dim, 1.0 / region.thickness
     for k, (nodes, courses, card) in enumerate(history.forces.groups(dim)):
         name = f"force {k + 1}"
@@ -254,6 +261,15 @@ def _loads(found: Found, region: Region, history: History, at: Index) -> None:
             label = region.deck.node_name(int(nodes[at[nodes] < 0][0]))
             raise card.error(f"node {label}: belongs to no element, where does its force go?")
         found.add("loads", (NodalForce, name, [_scaled(c, share) for c in courses]), card)
+    grows = any(section.material.grows for section in region.sections)
+    for k, (nodes, change, card) in enumerate(history.heat.groups() if history.heat else ()):
+        if not grows:
+            notes.append(f"{card} (line {card.number}): no material has an *EXPANSION")
+            break
+        name = f"temperature {k + 1}"
+        _without_elements(region, name, nodes, at)
+        if len(region.node_sets[name]):
+            found.add("loads", (Temperature, name, change), card)
     for (name, label), (course, card, _) in history.faces.items():
         found.add("loads", (Pressure, _loaded(name, label), course), card)
     for name, (course, way, card, scope) in history.bodies.items():
@@ -307,6 +323,8 @@ def _model(
     for kind, name, courses in found.loads:
         if kind is NodalForce:
             loads.append(NodalForce(name, [value(c) for c in courses]))
+        elif kind is Temperature:
+            loads.append(Temperature(value(courses), on=name))
         elif kind is Pressure:
             loads.append(Pressure(name, value(courses)))
         else:

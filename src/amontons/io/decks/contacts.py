@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ...core.errors import InvalidInput
-from ...mechanics.contact.pairs import pair_contact, project
-from ...mechanics.meshes import Facets, Mesh
-from ...mechanics.meshes.cells import CELLS, FACET_KIND
+from ...mechanics.contact import pair_contact
+from ...mechanics.contact.pairs import project
+from ...mechanics.meshes import Mesh
+from ...mechanics.meshes.facets import linear_parts
 from ...mechanics.meshes.surfaces import nodal_normals
 from ...mechanics.model import Contact
 from ...problem.law import ExponentialOverclosure, OverclosureCurve
@@ -31,6 +32,7 @@ from .scopes import Index, missing
 Array = NDArray[np.float64]
 ASIDE = {"HCRIT", "NOTHICKNESS", "SMALLSLIDING", "EXTENSIONZONE", "GEOMETRICCORRECTION",
          "SUPPLEMENTARYCONSTRAINTS", "WEIGHT", "TRACKING", "CPSET", "SMOOTH"}  # fmt: skip
+ROUNDING = 1e-12  # of the coordinates: distances below are none
 NEAR = 0.025  # of the size of a facet: a slave node that is tied without a tolerance
 TABLE = 60  # points of the law with a tension far away
 
@@ -343,25 +345,6 @@ def _slave(
 
 
 # ----------------------------------------------------------------------------- adjusting
-def _before_master(mesh: Mesh, points: Array, pair: Pair) -> tuple[Index, Array, Array]:
-    """Slave nodes with a master facet before them, their gaps, and the normals of that.
-
-    Facets of second order are taken by their corners, nodes between them as the others.
-    """
-    facets = mesh.surface(pair.slave)
-    nodes = np.unique(np.concatenate([block.nodes.ravel() for block in facets]))
-    flat = tuple(
-        Facets(FACET_KIND[mesh.dim, count], block.nodes[:, :count])
-        for block in mesh.surface(pair.master)
-        for count in [CELLS[block.kind].corner_count]
-    )
-    facing = nodal_normals(points, facets)[nodes]
-    hit = project(points[nodes], points, flat, facing=facing, own=nodes)
-    found, normals = hit.found, hit.normal[hit.found]
-    nodes = nodes[found]
-    return nodes, np.einsum("ij,ij->i", points[nodes] - hit.closest[found], normals), normals
-
-
 def adjusted(mesh: Mesh, at: Index, pairs: Sequence[Pair], notes: list[str]) -> Mesh:
     """The mesh with slave nodes put onto their master where a pair asks for it.
 
@@ -371,7 +354,8 @@ def adjusted(mesh: Mesh, at: Index, pairs: Sequence[Pair], notes: list[str]) -> 
     for pair in pairs:
         if pair.adjust is None:
             continue
-        nodes, gap, normals = _before_master(mesh, points, pair)
+        moved = replace(mesh, points=points)
+        nodes, gap, normals = _distances(moved, pair)
         if isinstance(pair.adjust, float):
             chosen = gap <= pair.adjust
         else:
@@ -392,3 +376,18 @@ def adjusted(mesh: Mesh, at: Index, pairs: Sequence[Pair], notes: list[str]) -> 
         if pair.within is not None:
             pair.glue(mesh)
     return mesh
+
+
+def _distances(mesh: Mesh, pair: Pair) -> tuple[Index, Array, Array]:
+    """Slave nodes (k,) with a master in front of them, distances (k,) and normals (k, d)."""
+    if mesh.order == 1:
+        rows, _, _ = pair_contact(mesh, pair.slave, mesh, pair.master)
+        return rows.nodes, rows.gap, rows.frames[:, 0]
+    slave, master = (linear_parts(mesh.surface(name)) for name in (pair.slave, pair.master))
+    nodes = np.unique(np.concatenate([block.nodes.ravel() for block in slave]))
+    normals, x = nodal_normals(mesh.points, slave)[nodes], mesh.points[nodes]
+    hit = project(x, mesh.points, master, facing=normals, search=np.inf, own=nodes)
+    at = np.flatnonzero(hit.found)
+    gap = np.einsum("kc,kc->k", x[at] - hit.closest[at], hit.normal[at])
+    gap[np.abs(gap) < ROUNDING * np.abs(mesh.points).max()] = 0.0
+    return nodes[at], gap, hit.normal[at]

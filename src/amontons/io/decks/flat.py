@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from .cards import Card, Row, digest_of, number, whole
+from .placement import motion
 from .scopes import Index, Names, Scope, missing
 from .shapes import SHAPES
 
@@ -145,34 +145,8 @@ def _assemble(deck: Deck, cards: Sequence[Card], parts: dict[str, list[Card]]) -
         before = len(deck._points)
         for each in (*parts[part], *inner):
             _take(deck, each, scope)
-        move = _motion(card)
+        move = motion(card)
         deck._points[before:] = [move(points) for points in deck._points[before:]]
-
-
-def _motion(card: Card) -> Callable[[Array], Array]:
-    """How an instance stands: translated, then turned about an axis by an angle in degrees."""
-    rows = [row for row in card.rows() if any(row.fields)]
-    shift, about, turn = np.zeros(WIDTH), np.zeros(WIDTH), np.eye(WIDTH)
-    for row in rows[:2]:
-        values = [number(text, row, "instance") for text in row.fields]
-        if len(values) <= WIDTH:
-            shift[: len(values)] = values
-        elif len(values) == 7:
-            about = np.array(values[:3])
-            turn = _rotation(np.array(values[3:6]) - about, np.deg2rad(values[6]), row)
-        else:
-            raise row.error(
-                "instance: expected a translation (3 numbers) or an axis and an angle (7), "
-                f"got {len(values)}"
-            )
-    return lambda points: (points + shift - about) @ turn.T + about
-
-
-def _rotation(axis: Array, angle: float, row: Row) -> Array:
-    size = float(np.linalg.norm(axis))
-    if not size:
-        raise row.error("instance: the two points of the axis are one")
-    return np.asarray(Rotation.from_rotvec(angle / size * axis).as_matrix())
 
 
 # --------------------------------------------------------------------------------- cards

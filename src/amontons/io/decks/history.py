@@ -12,12 +12,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .cards import Card, Row, number, whole
 from .flat import Deck, Placed
+from .heat import Heat
 from .scopes import Index, Scope, missing
 
 Array = NDArray[np.float64]
@@ -151,6 +153,7 @@ class History:
     faces: dict[tuple[str, str], tuple[Course, Card, Scope]] = field(default_factory=dict)
     bodies: dict[str, tuple[Course, Array, Card, Scope]] = field(default_factory=dict)
     spans: list[Span] = field(default_factory=list)
+    heat: Heat | None = None
     held: list[Index] = field(default_factory=list)
 
     @property
@@ -158,6 +161,7 @@ class History:
         """Times at which anything bends."""
         courses = [*self.supports.courses, *self.forces.courses]
         courses += [each[0] for each in (*self.faces.values(), *self.bodies.values())]
+        courses += self.heat.courses if self.heat else []
         return {t for course in courses for t in course.times}
 
     @property
@@ -171,6 +175,7 @@ def read_history(deck: Deck, before: Sequence[Placed], steps: Sequence[Sequence[
     """Follow the steps; raises FileFormatError with the line of what can not be followed."""
     shape = (len(deck.points), COMPONENTS)
     history = History(Prescribed(np.full(shape, FREE)), Prescribed(np.full(shape, FREE)))
+    history.heat = Heat.of(len(deck.points), before)
     amplitudes = _amplitudes([p.card for p in before])
     first = _span(steps[0], 0.0)
     for each in before:
@@ -255,6 +260,8 @@ def _follow(history: History, step: Sequence[Placed], span: Span, known: Amplitu
             _boundary(history, each, span, known, step=k)
         elif key == "CLOAD":
             _forces(history, each, span, known, given)
+        elif key == "TEMPERATURE" and history.heat is not None:
+            history.heat.give(each, Course, partial(_course, span=span, known=known))
         elif key in ("DLOAD", "DSLOAD"):
             _distributed(history, each, span, known)
 

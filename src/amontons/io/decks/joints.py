@@ -22,6 +22,7 @@ from .flat import Deck, Placed
 from .meshing import Region
 from .mpc import mpc_equations
 from .scopes import Index, missing
+from .sections import face_nodes, nodes_of, open_along
 
 Array = NDArray[np.float64]
 TRANSLATIONS = 3
@@ -165,7 +166,7 @@ class Joints:
             nodes = placed.scope.nodes(card.name("NSET"), row)
         else:
             chosen = placed.scope.elements(card.name("ELSET"), row)
-            nodes = _nodes_of(self.deck, chosen)
+            nodes = nodes_of(self.deck, chosen)
         own = [*self.turns, lead]
         name = f"rigid body {len(self.couplings) + 1}"
         self.sets[name] = nodes[~np.isin(nodes, own)]
@@ -198,7 +199,7 @@ class Joints:
         name = f"section {len(self.bolts) + 1}"
         self.bolts.append(Bolt(node, (name, f"{name} opposite"), normal, card))
         self.faces.append((name, placed))
-        _open(self.deck, [e for e, _ in faces], _face_nodes(self.deck, faces, card), card)
+        open_along(self.deck, [e for e, _ in faces], face_nodes(self.deck, faces, card), card)
 
     def _spring(self, placed: Placed) -> None:
         card = placed.card
@@ -267,66 +268,6 @@ def _components(card: Card) -> tuple[int, ...] | None:
             raise row.error(f"{card}: expected components from 1 to 6, got {first} to {last}")
         chosen |= {k - 1 for k in range(first, last + 1) if k <= TRANSLATIONS}
     return tuple(sorted(chosen)) if chosen and len(chosen) < TRANSLATIONS else None
-
-
-def _nodes_of(deck: Deck, elements: Index) -> Index:
-    """All nodes of some elements."""
-    found = [
-        block.nodes[elements[(elements >= block.first)
-                             & (elements < block.first + len(block.nodes))] - block.first]
-        for block in deck.blocks
-    ]  # fmt: skip
-    return np.unique(np.concatenate([nodes.ravel() for nodes in found]))
-
-
-def _face_nodes(deck: Deck, faces, card: Card) -> Index:  # noqa: ANN001
-    """Nodes of the faces of a section."""
-    from .shapes import SHAPES, side_of
-
-    out = []
-    for elements, label in faces:
-        for block in deck.blocks:
-            inside = (elements >= block.first) & (elements < block.first + len(block.nodes))
-            own = elements[inside] - block.first
-            sides, side = SHAPES[block.kind].sides, side_of(label)
-            if len(own) and (side is None or not 0 <= side < len(sides)):
-                raise card.error(f"face {label}: expected S1 to S{len(sides)}")
-            if len(own) and side is not None:
-                out.append(block.nodes[own][:, sides[side]].ravel())
-    return np.unique(np.concatenate(out))
-
-
-def _open(deck: Deck, elements: Sequence[Index], section: Index, card: Card) -> None:
-    """Give the elements on the side of the faces nodes of their own, as CalculiX does."""
-    middle = deck.points[section].mean(axis=0)
-    own = np.concatenate(elements)
-    corners = [
-        (block, k, deck.points[block.nodes[k]].mean(axis=0))
-        for block in deck.blocks
-        for k in np.flatnonzero(np.isin(block.nodes, section).any(axis=1))
-    ]  # fmt: skip
-    spread = deck.points[section] - middle
-    plane = np.linalg.svd(spread, full_matrices=True)[2]
-    normal = plane[-1] if np.ptp(deck.points[:, 2]) else _in_plane(plane[0])
-    inside = [c for block, k, c in corners if block.first + k in set(own.tolist())]
-    side = np.sign((np.mean(inside, axis=0) - middle) @ normal)
-    new = np.arange(len(deck.points))
-    new[section] = len(deck.points) + np.arange(len(section))
-    moved = [(block, k) for block, k, c in corners if np.sign((c - middle) @ normal) == side]
-    if len(moved) == len(corners):
-        raise card.error("SURFACE: no elements lie on the other side of the section")
-    for j, block in enumerate(deck.blocks):
-        rows = [k for other, k in moved if other is block]
-        nodes = block.nodes.copy()
-        nodes[rows] = new[nodes[rows]]
-        deck.blocks[j] = replace(block, nodes=nodes)
-    for node in section:
-        deck.doubled[int(new[node])] = int(node)
-    deck.points = np.concatenate([deck.points, deck.points[section]])
-
-
-def _in_plane(along: Array) -> Array:
-    return np.array([-along[1], along[0], 0.0])
 
 
 READERS = {

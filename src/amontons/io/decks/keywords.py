@@ -15,7 +15,8 @@ READ = {
     "SURFACEBEHAVIOR", "FRICTION", "CONTACTPAIR", "BOUNDARY", "AMPLITUDE", "STEP", "STATIC",
     "CLOAD", "DLOAD", "DSLOAD", "EQUATION", "MPC", "TIE", "TRANSFORM", "COUPLING", "KINEMATIC",
     "DISTRIBUTING", "RIGIDBODY", "PRE-TENSIONSECTION", "SPRING", "CLEARANCE",
-    "CHANGEFRICTION", "CHANGESURFACEBEHAVIOR", "MODELCHANGE",
+    "CHANGEFRICTION", "CHANGESURFACEBEHAVIOR", "MODELCHANGE", "EXPANSION", "TEMPERATURE",
+    "ORIENTATION",
 }  # fmt: skip
 OUTPUT = {
     "NODEPRINT", "NODEFILE", "NODEOUTPUT", "ELPRINT", "ELFILE", "ELEMENTOUTPUT", "CONTACTFILE",
@@ -29,14 +30,12 @@ NUMERICS = {  # how another program iterates
     "HOURGLASSSTIFFNESS",
 }  # fmt: skip
 THERMAL = {  # without a change of temperature they change nothing
-    "EXPANSION", "CONDUCTIVITY", "SPECIFICHEAT", "PHYSICALCONSTANTS", "GAPCONDUCTANCE",
-    "INITIALCONDITIONS",
+    "CONDUCTIVITY", "SPECIFICHEAT", "PHYSICALCONSTANTS", "GAPCONDUCTANCE",
 }  # fmt: skip
 EMPTY = {"SYSTEM"}  # of no effect without an option
 MEANS = {  # what a card would have done
     "PLASTIC": "the material would yield", "HYPERELASTIC": "the material would be rubber",
-    "ORIENTATION": "the axes of a material are turned", "DYNAMIC": "inertia would act",
-    "TEMPERATURE": "the bodies would grow and shrink",
+    "DYNAMIC": "inertia would act",
     "GAP": "contact elements would act",
     "FREQUENCY": "vibrations would be computed", "BUCKLE": "buckling would be computed",
     "CONTACT": "surfaces in contact would be found",
@@ -56,7 +55,7 @@ def sorted_out(cards: Iterable[Card], allowed: Sequence[str]) -> tuple[list[Card
         key = card.keyword
         if key in allow:
             notes.append(f"AT YOUR RISK: {card} (line {card.number}) is left out{_would(key)}")
-        elif key in READ:
+        elif key in READ or _is_first_temperature(card):
             kept.append(card)
         elif key in OUTPUT | NUMERICS | EMPTY or _is_thermal(card):
             skipped.setdefault(str(card), []).append(card.number)
@@ -72,10 +71,12 @@ def sorted_out(cards: Iterable[Card], allowed: Sequence[str]) -> tuple[list[Card
 
 
 def _is_thermal(card: Card) -> bool:
-    if card.keyword == "INITIALCONDITIONS":
-        return card.label("TYPE") == "TEMPERATURE"
     return card.keyword in THERMAL
 
 
 def _would(key: str) -> str:
     return f" ({MEANS[key]})" if key in MEANS else ""
+
+
+def _is_first_temperature(card: Card) -> bool:
+    return card.keyword == "INITIALCONDITIONS" and card.label("TYPE") == "TEMPERATURE"

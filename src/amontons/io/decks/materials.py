@@ -4,31 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from ...core.errors import InvalidInput
 from ...mechanics.elements.elasticity import LinearElastic
+from ...mechanics.elements.orthotropic import OrthotropicElastic
 from .cards import Card, Row, number
+from .elastic import Axes, Elastic, axes_of, elastic, expansion, first_row, read_orientations
 from .flat import Deck, Placed
 from .scopes import Index, missing
-
-PLANES = {"": "strain", "strain": "strain", "stress": "stress", "axisymmetric": "strain"}
-
-
-@dataclass(frozen=True)
-class Elastic:
-    """Young's modulus and Poisson's ratio, and the density where one is given."""
-
-    young: float
-    poisson: float
-    density: float | None
-    card: Card
-
-    def law(self, plane: str) -> LinearElastic:
-        """The material for a plane state; raises FileFormatError for what is none."""
-        try:
-            return LinearElastic(self.young, self.poisson, PLANES[plane], self.density)
-        except InvalidInput as reason:
-            raise self.card.error(str(reason)) from None
 
 
 @dataclass(frozen=True)
@@ -40,6 +24,11 @@ class Section:
     material: Elastic
     thickness: float
     card: Card
+    axes: Axes | None = None
+
+    def law(self, plane: str) -> LinearElastic | OrthotropicElastic:
+        """The material for a plane state, in the axes of the section."""
+        return self.material.law(plane, self.axes)
 
 
 @dataclass
@@ -63,51 +52,33 @@ def read_materials(cards: Sequence[Card]) -> dict[str, Elastic]:
     """The materials by name."""
     found: dict[str, Elastic] = {}
     density: dict[str, float] = {}
+    grows: dict[str, Any] = {}
     current: Card | None = None
     for card in cards:
         if card.keyword == "MATERIAL":
             current = card
             if card.name("NAME") in found:
                 raise card.error(f"NAME: material {card.name('NAME')} is there already")
-        elif card.keyword in ("ELASTIC", "DENSITY"):
+        elif card.keyword in ("ELASTIC", "DENSITY", "EXPANSION"):
             if current is None:
                 raise card.error("stands before the first *MATERIAL")
             name = current.name("NAME")
             if card.keyword == "DENSITY":
-                density[name] = number(_first(card).fields[0], _first(card), "density")
+                density[name] = number(first_row(card).fields[0], first_row(card), "density")
+            elif card.keyword == "EXPANSION":
+                grows[name] = expansion(card)
             else:
-                found[name] = _elastic(card)
+                found[name] = elastic(card)
     return {
-        name: Elastic(e.young, e.poisson, density.get(name), e.card)
+        name: replace(e, density=density.get(name), expansion=grows.get(name, 0.0))
         for name, e in found.items()
     }
-
-
-def _elastic(card: Card) -> Elastic:
-    kind = card.label("TYPE") or "ISO"
-    if kind not in ("ISO", "ISOTROPIC"):
-        raise card.error(f"TYPE={kind}: is not read, expected ISOTROPIC (two constants)")
-    rows = list(card.rows())
-    if len(rows) > 1:
-        raise rows[1].error("*ELASTIC: constants at several temperatures are not read")
-    row = _first(card)
-    if len(row.fields) < 2:
-        raise row.error(f"*ELASTIC: expected two constants, got {len(row.fields)}")
-    values = [number(text, row, "*ELASTIC") for text in row.fields[:2]]
-    return Elastic(values[0], values[1], None, card)
-
-
-def _first(card: Card) -> Row:
-    """The first data line."""
-    for row in card.rows():
-        return row
-    raise card.error("expected a line of data, got none")
 
 
 def read_sections(deck: Deck, placed: Sequence[Placed]) -> list[Section]:
     """Which elements are of which material."""
     materials = read_materials([p.card for p in placed])
-    found = []
+    turned, found = read_orientations([p.card for p in placed]), []
     for each in placed:
         card = each.card
         if card.keyword != "SOLIDSECTION":
@@ -124,7 +95,8 @@ def read_sections(deck: Deck, placed: Sequence[Placed]) -> list[Section]:
         elements = each.scope.elements(title, place)
         inside = each.scope.own.title
         found.append(Section(f"{inside}.{title}" if inside else title, elements,
-                             materials[name], thickness, card))  # fmt: skip
+                             materials[name], thickness, card,
+                             axes_of(card, turned)))  # fmt: skip
     if not found:
         raise InvalidInput("*SOLID SECTION: missing, expected one that gives a material")
     return found

@@ -47,23 +47,27 @@ WEDGE15 = (
 )  # fmt: skip
 REDUCED = "one point of integration there, full here: no motions without energy"
 INCOMPATIBLE = "incompatible modes there, none here"
+MODES = "incompatible modes that pass the patch test; those of CalculiX do on parallelepipeds"
+THIN = "no stress across the plane; CalculiX has a solid there, whose thickness changes evenly"
 
 
 def _planes() -> dict[str, Shape]:
     found = {}
     for prefix, plane in (("CPE", "strain"), ("CPS", "stress"), ("CAX", "axisymmetric")):
+        thin = THIN if plane == "stress" else ""
         for name, cell, nodes, sides in (
             ("3", "tri", 3, TRI), ("4", "quad", 4, QUAD), ("6", "tri6", 6, TRI6),
             ("8", "quad8", 8, QUAD8),
         ):  # fmt: skip
-            found[prefix + name] = Shape(cell, nodes, sides, plane)
+            few = "reduced" if prefix + name == "CAX3" else "full"  # one point
+            found[prefix + name] = Shape(cell, nodes, sides, plane, thin, few)
             if name == "8":
-                found[f"{prefix}8R"] = Shape(cell, nodes, sides, plane, "", "reduced")
+                found[f"{prefix}8R"] = Shape(cell, nodes, sides, plane, thin, "reduced")
             if name == "4":
                 found[f"{prefix}4R"] = Shape(cell, nodes, sides, plane, REDUCED)
                 found[f"{prefix}4I"] = (
                     Shape(cell, nodes, sides, plane, INCOMPATIBLE) if plane == "axisymmetric"
-                    else Shape(cell, nodes, sides, plane, "", "incompatible")
+                    else Shape(cell, nodes, sides, plane, MODES, "incompatible")
                 )  # fmt: skip
     return found
 
@@ -71,7 +75,7 @@ def _planes() -> dict[str, Shape]:
 SHAPES = {
     "C3D4": Shape("tet", 4, TET), "C3D10": Shape("tet10", 10, TET10),
     "C3D8": Shape("hex", 8, HEX), "C3D8R": Shape("hex", 8, HEX, note=REDUCED),
-    "C3D8I": Shape("hex", 8, HEX, integration="incompatible"),
+    "C3D8I": Shape("hex", 8, HEX, note=MODES, integration="incompatible"),
     "C3D6": Shape("wedge", 6, WEDGE, integration="reduced"),
     "C3D15": Shape("wedge15", 15, WEDGE15, integration="reduced"),
     "C3D20": Shape("hex20", 20, HEX20),

@@ -12,6 +12,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from ...analysis.audit import Audit
 from ...analysis.basins.study import Basins
 from ...analysis.paths.diagram import Diagram
 from ...analysis.paths.path import Branch
@@ -20,6 +21,7 @@ from ...core.errors import InvalidInput, shown
 from ...mechanics.steps import TimeStep
 from ...problem.solution import Convergence, FrictionSolution
 from ..results import Output, expect_picture
+from .audit import audit_figure
 from .basins import basins_figure
 from .branch import branch_figure
 from .convergence import convergence_figure
@@ -96,3 +98,8 @@ def _(result: Sequence[TimeStep], **options: Any) -> Figure:
 @figure_of.register
 def _(result: Basins, **options: Any) -> Figure:
     return basins_figure(result, **options)
+
+
+@figure_of.register
+def _(result: Audit, **options: Any) -> Figure:
+    return audit_figure(result, **options)

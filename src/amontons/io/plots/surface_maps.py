@@ -10,6 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from numpy.typing import NDArray
 
+from ...mechanics.meshes.cells import CELLS
+from ...mechanics.meshes.facets import corner_facets
 from ...problem.solution import ContactStatus
 from .contact_pairs import ContactPair
 from .style import COLOURS, INK, round_below
@@ -19,12 +21,14 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Patches = Iterator[tuple[Array, NDArray[np.int64]]]  # polygons (k, 4, 2) and their nodes
-QUARTERS = {"quad9": ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3))}
+QUARTERS = {"quad9": ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3)),
+            "quad8": ((0, 4, 1, 5, 2, 6, 3, 7),)}  # fmt: skip
 HEAT = "YlOrRd"
 TINY = 1e-300  # instead of a largest pressure of 0
 KEY = 0.36  # inches of the key of the arrows below its panel
 MAX_ARROWS = 400
 ARROW_LENGTH = 2.2  # of the longest, in spacings of the arrows: neighbours stay apart
+LONGEST = 0.25  # of the surface, where contacts are few
 
 
 def draw_maps(
@@ -89,8 +93,14 @@ def _node_patches(
     contact = np.full(len(points), -1)
     contact[pair.node] = np.arange(len(pair.node))
     for facets in pair.facets:
+        middles = facets.nodes[:, CELLS[facets.kind].corner_count :]
+        if (contact[middles] < 0).all():  # averages sit at corners
+            facets = corner_facets(facets)  # noqa: PLW2901
         cut = _thirds if facets.kind == "tri6" else _quarters
-        for table in QUARTERS.get(facets.kind, [slice(None)]):
+        tables = QUARTERS.get(facets.kind, [slice(None)])
+        if facets.kind == "quad8" and (contact[facets.nodes[:, 4:]] < 0).all():
+            tables = [slice(4)]  # nodal contact has none at the middles of sides
+        for table in tables:
             for patch, nodes in cut(points, facets.nodes[:, table]):
                 patches.append(patch)
                 owner.append(contact[nodes])
@@ -123,11 +133,12 @@ def _shear_arrows(axes: Axes, pair: ContactPair, origin: Array, view: Array) -> 
         return np.empty((0, 2))
     stride = -(-len(shear) // MAX_ARROWS)
     at, shear = ((pair.points - origin) @ view.T)[::stride], shear[::stride]
-    spacing = np.sqrt(np.prod(np.maximum(np.ptp(at, axis=0), 1e-12)) / len(at))
+    size = np.maximum(np.ptp(at, axis=0), 1e-12)
+    longest = min(ARROW_LENGTH * np.sqrt(np.prod(size) / len(at)), LONGEST * size.max())
     length = np.linalg.norm(shear, axis=1)
     shown = length > 1e-3 * length.max()
     at, shear = at[shown], shear[shown]
-    scale = length.max() / (ARROW_LENGTH * spacing)
+    scale = length.max() / longest
     arrows = axes.quiver(at[:, 0], at[:, 1], shear[:, 0], shear[:, 1], color=INK, angles="xy",
                          scale_units="xy", scale=scale, width=0.003, pivot="tail")  # fmt: skip
     value = round_below(float(length.max()))

@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 from ...mechanics.meshes import Facets, Mesh
 from ...mechanics.meshes.facets import corner_facets
 from ...mechanics.meshes.surfaces import facet_normals
+from .raster import seen
 
 Array = NDArray[np.float64]
 VIEWS = ((25, -55), (-25, 125))  # elevation and azimuth, opposite to each other
 LIGHT = 0.45  # how much darker a facet seen from the side is
 LEGEND_ROWS = 30
+PIXELS = 400  # of the view that tells which facets are hidden, each way
 BOX = {"boxstyle": "round,pad=0.15", "fc": "white", "alpha": 0.8, "lw": 0}  # under a number
 
 
@@ -62,21 +64,23 @@ def _towards(up: float, around: float) -> Array:
 
 
 def _draw_solid(ax: Any, mesh: Mesh, colours: Array, eye: Array) -> None:
-    corners, tints = [], []
+    shown, tints = [], []
     for facets, colour, number in _outer_facets(mesh, colours):
         flat = corner_facets(facets)
         normals = facet_normals(mesh.points, flat)
         cosine = normals @ eye / np.linalg.norm(normals, axis=1)
-        seen = mesh.points[flat.nodes[cosine > 0]]
-        if not len(seen):
+        facing = mesh.points[flat.nodes[cosine > 0]]
+        if not len(facing):
             continue
-        corners += list(seen)
+        shown.append((number, facing))
         tints.append((1 - LIGHT * (1 - cosine[cosine > 0]))[:, None] * colour)
+    for (number, facing), in_front in zip(shown, _in_front(shown, eye), strict=True):
         if number:
-            middles = seen.mean(axis=1)
+            middles = facing[in_front if in_front.any() else slice(None)].mean(axis=1)
             spot = middles[np.argmin(np.linalg.norm(middles - middles.mean(axis=0), axis=1))]
             ax.text(*spot, str(number), fontsize=9, ha="center", va="center", zorder=10,
                     bbox=BOX)  # fmt: skip
+    corners = [facet for _, facing in shown for facet in facing]
     # one collection, so that what is nearer hides what is behind it
     ax.add_collection3d(Poly3DCollection(corners, facecolors=np.concatenate(tints),
                                          edgecolors=(0, 0, 0, 0.15), linewidths=0.2)
@@ -86,6 +90,31 @@ def _draw_solid(ax: Any, mesh: Mesh, colours: Array, eye: Array) -> None:
            xlabel="x", ylabel="y", zlabel="z")  # fmt: skip
     ax.locator_params(nbins=4)
     ax.set_box_aspect(np.maximum(high - low, 0.05 * (high - low).max()))
+
+
+def _in_front(shown: list[tuple[int, Array]], eye: Array) -> Iterator[NDArray[np.bool_]]:
+    """Of facets (k, corners, 3) which have a middle that nothing hides, for each surface."""
+    across = np.cross((0.0, 0.0, 1.0), eye)
+    axes = np.stack([across / np.linalg.norm(across), np.cross(eye, across), eye])
+    axes[1] /= np.linalg.norm(axes[1])
+    views = [facets @ axes.T for _, facets in shown]
+    low = np.min([v.min(axis=(0, 1)) for v in views], axis=0)[:2]
+    high = np.max([v.max(axis=(0, 1)) for v in views], axis=0)[:2]
+    scale = (PIXELS - 1) / max((high - low).max(), 1e-300)
+    fans, owners, count = [], [], 0
+    for view in views:
+        view[:, :, :2] = (view[:, :, :2] - low) * scale
+        for k in range(1, view.shape[1] - 1):
+            fans.append(view[:, [0, k, k + 1]])
+            owners.append(count + np.arange(len(view)))
+        count += len(view)
+    front = seen(np.concatenate(fans), (PIXELS, PIXELS)).triangle
+    owner = np.append(np.concatenate(owners), -1)[front]
+    count = 0
+    for view in views:
+        column, row = np.rint(view.mean(axis=1)[:, :2]).astype(int).T
+        yield owner[row, column] == count + np.arange(len(view))
+        count += len(view)
 
 
 def _outer_facets(mesh: Mesh, colours: Array) -> Iterator[tuple[Facets, Array, int]]:

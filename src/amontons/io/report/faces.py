@@ -10,6 +10,7 @@ from functools import singledispatch
 from pathlib import Path
 from typing import Any
 
+from ...analysis.audit import Audit
 from ...analysis.paths.diagram import Diagram
 from ...analysis.paths.path import Branch
 from ...analysis.solutions.enumerate import Solutions
@@ -19,6 +20,7 @@ from ...problem.friction import FrictionProblem
 from ...problem.solution import FrictionSolution
 from ..results import Output
 from ..units import Units
+from .audits import audit_page
 from .curves import curves_page
 from .page import Page
 from .pages import solutions_page, solve_page
@@ -97,3 +99,8 @@ def _(result: Branch, *, title: str = "", units: Any = None, model: Any = None) 
 def _(result: Diagram, *, title: str = "", units: Any = None, model: Any = None) -> Page:
     return curves_page(result.branches, title or "solution curves", Units.of(units), model,
                        result.reason)  # fmt: skip
+
+
+@page_of.register
+def _(result: Audit, *, title: str = "", units: Any = None) -> Page:
+    return audit_page(result, title, Units.of(units))

@@ -128,11 +128,11 @@ def run_page(
     facts = [["steps", str(len(table))], ["time", f"{times[-1]:.6g} {units.time}".strip()],
              ["largest error", f"{table['error'].max():.1e}"],
              ["solving, all steps", f"{table['seconds'].sum():.3g} s"],
-             ["shown", f"{len(states)} states{shown}: {_span(states)}"]]  # fmt: skip
+             ["shown", f"{_number(len(states), 'state')}{shown}: {_span(states)}"]]  # fmt: skip
     if jumps:
         facts.append(["jumps at t", ", ".join(jumps)])
     return Page(
-        "run", title, headline=f"{len(table)} steps to t = {times[-1]:.6g}",
+        "run", title, headline=f"{_number(len(table), 'step')} to t = {times[-1]:.6g}",
         outcome="Not finished" if note else "All steps made", stamp=stamp,
         verdict=("Not asked", "Every step may have several solutions; “amontons follow” traces "
                  "how they change."),

@@ -27,11 +27,13 @@ WIDER = 0.15  # of the size of the slave, by which a plane is drawn beyond it
 PIECES = {  # facets as lines or triangles of their nodes
     "line": [[0, 1]], "line3": [[0, 2], [2, 1]], "tri": [[0, 1, 2]],
     "tri6": [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]], "quad": [[0, 1, 2], [0, 2, 3]],
+    "quad8": [[0, 4, 7], [4, 1, 5], [5, 2, 6], [6, 3, 7], [4, 5, 6], [4, 6, 7]],
     "quad9": [[0, 4, 8], [0, 8, 7], [4, 1, 5], [4, 5, 8], [8, 5, 2], [8, 2, 6], [7, 8, 6],
               [7, 6, 3]],
 }  # fmt: skip
 RINGS = {"line": [0, 1], "line3": [0, 2, 1], "tri": [0, 1, 2], "tri6": [0, 3, 1, 4, 2, 5],
-         "quad": [0, 1, 2, 3], "quad9": [0, 4, 1, 5, 2, 6, 3, 7]}  # fmt: skip
+         "quad": [0, 1, 2, 3], "quad9": [0, 4, 1, 5, 2, 6, 3, 7],
+         "quad8": [0, 4, 1, 5, 2, 6, 3, 7]}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...linear.blocks import spatial
 from ...mechanics.elements import von_mises
+from ...mechanics.model.temperature import warming
 from ..contact_fields import SLAVE, contact_fields
 from ..vtk import body_stress
 from .skin import Skin
@@ -75,8 +76,9 @@ class Stage:
         at = skin.whole
         mine = at[self.contacts]
         moved = spatial(np.concatenate(fields.displacement))[at]
-        parts = zip(model.bodies, fields.displacement, strict=True)
-        stress = von_mises(np.concatenate([body_stress(body, u)[1] for body, u in parts]))
+        warm = warming(model, getattr(solution, "time", None))
+        parts = zip(model.bodies, fields.displacement, warm, strict=True)
+        stress = von_mises(np.concatenate([body_stress(*part)[1] for part in parts]))
         told = getattr(solution, "solution", solution)
         counts = {name: int((solution.status == k).sum())
                   for k, name in enumerate(("open", "slip", "stick"))}  # fmt: skip

@@ -135,6 +135,8 @@ def mortar_contact(
     apart = average.onto_slave @ slave.points - across @ master.points
     apart += average.of_moments(of, parts.bulge)
     gap = np.einsum("pc,pc->p", axes[:, 0], apart)
+    if over.is_second:
+        gap = _without_overshoot(gap, over, parts, average.nodes)
     size = max(np.abs(mesh.points).max(initial=0.0) for mesh in (slave, master))
     gap[np.abs(gap) < ROUNDING * size] = 0.0
     rows = average.rows(axes, gap, fixed)
@@ -335,6 +337,24 @@ def _gauss_points(side: Surface) -> Iterator[tuple[Index, Array, Array, Array, A
             where = shape @ x
             area = area * around(where, axisymmetric=side.axisymmetric)
             yield of, first.shape(at), shape, area, where
+
+
+def _without_overshoot(
+    gap: Array, over: Surface, parts: Segments, nodes: Index
+) -> Array:
+    """Averaged gaps (nc,) that lie below all distances on the facets around nodes (nc,) raised.
+
+    Averages with functions that change their sign may do so: where facets are long and part
+    quickly, they would overlap without a reason.  Where distances differ by less than they are,
+    as in a press fit, averages of gaps and displacements belong together.
+    """
+    n = len(over.points)
+    least, most = np.full(n, np.inf), np.full(n, -np.inf)
+    around = over.nodes[parts.slave]
+    np.minimum.at(least, around, parts.between[:, :1].repeat(around.shape[1], axis=1))
+    np.maximum.at(most, around, parts.between[:, 1:].repeat(around.shape[1], axis=1))
+    low = least[nodes]
+    return np.where(most[nodes] - low > np.abs(low), np.maximum(gap, low), gap)
 
 
 # -------------------------------------------------------------------- sums over facets

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InvalidInput
-from ..meshes.cells import CELLS
+from ..meshes.cells import CELLS, FIRST
 from ..meshes.check import is_straight
 from ..meshes.facets import Facets, corner_facets
 from ..meshes.mesh import Mesh
@@ -137,7 +137,8 @@ class Segments:
     functions N of the slave's displacement, of first order phi; cross (k, a, w): the same of
     the master's; bulge (k, a, dim): int phi_a times how far the curved slave lies outside of
     its facet, less the same of the master, as vectors; area (k,); gap (k,): mean distance of
-    the facets along the slave's normal, < 0 where they overlap.
+    the facets along the slave's normal, < 0 where they overlap; between (k, 2): the least and
+    the largest distance at their points, of slaves of second order, else infinite.
     """
 
     slave: Index
@@ -148,6 +149,7 @@ class Segments:
     bulge: Array
     area: Array
     gap: Array
+    between: Array
 
     def at(self, chosen: Index | Mask) -> Segments:
         """A selection of these segments."""
@@ -213,8 +215,9 @@ def _joined(parts: list[Segments], slave: Surface, master: Surface) -> Segments:
         for w in (MAX_NODES, slave.all.shape[1], master.all.shape[1])
     )
     empty = Segments(
-        none, none, square, own, cross, np.zeros((0, MAX_NODES, dim)), np.zeros(0), np.zeros(0)
-    )
+        none, none, square, own, cross, np.zeros((0, MAX_NODES, dim)), np.zeros(0), np.zeros(0),
+        np.zeros((0, 2)),
+    )  # fmt: skip
     every = [empty, *parts]
     return Segments(
         *(np.concatenate([getattr(part, one.name) for part in every]) for one in fields(empty))
@@ -292,7 +295,30 @@ def _summed(
     on_master = np.einsum("kb,kbc->kc", cross.sum(axis=1), master.points[master.all[facet]])
     gap = np.einsum("kc,kc->k", on_master - on_slave, slave.normal[of])
     gap /= np.where(area > 0, area, 1.0)
-    return Segments(of, facet, mass, own, cross, bulge, area, gap).at(area > 0)
+    between = np.broadcast_to([-np.inf, np.inf], (k, 2))
+    if slave.is_second and len(pair):
+        between = _distances(slave, master, of, facet, parts)
+    return Segments(of, facet, mass, own, cross, bulge, area, gap, between).at(area > 0)
+
+
+def _distances(
+    slave: Surface, master: Surface, of: Index, facet: Index, parts: Cuts
+) -> Array:
+    """Least and largest distance at points of each pair (k, 2), along the slave's normal."""
+    places = []
+    for side, which, at in ((slave, of, parts.at), (master, facet, parts.opposite)):
+        cell = CELLS[SIDES[int(side.kind[which].max())]]
+        first = CELLS[FIRST.get(cell.kind, cell.kind)]
+        x = side.points[side.all[which, : cell.nodes]][parts.pair]
+        place = functions(cell.kind, at) @ x
+        if not side.curved:
+            place = place + _outside(side, which[parts.pair], functions(first.kind, at))
+        places.append(place)
+    apart = np.einsum("tqc,tc->tq", places[1] - places[0], slave.normal[of][parts.pair])
+    out = np.stack([np.full(len(of), np.inf), np.full(len(of), -np.inf)], axis=1)
+    np.minimum.at(out[:, 0], parts.pair, apart.min(axis=1))
+    np.maximum.at(out[:, 1], parts.pair, apart.max(axis=1))
+    return out
 
 
 def _with(

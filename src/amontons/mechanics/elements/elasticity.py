@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,14 @@ from .pattern import node_pattern
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+
+
+class Elastic(Protocol):
+    """What element loops ask of a law of small strains."""
+
+    def moduli(self, dim: int) -> Array:
+        """d stress_ik / d gradient_jl at [i, j, k, l], (dim, dim, dim, dim), unit of stress."""
+        ...
 
 
 class Isotropic:
@@ -61,15 +69,17 @@ class LinearElastic(Isotropic):
     """Isotropic elasticity: young, unit of stress, > 0; -1 < poisson < 0.5.
 
     plane: "strain" or "stress", read in 2D only.  density: mass per volume (per area in 2D),
-    read by dynamics only.
+    read by dynamics only.  expansion: strain per temperature, see `Temperature`.
     """
 
     young: float
     poisson: float
     plane: str = "strain"
     density: float | None = None
+    expansion: float = 0.0
 
     def __post_init__(self) -> None:
+        number("expansion", self.expansion)
         number("young", self.young)
         number("poisson", self.poisson)
         if self.density is not None:
@@ -131,7 +141,7 @@ def materials_by_region(
 
 
 def stiffness(
-    mesh: Mesh, material: Isotropic | Mapping[str, Isotropic]
+    mesh: Mesh, material: Elastic | Mapping[str, Elastic]
 ) -> sparse.bsr_array:
     """Stiffness matrix (n dim, n dim) in blocks of dim x dim, force per length.
 
@@ -183,11 +193,15 @@ def body_load(mesh: Mesh, force: Array, region: str | None = None) -> Array:
     return load
 
 
-def cell_stress(mesh: Mesh, material: LinearElastic | Materials, displacement: Array) -> Array:
+def cell_stress(
+    mesh: Mesh, material: LinearElastic | Materials, displacement: Array,
+    warming: Array | None = None,
+) -> Array:  # fmt: skip
     """Stress at the centre of every cell, (cells, 3, 3), in the order of mesh.cells.
 
     displacement (n, dim).  In 2D the third row holds the stress across the plane: zero in plane
     stress, poisson (s_xx + s_yy) in plane strain, that around the axis in axisymmetric meshes.
+    warming (n,): change of temperature.
     """
     by_region = materials_by_region(mesh, material)
     parts = []
@@ -198,8 +212,32 @@ def cell_stress(mesh: Mesh, material: LinearElastic | Materials, displacement: A
         if mesh.axisymmetric:
             shape = cell.shape(cell.centre)
             gradient = with_hoop(gradient, x[:, :, 0] @ shape, u[:, :, 0] @ shape)
-        parts.append(law.stress(gradient))
+        stress = law.stress(gradient)
+        if warming is not None:
+            change = warming[block.nodes] @ cell.shape(cell.centre)
+            stress -= change[:, None, None] * held_stress(
+                law, mesh.dim, axisymmetric=mesh.axisymmetric
+            )
+        parts.append(stress)
     return np.concatenate(parts)
+
+
+def held_stress(law: Any, dim: int, *, axisymmetric: bool = False) -> Array:
+    """Stress (3, 3) that would stretch a body as one degree does, unit of stress.
+
+    Zero for laws that do not expand.
+    """
+    out = np.zeros((3, 3))
+    alpha = np.asarray(getattr(law, "expansion", 0.0), dtype=float)
+    if not alpha.any():
+        return out
+    strain = alpha * np.eye(3)
+    if alpha.ndim:
+        strain = law.rotation.T @ np.diag(alpha) @ law.rotation
+    if dim == 2 and not axisymmetric and law.plane == "stress":
+        out[:2, :2] = np.einsum("ijkl,jl->ik", law.moduli(2), strain[:2, :2])
+        return out
+    return np.einsum("ijkl,jl->ik", law.moduli(3), strain)
 
 
 def with_hoop(gradient: Array, r: Array, u: Array) -> Array:

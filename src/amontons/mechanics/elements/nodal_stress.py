@@ -10,7 +10,13 @@ from numpy.typing import NDArray
 from ...core.errors import InvertedCells
 from ..meshes.cells import CELLS, ReferenceCell
 from .cell_loops import nodal_gradients_inplace
-from .elasticity import cell_stress, geometry_of, materials_by_region, with_hoop
+from .elasticity import (
+    cell_stress,
+    geometry_of,
+    held_stress,
+    materials_by_region,
+    with_hoop,
+)
 from .hyperelasticity import cauchy_stress, is_hyperelastic
 
 if TYPE_CHECKING:
@@ -20,19 +26,26 @@ Array = NDArray[np.float64]
 ASIDE = 1e-3  # how far from the apex of a pyramid its gradients are taken: there are none at it
 
 
-def stress_of(mesh: Mesh, material: Any, displacement: Array) -> tuple[Array, Array]:
+def stress_of(
+    mesh: Mesh, material: Any, displacement: Array, warming: Array | None = None
+) -> tuple[Array, Array]:
     """Stress at the centres of the cells, (cells, 3, 3), and at the nodes, (nodes, 3, 3).
 
     material: of a body that deforms; displacement (nodes, dim).  Cauchy stress of hyperelastic
     laws, see `cell_stress` for the others.  Regions keep their laws: a node between them has
-    the mean of their stresses.  Raises InvertedCells where the centre of a cell is.
+    the mean of their stresses.  warming (nodes,): change of temperature.  Raises InvertedCells
+    where the centre of a cell is.
     """
-    of: Any = cauchy_stress if is_hyperelastic(material) else cell_stress
-    at_centres = of(mesh, material, displacement)
-    return at_centres, _at_nodes(mesh, material, displacement, at_centres)
+    if is_hyperelastic(material):
+        at_centres = cauchy_stress(mesh, material, displacement)
+    else:
+        at_centres = cell_stress(mesh, material, displacement, warming)
+    return at_centres, _at_nodes(mesh, material, displacement, at_centres, warming)
 
 
-def _at_nodes(mesh: Mesh, material: Any, displacement: Array, at_centres: Array) -> Array:
+def _at_nodes(
+    mesh: Mesh, material: Any, displacement: Array, at_centres: Array, warming: Array | None
+) -> Array:
     laws = materials_by_region(mesh, material)
     u = np.ascontiguousarray(displacement, dtype=float)
     n, dim = u.shape
@@ -54,6 +67,9 @@ def _at_nodes(mesh: Mesh, material: Any, displacement: Array, at_centres: Array)
             stress = law.stress(mean)
         except InvertedCells:  # at corners, though no cell is at its centre
             return _mean_of_centres(mesh, at_centres)
+        if warming is not None:
+            held = held_stress(law, mesh.dim, axisymmetric=mesh.axisymmetric)
+            stress = stress - warming[at, None, None] * held
         total[at] += volume[at, None, None] * stress
         weight += volume
     missing = weight == 0

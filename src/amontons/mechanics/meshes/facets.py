@@ -20,8 +20,8 @@ class Cells:
     """Cells of one kind in one region: nodes (k, nodes per cell) in VTK order.
 
     integration: of the stiffness of small strains, "full", or "reduced", with fewer points:
-    2 per direction for quad8, quad9, hex20 and hex27, 2 for wedge, 9 for wedge15; or
-    "incompatible", bending modes inside of each quad or hex on its own.
+    1 for tri around an axis, 2 per direction for quad8, quad9, hex20 and hex27, 2 for wedge, 9
+    for wedge15; or "incompatible", bending modes inside of each quad or hex on its own.
     """
 
     kind: str
@@ -45,6 +45,23 @@ def corner_facets(facets: Facets) -> Facets:
     """The same facets as those of first order on their corners; their sides are straight."""
     kind = FIRST.get(facets.kind, facets.kind)
     return Facets(kind, facets.nodes[:, : CELLS[kind].nodes])
+
+
+PARTS = {  # of facets of second order, through all of their nodes
+    "line3": (("line", ((0, 2), (2, 1))),),
+    "tri6": (("tri", ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5))),),
+    "quad8": (("tri", ((0, 4, 7), (4, 1, 5), (5, 2, 6), (6, 3, 7))), ("quad", ((4, 5, 6, 7),))),
+    "quad9": (("quad", ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3))),),
+}
+
+
+def linear_parts(facets: tuple[Facets, ...]) -> tuple[Facets, ...]:
+    """The same surface as facets of first order between all of its nodes."""
+    return tuple(
+        Facets(kind, np.concatenate([block.nodes[:, part] for part in parts]))
+        for block in facets
+        for kind, parts in PARTS.get(block.kind, ((block.kind, (slice(None),)),))
+    )
 
 
 def sides(cells: tuple[Cells, ...], near: NDArray[np.bool_] | None = None) -> dict[int, Index]:

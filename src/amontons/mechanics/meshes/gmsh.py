@@ -232,6 +232,7 @@ def _raw(path: str, names: Names, nodes: tuple[Index, NDArray], elements: Elemen
             )
         dim = DIMENSION.get(kind, 3)
         groups = tuple(names.get((dim, tag), str(tag)) for tag in physical)
-        named = order[place]
-        blocks.append(RawBlock(kind, named[:, ORDER[kind]] if kind in ORDER else named, groups))
+        if kind in ORDER:
+            place = place[:, ORDER[kind]]
+        blocks.append(RawBlock(kind, order[place], groups))
     return RawMesh(points, blocks)

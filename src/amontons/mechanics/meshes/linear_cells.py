@@ -202,7 +202,7 @@ LINEAR = {
     cell.kind: cell
     for cell in (
         _cell("line", ((0,), (1,)), _tensor(np.array([[0], [1]])), _LINE),
-        _cell("tri", _TRI_FACETS, _simplex(2), _TRI, _ONE_IN_TRI),
+        _cell("tri", _TRI_FACETS, _simplex(2), _TRI, _ONE_IN_TRI, _ONE_IN_TRI),
         _cell("quad", _QUAD_FACETS, _tensor(_SQUARE), _QUAD),
         _cell("tet", _TET_FACETS, _simplex(3), _TET, _ONE_IN_TET),
         _cell("hex", _HEX_FACETS, _tensor(_CUBE), _HEX),

@@ -6,6 +6,7 @@ import contextlib
 import io
 import os
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +19,17 @@ from . import gmsh
 from .mesh import Mesh
 from .raw import RawBlock, RawMesh, to_mesh
 from .split import Glue, check_glue, split
+from .write import with_all_kinds
 
 KINDS = {
     "triangle": "tri", "tetra": "tet", "hexahedron": "hex", "triangle6": "tri6",
     "tetra10": "tet10", "hexahedron20": "hex20", "hexahedron27": "hex27",
 }  # fmt: skip
 CAD_SUFFIXES = (".step", ".stp", ".iges", ".igs", ".brep")
+EXPORTS = {
+    suffix: "; export it as .msh, .inp, .med or .vtu, which keep the names of groups"
+    for suffix in (".unv", ".bdf", ".nas", ".cdb", ".neu", ".k")
+}
 TAGS = ("gmsh:physical", "medit:ref", "cell_tags", "MaterialID", "region", "avsucd:material")
 
 
@@ -79,8 +85,13 @@ def file_head(path: Path) -> bytes:
 
 
 def _from_meshio(path: str) -> RawMesh:
+    return mesh_of_meshio(Path(path), _raw)
+
+
+def mesh_of_meshio(path: Path, use: Callable[[Any], Any] = lambda mesh: mesh) -> Any:
+    """What `use` makes of the mesh that meshio reads; raises FileFormatError, said by it."""
     try:
-        import meshio
+        meshio = with_all_kinds()
     except ImportError as error:
         raise MissingDependency(
             f"{path}: this format needs the package meshio: python -m pip install meshio"
@@ -95,9 +106,8 @@ def _from_meshio(path: str) -> RawMesh:
             warnings.catch_warnings(),
         ):
             warnings.simplefilter("ignore")
-            check_file(Path(path))
-            found = meshio.read(path)
-            return _raw(found)
+            check_file(path)
+            return use(meshio.read(path))
     except FileFormatError:
         raise
     # A broken file makes meshio's forty parsers raise anything, or leave the interpreter.
@@ -105,7 +115,7 @@ def _from_meshio(path: str) -> RawMesh:
         reason = " ".join(said.getvalue().split()) or str(error) or type(error).__name__
         raise FileFormatError(
             f"{path}: expected a mesh in gmsh 2.2 or 4.1 or another format of meshio, told by "
-            f"the suffix; {reason}"
+            f"the suffix; {reason}{EXPORTS.get(Path(path).suffix.lower(), '')}"
         ) from None
 
 

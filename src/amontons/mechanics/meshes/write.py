@@ -24,6 +24,15 @@ CELL_TYPES = {
 }  # fmt: skip
 
 
+def with_all_kinds() -> Any:
+    """The package meshio, told the dimension of wedge15, which its own table lacks."""
+    import meshio
+
+    table = getattr(meshio, "_mesh", None)
+    getattr(table, "topological_dimension", {}).setdefault("wedge15", 3)
+    return meshio
+
+
 def write_meshes(
     path: Path,
     meshes: list[Mesh],
@@ -38,8 +47,7 @@ def write_meshes(
     third coordinate is zero.  field_data: numbers of the whole, and remark: a line for those
     who look into the file, both in VTU files only.
     """
-    import meshio
-
+    meshio = with_all_kinds()
     starts = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
     cells: list[Any] = [
         (CELL_TYPES[block.kind], block.nodes + start)

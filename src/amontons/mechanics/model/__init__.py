@@ -2,14 +2,15 @@
 
 from ..elements.elasticity import LinearElastic
 from ..elements.hyperelasticity import CiarletGeymonat, NeoHookean
+from ..elements.orthotropic import OrthotropicElastic
 from ..elements.rigid import Rigid
 from .constraints import Axes, Coupling, Equation, Pretension, Reference, Spring
 from .fields import ContactFields
 from .model import Model
-from .parts import Body, BodyForce, Contact, Fix, NodalForce, Pressure, Traction
+from .parts import Body, BodyForce, Contact, Fix, NodalForce, Pressure, Temperature, Traction
 from .processes import distributed
 
 __all__ = ["Axes", "Body", "BodyForce", "CiarletGeymonat", "Contact", "ContactFields",
            "Coupling", "Equation", "Fix", "LinearElastic", "Model", "NeoHookean", "NodalForce",
-           "Pressure", "Pretension", "Reference", "Rigid", "Spring", "Traction",
-           "distributed"]  # fmt: skip
+           "OrthotropicElastic", "Pressure", "Pretension", "Reference", "Rigid", "Spring",
+           "Temperature", "Traction", "distributed"]  # fmt: skip

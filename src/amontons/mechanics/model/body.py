@@ -9,20 +9,22 @@ from ...core.errors import InvalidInput, shown
 from ...core.words import helpful
 from ..elements.elasticity import LinearElastic, materials_by_region
 from ..elements.hyperelasticity import CiarletGeymonat, NeoHookean
+from ..elements.orthotropic import OrthotropicElastic
 from ..elements.rigid import Rigid
 from ..meshes.mesh import Mesh
 from ..meshes.order import second_order
 
-Material = LinearElastic | NeoHookean | CiarletGeymonat
+Material = LinearElastic | OrthotropicElastic | NeoHookean | CiarletGeymonat
 
 
 @helpful
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A mesh and its material: LinearElastic, NeoHookean or CiarletGeymonat, or one per region.
+    """A mesh and its material, or one per region of it.
 
-    The last two mean finite strains, of all bodies of the model.  Rigid, of the whole body: it
-    moves without deforming, and its mesh only says where it is touched, held and loaded.
+    LinearElastic and OrthotropicElastic mean small strains, NeoHookean and CiarletGeymonat
+    finite ones, of all bodies of the model.  Rigid, of the whole body: it moves without
+    deforming, and its mesh only says where it is touched, held and loaded.
 
     order: 1 or 2, degree of the displacement.  With 2 the mesh becomes one of second order, see
     `second_order`: its points are then all nodes.
@@ -42,8 +44,9 @@ class Body:
             raise InvalidInput(f"mesh: expected a Mesh (see box, read_mesh), got {self.mesh!r}")
         if not isinstance(self.material, Material | Rigid | Mapping):
             raise InvalidInput(
-                "material: expected LinearElastic, NeoHookean, CiarletGeymonat or Rigid, or a "
-                f"dict region -> one of the first three, got {self.material!r}"
+                "material: expected LinearElastic, OrthotropicElastic, NeoHookean, "
+                "CiarletGeymonat or Rigid, or a dict region -> one of the first four, got "
+                f"{self.material!r}"
             )
         if self.order not in (1, 2):
             raise InvalidInput(f"order: expected 1 or 2, got {self.order!r}")
@@ -56,8 +59,8 @@ class Body:
             for region, law in laws.items():
                 if not isinstance(law, Material):
                     raise InvalidInput(
-                        f"material of region {region!r}: expected LinearElastic, NeoHookean or "
-                        f"CiarletGeymonat, got {law!r}"
+                        f"material of region {region!r}: expected LinearElastic, "
+                        f"OrthotropicElastic, NeoHookean or CiarletGeymonat, got {law!r}"
                     )
 
 
@@ -71,8 +74,9 @@ class Body:
             object.__setattr__(self, "mesh", self.mesh.turned())
         object.__setattr__(self, "axisymmetric", self.mesh.axisymmetric)
         for law in laws if self.axisymmetric else ():
-            if not isinstance(law, LinearElastic) or law.plane == "stress":
+            if not isinstance(law, LinearElastic | OrthotropicElastic) or law.plane == "stress":
                 raise InvalidInput(
-                    "axisymmetric: expected LinearElastic without plane='stress', got "
+                    "axisymmetric: expected LinearElastic, or OrthotropicElastic with an axis "
+                    "around, without plane='stress', got "
                     f"{law!r}; large strains and rigid bodies have no axisymmetric form"
                 )

@@ -30,9 +30,15 @@ CHECKS: tuple[Check, ...] = (
     like_percent,
 )
 OF_THE_START = (sliding_beyond_pairs, sliding_beyond_curvature)  # its pairs, normals
+OF_MOTIONS = (large_rotation, *OF_THE_START)
 
 
-def model_warnings(model: Model, fields: ContactFields) -> tuple[ResultWarning, ...]:
-    """All warnings about a solved state of a model, in the order of its checks."""
-    checks = model.formulation.doubts
+def model_warnings(
+    model: Model, fields: ContactFields, converged: bool = True
+) -> tuple[ResultWarning, ...]:
+    """All warnings about a solved state of a model, in the order of its checks.
+
+    What has not converged has no motion that could be judged.
+    """
+    checks = [c for c in model.formulation.doubts if converged or c not in OF_MOTIONS]
     return tuple(warning for check in checks for warning in check(model, fields))

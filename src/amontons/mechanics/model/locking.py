@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ...core.warned import ResultWarning
 from ..elements.elasticity import LinearElastic, materials_by_region
+from ..elements.orthotropic import OrthotropicElastic
 from ..elements.rigid import Rigid
 from ..meshes.cells import CELLS
 from ..meshes.mesh import Mesh
@@ -70,13 +71,16 @@ def _warning(where: str, law: Material, excess: float, remedy: str) -> ResultWar
 
 
 def _nearly_incompressible(law: Material, dim: int) -> bool:
-    """False in plane stress, where the thickness gives way."""
+    """False in plane stress, where the thickness gives way, and of orthotropic laws."""
+    if isinstance(law, OrthotropicElastic):
+        return False
     thin = dim == 2 and isinstance(law, LinearElastic) and law.plane == "stress"
     return law.poisson >= NEARLY and not thin
 
 
 def _excess(mesh: Mesh, region: str, law: Material) -> float:
-    """Estimated stiffness over the true one, minus 1."""
+    """Estimated stiffness over the true one, minus 1; of isotropic laws."""
+    assert not isinstance(law, OrthotropicElastic)
     volumes, squares, kinds = [], [], []
     for block in mesh.cells:
         cell = CELLS[block.kind]

@@ -28,7 +28,7 @@ from .held import check_outside
 from .joined import joined_loose
 from .laws import law_of, rubs
 from .names import named_bodies, pair_names, tuple_of
-from .parts import Body, Contact, Fix, Load, NodalForce
+from .parts import Body, Contact, Fix, Load, NodalForce, Temperature
 from .rigid import Piece, check_held, loose_modes
 from .values import ScalarValue, is_number
 
@@ -97,11 +97,11 @@ class Model(Told):
     def _check_surface(self, part: object, field: str) -> None:
         """Raise InvalidInput for a surface that no body has, or more than one."""
         name, optional = getattr(part, field), field == "master"
-        if name is None and optional:
+        if name is None and (optional or isinstance(part, Temperature)):
             return
         if not isinstance(name, str):
             raise InvalidInput(f"surface: expected a name, got {name!r}")
-        sets = isinstance(part, Fix | NodalForce)
+        sets = isinstance(part, Fix | NodalForce | Temperature)
         if sets and self.beside.named(name) is not None:
             return
         k, surface = locate(self.bodies, name, sets=sets)

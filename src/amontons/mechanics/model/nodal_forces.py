@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import within
 from ..elements.moved_loads import Pair, pressure_forces, traction_forces, volume_forces
-from .parts import CURRENT, BodyForce, Load, Pressure, Traction
+from .parts import CURRENT, BodyForce, Load, Pressure, Temperature, Traction
 from .supports import external_load, locate
 from .values import component_at, is_number, vector_at
 
@@ -160,6 +160,7 @@ def _followers(model: Model, load: Load, at: int) -> list[Follower]:
         ]  # fmt: skip
         what, kernel = "body force", volume_forces
     else:
+        assert not isinstance(load, Temperature)  # it does not follow
         k, surface = locate(model.bodies, load.on)
         blocks = [(facets.kind, facets.nodes + starts[k])
                   for facets in model.bodies[k].mesh.surface(surface)]  # fmt: skip
@@ -171,7 +172,7 @@ def _followers(model: Model, load: Load, at: int) -> list[Follower]:
         with within("loads", at, "value"):
             if isinstance(load, Pressure):
                 return component_at(load.value, x, what)
-            return vector_at(load.value, x, what)
+            return vector_at(load.value, x, what)  # type: ignore[arg-type]  # no temperature
 
     uniform = _is_uniform(load.value)
     return [Follower(kind, nodes, X, kernel, density, uniform) for kind, nodes in blocks]

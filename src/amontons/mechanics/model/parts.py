@@ -25,10 +25,11 @@ from ...problem.law import (
 from ..contact import Nitsche, Obstacle
 from .body import Body, Material
 from .law_numbers import numbers_of
+from .temperature import Temperature
 from .values import ScalarValue, VectorValue, check_scalar, check_vector, pressure_of
 
 __all__ = ["Body", "BodyForce", "Contact", "Fix", "Load", "Material", "NodalForce", "Pressure",
-           "Traction"]  # fmt: skip
+           "Temperature", "Traction"]  # fmt: skip
 Array = NDArray[np.float64]
 BONDS = ("stiffness", "stick_stiffness")  # numbers of a law that ties have too
 METHODS = ("nodal", "mortar", "nitsche")  # "dual-mortar" is another name of the second
@@ -123,7 +124,7 @@ class NodalForce:
     configuration = REFERENCE
 
 
-Load = Traction | Pressure | BodyForce | NodalForce
+Load = Traction | Pressure | BodyForce | NodalForce | Temperature
 
 
 def check_configuration(value: object) -> None:

@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from ...core.errors import InvalidInput, within
 from ..elements.elasticity import body_load
+from ..elements.thermal import thermal_load
 from ..meshes.mesh import Mesh, unknown
 from ..meshes.surfaces import pressure_load, surface_load
 from .parts import Body, BodyForce, Fix, Load, NodalForce, Pressure, Traction
+from .temperature import Temperature, changes, check_expansion
 from .timing import lasting
 from .values import component_at, vector_at
 
@@ -144,19 +146,35 @@ def external_load(
     None stands for a load of the model that is left out, so that others keep their address.
     """
     out, offsets = np.zeros(beside.total), beside.offsets
+    _add_temperature(out, bodies, loads, offsets)
     for at, load in enumerate(loads):
         with within("loads", at):
             if isinstance(load, BodyForce):
                 _add_body_force(out, bodies, load, offsets)
             elif isinstance(load, NodalForce):
                 _add_nodal_force(out, bodies, load, beside)
-            elif load is not None:
+            elif load is not None and not isinstance(load, Temperature):
                 k, surface = locate(bodies, load.on)
                 mesh = bodies[k].mesh
                 part = (_pressed(mesh, surface, load) if isinstance(load, Pressure)
                         else _drawn(mesh, surface, load))  # fmt: skip
                 out[offsets[k] : offsets[k + 1]] += part.ravel()
     return out
+
+
+def _add_temperature(
+    out: Array, bodies: Sequence[Body], loads: Sequence[Load | None], offsets: Index
+) -> None:
+    """Forces of all changes of temperature."""
+    where = [at for at, load in enumerate(loads) if isinstance(load, Temperature)]
+    if not where:
+        return
+    with within("loads", where[0]):
+        check_expansion(bodies)
+        for k, change in enumerate(changes(bodies, loads)):
+            if change is not None:
+                part = thermal_load(bodies[k].mesh, bodies[k].material, change)
+                out[offsets[k] : offsets[k + 1]] += part.ravel()
 
 
 def _add_nodal_force(

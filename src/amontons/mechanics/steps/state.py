@@ -80,7 +80,7 @@ class State:
         return not (self.displacement.any() or self.force.any())
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class TimeStep(Shown):
     """One step: the state after it, its discrete problem's solution, its energies.
 
@@ -184,7 +184,9 @@ class TimeStep(Shown):
     @cached_property
     def warnings(self) -> tuple[ResultWarning, ...]:
         """Reasons to doubt a step that has converged, each with a name."""
-        return self.solution.warnings + model_warnings(self.model, self.fields)
+        return self.solution.warnings + model_warnings(
+            self.model, self.fields, self.solution.converged
+        )
 
     @property
     def _force(self) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..model import BodyForce, Fix, Model, NodalForce, Pressure
+from ..model import BodyForce, Fix, Model, NodalForce, Pressure, Temperature
 from ..model.parts import Load
 from ..model.timing import at_time, is_timed
 
@@ -68,5 +68,7 @@ def _is_something(value: object) -> bool:
 def _name(part: Part) -> str:
     if isinstance(part, BodyForce):
         return "body force" if part.region is None else f"body force in {part.region!r}"
+    if isinstance(part, Temperature):
+        return "temperature"
     words = {Fix: "fix", Pressure: "pressure", NodalForce: "nodal force"}
     return f"{words.get(type(part), 'traction')} on {part.on!r}"

@@ -146,14 +146,15 @@ function along(pieces, points) {
 }
 
 /** Pressure and shear along the slave of a zone in 2D, and the status of its contacts. */
-function zoneChart({ shared, state, data }, zone) {
-  const parts = along(zone.pieces, shared.points), series = [], statuses = [[], [], []];
+function zoneChart(view, zone) {
+  const { shared, state, data } = view, parts = along(zone.pieces, shared.points), series = [], statuses = [[], [], []];
   for (const [k, name] of ["pressure", "shear"].entries()) parts.forEach((part, j) => {
     const known = part.filter(([v]) => state.status[shared.place.get(v)] >= 0);
-    series.push({ name: j ? "" : name, colour: k, x: known.map(([, s]) => s), y: known.map(([v]) => state.values[name][shared.place.get(v)]) });
+    series.push({ name: j ? "" : name, colour: 2 + k, x: known.map(([, s]) => s), y: known.map(([v]) => state.values[name][shared.place.get(v)]) });
   });
   for (const [v, s] of parts.flat()) statuses[state.status[shared.place.get(v)]]?.push(s);
   statuses.forEach((x, k) => { if (x.length) series.push({ name: STATUSES[k], colour: STATUSES[k], dots: true, x, y: x.map(() => 0) }); });
+  view.curve = series;
   return drawChart({ title: `Contact: ${zone.slave}`, x: withUnit("length along it", data.units.length),
     y: withUnit("stress", data.units.stress), series }, null);
 }

@@ -1,0 +1,55 @@
+"""More commands of the command line; only click is imported here too."""
+
+from __future__ import annotations
+
+import click
+
+from .folders import results_folder
+
+
+@click.command(
+    epilog="""\b
+Examples:
+  amontons audit model.inp model.frd                  is the result of CalculiX true?
+  amontons audit model.inp model.frd --solve --report -o model-audit
+  amontons audit case.toml case-results               our own results, as stored
+  amontons audit model.inp model.frd --json - | jq .verdict
+
+\b
+Exit codes: 0 right, 1 wrong or undecided, 2 it can not be read or belongs to another model.
+"""
+)
+@click.argument("source")
+@click.argument("result")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
+              help="Replace a value of the case.")  # fmt: skip
+@click.option("--time", type=float, metavar="T",
+              help="Judge the state at that time, against the loads of then. [the last]"
+              )  # fmt: skip
+@click.option("--law", type=click.Choice(["hard", "own"]),
+              help="hard: contact neither overlaps nor creeps while it sticks; own: it may "
+              "give way as its stiffness says. [hard for decks, own for cases]")  # fmt: skip
+@click.option("--solve", is_flag=True, help="Solve the model too, and put the forces beside.")
+@click.option("--json", "json_copy", metavar="FILE", help="The same as JSON; - prints it.")
+@click.option("--picture", metavar="FILE",
+              help="Draw where it is wrong: .png, .svg or .pdf.")  # fmt: skip
+@results_folder("name of the result with -audit", only_report=True)
+@click.option("--quiet", is_flag=True, help="The exit code alone.")
+def audit(**options: object) -> int:
+    """Say whether a contact result is true, of another program or of ours.
+
+    SOURCE is a deck (.inp), a case file or example:NAME; RESULT its displacements: .frd or .dat
+    of CalculiX, .vtu, solution.h5 or a results folder.  Forces follow from displacements; they
+    are held against balance, overlap, the friction cone and the slip, from both sides.
+    """
+    from .audit import run
+
+    return run(**options)  # type: ignore[arg-type]
+
+
+@click.command()
+def examples() -> None:
+    """List the built-in examples: `amontons solve example:NAME`, in time `amontons run`."""
+    from .sources import list_examples
+
+    list_examples()

@@ -1,0 +1,46 @@
+"""Thermal strains: a change of temperature T makes a body that nothing holds grow by alpha T.
+
+The stress is that of the strain without alpha T; in nodal forces, those of the stress C alpha T
+are added to the loads.  Linear elastic laws alone have an `expansion` alpha.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import InvalidInput
+from ..meshes.cells import CELLS
+from ..meshes.mesh import Mesh
+from .cell_matrices import components, gradient_rows, in_parts, rule_of
+from .elasticity import held_stress, materials_by_region
+
+Array = NDArray[np.float64]
+
+
+def thermal_load(mesh: Mesh, material: Any, change: Array) -> Array:
+    """Nodal forces (n, dim) of a change of temperature (n,) given at the nodes."""
+    laws: Mapping[str, Any] = materials_by_region(mesh, material)
+    load = np.zeros_like(mesh.points)
+    pairs = components(mesh.dim, axisymmetric=mesh.axisymmetric)
+    for cells in mesh.cells:
+        law = laws[cells.region]
+        stress = held_stress(law, mesh.dim, axisymmetric=mesh.axisymmetric)
+        if not stress.any():
+            continue
+        if cells.integration == "incompatible":
+            raise InvalidInput(
+                f"temperature: {cells.kind} cells with incompatible modes have no thermal "
+                "strains; take full integration"
+            )
+        cell, rows = CELLS[cells.kind], np.array([stress[i, k] for i, k in pairs])
+        for nodes in in_parts(cells):
+            for at, weight in zip(*rule_of(mesh, cells), strict=True):
+                B, volume = gradient_rows(mesh, cells.kind, nodes, at)
+                here = change[nodes] @ cell.shape(at) * weight * volume
+                force = np.einsum("s,ksa,k->ka", rows, B, here)
+                np.add.at(load, nodes, force.reshape(*nodes.shape, mesh.dim))
+    return load
