@@ -8,7 +8,7 @@ from ... import __version__
 from . import flags
 from .folders import results_folder
 from .group import Commands
-from .more_commands import audit, examples
+from .more_commands import audit, convert, examples
 
 EPILOG = """\b
 Examples:
@@ -114,31 +114,6 @@ def info(**options: object) -> None:
     SOURCE is a TOML case file, an FCLib HDF5 file, example:NAME, or a mesh or CAD file.
     """
     from .info import run
-
-    run(**options)  # type: ignore[arg-type]
-
-
-@main.command(
-    epilog="""\b
-Examples:
-  amontons convert global.hdf5 local.hdf5 --form local
-  amontons convert case.toml problem.hdf5
-  amontons convert cube-results cube.frd      displacements, stresses, contact for cgx, PrePoMax
-"""
-)
-@click.argument("source")
-@click.argument("target")
-@click.option("--form", type=click.Choice(["local", "global"]),
-              help="local: W, q; global: M, H, f, w. [the form it has]")  # fmt: skip
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
-              help="Replace a value of the case.")  # fmt: skip
-@flags.of_decks
-def convert(**options: object) -> None:
-    """Write a problem as an FCLib file, in either form, or results as .frd or .dat.
-
-    SOURCE is a TOML case file, an FCLib HDF5 file, a results folder, or example:NAME.
-    """
-    from .convert import run
 
     run(**options)  # type: ignore[arg-type]
 
@@ -404,4 +379,5 @@ def run(**options: object) -> int:
 
 
 main.add_command(audit)
+main.add_command(convert)
 main.add_command(examples)

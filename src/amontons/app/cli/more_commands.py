@@ -49,6 +49,31 @@ def audit(**options: object) -> int:
     return run(**options)  # type: ignore[arg-type]
 
 
+@click.command(
+    epilog="""\b
+Examples:
+  amontons convert global.hdf5 local.hdf5 --form local
+  amontons convert case.toml problem.hdf5
+  amontons convert cube-results cube.frd      displacements, stresses, contact for cgx, PrePoMax
+"""
+)
+@click.argument("source")
+@click.argument("target")
+@click.option("--form", type=click.Choice(["local", "global"]),
+              help="local: W, q; global: M, H, f, w. [the form it has]")  # fmt: skip
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
+              help="Replace a value of the case.")  # fmt: skip
+@flags.of_decks
+def convert(**options: object) -> None:
+    """Write a problem as an FCLib file, in either form, or results as .frd or .dat.
+
+    SOURCE is a TOML case file, an FCLib HDF5 file, a results folder, or example:NAME.
+    """
+    from .convert import run
+
+    run(**options)  # type: ignore[arg-type]
+
+
 @click.command()
 def examples() -> None:
     """List the built-in examples: `amontons solve example:NAME`, in time `amontons run`."""

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...core.errors import InvalidInput
+from .course import Course
 from .flat import Deck
-from .history import Course, History
+from .history import History
 from .scopes import Index
 from .shapes import SHAPES
 from .stages import Held

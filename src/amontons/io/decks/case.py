@@ -36,8 +36,9 @@ from .about import About
 from .axes import Turned
 from .cards import Card, Row, read_cards
 from .contacts import Options, adjusted, law_of, read_contacts
+from .course import Course
 from .flat import Deck, flatten
-from .history import Course, History, read_history
+from .history import History, read_history
 from .joints import Joints, tied
 from .keywords import sorted_out
 from .materials import read_interactions, read_sections

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cards import Card, Row, number, whole
+from .course import Course
 from .flat import Deck, Placed
 from .heat import Heat
 from .scopes import Index, Scope, missing
@@ -28,51 +29,6 @@ FREE, COMPONENTS = -1, 6
 TRANSLATIONS = 3
 HELD = {"ENCASTRE": (1, 2, 3), "PINNED": (1, 2, 3), "XSYMM": (1,), "YSYMM": (2,),
         "ZSYMM": (3,), "XASYMM": (2, 3), "YASYMM": (1, 3), "ZASYMM": (1, 2)}  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Course:
-    """A value over time: straight between these points, constant after the last."""
-
-    times: tuple[float, ...] = (0.0,)
-    values: tuple[float, ...] = (0.0,)
-
-    def at(self, t: float) -> float:
-        """The value at a time; NaN where it goes on from what is not known here."""
-        found = float(np.interp(t, self.times, self.values))
-        return found if np.isfinite(found) or t not in self.times else self._given(t)
-
-    def _given(self, t: float) -> float:
-        return self.values[len(self.times) - 1 - self.times[::-1].index(t)]
-
-    @property
-    def is_open(self) -> bool:
-        """True where it begins, or is held, at what is not known here."""
-        return bool(np.isnan(self.values).any())
-
-    def since(self, t: float, value: float) -> Course:
-        """The course from a time on, at which it is known to be `value`."""
-        later = [(s, v) for s, v in zip(self.times, self.values, strict=True) if s > t]
-        ends = [(s, value if np.isnan(v) else v) for s, v in later]
-        begin = (t, self.at(t) if np.isfinite(self.at(t)) else value)
-        times, values = zip(begin, *ends, strict=True)
-        return Course(times, values)
-
-    @property
-    def last(self) -> float:
-        """The value at the end."""
-        return self.values[-1]
-
-    @property
-    def is_zero(self) -> bool:
-        """True for a value that is always 0."""
-        return not any(self.values)
-
-    def then(self, times: Sequence[float], values: Sequence[float]) -> Course:
-        """This course with more points, those at its end and after."""
-        kept = [k for k, t in enumerate(self.times) if t < times[0]]
-        return Course((*(self.times[k] for k in kept), *times),
-                      (*(self.values[k] for k in kept), *values))  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -358,7 +314,7 @@ def _forces(history: History, each: Placed, span: Span, known: Amplitudes,
                 _same_amplitude(row, card, out.cards[before])
                 if card.label("AMPLITUDE") is not None:
                     raise row.error("*CLOAD: forces with an amplitude at one node add up twice")
-                before_it = _until(course, span.begin)
+                before_it = course.until(span.begin)
                 course = _course(before_it, course.last + value, span, card, known)
             else:
                 course = _course(course, value, span, card, known)
@@ -372,12 +328,6 @@ def _same_amplitude(row: Row, card: Card, other: Card) -> None:
         raise row.error(
             f"*CLOAD: another amplitude than that of line {other.number} at the same node"
         )
-
-
-def _until(course: Course, t: float) -> Course:
-    """What a course was up to a time, at least its first point."""
-    kept = [k for k, time in enumerate(course.times) if time <= t] or [0]
-    return Course(tuple(course.times[k] for k in kept), tuple(course.values[k] for k in kept))
 
 
 def _distributed(history: History, each: Placed, span: Span, known: Amplitudes) -> None:

@@ -10,7 +10,8 @@ from ...mechanics.model import Axes
 from ...mechanics.model.constraints import ROTATION
 from .axes import Turned
 from .cards import Card
-from .history import FREE, Course, History, Prescribed
+from .course import Course
+from .history import FREE, History, Prescribed
 from .joints import TRANSLATIONS, Joints
 from .scopes import Index
 from .stages import Held

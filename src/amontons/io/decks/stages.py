@@ -15,8 +15,9 @@ from ...mechanics.model.beside import Beside
 from ...mechanics.steps import State
 from .cards import Card
 from .contacts import Pair
+from .course import Course
 from .flat import Deck, Placed
-from .history import FREE, Course, History
+from .history import FREE, History
 from .materials import Interaction, changed_interactions
 from .scopes import Index, missing
 
