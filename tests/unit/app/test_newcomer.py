@@ -8,6 +8,7 @@ from click.testing import CliRunner
 
 import amontons as am
 from amontons.app.cli import main
+from amontons.app.cli.info import describe
 
 DECK = """*NODE
 1, 0, 0, 0
@@ -81,3 +82,12 @@ def test_an_unknown_method_says_how_to_name_ones_own(tmp_path):
     am.write_fclib(problem, tmp_path / "one.hdf5")
     told = CliRunner().invoke(main, ["solve", str(tmp_path / "one.hdf5"), "--method", "mine"])
     assert told.exit_code == 2 and "package.module:Class" in told.stderr.replace("\n", " ")
+
+
+@pytest.mark.parametrize("small", [am.Rigid(), am.LinearElastic(young=1.0, poisson=0.0)])
+def test_a_body_that_contact_alone_holds_can_be_described(small):
+    body = am.Body(am.box((2.0, 1.0), 1), small)
+    contact = am.Contact("bottom", am.Plane((0, 1)), mu=0.5)
+    model = am.Model([body], [], [contact], [am.Traction("top", (0.0, -1.0))])
+    facts = describe(model.discrete_problem())
+    assert "elastic bodies" in facts["scales (a guess)"]

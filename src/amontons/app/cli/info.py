@@ -205,11 +205,18 @@ def _scales(problem: FrictionProblem) -> str:
         return "no contact can react"
     stiffness = f"1/|W_ii| from {rho.min():.2g} to {rho.max():.2g}"
     is_mesh = problem.near_nullspace is not None  # also of few unknowns
-    if problem.form is Form.GLOBAL and (is_mesh or problem.small_blocks is None):
+    if problem.form is Form.GLOBAL and (is_mesh or not _has_small_blocks(problem)):
         return f"elastic bodies, u probably displacements; local stiffness {stiffness}"
     if problem.form is Form.GLOBAL:
         return f"rigid bodies, u probably velocities and r impulses; effective mass {stiffness}"
     return f"u probably velocities and r impulses; effective mass {stiffness}"
+
+
+def _has_small_blocks(problem: FrictionProblem) -> bool:
+    try:
+        return problem.small_blocks is not None
+    except SingularOperator:  # contact alone holds a small body
+        return False
 
 
 def fitting_methods(problem: FrictionProblem) -> list[str]:
