@@ -70,8 +70,63 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
+DECK = """*NODE
+1, 0, 0
+2, 1, 0
+3, 1, 1
+4, 0, 1
+5, 0, 1
+6, 1, 1
+7, 1, 2
+8, 0, 2
+*ELEMENT, TYPE=CPE4, ELSET=ALL
+1, 1, 2, 3, 4
+2, 5, 6, 7, 8
+*MATERIAL, NAME=M
+*ELASTIC
+100, 0
+*SOLID SECTION, ELSET=ALL, MATERIAL=M
+*SURFACE, NAME=LOW
+1, S3
+*SURFACE, NAME=HIGH
+2, S1
+*SURFACE INTERACTION, NAME=I
+*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=HARD
+*FRICTION
+0.3
+*CONTACT PAIR, INTERACTION=I, TYPE=SURFACE TO SURFACE
+HIGH, LOW
+*BOUNDARY
+1, 1, 2
+2, 1, 2
+8, 1, 1
+*STEP
+*STATIC
+*CLOAD
+7, 2, -1
+8, 2, -1
+*END STEP
+"""
+
+
+def with_results(line, folder):
+    """The results that an example begins with."""
+    words = line.split()
+    if "model.frd" in words:
+        (folder / "model.inp").write_text(DECK)
+        asked = ["solve", "model.inp", "--frd", "--no-figures", "-o", "model"]
+        assert CliRunner().invoke(main, asked).exit_code == 0
+        (folder / "model" / "solution.frd").rename("model.frd")
+    sources = {"case-results": "case.toml", "cube-results": "example:cube --set mesh.cells=2"}
+    for name, source in sources.items():
+        if name in words:
+            asked = ["solve", *source.split(), "--no-figures", "-o", name]
+            assert CliRunner().invoke(main, asked).exit_code == 0
+
+
 @pytest.mark.parametrize("line", list(examples()))
 def test_example_of_the_help_runs(line, folder):
+    with_results(line, folder)
     if "part.step" in line:
         pytest.importorskip("netgen.occ")
     typed, _, reader = line.partition("|")

@@ -164,7 +164,7 @@ BROKEN = [
     ("1000., 0.", "1000.", 28, "expected two constants, got 1"),
     ("1000., 0.", "1000., 0.7", 27, "poisson"),
     ("*FRICTION\n0.3,", "*FRICTION\n", 35, "expected one line with a coefficient"),
-    ("1, 1, 3\n2, 1, 3", "1, 3, 1\n2, 1, 3", 38, "components from 1 to 3, got 3 to 1"),
+    ("1, 1, 3\n2, 1, 3", "1, 3, 1\n2, 1, 3", 38, "components from 1 to 6, got 3 to 1"),
     ("1, 1, 3\n2, 1, 3", "NOSET, 1, 3\n2, 1, 3", 38, "node set NOSET: not found"),
     ("*STATIC\n1., 1.", "*STATIC\n-1., 1.", 48, "expected times > 0"),
     ("*STATIC\n1., 1.\n", "", 46, "expected one procedure, .STATIC, got 0"),

@@ -54,7 +54,8 @@ def classify(
     smaller of r_N and rho |u_T| for a slipping one; r_N counts from its largest tension.  Ties,
     which have no other status, have infinite ones.
     """
-    closed, sliding = problem.law.regions(r, u, problem.rho)
+    with np.errstate(over="ignore", invalid="ignore"):  # of what can not be squared
+        closed, sliding = problem.law.regions(r, u, problem.rho)
     closed = closed & (
         (r[:, 0] + problem.law.cohesion > 0) | problem.law.tied
     )  # of an unconverged state: without force there is no contact

@@ -290,7 +290,7 @@ def test_solutions_stand_side_by_side(tmp_path, opened):
 def test_a_point_moves_along_the_curve(tmp_path, opened):
     page = opened(made(tmp_path, "follow", "example:vee"))
     assert page.locator("circle[data-mark=fold]").count() == 2
-    dot = page.locator(".cursor circle")
+    dot = page.locator("figure.curve .cursor circle")
     before = dot.get_attribute("cx")
     assert changes(page, lambda: set_slider(page, "step", 3))
     assert dot.get_attribute("cx") != before

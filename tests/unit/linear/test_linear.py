@@ -168,7 +168,7 @@ def test_operations_beyond_the_integers_of_a_sparse_factor(monkeypatch):
     n = 60_000
     rows = SimpleNamespace(indptr=np.array([0, n, 2 * n], dtype=np.int32))
     factor = SimpleNamespace(L=rows, U=SimpleNamespace(tocsr=lambda: rows), solve=None)
-    monkeypatch.setattr(direct.sparse_linalg, "splu", lambda matrix, permc_spec: factor)
+    monkeypatch.setattr("scipy.sparse.linalg.splu", lambda matrix, permc_spec: factor)
     _, flops = direct._superlu(sparse.csc_array(np.eye(2)), 0)
     assert flops == 2 * 2 * n**2
 

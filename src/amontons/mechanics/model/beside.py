@@ -165,11 +165,13 @@ class Beside:
         return 0 if body is None else names.index(str(body)), given
 
     def _knows(self, name: str) -> bool:
-        try:
-            locate(self.bodies, name, sets=True)
-        except InvalidInput as reason:
-            return "several bodies" in str(reason)  # which `locate` then says
-        return True
+        """True for a name that `locate` finds, in one body or in several, which it says."""
+        own = [{*body.mesh.surfaces, *body.mesh.node_sets} for body in self.bodies]
+        return any(
+            name in known or (name.startswith(f"{body.name}.")
+                              and name[len(body.name) + 1 :] in known)
+            for body, known in zip(self.bodies, own, strict=True)
+        )  # fmt: skip
 
     def where(self, dof: int) -> str:
         """A degree of freedom in words: node, body and component."""

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.spatial import cKDTree
 
 from ...core.errors import InvalidInput, within
 from ..elements.rigid import Rigid
@@ -125,6 +124,8 @@ def _section(part: Pretension, beside: Beside) -> tuple[sparse.csr_array, Index]
     mesh, partner = beside.bodies[k].mesh, beside.bodies[j].mesh
     nodes, others = mesh.surface_nodes(name), partner.surface_nodes(other)
     size = float(np.ptp(mesh.points[nodes], axis=0).max())
+    from scipy.spatial import cKDTree
+
     tree = cKDTree(partner.points[others])
     away, at = tree.query(mesh.points[nodes])
     if len(nodes) != len(others) or away.max(initial=0.0) > SAME_PLACE * size:
