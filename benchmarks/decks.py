@@ -34,7 +34,8 @@ HERE = Path(__file__).parent / "results"
 PLACE = "/usr/share/doc/calculix-ccx-test/examples/test"
 HEAD = """# Decks of CalculiX' own tests
 
-Solved unedited, beside the answers that come with them. Regenerate: `python benchmarks/decks.py`.
+Solved unedited, beside the answers that come with them.
+Regenerate: `python benchmarks/decks.py`.
 
 u: largest difference of displacements, over the largest displacement; RF: the same of reaction
 forces, where they are printed. "hard": contact hard here, beside the same answer. "100 K":
