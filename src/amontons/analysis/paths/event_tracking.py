@@ -364,7 +364,8 @@ class _Walk:
             turns = self._note_turn()
             detail = system.told(apart, ROUNDING * max(1.0, float(np.abs(y).max(initial=0))))
             return Event(EventKind.BRANCH, self.p, self.y, self.travelled, before, self.pattern,
-                         turns=turns, directions=rows, detail=detail, problem=self.path)  # fmt: skip
+                         turns=turns, directions=rows, detail=detail,
+                         problem=self.path)  # fmt: skip
         return self._event(before)
 
     def _orientation(self, pattern: str, rate: float) -> int:

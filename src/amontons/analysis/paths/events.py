@@ -75,9 +75,9 @@ class Event(_OnPath):
     """Something that happens on a branch, at a precisely located point.
 
     before, after: names of the pieces on the two sides, in the sense of the branch.  smooth:
-    True for a fold inside of a piece.  turns: True where the parameter turns back, at a fold and
-    at some branch points.  directions, (k, n + 1), rows (y', p'): all one-sided
-    tangents at a branch point.  stop: for the kind END.
+    True for a fold inside of a piece.  turns: True where the parameter turns back, at a fold
+    and at some branch points.  directions, (k, n + 1), rows (y', p'): all one-sided tangents at
+    a branch point.  stop: for the kind END.
     """
 
     kind: EventKind
