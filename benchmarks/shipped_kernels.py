@@ -38,7 +38,7 @@ def noted(self, content):
     return load(self, content)
 JITCPUCodegen.unserialize_library = noted
 import amontons as am
-for cells in (4, 8):
+for cells in (8, 16):
     body = am.Body(am.box((1, 1, 1), cells=(cells,) * 3), am.LinearElastic(200, 0.3))
     slide = am.Fix("top", lambda x: (0, 0.2, 0.06 - 0.15 * x[0]))
     floor = am.Contact("bottom", am.Plane(normal=(0, 0, 1)), mu=1.0)
