@@ -58,10 +58,10 @@ _HOME = {
                          "read_cad", "read_mesh", "refined"),
     "mechanics.contact": ("LevelSet", "Nitsche", "Plane", "Sphere"),
     "mechanics.model": ("Axes", "Body", "BodyForce", "CiarletGeymonat", "Contact",
-                        "ContactFields", "Coupling", "Equation", "Fix", "LinearElastic",
-                        "Model", "NeoHookean", "NodalForce", "OrthotropicElastic", "Pressure",
-                        "Pretension", "Reference", "Rigid", "Spring", "Temperature", "Traction",
-                        "distributed"),
+                        "ContactFields", "Coupling", "Equation", "Fix", "FoundContacts",
+                        "FoundPair", "LinearElastic", "Model", "NeoHookean", "NodalForce",
+                        "OrthotropicElastic", "Pressure", "Pretension", "Reference", "Rigid",
+                        "Spring", "Temperature", "Traction", "distributed", "find_contacts"),
 }  # fmt: skip
 _GONE = {
     "AlgebraicMultigrid": "GeometricMultigrid(levels=()), whose levels are then algebraic ones",

@@ -56,6 +56,7 @@ from .mechanics.model import (
     OrthotropicElastic as OrthotropicElastic, Pressure as Pressure,
     Pretension as Pretension, Reference as Reference, Rigid as Rigid, Spring as Spring,
     Temperature as Temperature, Traction as Traction, distributed as distributed,
+    FoundContacts as FoundContacts, FoundPair as FoundPair, find_contacts as find_contacts,
 )
 from .mechanics.ready.packings import SpherePacking as SpherePacking
 from .mechanics.ready.walls import Bond as Bond, Wall as Wall

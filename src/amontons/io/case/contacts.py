@@ -26,7 +26,7 @@ def read_contact(table: Table, bodies: Sequence[Body]) -> Contact:
 
     table.only("slave", "obstacle", "master", "friction", "method", "kinematics",
                "configuration", "name", "clearance")  # fmt: skip
-    method = _contact_method(table)
+    method = contact_method(table)
     if isinstance(table.data.get("slave"), list):
         raise table.error("slave", "expected one surface; write a table [[contact]] for each")
     slave = table.text("slave")
@@ -37,7 +37,7 @@ def read_contact(table: Table, bodies: Sequence[Body]) -> Contact:
     if ("obstacle" in table.data) == ("master" in table.data):
         raise table.error("", "expected either obstacle = { plane = { normal = [0, 1] } } or "
                           'master = "SURFACE"')  # fmt: skip
-    numbers = _friction(table)
+    numbers = friction(table)
     found = configuration(table)  # older words for kinematics
     if "kinematics" in table.data:
         found["kinematics"] = table.choice("kinematics", ("small", "finite"))
@@ -55,7 +55,7 @@ def read_contact(table: Table, bodies: Sequence[Body]) -> Contact:
         return Contact(slave, obstacle, **numbers, method=method, **found)
 
 
-def _friction(contact: Table) -> dict[str, Any]:
+def friction(contact: Table) -> dict[str, Any]:
     """The numbers of a law by the names that `Contact` has for them."""
     given = contact.need("friction", LAWS)
     if given == "tied":
@@ -150,7 +150,7 @@ def _steady(table: Table, key: str) -> float | Expression:
     return value
 
 
-def _contact_method(table: Table) -> str | Nitsche | None:
+def contact_method(table: Table) -> str | Nitsche | None:
     """A word, or a table { kind = "nitsche", kappa = …, theta = … } of options, or None."""
     from ...mechanics.contact import Nitsche
 
@@ -174,14 +174,18 @@ def _contact_method(table: Table) -> str | Nitsche | None:
 def refuse_repeated(top: Table) -> None:
     """The same pair twice would share its load at random."""
     seen: list[dict[str, Any]] = []
-    for table in top.tables("contact"):
+    places: list[int] = []
+    for k, table in enumerate(top.tables("contact")):
         pair = {key: table.data.get(key) for key in ("slave", "obstacle", "master")}
+        if "pairs" in table.data:
+            continue  # found, and only one asks for it
         if pair in seen:
             raise table.error(
-                "", f"the same slave and partner as in contact[{seen.index(pair)}]; "
+                "", f"the same slave and partner as in contact[{places[seen.index(pair)]}]; "
                 "expected every pair once"
             )  # fmt: skip
         seen.append(pair)
+        places.append(k)
 
 
 def _obstacle(table: Table, dim: int) -> Obstacle:

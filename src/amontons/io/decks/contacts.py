@@ -102,9 +102,10 @@ def _near(points: Array, x: Array) -> NDArray[np.bool_]:
 
 
 def read_contacts(
-    deck: Deck, region: Region, interactions: dict[str, Interaction], notes: list[str]
-) -> list[Pair]:
-    """The pairs of a deck; raises FileFormatError with file and line."""
+    deck: Deck, region: Region, interactions: dict[str, Interaction], notes: list[str],
+    *, more: bool = False,
+) -> list[Pair]:  # fmt: skip
+    """The pairs of a deck; raises FileFormatError with file and line.  more: others follow."""
     for step in deck.steps:
         for placed in step:
             if placed.card.keyword in ("CONTACTPAIR", "SURFACEINTERACTION", "CLEARANCE"):
@@ -119,7 +120,7 @@ def read_contacts(
             pairs += _ties(placed, region)
         elif placed.card.keyword == "CLEARANCE":
             _clear(placed, pairs, region)
-    if not pairs:
+    if not (pairs or more):
         raise InvalidInput("*CONTACT PAIR: missing, a deck without contact")
     return pairs
 
@@ -146,7 +147,7 @@ def _pairs(
             raise row.error(
                 f"*CONTACT PAIR: expected slave, master, got {len(row.fields)} names"
             )
-        master = _surface(region, placed, names[1], row)
+        master = ask_surface(region, placed, names[1], row)
         pair = Pair("", master, card, name, smooth)
         pair.slave, pair.nodes = _slave(region, placed, names[0], master, row)
         pair.adjust = _adjust(placed)
@@ -168,7 +169,7 @@ def _ties(placed: Placed, region: Region) -> list[Pair]:
         names = [text for text in row.fields if text]
         if len(names) != 2:
             raise row.error(f"{card}: expected slave, master, got {len(names)} names")
-        master = _surface(region, placed, names[1], row)
+        master = ask_surface(region, placed, names[1], row)
         slave, nodes = _slave(region, placed, names[0], master, row)
         given = card.options.get("POSITIONTOLERANCE")
         within = (number(given, row, "POSITION TOLERANCE") if given
@@ -320,7 +321,7 @@ LAWS = {"HARD": lambda *_: {}, "LINEAR": _linear, "EXPONENTIAL": _exponential,
 
 
 # ------------------------------------------------------------------------------- surfaces
-def _surface(region: Region, placed: Placed, text: str, row: Row) -> str:
+def ask_surface(region: Region, placed: Placed, text: str, row: Row) -> str:
     """Ask the mesh for a surface; returns its name there."""
     faces, nodes = placed.scope.surface(text, row)
     name = text.strip('"').upper()
@@ -339,7 +340,7 @@ def _slave(
     _, nodes = placed.scope.surface(text, row)
     name = text.strip('"').upper()
     if nodes is None or name in region.facets or region.covers(nodes):
-        return _surface(region, placed, text, row), None
+        return ask_surface(region, placed, text, row), None
     region.add_around(name, nodes, region.facets[master], row)
     return name, nodes
 
