@@ -85,14 +85,14 @@ class Pair:
 
     def glue(self, mesh: Mesh) -> None:
         """Choose the nodes of a tie that are near enough; raises FileFormatError for none."""
-        rows, _, _ = pair_contact(mesh, self.slave, mesh, self.master)
-        near = np.abs(rows.gap) <= self.within
+        nodes, gap, _ = _distances(mesh, self)
+        near = np.abs(gap) <= self.within
         if not near.any():
             raise self.card.error(
                 f"no node of {self.slave} is within {self.within:.3g} of {self.master}; give a "
                 "POSITION TOLERANCE"
             )
-        self.glued = rows.points[near] if self.points is None else self.points
+        self.glued = mesh.points[nodes[near]] if self.points is None else self.points
 
 
 def _near(points: Array, x: Array) -> NDArray[np.bool_]:
@@ -381,13 +381,15 @@ def adjusted(mesh: Mesh, at: Index, pairs: Sequence[Pair], notes: list[str]) -> 
 
 def _distances(mesh: Mesh, pair: Pair) -> tuple[Index, Array, Array]:
     """Slave nodes (k,) with a master in front of them, distances (k,) and normals (k, d)."""
-    if mesh.order == 1:
+    if mesh.order == 1 and pair.within is None:
         rows, _, _ = pair_contact(mesh, pair.slave, mesh, pair.master)
         return rows.nodes, rows.gap, rows.frames[:, 0]
     slave, master = (linear_parts(mesh.surface(name)) for name in (pair.slave, pair.master))
     nodes = np.unique(np.concatenate([block.nodes.ravel() for block in slave]))
     normals, x = nodal_normals(mesh.points, slave)[nodes], mesh.points[nodes]
-    hit = project(x, mesh.points, master, facing=normals, search=np.inf, own=nodes)
+    hit = project(x, mesh.points, master, facing=normals, own=nodes)
+    if pair.within is not None and not hit.found.any():  # ties of sides that look one way
+        hit = project(x, mesh.points, master, own=nodes)
     at = np.flatnonzero(hit.found)
     gap = np.einsum("kc,kc->k", x[at] - hit.closest[at], hit.normal[at])
     gap[np.abs(gap) < ROUNDING * np.abs(mesh.points).max()] = 0.0

@@ -218,7 +218,7 @@ def _met(
     if mortar:
         rows, on_master, met = mortar_contact(
             slave, surface, master, other, held=held[k], lasting=lasting[k],
-            master_lasting=lasting[j],
+            master_lasting=lasting[j], tied=contact.tied,
         )  # fmt: skip
     else:
         rows, on_master, met = pair_contact(slave, surface, master, other)
