@@ -43,7 +43,8 @@ from .io.readers import read_case as read_case
 from .io.series import export_xdmf as export_xdmf
 from .linear import Direct as Direct, GeometricMultigrid as GeometricMultigrid, Petsc as Petsc
 from .mechanics.contact import (
-    LevelSet as LevelSet, Nitsche as Nitsche, Plane as Plane, Sphere as Sphere,
+    Cylinder as Cylinder, Extrusion as Extrusion, LevelSet as LevelSet, Nitsche as Nitsche,
+    Plane as Plane, Profile as Profile, Revolution as Revolution, Sphere as Sphere,
 )
 from .mechanics.meshes import (
     Cells as Cells, Facets as Facets, Mesh as Mesh, box as box, mesh_shape as mesh_shape,
