@@ -57,12 +57,13 @@ _HOME = {
     "mechanics.meshes": ("Cells", "Facets", "Mesh", "box", "mesh_shape", "opened",
                          "read_cad", "refined"),
     "io.meshes": ("read_mesh",),
-    "mechanics.contact": ("LevelSet", "Nitsche", "Plane", "Sphere"),
+    "mechanics.contact": ("Cylinder", "Extrusion", "LevelSet", "Nitsche", "Plane", "Profile",
+                          "Revolution", "Sphere"),
     "mechanics.model": ("Axes", "Body", "BodyForce", "CiarletGeymonat", "Contact",
-                        "ContactFields", "Coupling", "Equation", "Fix", "LinearElastic",
-                        "Model", "NeoHookean", "NodalForce", "OrthotropicElastic", "Pressure",
-                        "Pretension", "Reference", "Rigid", "Spring", "Temperature", "Traction",
-                        "distributed"),
+                        "ContactFields", "Coupling", "Equation", "Fix", "FoundContacts",
+                        "FoundPair", "LinearElastic", "Model", "NeoHookean", "NodalForce",
+                        "OrthotropicElastic", "Pressure", "Pretension", "Reference", "Rigid",
+                        "Spring", "Temperature", "Traction", "distributed", "find_contacts"),
 }  # fmt: skip
 _GONE = {
     "AlgebraicMultigrid": "GeometricMultigrid(levels=()), whose levels are then algebraic ones",
