@@ -38,6 +38,7 @@ from .io.checkpoint import (
     save_state as save_state,
 )
 from .io.fclib import read_fclib as read_fclib, write_fclib as write_fclib
+from .io.meshes import read_mesh as read_mesh
 from .io.readers import read_case as read_case
 from .io.series import export_xdmf as export_xdmf
 from .linear import Direct as Direct, GeometricMultigrid as GeometricMultigrid, Petsc as Petsc
@@ -46,7 +47,7 @@ from .mechanics.contact import (
 )
 from .mechanics.meshes import (
     Cells as Cells, Facets as Facets, Mesh as Mesh, box as box, mesh_shape as mesh_shape,
-    opened as opened, read_cad as read_cad, read_mesh as read_mesh, refined as refined,
+    opened as opened, read_cad as read_cad, refined as refined,
 )
 from .mechanics.model import (
     Axes as Axes, Body as Body, BodyForce as BodyForce, CiarletGeymonat as CiarletGeymonat,

@@ -137,13 +137,15 @@ class Takes(NamedTuple):
     of a solver with nitsche = True.  form: which one of a FrictionProblem.  matrix_free: True
     where its M may be an operator (`GridMatrix`); else the driver assembles it.  needs_cone:
     True where it takes Coulomb's law alone, not all laws of `problem.law`; changes of variables
-    are none of a solver's business, see `solvers.changed_law`.
+    are none of a solver's business, see `solvers.changed_law`.  changes_method: True where it
+    goes on with another method when one stalls, so that a repeated iterate is not the end.
     """
 
     solves: tuple[type, ...] = (FrictionProblem,)
     form: Form = Form.ANY
     matrix_free: bool = False
     needs_cone: bool = False
+    changes_method: bool = False
 
 
 def taken_by(solver: Any) -> Takes:
@@ -159,6 +161,7 @@ def _taken(kind: Any) -> Takes:
         getattr(kind, "form", Form.ANY),
         getattr(kind, "matrix_free", False),
         getattr(kind, "needs_cone", False),
+        getattr(kind, "changes_method", False),
     )
 
 

@@ -23,7 +23,7 @@ from ..problem.protocol import Problem
 from ..problem.settling import Accepted
 from ..problem.solution import Convergence, FrictionSolution, Outcome, Step, StoppedBy
 from .asked import Asked
-from .contract import Breakdown, Iterate, Judgement, Solver, Target
+from .contract import Breakdown, Iterate, Judgement, Solver, Target, taken_by
 from .first_iterate import own_motion, with_motion
 
 Array = NDArray[np.float64]
@@ -276,6 +276,7 @@ def _once(
     A method with a stopping rule of its own (`Iterate.ends`) is not stopped before that holds.
     """
     callback, limit = watch.asked.callback, watch.asked.max_iterations or np.inf
+    cycles_end = not taken_by(solver).changes_method
     try:
         iterates, judged = iter(solver.iterates(watch.problem, start, target)), None
         while (iterate := sent(iterates, judged)) is not None:
@@ -302,7 +303,7 @@ def _once(
                 return None
             if len(watch.history) == EARLY and watch.problem.gains_energy:
                 return Outcome.BREAKDOWN, "stopped early"
-            if watch.cycled(iterate, step.error):
+            if cycles_end and watch.cycled(iterate, step.error):
                 return Outcome.CYCLED, ""
             if watch.stagnated:
                 return Outcome.STAGNATED, ""

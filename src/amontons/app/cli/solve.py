@@ -29,6 +29,7 @@ from ...solvers.asked import Asked
 from ..api import solve_as_asked
 from ..model_solution import ModelSolution
 from .group import INTERRUPTED
+from .solve_deck import solve_in_steps
 from .sources import open_source, with_flags
 from .terminal import REPORT, check_folder, check_writable, say_notes, say_when
 
@@ -49,6 +50,17 @@ def run(
     """Solve and write; returns the exit code."""
     opened = open_source(source, overrides, method)
     if opened.evolution is not None and opened.moving is None:
+        if opened.about is not None:
+            flags = {
+                "method": method, "tolerance": tolerance, "max_iterations": max_iterations,
+                "contact_tolerance": contact_tolerance,
+                "time_limit": time_limit, "start": start, "uniqueness": full_verdict,
+                "frd": frd, "fclib-error": fclib_error,
+            }  # fmt: skip
+            return solve_in_steps(
+                source, opened.name, overrides, flags, folder, json_copy, quiet=quiet,
+                report=report,
+            )
         raise FileFormatError(
             f"{source}: a case in time, whose state depends on the way; use: amontons run "
             f"{source}"

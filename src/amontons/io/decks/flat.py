@@ -7,7 +7,7 @@ cards of materials, interactions and steps are kept in their order.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from .cards import Card, Row, digest_of, number, whole
 from .placement import motion
 from .scopes import Index, Names, Scope, missing
-from .shapes import SHAPES
+from .shapes import SHAPES, Shape
 
 Array = NDArray[np.float64]
 SPRINGS = {"SPRINGA": 2, "SPRING1": 1, "SPRING2": 2}  # spring elements, and their nodes
@@ -62,6 +62,7 @@ class Deck:
     springs: dict[str, list[tuple[str, Index]]] = field(default_factory=dict)
     doubled: dict[int, int] = field(default_factory=dict)
     digest: str = ""  # of all that is not in the mesh
+    shapes: Mapping[str, Shape] = field(default_factory=lambda: SHAPES)
     _points: list[Array] = field(default_factory=list)
     _count: int = 0
     _elements: int = 0
@@ -75,9 +76,9 @@ class Deck:
         return str(node)
 
 
-def flatten(cards: Sequence[Card]) -> Deck:
+def flatten(cards: Sequence[Card], shapes: Mapping[str, Shape] = SHAPES) -> Deck:
     """The deck that cards make; raises FileFormatError with file and line."""
-    deck = Deck(digest=digest_of(cards))
+    deck = Deck(digest=digest_of(cards), shapes=shapes)
     parts: dict[str, list[Card]] = {}
     k = 0
     while k < len(cards):
@@ -217,9 +218,9 @@ def _elements(deck: Deck, card: Card, scope: Scope) -> None:
     if kind in SPRINGS:
         _springs(deck, card, scope, kind)
         return
-    if kind not in SHAPES:
-        raise card.error(f"TYPE={kind}: {missing('element type', kind, SHAPES)}")
-    width = 1 + SHAPES[kind].nodes
+    if kind not in deck.shapes:
+        raise card.error(f"TYPE={kind}: {missing('element type', kind, deck.shapes)}")
+    width = 1 + deck.shapes[kind].nodes
     table = card.table(width, np.int64)
     if table is None or (table.size and table.min() <= 0):
         table = _element_rows(card, width).astype(np.int64)
