@@ -147,7 +147,9 @@ def ours(path, *overrides, times=()):
 def forces_of(model, u, r):
     """What acts on nodes from outside: supports and loads."""
     parts = model.discretisation
-    return (parts.K @ u.ravel() - parts.whole_H @ r.ravel()).reshape(u.shape)
+    n = u.size  # without what stands beside the nodes
+    K, H = parts.K.tocsr()[:n, :n], parts.whole_H.tocsr()[:n]
+    return (K @ u.ravel() - H @ r.ravel()).reshape(u.shape)
 
 
 def deviation(found, wanted, nodes):
@@ -234,7 +236,7 @@ def refused(path):
 def reason_of(message):
     """The class of a message: the keyword, or the element type."""
     text = message.split(": ", 2)
-    known = re.search(r"TYPE=(\w+): element type", message)
+    known = re.search(r"TYPE=(\w+): elements of", message)
     if known:
         return f"elements {known.group(1).rstrip('R')}"
     card = re.search(r"(\*[A-Z][A-Z -]+)", message)

@@ -71,14 +71,14 @@ class Pair:
 
     def glue(self, mesh: Mesh) -> None:
         """Choose the nodes of a tie that are near enough; raises FileFormatError for none."""
-        rows, _, _ = pair_contact(mesh, self.slave, mesh, self.master)
-        near = np.abs(rows.gap) <= self.within
+        nodes, gap, _ = _distances(mesh, self)
+        near = np.abs(gap) <= self.within
         if not near.any():
             raise self.card.error(
                 f"no node of {self.slave} is within {self.within:.3g} of {self.master}; give a "
                 "POSITION TOLERANCE"
             )
-        self.glued = rows.points[near] if self.points is None else self.points
+        self.glued = mesh.points[nodes[near]] if self.points is None else self.points
 
 
 def _near(points: Array, x: Array) -> NDArray[np.bool_]:
@@ -88,9 +88,10 @@ def _near(points: Array, x: Array) -> NDArray[np.bool_]:
 
 
 def read_contacts(
-    deck: Deck, region: Region, interactions: dict[str, Interaction], notes: list[str]
-) -> list[Pair]:
-    """The pairs of a deck; raises FileFormatError with file and line."""
+    deck: Deck, region: Region, interactions: dict[str, Interaction], notes: list[str],
+    *, more: bool = False,
+) -> list[Pair]:  # fmt: skip
+    """The pairs of a deck; raises FileFormatError with file and line.  more: others follow."""
     for step in deck.steps:
         for placed in step:
             if placed.card.keyword in ("CONTACTPAIR", "SURFACEINTERACTION", "CLEARANCE"):
@@ -105,7 +106,7 @@ def read_contacts(
             pairs += _ties(placed, region)
         elif placed.card.keyword == "CLEARANCE":
             _clear(placed, pairs, region)
-    if not pairs:
+    if not (pairs or more):
         raise InvalidInput("*CONTACT PAIR: missing, a deck without contact")
     return pairs
 
@@ -132,7 +133,7 @@ def _pairs(
             raise row.error(
                 f"*CONTACT PAIR: expected slave, master, got {len(row.fields)} names"
             )
-        master = _surface(region, placed, names[1], row)
+        master = ask_surface(region, placed, names[1], row)
         pair = Pair("", master, card, name, smooth)
         pair.slave, pair.nodes = _slave(region, placed, names[0], master, row)
         pair.adjust = _adjust(placed)
@@ -154,7 +155,7 @@ def _ties(placed: Placed, region: Region) -> list[Pair]:
         names = [text for text in row.fields if text]
         if len(names) != 2:
             raise row.error(f"{card}: expected slave, master, got {len(names)} names")
-        master = _surface(region, placed, names[1], row)
+        master = ask_surface(region, placed, names[1], row)
         slave, nodes = _slave(region, placed, names[0], master, row)
         given = card.options.get("POSITIONTOLERANCE")
         within = (number(given, row, "POSITION TOLERANCE") if given
@@ -198,7 +199,7 @@ def _clear(placed: Placed, pairs: Sequence[Pair], region: Region) -> None:
 
 
 # ------------------------------------------------------------------------------- surfaces
-def _surface(region: Region, placed: Placed, text: str, row: Row) -> str:
+def ask_surface(region: Region, placed: Placed, text: str, row: Row) -> str:
     """Ask the mesh for a surface; returns its name there."""
     faces, nodes = placed.scope.surface(text, row)
     name = text.strip('"').upper()
@@ -219,7 +220,7 @@ def _slave(
     _, nodes = placed.scope.surface(text, row)
     name = text.strip('"').upper()
     if nodes is None or name in region.facets or region.covers(nodes):
-        return _surface(region, placed, text, row), None
+        return ask_surface(region, placed, text, row), None
     region.add_around(name, nodes, region.facets[master], row)
     return name, nodes
 
@@ -266,13 +267,15 @@ def adjusted(mesh: Mesh, at: Index, pairs: Sequence[Pair], notes: list[str]) -> 
 
 def _distances(mesh: Mesh, pair: Pair) -> tuple[Index, Array, Array]:
     """Slave nodes (k,) with a master in front of them, distances (k,) and normals (k, d)."""
-    if mesh.order == 1:
+    if mesh.order == 1 and pair.within is None:
         rows, _, _ = pair_contact(mesh, pair.slave, mesh, pair.master)
         return rows.nodes, rows.gap, rows.frames[:, 0]
     slave, master = (linear_parts(mesh.surface(name)) for name in (pair.slave, pair.master))
     nodes = np.unique(np.concatenate([block.nodes.ravel() for block in slave]))
     normals, x = nodal_normals(mesh.points, slave)[nodes], mesh.points[nodes]
-    hit = project(x, mesh.points, master, facing=normals, search=np.inf, own=nodes)
+    hit = project(x, mesh.points, master, facing=normals, own=nodes)
+    if pair.within is not None and not hit.found.any():  # ties of sides that look one way
+        hit = project(x, mesh.points, master, own=nodes)
     at = np.flatnonzero(hit.found)
     gap = np.einsum("kc,kc->k", x[at] - hit.closest[at], hit.normal[at])
     gap[np.abs(gap) < ROUNDING * np.abs(mesh.points).max()] = 0.0
