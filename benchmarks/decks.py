@@ -236,7 +236,7 @@ def refused(path):
 def reason_of(message):
     """The class of a message: the keyword, or the element type."""
     text = message.split(": ", 2)
-    known = re.search(r"TYPE=(\w+): element type", message)
+    known = re.search(r"TYPE=(\w+): elements of", message)
     if known:
         return f"elements {known.group(1).rstrip('R')}"
     card = re.search(r"(\*[A-Z][A-Z -]+)", message)

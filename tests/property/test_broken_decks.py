@@ -182,3 +182,33 @@ def test_a_section_whose_elements_are_given_again_needs_no_cells(tmp_path):
               "*ELSET, ELSET=BOTH\nLOWER, UPPER\n*SOLID SECTION, ELSET=BOTH, MATERIAL=STEEL\n"
               "*SOLID SECTION, ELSET=LOWER, MATERIAL=STEEL\n"))  # fmt: skip
     assert read(path).model.assemble().contacts == 4
+
+
+STEP = "*STEP\n*STATIC\n1., 1.\n"
+OTHER = "*STEP\n*FREQUENCY\n10\n*END STEP\n"
+REFUSED = [  # old, new, words
+    (STEP, OTHER + STEP, "one of vibrations, .*--allow FREQUENCY leaves the whole step"),
+    (STEP, "*STEP\n*HEAT TRANSFER\n1., 1.\n", "one of heat, .*there is nothing to solve"),
+    ("*NODE, NSET=NALL", "*RESTART, READ\n*NODE, NSET=NALL", "results of another run"),
+    ("*STEP", "*INITIAL CONDITIONS, TYPE=STRESS\n1, 1, 0.\n*STEP", "TYPE=STRESS: changes"),
+    ("TYPE=C3D8, ELSET=LOWER", "TYPE=DC3D8, ELSET=LOWER", "this type, of heat, are not read"),
+    ("TYPE=C3D8, ELSET=LOWER", "TYPE=C3D9, ELSET=LOWER", "not read, .*did you mean C3D"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "words"), REFUSED)
+def test_refusals_say_what_would_have_been_done_and_what_helps(tmp_path, old, new, words):
+    assert old in DECK
+    path = tmp_path / "deck.inp"
+    path.write_text(DECK.replace(old, new, 1))
+    with pytest.raises(am.FileFormatError, match=words):
+        read(path)
+
+
+def test_a_step_of_another_kind_is_left_out_where_that_is_allowed(tmp_path):
+    path = tmp_path / "deck.inp"
+    path.write_text(DECK + OTHER)
+    case = read(path, ["deck.allow=[FREQUENCY]"])
+    path.write_text(DECK)
+    assert any("a step of vibrations, is left out" in note for note in case.notes)
+    assert case.evolution.until == read(path).evolution.until

@@ -44,7 +44,7 @@ from .flat import Deck, flatten
 from .general import found_pairs, motion_of, part_titles, read_general
 from .history import History, read_history
 from .joints import Joints, tied
-from .keywords import sorted_out
+from .keywords import left_out, sorted_out
 from .materials import read_interactions, read_sections
 from .meshing import Region
 from .scopes import Index
@@ -121,6 +121,10 @@ def _leave_out(deck: Deck, options: Options) -> list[str]:
     kept, notes = sorted_out([p.card for p in deck.model], options.allow)
     chosen = {id(card) for card in kept}
     deck.model = [p for p in deck.model if id(p.card) in chosen]
+    static = any(p.card.keyword == "STATIC" for step in deck.steps for p in step)
+    said = [left_out([p.card for p in s], options.allow, has_static=static) for s in deck.steps]
+    deck.steps = [step for step, note in zip(deck.steps, said, strict=True) if not note]
+    notes += [note for note in said if note]
     for k, step in enumerate(deck.steps):
         kept, more = sorted_out([p.card for p in step], options.allow)
         chosen = {id(card) for card in kept}

@@ -17,7 +17,7 @@ from ...core.errors import FileFormatError
 from .cards import LARGEST, Card, Row, digest_of, is_whole, number, whole
 from .placement import motion
 from .scopes import Index, Names, Scope, missing
-from .shapes import SHAPES, Shape
+from .shapes import SHAPES, Shape, unread
 
 Array = NDArray[np.float64]
 SPRINGS = {"SPRINGA": 2, "SPRING1": 1, "SPRING2": 2}  # spring elements, and their nodes
@@ -227,7 +227,7 @@ def _elements(deck: Deck, card: Card, scope: Scope) -> None:
         _springs(deck, card, scope, kind)
         return
     if kind not in deck.shapes:
-        raise card.error(f"TYPE={kind}: {missing('element type', kind, deck.shapes)}")
+        raise card.error(f"TYPE={kind}: {unread(kind, deck.shapes)}")
     width = 1 + deck.shapes[kind].nodes
     table = card.table(width, np.int64)
     if table is None or (table.size and not 0 < table.min() <= table.max() < LARGEST):
@@ -275,7 +275,8 @@ def _element_rows(card: Card, width: int) -> Array:
         current += [whole(text, row, "element") for text in row.fields if text]
         if len(current) > width:
             raise row.error(
-                f"element {current[0]}: expected {width - 1} nodes, got {len(current) - 1}"
+                f"element {current[0]}: {card.label('TYPE')}: expected {width - 1} nodes, got "
+                f"{len(current) - 1}"
             )
         if len(current) == width:
             found.append(current)

@@ -33,12 +33,18 @@ NUMERICS = {  # how another program iterates
 THERMAL = {  # without a change of temperature they change nothing
     "CONDUCTIVITY", "SPECIFICHEAT", "PHYSICALCONSTANTS", "GAPCONDUCTANCE",
 }  # fmt: skip
+PROCEDURES = {  # what a step may do instead of *STATIC
+    "FREQUENCY": "vibrations", "COMPLEXFREQUENCY": "vibrations", "BUCKLE": "buckling",
+    "DYNAMIC": "inertia", "MODALDYNAMIC": "inertia", "STEADYSTATEDYNAMICS": "vibrations",
+    "HEATTRANSFER": "heat", "COUPLEDTEMPERATURE-DISPLACEMENT": "heat",
+    "UNCOUPLEDTEMPERATURE-DISPLACEMENT": "heat", "VISCO": "creep", "CFD": "flow",
+    "GREEN": "vibrations", "SENSITIVITY": "sensitivities", "ELECTROMAGNETICS": "currents",
+    "SUBSTRUCTUREGENERATE": "a substructure", "NOANALYSIS": "nothing",
+}  # fmt: skip
 EMPTY = {"SYSTEM"}  # of no effect without an option
 MEANS = {  # what a card would have done
     "PLASTIC": "the material would yield", "HYPERELASTIC": "the material would be rubber",
-    "DYNAMIC": "inertia would act",
     "GAP": "contact elements would act",
-    "FREQUENCY": "vibrations would be computed", "BUCKLE": "buckling would be computed",
 }  # fmt: skip
 
 
@@ -57,17 +63,40 @@ def sorted_out(cards: Iterable[Card], allowed: Sequence[str]) -> tuple[list[Card
             notes.append(f"AT YOUR RISK: {card} (line {card.number}) is left out{_would(key)}")
         elif key in READ or _is_first_temperature(card):
             kept.append(card)
+        elif key == "RESTART" and "READ" in card.options:
+            raise card.error("READ: the results of another run are not read, give its deck")
         elif key in OUTPUT | NUMERICS | EMPTY or _is_thermal(card):
             skipped.setdefault(str(card), []).append(card.number)
         else:
+            kind = card.label("TYPE")
             raise card.error(
-                f"changes the answer and is not read{_would(key)}; without it the result is "
+                f"{f'TYPE={kind}: ' if kind else ''}changes the answer and is not "
+                f"read{_would(key)}; without it the result is "
                 f"that of another model: --allow {key} takes this risk"
             )
     for name, lines in skipped.items():
         where = ", ".join(map(str, lines[:4])) + (", ..." if len(lines) > 4 else "")
         notes.append(f"{name} (line {where}) is skipped: it does not change the answer")
     return kept, notes
+
+
+def left_out(step: Sequence[Card], allowed: Sequence[str], *, has_static: bool) -> str:
+    """What to say of a step that is not static and is left out, "" for one that is read.
+
+    Raises FileFormatError for one that is not allowed; has_static: other steps are static.
+    """
+    allow = {"".join(word.upper().split()).removeprefix("*") for word in allowed}
+    for card in step:
+        if card.keyword in PROCEDURES:
+            what = f"{card} (line {card.number}), a step of {PROCEDURES[card.keyword]}"
+            if card.keyword in allow and has_static:
+                return f"AT YOUR RISK: {what}, is left out with all that stands in it"
+            hint = (f"; --allow {card.keyword} leaves the whole step out" if has_static
+                    else ", and no other step is one: there is nothing to solve")  # fmt: skip
+            raise card.error(
+                f"this step is one of {PROCEDURES[card.keyword]}, expected *STATIC{hint}"
+            )
+    return ""
 
 
 def _is_thermal(card: Card) -> bool:

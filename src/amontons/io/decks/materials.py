@@ -100,7 +100,7 @@ def read_sections(deck: Deck, placed: Sequence[Placed]) -> list[Section]:
     if not found:
         if deck.blocks:
             raise deck.blocks[0].card.error("no *SOLID SECTION gives a material to elements")
-        raise InvalidInput("*ELEMENT: missing, the deck has no elements")
+        raise InvalidInput("*ELEMENT: missing, the deck has no solid elements")
     return found
 
 
