@@ -7,6 +7,7 @@ without it at the user's risk, which every result then says.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 
 from .cards import Card
 
@@ -47,6 +48,8 @@ MEANS = {  # what a card would have done
     "GAP": "contact elements would act",
 }  # fmt: skip
 
+SLIP = 0.85  # share of letters that keywords have in common from which one is a slip
+
 
 def sorted_out(cards: Iterable[Card], allowed: Sequence[str]) -> tuple[list[Card], list[str]]:
     """The cards that are read, and what is to be said of those that are left out.
@@ -72,7 +75,7 @@ def sorted_out(cards: Iterable[Card], allowed: Sequence[str]) -> tuple[list[Card
             raise card.error(
                 f"{f'TYPE={kind}: ' if kind else ''}changes the answer and is not "
                 f"read{_would(key)}; without it the result is "
-                f"that of another model: --allow {key} takes this risk"
+                f"that of another model: --allow {key} takes this risk{_meant(key)}"
             )
     for name, lines in skipped.items():
         where = ", ".join(map(str, lines[:4])) + (", ..." if len(lines) > 4 else "")
@@ -105,6 +108,12 @@ def _is_thermal(card: Card) -> bool:
 
 def _would(key: str) -> str:
     return f" ({MEANS[key]})" if key in MEANS else ""
+
+
+def _meant(key: str) -> str:
+    """What a keyword may be a slip of the pen for; none that exists is so near another."""
+    close = [] if key in MEANS else get_close_matches(key, READ, 1, SLIP)
+    return f"; did you mean *{close[0]}?" if close else ""
 
 
 def _is_first_temperature(card: Card) -> bool:
