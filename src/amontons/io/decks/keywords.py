@@ -16,7 +16,8 @@ READ = {
     "CLOAD", "DLOAD", "DSLOAD", "EQUATION", "MPC", "TIE", "TRANSFORM", "COUPLING", "KINEMATIC",
     "DISTRIBUTING", "RIGIDBODY", "PRE-TENSIONSECTION", "SPRING", "CLEARANCE",
     "CHANGEFRICTION", "CHANGESURFACEBEHAVIOR", "MODELCHANGE", "EXPANSION", "TEMPERATURE",
-    "ORIENTATION",
+    "ORIENTATION", "CONTACT", "CONTACTINCLUSIONS", "CONTACTEXCLUSIONS",
+    "CONTACTPROPERTYASSIGNMENT",
 }  # fmt: skip
 OUTPUT = {
     "NODEPRINT", "NODEFILE", "NODEOUTPUT", "ELPRINT", "ELFILE", "ELEMENTOUTPUT", "CONTACTFILE",
@@ -26,8 +27,8 @@ OUTPUT = {
     "FILTER", "PREPROCESS",
 }  # fmt: skip
 NUMERICS = {  # how another program iterates
-    "CONTROLS", "CONTACTCONTROLS", "CONTACTSTABILIZATION", "SOLVERCONTROLS", "SECTIONCONTROLS",
-    "HOURGLASSSTIFFNESS",
+    "CONTROLS", "CONTACTCONTROLS", "CONTACTFORMULATION", "CONTACTSTABILIZATION",
+    "SOLVERCONTROLS", "SECTIONCONTROLS", "HOURGLASSSTIFFNESS",
 }  # fmt: skip
 THERMAL = {  # without a change of temperature they change nothing
     "CONDUCTIVITY", "SPECIFICHEAT", "PHYSICALCONSTANTS", "GAPCONDUCTANCE",
@@ -38,7 +39,6 @@ MEANS = {  # what a card would have done
     "DYNAMIC": "inertia would act",
     "GAP": "contact elements would act",
     "FREQUENCY": "vibrations would be computed", "BUCKLE": "buckling would be computed",
-    "CONTACT": "surfaces in contact would be found",
 }  # fmt: skip
 
 
