@@ -27,6 +27,7 @@ from ...core.files import check_is_regular
 DEEPEST = 32  # files that include one another
 LARGEST_FILE = 2**33  # bytes, unpacked
 OPTION = re.compile(r'((?:[^,"]|"[^"]*")*)(?:,|$)')  # up to a comma outside of quotes
+NUMERIC = re.compile(r"(^|,)[ \t]*[-+.]?\d[^=,\n]*(,|$)")  # a field that is a number
 REMARK = re.compile(r"^[ \t]*\*\*.*\n?", re.MULTILINE)
 NEWLINE, COMMA = b"\n,"
 LONGEST = 80  # letters of a number with blanks
@@ -257,6 +258,8 @@ def _joined(text: str, begin: int, stop: int) -> tuple[str, int]:
         after = text.find("\n", end + 1, stop)
         after = stop if after < 0 else after
         more = text[end + 1 : after].strip()
+        if NUMERIC.search(more) and not more.startswith("**"):
+            break  # no option is a number alone: the comma ends the line, as some write it
         end = after
         if not more.startswith("**"):
             line += more
