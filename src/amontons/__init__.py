@@ -77,7 +77,9 @@ __all__ = sorted(_MODULE)
 
 def __getattr__(name: str) -> Any:
     if name in _MODULE:
-        return getattr(importlib.import_module(f".{_MODULE[name]}", __name__), name)
+        value = getattr(importlib.import_module(f".{_MODULE[name]}", __name__), name)
+        globals()[name] = value  # found at once from now on
+        return value
     if name in _GONE:
         from .core.errors import InvalidInput
 
@@ -90,4 +92,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *__all__])
+    return sorted({*globals(), *__all__})

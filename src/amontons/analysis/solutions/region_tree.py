@@ -10,6 +10,7 @@ from abc import ABC, abstractmethod
 from typing import Any
 
 from ...core.clock import Deadline
+from ...core.onlookers import say
 from ..scaled import Scaled
 
 FINDING = 0.2  # share of the time left that goes into looking for another solution
@@ -61,6 +62,7 @@ class RegionTree(ABC):
         """Close or divide the region that is next."""
         self.deadline.spend(self._work)
         self.examined += 1
+        say(f"this load: region {self.examined}, {len(self.queue)} to be looked at")
         self.queue += reversed(self._look_at(self.queue.pop()))
 
     def run(self, *, until_several: bool = False) -> None:

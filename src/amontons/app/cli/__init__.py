@@ -167,9 +167,11 @@ Examples:
   amontons enumerate example:brake --picture brake.png
   amontons enumerate example:hild --mu 2 --set mesh.refine=4
   amontons enumerate problem.hdf5 --json - | jq .complete
+  amontons enumerate example:brake -o brake   solutions.csv: a row per solution and contact
 
 \b
-Exit codes: 0 the list is complete, 1 there may be others, 2 bad input.
+Exit codes: 0 the list is complete, 1 there may be others, 2 bad input, 130 interrupted before
+it was complete: Ctrl-C ends the search with what it has found, a second one at once.
 """,
 )
 @click.argument("source")
@@ -181,7 +183,7 @@ Exit codes: 0 the list is complete, 1 there may be others, 2 bad input.
 @click.option("--json", "json_copy", metavar="FILE", help="The same as JSON; - prints it.")
 @click.option("--picture", metavar="FILE",
               help="Draw the solutions side by side: .png, .svg or .pdf.")  # fmt: skip
-@results_folder("name of the source with -results", only_report=True)
+@results_folder("name of the source with -results", asked=True)
 @flags.of_decks
 def enumerate_solutions(**options: object) -> int:
     """Find all solutions of a problem with Coulomb friction, and prove that these are all.
@@ -259,7 +261,8 @@ Examples:
   amontons uniqueness problem.hdf5 --json - | jq .verdict
 
 \b
-Exit codes: 0 settled, either way, 1 undecided, 2 bad input.
+Exit codes: 0 settled, either way, 1 undecided, 2 bad input, 130 interrupted while undecided:
+Ctrl-C ends the search with what is known, a second one at once.
 """,
 )
 @click.argument("source")

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.errors import InvalidInput
 from ...mechanics.contact import pair_contact
 from ...mechanics.contact.pairs import project
 from ...mechanics.meshes import Mesh
@@ -32,8 +33,10 @@ def adjusted(mesh: Mesh, at: Index, pairs: Sequence[Pair], notes: list[str]) -> 
             pair.tool = faced(pair.tool, mesh, pair.slave)
         if pair.adjust is None:
             continue
-        moved = replace(mesh, points=points)
-        nodes, gap, normals = _distances(moved, pair)
+        try:
+            nodes, gap, normals = _distances(replace(mesh, points=points), pair)
+        except InvalidInput as reason:
+            raise pair.card.error(str(reason)) from reason
         if isinstance(pair.adjust, float):
             chosen = gap <= pair.adjust
         else:
@@ -47,7 +50,11 @@ def adjusted(mesh: Mesh, at: Index, pairs: Sequence[Pair], notes: list[str]) -> 
                 f"the master, at most {np.abs(way).max():.3g} away"
             )
     if not np.array_equal(points, mesh.points):
-        mesh = replace(mesh, points=points)
+        try:
+            mesh = replace(mesh, points=points)
+        except InvalidInput as reason:
+            card = next(pair.card for pair in pairs if pair.adjust is not None)
+            raise card.error(f"slave nodes put onto the master: {reason}") from reason
     for pair in pairs:
         if pair.nodes is not None:
             pair.points = mesh.points[at[pair.nodes]]

@@ -38,7 +38,8 @@ from .about import About
 from .adjusting import adjusted
 from .axes import Turned
 from .cards import Card, Row, read_cards
-from .contacts import Options, law_of, read_contacts
+from .contact_laws import Options, law_of
+from .contacts import read_contacts
 from .course import Course
 from .flat import Deck, flatten
 from .general import found_pairs, motion_of, part_titles, read_general
@@ -81,10 +82,11 @@ class Found:
 def read(path: Path, overrides: Sequence[str] = (), method: str | None = None) -> Case:
     """The case in a deck.  Overrides: those of the solver, deck.allow and deck.hard."""
     settings, options = _settings(overrides, method)
-    deck = flatten(read_cards(path))
+    cards = read_cards(path)
+    deck = flatten(cards)
     notes = _leave_out(deck, options)
     if not deck.steps:
-        raise FileFormatError(f"{path}: *STEP: missing, the deck loads nothing")
+        raise cards[-1].error("the deck ends here without a *STEP, it loads nothing")
     try:
         return _case(path, deck, settings, options, notes)
     except FileFormatError:
@@ -148,6 +150,7 @@ def _case(
     check_removed(stages, pairs, deck)
     _name_faces(region, history)
     mesh, at = region.mesh(title)
+    sections = [s for s in sections if s.name in mesh.regions]  # others are given again
     materials = {s.name: s.law(region.plane) for s in sections}
     if general is not None:
         mesh, more, said = found_pairs(

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from .cards import is_whole
+
 FULL = "full integration"
 
 
@@ -85,6 +87,6 @@ SHAPES = {
 
 def side_of(label: str) -> int | None:
     """The number of a side from 0 of "S3", also "P3" of a pressure; None for another word."""
-    if label[:1] in ("S", "P") and label[1:].isdigit():
+    if label[:1] in ("S", "P") and is_whole(label[1:]):
         return int(label[1:]) - 1
     return None
