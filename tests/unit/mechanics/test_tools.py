@@ -234,3 +234,29 @@ def test_an_obstacle_in_space_needs_a_mesh_in_space():
     model = am.Model([body], [am.Fix("bottom", 0)], [contact])
     with pytest.raises(am.InvalidInput, match="cylinder: is in 3D, the mesh in 2D"):
         model.assemble()
+
+
+def test_hertz_of_a_ball_around_its_axis():
+    """Largest pressure 3 F / (2 pi a^2), approach a^2 / R on a large body."""
+    R, F, E, nu = 10.0, 5.0, 1000.0, 0.3
+    star = E / (1 - nu**2)
+    a = (3 * F * R / (4 * star)) ** (1 / 3)
+    mesh = am.box((1, 1), (48, 48))
+    x = np.stack([8 * mesh.points[:, 0] ** 2, -8 * (1 - mesh.points[:, 1]) ** 2], axis=1)
+    block = am.Body(replace(mesh, points=x), SOFT, "block", axisymmetric=True)
+    ball = replace(tool(2), axisymmetric=True)
+    model = am.Model(
+        [block, ball], [am.Fix("block.bottom", 0)],
+        [am.Contact("block.top", am.Sphere((0, R), R), mu=0.0, follows="punch",
+                    method="mortar")],
+        [am.NodalForce("R", (0, -F))], references=[am.Reference("R", (0, R))],
+        constraints=[am.Coupling("punch", "R")],
+    )  # fmt: skip
+    found = am.solve(model, tolerance=1e-11)
+    assert found.resultant[1] == pytest.approx(-F, rel=1e-9)
+    assert found.fields.pressure.max() == pytest.approx(1.5 * F / (np.pi * a**2), rel=0.03)
+    sunk = -found.references["R"].displacement
+    assert sunk[0] == 0
+    assert sunk[1] == pytest.approx(a**2 / R, rel=0.12)  # the block is 26 a deep
+    with pytest.raises(am.InvalidInput, match="around an axis follows a reference"):
+        replace(model, constraints=[], loads=[]).assemble()

@@ -35,10 +35,11 @@ from ..case.overrides import override_settings
 from ..case.settings import Settings
 from ..readers import Case
 from .about import About
+from .adjusting import adjusted
 from .axes import Turned
 from .cards import Card, Row, read_cards
 from .contact_laws import Options, law_of
-from .contacts import adjusted, read_contacts
+from .contacts import read_contacts
 from .course import Course
 from .flat import Deck, flatten
 from .general import found_pairs, motion_of, part_titles, read_general
@@ -50,6 +51,7 @@ from .meshing import Region
 from .scopes import Index
 from .special import special_nodes
 from .stages import Held, check_removed, read_stages, times_of
+from .tools import OWN, own_nodes, tool_bodies
 
 KINDS = ("supports", "loads", "contacts", "references", "constraints", "springs")
 
@@ -168,7 +170,12 @@ def _case(
         _supports(found, stage, region, history, at, notes)
         stage.contacts = stage.contacts_of(pairs, mesh, law)
     found.cards["contacts"] = [pair.card for pair in pairs]
-    make = partial(_model, [Body(mesh, materials)], found, title)
+    bodies = [Body(mesh, materials), *tool_bodies(joints, region)]
+    if len(bodies) > 1:
+        bodies[0] = replace(bodies[0], name=OWN)
+        found.constraints[:] = own_nodes(found.constraints)
+        found.springs[:] = own_nodes(found.springs)
+    make = partial(_model, bodies, found, title)
     later = tuple(Stage(s.begin, partial(_of_state, make, s)) for s in stages[1:])
     plan = Schedule(*times_of(history, options.increments, notes), stages=later)
     case = Case(make(stages[0], None), settings, title, path,

@@ -7,7 +7,7 @@ with its share of the facets next to it that face the master; all else is mortar
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -16,17 +16,13 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ...core.errors import InvalidInput
-from ...mechanics.contact import pair_contact
-from ...mechanics.contact.pairs import project
-from ...mechanics.meshes import Mesh
-from ...mechanics.meshes.facets import linear_parts
-from ...mechanics.meshes.surfaces import nodal_normals
 from ...mechanics.model import Contact
 from .cards import Card, Row, number
 from .flat import Deck, Placed
 from .materials import Interaction
 from .meshing import Region
-from .scopes import Index, missing
+from .scopes import Analytic, Index, missing
+from .tools import Tool, obstacle_of
 
 Array = NDArray[np.float64]
 ASIDE = {"HCRIT", "NOTHICKNESS", "SMALLSLIDING", "EXTENSIONZONE", "GEOMETRICCORRECTION",
@@ -54,34 +50,28 @@ class Pair:
     clearance: float | None = None
     within: float | None = None
     glued: Array | None = None
+    tool: Tool | None = None
+    follows: str | None = None
 
     def contact(self, law: dict[str, Any], far: float | None = None) -> Contact:
         """The contact of the model under a law; far: how far away one is that is removed."""
         if self.glued is not None:
             nodal = "mortar" if self.points is None else "nodal"
             return Contact(self.slave, master=self.master, tied=True, method=nodal,
-                           where=partial(_near, self.glued))  # fmt: skip
+                           where=partial(near, self.glued))  # fmt: skip
         gap = self.clearance if far is None else far
+        if self.tool is not None:
+            return Contact(self.slave, self.tool, follows=self.follows, method="mortar",
+                           clearance=gap, **law)  # fmt: skip
         if self.points is None:
             return Contact(self.slave, master=self.master, clearance=gap, **law)
-        where = partial(_near, self.points)
+        where = partial(near, self.points)
         return Contact(
             self.slave, master=self.master, clearance=gap, method="nodal", where=where, **law
         )
 
-    def glue(self, mesh: Mesh) -> None:
-        """Choose the nodes of a tie that are near enough; raises FileFormatError for none."""
-        nodes, gap, _ = _distances(mesh, self)
-        near = np.abs(gap) <= self.within
-        if not near.any():
-            raise self.card.error(
-                f"no node of {self.slave} is within {self.within:.3g} of {self.master}; give a "
-                "POSITION TOLERANCE"
-            )
-        self.glued = mesh.points[nodes[near]] if self.points is None else self.points
 
-
-def _near(points: Array, x: Array) -> NDArray[np.bool_]:
+def near(points: Array, x: Array) -> NDArray[np.bool_]:
     """Which of x (n, dim) are among points (k, dim)."""
     size = float(np.abs(points).max(initial=0.0)) or 1.0
     return np.asarray(cKDTree(points).query(x)[0] <= 1e-9 * size)
@@ -133,15 +123,27 @@ def _pairs(
             raise row.error(
                 f"*CONTACT PAIR: expected slave, master, got {len(row.fields)} names"
             )
-        master = ask_surface(region, placed, names[1], row)
-        pair = Pair("", master, card, name, smooth)
-        pair.slave, pair.nodes = _slave(region, placed, names[0], master, row)
+        pair = Pair("", names[1].strip('"').upper(), card, name, smooth)
+        analytic = placed.scope.analytic(names[1])
+        if analytic is not None:
+            pair.tool, pair.follows = _tool(analytic, names[1], region.dim, row)
+            pair.slave, pair.nodal = ask_surface(region, placed, names[0], row), False
+        else:
+            pair.master = ask_surface(region, placed, names[1], row)
+            pair.slave, pair.nodes = _slave(region, placed, names[0], pair.master, row)
         pair.adjust = _adjust(placed)
         out.append(pair)
     if smooth and out:
         what = "node by node" if out[0].nodes is not None else "mortar"
         notes.append(f"{card} (line {card.number}): NODE TO SURFACE is taken as {what}")
     return out
+
+
+def _tool(surface: Analytic, name: str, dim: int, row: Row) -> tuple[Tool, str]:
+    """The obstacle of an analytic surface, and the body that it moves with."""
+    if not surface.body:
+        raise row.error(f"surface {name}: expected a *RIGID BODY, ANALYTICAL SURFACE={name}")
+    return obstacle_of(surface, dim), surface.body
 
 
 def _ties(placed: Placed, region: Region) -> list[Pair]:
@@ -223,60 +225,3 @@ def _slave(
         return ask_surface(region, placed, text, row), None
     region.add_around(name, nodes, region.facets[master], row)
     return name, nodes
-
-
-# ----------------------------------------------------------------------------- adjusting
-def adjusted(mesh: Mesh, at: Index, pairs: Sequence[Pair], notes: list[str]) -> Mesh:
-    """The mesh with slave nodes put onto their master where a pair asks for it.
-
-    at: number in the mesh of each node of the deck.  Also tells pairs of nodes where these are.
-    """
-    points = np.array(mesh.points)
-    for pair in pairs:
-        if pair.adjust is None:
-            continue
-        try:
-            nodes, gap, normals = _distances(replace(mesh, points=points), pair)
-        except InvalidInput as reason:
-            raise pair.card.error(str(reason)) from reason
-        if isinstance(pair.adjust, float):
-            chosen = gap <= pair.adjust
-        else:
-            chosen = np.isin(nodes, at[pair.adjust])
-        chosen &= gap != 0.0
-        way = gap[chosen]
-        points[nodes[chosen]] -= way[:, None] * normals[chosen]
-        if len(way):
-            notes.append(
-                f"{pair.card} (line {pair.card.number}): {len(way)} slave nodes are put onto "
-                f"the master, at most {np.abs(way).max():.3g} away"
-            )
-    if not np.array_equal(points, mesh.points):
-        try:
-            mesh = replace(mesh, points=points)
-        except InvalidInput as reason:
-            card = next(pair.card for pair in pairs if pair.adjust is not None)
-            raise card.error(f"slave nodes put onto the master: {reason}") from reason
-    for pair in pairs:
-        if pair.nodes is not None:
-            pair.points = mesh.points[at[pair.nodes]]
-        if pair.within is not None:
-            pair.glue(mesh)
-    return mesh
-
-
-def _distances(mesh: Mesh, pair: Pair) -> tuple[Index, Array, Array]:
-    """Slave nodes (k,) with a master in front of them, distances (k,) and normals (k, d)."""
-    if mesh.order == 1 and pair.within is None:
-        rows, _, _ = pair_contact(mesh, pair.slave, mesh, pair.master)
-        return rows.nodes, rows.gap, rows.frames[:, 0]
-    slave, master = (linear_parts(mesh.surface(name)) for name in (pair.slave, pair.master))
-    nodes = np.unique(np.concatenate([block.nodes.ravel() for block in slave]))
-    normals, x = nodal_normals(mesh.points, slave)[nodes], mesh.points[nodes]
-    hit = project(x, mesh.points, master, facing=normals, own=nodes)
-    if pair.within is not None and not hit.found.any():  # ties of sides that look one way
-        hit = project(x, mesh.points, master, own=nodes)
-    at = np.flatnonzero(hit.found)
-    gap = np.einsum("kc,kc->k", x[at] - hit.closest[at], hit.normal[at])
-    gap[np.abs(gap) < ROUNDING * np.abs(mesh.points).max()] = 0.0
-    return nodes[at], gap, hit.normal[at]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ...core.errors import FileFormatError
 from .cards import LARGEST, Card, Row, digest_of, is_whole, number, whole
 from .placement import motion
-from .scopes import Index, Names, Scope, missing
+from .scopes import Analytic, Index, Names, Scope, missing
 from .shapes import SHAPES, Shape, unread
 
 Array = NDArray[np.float64]
@@ -156,6 +156,8 @@ def _assemble(deck: Deck, cards: Sequence[Card], parts: dict[str, list[Card]]) -
             _take(deck, each, scope)
         move = motion(card)
         deck._points[before:] = [move(points) for points in deck._points[before:]]
+        for surface in deck.instances[name].analytic.values():
+            surface.move = move
 
 
 # --------------------------------------------------------------------------------- cards
@@ -368,14 +370,19 @@ def _surface(deck: Deck, card: Card, scope: Scope) -> None:
     name = card.name("NAME")
     kind = card.label("TYPE") or "ELEMENT"
     own = scope.own
-    if name in own.faces or name in own.node_surfaces:
+    if name in own.faces or name in own.node_surfaces or name in own.analytic:
         raise card.error(f"NAME: surface {name} is there already")
     if kind == "NODE":
         found = [scope.nodes(row.fields[0], row) for row in card.rows()]
         own.node_surfaces[name] = _unique(np.concatenate(found)) if found else np.zeros(0, int)
         return
+    if kind in ("SEGMENTS", "CYLINDER", "REVOLUTION"):
+        own.analytic[name] = Analytic(card)
+        return
     if kind != "ELEMENT":
-        raise card.error(f"TYPE={kind}: expected ELEMENT or NODE")
+        raise card.error(
+            f"TYPE={kind}: expected ELEMENT, NODE, SEGMENTS, CYLINDER or REVOLUTION"
+        )
     own.faces[name] = [
         (scope.elements(row.fields[0], row),
          (row.fields[1] if len(row.fields) > 1 else "").upper())

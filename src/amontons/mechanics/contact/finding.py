@@ -174,6 +174,77 @@ def _off_axis(mesh: Mesh, block: Facets) -> Mask:
     return x.max(axis=1) > ON_AXIS * mesh.points[:, 0].max()
 
 
+def meetings_within(skin: Skin, part: int, reach: Reach, allowed: Allowed) -> list[Meeting]:
+    """Where a part meets itself: one meeting for each two smooth faces, or halves of one.
+
+    Facets that share a node do not meet, nor do those that see each other through the body.
+    """
+    rows = skin.in_order(np.flatnonzero(skin.part == part))
+    side = Surface.of(skin.mesh.points, skin.facets(rows), "outside",
+                      axisymmetric=skin.mesh.axisymmetric)  # fmt: skip
+    found = segments(side, side, joined=True)
+    counts = _counts(side, side, found, reach) & ~_through(side, found, distances(side, found))
+    counts &= allowed(rows[found.slave], rows[found.master])
+    found = nearest(side, found.at(counts))
+    if not len(found.slave):
+        return []
+    apart = distances(side, found)
+    half = _halves(skin, rows, found)
+    out = []
+    both = np.stack([half[found.slave], half[found.master]], axis=1)
+    for a, b in np.unique(np.sort(both, axis=1), axis=0):
+        chosen = (both[:, 0] == a) & (both[:, 1] == b)
+        if not chosen.any():
+            continue
+        met = (rows[np.unique(found.slave[chosen])], rows[np.unique(found.master[chosen])])
+        least = float(apart[chosen].min())
+        out.append(Meeting(met, met, float(found.area[chosen].sum()), max(least, 0.0),
+                           max(-least, 0.0)))  # fmt: skip
+    return out
+
+
+def _through(side: Surface, found: Segments, apart: Array) -> Mask:
+    """Segments (k,) whose sides overlap: back to back through the body, not in front of it."""
+    return apart < -NONE * side.radius[found.slave]
+
+
+def _halves(skin: Skin, rows: Index, found: Segments) -> Index:
+    """A number for each of the facets rows (k,): even ones and odd ones face each other.
+
+    Smooth faces are coloured one after another; where two facets of one face meet, that face
+    falls into two halves: facets side by side are of one, facets opposite of different ones.
+    """
+    face = skin.face[rows]
+    own = face[found.slave] == face[found.master]
+    place = np.full(len(skin.corners), -1)
+    place[rows] = np.arange(len(rows))
+    met = np.zeros(len(rows), dtype=bool)
+    met[found.slave[own]] = met[found.master[own]] = True
+    one, other = (place[x] for x in skin._beside)
+    beside = (one >= 0) & (other >= 0) & met[one] & met[other]
+    beside &= face[one] == face[other]
+    links: dict[int, list[tuple[int, int]]] = {}
+    for a, b, way in (
+        *((int(a), int(b), 0) for a, b in zip(one[beside], other[beside], strict=True)),
+        *((int(a), int(b), 1) for a, b in
+          zip(found.slave[own], found.master[own], strict=True)),
+    ):  # fmt: skip
+        links.setdefault(a, []).append((b, way))
+        links.setdefault(b, []).append((a, way))
+    colour = np.full(len(rows), -1)
+    for first in np.flatnonzero(met):
+        if colour[first] >= 0:
+            continue
+        colour[first], todo = 0, [int(first)]
+        while todo:
+            here = todo.pop()
+            for there, way in sorted(links.get(here, ()), key=lambda link: -link[1]):
+                if colour[there] < 0:
+                    colour[there] = colour[here] ^ way
+                    todo.append(there)
+    return 2 * face + np.maximum(colour, 0)
+
+
 @dataclass(frozen=True, eq=False)
 class Meeting:
     """Where two parts meet: facets of both sides (k,), and what lies between them.
@@ -236,8 +307,7 @@ def meeting(
 
 def distances(slave: Surface, found: Segments) -> Array:
     """Mean distance of the curved sides of each segment, (k,), < 0 where they overlap."""
-    out = np.einsum("kac,kc->k", found.bulge, slave.normal[found.slave])
-    apart = found.gap - out / found.area
+    apart = found.apart.sum(axis=1) / found.area
     apart[np.abs(apart) < NONE * slave.radius[found.slave]] = 0.0
     return apart
 

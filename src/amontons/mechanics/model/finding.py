@@ -17,7 +17,15 @@ from numpy.typing import NDArray
 
 from ...core.arrays import number
 from ...core.errors import InvalidInput, shown, within
-from ..contact.finding import Allowed, Meeting, Reach, Skin, close_parts, meeting
+from ..contact.finding import (
+    Allowed,
+    Meeting,
+    Reach,
+    Skin,
+    close_parts,
+    meeting,
+    meetings_within,
+)
 from ..elements.rigid import Rigid
 from ..meshes.facets import Facets, corner_facets
 from ..meshes.mesh import unknown
@@ -85,7 +93,7 @@ class FoundContacts:
 
 def find_contacts(
     bodies: Sequence[Body], *, gap: float | None = None, exclude: Sequence[Any] = (),
-    known: Sequence[Contact] = (), **law: Any,
+    known: Sequence[Contact] = (), itself: bool = False, **law: Any,
 ) -> FoundContacts:  # fmt: skip
     """All pairs of parts that may touch, small sliding: one contact for each two parts.
 
@@ -95,6 +103,8 @@ def find_contacts(
     each other.  A part is what is connected in a mesh; where a body has several they are named
     by their regions, else "body (part 1 of 2)".
     known: contacts given by hand, whose facets are not found again between the same two sides.
+    itself: also contact of parts with themselves: slots that close, folds.  Facets that share a
+    node do not meet; each two faces that do make a pair.
     law: what `Contact` takes: mu=0.3, method="mortar", ...; for all that is found.
 
     Raises InvalidInput where nothing is found, and for names that no body has.
@@ -117,7 +127,7 @@ def find_contacts(
             masks for (k, j), masks in by_hand if (k, j) == (one[0], other[0])
         ])  # fmt: skip
 
-    found = find_between(parts, Reach(gap), law, allowed)
+    found = find_between(parts, Reach(gap), law, allowed, itself=itself)
     if not found.contacts and not known:
         raise InvalidInput(_nothing(parts, gap))
     return found
@@ -125,10 +135,18 @@ def find_contacts(
 
 def find_between(
     parts: Parts, reach: Reach, law: dict[str, Any],
-    allowed: Callable[[Side, Side], Allowed | None],
+    allowed: Callable[[Side, Side], Allowed | None], *, itself: bool = False,
 ) -> FoundContacts:  # fmt: skip
-    """Contacts of parts within reach; allowed: which facets of two may meet, None for none."""
+    """Contacts of parts within reach; allowed: which facets of two may meet, None for none.
+
+    itself: also of parts with themselves.
+    """
     made = _Made(parts.bodies)
+    for k, skin in enumerate(parts.skins if itself else ()):
+        for p in np.unique(skin.part):
+            may = allowed((k, int(p)), (k, int(p)))
+            for met in [] if may is None else meetings_within(skin, int(p), reach, may):
+                made.add(parts, ((k, int(p)), (k, int(p))), met, law)
     for k, p, j, q in close_parts(parts.skins, reach):
         may = allowed((k, p), (j, q))
         if may is None:
@@ -218,6 +236,9 @@ class _Made:
         order = (0, 1) if _first_is_slave(parts, which, met) else (1, 0)
         names = [parts.titles[which[k][0]][which[k][1]] for k in order]
         labels = (f"{names[0]} on {names[1]}", f"{names[1]} under {names[0]}")
+        times = sum(pair.parts == (names[0], names[1]) for pair in self.pairs)
+        if times:  # a part meets itself in several places
+            labels = (f"{labels[0]} {times + 1}", f"{labels[1]} {times + 1}")
         for side, label in zip(order, labels, strict=True):
             body = which[side][0]
             chosen = parts.skins[body].facets(met.faces[side])
