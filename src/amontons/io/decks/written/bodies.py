@@ -134,8 +134,9 @@ def element_type(
     for name in fitting:
         if SHAPES[name].integration == integration and not name.endswith("4R"):
             return name if name != "C3D8R" else "C3D8"
-    hint = "; expected quad8, hex20 or others of decks" if not fitting else (
-        f"; expected integration {SHAPES[fitting[0]].integration!r} of these cells")  # fmt: skip
+    hint = "; expected quad8, hex20 or others of decks"
+    if fitting:
+        hint = f"; expected integration {SHAPES[fitting[0]].integration!r} of these cells"
     raise InvalidInput(
         f"body {body!r}: cells {cell!r} with {integration} integration: no element of a "
         f"deck is the same{hint}"
