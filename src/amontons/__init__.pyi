@@ -43,7 +43,8 @@ from .io.readers import read_case as read_case
 from .io.series import export_xdmf as export_xdmf
 from .linear import Direct as Direct, GeometricMultigrid as GeometricMultigrid, Petsc as Petsc
 from .mechanics.contact import (
-    LevelSet as LevelSet, Nitsche as Nitsche, Plane as Plane, Sphere as Sphere,
+    Cylinder as Cylinder, Extrusion as Extrusion, LevelSet as LevelSet, Nitsche as Nitsche,
+    Plane as Plane, Profile as Profile, Revolution as Revolution, Sphere as Sphere,
 )
 from .mechanics.meshes import (
     Cells as Cells, Facets as Facets, Mesh as Mesh, box as box, mesh_shape as mesh_shape,
@@ -57,6 +58,7 @@ from .mechanics.model import (
     OrthotropicElastic as OrthotropicElastic, Pressure as Pressure,
     Pretension as Pretension, Reference as Reference, Rigid as Rigid, Spring as Spring,
     Temperature as Temperature, Traction as Traction, distributed as distributed,
+    FoundContacts as FoundContacts, FoundPair as FoundPair, find_contacts as find_contacts,
 )
 from .mechanics.ready.packings import SpherePacking as SpherePacking
 from .mechanics.ready.walls import Bond as Bond, Wall as Wall

@@ -186,7 +186,10 @@ def _written(solver: object) -> str:
 
 
 def fitted(problem: Problem, solver: Solver, deadline: Deadline | None) -> Problem:
-    """The problem as the solver takes it; raises UnsupportedForm where it does not."""
+    """The problem as the solver takes it; raises UnsupportedForm where it does not.
+
+    deadline: of condensing it where need be; None to raise UnsupportedForm instead.
+    """
     takes = taken_by(solver)
     if not isinstance(problem, takes.solves):
         check_solves(solver, type(problem))
@@ -195,12 +198,16 @@ def fitted(problem: Problem, solver: Solver, deadline: Deadline | None) -> Probl
             f"{type(solver).__name__} needs Coulomb's cone, the problem has "
             f"{problem.law.name}; use Auto, SemismoothNewton or GaussSeidel", ("solver",), "",
         )  # fmt: skip
-    try:
-        return problem.in_form(takes.form, not takes.matrix_free, deadline)
-    except UnsupportedForm as reason:
+    if takes.form is Form.DELASSUS and deadline is not None:
+        problem = problem.condensed(deadline)
+    if Form.ANY not in (takes.form, problem.form) and takes.form is not problem.form:
+        local = takes.form is Form.DELASSUS
+        hint = "problem.condensed()" if local else "Auto or a solver of the local form"
         raise UnsupportedForm(
-            f"{type(solver).__name__} {reason.text}", ("solver",), ""
-        ) from None
+            f"{type(solver).__name__} needs the {takes.form.value} form, the problem is "
+            f"{problem.form.value}; use {hint}", ("solver",), "",
+        )  # fmt: skip
+    return problem if takes.matrix_free else problem.assembled()
 
 
 def check_solves(solver: Any, kind: type[Problem]) -> None:

@@ -67,7 +67,8 @@ Examples:
 def convert(**options: object) -> None:
     """Write a problem as an FCLib file, in either form, or results as .frd or .dat.
 
-    SOURCE is a TOML case file, an FCLib HDF5 file, a results folder, or example:NAME.
+    SOURCE is a case file (.toml), a deck (.inp), an FCLib file, a results folder, or
+    example:NAME.
     """
     from .convert import run
 

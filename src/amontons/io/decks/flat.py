@@ -13,10 +13,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from .cards import Card, Row, digest_of, number, whole
+from ...core.errors import FileFormatError
+from .cards import LARGEST, Card, Row, digest_of, is_whole, number, whole
 from .placement import motion
 from .scopes import Index, Names, Scope, missing
-from .shapes import SHAPES, Shape
+from .shapes import SHAPES, Shape, unread
 
 Array = NDArray[np.float64]
 SPRINGS = {"SPRINGA": 2, "SPRING1": 1, "SPRING2": 2}  # spring elements, and their nodes
@@ -74,6 +75,13 @@ class Deck:
                 label = names.node_labels[np.flatnonzero(names.node_at == node)[0]]
                 return f"{names.title}.{label}" if names.title else str(label)
         return str(node)
+
+    def element_labels(self) -> Index:
+        """Numbers of all elements in the deck, those of their part in an instance."""
+        labels = np.zeros(sum(len(block.nodes) for block in self.blocks), dtype=np.int64)
+        for names in {id(n): n for n, _ in self.point_labels}.values():
+            labels[names.element_at] = names.element_labels
+        return labels
 
 
 def flatten(cards: Sequence[Card], shapes: Mapping[str, Shape] = SHAPES) -> Deck:
@@ -181,7 +189,7 @@ def _nodes(deck: Deck, card: Card, scope: Scope) -> None:
 
 def _regular(labels: Array) -> bool:
     """True for whole numbers > 0, as far as 64 bits hold them."""
-    return bool(((labels == np.floor(labels)) & (labels > 0) & (labels < 2**53)).all())
+    return bool(((labels == np.floor(labels)) & (labels > 0) & (labels < LARGEST)).all())
 
 
 def _node(row: Row) -> list[float]:
@@ -206,7 +214,7 @@ def _no_doubles(labels: Index, before: Index, card: Card, what: str) -> None:
     label = int(twice[0] if len(twice) else again[0])
     seen = 0 if len(twice) else 1
     for row in card.rows():
-        if row.fields[0].isdigit() and int(row.fields[0]) == label:
+        if is_whole(row.fields[0]) and int(row.fields[0]) == label:
             seen += 1
             if seen > 1:
                 raise row.error(f"{what} {label}: the number is given twice")
@@ -219,16 +227,18 @@ def _elements(deck: Deck, card: Card, scope: Scope) -> None:
         _springs(deck, card, scope, kind)
         return
     if kind not in deck.shapes:
-        raise card.error(f"TYPE={kind}: {missing('element type', kind, deck.shapes)}")
+        raise card.error(f"TYPE={kind}: {unread(kind, deck.shapes)}")
     width = 1 + deck.shapes[kind].nodes
     table = card.table(width, np.int64)
-    if table is None or (table.size and table.min() <= 0):
+    if table is None or (table.size and not 0 < table.min() <= table.max() < LARGEST):
         table = _element_rows(card, width).astype(np.int64)
+    if not len(table):
+        return
     labels, nodes = table[:, 0], table[:, 1:]
     known = scope.own.nodes(nodes.ravel()).reshape(nodes.shape)
     if (known < 0).any():
         k, n = np.argwhere(known < 0)[0]
-        _at_element(card, int(labels[k]), f"node {nodes[k, n]} is not there")
+        raise at_element(card, int(labels[k]), f"node {nodes[k, n]} is not there")
     at = deck._elements + np.arange(len(labels))
     _no_doubles(labels, scope.own.elements(labels), card, "element")
     deck.blocks.append(Block(kind, deck._elements, known, card))
@@ -246,11 +256,12 @@ def _springs(deck: Deck, card: Card, scope: Scope, kind: str) -> None:
     deck.springs.setdefault(card.name("ELSET"), []).append((kind, known))
 
 
-def _at_element(card: Card, label: int, text: str) -> None:
+def at_element(card: Card, label: int, text: str) -> FileFormatError:
+    """What is wrong with an element, with its line."""
     for row in card.rows():
-        if row.fields[0].isdigit() and int(row.fields[0]) == label:
-            raise row.error(f"element {label}: {text}")
-    raise card.error(f"element {label}: {text}")
+        if is_whole(row.fields[0]) and int(row.fields[0]) == label:
+            return row.error(f"element {label}: {text}")
+    return card.error(f"element {label}: {text}")
 
 
 def _element_rows(card: Card, width: int) -> Array:
@@ -264,7 +275,8 @@ def _element_rows(card: Card, width: int) -> Array:
         current += [whole(text, row, "element") for text in row.fields if text]
         if len(current) > width:
             raise row.error(
-                f"element {current[0]}: expected {width - 1} nodes, got {len(current) - 1}"
+                f"element {current[0]}: {card.label('TYPE')}: expected {width - 1} nodes, got "
+                f"{len(current) - 1}"
             )
         if len(current) == width:
             found.append(current)

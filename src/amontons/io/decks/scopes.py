@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.words import near
-from .cards import Row
+from .cards import Row, is_whole
 
 Index = NDArray[np.int64]
 DENSE = 4  # numbers up to the largest, for each that is there, at which a table pays
@@ -77,7 +77,7 @@ class Scope:
     def _named(self, text: str, row: Row, what: str) -> Index:
         names, rest = self._place(text)
         known = names.node_sets if what == "node" else names.element_sets
-        if rest.isdigit() and rest not in known:
+        if is_whole(rest) and rest not in known:
             numbers = np.array([int(rest)])
             at = names.nodes(numbers) if what == "node" else names.elements(numbers)
             if at[0] < 0:

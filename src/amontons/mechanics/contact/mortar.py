@@ -35,7 +35,7 @@ from scipy import sparse
 from ...core.errors import within
 from ..elements.cell_matrices import around
 from ..meshes.cells import CELLS, FIRST
-from ..meshes.facets import Facets, corner_facets
+from ..meshes.facets import Facets, corner_facets, turned
 from ..meshes.mesh import Mesh
 from ..meshes.surfaces import nodal_normals, nodal_weights, outward
 from .clipping import line_rule, square_rule, triangle_rule
@@ -103,13 +103,15 @@ def mortar_contact(
     held: Mask | None = None,
     lasting: Array | None = None,
     master_lasting: Array | None = None,
+    tied: bool = False,
 ) -> tuple[ContactRows, sparse.csc_array, Mask]:
     """Contacts of a slave with a master surface: rows, their part on the master, and found.
 
     As `pair_contact`: rows.H in the dofs of the slave mesh, the second matrix (n_master, nc d)
     in those of the master; found, (slave nodes,): nodes with a multiplier.  held (n, dim):
     components of the slave that supports prescribe; lasting, master_lasting (n, dim): values
-    that they prescribe at all times, NaN elsewhere.
+    that they prescribe at all times, NaN elsewhere.  tied: sides that look the same way are
+    met too, where none face each other.
     Raises InvalidInput when the bodies do not face each other, for a surface in contact with
     itself, and for facets without area.  Cost linear in the facets.
     """
@@ -118,6 +120,12 @@ def mortar_contact(
     check_different(slave, surface, master, master_surface)
     over, under = Surface.on(slave, surface), Surface.on(master, master_surface)
     parts = in_front(over, under, master, joined=slave is master)
+    if tied and not len(parts.slave):
+        behind = turned(master.surface(master_surface))
+        under = Surface.of(
+            master.points, behind, master_surface, axisymmetric=master.axisymmetric
+        )
+        parts = in_front(over, under, master, joined=slave is master)
     if not len(parts.slave):
         raise not_facing(slave, surface, master, master_surface)
     facets, of = np.unique(parts.slave, return_inverse=True)
@@ -282,12 +290,12 @@ def _normals(slave: Surface, facets: Index) -> Array:
     np.add.at(first, slave.nodes[facets], share * slave.real[facets, :, None])
     length = np.linalg.norm(first, axis=1)
     along = np.einsum("fac,fc->fa", first[slave.nodes], slave.normal)
-    turned = ((along < AROUND * length[slave.nodes]) & slave.real).any(axis=1) & ~facing
+    around = ((along < AROUND * length[slave.nodes]) & slave.real).any(axis=1) & ~facing
     if slave.curved:
-        return _of_shapes(slave, _curved_normals(slave, ~turned), turned)
-    blocks = np.split(turned, np.cumsum([len(b.nodes) for b in slave.blocks])[:-1])
+        return _of_shapes(slave, _curved_normals(slave, ~around), around)
+    blocks = np.split(around, np.cumsum([len(b.nodes) for b in slave.blocks])[:-1])
     kept = [Facets(b.kind, b.nodes[~out]) for b, out in zip(slave.blocks, blocks, strict=True)]
-    return _of_shapes(slave, nodal_normals(slave.points, tuple(kept)), turned)
+    return _of_shapes(slave, nodal_normals(slave.points, tuple(kept)), around)
 
 
 def _of_shapes(slave: Surface, normals: Array, turned: Mask) -> Array:
