@@ -25,8 +25,10 @@ def lame(size: int) -> list[Value]:
     mean = found.weights @ pressure / found.weights.sum()
     exact = _of_both(case)
     largest = float(np.abs(pressure / exact - 1).max())
-    return [Value("mean pressure, N/mm^2", mean, exact),
-            Value("pressure, largest error", largest, 0.0, 1.0, known=case.overlap)]  # fmt: skip
+    return [
+        Value("mean pressure, N/mm^2", mean, exact),
+        Value("pressure, largest error", largest, 0.0, 1.0, known=case.overlap),
+    ]
 
 
 def _of_both(case: Rings) -> float:
