@@ -1,4 +1,4 @@
-"""`python -m benchmarks.audit`: what audits say of anchors, of own results and of altered ones."""
+"""`python -m benchmarks.audit`: audits of anchors, of own results and of altered ones."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ import amontons as am
 from amontons.analysis.audit import Answer, Audit, audit_answer
 from amontons.io.answers.read import half_units
 
-from .audit_models import KINDS, SYSTEMS, deck_in, frd_in, models
+from .audit_models import KINDS, SYSTEMS, Units, deck_in, frd_in, models
 from .machine import describe
 
 Array = NDArray[np.float64]
@@ -49,7 +49,7 @@ def anchors(folder: Path) -> list[str]:
     return rows
 
 
-def _anchor(deck: str, result: str, units: object, *, exchanged: bool) -> Audit:
+def _anchor(deck: str, result: str, units: Units, *, exchanged: bool) -> Audit:
     with tempfile.TemporaryDirectory() as made:
         at = Path(made)
         (at / "a.inp").write_text(deck_in(deck, units, exchanged=exchanged))
@@ -71,12 +71,17 @@ def own_results() -> tuple[list[str], dict[str, am.ModelSolution]]:
         said = {suffix: _through(model, solution, suffix) for suffix in ("frd", "dat", "vtu")}
         balance = found.findings["balance"].numbers["residual"]
         stated = found.findings["forces"].numbers["difference"]
-        good = found.is_right and balance <= 1e-8 and set(said.values()) == {"right"}
+        good = found.is_right and balance <= 1e-8 and _fit(said)
         rows.append(f"| {name} | {found.verdict} | {balance:.0e} | {stated:.0e} | "
                     + " | ".join(said.values()) + f" | {'yes' if good else '**no**'} |")
         click.echo(rows[-1])
         solved[name] = solution
     return rows, solved
+
+
+def _fit(said: dict[str, str]) -> bool:
+    """Right through all files with all digits, and not wrong in six."""
+    return said["dat"] == said["vtu"] == "right" and said["frd"] != "wrong"
 
 
 def _through(model: am.Model, solution: am.ModelSolution, suffix: str) -> str:
@@ -242,7 +247,9 @@ friction = { coulomb = 1.0 }
 
 
 # ------------------------------------------------------------------------------ the page
-def page(parts: dict[str, list[str]], found: list[Draw], noise: list[Draw], command: str) -> str:
+def page(
+    parts: dict[str, list[str]], found: list[Draw], noise: list[Draw], command: str
+) -> str:  # fmt: skip
     """The page of results."""
     caught = sum(d.verdict == "wrong" for d in found)
     named = sum(d.named for d in found)
@@ -257,7 +264,8 @@ def page(parts: dict[str, list[str]], found: list[Draw], noise: list[Draw], comm
         *parts["anchors"], "",
         "## Our own results", "",
         "Solved to 1e-10; balance and stated contact forces over the largest nodal force; "
-        "and what is said of the same result through files (.frd has six digits).", "",
+        "and what is said of the same result through files. A .frd has six digits, which leave "
+        "nothing of forces where a body moves as a whole: undecided.", "",
         "| model | said | balance | forces | .frd | .dat | .vtu | good |", "|" + "---|" * 8,
         *parts["own"], "",
         "## Altered results", "",
@@ -286,11 +294,12 @@ def main(draws: int, seed: int, output: Path | None) -> None:
     """Audit anchors, our own results, altered ones; needs AMONTONS_SHARED for the anchors."""
     warnings.simplefilter("ignore", am.DoubtWarning)
     folder = Path(os.environ.get("AMONTONS_SHARED", "../shared")) / "data" / "audit"
-    own, solved = own_results() if not os.environ.get("QUICK") else ([], {n: am.solve(f(), tolerance=1e-10) for n, f in KINDS.items()})
+    own, solved = own_results()
     found = altered(solved, draws, seed)
     noise = controls(solved, draws, seed)
     parts = {"own": own, "anchors": anchors(folder), "speed": speed()}
-    text = page(parts, found, noise, f"python -m benchmarks.audit --draws {draws} --seed {seed}")
+    command = f"python -m benchmarks.audit --draws {draws} --seed {seed}"
+    text = page(parts, found, noise, command)
     click.echo(f"{sum(d.verdict == 'wrong' for d in found)} of {len(found)} found")
     if output is not None:
         output.write_text(text, encoding="utf-8")

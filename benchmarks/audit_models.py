@@ -1,12 +1,10 @@
-"""Models for audits: one of every kind, and decks in other units or with their sides exchanged."""
+"""Models for audits: one of every kind, and decks in other units or sides exchanged."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-
-import numpy as np
 
 import amontons as am
 from amontons.io.readers import read
@@ -21,14 +19,14 @@ def pair(  # noqa: PLR0913  # what kinds of pairs differ by
     order: int = 1, mu: float = 0.3, *, tied: bool = False,
 ) -> am.Model:  # fmt: skip
     """A block pressed on a wider one and dragged; low, high: their cells per length."""
-    up, along = (0,) * (dim - 1), (0,) * (dim - 2)
+    along = (0,) * (dim - 2)
     below = am.box((2,) * (dim - 1) + (1,), (2 * low,) * (dim - 1) + (low,), kind)
     above = am.box((1,) * dim, high, kind, origin=(0.5,) * (dim - 1) + (1,))
-    bodies = [am.Body(below, STEEL, "low", order=order), am.Body(above, STEEL, "high", order=order)]
+    bodies = [am.Body(below, STEEL, "low", order=order),
+              am.Body(above, STEEL, "high", order=order)]  # fmt: skip
     supports = [am.Fix("low.bottom", 0.0), am.Fix("high.top", (0.004, *along, -0.01))]
     law = {"tied": True} if tied else {"mu": mu}
     contact = am.Contact("high.bottom", master="low.top", method=method, **law)
-    del up
     return am.Model(bodies, supports, [contact])
 
 
@@ -69,22 +67,13 @@ def on_springs() -> am.Model:
     )  # fmt: skip
 
 
-def equation() -> am.Model:
-    """A block whose right side moves alike along the plane."""
+def coupled() -> am.Model:
+    """A block whose top a reference presses down and turns."""
     model = on_plane(2)
-    nodes = model.bodies[0].mesh.surface_nodes("right")
-    del nodes
     moved = am.Reference("R", (2.0, 0.5))
     top = am.Fix("R", (0.01, -0.02))
     return replace(model, supports=[top, am.Fix("R.rotation", (0.002,))], references=[moved],
                    constraints=[am.Coupling("top", "R")])  # fmt: skip
-
-
-def bolt() -> am.Model:
-    """Two plates that a bolt's shank of given tension pulls together."""
-    mesh = am.box((1, 2), (4, 8))
-    mesh = am.opened(mesh, "cut", (0, 1), (0, 1)) if False else mesh
-    raise NotImplementedError(mesh)
 
 
 def on_rigid() -> am.Model:
@@ -112,7 +101,7 @@ KINDS: dict[str, Callable[[], am.Model]] = {
     "axisymmetric of second order": lambda: axisymmetric(2),
     "temperature": warmed,
     "springs": on_springs,
-    "coupling to a reference": equation,
+    "coupling to a reference": coupled,
     "rigid body": on_rigid,
 }
 EXAMPLE_NAMES = ("brake", "cube", "dome", "hertz", "hild", "release", "slab", "tresca", "vee",
@@ -149,7 +138,8 @@ def deck_in(text: str, units: Units, *, exchanged: bool = False) -> str:
     stress = units.force / units.length**2
     factors = {  # keyword -> factor of each column, None for what has no unit
         "*NODE": (None, *[units.length] * 3), "*ELASTIC": (stress, None),
-        "*SURFACE BEHAVIOR": (stress / units.length,), "*FRICTION": (None, stress / units.length),
+        "*SURFACE BEHAVIOR": (stress / units.length,),
+        "*FRICTION": (None, stress / units.length),
         "*BOUNDARY": (None, None, None, units.length), "*CLOAD": (None, None, units.force),
         "*DLOAD": (None, None, stress),
     }  # fmt: skip

@@ -15,7 +15,7 @@ FROM = 5  # candidates are the nodes around so many of the worst ones
 def culprits(
     K: sparse.csr_array, left: Array, off: Mask, dim: int
 ) -> list[tuple[int, float, float]]:  # fmt: skip
-    """Nodes that explain an imbalance alone: (node, share, its displacement's error), best first.
+    """Nodes that explain an imbalance alone, best first: (node, share, displacement's error).
 
     K (dofs, dofs): stiffness; left (dofs,): forces that balance nothing, where off (dofs,) says
     that they should.  share: part of the squares of these forces.  Empty where no node does.

@@ -33,7 +33,8 @@ class NodalForces:
     bound (dofs,): by how much rounding of the displacements may have moved them; large (dofs,):
     what small strains miss, where the answer is one of large ones.  blur (dofs,): of the
     displacements.  work: u . K u, twice the elastic energy; is_held (dofs,): supports act.
-    gradient: largest one of the displacements; size: largest force that they need one by one.
+    gradient: largest one of the displacements, 0 where they are small;
+    size: largest force that they need one by one.
     """
 
     missing: Array
@@ -52,7 +53,7 @@ class NodalForces:
 
 
 def nodal_forces(model: Model, u: Array, blur: Array, *, large: bool) -> NodalForces:
-    """The forces at displacements u (dofs,) of the nodes, known up to blur (dofs,), both lengths.
+    """The forces at displacements u (dofs,) of nodes, known up to blur (dofs,), both lengths.
 
     large: the displacements are those of large strains and rotations.  What references do is
     that which their nodes say: springs on them act on nodes too.
@@ -68,10 +69,12 @@ def nodal_forces(model: Model, u: Array, blur: Array, *, large: bool) -> NodalFo
         K = sparse.csr_array(K[:nodes, :nodes])
     sizes = sparse.csr_array((np.abs(K.data), K.indices, K.indptr), shape=K.shape)
     bound = sizes @ np.maximum(blur, DOUBLE * np.abs(u))
-    points = np.concatenate([body.mesh.points for body in model.bodies])
-    gradient, change = _large(sizes, points, u)
+    gradient, change = 0.0, np.zeros_like(bound)
+    if large:  # looks at all pairs of nodes, which takes as long as all the rest
+        points = np.concatenate([body.mesh.points for body in model.bodies])
+        gradient, change = _large(sizes, points, u)
     return NodalForces(
-        inner - load, bound, change if large else np.zeros_like(bound), blur,
+        inner - load, bound, change, blur,
         float(u @ inner), held, gradient,
         float((sizes @ np.abs(u)).max(initial=0.0)),
     )  # fmt: skip

@@ -44,9 +44,8 @@ class Answer:
     before: displacements of the increment before, None without.  reactions (nc, d): contact
     forces that the answer states, in the model's frames.  large: of large strains; other:
     elements formulated otherwise, in words; time, until: of the answer and of the end.
-    names (nodes,): what its nodes are called.
-    tolerance: imbalance, over the largest nodal force, that another formulation explains.
-    one_way: loads grow along one straight way.
+    names (nodes,): what its nodes are called.  tolerance: imbalance, over the largest nodal
+    force, that another formulation explains.  one_way: loads grow along one straight way.
     """
 
     displacement: tuple[Array, ...]
@@ -77,13 +76,15 @@ def audit_answer(model: Model, answer: Answer, *, deck_law: bool = True) -> Audi
     u, blur = _whole(model, answer.displacement), _blur(model, answer)
     forces = nodal_forces(model, u, blur, large=answer.large)
     scale = _scale(model, forces)
+    idle = max(scale, float(forces.known.max(initial=0.0))) <= ZERO * forces.size
+    least = forces.size if idle else scale  # of what loads pairs; sums of nothing are rounding
     every = sides_of(model, forces, u)
     findings: dict[str, Finding] = {}
     off = _on_no_contact(model)
     findings["balance"] = _balance(model, forces, (u, scale), off, every, answer)
     before = None if answer.before is None else _whole(model, answer.before)
     pairs = tuple(
-        _pair(model, k, sides, (u, before, scale), answer, deck_law=deck_law)
+        _pair(model, k, sides, (u, before, least), answer, deck_law=deck_law)
         for k, sides in enumerate(every)
     )
     for name in QUESTIONS[1:]:
@@ -94,8 +95,8 @@ def audit_answer(model: Model, answer: Answer, *, deck_law: bool = True) -> Audi
         findings["time"] = _time(answer.time, answer.until)
     if findings["balance"].verdict is UNDECIDED and answer.other:
         findings = {name: _only_bounded(name, f) for name, f in findings.items()}
-    body = float(np.max(forces.bound * off, initial=0.0)) / scale if scale > 0 else 0.0
-    return Audit(model.name or "model", findings, pairs, body, answer.displacement, model,
+    hidden = float(np.max(forces.bound * off, initial=0.0)) / scale if scale > 0 else 0.0
+    return Audit(model.name or "model", findings, pairs, hidden, answer.displacement, model,
                  _notes(answer, forces))  # fmt: skip
 
 
@@ -154,8 +155,7 @@ def _scale(model: Model, forces: NodalForces) -> float:
 def _on_no_contact(model: Model) -> Mask:
     """Dofs (dofs,) where neither supports nor contacts act."""
     parts, d = model.discretisation, model.dimension
-    count = parts.beside.first
-    off = np.ones((count // d, d), dtype=bool)
+    off = np.ones((parts.beside.first // d, d), dtype=bool)
     for contact in model.contacts:
         for name in (contact.slave, contact.master):
             if name is not None:
@@ -163,7 +163,7 @@ def _on_no_contact(model: Model) -> Mask:
                 nodes = model.bodies[k].mesh.surface_nodes(surface)
                 off[int(parts.offsets[k]) // d + nodes] = False
     out = off.ravel()
-    out[parts.held[parts.held < count]] = False
+    out[parts.held[parts.held < out.size]] = False
     return out
 
 
@@ -188,11 +188,10 @@ def _balance(
                "between_sides": between, "supports": moved}  # fmt: skip
     name = _namer(model, answer)
     if moved > PLACED:
-        first = at * model.dimension
-        fixed = model.discretisation.is_fixed[first : first + model.dimension].any()
-        what = ("supports do not have the displacements that they prescribe" if fixed else
-                "nodes do not follow their constraints")  # fmt: skip
-        text = f"{what}: node {name(at)} is off by {moved:.2g} of the largest"
+        fixed = model.discretisation.is_fixed[at * model.dimension :][: model.dimension].any()
+        text = "supports do not have the displacements that they prescribe"
+        text = text if fixed else "nodes do not follow their constraints"
+        text += f": node {name(at)} is off by {moved:.2g} of the largest"
         return Finding(WRONG, text, numbers, (name(at),))
     if excess <= answer.tolerance and between <= max(ACTION, answer.tolerance):
         excess = between = 0.0
@@ -219,15 +218,15 @@ def _unbalanced(
     model: Model, forces: NodalForces, where: tuple[Mask, Array], numbers: dict[str, float],
     name: Any,
 ) -> Finding:  # fmt: skip
-    """Forces that balance nothing; where: off contacts and supports, and by how much (dofs,)."""
+    """Forces that balance nothing; where (dofs,): asked for balance, and by how much off."""
     off, over = where
     alone = culprits(model.discretisation.stored_stiffness[: len(off), : len(off)],
                      forces.missing, off, model.dimension)[:3]  # fmt: skip
     order = np.argsort(-over, kind="stable") // model.dimension
     nodes = tuple(dict.fromkeys(name(int(n)) for n in order[: 4 * NAMED]))[:3]
-    text = (f"inner forces do not balance the loads off the contacts: by {numbers['excess']:.2g} "
-            f"of the largest nodal force at node {nodes[0]}, where rounding explains "
-            f"{numbers['bound']:.1g}")  # fmt: skip
+    text = ("inner forces do not balance the loads off the contacts: by "
+            f"{numbers['excess']:.2g} of the largest nodal force at node {nodes[0]}, where "
+            f"rounding explains {numbers['bound']:.1g}")  # fmt: skip
     if alone:
         node, share, size = alone[0]
         text += (f"; the displacement of node {name(node)} alone, off by {size:.3g}, explains "
@@ -259,8 +258,7 @@ def _misplaced(model: Model, u: Array, blur: Array) -> tuple[float, int]:
     near = allowed(model, u)
     if near is not None:
         tied = parts.held[parts.held < len(u)]
-        apart = np.abs(u - near[: len(u)])[tied] - 4 * float(blur.max(initial=0.0))
-        off[tied] = np.maximum(off[tied], apart)
+        off[tied] = np.maximum(off[tied], np.abs(u - near[: len(u)])[tied] - 4 * blur.max())
     worst = int(off.argmax()) if len(off) else 0
     return (float(max(off[worst], 0.0)) / size if size > 0 else 0.0), worst // model.dimension
 

@@ -166,7 +166,7 @@ def _side(
             np.where(np.isfinite(gap[node]), gap[node], mean)
             for gap, mean in zip((near.start, near.now), at_points, strict=True)
         ]
-    span = ROUNDED * float(np.abs(moved[1]).max(initial=0.0))  # of points, in which gaps are told
+    span = ROUNDED * float(np.abs(moved[1]).max(initial=0.0))
     blurred = (abs(placed.H).T @ (forces.blur + span)).reshape(-1, d).max(axis=1, initial=0.0)
     return Side(
         contact, node, rows.points, rows.weights, rows.sums, np.where(known, r, 0.0), known,

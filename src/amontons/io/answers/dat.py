@@ -45,6 +45,16 @@ def read_dat(path: Path) -> list[Block]:
     ]
 
 
+def digits_of(path: Path) -> int:
+    """How many digits its displacements are printed with: CalculiX gives 7, we all."""
+    for line in _lines(path):
+        words = line.split()
+        if len(words) == 4 and words[0].isdigit():
+            mantissas = [word.upper().split("E")[0] for word in words[1:]]
+            return max(sum(c.isdigit() for c in mantissa) for mantissa in mantissas)
+    return DIGITS
+
+
 def _row(path: Path, at: int, line: str) -> tuple[int, list[float]]:
     words = line.split()
     try:

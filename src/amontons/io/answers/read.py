@@ -53,7 +53,8 @@ def read_answer(path: Path, case: Case, time: float | None = None) -> tuple[Mode
         from .own import read_own
 
         return _at_end(case), _named(read_own(path, case.model), case)
-    digits = {".frd": frd.DIGITS, ".dat": dat.DIGITS}.get(suffix)
+    digits = frd.DIGITS if suffix == ".frd" else None
+    digits = dat.digits_of(path) if suffix == ".dat" else digits
     tables = _tables(path, suffix, case)
     at = _chosen(path, tables, time)
     table, before = tables[at], tables[at - 1] if at > 0 else None
