@@ -19,7 +19,7 @@ from ...mechanics.meshes.raw import RawBlock, RawMesh, to_mesh
 from ...mechanics.meshes.split import Glue, check_glue, split
 from .cards import Card, read_cards
 from .flat import Block, Deck, flatten
-from .scopes import Names
+from .scopes import Index, Names
 from .shapes import QUAD, QUAD8, SHAPES, TRI, TRI6, Shape, side_of
 
 MESH_CARDS = {
@@ -99,7 +99,8 @@ def _raw(deck: Deck, writing: dict[str, str], chosen: set[str | None]) -> RawMes
         for key, members in (names.node_sets | names.node_surfaces).items():
             node_sets[called(key)] = members
         for key, sides in names.faces.items():
-            faces += [b for s in sides for b in _sides(deck, *s, called(key))]
+            for elements, label in sides:
+                faces += _sides(deck, elements, label, called(key))
     blocks = [part for block in deck.blocks for part in _parts(block, groups, deck.shapes)]
     return RawMesh(deck.points, [*blocks, *faces], node_sets)
 
@@ -113,7 +114,7 @@ def _parts(block: Block, groups: list[list[str]], shapes: dict[str, Shape]) -> l
     return [RawBlock(cell, block.nodes[own], key) for key, own in rows.items()]
 
 
-def _sides(deck: Deck, elements: np.ndarray, label: str, name: str) -> Iterator[RawBlock]:
+def _sides(deck: Deck, elements: Index, label: str, name: str) -> Iterator[RawBlock]:
     """Sides of elements as facets, of shells and lines the elements themselves."""
     for block in deck.blocks:
         own = elements[(elements >= block.first) & (elements < block.first + len(block.nodes))]
