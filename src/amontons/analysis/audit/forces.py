@@ -52,16 +52,20 @@ class NodalForces:
 
 
 def nodal_forces(model: Model, u: Array, blur: Array, *, large: bool) -> NodalForces:
-    """The forces at displacements u (dofs,), known up to blur (dofs,), both lengths.
+    """The forces at displacements u (dofs,) of the nodes, known up to blur (dofs,), both lengths.
 
-    large: the displacements are those of large strains and rotations.
+    large: the displacements are those of large strains and rotations.  What references do is
+    that which their nodes say: springs on them act on nodes too.
     """
-    parts = model.discretisation
-    load = model.load_factor * external_load(model.bodies, model.loads, parts.beside)
-    inner = parts.K @ u
+    parts, nodes = model.discretisation, len(u)
+    load = model.load_factor * external_load(model.bodies, model.loads, parts.beside)[:nodes]
+    inner = (parts.K @ followed(model, u))[:nodes]
     held = np.zeros(parts.dofs, dtype=bool)
     held[parts.held] = True
+    held = held[:nodes]
     K = parts.stored_stiffness
+    if parts.dofs > nodes:
+        K = sparse.csr_array(K[:nodes, :nodes])
     sizes = sparse.csr_array((np.abs(K.data), K.indices, K.indptr), shape=K.shape)
     bound = sizes @ np.maximum(blur, DOUBLE * np.abs(u))
     points = np.concatenate([body.mesh.points for body in model.bodies])
@@ -71,6 +75,29 @@ def nodal_forces(model: Model, u: Array, blur: Array, *, large: bool) -> NodalFo
         float(u @ inner), held, gradient,
         float((sizes @ np.abs(u)).max(initial=0.0)),
     )  # fmt: skip
+
+
+def followed(model: Model, u: Array) -> Array:
+    """Displacements of all unknowns, those beside the nodes (dofs,) too, as constraints allow.
+
+    u (dofs of nodes,) itself where nothing is beside the nodes; else followed by the nearest
+    motion of references and bolts.
+    """
+    parts = model.discretisation
+    if parts.dofs == len(u):
+        return u
+    near = allowed(model, u)
+    assert near is not None
+    return np.concatenate([u, near[len(u) :]])
+
+
+def allowed(model: Model, u: Array) -> Array | None:
+    """The motion (dofs,) next to u that constraints and supports allow; None without them."""
+    parts = model.discretisation
+    if parts.eliminated is None:
+        return None
+    whole = np.concatenate([u, np.zeros(parts.dofs - len(u))])
+    return parts.eliminated.nearest(whole, model.load_factor * parts.prescribed)
 
 
 def _large(sizes: sparse.csr_array, points: Array, u: Array) -> tuple[float, Array]:

@@ -16,7 +16,8 @@ from ...mechanics.elements.rigid import Rigid
 from ...mechanics.model.supports import external_load, locate
 from ...problem.friction import FrictionProblem
 from . import questions
-from .forces import NodalForces, nodal_forces
+from .culprit import culprits
+from .forces import NodalForces, allowed, nodal_forces
 from .laws import Give, Seen, approach_of, seen
 from .sides import Side, sides_of
 from .verdict import QUESTIONS, RIGHT, UNDECIDED, WRONG, Audit, Finding, PairAudit, joined
@@ -72,11 +73,6 @@ def audit_answer(model: Model, answer: Answer, *, deck_law: bool = True) -> Audi
         raise UnsupportedForm(
             "an audit needs small strains and nodal or mortar contact in the reference "
             "configuration; for others `solution.convergence` is the judge's word"
-        )
-    if model.discretisation.dofs != sum(body.mesh.points.size for body in model.bodies):
-        raise UnsupportedForm(
-            "an audit needs the displacements of all unknowns, and those of reference points "
-            "(couplings, rigid bodies, pretension) are in no file of results"
         )
     u, blur = _whole(model, answer.displacement), _blur(model, answer)
     forces = nodal_forces(model, u, blur, large=answer.large)
@@ -148,7 +144,8 @@ def _blur(model: Model, answer: Answer) -> Array:
 def _scale(model: Model, forces: NodalForces) -> float:
     """The largest force at a node, of contacts, supports or loads."""
     d = model.dimension
-    load = external_load(model.bodies, model.loads, model.discretisation.beside)
+    beside = model.discretisation.beside
+    load = external_load(model.bodies, model.loads, beside)[: beside.first]
     sizes = [np.linalg.norm(f.reshape(-1, d), axis=1).max(initial=0.0)
              for f in (forces.missing, model.load_factor * load)]  # fmt: skip
     return float(max(sizes))
@@ -157,7 +154,8 @@ def _scale(model: Model, forces: NodalForces) -> float:
 def _on_no_contact(model: Model) -> Mask:
     """Dofs (dofs,) where neither supports nor contacts act."""
     parts, d = model.discretisation, model.dimension
-    off = np.ones((parts.dofs // d, d), dtype=bool)
+    count = parts.beside.first
+    off = np.ones((count // d, d), dtype=bool)
     for contact in model.contacts:
         for name in (contact.slave, contact.master):
             if name is not None:
@@ -165,7 +163,7 @@ def _on_no_contact(model: Model) -> Mask:
                 nodes = model.bodies[k].mesh.surface_nodes(surface)
                 off[int(parts.offsets[k]) // d + nodes] = False
     out = off.ravel()
-    out[parts.held] = False
+    out[parts.held[parts.held < count]] = False
     return out
 
 
@@ -190,8 +188,11 @@ def _balance(
                "between_sides": between, "supports": moved}  # fmt: skip
     name = _namer(model, answer)
     if moved > PLACED:
-        text = (f"supports do not have the displacements that they prescribe: node {name(at)} "
-                f"is off by {moved:.2g} of the largest")  # fmt: skip
+        first = at * model.dimension
+        fixed = model.discretisation.is_fixed[first : first + model.dimension].any()
+        what = ("supports do not have the displacements that they prescribe" if fixed else
+                "nodes do not follow their constraints")  # fmt: skip
+        text = f"{what}: node {name(at)} is off by {moved:.2g} of the largest"
         return Finding(WRONG, text, numbers, (name(at),))
     if excess <= answer.tolerance and between <= max(ACTION, answer.tolerance):
         excess = between = 0.0
@@ -202,12 +203,7 @@ def _balance(
         )
         return Finding(UNDECIDED, text, numbers)
     if excess > BALANCED:
-        order = np.argsort(-over, kind="stable") // model.dimension
-        nodes = tuple(dict.fromkeys(name(int(n)) for n in order[: 4 * NAMED]))[:3]
-        text = (f"inner forces do not balance the loads off the contacts: by {residual:.2g} of "
-                f"the largest nodal force at node {nodes[0]}, where rounding explains "
-                f"{bound:.1g}")  # fmt: skip
-        return Finding(WRONG, text, numbers, nodes)
+        return _unbalanced(model, forces, (off, over), numbers, name)
     if between > ACTION:
         text = f"the forces on both sides of pair {pair} differ by {between:.2g} of its force"
         return Finding(WRONG, text, numbers)
@@ -217,6 +213,27 @@ def _balance(
         return Finding(UNDECIDED, text, numbers)
     return Finding(RIGHT, f"holds to {residual:.1e} of the largest nodal force (rounding may "
                    f"hide {bound:.1e})", numbers)  # fmt: skip
+
+
+def _unbalanced(
+    model: Model, forces: NodalForces, where: tuple[Mask, Array], numbers: dict[str, float],
+    name: Any,
+) -> Finding:  # fmt: skip
+    """Forces that balance nothing; where: off contacts and supports, and by how much (dofs,)."""
+    off, over = where
+    alone = culprits(model.discretisation.stored_stiffness[: len(off), : len(off)],
+                     forces.missing, off, model.dimension)[:3]  # fmt: skip
+    order = np.argsort(-over, kind="stable") // model.dimension
+    nodes = tuple(dict.fromkeys(name(int(n)) for n in order[: 4 * NAMED]))[:3]
+    text = (f"inner forces do not balance the loads off the contacts: by {numbers['excess']:.2g} "
+            f"of the largest nodal force at node {nodes[0]}, where rounding explains "
+            f"{numbers['bound']:.1g}")  # fmt: skip
+    if alone:
+        node, share, size = alone[0]
+        text += (f"; the displacement of node {name(node)} alone, off by {size:.3g}, explains "
+                 f"{share:.1%} of it")  # fmt: skip
+        nodes = tuple(dict.fromkeys([*(name(each[0]) for each in alone), *nodes]))
+    return Finding(WRONG, text, numbers, nodes)
 
 
 def _action(every: Sequence[tuple[Side, ...]], model: Model) -> tuple[float, str]:
@@ -234,11 +251,16 @@ def _action(every: Sequence[tuple[Side, ...]], model: Model) -> tuple[float, str
 
 
 def _misplaced(model: Model, u: Array, blur: Array) -> tuple[float, int]:
-    """How far held dofs are from what supports prescribe, over the largest; the node."""
+    """How far held dofs are from what supports and constraints ask, over the largest; node."""
     parts = model.discretisation
-    wanted = model.load_factor * parts.prescribed
+    wanted = (model.load_factor * parts.prescribed)[: len(u)]
     size = max(float(np.abs(u).max(initial=0.0)), float(np.abs(wanted).max(initial=0.0)))
-    off = np.where(parts.is_fixed, np.abs(u - wanted) - 2 * blur, 0.0)
+    off = np.where(parts.is_fixed[: len(u)], np.abs(u - wanted) - 2 * blur, 0.0)
+    near = allowed(model, u)
+    if near is not None:
+        tied = parts.held[parts.held < len(u)]
+        apart = np.abs(u - near[: len(u)])[tied] - 4 * float(blur.max(initial=0.0))
+        off[tied] = np.maximum(off[tied], apart)
     worst = int(off.argmax()) if len(off) else 0
     return (float(max(off[worst], 0.0)) / size if size > 0 else 0.0), worst // model.dimension
 

@@ -73,7 +73,8 @@ Examples:
 def convert(**options: object) -> None:
     """Write a problem as an FCLib file, a model as a deck (.inp), results as .frd or .dat.
 
-    SOURCE is a TOML case file, a deck, an FCLib HDF5 file, a results folder, or example:NAME.
+    SOURCE is a case file (.toml), a deck (.inp), an FCLib file, a results folder, or
+    example:NAME.
     """
     from .convert import run
 

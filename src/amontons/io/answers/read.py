@@ -121,29 +121,29 @@ def _tables(path: Path, suffix: str, case: Case) -> list[Table]:
     about = case.about
     if suffix == ".vtu":
         return [_from_vtu(path, points)]
-    if about is None:
-        raise FileFormatError(f"{path}: goes with a deck (.inp), whose numbers its nodes have")
+    labels = np.arange(1, len(points) + 1) if about is None else about.labels
     if suffix == ".dat":
         return [
-            Table(block.time, block.values[by_label(path, block.labels, about.labels)]
+            Table(block.time, block.values[by_label(path, block.labels, labels)]
                   [:, : points.shape[1]])
             for block in dat.read_dat(path)
         ]  # fmt: skip
     found = frd.read_frd(path)
     blocks = found.named("DISP")
-    if about.plane or not about.are_unique:
+    if about is not None and (about.plane or not about.are_unique):
         return _by_place(path, found, blocks, points, about)
-    rows = by_label(path, found.labels, about.labels)
-    check_points(path, found.points[rows], points, about.labels)
+    rows = by_label(path, found.labels, labels)
+    check_points(path, found.points[rows], points, labels)
     strange = len(found.labels) - len(rows)
-    more = np.setdiff1d(found.labels, about.labels) if strange else np.zeros(0)
+    more = np.setdiff1d(found.labels, labels) if strange else np.zeros(0)
     if len(more) > 0.5 * len(rows):
         raise FileFormatError(
-            f"{path}: has {len(more)} nodes that the deck's elements lack: it is the result of "
-            "another deck"
+            f"{path}: has {len(more)} nodes that the model lacks: it is the result of another "
+            "one"
         )
     return [
-        Table(block.time, block.values[by_label(path, block.labels, about.labels)])
+        Table(block.time, block.values[by_label(path, block.labels, labels)]
+              [:, : points.shape[1]])
         for block in blocks
     ]
 

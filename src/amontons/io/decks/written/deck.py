@@ -95,6 +95,9 @@ def _with_planes(model: Model, notes: list[str]) -> Model:
                     f"{type(contact.obstacle).__name__}: can not be said in a deck; expected a "
                     "Plane, or a meshed body as the master"
                 )
+        if contact.follows is not None:
+            with within("contacts", k, "follows"):
+                raise InvalidInput("an obstacle that moves: can not be said in a deck")
         name = f"obstacle {k + 1}"
         mesh = plane_element(model, contact.obstacle.normal, contact.obstacle.point)
         mesh = replace(mesh, node_sets={f"held {k + 1}": np.arange(len(mesh.points))})
