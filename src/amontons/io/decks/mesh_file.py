@@ -7,7 +7,7 @@ cells, are what exporters write for groups of sides.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -105,7 +105,7 @@ def _raw(deck: Deck, writing: dict[str, str], chosen: set[str | None]) -> RawMes
     return RawMesh(deck.points, [*blocks, *faces], node_sets)
 
 
-def _parts(block: Block, groups: list[list[str]], shapes: dict[str, Shape]) -> list[RawBlock]:
+def _parts(block: Block, groups: list[list[str]], shapes: Mapping[str, Shape]) -> list[RawBlock]:
     """The elements of a block, apart where they are in other groups."""
     rows: dict[tuple[str, ...], list[int]] = {}
     for k in range(len(block.nodes)):

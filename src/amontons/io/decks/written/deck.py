@@ -57,9 +57,11 @@ def write_deck(
     contacts = Contacts(whole, meshes, dialect, penalty, notes)
     beside = Beside.of(whole.bodies, whole.references, whole.constraints)
     labels, extra = _labels(beside)
+    own = Beside.of(model.bodies, model.references, model.constraints)
+    known = labels[: own.first] + labels[beside.first :]  # planes come after the bodies
     title = " ".join((model.name or "a model of amontons").replace("*", " ").split())[:80]
-    lines = ["*HEADING", title, *extra, *meshes.lines, *_springs(whole, beside, labels, meshes),
-             *_equations(whole, beside, labels), *contacts.lines]  # fmt: skip
+    lines = ["*HEADING", title, *extra, *meshes.lines, *_springs(model, own, known, meshes),
+             *_equations(model, own, known), *contacts.lines]  # fmt: skip
     lines += _step(whole, beside, labels, meshes, dialect)
     write_bytes(Path(path), ("\n".join(lines) + "\n").encode("ascii", "replace"))
     return tuple(dict.fromkeys(notes))
@@ -93,6 +95,9 @@ def _with_planes(model: Model, notes: list[str]) -> Model:
                     f"{type(contact.obstacle).__name__}: can not be said in a deck; expected a "
                     "Plane, or a meshed body as the master"
                 )
+        if contact.follows is not None:
+            with within("contacts", k, "follows"):
+                raise InvalidInput("an obstacle that moves: can not be said in a deck")
         name = f"obstacle {k + 1}"
         mesh = plane_element(model, contact.obstacle.normal, contact.obstacle.point)
         mesh = replace(mesh, node_sets={f"held {k + 1}": np.arange(len(mesh.points))})
