@@ -295,6 +295,13 @@ def test_the_way_through_the_steps(tmp_path):
     assert CliRunner().invoke(main, solved).exit_code == 0
 
 
+def test_a_file_cut_within_its_step(tmp_path):
+    """What follows the cut would have changed the answer."""
+    text = DECK[: DECK.rindex("*END STEP")]
+    with pytest.raises(am.FileFormatError, match=r"inp:\d+: \*STEP: has no \*END STEP: is"):
+        case_of(tmp_path, text)
+
+
 def test_amplitudes_and_loads_that_go(tmp_path):
     text = DECK.replace("*FRICTION\n0.3,\n", "").replace(
         "*CLOAD\n", "*AMPLITUDE, NAME=RAMP\n0., 0., .5, 2., 1., 1.\n*CLOAD, AMPLITUDE=ramp\n"

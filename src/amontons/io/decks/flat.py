@@ -103,7 +103,7 @@ def flatten(cards: Sequence[Card], shapes: Mapping[str, Shape] = SHAPES) -> Deck
             inner, k = _inside(cards, k)
             _assemble(deck, inner, parts)
         elif card.keyword == "STEP":
-            inner, k = _inside(cards, k, open_ended=True)
+            inner, k = _inside(cards, k)
             scope = deck.top
             deck.steps.append([Placed(c, scope) for c in (card, *inner)])
         else:
@@ -116,9 +116,7 @@ def flatten(cards: Sequence[Card], shapes: Mapping[str, Shape] = SHAPES) -> Deck
     return deck
 
 
-def _inside(
-    cards: Sequence[Card], start: int, *, open_ended: bool = False
-) -> tuple[list[Card], int]:
+def _inside(cards: Sequence[Card], start: int) -> tuple[list[Card], int]:
     """The cards up to the end of what begins at `start`, and where to go on."""
     begin = cards[start]
     end = ENDS[begin.keyword]
@@ -127,8 +125,6 @@ def _inside(
             return list(cards[start + 1 : k]), k + 1
         if cards[k].keyword == begin.keyword:
             raise cards[k].error(f"the one of line {begin.number} has not ended")
-    if open_ended:
-        return list(cards[start + 1 :]), len(cards)
     raise begin.error(f"has no *END {begin.written}: is the file cut?")
 
 
