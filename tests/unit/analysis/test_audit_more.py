@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import amontons as am
+from verify.press_fits import Fit
 
 STEEL = am.LinearElastic(1000.0, 0.3)
 
@@ -89,3 +90,11 @@ def test_rounding_noise_of_a_body_without_forces_is_never_wrong(seed):
     last = np.array([0.5e-10, 0.5e-9])  # half a unit of the ninth digit
     noise = last * np.random.default_rng(seed).uniform(-1, 1, moved.shape)
     assert am.audit(model, (moved + noise,), digits=9).verdict != "wrong"
+
+
+@pytest.mark.parametrize("push", [0.0, 1.0])
+def test_our_own_curved_fit_of_second_order_is_right(push):
+    """Frames turn over its facets: nodal forces are no multiples of one frame each."""
+    model = Fit((2, 4, 2), (2, 6, 3), order=2).model(push)
+    found = am.audit(model, am.solve(model, tolerance=1e-10))
+    assert found.verdict == "right", str(found)

@@ -183,7 +183,8 @@ def _statuses(
     length = np.linalg.norm(slip, axis=1)
     why = np.full(len(gap), "", dtype=object)
     clear = push > bound * (1 + RATIO) + side.bound[:, 1:].max(axis=1, initial=0.0)
-    why[pressed & rubs & clear & (push > RATIO * bound.max(initial=0.0))] = "above the cone"
+    least = RATIO * (bound if bound.any() else side.r[:, 0]).max(initial=0.0)  # or no friction
+    why[pressed & rubs & clear & (push > least)] = "above the cone"
     slipped = pressed & rubs & (length > slid) & (lost > AWAY * length)
     why[slipped] = "slips without the friction that it should have"
     along = (side.r[:, 1:] * slip).sum(axis=1)
