@@ -10,8 +10,6 @@ import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-import numpy as np
-
 from ...core.errors import FileFormatError
 from ...mechanics.meshes.cells import FACET_KIND
 from ...mechanics.meshes.mesh import Mesh
@@ -105,7 +103,9 @@ def _raw(deck: Deck, writing: dict[str, str], chosen: set[str | None]) -> RawMes
     return RawMesh(deck.points, [*blocks, *faces], node_sets)
 
 
-def _parts(block: Block, groups: list[list[str]], shapes: Mapping[str, Shape]) -> list[RawBlock]:
+def _parts(
+    block: Block, groups: list[list[str]], shapes: Mapping[str, Shape]
+) -> list[RawBlock]:
     """The elements of a block, apart where they are in other groups."""
     rows: dict[tuple[str, ...], list[int]] = {}
     for k in range(len(block.nodes)):
