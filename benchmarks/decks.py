@@ -1,12 +1,13 @@
 """The decks of CalculiX' own tests: solved unedited, beside the answers that come with them.
 
-    python benchmarks/decks.py [--decks DIR] [--ccx PROGRAM] [--only NAME ...]
+    python benchmarks/decks.py [--decks DIR] [--ccx PROGRAM] [--only NAME ...] [--explain]
 
 DIR holds *.inp or *.inp.gz with *.dat.ref and *.frd.ref, packed or not; by default what
 AMONTONS_DECKS says, else where Debian's calculix-ccx-test puts them.  Every deck that is not
 solved must end with exit code 2 and one message with file and line.  Where `ccx` is installed,
 decks with a stiffness of contact are solved again by both with 100 times of it, and hard by
-us: a difference that comes from the stiffness falls with it.  Writes results/decks.md.
+us: a difference that comes from the stiffness falls with it.  Writes results/decks.md; with
+--explain results/decks_explained.md, see decks_explained.py.
 """
 
 import argparse
@@ -16,6 +17,7 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 import tempfile
 import time
 from collections import Counter, defaultdict
@@ -23,6 +25,7 @@ from pathlib import Path
 
 import numpy as np
 from click.testing import CliRunner
+from decks_explained import explain, stiffness
 
 import amontons as am
 from amontons.app.cli import main as command
@@ -129,7 +132,10 @@ def ours(path, *overrides, times=()):
         last = found.fields
     else:
         for step in am.evolve(
-            case.in_time, case.evolution.method, until=case.evolution.until, tolerance=1e-8,
+            case.in_time,
+            case.evolution.method,
+            until=case.evolution.until,
+            tolerance=1e-8,
             time_limit=SECONDS,
         ):
             u = step.state.displacement.reshape(-1, case.model.dimension)
@@ -141,7 +147,9 @@ def ours(path, *overrides, times=()):
 def forces_of(model, u, r):
     """What acts on nodes from outside: supports and loads."""
     parts = model.discretisation
-    return (parts.K @ u.ravel() - parts.whole_H @ r.ravel()).reshape(u.shape)
+    n = u.size  # without what stands beside the nodes
+    K, H = parts.K.tocsr()[:n, :n], parts.whole_H.tocsr()[:n]
+    return (K @ u.ravel() - H @ r.ravel()).reshape(u.shape)
 
 
 def deviation(found, wanted, nodes):
@@ -166,16 +174,10 @@ def part(found, k):
 
 
 # ------------------------------------------------------------------------------------ theirs
-STIFF = re.compile(
-    r"(\*SURFACE BEHAVIOR[^\n]*OVERCLOSURE=LINEAR[^\n]*\n(?:\*\*[^\n]*\n)*\s*)([^,\s]+)", re.I
-)
-
-
 def stiffer(text):
-    """The deck with TIMES the stiffness of LINEAR contact; None without one."""
-    if not STIFF.search(text):
-        return None
-    return STIFF.sub(lambda m: f"{m.group(1)}{TIMES * float(m.group(2)):.6e}", text)
+    """The deck with TIMES the stiffness of contact and sticking; None without one."""
+    more = stiffness(TIMES)(text)
+    return more if more != text else None
 
 
 def theirs(program, text, name, folder):
@@ -234,7 +236,7 @@ def refused(path):
 def reason_of(message):
     """The class of a message: the keyword, or the element type."""
     text = message.split(": ", 2)
-    known = re.search(r"TYPE=(\w+): element type", message)
+    known = re.search(r"TYPE=(\w+): elements of", message)
     if known:
         return f"elements {known.group(1).rstrip('R')}"
     card = re.search(r"(\*[A-Z][A-Z -]+)", message)
@@ -273,10 +275,14 @@ def main():
     parser.add_argument("--decks", default=os.environ.get("AMONTONS_DECKS", PLACE))
     parser.add_argument("--ccx", default=shutil.which("ccx"))
     parser.add_argument("--only", nargs="*")
+    parser.add_argument("--explain", action="store_true")
     asked = parser.parse_args()
     place = Path(asked.decks)
     if not place.is_dir():
         print(f"{place}: no such folder, nothing is done; --decks DIR or AMONTONS_DECKS")
+        return
+    if asked.explain:
+        explain(place, asked.ccx, asked.only, sys.modules[__name__])
         return
     rows, answers, odd, lineless = [], {}, [], 0
     for path in sorted((*place.glob("*.inp"), *place.glob("*.inp.gz"))):

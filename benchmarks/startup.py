@@ -143,14 +143,14 @@ def main():
     asked = parser.parse_args()
     machine = "; ".join(f"{k} {v}" for k, v in describe().items())
     text = HEAD.format(before=asked.before or "REVISION", repeats=REPEATS, machine=machine)
-    for name, revision in (("Before", asked.before), ("Now", None)):
+    for name, revision in (("Now", None), ("Before", asked.before)):
         if name == "Before" and revision is None:
             continue
         with tempfile.TemporaryDirectory() as folder:
             installed = Installed(Path(folder), revision)
             names = asked.examples.split(",") if asked.examples else installed.examples()
             text += table(name, installed, names) + "\n"
-    (HERE / "results/startup.md").write_text(text.rstrip() + "\n")
+        (HERE / "results/startup.md").write_text(text.rstrip() + "\n")
     print(text)
 
 

@@ -1,6 +1,7 @@
 """Calls of all kinds of cells, forms and methods on tiny problems, to see what compiles."""
 
 import itertools
+from dataclasses import replace
 
 import amontons as am
 
@@ -29,6 +30,16 @@ def models():
             )
 
 
+def without_levels():
+    """A body whose mesh comes from a file, so that multigrid has to find its levels."""
+    box = replace(am.box((1, 1, 1), cells=(8, 8, 8)), grid=None, levels=())
+    return am.Model(
+        [am.Body(box, am.LinearElastic(young=200, poisson=0.3))],
+        supports=[am.Fix("top", (0.01, 0, -0.02))],
+        contacts=[am.Contact("bottom", am.Plane(normal=(0, 0, 1)), mu=0.5)],
+    )
+
+
 def attempt(what, *arguments):
     """Call; what is refused needs no kernel."""
     try:
@@ -45,6 +56,7 @@ def problems():
         W = np.eye(2 * dim) + 0.1
         q = np.array([[-1, 0.5, 0.2][:dim], [-0.5, 0.1, 0.1][:dim]])
         yield am.FrictionProblem.from_delassus(W=W, q=q, mu=[0.3, 0.3])
+        yield am.FrictionProblem.from_delassus(W=-W, q=q, mu=[0.3, 0.3])  # what failures ask
 
 
 def main():
@@ -52,6 +64,7 @@ def main():
     for problem in problems():
         for method in METHODS:
             attempt(method.__name__, problem, method())
+    attempt("levels", without_levels(), am.ContactMultigrid())
     for model in models():
         attempt("model", model)
 

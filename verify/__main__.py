@@ -15,12 +15,13 @@ from amontons.core.errors import AmontonsError
 from amontons.core.files import replacing
 from benchmarks.machine import describe
 
-from . import blocks, cylinders, half_spaces
+from . import blocks, cylinders, half_spaces, joints
 from .case import Outcome, run
 from .page import figure, page, recorded, text_of
 
 HERE = Path(__file__).parent
-CASES = {case.name: case for room in (half_spaces, cylinders, blocks) for case in room.CASES}
+ROOMS = (half_spaces, cylinders, blocks, joints)
+CASES = {case.name: case for room in ROOMS for case in room.CASES}
 
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})

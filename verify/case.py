@@ -47,7 +47,7 @@ class Case:
     compute(size): its values, the same names at every size.  sizes: of the default, ascending,
     mesh width or step go like 1 / size; fine: those added by --fine.  order: of the errors in
     1 / size that theory expects, None where the case is exact at every size.  remarks: what the
-    computed model does otherwise than the problem.
+    computed model does otherwise than the problem.  close: the tolerance where it is another.
     """
 
     name: str
@@ -59,10 +59,13 @@ class Case:
     fine: tuple[int, ...] = ()
     order: float | None = None
     remarks: str = ""
+    close: float | None = None
 
     @property
     def tolerance(self) -> float:
         """Of all values, at the largest size."""
+        if self.close is not None:
+            return self.close
         return EXACT if self.order is None else CLOSE
 
 

@@ -55,13 +55,15 @@ _HOME = {
                  "Stop", "Switch", "Tangent", "TangentCone", "ThetaMethod", "Uniqueness",
                  "Verdict", "Witness", "graded", "performance_profile"),
     "mechanics.meshes": ("Cells", "Facets", "Mesh", "box", "mesh_shape", "opened",
-                         "read_cad", "read_mesh", "refined"),
-    "mechanics.contact": ("LevelSet", "Nitsche", "Plane", "Sphere"),
+                         "read_cad", "refined"),
+    "io.meshes": ("read_mesh",),
+    "mechanics.contact": ("Cylinder", "Extrusion", "LevelSet", "Nitsche", "Plane", "Profile",
+                          "Revolution", "Sphere"),
     "mechanics.model": ("Axes", "Body", "BodyForce", "CiarletGeymonat", "Contact",
-                        "ContactFields", "Coupling", "Equation", "Fix", "LinearElastic",
-                        "Model", "NeoHookean", "NodalForce", "OrthotropicElastic", "Pressure",
-                        "Pretension", "Reference", "Rigid", "Spring", "Temperature", "Traction",
-                        "distributed"),
+                        "ContactFields", "Coupling", "Equation", "Fix", "FoundContacts",
+                        "FoundPair", "LinearElastic", "Model", "NeoHookean", "NodalForce",
+                        "OrthotropicElastic", "Pressure", "Pretension", "Reference", "Rigid",
+                        "Spring", "Temperature", "Traction", "distributed", "find_contacts"),
 }  # fmt: skip
 _GONE = {
     "AlgebraicMultigrid": "GeometricMultigrid(levels=()), whose levels are then algebraic ones",
@@ -75,7 +77,9 @@ __all__ = sorted(_MODULE)
 
 def __getattr__(name: str) -> Any:
     if name in _MODULE:
-        return getattr(importlib.import_module(f".{_MODULE[name]}", __name__), name)
+        value = getattr(importlib.import_module(f".{_MODULE[name]}", __name__), name)
+        globals()[name] = value  # found at once from now on
+        return value
     if name in _GONE:
         from .core.errors import InvalidInput
 
@@ -88,4 +92,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *__all__])
+    return sorted({*globals(), *__all__})

@@ -38,15 +38,17 @@ from .io.checkpoint import (
     save_state as save_state,
 )
 from .io.fclib import read_fclib as read_fclib, write_fclib as write_fclib
+from .io.meshes import read_mesh as read_mesh
 from .io.readers import read_case as read_case
 from .io.series import export_xdmf as export_xdmf
 from .linear import Direct as Direct, GeometricMultigrid as GeometricMultigrid, Petsc as Petsc
 from .mechanics.contact import (
-    LevelSet as LevelSet, Nitsche as Nitsche, Plane as Plane, Sphere as Sphere,
+    Cylinder as Cylinder, Extrusion as Extrusion, LevelSet as LevelSet, Nitsche as Nitsche,
+    Plane as Plane, Profile as Profile, Revolution as Revolution, Sphere as Sphere,
 )
 from .mechanics.meshes import (
     Cells as Cells, Facets as Facets, Mesh as Mesh, box as box, mesh_shape as mesh_shape,
-    opened as opened, read_cad as read_cad, read_mesh as read_mesh, refined as refined,
+    opened as opened, read_cad as read_cad, refined as refined,
 )
 from .mechanics.model import (
     Axes as Axes, Body as Body, BodyForce as BodyForce, CiarletGeymonat as CiarletGeymonat,
@@ -56,6 +58,7 @@ from .mechanics.model import (
     OrthotropicElastic as OrthotropicElastic, Pressure as Pressure,
     Pretension as Pretension, Reference as Reference, Rigid as Rigid, Spring as Spring,
     Temperature as Temperature, Traction as Traction, distributed as distributed,
+    FoundContacts as FoundContacts, FoundPair as FoundPair, find_contacts as find_contacts,
 )
 from .mechanics.ready.packings import SpherePacking as SpherePacking
 from .mechanics.ready.walls import Bond as Bond, Wall as Wall

@@ -8,12 +8,15 @@ from pathlib import Path
 
 import h5py
 import meshio
+import numpy as np
 import pytest
 from click.testing import CliRunner
+from numpy.testing import assert_allclose
 
 import amontons as am
 from amontons.app.cli import main
 from amontons.app.cli.run_folder import COLUMNS
+from amontons.app.cli.sources import open_source
 
 PAGE = (Path(__file__).parents[2] / "docs" / "results.md").read_text()
 CASE = """
@@ -102,6 +105,30 @@ def test_the_tables(solved, ran):
     assert set(COLUMNS) < set(columns)
     with (solved / "pairs.csv").open(newline="") as file:
         same(told("pairs.csv"), next(csv.reader(file)))
+
+
+def test_the_table_of_all_solutions(tmp_path):
+    written = set()
+    for source in ("example:brake", "example:cube"):
+        smaller = ["--set", "mesh.cells=1"] if source == "example:cube" else []
+        done = CliRunner().invoke(main, ["enumerate", source, *smaller, "-o", str(tmp_path)])
+        assert done.exit_code == 0, done.output
+        with (tmp_path / "solutions.csv").open(newline="") as file:
+            rows = list(csv.DictReader(file))
+        problem = open_source(source, [*smaller[1:]]).discrete()
+        for number in {row["solution"] for row in rows}:
+            own = [row for row in rows if row["solution"] == number]
+            assert [row["contact"] for row in own] == [str(k) for k in range(len(own))]
+            r = np.array([[float(v) for k, v in row.items() if k.startswith("r_")]
+                          for row in own])  # fmt: skip
+            assert problem.error(r) < 1e-8
+            u = np.array([[float(v) for k, v in row.items() if k.startswith("u_")]
+                          for row in own])  # fmt: skip
+            assert_allclose(u, problem.velocity(r)[0], atol=1e-9 * np.abs(u).max())
+            assert {row["status"].split()[0] for row in own} <= {"open", "stick", "slip"}
+            assert [row["status"] == "open" for row in own] == [not any(x) for x in r]
+        written |= set(rows[0])
+    same(told("solutions.csv"), written)
 
 
 def test_the_arrays(solved):

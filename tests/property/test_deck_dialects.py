@@ -148,7 +148,7 @@ def test_includes_at_any_depth(tmp_path, plain):
 # -------------------------------------------------------------------------------- broken
 BROKEN = [
     ("*ELEMENT, TYPE=C3D8, ELSET=LOWER", "*ELEMENT, ELSET=LOWER", 18, "TYPE: missing"),
-    ("TYPE=C3D8, ELSET=LOWER", "TYPE=S4R, ELSET=LOWER", 18, "element type S4R: not found"),
+    ("TYPE=C3D8, ELSET=LOWER", "TYPE=S4R, ELSET=LOWER", 18, "TYPE=S4R: .*shells, are not read"),
     ("*NODE, NSET=NALL", "*NODE, NSET=NALL, SYSTEM=C", 1, "SYSTEM=C: expected R"),
     ("1, 0., 0., 0.", "-1, 0., 0., 0.", 2, "expected a number > 0, got -1"),
     ("1, 0., 0., 0.", "1.5, 0., 0., 0.", 2, "expected a whole number"),

@@ -17,7 +17,13 @@ def test_cheap_cases_pass(name):
 
 
 def test_fracture_and_press_fit_come_closer_with_the_mesh():
-    for name, sizes in (("fracture", (4, 8)), ("press-fit", (2, 4))):
+    for name, sizes in (
+        ("fracture", (4, 8)),
+        ("press-fit", (2, 4)),
+        ("press-fit-3d", (2, 3)),
+        ("capstan", (8, 16)),
+        ("thermal-fit", (2, 4)),
+    ):
         outcome = run(replace(CASES[name], sizes=sizes))
         for value in outcome.last:
             first, last = outcome.errors(value.name)

@@ -116,7 +116,7 @@ def _logged(result: Any) -> Any:
 
 def is_discrete(problem: object) -> bool:
     """True for a discrete problem, also for one of the user's own (`Problem`)."""
-    return hasattr(type(problem), "in_form")
+    return isinstance(problem, Problem)
 
 
 def checked(problem: Any, name: str = "problem") -> FrictionProblem | Model:

@@ -1,17 +1,20 @@
-"""A line that tells how far a solve is, on a terminal or in a notebook."""
+"""A line that tells how far a solve or a search is, on a terminal or in a notebook."""
 
 from __future__ import annotations
 
 import html
 import sys
+import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
+from ..core.onlookers import Onlooker, anybody_looks, present
 from ..problem.solution import Step
 from ..solvers.asked import Callback
 from ..solvers.contract import Iterate
 
+Draw = Callable[[str, str], None]
 PAUSE = 0.1  # seconds: drawing takes longer than a small solve
 
 
@@ -20,18 +23,33 @@ def progress(callback: Callback | None, tolerance: float) -> Iterator[Callback |
     """The callback of the user, or one that shows each iterate where somebody may look."""
     if callback is not None:
         yield callback
-    elif in_notebook():
+        return
+    with _line("solving …") as draw:
+        yield None if draw is None else _telling(draw, tolerance)
+
+
+@contextmanager
+def searching(verb: str) -> Iterator[None]:
+    """Shows in which stage a search is, where somebody may look."""
+    with ExitStack() as stack:
+        draw = None if anybody_looks() else stack.enter_context(_line(f"{verb} …"))
+        if draw is not None:
+            stack.enter_context(present(Onlooker(_staging(draw, verb))))
+        yield
+
+
+@contextmanager
+def _line(first: str) -> Iterator[Draw | None]:
+    """What draws (stage, text) in a notebook or on a terminal; None where nobody looks."""
+    if in_notebook():
         with _notebook() as draw:
-            yield _telling(lambda stage, text: draw(f"{stage} {text}".strip()), tolerance)
+            yield lambda stage, text: draw(f"{stage} {text}".strip())
     elif sys.stderr.isatty():
         from rich.console import Console
 
-        with Console(stderr=True).status("solving …", refresh_per_second=8) as line:
-            yield _telling(
-                lambda stage, text: line.update(
-                    (f"[dim]{stage}[/dim]  " if stage else "") + text
-                ),
-                tolerance,
+        with Console(stderr=True).status(first, refresh_per_second=8) as line:
+            yield lambda stage, text: line.update(
+                (f"[dim]{stage}[/dim]  " if stage else "") + text
             )
     else:
         yield None
@@ -56,7 +74,7 @@ def _notebook() -> Iterator[Callable[[str], None]]:
         line.update(HTML(""))
 
 
-def _telling(draw: Callable[[str, str], None], tolerance: float) -> Callback:
+def _telling(draw: Draw, tolerance: float) -> Callback:
     shown = 0.0
 
     def show(step: Step, iterate: Iterate) -> None:
@@ -69,5 +87,18 @@ def _telling(draw: Callable[[str, str], None], tolerance: float) -> Callback:
             f"iteration {step.iteration}  error {step.error:.1e} (goal {tolerance:.0e})  "
             f"{step.seconds:.1f} s",
         )
+
+    return show
+
+
+def _staging(draw: Draw, verb: str) -> Callable[[str], None]:
+    began = shown = time.perf_counter()
+
+    def show(stage: str) -> None:
+        nonlocal shown
+        moment = time.perf_counter()
+        if moment >= shown + PAUSE:
+            shown = moment
+            draw(verb, f"{stage}  {moment - began:.1f} s".strip())
 
     return show

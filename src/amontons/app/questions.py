@@ -16,6 +16,7 @@ from ..problem.law import Coulomb, Tresca
 from ..problem.solution import FrictionSolution
 from .api import checked
 from .model_solution import ModelSolution
+from .progress import searching
 
 if TYPE_CHECKING:
     from ..analysis.basins.study import Basins
@@ -36,6 +37,7 @@ SEARCH, WORK = 0.5, 60.0  # share of a limit, or seconds of work, for the search
 HUGE = 1e12  # friction above which rounding hides what the law says
 
 
+@searching("all solutions")
 def all_solutions(
     problem: FrictionProblem | Model, *, time_limit: TimeLimit = None,
     keep_proof: bool = False,
@@ -71,6 +73,7 @@ def all_solutions(
     return replace(found, solutions=some.solutions, resolution=some.resolution)
 
 
+@searching("solutions from many starts")
 def multistart(
     problem: FrictionProblem | Model, *, starts: int = 1000, seed: int = 0,
     time_limit: TimeLimit = None,
@@ -266,6 +269,7 @@ def _base(base: Any) -> FrictionProblem | Model | None:
     return None if base is None else checked(base, "base")
 
 
+@searching("uniqueness")
 def uniqueness(
     problem: FrictionProblem | Model, solution: FrictionSolution | ModelSolution | None = None,
     *, time_limit: TimeLimit = None,
@@ -291,6 +295,7 @@ def uniqueness(
     return replace(verdict, reason=text)
 
 
+@searching("existence")
 def existence(
     problem: FrictionProblem | Model, *, time_limit: TimeLimit = None
 ) -> Opening:
@@ -304,6 +309,7 @@ def existence(
     return opening(_discrete(problem), time_limit=_begun(time_limit))
 
 
+@searching("critical friction")
 def critical_friction(
     problem: FrictionProblem | Model, *, gap: float = 1e-2,
     time_limit: TimeLimit = None,
@@ -323,6 +329,7 @@ def critical_friction(
     return bounds(discrete, gap=gap, time_limit=limit)
 
 
+@searching("P-matrix criterion")
 def p_matrix_friction(
     problem: FrictionProblem | Model, *, given_tangents: bool = False, gap: float = 1e-2,
     time_limit: TimeLimit = None,
@@ -342,6 +349,7 @@ def p_matrix_friction(
     return ask(discrete, given_tangents=given_tangents, gap=gap, time_limit=limit)
 
 
+@searching("full contact")
 def full_contact_friction(
     problem: FrictionProblem | Model, *, sharp: bool = False, gap: float = 1e-2,
     time_limit: TimeLimit = None,

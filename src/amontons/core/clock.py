@@ -20,6 +20,7 @@ from numba.core import event
 
 from .errors import InvalidInput, TimeUp
 from .interrupts import hold, release
+from .onlookers import seconds_until_end
 from .telling import told
 
 
@@ -127,12 +128,12 @@ class Deadline:
     @property
     def left(self) -> float:
         """Seconds that are left, 0 when it has passed."""
-        return max(self.moment - self.time, 0.0)
+        return 0.0 if self.passed else self.moment - self.time
 
     @property
     def passed(self) -> bool:
-        """True when no time is left."""
-        return self.time >= self.moment
+        """True when no time is left, or an onlooker has asked the work to end."""
+        return seconds_until_end() is not None or self.time >= self.moment
 
     def spend(self, operations: float) -> None:
         """Count what was done; the clock needs no telling."""
@@ -146,6 +147,7 @@ class Deadline:
     def pay(self, operations: float) -> None:
         """Spend what nothing can interrupt; raises TimeUp before where that takes too long."""
         if not self.affords(operations):
+            self.check()
             raise TimeUp(f"stopped after {self}: the next step takes longer than is left")
         self.spend(operations)
 
@@ -163,6 +165,9 @@ class Deadline:
         return replace(self, moment=min(self.moment, self.time + seconds))
 
     def __str__(self) -> str:
+        early = seconds_until_end()
+        if early is not None:
+            return f"{early:.3g} s by the user"
         return f"{self.seconds:g} s" if self.work is None else f"the work of {self.seconds:g} s"
 
 

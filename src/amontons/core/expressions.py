@@ -54,14 +54,12 @@ class Expression:
     def __post_init__(self) -> None:
         if not isinstance(self.text, str):
             raise InvalidInput(f"expression: expected a text, got {self.text!r}")
-        _check(self.text, _parse(self.text), 0)
+        _variables(self.text)
 
     @property
     def names(self) -> frozenset[str]:
         """Variables that occur."""
-        tree = _parse(self.text)
-        found = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
-        return frozenset(found & set(VARIABLES))
+        return _variables(self.text)
 
     def __call__(self, points: Array) -> Array:
         """Values at points (n, dim), shape (n,); raises InvalidInput where not finite."""
@@ -103,6 +101,15 @@ def _parse(text: str) -> ast.expr:
         raise _error(text, f"can not be read near {near!r}") from None
     except (ValueError, MemoryError, RecursionError) as reason:
         raise _error(text, f"can not be read: {reason or 'too deeply nested'}") from None
+
+
+@lru_cache(maxsize=1024)
+def _variables(text: str) -> frozenset[str]:
+    """Names of variables in an expression, which is checked."""
+    tree = _parse(text)
+    _check(text, tree, 0)
+    found = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    return frozenset(found & set(VARIABLES))
 
 
 def _check(text: str, node: ast.AST, depth: int) -> None:

@@ -14,9 +14,11 @@ from ..mechanics.model.references import reference_results
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ..analysis.solutions.enumerate import PieceSolution
     from ..mechanics.model import ContactFields, Model
 
 AXES = ("x", "y", "z")
+STATUS = {"f": "open", "s": "stick", "+": "slip +", "-": "slip -", "l": "slip"}
 SUPPORT = "fix "  # what stands before the name of a support in columns
 SCALARS = ("area", "largest_pressure", "slip_net", "slip_accumulated", "friction_work",
            "share_sticking")  # fmt: skip
@@ -90,6 +92,29 @@ def pairs_csv(model: Model, fields: ContactFields) -> bytes:
         ("fix", held.name, held.on, "", *vector_values(held), *blank)
         for held in support_results(model, fields).values()
     ]
+    text = StringIO(newline="")
+    csv.writer(text).writerows(rows)
+    return text.getvalue().encode("utf-8")
+
+
+def solutions_csv(
+    solutions: Sequence[PieceSolution], dimension: int, model: Model | None = None
+) -> bytes:
+    """A table with a row for every solution and contact; with a model also where they are."""
+    tangents = ("t",) if dimension == 2 else ("t1", "t2")
+    columns = [f"{letter}_{axis}" for letter in "ru" for axis in ("n", *tangents)]
+    places: list[Sequence[Any]] = []
+    where: tuple[str, ...] = ()
+    if model is not None:
+        where, placed = ("pair", *AXES[:dimension]), model.discretisation.placed
+        places = [(name, *point) for name, own in zip(model.pair_names, placed, strict=True)
+                  for point in own.rows.points.tolist()]  # fmt: skip
+    rows: list[Sequence[Any]] = [("solution", "contact", *where, "status", *columns)]
+    for number, found in enumerate(solutions, 1):
+        numbers = zip(found.pattern, found.r.tolist(), found.u.tolist(), strict=True)
+        for k, (letter, r, u) in enumerate(numbers):
+            place = places[k] if places else ()
+            rows.append((number, k, *place, STATUS[letter], *r, *u))
     text = StringIO(newline="")
     csv.writer(text).writerows(rows)
     return text.getvalue().encode("utf-8")

@@ -41,7 +41,8 @@ class Case:
     path: the file, None of a problem without one; tables: what a case file says, with
     overrides; key_of: the words of the file for an address in the model.  moving: the model
     as it goes on in time, where `target` is its state at the end, which can be solved for at
-    once.  notes: what the file says and the case leaves out, in words.  units: what they are
+    once.  notes: what the file says and the case leaves out, and
+    contacts that it leaves to be found, in words.  units: what they are
     called.  about: what an audit asks of a deck.
     """
 

@@ -31,7 +31,7 @@ from ..core.arrays import (
     sparse_matrix,
 )
 from ..core.clock import NEVER, Deadline
-from ..core.errors import InvalidInput, UnsupportedForm, UnsupportedLaw, shown
+from ..core.errors import InvalidInput, UnsupportedLaw, shown
 from ..core.faces import Told
 from ..core.prepared import Prepared
 from ..linear.blocks import BlockRows, block_part, block_rows
@@ -221,24 +221,6 @@ class FrictionProblem(Told, Equations):
             return self
         levels = self.levels or self.matrices.stored_levels()
         return replace(self, M=self.matrices.stored(), levels=levels)
-
-    def in_form(
-        self, form: Form, stored: bool, deadline: Deadline | None = None
-    ) -> FrictionProblem:
-        """The problem in the form that a solver needs, with M stored or as it is.
-
-        Without a deadline for condensing another form raises UnsupportedForm.
-        """
-        problem = self
-        if form is Form.DELASSUS and deadline is not None:
-            problem = self.condensed(deadline)
-        elif form is not Form.ANY and form is not self.form:
-            condense = form is Form.DELASSUS
-            hint = "problem.condensed()" if condense else "Auto or a solver of the local form"
-            raise UnsupportedForm(
-                f"needs the {form.value} form, the problem is {self.form.value}; use {hint}"
-            )
-        return problem.assembled() if stored else problem
 
     @property
     def knows_q(self) -> bool:  # type: ignore[override]

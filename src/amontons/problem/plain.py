@@ -54,11 +54,12 @@ def of_plain(judged: Callable[..., Any]) -> Callable[..., Any]:
 
     @wraps(judged)
     def asked(self: Equations, r: Array, v: Array | None = None, **named: Any) -> Any:
-        if self.law.varies:
+        law, given = self.law, () if v is None else (v,)
+        if law.varies:
             return asked(frozen(self, r, v), r, v, **named)
-        plain, given = self.plain, () if v is None else (v,)
-        if plain is self:
+        if law.plain is law:
             return judged(self, r, *given, **named)
+        plain = self.plain
         if v is not None:
             wider = plain_motion(self, r, v)  # type: ignore[arg-type]
             given = () if wider is None else (wider,)

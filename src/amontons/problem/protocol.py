@@ -17,7 +17,7 @@ the member.  A solver for it names its class in `solves` (`solvers.contract`).
 from __future__ import annotations
 
 from enum import Enum
-from typing import TYPE_CHECKING, ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -60,6 +60,7 @@ class Problem:
     rho: Array
 
     name: str = ""
+    form: Form = Form.ANY  # which matrices it holds; of all forms where it knows none
     measure: Measure = Measure.RESIDUAL  # what `error` is called in records
     has_v: bool = True  # False where reactions are the only unknowns
     has_q: ClassVar[bool] = False  # True where published measures apply: there is a q
@@ -112,11 +113,12 @@ class Problem:
         keep = given.v is not None and self.has_v
         return r, checked_motion(given.v, self.unknowns) if keep else None
 
-    def in_form(self, form: Form, stored: bool, deadline: Deadline | None = None) -> Problem:
-        """The problem as a solver needs it: in a form, with its matrices stored or not.
+    def condensed(self, deadline: Deadline = NEVER) -> Self:
+        """The problem in reactions alone, where it has that form; raises TimeUp."""
+        return self
 
-        deadline: of bringing it into that form; None to raise UnsupportedForm instead.
-        """
+    def assembled(self) -> Self:
+        """The problem with matrices that are stored, where they may be operators."""
         return self
 
     def prepare(self, deadline: Deadline = NEVER) -> None:

@@ -25,7 +25,7 @@ from .judge.measures import Weakest
 from .law import Law
 
 if TYPE_CHECKING:
-    from .friction import FrictionProblem
+    from .equations import Equations
 
 Array = NDArray[np.float64]
 Motion = tuple[Array, Array | None]  # u (nc, d), and v (n,) where there is one
@@ -73,7 +73,7 @@ def settle(law: Law, rho: Array, r: Array, u: Array) -> Settled:
 
 
 def accepted_exactly(
-    problem: FrictionProblem, r: Array, v: Array | None, error: float, tolerance: float
+    problem: Equations, r: Array, v: Array | None, error: float, tolerance: float
 ) -> Accepted:
     """What `Problem.accepted` says by the exact measure, in the Delassus form."""
     d, found = r.shape[1], r

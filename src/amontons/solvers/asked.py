@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from ..core.clock import Deadline, TimeLimit, deadline_of
 from ..core.errors import InvalidInput, UnsupportedForm, shown
@@ -32,12 +32,17 @@ class Asked:
     criterion: Criterion = Criterion.JUDGE
     patience: int | None = PATIENCE
     condense: bool = False
+    deadline: Deadline = field(init=False)  # when the time is over
+    of_contacts: float = field(init=False)  # the contact tolerance that holds
 
     def __post_init__(self) -> None:
         if self.callback is not None and not callable(self.callback):
             raise InvalidInput(f"callback: expected a function, got {self.callback!r}")
         check_goals(self.tolerance, self.contact_tolerance, self.max_iterations)
-        object.__setattr__(self, "time_limit", deadline_of(self.time_limit))
+        given = self.contact_tolerance
+        object.__setattr__(self, "deadline", deadline_of(self.time_limit))
+        object.__setattr__(self, "time_limit", self.deadline)
+        object.__setattr__(self, "of_contacts", self.tolerance**0.5 if given is None else given)
         if not isinstance(self.criterion, Criterion):
             words = ", ".join(f"Criterion.{member.name}" for member in Criterion)
             got = shown(self.criterion)
@@ -47,17 +52,6 @@ class Asked:
             raise InvalidInput(
                 f"patience: expected a whole number >= 1, or None, got {shown(self.patience)}"
             )
-
-    @property
-    def deadline(self) -> Deadline:
-        """When the time is over."""
-        return deadline_of(self.time_limit)
-
-    @property
-    def of_contacts(self) -> float:
-        """The contact tolerance that holds."""
-        given = self.contact_tolerance
-        return self.tolerance**0.5 if given is None else given
 
     def check_fits(self, problem: Problem) -> None:
         """Raise UnsupportedForm where a problem has no such criterion."""

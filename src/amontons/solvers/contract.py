@@ -137,13 +137,15 @@ class Takes(NamedTuple):
     of a solver with nitsche = True.  form: which one of a FrictionProblem.  matrix_free: True
     where its M may be an operator (`GridMatrix`); else the driver assembles it.  needs_cone:
     True where it takes Coulomb's law alone, not all laws of `problem.law`; changes of variables
-    are none of a solver's business, see `solvers.changed_law`.
+    are none of a solver's business, see `solvers.changed_law`.  changes_method: True where it
+    goes on with another method when one stalls, so that a repeated iterate is not the end.
     """
 
     solves: tuple[type, ...] = (FrictionProblem,)
     form: Form = Form.ANY
     matrix_free: bool = False
     needs_cone: bool = False
+    changes_method: bool = False
 
 
 def taken_by(solver: Any) -> Takes:
@@ -159,6 +161,7 @@ def _taken(kind: Any) -> Takes:
         getattr(kind, "form", Form.ANY),
         getattr(kind, "matrix_free", False),
         getattr(kind, "needs_cone", False),
+        getattr(kind, "changes_method", False),
     )
 
 
@@ -183,7 +186,10 @@ def _written(solver: object) -> str:
 
 
 def fitted(problem: Problem, solver: Solver, deadline: Deadline | None) -> Problem:
-    """The problem as the solver takes it; raises UnsupportedForm where it does not."""
+    """The problem as the solver takes it; raises UnsupportedForm where it does not.
+
+    deadline: of condensing it where need be; None to raise UnsupportedForm instead.
+    """
     takes = taken_by(solver)
     if not isinstance(problem, takes.solves):
         check_solves(solver, type(problem))
@@ -192,12 +198,16 @@ def fitted(problem: Problem, solver: Solver, deadline: Deadline | None) -> Probl
             f"{type(solver).__name__} needs Coulomb's cone, the problem has "
             f"{problem.law.name}; use Auto, SemismoothNewton or GaussSeidel", ("solver",), "",
         )  # fmt: skip
-    try:
-        return problem.in_form(takes.form, not takes.matrix_free, deadline)
-    except UnsupportedForm as reason:
+    if takes.form is Form.DELASSUS and deadline is not None:
+        problem = problem.condensed(deadline)
+    if Form.ANY not in (takes.form, problem.form) and takes.form is not problem.form:
+        local = takes.form is Form.DELASSUS
+        hint = "problem.condensed()" if local else "Auto or a solver of the local form"
         raise UnsupportedForm(
-            f"{type(solver).__name__} {reason.text}", ("solver",), ""
-        ) from None
+            f"{type(solver).__name__} needs the {takes.form.value} form, the problem is "
+            f"{problem.form.value}; use {hint}", ("solver",), "",
+        )  # fmt: skip
+    return problem if takes.matrix_free else problem.assembled()
 
 
 def check_solves(solver: Any, kind: type[Problem]) -> None:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.clock import Deadline, compiling, now
+from ..core.clock import compiling, now
 from ..core.errors import SingularOperator, TimeUp
 from ..core.interrupts import Watching
 from ..problem.judge.measures import EPSILON, Criterion, Measure, Weakest
@@ -23,7 +23,7 @@ from ..problem.protocol import Problem
 from ..problem.settling import Accepted
 from ..problem.solution import Convergence, FrictionSolution, Outcome, Step, StoppedBy
 from .asked import Asked
-from .contract import Breakdown, Iterate, Judgement, Solver, Target
+from .contract import Breakdown, Iterate, Judgement, Solver, Target, taken_by
 from .first_iterate import own_motion, with_motion
 
 Array = NDArray[np.float64]
@@ -35,7 +35,8 @@ BLUR = 1e-2  # rounding, relative to the tolerance, above which an error is eval
 BLURRED = 20  # iterates that would do if rounding could hide no error in them
 TIGHTER = 0.3  # goal of a second start, relative to what would just do
 TIGHTEST = 1e-300  # smallest goal: contacts far smaller than others need tiny sums
-CONTENT = 5  # iterates with which a solver is content before its goal is tightened
+CONTENT = 5  # iterates with which a solver is content before its goal is tightened: Newton is
+# there with one more, and keeps its history
 EARLY = 100  # iterates after which a problem that no method is made for is given up
 GAVE_UP = (Outcome.STAGNATED, Outcome.BREAKDOWN, Outcome.CYCLED, Outcome.NON_FINITE)
 
@@ -60,29 +61,40 @@ class Watch:
     flops: float | None = 0.0  # None from the first iterate on that does not count its own
     history: list[Step] = field(default_factory=list)
     seen: list[tuple[float, Array]] = field(default_factory=list)
+    cycled: bool = False  # the last iterate was here before
+    goal: float = 0.0  # error that the solver is asked for, perhaps tighter than the tolerance
     content: int = 0  # iterates in a row that the judge would take, but not the criterion
     blurred: int = 0  # iterates whose error rounding hides
     mark: tuple[int, float] = (0, np.inf)  # iterate and error of the last real progress
     stopped_by: StoppedBy | None = None  # who has asked for the end
 
     def judge(self, iterate: Iterate) -> Step:
-        """Judge an iterate and remember it if it is the best."""
-        iterate = self.taken(self.problem, iterate)
+        """Judge an iterate, note it, and remember it if it is the best."""
+        judged = self.taken(self.problem, iterate)
+        error, weakest, told = self._measured(judged.r, judged.v)
+        self.cycled = error > self.goal and self._was_here(iterate.r, error)
+        if told is not None and told.r is not judged.r:
+            judged = replace(judged, r=told.r, v=told.v)
+        return self._noted(judged, error, weakest, told)
+
+    def _measured(
+        self, r: Array, v: Array | None
+    ) -> tuple[float, Weakest | None, Accepted | None]:
+        """The error by the criterion; where it will do, the weakest contact and the state."""
+        error = self.problem.error(r, v)
         if self.asked.criterion is Criterion.NATURAL:
-            error = self.problem.natural_error(iterate.r, iterate.v)
-            return self._noted(iterate, error, None, None)
-        error, weakest, told = self.problem.error(iterate.r, iterate.v), None, None
-        if error <= self.asked.tolerance:
-            told = self.problem.accepted(iterate.r, iterate.v, error, self.asked.tolerance)
-            error, weakest = told.error, told.weakest
-            if told.r is not iterate.r:
-                iterate = replace(iterate, r=told.r, v=told.v)
+            self.content = self.content + 1 if error <= self.goal else 0
+            return self.problem.natural_error(r, v), None, None
+        if not error <= self.asked.tolerance:
+            return error, None, None
+        told = self.problem.accepted(r, v, error, self.asked.tolerance)
+        error, weakest = told.error, told.weakest
         if weakest is not None and weakest.hidden > BLUR * self.asked.tolerance:
-            error = self.problem.certain_error(iterate.r, iterate.v)
+            error = self.problem.certain_error(told.r, told.v)
             if error > self.asked.tolerance:
                 weakest = None
                 self.blurred += 1
-        return self._noted(iterate, error, weakest, told)
+        return error, weakest, told
 
     def _noted(
         self, iterate: Iterate, error: float, weakest: Weakest | None,
@@ -93,8 +105,6 @@ class Watch:
         self.linear_iterations += iterate.linear_iterations
         seconds = now() - self.started
         self.flops = self._counted(iterate)
-        if self.asked.deadline.work is not None:  # a limit that counts operations
-            self.asked.deadline.spend(iterate.iterations * self.problem.operations)
         step = Step(
             self.iterations, error, self.linear_iterations, seconds, iterate.sets, self.flops,
             iterate.stage, iterate.own,
@@ -108,9 +118,18 @@ class Watch:
             self.mark = (len(self.history), error)
         return step
 
-    def judgement(self, step: Step, deadline: Deadline) -> Judgement:
+    @property
+    def judgement(self) -> Judgement:
         """What a solver is told of its last iterate."""
-        return Judgement(step.error, None if self.last is None else self.last.error, deadline)
+        weakest = None if self.last is None else self.last.error
+        return Judgement(self.history[-1].error, weakest, self.asked.deadline)
+
+    def late(self, iterations: int) -> bool:
+        """True when the time is over, of which the last iterate took so many iterations."""
+        deadline = self.asked.deadline
+        if deadline.work is not None:  # it counts operations, no seconds
+            deadline.spend(iterations * self.problem.operations)
+        return deadline.passed
 
     def _counted(self, iterate: Iterate) -> float | None:
         """Floating point operations so far, judgements among them; None if not counted."""
@@ -169,27 +188,22 @@ class Watch:
         share = TIGHTER * self.asked.of_contacts / self.weakest.error
         return max(min(self.error * share, TIGHTER * goal), np.finfo(float).tiny)
 
-    def cycled(self, iterate: Iterate, error: float) -> bool:
+    def _was_here(self, r: Array, error: float) -> bool:
         """True when this iterate was here before, with other iterates in between.
 
         One that hardly moves does not come back: its method may wait for something else.
         """
-        near = 1e-12 * error
+        near, size = 1e-12 * error, np.abs(r).max(initial=0.0)
         same = [
-            not abs(old_error - error) > near and self._repeats(iterate, old)
+            not abs(old_error - error) > near
+            and bool(np.abs(old - r).max(initial=0.0) <= 1e-13 * size)
             for old_error, old in self.seen
         ]
-        self.seen.append((error, iterate.r))
+        self.seen.append((error, r))
         del self.seen[:-MEMORY]
         if not any(same) or same[-1]:
             return False
-        moved = np.abs(self.seen[-2][1] - iterate.r).max(initial=0.0)
-        return bool(moved > AT_REST * np.abs(iterate.r).max(initial=0.0))
-
-    @staticmethod
-    def _repeats(iterate: Iterate, old: Array) -> bool:
-        size = np.abs(iterate.r).max(initial=0.0)
-        return bool(np.abs(old - iterate.r).max(initial=0.0) <= 1e-13 * size)
+        return bool(np.abs(self.seen[-2][1] - r).max(initial=0.0) > AT_REST * size)
 
     @property
     def stagnated(self) -> bool:
@@ -248,6 +262,7 @@ def run(
                 start = watch.best or start
                 target = replace(target, tolerance=goal, start_error=watch.error)
                 watch.content = 0
+            watch.goal = target.tolerance
             ended = _once(watching, watch, solver, start, target)
             if ended is not None:
                 break
@@ -276,6 +291,7 @@ def _once(
     A method with a stopping rule of its own (`Iterate.ends`) is not stopped before that holds.
     """
     callback, limit = watch.asked.callback, watch.asked.max_iterations or np.inf
+    cycles_end = not taken_by(solver).changes_method
     try:
         iterates, judged = iter(solver.iterates(watch.problem, start, target)), None
         while (iterate := sent(iterates, judged)) is not None:
@@ -294,19 +310,19 @@ def _once(
                 return Outcome.NON_FINITE, ""
             if watch.iterations >= limit:
                 return Outcome.MAX_ITERATIONS, ""
-            if target.deadline.passed:
+            if watch.late(iterate.iterations):
                 return Outcome.TIME_LIMIT, ""
             if watch.weak and step.error <= target.tolerance and iterate.ends is None:
                 return None
-            if _content_too_early(watch, iterate, target):
+            if watch.content > CONTENT:
                 return None
             if len(watch.history) == EARLY and watch.problem.gains_energy:
                 return Outcome.BREAKDOWN, "stopped early"
-            if watch.cycled(iterate, step.error):
+            if cycles_end and watch.cycled:
                 return Outcome.CYCLED, ""
             if watch.stagnated:
                 return Outcome.STAGNATED, ""
-            judged = watch.judgement(step, target.deadline)
+            judged = watch.judgement
         if watch.content:
             return None
         return Outcome.STAGNATED, "the method has nothing left to try"
@@ -325,18 +341,6 @@ def _stopped(watch: Watch, by: StoppedBy, why: str = "") -> tuple[Outcome, str]:
     """The end on request, noted with who asked for it."""
     watch.stopped_by = by
     return Outcome.STOPPED, f"{by.value}{why}"
-
-
-def _content_too_early(watch: Watch, iterate: Iterate, target: Target) -> bool:
-    """True where a solver is content by the judge's error, but the criterion is another one.
-
-    Some iterates of it may come first: Newton is there with one more, and keeps its history.
-    """
-    if watch.asked.criterion is Criterion.JUDGE:
-        return False
-    content = watch.problem.error(iterate.r, iterate.v) <= target.tolerance
-    watch.content = watch.content + 1 if content else 0
-    return watch.content > CONTENT
 
 
 def finished(

@@ -247,8 +247,8 @@ def test_the_clock():
 
 def test_shared_multipliers_are_complete_certificates(monkeypatch):
     # few multipliers on a subspace first, as for many contacts
-    monkeypatch.setattr("amontons.analysis.certificates.one_load.inequality.LARGE", 1)
-    monkeypatch.setattr("amontons.analysis.certificates.one_load.reduction.SETS", 4)
+    monkeypatch.setattr("amontons.analysis.solutions.discs.multipliers.LARGE", 1)
+    monkeypatch.setattr("amontons.analysis.solutions.discs.reduction.SETS", 4)
     called = []
 
     def never(*arguments, **options):
@@ -261,7 +261,7 @@ def test_shared_multipliers_are_complete_certificates(monkeypatch):
     for other in (problem, am.FrictionProblem.from_delassus(problem.W, q, problem.mu)):
         with monkeypatch.context() as patch:
             patch.setattr(
-                "amontons.analysis.certificates.one_load.inequality.find_multipliers", never
+                "amontons.analysis.solutions.discs.multipliers.find_multipliers", never
             )
             answer = certify_load(other, am.solve(other))
         assert not called
@@ -308,9 +308,9 @@ def test_a_rough_solution_is_good_enough():
 
 
 def test_too_many_contacts_are_undecided_where_sharing_fails(monkeypatch):
-    monkeypatch.setattr("amontons.analysis.certificates.one_load.inequality.LARGE", 1)
-    monkeypatch.setattr("amontons.analysis.certificates.one_load.inequality.LARGEST", 5)
-    monkeypatch.setattr("amontons.analysis.certificates.one_load.reduction.SETS", 2)
+    monkeypatch.setattr("amontons.analysis.solutions.discs.multipliers.LARGE", 1)
+    monkeypatch.setattr("amontons.analysis.solutions.discs.multipliers.LARGEST", 5)
+    monkeypatch.setattr("amontons.analysis.solutions.discs.reduction.SETS", 2)
     problem = hild_triangle(15, mu=2.9).assemble().condensed()
     answer = certify_load(problem, am.solve(problem))
     assert answer.outcome is LoadOutcome.UNDECIDED

@@ -148,3 +148,23 @@ def test_results_of_all_steps_and_a_restart(tmp_path, monkeypatch):
 def test_what_is_wrong_is_said_with_its_line(tmp_path, more, words):
     with pytest.raises(am.FileFormatError, match=rf"deck.inp:\d+: .*{words}"):
         case_of(tmp_path, DECK + step(more))
+
+
+def test_solve_makes_the_steps_of_a_deck_whose_state_depends_on_the_way(tmp_path, monkeypatch):
+    text = DECK + step("*CHANGE FRICTION, INTERACTION=I\n*FRICTION\n0.1,\n")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "deck.inp").write_text(text)
+    solved = CliRunner().invoke(main, ["solve", "deck.inp", "-o", "a", "--json", "copy.json"])
+    assert solved.exit_code == 0, solved.output
+    assert "depends on the way" in solved.output
+    run = CliRunner().invoke(main, ["run", "deck.inp", "-o", "b"])
+    assert run.exit_code == 0, run.output
+    found, known = (json.loads((tmp_path / k / "solution.json").read_text()) for k in "ab")
+    for pair, other in zip(found["pairs"], known["pairs"], strict=True):
+        np.testing.assert_allclose(pair["force"], other["force"], rtol=1e-9, atol=1e-12)
+    assert json.loads((tmp_path / "copy.json").read_text()) == found
+    assert (tmp_path / "a" / "steps.csv").is_file()
+    alone = CliRunner().invoke(main, ["solve", "deck.inp", "-o", "c", "--uniqueness"])
+    assert alone.exit_code == 2
+    assert "--uniqueness: for one state alone" in alone.output
+    assert not (tmp_path / "c").exists()

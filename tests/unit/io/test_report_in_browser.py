@@ -311,11 +311,10 @@ def test_a_race_has_a_page(tmp_path, opened, monkeypatch):
     assert "ms" in rows.first.inner_text()
 
 
-def test_a_folder_is_for_the_report(tmp_path):
+def test_a_report_is_written_where_it_is_asked_for(tmp_path):
     found = CliRunner().invoke(main, ["enumerate", "example:brake", "-o", f"{tmp_path}/x"])
-    assert found.exit_code == 2
-    assert "with --report only" in found.output
-    assert not list(tmp_path.iterdir())
+    assert found.exit_code == 0
+    assert [path.name for path in (tmp_path / "x").iterdir()] == ["solutions.csv"]
 
 
 def test_printing_shows_the_bodies(cube, tmp_path, opened):

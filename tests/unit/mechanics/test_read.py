@@ -104,7 +104,7 @@ def test_broken_gmsh_files_say_what_is_wrong(tmp_path, capfd, old, new, words):
         ("noise.msh", bytes(range(256)) * 9, "expected a mesh"),
         ("noise.vtu", b"<VTKFile", "expected a mesh"),
         ("noise.vtk", b"# vtk DataFile Version 3.0\nrubbish\n", "expected a mesh"),
-        ("noise.inp", b"*NODE\n1, x, y\n", "expected a mesh"),
+        ("noise.inp", b"*NODE\n1, x, y\n", "inp:2: coordinate: expected a number, got 'x'"),
         ("noise.med", b"not hdf5", "expected a mesh"),
         ("noise", b"text", "expected a mesh"),
     ],

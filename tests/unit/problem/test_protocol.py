@@ -109,8 +109,8 @@ def test_what_a_solver_takes_by_default():
         form = am.Form.GLOBAL
         nitsche = True
 
-    solves, form, matrix_free, needs_cone = taken_by(Old())
-    assert [kind.__name__ for kind in solves] == ["FrictionProblem", "NitscheProblem"]
-    assert form is am.Form.GLOBAL
-    assert not matrix_free and not needs_cone
+    takes = taken_by(Old())
+    assert [kind.__name__ for kind in takes.solves] == ["FrictionProblem", "NitscheProblem"]
+    assert takes.form is am.Form.GLOBAL
+    assert not takes.matrix_free and not takes.needs_cone and not takes.changes_method
     assert taken_by(object()).solves == (am.FrictionProblem,)

@@ -1,9 +1,12 @@
 """Bodies that contact alone holds, pressed by forces and pushed far: balance knows them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import amontons as am
+from amontons.solvers.auto.hybrid import WHOLE
 from amontons.solvers.auto.tethers import Tethers
 
 
@@ -51,3 +54,26 @@ def test_what_has_no_solution_comes_to_an_end():
     assert not found.converged
     assert np.isfinite(found.r).all()
     assert found.convergence.advice
+
+
+def wedge(mu, load):
+    """A block whose sides lean by 45 degrees, pressed between two planes."""
+    mesh = am.box((2.0, 1.0), cells=(6, 6))
+    points = mesh.points.copy()
+    points[:, 0] = 1 + (points[:, 0] - 1) * (1 + points[:, 1])
+    body = am.Body(replace(mesh, points=points), am.LinearElastic(young=100.0, poisson=0.3))
+    left, right = am.Plane((1, 1), point=(0, 0)), am.Plane((-1, 1), point=(2, 0))
+    contacts = [am.Contact("left", left, mu=mu), am.Contact("right", right, mu=mu)]
+    return am.Model([body], [], contacts, [am.Traction("top", load)])
+
+
+@pytest.mark.parametrize("mu", [0.1, 0.3])
+@pytest.mark.parametrize("push", [0.3, -0.2])
+def test_a_cycle_of_one_method_is_not_the_end_of_all(mu, push):
+    model = wedge(mu, (push, -1.0))
+    alone = am.drive(model.assemble(), WHOLE, contact_tolerance=np.inf)
+    assert alone.convergence.outcome is am.Outcome.CYCLED
+    found = am.solve(model)
+    assert found.convergence.outcome is am.Outcome.CONVERGED
+    force = sum(pair.force for pair in found.pairs.values())
+    np.testing.assert_allclose(force, [-4 * push, 4.0], atol=1e-6)

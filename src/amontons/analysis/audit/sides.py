@@ -36,6 +36,7 @@ Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 HELD = 0.1  # part of an axis along held components from which its force is not known
 ROUNDED = 1e-15  # relative error of a point
+TURNED = 1e-9  # by which the mean of a frame that turns is shorter than 1
 FITTED = 1e-12  # accuracy of forces that several contacts share at a node
 
 
@@ -126,7 +127,7 @@ def _seen(
         _side(model, contact, one, forces, (u, points), gaps)
         for contact, one, gaps in zip(contacts, placed, near, strict=True)
     ]
-    if not _shared(model, contacts):
+    if not (_shared(model, contacts) or any(_turn(model, one) for one in placed)):
         return pairs
     whole = sparse.csr_array(sparse.hstack([p.H for p in placed], format="csr"))
     fixed = parts.is_fixed[: parts.beside.first]
@@ -168,7 +169,7 @@ def _side(
     span = ROUNDED * float(np.abs(moved[1]).max(initial=0.0))
     blurred = (abs(placed.H).T @ (forces.blur + span)).reshape(-1, d).max(axis=1, initial=0.0)
     return Side(
-        contact, node, rows.points, rows.weights, rows.frames, np.where(known, r, 0.0), known,
+        contact, node, rows.points, rows.weights, rows.sums, np.where(known, r, 0.0), known,
         np.einsum("pkc,pc->pk", np.abs(rows.frames), blur), start + local[:, 0],
         flat + local[:, 0], local[:, 1:], blurred, start, flat, placed.H,
         law_of([contact], replace(parts, placed=(placed,))), *at_points,
@@ -206,6 +207,14 @@ def _middles(kind: str, nodes: Index) -> list[tuple[Index, Index, Array]]:
         for k, between in enumerate(cell.parents)
         for corner in between
     ]
+
+
+def _turn(model: Model, placed: Placed) -> bool:
+    """True where frames turn over the facets: forces at nodes are then no multiples of them."""
+    if model.bodies[placed.body].mesh.order == 1:
+        return False
+    size = np.linalg.norm(placed.rows.sums, axis=2)
+    return bool(((size > HELD) & (np.abs(size - 1) > TURNED)).any())
 
 
 def _shared(model: Model, contacts: Sequence[Contact]) -> bool:

@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from ...core.clock import NEVER, Deadline, TimeLimit, deadline_of, now
 from ...core.errors import InvalidInput, TimeUp, UnsupportedForm
 from ...core.faces import Told
+from ...core.onlookers import say
 from ...problem.friction import FrictionProblem
 from ..scaled import Scaled
 from ..statuses import STICK
@@ -150,6 +151,7 @@ class _Search:
     def run(self) -> None:
         """Close the bounds as far as time allows."""
         pieces, found = self.pieces, self.found
+        say("critical friction: upper bounds")
         search_windows(pieces, found, self.deadline.share(WINDOWS))
         if pieces.contacts <= ENUMERATED:
             exact_threshold(pieces, found, self.deadline)
@@ -196,6 +198,8 @@ class _Search:
         POSITIVE, NEGATIVE with a smaller upper bound, STOPPED, or UNKNOWN within rounding.
         """
         found = self.found
+        say(f"critical friction: between {found.lower:.4g} and {found.upper:.4g}, is {t:.4g} "
+            "safe?")  # fmt: skip
         branching = Branching(self.pieces, t, self.deadline.share(share))
         sign = branching.run()
         found.seen += branching.patterns + branching.inequalities
@@ -206,7 +210,8 @@ class _Search:
         states = branching.failed
         if states is not None and found.take(self.pieces, states):
             return NEGATIVE
-        self.reason = "time is up" if sign == STOPPED else "a determinant is too near to zero"
+        stopped = f"stopped after {self.deadline}"
+        self.reason = stopped if sign == STOPPED else "a determinant is too near to zero"
         return STOPPED if sign == STOPPED else UNKNOWN
 
     def _next(self, part: float, failed: float, began: float) -> float:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ...core.clock import Deadline, TimeLimit, deadline_of, now
 from ...core.errors import InvalidInput, SingularOperator, TimeUp
+from ...core.onlookers import say
 from ...linear.dense import dense
 from ...problem.friction import FrictionProblem
 from ...problem.law import Coulomb, Law, Tresca
@@ -219,6 +220,7 @@ def _this_load(
             return answer
     given = solution is not None
     if solution is None:
+        say("a solution for this load")
         solution = drive(local, time_limit=deadline)
     if not solution.converged:
         reason = f"No solution was found: {solution.convergence}."

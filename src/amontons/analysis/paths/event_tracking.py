@@ -361,10 +361,11 @@ class _Walk:
         self._aim()
         if len(others) > 1 or system.sets:
             rows = np.array([np.append(t.direction, t.rate) for t in system.tangents])
-            self._note_turn()
+            turns = self._note_turn()
             detail = system.told(apart, ROUNDING * max(1.0, float(np.abs(y).max(initial=0))))
             return Event(EventKind.BRANCH, self.p, self.y, self.travelled, before, self.pattern,
-                         directions=rows, detail=detail, problem=self.path)  # fmt: skip
+                         turns=turns, directions=rows, detail=detail,
+                         problem=self.path)  # fmt: skip
         return self._event(before)
 
     def _orientation(self, pattern: str, rate: float) -> int:

@@ -75,8 +75,9 @@ class Event(_OnPath):
     """Something that happens on a branch, at a precisely located point.
 
     before, after: names of the pieces on the two sides, in the sense of the branch.  smooth:
-    True for a fold inside of a piece.  directions, (k, n + 1), rows (y', p'): all one-sided
-    tangents at a branch point.  stop: for the kind END.
+    True for a fold inside of a piece.  turns: True where the parameter turns back, at a fold
+    and at some branch points.  directions, (k, n + 1), rows (y', p'): all one-sided tangents at
+    a branch point.  stop: for the kind END.
     """
 
     kind: EventKind
@@ -86,6 +87,7 @@ class Event(_OnPath):
     before: Hashable = None
     after: Hashable = None
     smooth: bool = False
+    turns: bool = False
     directions: Array | None = None
     stop: Stop | None = None
     detail: str = ""
@@ -100,6 +102,8 @@ class Event(_OnPath):
         }
         if self.kind is EventKind.FOLD:
             out["smooth"] = self.smooth
+        elif self.turns:
+            out["turns"] = True
         for name in ("before", "after"):
             value = getattr(self, name)
             if isinstance(value, str):

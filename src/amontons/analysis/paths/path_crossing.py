@@ -140,7 +140,7 @@ class PathCrossing:
         followed = share
         walk = way.steps(path, y, share, onward, (-self.back, 1.0))
         for count, (point, event) in enumerate(walk):
-            if event is not None and event.kind is EventKind.FOLD:
+            if event is not None and (event.kind is EventKind.FOLD or event.turns):
                 folds.append(event.parameter)
             if event is not None and event.stop is not None:
                 if point.parameter == 1.0:

@@ -94,7 +94,9 @@ class WalkByPieces(Walk):
         if several:
             rows = np.array([np.append(t.direction, t.rate) for t in system.tangents])
             detail = system.told(self._apart(system, tolerance), MET * LOCATED * tolerance)
-            event = self._event(EventKind.BRANCH, before, directions=rows, detail=detail)
+            event = self._event(
+                EventKind.BRANCH, before, turns=turned, directions=rows, detail=detail
+            )
         else:
             event = self._event(EventKind.FOLD if turned else EventKind.STATUS, before)
         return [(self.here(), event)]

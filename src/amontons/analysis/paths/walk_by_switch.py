@@ -114,7 +114,7 @@ class WalkBySwitch(Walk):
         turns = self._note_turn()
         kind = EventKind.FOLD if turns else EventKind.STATUS
         kind = EventKind.BRANCH if more else kind
-        return [(self.here(), self._event(kind, before, **more))]
+        return [(self.here(), self._event(kind, before, turns=turns, **more))]
 
     def _straightest(self, ways: list[Tangent]) -> Tangent:
         """The tangent that keeps the orientation and turns least."""

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from ...core.clock import Deadline, TimeLimit, deadline_of, now
 from ...core.errors import InvalidInput, TimeUp, UnsupportedForm
 from ...core.faces import Shown
+from ...core.onlookers import say
 from ...problem.friction import FrictionProblem
 from ..scaled import UNRESOLVED, Scaled
 from ..statuses import STICK, word
@@ -244,6 +245,7 @@ def _collect(
     search_space = (box.A, box.spread, box.c, (box.low, box.high), piece.reacts, piece.mu > 0)
     for leaves, more, done in leaves_of(*search_space, cuts):
         nodes += more
+        say(f"this load: {nodes} partial patterns, {len(found)} with solutions")
         deadline.spend(node * more)
         for k, states in enumerate(leaves):
             if k and deadline.passed:

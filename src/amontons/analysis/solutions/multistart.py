@@ -20,6 +20,7 @@ from scipy.linalg import lapack
 
 from ...core.clock import NEVER, Deadline, TimeLimit, deadline_of
 from ...core.errors import InvalidInput
+from ...core.onlookers import say
 from ...problem.friction import FrictionProblem
 from ...solvers.driver import drive
 from ..scaled import Scaled
@@ -60,6 +61,7 @@ def multistart(
         while used < starts or (finder.lacks_one and used < EXTRA * starts):
             if deadline.passed:
                 break
+            say(f"this load: {used} starts, {len(finder.found)} solutions")
             used += finder.search(min(ROUND, EXTRA * starts - used), deadline)
         found = tuple(finder.solutions())
         return Solutions(found, False, finder.reason(used), used, resolution=SAME)

@@ -1,16 +1,26 @@
 """A tree of regions that together are everything a problem allows: closed, or divided.
 
-In 2D a region is a state of every contact, in 3D an arc of slip directions besides; a region
-with two directions is a disc of dimension one.  A kind of region says how one is looked at.
+A region gives every contact the statuses it may have, and in 3D an arc for its direction of
+slip; in 2D that has two directions, the disc has dimension one.  A contact is decided: free or
+closed, stick or slip, then slip + or -, or halves of the arc.  A tree says how a region is
+looked at.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ...core.clock import Deadline
+from ...core.onlookers import say
 from ..scaled import Scaled
+from .discs.sets import Region, Regions
+
+Array = NDArray[np.float64]
 
 FINDING = 0.2  # share of the time left that goes into looking for another solution
 
@@ -25,13 +35,16 @@ class RegionTree(ABC):
     unresolved = False  # is it that solutions can not be told apart?
     LOOK = 50.0  # operations of looking at a region per cube of the reactions, at least
 
-    def __init__(self, scaled: Scaled, deadline: Deadline, queue: list[Any]) -> None:
-        self.scaled, self.deadline, self.queue = scaled, deadline, queue
+    def __init__(self, scaled: Scaled, deadline: Deadline) -> None:
+        self.scaled, self.deadline = scaled, deadline
+        # every contact undecided; those that can not react are free
+        root = tuple(Region() if able else Region("f") for able in scaled.reacts)
+        self.queue: list[Regions] = [root]
         self.examined = self.undecided = 0
         self.stopped = False
 
     @abstractmethod
-    def _look_at(self, region: Any, /) -> list[Any]:
+    def _look_at(self, regions: Regions, /) -> list[Regions]:
         """Regions that remain of one; none where it is closed or has to be given up."""
 
     @property
@@ -61,6 +74,7 @@ class RegionTree(ABC):
         """Close or divide the region that is next."""
         self.deadline.spend(self._work)
         self.examined += 1
+        say(f"this load: region {self.examined}, {len(self.queue)} to be looked at")
         self.queue += reversed(self._look_at(self.queue.pop()))
 
     def run(self, *, until_several: bool = False) -> None:
@@ -78,3 +92,43 @@ class RegionTree(ABC):
         if not (self.complete or self.several):
             self._look_elsewhere(self.deadline.share(FINDING))
             self.run(until_several=True)
+
+    # ------------------------------------------------------------------ to divide
+    def _parts_of(
+        self, regions: Regions, scores: Array, inside: Sequence[Array] = ()
+    ) -> list[Regions]:
+        """The parts of a region by the most promising contact; undecided where there are none.
+
+        inside: solutions that are known in it.
+        """
+        for p in self._order(regions, scores):
+            parts = self._divided(regions, p, inside)
+            if parts:
+                return parts
+        self.undecided += 1
+        return []
+
+    def _order(self, regions: Regions, scores: Array) -> Iterator[int]:
+        """Contacts to divide, the most promising first."""
+        width = [2 * np.pi if own.letter in ".c" else own.half * (own.letter == "l")
+                 for own in regions]  # fmt: skip
+        yield from sorted(range(len(regions)), key=lambda p: (-scores[p], -width[p]))
+
+    def _divided(self, regions: Regions, p: int, inside: Sequence[Array]) -> list[Regions]:
+        """The parts of regions by contact p, [] where it is decided to the last."""
+        own = regions[p]
+        if own.letter == ".":
+            parts = [Region("f"), Region("c")]
+        elif self.scaled.mu[p] == 0:
+            return []
+        elif own.letter == "c":
+            parts = [Region("s"), replace(own, letter="l")]
+        elif own.letter == "l":
+            parts = self._slip_divided(own, p, inside)
+        else:
+            return []
+        return [(*regions[:p], part, *regions[p + 1 :]) for part in parts]
+
+    def _slip_divided(self, own: Region, p: int, inside: Sequence[Array]) -> list[Region]:
+        """Parts of the directions of slip of contact p: in 2D there are two."""
+        return [Region("+"), Region("-")]

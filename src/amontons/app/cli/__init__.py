@@ -29,7 +29,7 @@ Exit codes: 0 converged, 1 not converged (results are written all the same),
 )
 @click.version_option(__version__, prog_name="amontons")
 def main() -> None:
-    """Frictional contact mechanics: from a mesh, a case file or an FCLib problem to a solution.
+    """Frictional contact mechanics: from a case file, a deck or an FCLib file to a solution.
 
     Each answer is judged by an error measure that no solver computes for itself and that does
     not depend on units.  `amontons COMMAND --help` explains a command.
@@ -81,7 +81,8 @@ Examples:
 def solve(**options: object) -> int:
     """Solve a problem and write the results.
 
-    SOURCE is a TOML case file, an FCLib HDF5 file, or example:NAME.  Writes solution.json,
+    SOURCE is a case file (.toml), a deck (.inp), an FCLib file (.hdf5), or example:NAME.
+    Writes solution.json,
     solution.h5, status.png, convergence.png and, for models, solution.vtu into DIR.
     """
     from .solve import run
@@ -111,7 +112,8 @@ def info(**options: object) -> None:
     It tells the rank of H (or W) with the degree of hyperstaticity, and whether solutions exist
     whatever the load, by a motion that opens all contacts or reactions that hold each other.
 
-    SOURCE is a TOML case file, an FCLib HDF5 file, example:NAME, or a mesh or CAD file.
+    SOURCE is a case file (.toml), a deck (.inp), an FCLib file (.hdf5), example:NAME, or a mesh
+    or CAD file.
     """
     from .info import run
 
@@ -167,9 +169,11 @@ Examples:
   amontons enumerate example:brake --picture brake.png
   amontons enumerate example:hild --mu 2 --set mesh.refine=4
   amontons enumerate problem.hdf5 --json - | jq .complete
+  amontons enumerate example:brake -o brake   solutions.csv: a row per solution and contact
 
 \b
-Exit codes: 0 the list is complete, 1 there may be others, 2 bad input.
+Exit codes: 0 the list is complete, 1 there may be others, 2 bad input, 130 interrupted before
+it was complete: Ctrl-C ends the search with what it has found, a second one at once.
 """,
 )
 @click.argument("source")
@@ -181,12 +185,13 @@ Exit codes: 0 the list is complete, 1 there may be others, 2 bad input.
 @click.option("--json", "json_copy", metavar="FILE", help="The same as JSON; - prints it.")
 @click.option("--picture", metavar="FILE",
               help="Draw the solutions side by side: .png, .svg or .pdf.")  # fmt: skip
-@results_folder("name of the source with -results", only_report=True)
+@results_folder("name of the source with -results", asked=True)
 @flags.of_decks
 def enumerate_solutions(**options: object) -> int:
     """Find all solutions of a problem with Coulomb friction, and prove that these are all.
 
-    SOURCE is a TOML case file, an FCLib HDF5 file, or example:NAME.  Patterns list the contacts
+    SOURCE is a case file (.toml), a deck (.inp), an FCLib file (.hdf5), or example:NAME.
+    Patterns list the contacts
     in order: f free, s stick, + or - slip, in 3D l slip.
     """
     from .enumerate import run as run_enumerate
@@ -243,7 +248,8 @@ Exit codes: 0 all runs are made, 1 the time was over before, 2 bad input, 130 in
 def basins(**options: object) -> int:
     """Find out which solution each method finds, from many starts, over its parameters.
 
-    SOURCE is a TOML case file, an FCLib HDF5 file, or example:NAME.  The solutions are listed
+    SOURCE is a case file (.toml), a deck (.inp), an FCLib file (.hdf5), or example:NAME.
+    The solutions are listed
     first, as by `enumerate`; a run counts when the judge takes its reactions and its motion.
     """
     from .basins import run as run_basins
@@ -259,7 +265,8 @@ Examples:
   amontons uniqueness problem.hdf5 --json - | jq .verdict
 
 \b
-Exit codes: 0 settled, either way, 1 undecided, 2 bad input.
+Exit codes: 0 settled, either way, 1 undecided, 2 bad input, 130 interrupted while undecided:
+Ctrl-C ends the search with what is known, a second one at once.
 """,
 )
 @click.argument("source")
@@ -274,7 +281,8 @@ Exit codes: 0 settled, either way, 1 undecided, 2 bad input.
 def uniqueness(**options: object) -> int:
     """Say whether a problem has one solution: for every load, for this load, or several.
 
-    SOURCE is a TOML case file, an FCLib HDF5 file, or example:NAME.  In 2D also bounds on the
+    SOURCE is a case file (.toml), a deck (.inp), an FCLib file (.hdf5), or example:NAME.
+    In 2D also bounds on the
     critical friction, below which every load has exactly one solution.
     """
     from .uniqueness import run
@@ -322,7 +330,8 @@ Exit codes: 0 every branch has come to its end, 1 one was given up, 2 bad input.
 def follow(**options: object) -> int:
     """Follow the solutions while the load or the friction changes: folds, events, branches.
 
-    SOURCE is a TOML case file, an FCLib HDF5 file, or example:NAME.  Writes follow.json (points
+    SOURCE is a case file (.toml), a deck (.inp), an FCLib file (.hdf5), or example:NAME.
+    Writes follow.json (points
     and events), follow.csv and follow.png into DIR.
     """
     from .follow import run as run_follow

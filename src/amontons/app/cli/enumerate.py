@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import click
@@ -10,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis.solutions.enumerate import Solutions
+from ...core.files import made, write_bytes
 from ...core.words import shortened
+from ...io.numbers import solutions_csv
 from ...io.readers import Case
 from ...io.results import FIGURES, to_json, versions
 from ...problem.friction import FrictionProblem
@@ -18,10 +21,11 @@ from ...solvers import Iterate
 from ...solvers.driver import drive
 from ..questions import all_solutions
 from .sources import open_source
+from .stopping import ending_early
 from .terminal import (
+    check_folder,
     check_writable,
     deliver_json,
-    report_folder,
     say_when,
     show_table,
     write_report,
@@ -29,6 +33,7 @@ from .terminal import (
 
 Array = NDArray[np.float64]
 SCHEMA = "amontons/enumerate/1"
+TABLE = "solutions.csv"
 INCOMPLETE = 1  # exit code
 
 
@@ -41,9 +46,12 @@ def run(
     check_writable(json_copy, "--json")
     check_writable(picture, "--picture", FIGURES)
     opened = open_source(source, overrides)
-    place = report_folder(report, folder, f"{opened.name}-results")
+    place = None
+    if report or folder is not None:
+        place = check_folder(f"{opened.name}-results" if folder is None else folder)
     problem = opened.discrete_with(mu)
-    found = all_solutions(opened.target_with(mu), time_limit=time_limit)
+    with ending_early() as stop:
+        found = all_solutions(opened.target_with(mu), time_limit=time_limit)
     if json_copy != "-":
         _show(opened.title, found)
         say_when(opened.target)
@@ -55,12 +63,25 @@ def run(
         ]
         draw(opened, problem, [s.r for s in found.solutions], named, picture)
     if place is not None:
-        from ...io.report import solutions_page
+        _write(found, opened, problem, mu, place, report=report)
+    if found.complete:
+        return 0
+    return INCOMPLETE if stop.received is None else stop.code
 
-        model = opened.target_with(mu) if opened.has_model else None
-        page = solutions_page(found, opened.title, opened.units, problem, model)  # type: ignore
-        write_report(page, place)
-    return 0 if found.complete else INCOMPLETE
+
+def _write(
+    found: Solutions, opened: Case, problem: FrictionProblem, mu: float | None, place: Path, *,
+    report: bool,
+) -> None:  # fmt: skip
+    """The folder: solutions.csv, and the page where that is asked for."""
+    model: Any = opened.target_with(mu) if opened.has_model else None
+    with made(place):
+        write_bytes(place / TABLE, solutions_csv(found.solutions, problem.dimension, model))
+        if report:
+            from ...io.report import solutions_page
+
+            page = solutions_page(found, opened.title, opened.units, problem, model)
+            write_report(page, place)
 
 
 def record(found: Solutions) -> dict[str, Any]:

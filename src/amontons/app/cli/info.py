@@ -24,7 +24,7 @@ from ...solvers.contract import taken_by
 from .info_mesh import is_mesh
 from .info_mesh import run as run_mesh
 from .sources import open_source
-from .terminal import check_writable, deliver_json, show_table
+from .terminal import check_writable, deliver_json, say_notes, show_table
 
 if TYPE_CHECKING:
     from ...mechanics.model.large_deformation import LargeDeformation
@@ -59,8 +59,10 @@ def run(
         facts["existence"] = _existence(problem.assembled(), deadline)
     if json_copy != "-":
         show_table(opened.title, ["", ""], [[k, _text(v)] for k, v in facts.items()], "left")
+        say_notes(opened.notes)
     if json_copy is not None:
-        deliver_json(to_json(facts), json_copy)
+        told = {"notes": list(opened.notes)} if opened.notes else {}
+        deliver_json(to_json(facts | told), json_copy)
 
 
 def describe(problem: Any) -> dict[str, Any]:

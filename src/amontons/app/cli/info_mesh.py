@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from ...core.errors import InvalidInput
+from ...io.meshes import read_mesh
 from ...io.readers import MESHES
 from ...io.results import to_json
-from ...mechanics.meshes import Facets, Mesh, is_cad, read_cad, read_mesh
+from ...mechanics.meshes import Facets, Mesh, is_cad, read_cad
 from ...mechanics.meshes.surfaces import facet_areas
 from .sources import check_is_plain
 from .terminal import check_writable, deliver_json, show_table

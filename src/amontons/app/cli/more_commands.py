@@ -54,6 +54,7 @@ def audit(**options: object) -> int:
 Examples:
   amontons convert global.hdf5 local.hdf5 --form local
   amontons convert case.toml problem.hdf5
+  amontons convert example:cube cube.inp --dialect abaqus
   amontons convert cube-results cube.frd      displacements, stresses, contact for cgx, PrePoMax
 """
 )
@@ -63,11 +64,17 @@ Examples:
               help="local: W, q; global: M, H, f, w. [the form it has]")  # fmt: skip
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
               help="Replace a value of the case.")  # fmt: skip
+@click.option("--dialect", type=click.Choice(["calculix", "abaqus"]),
+              help="Of a deck (.inp) that is written. [calculix]")  # fmt: skip
+@click.option("--penalty", type=float, metavar="K",
+              help="Of such a deck: pressure over overclosure of hard contact, stress over "
+              "length. [HARD]")  # fmt: skip
 @flags.of_decks
 def convert(**options: object) -> None:
-    """Write a problem as an FCLib file, in either form, or results as .frd or .dat.
+    """Write a problem as an FCLib file, a model as a deck (.inp), results as .frd or .dat.
 
-    SOURCE is a TOML case file, an FCLib HDF5 file, a results folder, or example:NAME.
+    SOURCE is a case file (.toml), a deck (.inp), an FCLib file, a results folder, or
+    example:NAME.
     """
     from .convert import run
 

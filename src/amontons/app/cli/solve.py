@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -14,22 +13,20 @@ import click
 from ...analysis.certificates.uniqueness import assess, quick_verdict
 from ...analysis.certificates.verdict import Uniqueness
 from ...core.clock import TimeLimit
-from ...core.errors import FileFormatError, InvalidInput, SingularOperator, UnsupportedForm
+from ...core.errors import FileFormatError, UnsupportedForm
 from ...core.files import put
 from ...io import results as output
-from ...io.checkpoint import load_start
 from ...io.readers import Case
 from ...io.units import Units
 from ...problem.friction import FrictionProblem
 from ...problem.judge.measures import Criterion
-from ...problem.nitsche import NitscheProblem
 from ...problem.solution import FrictionSolution, Outcome
-from ...solvers import Iterate
 from ...solvers.asked import Asked
 from ..api import solve_as_asked
 from ..model_solution import ModelSolution
 from .group import INTERRUPTED
-from .sources import open_source, with_flags
+from .solve_deck import solve_in_steps
+from .sources import naming_culprits, open_source, start_from, with_flags
 from .terminal import REPORT, check_folder, check_writable, say_notes, say_when
 
 NOT_EXAMINED = (
@@ -49,6 +46,17 @@ def run(
     """Solve and write; returns the exit code."""
     opened = open_source(source, overrides, method)
     if opened.evolution is not None and opened.moving is None:
+        if opened.about is not None:
+            flags = {
+                "method": method, "tolerance": tolerance, "max_iterations": max_iterations,
+                "contact_tolerance": contact_tolerance,
+                "time_limit": time_limit, "start": start, "uniqueness": full_verdict,
+                "frd": frd, "fclib-error": fclib_error,
+            }  # fmt: skip
+            return solve_in_steps(
+                source, opened.name, overrides, flags, folder, json_copy, quiet=quiet,
+                report=report,
+            )
         raise FileFormatError(
             f"{source}: a case in time, whose state depends on the way; use: amontons run "
             f"{source}"
@@ -58,9 +66,9 @@ def run(
     )
     place = check_folder(f"{opened.name}-results" if folder is None else folder)
     check_writable(json_copy, "--json")
-    begin = None if start is None else _start(start, opened)
+    begin = None if start is None else start_from(start, opened)
     silent = quiet or json_copy == "-"
-    with _naming_culprits(source, opened, settings.method, start):
+    with naming_culprits(opened, source, settings.method, start):
         asked = Asked(
             settings.tolerance, settings.contact_tolerance, settings.max_iterations,
             settings.time_limit, (lambda step, iterate: None) if silent else None,
@@ -91,35 +99,6 @@ def _page(result: output.Output, path: Path, units: Units) -> None:
     from ...io.report import page_of
 
     put(path, page_of(result, units=units).html.encode("utf-8"))
-
-
-def _start(file: str, opened: Case) -> Iterate:
-    """The start in the file of --start."""
-    try:
-        found = load_start(file)
-    except FileFormatError as reason:
-        raise FileFormatError(f"--start {reason}") from None
-    if opened.has_model and opened.model.kind is NitscheProblem and found.v is None:
-        raise InvalidInput(
-            f"--start {file}: no v, and the method starts from displacements"
-        )
-    return found
-
-
-@contextmanager
-def _naming_culprits(
-    source: str, opened: Case, method: str, start: str | None
-) -> Iterator[None]:
-    """Say which key, file or flag an error comes from."""
-    try:
-        yield
-    except (UnsupportedForm, SingularOperator, InvalidInput) as error:
-        where, key = f"{source}: --method {method}", opened.key_of(error.at)
-        if error.at[:1] == ("start",):
-            where = f"--start {start}"
-        elif key:
-            where = f"{opened.path}: {key}"
-        raise type(error)(f"{where}: {error.text}") from error
 
 
 def _output(

@@ -1,21 +1,25 @@
-"""What a command works on: a case file, an FCLib file, or a built-in example."""
+"""What a command works on: a file or a built-in example, with the flags that go with it."""
 
 from __future__ import annotations
 
 import os
 import stat
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 import click
 
-from ...core.errors import FileFormatError, InvalidInput
+from ...core.errors import FileFormatError, InvalidInput, SingularOperator, UnsupportedForm
 from ...core.words import near, near_file, nearest
 from ...io.case import DATA, Settings, make_solver, method_class, read_case
 from ...io.case.overrides import override_settings
+from ...io.checkpoint import load_start
 from ...io.readers import Case, read
+from ...problem.nitsche import NitscheProblem
+from ...solvers import Iterate
 
 
 def open_source(text: str, overrides: Sequence[str] = (), method: str | None = None) -> Case:
@@ -103,6 +107,35 @@ def with_flags(
         raise InvalidInput(f"time-limit: expected seconds > 0, got {settings.time_limit}")
     make_solver(settings.method, settings.options)
     return settings
+
+
+def start_from(file: str, opened: Case) -> Iterate:
+    """The start in the file of --start."""
+    try:
+        found = load_start(file)
+    except FileFormatError as reason:
+        raise FileFormatError(f"--start {reason}") from None
+    if opened.has_model and opened.model.kind is NitscheProblem and found.v is None:
+        raise InvalidInput(
+            f"--start {file}: no v, and the method starts from displacements"
+        )
+    return found
+
+
+@contextmanager
+def naming_culprits(
+    opened: Case, source: str, method: str, start: str | None
+) -> Iterator[None]:
+    """Say which key, file or flag an error comes from."""
+    try:
+        yield
+    except (UnsupportedForm, SingularOperator, InvalidInput) as error:
+        where, key = f"{source}: --method {method}", opened.key_of(error.at)
+        if error.at[:1] == ("start",):
+            where = f"--start {start}"
+        elif key:
+            where = f"{opened.path}: {key}"
+        raise type(error)(f"{where}: {error.text}") from error
 
 
 # ----------------------------------------------------------------------------- examples

@@ -10,6 +10,7 @@ from types import FrameType
 from typing import Any
 
 from ...core.interrupts import again, is_busy
+from ...core.onlookers import Onlooker, present
 
 SIGNALS = {signal.SIGINT: "Interrupted", signal.SIGTERM: "Terminated"}
 BY_SIGNAL = 128  # plus its number: the exit code of a process that a signal has ended
@@ -20,11 +21,13 @@ class Stopping:
 
     A signal raises KeyboardInterrupt within `breaking`, and only there; where that would do
     harm or be lost, in imports and compilers, it waits (`core.interrupts`), and elsewhere
-    `received` remembers it.  A signal that the process was started to ignore, as shells do for
-    commands in the background, is still ignored.
+    `received` remembers it.  impatient: a second signal raises it anywhere.  A signal that the
+    process was started to ignore, as shells do for commands in the background, is still
+    ignored.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, impatient: bool = False) -> None:
+        self.impatient = impatient
         self.received: signal.Signals | None = None
         self._breakable = False
         self._before: dict[signal.Signals, Any] = {}
@@ -61,8 +64,17 @@ class Stopping:
             self._breakable = False
 
     def _take(self, number: int, frame: FrameType | None) -> None:
+        breakable = self._breakable or (self.impatient and self.received is not None)
         self.received = self.received or signal.Signals(number)
-        if self._breakable and is_busy(frame):
+        if breakable and is_busy(frame):
             again(number)
-        elif self._breakable:
+        elif breakable:
             raise KeyboardInterrupt
+
+
+@contextmanager
+def ending_early() -> Iterator[Stopping]:
+    """The first signal ends a search with what it knows, a second one breaks into it."""
+    with Stopping(impatient=True) as stop:
+        with present(Onlooker(ends=lambda: stop.received is not None)):
+            yield stop

@@ -67,9 +67,9 @@ def say_growth(case: Case) -> None:
 
 
 def say_notes(notes: Sequence[str]) -> None:
-    """Print what the file of a case says and its model leaves out, a line for each."""
+    """Print what a case leaves out of its file, or has found, a line for each."""
     for note in notes:
-        click.echo(f"deck: {note}")
+        click.echo(f"note: {note}")
 
 
 def deliver_json(text: str, target: str | None) -> None:

@@ -11,6 +11,7 @@ from ...core.errors import InvalidInput
 from ...io.results import to_json, verdict_record
 from ..questions import uniqueness
 from .sources import open_source
+from .stopping import ending_early
 from .terminal import check_writable, deliver_json, say_when
 
 UNSETTLED = 1  # exit code
@@ -25,10 +26,13 @@ def run(
     if time_limit is not None and not time_limit > 0:
         raise InvalidInput(f"--time-limit: expected seconds > 0, got {time_limit}")
     opened = open_source(source, overrides)
-    found = uniqueness(opened.target_with(mu), time_limit=time_limit)
+    with ending_early() as stop:
+        found = uniqueness(opened.target_with(mu), time_limit=time_limit)
     if json_copy != "-":
         click.echo(f"{opened.title}\n{found.in_full}")
         say_when(opened.target)
     if json_copy is not None:
         deliver_json(to_json(verdict_record(found)), json_copy)
-    return UNSETTLED if found.verdict is Verdict.UNDECIDED else 0
+    if found.verdict is not Verdict.UNDECIDED:
+        return 0
+    return UNSETTLED if stop.received is None else stop.code

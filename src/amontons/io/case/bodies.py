@@ -148,7 +148,8 @@ def _mesh_file(table: Table, path: Path) -> Mesh:
 
 def _read_file(table: Table, path: Path) -> Mesh:
     """The mesh of a mesh file, or of a CAD file, which needs a size of cells."""
-    from ...mechanics.meshes import is_cad, read_cad, read_mesh
+    from ...mechanics.meshes import is_cad, read_cad
+    from ..meshes import read_mesh
 
     name = path.parent / table.text("file")
     try:

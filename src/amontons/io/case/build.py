@@ -19,6 +19,7 @@ from ..units import UNIT_NAMES, Units
 from .bodies import read_bodies, read_material
 from .contacts import read_contact, refuse_repeated
 from .evolution import Evolution, read_evolution, read_wall
+from .found import found_contacts
 from .joints import TABLES, read_joints
 from .keys import key_of
 from .overrides import apply_overrides, check_depth
@@ -64,10 +65,13 @@ def read_case(
             raise top.error(key, f"unknown key; did you mean 'solver.{key}'?")
     top.only(*TOP)
     title = top.text("title", path.stem if path.stem != "case" else path.parent.name)
-    model = _wall_model(top, title) if "wall" in top.data else _model(top, path, title)
+    model, notes = (
+        (_wall_model(top, title), ()) if "wall" in top.data else _model(top, path, title)
+    )
     settings = _settings(top)
     return Case(model, settings, title, path, _evolution(top, settings), top.data,
-                key_of=partial(key_of, tables=top.data), units=_units(top))  # fmt: skip
+                key_of=partial(key_of, tables=top.data), notes=notes,
+                units=_units(top))  # fmt: skip
 
 
 def _units(top: Table) -> Units:
@@ -124,7 +128,8 @@ def _hint(path: Path) -> str:
 
 
 # -------------------------------------------------------------------------------- model
-def _model(top: Table, path: Path, title: str) -> Model:
+def _model(top: Table, path: Path, title: str) -> tuple[Model, tuple[str, ...]]:
+    """The model, and what is to be said of contacts that were found."""
     from ...mechanics.model import BodyForce, Fix, Model, Traction
 
     bodies = read_bodies(top, path)
@@ -148,14 +153,19 @@ def _model(top: Table, path: Path, title: str) -> Model:
     loads += [temperature_of(table, bodies) for table in top.tables("temperature")]
     if "contact" not in top.data:
         raise top.error("contact", "missing, expected at least one table [[contact]]")
-    contacts = [read_contact(table, bodies) for table in top.tables("contact")]
+    named = [table for table in top.tables("contact") if "pairs" not in table.data]
+    contacts = [read_contact(table, bodies) for table in named]
     refuse_repeated(top)
+    notes: tuple[str, ...] = ()
+    if (found := found_contacts(top.tables("contact"), bodies, contacts)) is not None:
+        bodies, notes = found.bodies, found.lines
+        contacts += found.contacts
     with top.blamed("contact", partial(key_of, tables=top.data)):
         return Model(
             bodies, supports=[*fixes, *joints.supports], contacts=contacts,
             loads=[*loads, *joints.loads], name=title, references=joints.references,
             constraints=joints.constraints, springs=joints.springs,
-        )  # fmt: skip
+        ), notes  # fmt: skip
 
 
 def _wall_model(top: Table, title: str) -> Model:

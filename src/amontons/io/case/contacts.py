@@ -1,16 +1,16 @@
-"""Contacts and obstacles of a case file."""
+"""Contacts of a case file."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from ...core.expressions import Expression
+from .obstacles import read_obstacle
 from .tables import Table
-from .values import configuration, scalar
+from .values import configuration, steady
 
 if TYPE_CHECKING:
-    from ...mechanics.contact import Nitsche, Obstacle
+    from ...mechanics.contact import Nitsche
     from ...mechanics.model import Body, Contact
 
 LAWS = "a table, { coulomb = COEFFICIENT } or { tresca = STRESS }, or 'tied'"
@@ -25,8 +25,8 @@ def read_contact(table: Table, bodies: Sequence[Body]) -> Contact:
     from ...mechanics.model.supports import locate
 
     table.only("slave", "obstacle", "master", "friction", "method", "kinematics",
-               "configuration", "name", "clearance")  # fmt: skip
-    method = _contact_method(table)
+               "configuration", "name", "clearance", "follows")  # fmt: skip
+    method = contact_method(table)
     if isinstance(table.data.get("slave"), list):
         raise table.error("slave", "expected one surface; write a table [[contact]] for each")
     slave = table.text("slave")
@@ -37,25 +37,26 @@ def read_contact(table: Table, bodies: Sequence[Body]) -> Contact:
     if ("obstacle" in table.data) == ("master" in table.data):
         raise table.error("", "expected either obstacle = { plane = { normal = [0, 1] } } or "
                           'master = "SURFACE"')  # fmt: skip
-    numbers = _friction(table)
+    numbers = friction(table)
     found = configuration(table)  # older words for kinematics
     if "kinematics" in table.data:
         found["kinematics"] = table.choice("kinematics", ("small", "finite"))
     if "clearance" in table.data:
-        found["clearance"] = _steady(table, "clearance")
-    if "name" in table.data:
-        found["name"] = table.text("name")
+        found["clearance"] = steady(table, "clearance")
+    for key in ("name", "follows"):
+        if key in table.data:
+            found[key] = table.text(key)
     with table.blamed():
         if "master" in table.data:
             master = table.text("master")
             return Contact(slave, master=master, **numbers, method=method, **found)
         words = "a table, such as { plane = { normal = [0, 1] } }"
         given = table.as_table("obstacle", table.data["obstacle"], words)
-        obstacle = _obstacle(given, bodies[0].mesh.dim)
+        obstacle = read_obstacle(given, bodies[0].mesh.dim)
         return Contact(slave, obstacle, **numbers, method=method, **found)
 
 
-def _friction(contact: Table) -> dict[str, Any]:
+def friction(contact: Table) -> dict[str, Any]:
     """The numbers of a law by the names that `Contact` has for them."""
     given = contact.need("friction", LAWS)
     if given == "tied":
@@ -90,7 +91,7 @@ def _scalars(table: Table, done: set[str]) -> dict[str, Any]:
         if key == "stiffness" and isinstance(table.data[key], dict):
             numbers[key] = _overclosure(table.table(key))
             continue
-        value = numbers[NUMBERS[key]] = _steady(table, key)
+        value = numbers[NUMBERS[key]] = steady(table, key)
         if isinstance(value, float) and value < 0:
             raise table.error(key, f"expected a number >= 0, got {value}")
         if key in POSITIVE and value == 0:
@@ -141,16 +142,7 @@ def _overclosure(table: Table) -> Any:
         return kind(**{key: table.data[key] for key in table.data})
 
 
-def _steady(table: Table, key: str) -> float | Expression:
-    """A number or an expression without the time."""
-    value = scalar(table, key)
-    if isinstance(value, Expression) and "t" in value.names:
-        raise table.error(key, "expected an expression in x, y, z: only loads and supports "
-                          "depend on the time t")  # fmt: skip
-    return value
-
-
-def _contact_method(table: Table) -> str | Nitsche | None:
+def contact_method(table: Table) -> str | Nitsche | None:
     """A word, or a table { kind = "nitsche", kappa = …, theta = … } of options, or None."""
     from ...mechanics.contact import Nitsche
 
@@ -174,33 +166,15 @@ def _contact_method(table: Table) -> str | Nitsche | None:
 def refuse_repeated(top: Table) -> None:
     """The same pair twice would share its load at random."""
     seen: list[dict[str, Any]] = []
-    for table in top.tables("contact"):
+    places: list[int] = []
+    for k, table in enumerate(top.tables("contact")):
         pair = {key: table.data.get(key) for key in ("slave", "obstacle", "master")}
+        if "pairs" in table.data:
+            continue  # found, and only one asks for it
         if pair in seen:
             raise table.error(
-                "", f"the same slave and partner as in contact[{seen.index(pair)}]; "
+                "", f"the same slave and partner as in contact[{places[seen.index(pair)]}]; "
                 "expected every pair once"
             )  # fmt: skip
         seen.append(pair)
-
-
-def _obstacle(table: Table, dim: int) -> Obstacle:
-    from ...mechanics.contact import LevelSet, Plane, Sphere
-
-    table.only("plane", "sphere", "level_set")
-    if len(table.data) != 1:
-        raise table.error("", "expected one of plane, sphere, level_set")
-    kind = next(iter(table.data))
-    if kind == "level_set":
-        function = _steady(table, "level_set")
-        if not isinstance(function, Expression):
-            raise table.error(kind, f"expected an expression in x, y, z, got {function}")
-        return LevelSet(function)
-    inner = table.table(kind)
-    with inner.blamed():
-        if kind == "plane":
-            inner.only("point", "normal")
-            point = inner.numbers("point", (dim,)) if "point" in inner.data else None
-            return Plane(normal=inner.numbers("normal", (dim,)), point=point)
-        inner.only("center", "radius")
-        return Sphere(center=inner.numbers("center", (dim,)), radius=inner.number("radius"))
+        places.append(k)

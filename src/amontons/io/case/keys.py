@@ -34,7 +34,7 @@ def key_of(at: Address, tables: dict[str, Any]) -> str:
         return _constraint_key(int(rest[0]) if rest else 0, tables)
     if part == "contacts":
         inner = [key for name in rest[1:] for key in _contact_keys(name)]
-        return dotted(("contact", *rest[:1], *inner))
+        return dotted(("contact", *_contact_at(rest[:1], tables), *inner))
     if part == "loads" and rest:
         return _load_key(int(rest[0]), tuple(rest[1:]), tables)
     return ""
@@ -47,6 +47,15 @@ def _constraint_key(number: int, tables: dict[str, Any]) -> str:
             return dotted((kind, number))
         number -= count
     return ""
+
+
+def _contact_at(number: list[str | int], tables: dict[str, Any]) -> list[str | int]:
+    """The table of a contact: those that are found come after all others."""
+    given = tables.get("contact", ())
+    places = sorted(range(len(given)), key=lambda k: "pairs" in given[k])
+    if not (number and places):
+        return number
+    return [places[min(int(number[0]), len(places) - 1)]]
 
 
 def _contact_keys(name: str | int) -> Address:

@@ -107,3 +107,12 @@ def _entry(table: Table, key: str, value: Any, dim: int) -> float | Expression:
     except AmontonsError as reason:
         hint = '; did you mean "free"?' if value.strip().lower() in FREE else number_hint(value)
         raise table.error(key, f"{reason}{hint}") from None
+
+
+def steady(table: Table, key: str) -> float | Expression:
+    """A number or an expression without the time."""
+    value = scalar(table, key)
+    if isinstance(value, Expression) and "t" in value.names:
+        raise table.error(key, "expected an expression in x, y, z: only loads and supports "
+                          "depend on the time t")  # fmt: skip
+    return value

@@ -75,9 +75,7 @@ class About:
 
 def _cells(deck: Deck, numbers: Index) -> tuple[tuple[Index, Index], ...]:
     """Elements of every block: what the deck calls them, and their nodes in the mesh."""
-    labels = np.zeros(sum(len(block.nodes) for block in deck.blocks), dtype=np.int64)
-    for names in {id(n): n for n, _ in deck.point_labels}.values():
-        labels[names.element_at] = names.element_labels
+    labels = deck.element_labels()
     return tuple(
         (labels[block.first : block.first + len(block.nodes)], numbers[block.nodes])
         for block in deck.blocks

@@ -27,9 +27,11 @@ from ...core.files import check_is_regular
 DEEPEST = 32  # files that include one another
 LARGEST_FILE = 2**33  # bytes, unpacked
 OPTION = re.compile(r'((?:[^,"]|"[^"]*")*)(?:,|$)')  # up to a comma outside of quotes
+NUMERIC = re.compile(r"(^|,)[ \t]*[-+.]?\d[^=,\n]*(,|$)")  # a field that is a number
 REMARK = re.compile(r"^[ \t]*\*\*.*\n?", re.MULTILINE)
 NEWLINE, COMMA = b"\n,"
 LONGEST = 80  # letters of a number with blanks
+LARGEST = 2**53  # whole numbers below are told apart by 64 bits
 PACKED = b"\x1f\x8b"
 
 
@@ -169,6 +171,8 @@ def number(text: str, row: Row, what: str) -> float:
     """A finite number as decks write it, 1.5D+3 too; an empty field is 0."""
     if not text:
         return 0.0
+    if "_" in text or not text.isascii():  # Python reads 1_000 and digits of other scripts
+        raise row.error(f"{what}: expected a number, got {shown(text)}")
     try:
         value = float(text)
     except ValueError:
@@ -186,7 +190,14 @@ def whole(text: str, row: Row, what: str) -> int:
     value = number(text, row, what)
     if not text or value != int(value):
         raise row.error(f"{what}: expected a whole number, got {shown(text)}")
+    if abs(value) >= LARGEST:
+        raise row.error(f"{what}: expected a number below 2^53, got {shown(text)}")
     return int(value)
+
+
+def is_whole(text: str) -> bool:
+    """True for the digits of a number >= 0 that is told apart from others."""
+    return text.isascii() and text.isdigit() and int(text) < LARGEST
 
 
 def read_cards(path: Path) -> list[Card]:
@@ -247,6 +258,8 @@ def _joined(text: str, begin: int, stop: int) -> tuple[str, int]:
         after = text.find("\n", end + 1, stop)
         after = stop if after < 0 else after
         more = text[end + 1 : after].strip()
+        if NUMERIC.search(more) and not more.startswith("**"):
+            break  # no option is a number alone: the comma ends the line, as some write it
         end = after
         if not more.startswith("**"):
             line += more

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from ...core.errors import Address, AmontonsError, FileFormatError, InvalidInput
+from ...mechanics.contact.finding import Reach
 from ...mechanics.model import (
     BodyForce,
     Fix,
@@ -27,25 +28,30 @@ from ...mechanics.model import (
 from ...mechanics.model.beside import Beside
 from ...mechanics.model.constraints import Constraint
 from ...mechanics.model.parts import Body
+from ...mechanics.model.rigid import piece_labels
 from ...mechanics.steps import Schedule, Stage, State
 from ..case.evolution import Evolution
 from ..case.overrides import override_settings
 from ..case.settings import Settings
 from ..readers import Case
 from .about import About
+from .adjusting import adjusted
 from .axes import Turned
 from .cards import Card, Row, read_cards
-from .contacts import Options, adjusted, law_of, read_contacts
+from .contact_laws import Options, law_of
+from .contacts import read_contacts
 from .course import Course
 from .flat import Deck, flatten
+from .general import found_pairs, motion_of, part_titles, read_general
 from .history import History, read_history
 from .joints import Joints, tied
-from .keywords import sorted_out
+from .keywords import left_out, sorted_out
 from .materials import read_interactions, read_sections
 from .meshing import Region
 from .scopes import Index
 from .special import special_nodes
 from .stages import Held, check_removed, read_stages, times_of
+from .tools import OWN, own_nodes, tool_bodies
 
 KINDS = ("supports", "loads", "contacts", "references", "constraints", "springs")
 
@@ -76,10 +82,11 @@ class Found:
 def read(path: Path, overrides: Sequence[str] = (), method: str | None = None) -> Case:
     """The case in a deck.  Overrides: those of the solver, deck.allow and deck.hard."""
     settings, options = _settings(overrides, method)
-    deck = flatten(read_cards(path))
+    cards = read_cards(path)
+    deck = flatten(cards)
     notes = _leave_out(deck, options)
     if not deck.steps:
-        raise FileFormatError(f"{path}: *STEP: missing, the deck loads nothing")
+        raise cards[-1].error("the deck ends here without a *STEP, it loads nothing")
     try:
         return _case(path, deck, settings, options, notes)
     except FileFormatError:
@@ -116,6 +123,10 @@ def _leave_out(deck: Deck, options: Options) -> list[str]:
     kept, notes = sorted_out([p.card for p in deck.model], options.allow)
     chosen = {id(card) for card in kept}
     deck.model = [p for p in deck.model if id(p.card) in chosen]
+    static = any(p.card.keyword == "STATIC" for step in deck.steps for p in step)
+    said = [left_out([p.card for p in s], options.allow, has_static=static) for s in deck.steps]
+    deck.steps = [step for step, note in zip(deck.steps, said, strict=True) if not note]
+    notes += [note for note in said if note]
     for k, step in enumerate(deck.steps):
         kept, more = sorted_out([p.card for p in step], options.allow)
         chosen = {id(card) for card in kept}
@@ -135,13 +146,23 @@ def _case(
     notes += _formulations(deck)
     found = Found()
     interactions = read_interactions([p.card for p in deck.model])
+    general = read_general(deck, region, interactions)
     stages = read_stages(deck, history, interactions)
     _joined(found, region, history, (joints, turned), stages)
     _name_nodes(region, history, stages)
-    pairs = read_contacts(deck, region, interactions, notes)
+    pairs = read_contacts(deck, region, interactions, notes, more=general is not None)
     check_removed(stages, pairs, deck)
     _name_faces(region, history)
     mesh, at = region.mesh(title)
+    sections = [s for s in sections if s.name in mesh.regions]  # others are given again
+    materials = {s.name: s.law(region.plane) for s in sections}
+    if general is not None:
+        mesh, more, said = found_pairs(
+            general, Body(mesh, materials), pairs, Reach(more=motion_of(history)),
+            part_titles(deck, at, piece_labels(mesh)),
+        )  # fmt: skip
+        pairs += more
+        notes += said
     mesh = adjusted(mesh, at, pairs, notes)
     _loads(found, region, history, at, notes)
     law = partial(law_of, options=options, notes=notes)
@@ -149,8 +170,12 @@ def _case(
         _supports(found, stage, region, history, at, notes)
         stage.contacts = stage.contacts_of(pairs, mesh, law)
     found.cards["contacts"] = [pair.card for pair in pairs]
-    materials = {s.name: s.law(region.plane) for s in sections}
-    make = partial(_model, [Body(mesh, materials)], found, title)
+    bodies = [Body(mesh, materials), *tool_bodies(joints, region)]
+    if len(bodies) > 1:
+        bodies[0] = replace(bodies[0], name=OWN)
+        found.constraints[:] = own_nodes(found.constraints)
+        found.springs[:] = own_nodes(found.springs)
+    make = partial(_model, bodies, found, title)
     later = tuple(Stage(s.begin, partial(_of_state, make, s)) for s in stages[1:])
     plan = Schedule(*times_of(history, options.increments, notes), stages=later)
     case = Case(make(stages[0], None), settings, title, path,

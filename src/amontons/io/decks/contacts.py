@@ -7,7 +7,7 @@ with its share of the facets next to it that face the master; all else is mortar
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -16,37 +16,19 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ...core.errors import InvalidInput
-from ...mechanics.contact import pair_contact
-from ...mechanics.contact.pairs import project
-from ...mechanics.meshes import Mesh
-from ...mechanics.meshes.facets import linear_parts
-from ...mechanics.meshes.surfaces import nodal_normals
 from ...mechanics.model import Contact
-from ...problem.law import ExponentialOverclosure, OverclosureCurve
 from .cards import Card, Row, number
 from .flat import Deck, Placed
 from .materials import Interaction
 from .meshing import Region
-from .scopes import Index, missing
+from .scopes import Analytic, Index, missing
+from .tools import Tool, obstacle_of
 
 Array = NDArray[np.float64]
 ASIDE = {"HCRIT", "NOTHICKNESS", "SMALLSLIDING", "EXTENSIONZONE", "GEOMETRICCORRECTION",
          "SUPPLEMENTARYCONSTRAINTS", "WEIGHT", "TRACKING", "CPSET", "SMOOTH"}  # fmt: skip
 ROUNDING = 1e-12  # of the coordinates: distances below are none
 NEAR = 0.025  # of the size of a facet: a slave node that is tied without a tolerance
-TABLE = 60  # points of the law with a tension far away
-
-
-@dataclass(frozen=True)
-class Options:
-    """How a deck is read: cards that may be left out; hard: laws of overclosure too.
-
-    increments: of each step, in the place of what the deck says.
-    """
-
-    allow: tuple[str, ...] = ()
-    hard: bool = False
-    increments: int | None = None
 
 
 @dataclass
@@ -68,43 +50,38 @@ class Pair:
     clearance: float | None = None
     within: float | None = None
     glued: Array | None = None
+    tool: Tool | None = None
+    follows: str | None = None
 
     def contact(self, law: dict[str, Any], far: float | None = None) -> Contact:
         """The contact of the model under a law; far: how far away one is that is removed."""
         if self.glued is not None:
             nodal = "mortar" if self.points is None else "nodal"
             return Contact(self.slave, master=self.master, tied=True, method=nodal,
-                           where=partial(_near, self.glued))  # fmt: skip
+                           where=partial(near, self.glued))  # fmt: skip
         gap = self.clearance if far is None else far
+        if self.tool is not None:
+            return Contact(self.slave, self.tool, follows=self.follows, method="mortar",
+                           clearance=gap, **law)  # fmt: skip
         if self.points is None:
             return Contact(self.slave, master=self.master, clearance=gap, **law)
-        where = partial(_near, self.points)
+        where = partial(near, self.points)
         return Contact(
             self.slave, master=self.master, clearance=gap, method="nodal", where=where, **law
         )
 
-    def glue(self, mesh: Mesh) -> None:
-        """Choose the nodes of a tie that are near enough; raises FileFormatError for none."""
-        rows, _, _ = pair_contact(mesh, self.slave, mesh, self.master)
-        near = np.abs(rows.gap) <= self.within
-        if not near.any():
-            raise self.card.error(
-                f"no node of {self.slave} is within {self.within:.3g} of {self.master}; give a "
-                "POSITION TOLERANCE"
-            )
-        self.glued = rows.points[near] if self.points is None else self.points
 
-
-def _near(points: Array, x: Array) -> NDArray[np.bool_]:
+def near(points: Array, x: Array) -> NDArray[np.bool_]:
     """Which of x (n, dim) are among points (k, dim)."""
     size = float(np.abs(points).max(initial=0.0)) or 1.0
     return np.asarray(cKDTree(points).query(x)[0] <= 1e-9 * size)
 
 
 def read_contacts(
-    deck: Deck, region: Region, interactions: dict[str, Interaction], notes: list[str]
-) -> list[Pair]:
-    """The pairs of a deck; raises FileFormatError with file and line."""
+    deck: Deck, region: Region, interactions: dict[str, Interaction], notes: list[str],
+    *, more: bool = False,
+) -> list[Pair]:  # fmt: skip
+    """The pairs of a deck; raises FileFormatError with file and line.  more: others follow."""
     for step in deck.steps:
         for placed in step:
             if placed.card.keyword in ("CONTACTPAIR", "SURFACEINTERACTION", "CLEARANCE"):
@@ -119,7 +96,7 @@ def read_contacts(
             pairs += _ties(placed, region)
         elif placed.card.keyword == "CLEARANCE":
             _clear(placed, pairs, region)
-    if not pairs:
+    if not (pairs or more):
         raise InvalidInput("*CONTACT PAIR: missing, a deck without contact")
     return pairs
 
@@ -146,15 +123,27 @@ def _pairs(
             raise row.error(
                 f"*CONTACT PAIR: expected slave, master, got {len(row.fields)} names"
             )
-        master = _surface(region, placed, names[1], row)
-        pair = Pair("", master, card, name, smooth)
-        pair.slave, pair.nodes = _slave(region, placed, names[0], master, row)
+        pair = Pair("", names[1].strip('"').upper(), card, name, smooth)
+        analytic = placed.scope.analytic(names[1])
+        if analytic is not None:
+            pair.tool, pair.follows = _tool(analytic, names[1], region.dim, row)
+            pair.slave, pair.nodal = ask_surface(region, placed, names[0], row), False
+        else:
+            pair.master = ask_surface(region, placed, names[1], row)
+            pair.slave, pair.nodes = _slave(region, placed, names[0], pair.master, row)
         pair.adjust = _adjust(placed)
         out.append(pair)
     if smooth and out:
         what = "node by node" if out[0].nodes is not None else "mortar"
         notes.append(f"{card} (line {card.number}): NODE TO SURFACE is taken as {what}")
     return out
+
+
+def _tool(surface: Analytic, name: str, dim: int, row: Row) -> tuple[Tool, str]:
+    """The obstacle of an analytic surface, and the body that it moves with."""
+    if not surface.body:
+        raise row.error(f"surface {name}: expected a *RIGID BODY, ANALYTICAL SURFACE={name}")
+    return obstacle_of(surface, dim), surface.body
 
 
 def _ties(placed: Placed, region: Region) -> list[Pair]:
@@ -168,7 +157,7 @@ def _ties(placed: Placed, region: Region) -> list[Pair]:
         names = [text for text in row.fields if text]
         if len(names) != 2:
             raise row.error(f"{card}: expected slave, master, got {len(names)} names")
-        master = _surface(region, placed, names[1], row)
+        master = ask_surface(region, placed, names[1], row)
         slave, nodes = _slave(region, placed, names[0], master, row)
         given = card.options.get("POSITIONTOLERANCE")
         within = (number(given, row, "POSITION TOLERANCE") if given
@@ -211,119 +200,13 @@ def _clear(placed: Placed, pairs: Sequence[Pair], region: Region) -> None:
         pair.clearance = value
 
 
-# ---------------------------------------------------------------------------------- laws
-def law_of(
-    interaction: Interaction, *, options: Options, notes: list[str], nodal: bool = False
-) -> dict[str, Any]:
-    """Numbers of a contact; raises FileFormatError for a law of overclosure that is not read.
-
-    nodal: LINEAR has a tension far away, which bends the line where contact begins.
-    With the option `hard` all are hard and stick rigidly.
-    """
-    numbers: dict[str, Any] = {"mu": interaction.friction, "cap": interaction.limit}
-    word, card = interaction.behaviour, interaction.behaviour_card or interaction.card
-    if word not in LAWS:
-        raise card.error(
-            f"{word}: this law of pressure over overclosure is not read, expected one of "
-            f"{', '.join(LAWS)}; --hard takes contact as hard and rigid"
-        )
-    if options.hard:
-        if word != "HARD" or interaction.slope is not None:
-            text = f"{card} (line {card.number}): contact is taken as hard and rigid, as asked"
-            notes += [text] if text not in notes else []
-        return numbers if word != "TIED" else {"tied": True}
-    numbers |= LAWS[word](interaction, card, nodal)
-    if interaction.slope is not None and (interaction.friction or word == "TIED"):
-        numbers["stick_stiffness"] = interaction.slope
-    if word == "TIED":
-        numbers = {"tied": True} | {k: v for k, v in numbers.items() if k in BONDS}
-    said = f"{card} (line {card.number}): {word}"
-    if word != "HARD":
-        said += f", {_told(numbers)}"
-        notes += [said] if said not in notes else []
-    return numbers
-
-
-BONDS = ("stiffness", "stick_stiffness")
-
-
-def _told(numbers: dict[str, Any]) -> str:
-    """What of a law lets surfaces overlap or slip elastically, in words."""
-    stiffness = numbers.get("stiffness")
-    if stiffness is None:
-        words = "rigid"
-    elif isinstance(stiffness, float):
-        words = f"{stiffness:g} of pressure over overclosure"
-    else:
-        words = "a curve of pressure over overclosure"
-    slope = numbers.get("stick_stiffness")
-    return words + ("" if slope is None else f", {slope:g} of shear over elastic slip")
-
-
-def _values(interaction: Interaction, card: Card, least: int) -> tuple[list[float], Row]:
-    """The numbers of the first line of a *SURFACE BEHAVIOR."""
-    for row in interaction.values:
-        if len(row.fields) < least:
-            raise row.error(f"{card}: expected {least} numbers, got {len(row.fields)}")
-        return [number(text, row, str(card)) for text in row.fields], row
-    raise card.error(f"expected a line with {least} numbers, got none")
-
-
-def _linear(interaction: Interaction, card: Card, nodal: bool) -> dict[str, Any]:
-    """K, and for nodes the tension sigma that CalculiX has far away: a smooth corner.
-
-    There p = K d (1/2 + atan(d / e) / pi) with e = pi sigma / K, of which p >= 0 is read.
-    """
-    values, _ = _values(interaction, card, 1)
-    if not values[0] > 0:
-        raise card.error("expected a stiffness > 0, pressure over overclosure")
-    tension = values[1] if len(values) > 1 else 0.0
-    if not nodal or not tension > 0:
-        return {"stiffness": values[0]}
-    x = np.concatenate([[0.0], np.geomspace(1e-2, 1e4, TABLE)])
-    width = np.pi * tension / values[0]
-    pressure = np.pi * tension * x * (0.5 + np.arctan(x) / np.pi)
-    return {"stiffness": OverclosureCurve(pressure, width * x)}
-
-
-def _exponential(interaction: Interaction, card: Card, nodal: bool) -> dict[str, Any]:
-    """c0, p0 as CalculiX has them: a hundredth of p0 at the gap c0."""
-    values, row = _values(interaction, card, 2)
-    if not (values[0] > 0 and values[1] > 0):
-        raise row.error(f"{card}: expected c0 > 0 and p0 > 0, got {values[:2]}")
-    return {"stiffness": ExponentialOverclosure(values[1], values[0])}
-
-
-def _tabular(interaction: Interaction, card: Card, nodal: bool) -> dict[str, Any]:
-    """Lines of pressure, overclosure."""
-    rows = []
-    for row in interaction.values:
-        if len(row.fields) != 2:
-            raise row.error(f"{card}: expected pressure, overclosure, got {row.fields}")
-        rows.append([number(text, row, str(card)) for text in row.fields])
-    table = np.array(rows).reshape(-1, 2)
-    try:
-        return {"stiffness": OverclosureCurve(table[:, 0], table[:, 1])}
-    except InvalidInput as reason:
-        raise card.error(str(reason)) from None
-
-
-def _tied(interaction: Interaction, card: Card, nodal: bool) -> dict[str, Any]:
-    values, _ = _values(interaction, card, 1)
-    if not values[0] > 0:
-        raise card.error("expected a stiffness > 0, stress over the distance")
-    return {"stiffness": values[0]}
-
-
-LAWS = {"HARD": lambda *_: {}, "LINEAR": _linear, "EXPONENTIAL": _exponential,
-        "TABULAR": _tabular, "TIED": _tied}  # fmt: skip
-
-
 # ------------------------------------------------------------------------------- surfaces
-def _surface(region: Region, placed: Placed, text: str, row: Row) -> str:
+def ask_surface(region: Region, placed: Placed, text: str, row: Row) -> str:
     """Ask the mesh for a surface; returns its name there."""
     faces, nodes = placed.scope.surface(text, row)
     name = text.strip('"').upper()
+    if not sum(len(elements) for elements, _ in faces) and (nodes is None or not len(nodes)):
+        raise row.error(f"{placed.card}: surface {text}: is empty, expected element faces")
     if name not in region.facets:
         if nodes is None:
             region.add_faces(name, faces, row)
@@ -339,55 +222,6 @@ def _slave(
     _, nodes = placed.scope.surface(text, row)
     name = text.strip('"').upper()
     if nodes is None or name in region.facets or region.covers(nodes):
-        return _surface(region, placed, text, row), None
+        return ask_surface(region, placed, text, row), None
     region.add_around(name, nodes, region.facets[master], row)
     return name, nodes
-
-
-# ----------------------------------------------------------------------------- adjusting
-def adjusted(mesh: Mesh, at: Index, pairs: Sequence[Pair], notes: list[str]) -> Mesh:
-    """The mesh with slave nodes put onto their master where a pair asks for it.
-
-    at: number in the mesh of each node of the deck.  Also tells pairs of nodes where these are.
-    """
-    points = np.array(mesh.points)
-    for pair in pairs:
-        if pair.adjust is None:
-            continue
-        moved = replace(mesh, points=points)
-        nodes, gap, normals = _distances(moved, pair)
-        if isinstance(pair.adjust, float):
-            chosen = gap <= pair.adjust
-        else:
-            chosen = np.isin(nodes, at[pair.adjust])
-        chosen &= gap != 0.0
-        way = gap[chosen]
-        points[nodes[chosen]] -= way[:, None] * normals[chosen]
-        if len(way):
-            notes.append(
-                f"{pair.card} (line {pair.card.number}): {len(way)} slave nodes are put onto "
-                f"the master, at most {np.abs(way).max():.3g} away"
-            )
-    if not np.array_equal(points, mesh.points):
-        mesh = replace(mesh, points=points)
-    for pair in pairs:
-        if pair.nodes is not None:
-            pair.points = mesh.points[at[pair.nodes]]
-        if pair.within is not None:
-            pair.glue(mesh)
-    return mesh
-
-
-def _distances(mesh: Mesh, pair: Pair) -> tuple[Index, Array, Array]:
-    """Slave nodes (k,) with a master in front of them, distances (k,) and normals (k, d)."""
-    if mesh.order == 1:
-        rows, _, _ = pair_contact(mesh, pair.slave, mesh, pair.master)
-        return rows.nodes, rows.gap, rows.frames[:, 0]
-    slave, master = (linear_parts(mesh.surface(name)) for name in (pair.slave, pair.master))
-    nodes = np.unique(np.concatenate([block.nodes.ravel() for block in slave]))
-    normals, x = nodal_normals(mesh.points, slave)[nodes], mesh.points[nodes]
-    hit = project(x, mesh.points, master, facing=normals, search=np.inf, own=nodes)
-    at = np.flatnonzero(hit.found)
-    gap = np.einsum("kc,kc->k", x[at] - hit.closest[at], hit.normal[at])
-    gap[np.abs(gap) < ROUNDING * np.abs(mesh.points).max()] = 0.0
-    return nodes[at], gap, hit.normal[at]

@@ -7,16 +7,17 @@ cards of materials, interactions and steps are kept in their order.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .cards import Card, Row, digest_of, number, whole
+from ...core.errors import FileFormatError
+from .cards import LARGEST, Card, Row, digest_of, is_whole, number, whole
 from .placement import motion
-from .scopes import Index, Names, Scope, missing
-from .shapes import SHAPES
+from .scopes import Analytic, Index, Names, Scope, missing
+from .shapes import SHAPES, Shape, unread
 
 Array = NDArray[np.float64]
 SPRINGS = {"SPRINGA": 2, "SPRING1": 1, "SPRING2": 2}  # spring elements, and their nodes
@@ -62,6 +63,7 @@ class Deck:
     springs: dict[str, list[tuple[str, Index]]] = field(default_factory=dict)
     doubled: dict[int, int] = field(default_factory=dict)
     digest: str = ""  # of all that is not in the mesh
+    shapes: Mapping[str, Shape] = field(default_factory=lambda: SHAPES)
     _points: list[Array] = field(default_factory=list)
     _count: int = 0
     _elements: int = 0
@@ -74,10 +76,17 @@ class Deck:
                 return f"{names.title}.{label}" if names.title else str(label)
         return str(node)
 
+    def element_labels(self) -> Index:
+        """Numbers of all elements in the deck, those of their part in an instance."""
+        labels = np.zeros(sum(len(block.nodes) for block in self.blocks), dtype=np.int64)
+        for names in {id(n): n for n, _ in self.point_labels}.values():
+            labels[names.element_at] = names.element_labels
+        return labels
 
-def flatten(cards: Sequence[Card]) -> Deck:
+
+def flatten(cards: Sequence[Card], shapes: Mapping[str, Shape] = SHAPES) -> Deck:
     """The deck that cards make; raises FileFormatError with file and line."""
-    deck = Deck(digest=digest_of(cards))
+    deck = Deck(digest=digest_of(cards), shapes=shapes)
     parts: dict[str, list[Card]] = {}
     k = 0
     while k < len(cards):
@@ -147,6 +156,8 @@ def _assemble(deck: Deck, cards: Sequence[Card], parts: dict[str, list[Card]]) -
             _take(deck, each, scope)
         move = motion(card)
         deck._points[before:] = [move(points) for points in deck._points[before:]]
+        for surface in deck.instances[name].analytic.values():
+            surface.move = move
 
 
 # --------------------------------------------------------------------------------- cards
@@ -180,7 +191,7 @@ def _nodes(deck: Deck, card: Card, scope: Scope) -> None:
 
 def _regular(labels: Array) -> bool:
     """True for whole numbers > 0, as far as 64 bits hold them."""
-    return bool(((labels == np.floor(labels)) & (labels > 0) & (labels < 2**53)).all())
+    return bool(((labels == np.floor(labels)) & (labels > 0) & (labels < LARGEST)).all())
 
 
 def _node(row: Row) -> list[float]:
@@ -205,7 +216,7 @@ def _no_doubles(labels: Index, before: Index, card: Card, what: str) -> None:
     label = int(twice[0] if len(twice) else again[0])
     seen = 0 if len(twice) else 1
     for row in card.rows():
-        if row.fields[0].isdigit() and int(row.fields[0]) == label:
+        if is_whole(row.fields[0]) and int(row.fields[0]) == label:
             seen += 1
             if seen > 1:
                 raise row.error(f"{what} {label}: the number is given twice")
@@ -217,17 +228,19 @@ def _elements(deck: Deck, card: Card, scope: Scope) -> None:
     if kind in SPRINGS:
         _springs(deck, card, scope, kind)
         return
-    if kind not in SHAPES:
-        raise card.error(f"TYPE={kind}: {missing('element type', kind, SHAPES)}")
-    width = 1 + SHAPES[kind].nodes
+    if kind not in deck.shapes:
+        raise card.error(f"TYPE={kind}: {unread(kind, deck.shapes)}")
+    width = 1 + deck.shapes[kind].nodes
     table = card.table(width, np.int64)
-    if table is None or (table.size and table.min() <= 0):
+    if table is None or (table.size and not 0 < table.min() <= table.max() < LARGEST):
         table = _element_rows(card, width).astype(np.int64)
+    if not len(table):
+        return
     labels, nodes = table[:, 0], table[:, 1:]
     known = scope.own.nodes(nodes.ravel()).reshape(nodes.shape)
     if (known < 0).any():
         k, n = np.argwhere(known < 0)[0]
-        _at_element(card, int(labels[k]), f"node {nodes[k, n]} is not there")
+        raise at_element(card, int(labels[k]), f"node {nodes[k, n]} is not there")
     at = deck._elements + np.arange(len(labels))
     _no_doubles(labels, scope.own.elements(labels), card, "element")
     deck.blocks.append(Block(kind, deck._elements, known, card))
@@ -245,11 +258,12 @@ def _springs(deck: Deck, card: Card, scope: Scope, kind: str) -> None:
     deck.springs.setdefault(card.name("ELSET"), []).append((kind, known))
 
 
-def _at_element(card: Card, label: int, text: str) -> None:
+def at_element(card: Card, label: int, text: str) -> FileFormatError:
+    """What is wrong with an element, with its line."""
     for row in card.rows():
-        if row.fields[0].isdigit() and int(row.fields[0]) == label:
-            raise row.error(f"element {label}: {text}")
-    raise card.error(f"element {label}: {text}")
+        if is_whole(row.fields[0]) and int(row.fields[0]) == label:
+            return row.error(f"element {label}: {text}")
+    return card.error(f"element {label}: {text}")
 
 
 def _element_rows(card: Card, width: int) -> Array:
@@ -263,7 +277,8 @@ def _element_rows(card: Card, width: int) -> Array:
         current += [whole(text, row, "element") for text in row.fields if text]
         if len(current) > width:
             raise row.error(
-                f"element {current[0]}: expected {width - 1} nodes, got {len(current) - 1}"
+                f"element {current[0]}: {card.label('TYPE')}: expected {width - 1} nodes, got "
+                f"{len(current) - 1}"
             )
         if len(current) == width:
             found.append(current)
@@ -355,14 +370,19 @@ def _surface(deck: Deck, card: Card, scope: Scope) -> None:
     name = card.name("NAME")
     kind = card.label("TYPE") or "ELEMENT"
     own = scope.own
-    if name in own.faces or name in own.node_surfaces:
+    if name in own.faces or name in own.node_surfaces or name in own.analytic:
         raise card.error(f"NAME: surface {name} is there already")
     if kind == "NODE":
         found = [scope.nodes(row.fields[0], row) for row in card.rows()]
         own.node_surfaces[name] = _unique(np.concatenate(found)) if found else np.zeros(0, int)
         return
+    if kind in ("SEGMENTS", "CYLINDER", "REVOLUTION"):
+        own.analytic[name] = Analytic(card)
+        return
     if kind != "ELEMENT":
-        raise card.error(f"TYPE={kind}: expected ELEMENT or NODE")
+        raise card.error(
+            f"TYPE={kind}: expected ELEMENT, NODE, SEGMENTS, CYLINDER or REVOLUTION"
+        )
     own.faces[name] = [
         (scope.elements(row.fields[0], row),
          (row.fields[1] if len(row.fields) > 1 else "").upper())

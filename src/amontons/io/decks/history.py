@@ -17,7 +17,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from .cards import Card, Row, number, whole
+from .cards import Card, Row, is_whole, number, whole
 from .course import Course
 from .flat import Deck, Placed
 from .heat import Heat
@@ -348,7 +348,7 @@ def _distributed(history: History, each: Placed, span: Span, known: Amplitudes) 
             continue
         if card.keyword == "DSLOAD" and label != "P":
             raise row.error(f"*DSLOAD {label}: is not read, expected P, a pressure")
-        if card.keyword == "DLOAD" and not (label[:1] == "P" and label[1:].isdigit()):
+        if card.keyword == "DLOAD" and not (label[:1] == "P" and is_whole(label[1:])):
             raise row.error(f"*DLOAD {label}: is not read, expected P1, P2, ... or GRAV")
         key = (name, label if card.keyword == "DLOAD" else "")
         before = history.faces.get(key)

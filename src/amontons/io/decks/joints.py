@@ -59,6 +59,7 @@ class Joints:
     springs: list[tuple[list[Raw], float, Card]] = field(default_factory=list)
     sets: dict[str, Index] = field(default_factory=dict)
     faces: list[tuple[str, Placed]] = field(default_factory=list)
+    tools: list[tuple[str, int]] = field(default_factory=list)  # bodies, and their nodes
 
     @classmethod
     def of(cls, deck: Deck) -> Joints:
@@ -162,6 +163,9 @@ class Joints:
         if card.label("ROTNODE"):
             turn = placed.scope.nodes(card.name("ROTNODE"), row)
             self.turns[int(turn[0])] = lead
+        if card.label("ANALYTICALSURFACE"):
+            self._tool(placed, lead, row)
+            return
         if card.label("NSET"):
             nodes = placed.scope.nodes(card.name("NSET"), row)
         else:
@@ -171,6 +175,20 @@ class Joints:
         name = f"rigid body {len(self.couplings) + 1}"
         self.sets[name] = nodes[~np.isin(nodes, own)]
         self.couplings.append((name, lead, "kinematic", None, card))
+
+    def _tool(self, placed: Placed, lead: int, row: Row) -> None:
+        """A rigid body that is an analytic surface alone."""
+        name = placed.card.name("ANALYTICALSURFACE")
+        for option in ("NSET", "ELSET"):
+            if option in placed.card.options:
+                raise placed.card.error(f"{option}: expected ANALYTICAL SURFACE alone")
+        surface = placed.scope.analytic(name)
+        if surface is None:
+            known = placed.scope.own.analytic
+            raise row.error(missing("analytic surface", name, known))
+        surface.body = f"tool {len(self.tools) + 1}"
+        self.tools.append((surface.body, lead))
+        self.couplings.append((surface.body, lead, "kinematic", None, placed.card))
 
     def _lead(self, placed: Placed, option: str, row: Row) -> int:
         nodes = placed.scope.nodes(placed.card.name(option), row)

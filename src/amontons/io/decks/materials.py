@@ -98,7 +98,9 @@ def read_sections(deck: Deck, placed: Sequence[Placed]) -> list[Section]:
                              materials[name], thickness, card,
                              axes_of(card, turned)))  # fmt: skip
     if not found:
-        raise InvalidInput("*SOLID SECTION: missing, expected one that gives a material")
+        if deck.blocks:
+            raise deck.blocks[0].card.error("no *SOLID SECTION gives a material to elements")
+        raise InvalidInput("*ELEMENT: missing, the deck has no solid elements")
     return found
 
 

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ...core.errors import InvalidInput
+from ...core.errors import AmontonsError, InvalidInput
 from ...mechanics.meshes import Cells, Facets, Mesh
 from ...mechanics.meshes.cells import CELLS, FACET_KIND
+from ...mechanics.meshes.check import checked_cells
 from ...mechanics.meshes.surfaces import facet_normals
 from .cards import Card, Row
-from .flat import Deck
+from .flat import Deck, at_element
 from .materials import Section
 from .scopes import Faces, Index
 from .shapes import SHAPES, side_of
@@ -210,9 +211,37 @@ class Region:
             for name, facets in self.facets.items()
         }
         sets = {name: at[nodes][at[nodes] >= 0] for name, nodes in self.node_sets.items()}
-        mesh = Mesh(points, tuple(cells), surfaces, name=title, node_sets=sets,
-                    axisymmetric=self.plane == "axisymmetric")  # fmt: skip
+        try:
+            mesh = Mesh(points, tuple(cells), surfaces, name=title, node_sets=sets,
+                        axisymmetric=self.plane == "axisymmetric")  # fmt: skip
+        except InvalidInput as reason:
+            raise self._blamed(points, at, reason) from reason
         return mesh, at
+
+    def _blamed(self, points: Array, at: Index, reason: InvalidInput) -> AmontonsError:
+        """The reason with the line of the first element that is no valid cell by itself."""
+        labels = self.deck.element_labels()
+        for block in self.deck.blocks:
+            kind, nodes = SHAPES[block.kind].cell, at[block.nodes]
+            first, last = 0, len(nodes)
+            if _is_valid(points, kind, nodes):
+                continue
+            while last - first > 1:
+                middle = (first + last) // 2
+                if _is_valid(points, kind, nodes[first:middle]):
+                    first = middle
+                else:
+                    last = middle
+            return at_element(block.card, int(labels[block.first + first]), str(reason))
+        return reason
+
+
+def _is_valid(points: Array, kind: str, nodes: Index) -> bool:
+    try:
+        checked_cells(points, kind, nodes, "")
+    except InvalidInput:
+        return False
+    return True
 
 
 def _centres(points: Array, facets: Facets, dim: int) -> tuple[Array, Array]:

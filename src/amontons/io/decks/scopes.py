@@ -7,18 +7,27 @@ written, or else of the assembly.  A deck without parts has one place for all.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.words import near
-from .cards import Row
+from .cards import Card, Row, is_whole
 
 Index = NDArray[np.int64]
 DENSE = 4  # numbers up to the largest, for each that is there, at which a table pays
 Faces = list[tuple[Index, str]]  # elements, and the side of each: S1, SPOS, ... or "" for all
+
+
+@dataclass
+class Analytic:
+    """A surface given by a profile; how its instance stands, and the body that moves it."""
+
+    card: Card
+    move: Callable[[NDArray[np.float64]], NDArray[np.float64]] = lambda points: points
+    body: str = ""
 
 
 @dataclass
@@ -38,6 +47,7 @@ class Names:
     element_sets: dict[str, Index] = field(default_factory=dict)
     faces: dict[str, Faces] = field(default_factory=dict)  # surfaces of element faces
     node_surfaces: dict[str, Index] = field(default_factory=dict)
+    analytic: dict[str, Analytic] = field(default_factory=dict)
 
     def add_nodes(self, labels: Index, at: Index) -> None:
         """Number nodes."""
@@ -77,7 +87,7 @@ class Scope:
     def _named(self, text: str, row: Row, what: str) -> Index:
         names, rest = self._place(text)
         known = names.node_sets if what == "node" else names.element_sets
-        if rest.isdigit() and rest not in known:
+        if is_whole(rest) and rest not in known:
             numbers = np.array([int(rest)])
             at = names.nodes(numbers) if what == "node" else names.elements(numbers)
             if at[0] < 0:
@@ -99,6 +109,14 @@ class Scope:
                 return [], place.node_surfaces[rest]
         known = [*self._known("faces"), *self._known("node_surfaces")]
         raise row.error(missing("surface", text, known))
+
+    def analytic(self, text: str) -> Analytic | None:
+        """The analytic surface of a name, None where it is none."""
+        names, rest = self._place(text)
+        for place in (names, self.above):
+            if place is not None and rest in place.analytic:
+                return place.analytic[rest]
+        return None
 
     def _place(self, text: str) -> tuple[Names, str]:
         """The place that a name names, and the name there."""

@@ -7,7 +7,11 @@ energy: there it is full, and `note` says so.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+
+from ...core.words import near
+from .cards import is_whole
 
 FULL = "full integration"
 
@@ -83,8 +87,27 @@ SHAPES = {
 } | _planes()  # fmt: skip
 
 
+FAMILIES = {  # elements that are not read, by how their names begin
+    "DC": "of heat", "AC": "of sound", "F3D": "of flow", "D": "of a network of flow",
+    "S": "shells", "M3D": "membranes", "B": "beams", "T2D": "bars", "T3D": "bars",
+    "GAP": "of contact between two nodes", "DASHPOT": "dampers", "MASS": "masses",
+    "CONN": "connectors", "R2D": "rigid surfaces", "R3D": "rigid surfaces", "U": "of users",
+    "DCOUP": "couplings", "SFM": "surfaces", "COH": "of glue", "CGAX": "solids that twist",
+}  # fmt: skip
+
+
+def unread(kind: str, known: Iterable[str]) -> str:
+    """What to say of a type that is not read."""
+    names = sorted(known)
+    starts = sorted((f for f in FAMILIES if kind.startswith(f)), key=len)
+    what = f", {FAMILIES[starts[-1]]}," if starts else ""
+    meant = "" if starts else near(kind, names)
+    hint = f"; did you mean {meant}?" if meant else ""
+    return f"elements of this type{what} are not read, expected {', '.join(names)}{hint}"
+
+
 def side_of(label: str) -> int | None:
     """The number of a side from 0 of "S3", also "P3" of a pressure; None for another word."""
-    if label[:1] in ("S", "P") and label[1:].isdigit():
+    if label[:1] in ("S", "P") and is_whole(label[1:]):
         return int(label[1:]) - 1
     return None

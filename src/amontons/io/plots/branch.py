@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+OF_ANY = "#999999"  # marks in the legend of branches of several colours
 MARKS = {"FOLD": ("o", "fold"), "BRANCH": ("D", "branch point")}  # of kinds of events
 # names of `Stop` at which a branch is cut off, and may go on
 UNFINISHED = ("SINGULAR", "STEP_TOO_SMALL", "LOST", "MAX_POINTS", "TIME_LIMIT", "STOPPED")
@@ -76,9 +77,10 @@ def _unfinished(branches: list[Branch]) -> str:
 def _marks(branches: list[Branch]) -> list[Line2D]:
     """What the marks and dashes mean that there are."""
     kinds = {event.kind.name for branch in branches for event in branch.events}
+    fill = LINES[0] if len(branches) == 1 else OF_ANY
     marks = [
-        Line2D([], [], linestyle="", marker=marker, markersize=5, color="white",
-               markeredgecolor=INK, label=name)
+        Line2D([], [], linestyle="", marker=marker, markersize=5, color=fill,
+               markeredgecolor=INK, markeredgewidth=0.6, label=name)
         for kind, (marker, name) in MARKS.items() if kind in kinds
     ]  # fmt: skip
     if any((branch.orientation < 0).any() for branch in branches):

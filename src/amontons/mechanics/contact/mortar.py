@@ -35,12 +35,12 @@ from scipy import sparse
 from ...core.errors import within
 from ..elements.cell_matrices import around
 from ..meshes.cells import CELLS, FIRST
-from ..meshes.facets import Facets, corner_facets
+from ..meshes.facets import Facets, corner_facets, turned
 from ..meshes.mesh import Mesh
 from ..meshes.surfaces import nodal_normals, nodal_weights, outward
 from .clipping import line_rule, square_rule, triangle_rule
-from .curvature import heights
 from .cuts import SIDES
+from .distances import raised
 from .dual import dual_functions, nodes_with_multiplier
 from .geometry import Obstacle, frames
 from .held_averages import (
@@ -55,6 +55,7 @@ from .nodal import ContactRows, Field, check_exterior, contact_nodes
 from .overlap import check_different, not_facing
 from .pairs import KINDS, MAX_NODES
 from .segments import Segments, Surface, in_front
+from .turned import Turned, turns
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -87,7 +88,9 @@ def mortar_obstacle(
     average = _Average.of(slave, np.arange(len(slave.nodes)), mass, own, without)
     nodes = average.nodes
     gap = average.of_moments(np.arange(len(moment)), moment[:, :, None])[:, 0]
-    rows = average.rows(frames(normals[nodes]), gap, None)
+    axes = frames(normals[nodes])
+    H = coupled_columns(average.onto_slave, axes, np.zeros(axes.shape[:2], dtype=bool))
+    rows = average.rows(axes, gap, H)
     return rows, np.isin(mortar_nodes(mesh, surface), nodes)
 
 
@@ -100,13 +103,15 @@ def mortar_contact(
     held: Mask | None = None,
     lasting: Array | None = None,
     master_lasting: Array | None = None,
+    tied: bool = False,
 ) -> tuple[ContactRows, sparse.csc_array, Mask]:
     """Contacts of a slave with a master surface: rows, their part on the master, and found.
 
     As `pair_contact`: rows.H in the dofs of the slave mesh, the second matrix (n_master, nc d)
     in those of the master; found, (slave nodes,): nodes with a multiplier.  held (n, dim):
     components of the slave that supports prescribe; lasting, master_lasting (n, dim): values
-    that they prescribe at all times, NaN elsewhere.
+    that they prescribe at all times, NaN elsewhere.  tied: sides that look the same way are
+    met too, where none face each other.
     Raises InvalidInput when the bodies do not face each other, for a surface in contact with
     itself, and for facets without area.  Cost linear in the facets.
     """
@@ -115,6 +120,12 @@ def mortar_contact(
     check_different(slave, surface, master, master_surface)
     over, under = Surface.on(slave, surface), Surface.on(master, master_surface)
     parts = in_front(over, under, master, joined=slave is master)
+    if tied and not len(parts.slave):
+        behind = turned(master.surface(master_surface))
+        under = Surface.of(
+            master.points, behind, master_surface, axisymmetric=master.axisymmetric
+        )
+        parts = in_front(over, under, master, joined=slave is master)
     if not len(parts.slave):
         raise not_facing(slave, surface, master, master_surface)
     facets, of = np.unique(parts.slave, return_inverse=True)
@@ -132,16 +143,18 @@ def mortar_contact(
         (master.points, lasting_values(master_lasting, master)), at_end(over),
     )  # fmt: skip
     axes = frames(within_free(normals[average.nodes], fixed))
-    apart = average.onto_slave @ slave.points - across @ master.points
-    apart += average.of_moments(of, parts.bulge)
+    apart = average.of_moments(of, -parts.apart[:, :, None] * over.normal[parts.slave, None])
     gap = np.einsum("pc,pc->p", axes[:, 0], apart)
+    on_slave = coupled_columns(average.onto_slave, axes, fixed)
+    on_master = coupled_columns(across, axes, fixed)
+    if over.is_second and turns(over):
+        on_slave, on_master, gap = Turned(over, under, average, axes).sums(parts, fixed)
     if over.is_second:
         gap = _without_overshoot(gap, over, parts, average.nodes)
     size = max(np.abs(mesh.points).max(initial=0.0) for mesh in (slave, master))
     gap[np.abs(gap) < ROUNDING * size] = 0.0
-    rows = average.rows(axes, gap, fixed)
     found = np.isin(mortar_nodes(slave, surface), average.nodes)
-    return rows, -coupled_columns(across, axes, fixed), found
+    return average.rows(axes, gap, on_slave), -on_master, found
 
 
 def mortar_nodes(mesh: Mesh, surface: str) -> Index:
@@ -216,7 +229,7 @@ class _Average:
         at_nodes[used] = field(self.points[used])
         moments = np.einsum("fab,fb->fa", self.mass, at_nodes[self.facet_nodes])
         exact = np.zeros((len(self.surface.nodes), MAX_NODES))
-        for of, phi, _, area, x in _gauss_points(self.surface):
+        for of, _, phi, _, area, x in _gauss_points(self.surface):
             exact[of, : len(phi)] += (area * field(x))[:, None] * phi
         covered = self.mass.sum(axis=(1, 2))
         whole = covered > (1 - COVERED) * self.surface.area[self.facets]
@@ -238,10 +251,8 @@ class _Average:
         sums = [_scatter(n, where, values[:, :, c]) for c in range(values.shape[2])]
         return np.stack(sums, axis=1)[self.nodes] / self.weights[:, None]
 
-    def rows(self, axes: Array, gap: Array, fixed: Mask | None) -> ContactRows:
-        """Contacts with given frames and gaps, in the dofs of the slave."""
-        fixed = np.zeros(axes.shape[:2], dtype=bool) if fixed is None else fixed
-        H = coupled_columns(self.onto_slave, axes, fixed)
+    def rows(self, axes: Array, gap: Array, H: sparse.csc_array) -> ContactRows:
+        """Contacts with given frames, gaps and H in the dofs of the slave."""
         return ContactRows(
             self.nodes, self.points[self.nodes], self.weights, gap, axes, H, self.of_function
         )
@@ -279,12 +290,22 @@ def _normals(slave: Surface, facets: Index) -> Array:
     np.add.at(first, slave.nodes[facets], share * slave.real[facets, :, None])
     length = np.linalg.norm(first, axis=1)
     along = np.einsum("fac,fc->fa", first[slave.nodes], slave.normal)
-    turned = ((along < AROUND * length[slave.nodes]) & slave.real).any(axis=1) & ~facing
+    around = ((along < AROUND * length[slave.nodes]) & slave.real).any(axis=1) & ~facing
     if slave.curved:
-        return _curved_normals(slave, ~turned)
-    blocks = np.split(turned, np.cumsum([len(b.nodes) for b in slave.blocks])[:-1])
+        return _of_shapes(slave, _curved_normals(slave, ~around), around)
+    blocks = np.split(around, np.cumsum([len(b.nodes) for b in slave.blocks])[:-1])
     kept = [Facets(b.kind, b.nodes[~out]) for b, out in zip(slave.blocks, blocks, strict=True)]
-    return nodal_normals(slave.points, tuple(kept))
+    return _of_shapes(slave, nodal_normals(slave.points, tuple(kept)), around)
+
+
+def _of_shapes(slave: Surface, normals: Array, turned: Mask) -> Array:
+    """Normals (n, dim); those of a sphere, cone or cylinder where nothing else is around."""
+    of = slave.shapes.of
+    for number, shape in enumerate(slave.shapes.every):
+        on = np.unique(slave.nodes[(of == number) & ~turned])
+        mine = on[~np.isin(on, slave.nodes[(of != number) & ~turned])]
+        normals[mine] = shape.distance(slave.points[mine])[1]
+    return normals
 
 
 def _curved_normals(slave: Surface, counts: Mask) -> Array:
@@ -310,20 +331,18 @@ def _against(slave: Surface, obstacle: Obstacle) -> tuple[Array, Array | None, A
     mass = np.zeros((len(slave.nodes), MAX_NODES, MAX_NODES))
     own = np.zeros((len(slave.nodes), MAX_NODES, slave.all.shape[1]))
     moment = np.zeros((len(slave.nodes), MAX_NODES))
-    for of, phi, whole, area, x in _gauss_points(slave):
-        n, corners = len(phi), slave.points[slave.nodes[of, : len(phi)]]
+    for of, at, phi, whole, area, _ in _gauss_points(slave):
+        n = len(phi)
         mass[of, :n, :n] += area[:, None, None] * np.outer(phi, phi)
         own[of, :n, : len(whole)] += area[:, None, None] * np.outer(phi, whole)
-        height = heights(
-            np.broadcast_to(phi, (len(of), 1, n)), slave.slopes[of, :n], corners
-        )
-        gap = obstacle.gap(x + height * slave.normal[of])
+        on_surface, _ = raised(slave, of, np.broadcast_to(at, (len(of), 1, len(at))))
+        gap = obstacle.gap(on_surface[:, 0])
         moment[of, :n] += (area * gap)[:, None] * phi
     return mass, own if slave.is_second else None, moment
 
 
-def _gauss_points(side: Surface) -> Iterator[tuple[Index, Array, Array, Array, Array]]:
-    """Point after point: facets (k,), functions, weights (k,) and places (k, d).
+def _gauss_points(side: Surface) -> Iterator[tuple[Index, Array, Array, Array, Array, Array]]:
+    """Point after point: facets (k,), reference point, functions, weights (k,), places (k, d).
 
     Functions of the corners (a,), and of displacements (w,).
     """
@@ -336,7 +355,7 @@ def _gauss_points(side: Surface) -> Iterator[tuple[Index, Array, Array, Array, A
             area = weight * np.sqrt(np.linalg.det(np.swapaxes(jac, 1, 2) @ jac))
             where = shape @ x
             area = area * around(where, axisymmetric=side.axisymmetric)
-            yield of, first.shape(at), shape, area, where
+            yield of, at, first.shape(at), shape, area, where
 
 
 def _without_overshoot(

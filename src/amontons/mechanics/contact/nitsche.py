@@ -45,12 +45,12 @@ from ..elements.traces import (
     surface_points,
 )
 from ..meshes.mesh import Mesh
-from .cuts import functions, points_on
+from .cuts import points_on
+from .distances import distances_at
 from .geometry import Obstacle, frames
 from .nodal import ContactRows, check_exterior
 from .overlap import check_different, not_facing
-from .pairs import KINDS, MAX_NODES
-from .segments import Surface, bulge, in_front
+from .segments import Surface, in_front
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -148,7 +148,7 @@ def nitsche_pair(  # noqa: PLR0913
 
     Rows and terms in the dofs of the slave, and the part of H in those of the master.  A point
     meets the one opposite, along the normal of its facet; the gap is that of the curved
-    surfaces for which the facets stand, see `curvature`.
+    surfaces for which the facets stand, see `distances`.
     """
     check_exterior(slave, surface)
     check_exterior(master, master_surface, "master")
@@ -163,22 +163,11 @@ def nitsche_pair(  # noqa: PLR0913
     at = surface_points(slave, surface, material, where)
     nodes, shape = facet_traces(master, master_surface, facet, opposite)
     axes = frames(-(at.normals if over.curved else over.normal[where.facet]))
-    apart = at.points - np.einsum("qa,qac->qc", shape, master.points[nodes])
-    apart += bulge(over, where.facet, _on_corners(over, where.facet, where.at))
-    apart -= bulge(under, facet, _on_corners(under, facet, opposite))
-    gap = np.einsum("qc,qc->q", axes[:, 0], apart)
+    far = distances_at(over, under, (where.facet, where.at), (facet, opposite))
+    gap = -far * np.einsum("qc,qc->q", axes[:, 0], over.normal[where.facet])
     rows, terms = _rows(at, gap, axes, slave.points.size, options)
     values = np.einsum("qa,qkc->qack", shape, -axes)
     return rows, terms, node_columns(nodes, values, master.points.size)
-
-
-def _on_corners(side: Surface, facet: Index, at: Array) -> Array:
-    """Shape functions of first order (q, 4) at points of facets, padded with zeros."""
-    out = np.zeros((len(facet), MAX_NODES))
-    for n in np.unique(side.corners[facet]):
-        mine = side.corners[facet] == n
-        out[mine, :n] = functions(KINDS[n - 2], at[mine, None])[:, 0]
-    return out
 
 
 def _rows(

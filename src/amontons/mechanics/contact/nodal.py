@@ -52,10 +52,10 @@ class ContactRows:
 
         Averages may act on several nodes: their sum, so that all forces balance the loads.
         """
-        return np.einsum("pkc,pk->pc", self._sums, r)
+        return np.einsum("pkc,pk->pc", self.sums, r)
 
     @cached_property
-    def _sums(self) -> Array:
+    def sums(self) -> Array:
         """Sums of the columns of H over all nodes, (nc, d, d): axes times total weights."""
         nc, d = len(self.nodes), self.points.shape[1]
         rows = self.H.tocsr()

@@ -106,8 +106,8 @@ def meeting(
     facets = master.surface(master_surface)
     if other := {block.kind for block in facets} - set(KINDS):
         raise InvalidInput(
-            f"expected facets of first order, got {other.pop()!r}; take order = 1 and finer "
-            'cells, or method="nitsche"', ("master",), f"master {master_surface!r}",
+            f"expected facets of first order for nodal contact, got {other.pop()!r}; take "
+            'method="mortar" or "nitsche"', ("master",), f"master {master_surface!r}",
         )  # fmt: skip
     points = slave.points[nodes]
     normals = nodal_normals(slave.points, slave.surface(surface))[nodes]

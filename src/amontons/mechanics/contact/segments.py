@@ -14,15 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InvalidInput
-from ..meshes.cells import CELLS, FIRST
+from ..meshes.cells import CELLS
 from ..meshes.check import is_straight
 from ..meshes.facets import Facets, corner_facets
 from ..meshes.mesh import Mesh
 from ..meshes.surfaces import facet_areas, facet_normals, nodal_normals
 from .curvature import heights, slopes
 from .cuts import SIDES, Cuts, cuts, functions
+from .distances import distances
 from .overlap import inside
 from .pairs import AROUND, BESIDE, DEEP, EDGEWISE, KINDS, MAX_NODES
+from .primitives import Shapes, shapes_of
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
@@ -46,7 +48,7 @@ class Surface:
     Of second order these are the facets between corners, and all (f, w) their nodes with those
     in between, else the corners again; kind (f,): place in SIDES.  curved: nodes in between
     lie elsewhere than in the middle, they tell the surface, and slopes are zero.  axisymmetric:
-    areas go around the axis.
+    areas go around the axis.  shapes: spheres, cones and cylinders on which nodes lie.
     """
 
     points: Array
@@ -60,6 +62,7 @@ class Surface:
     blocks: tuple[Facets, ...]
     all: Index
     kind: Index
+    shapes: Shapes
     curved: bool = False
     axisymmetric: bool = False
 
@@ -94,7 +97,7 @@ class Surface:
             points, nodes, corners, centre, normal, radius, area, bent, blocks,
             np.concatenate([_padded(b.nodes, width) for b in given]),
             np.concatenate([np.full(len(b.nodes), SIDES.index(b.kind)) for b in given]),
-            curved, axisymmetric,
+            shapes_of(points, nodes, corners, normal), curved, axisymmetric,
         )  # fmt: skip
 
     @classmethod
@@ -135,10 +138,10 @@ class Segments:
 
     mass (k, a, b): int phi_a phi_b of the corners; own (k, a, w): int phi_a N_b with the shape
     functions N of the slave's displacement, of first order phi; cross (k, a, w): the same of
-    the master's; bulge (k, a, dim): int phi_a times how far the curved slave lies outside of
-    its facet, less the same of the master, as vectors; area (k,); gap (k,): mean distance of
-    the facets along the slave's normal, < 0 where they overlap; between (k, 2): the least and
-    the largest distance at their points, of slaves of second order, else infinite.
+    the master's; apart (k, a): int phi_a times the distance of the curved surfaces along the
+    normal of the slave's facet (`distances`), < 0 where they overlap; area (k,); gap (k,): mean
+    distance of the facets themselves; between (k, 2): the least and the largest distance of the
+    curved surfaces, of slaves of second order, else infinite.
     """
 
     slave: Index
@@ -146,7 +149,7 @@ class Segments:
     mass: Array
     own: Array
     cross: Array
-    bulge: Array
+    apart: Array
     area: Array
     gap: Array
     between: Array
@@ -209,13 +212,13 @@ def _padded(nodes: Index, width: int) -> Index:
 
 
 def _joined(parts: list[Segments], slave: Surface, master: Surface) -> Segments:
-    none, dim = np.zeros(0, dtype=np.int64), slave.points.shape[1]
+    none = np.zeros(0, dtype=np.int64)
     square, own, cross = (
         np.zeros((0, MAX_NODES, w))
         for w in (MAX_NODES, slave.all.shape[1], master.all.shape[1])
     )
     empty = Segments(
-        none, none, square, own, cross, np.zeros((0, MAX_NODES, dim)), np.zeros(0), np.zeros(0),
+        none, none, square, own, cross, np.zeros((0, MAX_NODES)), np.zeros(0), np.zeros(0),
         np.zeros((0, 2)),
     )  # fmt: skip
     every = [empty, *parts]
@@ -281,15 +284,13 @@ def _summed(
     )
     k, n = len(of), phi.shape[2]
     mass = np.zeros((k, MAX_NODES, MAX_NODES))
-    bulge = np.zeros((k, MAX_NODES, slave.points.shape[1]))
+    apart = np.zeros((k, MAX_NODES))
     weighted = np.swapaxes(weight[:, :, None] * phi, 1, 2)
     np.add.at(mass[:, :n, :n], pair, weighted @ phi)
     own = _with(slave, of, pair, weighted, phi, parts.at) if slave.is_second else mass
     cross = _with(master, facet, pair, weighted, psi, parts.opposite)
-    for side, facets, values, sign in ((slave, of, phi, 1), (master, facet, psi, -1)):
-        if not side.curved:
-            outside = _outside(side, facets[pair], values)
-            np.add.at(bulge[:, :n], pair, sign * (weighted @ outside))
+    far = distances(slave, master, of, facet, parts)
+    np.add.at(apart[:, :n], pair, (weighted @ far[:, :, None])[..., 0])
     area = mass.sum(axis=(1, 2))
     on_slave = np.einsum("ka,kac->kc", own.sum(axis=1), slave.points[slave.all[of]])
     on_master = np.einsum("kb,kbc->kc", cross.sum(axis=1), master.points[master.all[facet]])
@@ -297,28 +298,10 @@ def _summed(
     gap /= np.where(area > 0, area, 1.0)
     between = np.broadcast_to([-np.inf, np.inf], (k, 2))
     if slave.is_second and len(pair):
-        between = _distances(slave, master, of, facet, parts)
-    return Segments(of, facet, mass, own, cross, bulge, area, gap, between).at(area > 0)
-
-
-def _distances(
-    slave: Surface, master: Surface, of: Index, facet: Index, parts: Cuts
-) -> Array:
-    """Least and largest distance at points of each pair (k, 2), along the slave's normal."""
-    places = []
-    for side, which, at in ((slave, of, parts.at), (master, facet, parts.opposite)):
-        cell = CELLS[SIDES[int(side.kind[which].max())]]
-        first = CELLS[FIRST.get(cell.kind, cell.kind)]
-        x = side.points[side.all[which, : cell.nodes]][parts.pair]
-        place = functions(cell.kind, at) @ x
-        if not side.curved:
-            place = place + _outside(side, which[parts.pair], functions(first.kind, at))
-        places.append(place)
-    apart = np.einsum("tqc,tc->tq", places[1] - places[0], slave.normal[of][parts.pair])
-    out = np.stack([np.full(len(of), np.inf), np.full(len(of), -np.inf)], axis=1)
-    np.minimum.at(out[:, 0], parts.pair, apart.min(axis=1))
-    np.maximum.at(out[:, 1], parts.pair, apart.max(axis=1))
-    return out
+        between = np.stack([np.full(k, np.inf), np.full(k, -np.inf)], axis=1)
+        np.minimum.at(between[:, 0], pair, far.min(axis=1))
+        np.maximum.at(between[:, 1], pair, far.max(axis=1))
+    return Segments(of, facet, mass, own, cross, apart, area, gap, between).at(area > 0)
 
 
 def _with(

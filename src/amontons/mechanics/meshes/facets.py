@@ -47,6 +47,16 @@ def corner_facets(facets: Facets) -> Facets:
     return Facets(kind, facets.nodes[:, : CELLS[kind].nodes])
 
 
+BACKWARDS = {"line": (1, 0), "tri": (0, 2, 1), "quad": (0, 3, 2, 1), "line3": (1, 0, 2),
+             "tri6": (0, 2, 1, 5, 4, 3), "quad8": (0, 3, 2, 1, 7, 6, 5, 4),
+             "quad9": (0, 3, 2, 1, 7, 6, 5, 4, 8)}  # fmt: skip
+
+
+def turned(facets: tuple[Facets, ...]) -> tuple[Facets, ...]:
+    """The same facets seen from behind: normals are opposite."""
+    return tuple(Facets(b.kind, b.nodes[:, BACKWARDS[b.kind]]) for b in facets)
+
+
 PARTS = {  # of facets of second order, through all of their nodes
     "line3": (("line", ((0, 2), (2, 1))),),
     "tri6": (("tri", ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5))),),

@@ -165,6 +165,18 @@ class Mesh:
         object.__setattr__(other, "axisymmetric", True)
         return other
 
+    def with_surfaces(self, more: Mapping[str, tuple[Facets, ...]]) -> Mesh:
+        """The same mesh with more named surfaces, of facets of its `boundary`.
+
+        Raises InvalidInput for a name that is taken.
+        """
+        for name in more:
+            if name in self.surfaces or name in self.node_sets:
+                raise InvalidInput(f"surface {name!r}: is there already")
+        other = copy(self)
+        object.__setattr__(other, "surfaces", {**self.surfaces, **more})
+        return other
+
     def bounding_box(self) -> tuple[Array, Array]:
         """Smallest and largest coordinates, each (dim,)."""
         return self.points.min(axis=0), self.points.max(axis=0)

@@ -6,11 +6,13 @@ from ..elements.orthotropic import OrthotropicElastic
 from ..elements.rigid import Rigid
 from .constraints import Axes, Coupling, Equation, Pretension, Reference, Spring
 from .fields import ContactFields
+from .finding import FoundContacts, FoundPair, find_contacts
 from .model import Model
 from .parts import Body, BodyForce, Contact, Fix, NodalForce, Pressure, Temperature, Traction
 from .processes import distributed
 
 __all__ = ["Axes", "Body", "BodyForce", "CiarletGeymonat", "Contact", "ContactFields",
-           "Coupling", "Equation", "Fix", "LinearElastic", "Model", "NeoHookean", "NodalForce",
-           "OrthotropicElastic", "Pressure", "Pretension", "Reference", "Rigid", "Spring",
-           "Temperature", "Traction", "distributed"]  # fmt: skip
+           "Coupling", "Equation", "Fix", "FoundContacts", "FoundPair", "LinearElastic",
+           "Model", "NeoHookean", "NodalForce", "OrthotropicElastic", "Pressure", "Pretension",
+           "Reference", "Rigid", "Spring", "Temperature", "Traction", "distributed",
+           "find_contacts"]  # fmt: skip

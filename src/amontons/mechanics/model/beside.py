@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InvalidInput, within
+from ..elements.rigid import Rigid
 from ..meshes.mesh import unknown
-from .constraints import ROTATION, Axes, Constraint, Pretension, Reference, Where
+from .constraints import ROTATION, Axes, Constraint, Coupling, Pretension, Reference, Where
 from .parts import Body
 from .supports import locate
 
@@ -28,7 +29,7 @@ class Entry:
     """Degrees of freedom under one name: dofs (k, c), and the points (k, dim) they belong to.
 
     axes (k, dim, dim): directions of the components, None where they are the global ones.
-    held: prescribed without a support.
+    held: prescribed without a support; still: components that are.
     """
 
     kind: str
@@ -36,6 +37,7 @@ class Entry:
     points: Array
     axes: Array | None = None
     held: bool = False
+    still: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +80,18 @@ class Beside:
                     made.entries[part.name] = entry
                 elif isinstance(part, Axes):
                     made = made._with_axes(part, dim)
+                elif isinstance(part, Coupling):
+                    made._hold_off_axis(part)
         return made
+
+    def _hold_off_axis(self, part: Coupling) -> None:
+        """Around an axis a rigid body, and the reference that it follows, moves along it."""
+        if not self.bodies[0].mesh.axisymmetric or part.reference not in self.entries:
+            return
+        body = self.bodies[self._numbered(part.on)[0]]
+        if isinstance(body.material, Rigid):
+            for name, still in ((part.reference, (0,)), (part.reference + ROTATION, (0,))):
+                self.entries[name] = replace(self.entries[name], still=still)
 
     def _with(
         self, name: str, kind: str, points: Array, size: int, axes: Array | None = None

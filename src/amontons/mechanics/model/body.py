@@ -32,7 +32,8 @@ class Body:
     `second_order`: its points are then all nodes.
     axisymmetric: the mesh, in 2D with x >= 0, is one half of the section of a body of
     revolution, x the distance from the axis and y along it.  Nothing twists.  Forces are those
-    of the whole body, as loads and in results; tractions and pressures are per area.
+    of the whole body, as loads and in results; tractions and pressures are per area.  A rigid
+    one moves along the axis alone, and follows a reference.
     """
 
     mesh: Mesh
@@ -100,9 +101,11 @@ class Body:
             object.__setattr__(self, "mesh", self.mesh.turned())
         object.__setattr__(self, "axisymmetric", self.mesh.axisymmetric)
         for law in laws if self.axisymmetric else ():
+            if isinstance(law, Rigid):
+                continue
             if not isinstance(law, LinearElastic | OrthotropicElastic) or law.plane == "stress":
                 raise InvalidInput(
-                    "axisymmetric: expected LinearElastic, or OrthotropicElastic with an axis "
-                    "around, without plane='stress', got "
-                    f"{law!r}; large strains and rigid bodies have no axisymmetric form"
+                    "axisymmetric: expected LinearElastic, OrthotropicElastic with an axis "
+                    "around, or Rigid, without plane='stress', got "
+                    f"{law!r}; large strains have no axisymmetric form"
                 )

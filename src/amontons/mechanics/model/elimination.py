@@ -23,7 +23,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 from scipy.sparse import linalg as sparse_linalg
 
-from ...core.errors import SingularOperator
+from ...core.errors import InvalidInput, SingularOperator
 from ..elements.rigid import Rigid
 from .beside import TURN, Beside
 from .bound import Bound
@@ -106,10 +106,18 @@ def _without_reference(beside: Beside, constraints: Sequence[Constraint]) -> tup
         - 1
         for part in constraints if isinstance(part, Coupling) and is_rigid(part, beside)
     }  # fmt: skip
-    return tuple(
+    found = tuple(
         k for k, body in enumerate(beside.bodies)
         if isinstance(body.material, Rigid) and k not in led
     )  # fmt: skip
+    if found and beside.bodies[0].mesh.axisymmetric:
+        name = beside.bodies[found[0]].name
+        raise InvalidInput(
+            f"a rigid body around an axis follows a reference: expected Coupling({name!r}, "
+            "...) and the Reference among the constraints", ("bodies", found[0]),
+            f"body {name!r}",
+        )  # fmt: skip
+    return found
 
 
 def _turns(beside: Beside) -> Mask:

@@ -54,7 +54,7 @@ class HeldNodes:
         return cls(
             contact.slave, first + rows.nodes[:, None] * d + np.arange(d), rows.points,
             rows.gap if exact else np.maximum(rows.gap, 0.0), sparse.csc_array(H[:, ::d]),
-            TOUCHING * size, contact.obstacle,
+            TOUCHING * size, None if contact.follows else contact.obstacle,
         )  # fmt: skip
 
     def left(self, prescribed: Array) -> Array:

@@ -40,6 +40,7 @@ def joined_loose(
     columns = _columns(parts, eliminated)
     z_of = _independent_motions(columns, eliminated)
     rows = _conditions(columns, z_of, eliminated, is_fixed)
+    rows = sparse.csr_array(sparse.vstack([rows, _straining(parts, columns)], format="csr"))
     count = rows.shape[1]
     starts, ends = columns.starts[:-1], columns.starts[1:]
     chain = np.concatenate([np.arange(a, b - 1) for a, b in zip(starts, ends, strict=True)])
@@ -109,6 +110,18 @@ def _conditions(
     differ = sparse.csr_array(columns.motions[follow] - moved[follow])
     held = moved[np.flatnonzero(is_fixed)]
     return sparse.csr_array(sparse.vstack([differ, held], format="csr"))
+
+
+def _straining(parts: list[Piece], columns: _Columns) -> sparse.csr_array:
+    """Rows that are zero for motions without those modes of pieces that strain them."""
+    numbers = [
+        a + k
+        for piece, a in zip(parts, columns.starts[:-1], strict=True) if piece.rigid is not None
+        for k in range(piece.modes.shape[1]) if k not in piece.rigid
+    ]  # fmt: skip
+    entries = (np.ones(len(numbers)), (np.arange(len(numbers)), numbers))
+    shape = (len(numbers), columns.motions.shape[1])
+    return sparse.csr_array(sparse.coo_array(entries, shape=shape))
 
 
 def _joined(members: list[Piece]) -> Piece:

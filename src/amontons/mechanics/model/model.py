@@ -23,6 +23,7 @@ from .balance import Imbalance, imbalance, in_words
 from .beside import Beside
 from .constraints import Constraint, Reference, Spring
 from .fields import ContactFields
+from .following import check_follows
 from .formulation import Formulation, formulation_of
 from .held import check_outside
 from .joined import joined_loose
@@ -88,6 +89,9 @@ class Model(Told):
         object.__setattr__(self, "bodies", named_bodies(self.bodies))
         object.__setattr__(self, "beside", Beside.of(self.bodies, self.references,
                                                      self.constraints))  # fmt: skip
+        for k, contact in enumerate(self.contacts):
+            with within("contacts", k):
+                check_follows(contact, self.beside, self.constraints, self.is_large)
         for part, fields in SURFACES.items():
             for k, item in enumerate(getattr(self, part)):
                 for name in (name for name in fields if hasattr(item, name)):

@@ -171,6 +171,8 @@ class Contact:
     kinematics: "small", gap and normal are those of the undeformed bodies, or "finite", those
     where the nodes are now (nodal, obstacles only); by default "finite" with hyperelastic laws.
     configuration: the same in older words, "reference" or "current".
+    follows: the name of a rigid body that the obstacle moves with, a tool: what supports and
+    loads give to it, moves and presses the obstacle.  Small kinematics.
     name: of the pair in results and files; by default that of the slave, with a number where
     several contacts share it.
     """
@@ -195,6 +197,7 @@ class Contact:
     angle: ScalarValue | None = None  # of the direction, from t1 to t2 of the contact frame
     name: str = ""
     clearance: float | Callable[[Array], Array] | None = None
+    follows: str | None = None
 
     def __post_init__(self, configuration: str | None, law: Law | None) -> None:
         if not isinstance(self.name, str) or not self.name.isprintable():
@@ -210,6 +213,8 @@ class Contact:
             raise InvalidInput(
                 f"contact on {self.slave!r}: expected either an obstacle or a master surface"
             )
+        if self.follows is not None:
+            self._check_follows()
         if not isinstance(self.method, Nitsche | str | None):
             raise InvalidInput(f"method: expected a text, got {shown(self.method)}")
         if self.method is None:
@@ -240,9 +245,21 @@ class Contact:
             or not (hasattr(self.obstacle, "gap") and hasattr(self.obstacle, "normals"))
         ):
             raise InvalidInput(
-                f"obstacle: expected a Plane, Sphere or LevelSet, got {self.obstacle!r}; "
+                f"obstacle: expected one, such as Plane, Sphere or LevelSet, got "
+                f"{self.obstacle!r}; "
                 'another surface is master="NAME"'
             )
+
+    def _check_follows(self) -> None:
+        where = f"contact on {self.slave!r}: follows"
+        if not isinstance(self.follows, str):
+            raise InvalidInput(f"{where}: expected a body's name, got {shown(self.follows)}")
+        if self.obstacle is None:
+            raise InvalidInput(f"{where}: goes with an obstacle; a master moves by itself")
+        if self.nitsche is not None or self.method == "nitsche":
+            raise InvalidInput(f"{where}: goes with method 'nodal' or 'mortar', not 'nitsche'")
+        if self.kinematics == FINITE:
+            raise InvalidInput(f"{where}: goes with kinematics='small'")
 
     def _check_law(self) -> None:
         where = f"contact on {self.slave!r}"

@@ -34,6 +34,7 @@ from ..elements.rigid import Rigid
 from ..meshes.mesh import Mesh
 from ..meshes.surfaces import facet_normals
 from .elimination import Elimination
+from .following import followed, following_columns
 from .held import HeldNodes
 from .parts import Body, Contact
 from .supports import Prescribed, locate
@@ -166,7 +167,7 @@ def _held_nodes(
         return None
     if contact.obstacle is not None:
         rows = nodal_contact(slave, surface, contact.obstacle)
-        H = _shifted(rows.H, first, total)
+        H = _with_tool(bodies, contact, rows, offsets)
     else:
         assert contact.master is not None
         j, other = locate(bodies, contact.master)
@@ -182,6 +183,19 @@ def _held_nodes(
     size = np.abs(slave.points).max() + np.ptp(slave.points, axis=0).max()
     columns = sparse.csc_array(sparse.csc_array(H)[:, np.repeat(held, d)])
     return HeldNodes.of(contact, rows.at(held), columns, first, size)
+
+
+def _with_tool(
+    bodies: Sequence[Body], contact: Contact, rows: ContactRows, offsets: Index
+) -> sparse.csc_array:
+    """H of contacts with an obstacle, and with the motion of the body that it follows."""
+    k, size = locate(bodies, contact.slave)[0], int(offsets[-1])
+    H = _shifted(rows.H, int(offsets[k]), size)
+    if contact.follows is None or contact.obstacle is None:
+        return H
+    j = followed(bodies, contact)
+    tool = following_columns(bodies[j], contact.obstacle, rows)
+    return sparse.csc_array(H + _shifted(tool, int(offsets[j]), size))
 
 
 def _sides(bodies: Sequence[Body], contact: Contact) -> tuple[Mesh, str, Mesh, str] | None:
@@ -211,14 +225,14 @@ def _met(
         met = np.ones(len(rows.nodes), dtype=bool)
         if mortar:
             rows, met = mortar_obstacle(slave, surface, contact.obstacle, held=held[k])
-        return rows, _shifted(rows.H, int(offsets[k]), size), met, points, None
+        return rows, _with_tool(bodies, contact, rows, offsets), met, points, None
     assert contact.master is not None
     j, other = locate(bodies, contact.master)
     master = bodies[j].mesh
     if mortar:
         rows, on_master, met = mortar_contact(
             slave, surface, master, other, held=held[k], lasting=lasting[k],
-            master_lasting=lasting[j],
+            master_lasting=lasting[j], tied=contact.tied,
         )  # fmt: skip
     else:
         rows, on_master, met = pair_contact(slave, surface, master, other)

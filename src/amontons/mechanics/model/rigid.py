@@ -48,8 +48,8 @@ class Piece:
 
 def pieces(mesh: Mesh, name: str, offset: int, material: object = None) -> list[Piece]:
     """Connected pieces of a mesh whose dofs start at `offset`; material: of its body."""
-    labels = _labels(mesh)
-    titles = _titles(mesh, name, labels)
+    labels = piece_labels(mesh)
+    titles = piece_titles(mesh, name, labels)
     out = []
     for label, title in enumerate(titles):
         nodes = np.flatnonzero(labels == label)
@@ -62,7 +62,7 @@ def pieces(mesh: Mesh, name: str, offset: int, material: object = None) -> list[
     return out
 
 
-def _titles(mesh: Mesh, name: str, labels: NDArray[np.int32]) -> list[str]:
+def piece_titles(mesh: Mesh, name: str, labels: Index) -> list[str]:
     """A name for every piece: of its regions where these are its alone, else a number.
 
     The name of the body stands before it where the user gave one.
@@ -87,7 +87,7 @@ def _titles(mesh: Mesh, name: str, labels: NDArray[np.int32]) -> list[str]:
     return titles
 
 
-def _labels(mesh: Mesh) -> NDArray[np.int32]:
+def piece_labels(mesh: Mesh) -> Index:
     """Number of the connected piece of every node, (n,)."""
     from scipy.sparse import csgraph
 
@@ -98,7 +98,7 @@ def _labels(mesh: Mesh) -> NDArray[np.int32]:
     start, end = np.concatenate(links, axis=1)
     n = len(mesh.points)
     graph = sparse.coo_array((np.ones(len(start)), (start, end)), shape=(n, n))
-    return csgraph.connected_components(graph, directed=False)[1]
+    return csgraph.connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def rigid_modes(points: Array) -> Array:

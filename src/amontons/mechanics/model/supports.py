@@ -82,8 +82,8 @@ def locate(bodies: Sequence[Body], on: str, *, sets: bool = False) -> tuple[int,
 def with_held(values: Array, beside: Beside) -> Array:
     """Prescribed values (dofs,) with 0 for what is held without a support."""
     for entry in beside.entries.values():
-        if entry.held:
-            values[entry.dofs] = np.where(np.isnan(values[entry.dofs]), 0.0, values[entry.dofs])
+        dofs = entry.dofs if entry.held else entry.dofs[:, list(entry.still)]
+        values[dofs] = np.where(np.isnan(values[dofs]), 0.0, values[dofs])
     return values
 
 

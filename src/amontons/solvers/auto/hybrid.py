@@ -12,7 +12,7 @@
                                     the Delassus form after all if W fits into memory
     global form, M singular         semismooth Newton with a factor of the whole system;
                                     on a mesh `ContactMultigrid`; Newton on the natural map;
-                                    proximal points (`tethers`)
+                                    active sets; proximal points (`tethers`)
     Nitsche's method                Newton, then proximal points (`newton.nitsche`)
     large deformations              `NonlinearNewton`
 
@@ -48,6 +48,7 @@ from ...linear.distributed import DistributedMatrix
 from ...problem.friction import Form, FrictionProblem
 from ...problem.nitsche import NitscheProblem
 from ...problem.protocol import Problem
+from ..active_set.sets import ActiveSet
 from ..contract import (
     Breakdown,
     Iterate,
@@ -70,6 +71,7 @@ from .portfolio import FIRST, JOINTS, Portfolio
 from .tethers import Tethers
 
 MESH = 3_000  # unknowns of a mesh from which multigrid beats a factorisation
+SAME = 1e-12  # relative difference of errors up to which they are the same
 STALLED = 20  # iterates without halving the error after which Auto changes the method
 
 
@@ -129,6 +131,7 @@ HELD = (
     Attempt(WHOLE, from_best=False),
     Attempt(ContactMultigrid(), from_best=False, on_meshes=True),
     Attempt(replace(WHOLE, function=NaturalMap())),
+    Attempt(ActiveSet(), from_best=False),
     Attempt(Tethers(), from_best=False),
     Attempt(WHOLE),
 )
@@ -150,6 +153,7 @@ class Auto:
     solves: ClassVar[tuple[type, ...]] = (FrictionProblem, NitscheProblem, NonlinearProblem)
     form: ClassVar[Form] = Form.ANY
     matrix_free: ClassVar[bool] = True
+    changes_method: ClassVar[bool] = True
 
     def choice(self, problem: Problem) -> Auto | NonlinearNewton:
         """The method of a problem that one alone solves, else itself."""
@@ -224,6 +228,13 @@ def _regular(problem: FrictionProblem) -> bool:
     return True
 
 
+def _repeats(errors: list[float], error: float) -> bool:
+    """True where an error comes back after another one: a cycle of the method."""
+    near = SAME * error
+    earlier = [abs(old - error) <= near for old in errors]
+    return any(earlier) and not earlier[-1]
+
+
 def _named(iterate: Iterate, solver: Solver) -> Iterate:
     """The iterate with the name of its solver as stage, unless it has one."""
     return iterate if iterate.stage else replace(iterate, stage=type(solver).__name__)
@@ -236,8 +247,9 @@ def _watched(
     target: Target,
     best: _Best,
 ) -> Iterates:
-    """Iterates of a solver until it breaks down or stalls; best becomes the best so far."""
+    """Iterates of a solver until it breaks down, stalls or repeats; best: the best so far."""
     patience = Patience(STALLED, mark=start.error)
+    errors: list[float] = []
     iterates, judged = solver.iterates(problem, start.iterate, target), None
     try:
         while (iterate := sent(iterates, judged)) is not None:
@@ -245,7 +257,8 @@ def _watched(
             error = target.error(problem, iterate, judged)
             if error < best.error:
                 best.iterate, best.error = iterate, error
-            if patience.over(error):
+            if patience.over(error) or _repeats(errors, error):
                 return
+            errors.append(error)
     except (Breakdown, SingularOperator):
         return

@@ -15,6 +15,9 @@ each of them earns is measured in `benchmarks/results/ablation.md`.
              the best point and from zero; proximal point; relaxed sweeps worth the cost of
              Newton so far; every method alone from the start, later from a disturbed reaction;
              under other laws than Coulomb's, which have no cone, those that need none
+
+Where a contact alone gains energy, TURNS do not begin: what their methods minimise has no
+bottom there.  Of 107 random problems with such a contact sweeps solved 59, all others none.
 """
 
 from __future__ import annotations
@@ -26,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...problem.friction import FrictionProblem
-from ..contract import Iterate, Target
+from ..contract import Breakdown, Iterate, Target
 from .stages import (
     SEMISMOOTH_CONTACTS,
     Stage,
@@ -114,6 +117,8 @@ class Portfolio:
         """All stages in the order of the table."""
         state = State(self.problem, self.target, self.r)
         yield from _walk(self.first, state, 0)
+        if self.problem.gains_energy:
+            raise Breakdown("stopped early")
         for turn in range(MOST_TURNS):
             yield from _walk(self.turns, state, turn)
 

@@ -10,7 +10,7 @@ Where none exist for all statuses together, they are divided: free or closed, st
 slip + or -, in 3D arcs of its direction.  Parts with z0 are treated alike, without the
 velocities and reactions that vanish there; parts without z0 must be shown to hold no solution,
 by multipliers of (z, 1).  Other solutions are looked for with Newton's method, from many starts
-and from where an inequality fails.  `status_tree` does that in 2D, `discs` in 3D.
+and from where an inequality fails.  `tree` does that.
 
 What CERTIFIED means, in floating point with all rounding accounted for (`branch_proof`): every
 solution of the problem, with W, q and mu as given, is within `distance` of the one found; where
@@ -33,8 +33,7 @@ from ...scaled import Scaled
 from ...solutions.enumerate import PieceSolution
 from ...solutions.existence import exist, takes_too_long
 from .answer import LoadCertificate, LoadOutcome
-from .discs import DiscTree
-from .status_tree import StatusTree
+from .tree import DiscTree, PlaneTree
 
 Array = NDArray[np.float64]
 SECONDS = 60.0  # whose work a certificate without a time limit may take
@@ -55,7 +54,7 @@ def certify_load(
     r, shape = np.asarray(solution.r), (problem.contacts, problem.dimension)
     if r.shape != shape:
         raise InvalidInput(f"solution: expected reactions {shape}, got {r.shape}")
-    tree: StatusTree | DiscTree | None = None
+    tree: PlaneTree | DiscTree | None = None
     other: PieceSolution | None = None
     try:
         scaled = Scaled.of(problem, deadline)
@@ -64,7 +63,7 @@ def certify_load(
         elif not scaled.q.any():
             outcome, reason = LoadOutcome.UNDECIDED, "q is zero: nothing sets a scale"
         else:
-            tree = (StatusTree if shape[1] == 2 else DiscTree)(scaled, r, deadline)
+            tree = (PlaneTree if shape[1] == 2 else DiscTree)(scaled, r, deadline)
             r = tree.known * scaled.to_r
             tree.close()
             other = tree.other
@@ -82,7 +81,7 @@ def certify_load(
 
 
 def _outcome(
-    tree: StatusTree | DiscTree, r: Array, other: PieceSolution | None, deadline: Deadline
+    tree: PlaneTree | DiscTree, r: Array, other: PieceSolution | None, deadline: Deadline
 ) -> tuple[LoadOutcome, str]:
     """The answer and its reason; REFUTED only if both solutions are proved to exist.
 

@@ -46,7 +46,7 @@ class DiscProof:
 def box_of(scaled: Scaled, proof: BoxProof) -> DiscBox:
     """What closed a region, in the units of the problem."""
     nc = len(proof.regions)
-    unit = np.repeat(np.hstack([scaled.to_r, scaled.to_u]), 3, axis=1)
+    unit = np.repeat(np.hstack([scaled.to_r, scaled.to_u]), scaled.dimension, axis=1)
     if proof.r is None:
         unit = np.hstack([unit, np.ones((nc, 1))])
     V = proof.V / unit[:, :, None] / unit[:, None, :]

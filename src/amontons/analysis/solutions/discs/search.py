@@ -10,7 +10,7 @@ which every contact is free or sticks are a linear system.  Solutions to begin w
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -28,10 +28,9 @@ from ..newton_batch import newton, on_piece, polished, width
 from ..region_tree import RegionTree
 from .multipliers import BoxProblem, BoxProof
 from .proof import DiscProof, box_of
-from .sets import Law, Region, states_of_regions
+from .sets import Law, Region, Regions, states_of_regions
 
 Array = NDArray[np.float64]
-Regions = tuple[Region, ...]
 FINEST = 0.002  # rad: half of the smallest arc
 SURE = 1e-7  # scaled violation of the law that excludes the solution of a linear system
 GHOST_STEPS, TURN = 12, 1e-6  # Newton steps for directions, rad of their differences
@@ -76,13 +75,13 @@ class DiscSearch(RegionTree):
     """The state of one search; `run` does it."""
 
     def __init__(self, scaled: Scaled, finder: Finder, deadline: Deadline = NEVER) -> None:
-        super().__init__(scaled, deadline, [])
+        super().__init__(scaled, deadline)
         self.finder = finder
         self.proofs: list[BoxProof] = []
         self.linear: list[Regions] = []
         self.errors: list[float] = []
-        if not self._penetrates:
-            self.queue.append(self._root())
+        if self._penetrates:
+            self.queue.clear()
 
     @property
     def several(self) -> bool:
@@ -180,10 +179,6 @@ class DiscSearch(RegionTree):
                 self.finder.found[k] = better
             self.errors.append(REFERENCE + 10 * step / (1 + float(np.abs(r).max(initial=0.0))))
 
-    def _root(self) -> Regions:
-        """Every contact undecided; those that can not react are free."""
-        return tuple(Region() if able else Region("f") for able in self.scaled.reacts)
-
     def _look_at(self, regions: Regions) -> list[Regions]:
         """Regions that remain of one; none where it is closed or has to be given up."""
         if len(self.errors) < len(self.finder.found):
@@ -211,12 +206,7 @@ class DiscSearch(RegionTree):
                 return [regions]
             if self._closed_about_a_ghost(regions):
                 return []
-        for p in self._order(regions, answer.scores):
-            parts = self._divided(regions, p, inside)
-            if parts:
-                return parts
-        self.undecided += 1
-        return []
+        return self._parts_of(regions, answer.scores, inside)
 
     def _closed_about_a_ghost(self, regions: Regions) -> bool:
         """Close a pattern about the one point where its equations hold but a sign does not."""
@@ -276,34 +266,12 @@ class DiscSearch(RegionTree):
         laws = self._laws(r)
         return all(law.lies_in(region) for law, region in zip(laws, regions, strict=True))
 
-    def _order(self, regions: Regions, scores: Array) -> Iterator[int]:
-        """Contacts to divide, the most promising first."""
-        width = np.array([{".": 2 * np.pi, "c": 2 * np.pi}.get(g.letter, g.half * (
-            g.letter == "l")) for g in regions])  # fmt: skip
-        key = np.where(scores > 0, scores, 0.0)
-        yield from sorted(range(len(regions)), key=lambda p: (-key[p], -width[p]))
-
-    def _divided(self, regions: Regions, p: int, inside: list[Array]) -> list[Regions]:
-        """The parts of regions by contact p, [] where it is decided to the last."""
-        own = regions[p]
-        if own.letter in "fs":
-            return []
-        if own.letter == ".":
-            parts = [Region("f"), Region("c")]
-        elif own.letter == "c":
-            if self.scaled.mu[p] == 0:
-                return []
-            parts = [Region("s"), replace(own, letter="l")]
-        else:
-            parts = self._arcs(own, p, inside)
-        return [(*regions[:p], part, *regions[p + 1 :]) for part in parts]
-
-    def _arcs(self, own: Region, p: int, inside: list[Array]) -> list[Region]:
+    def _slip_divided(self, own: Region, p: int, inside: Sequence[Array]) -> list[Region]:
         """Halves of an arc; a circle is cut across the direction of a known solution.
 
         The arc of two known solutions is cut between them.
         """
-        if own.half <= FINEST or self.scaled.mu[p] == 0:
+        if own.half <= FINEST:
             return []
         angles = [law.direction for law in (self._laws(r)[p] for r in inside)]
         known = [angle for angle in angles if angle is not None]

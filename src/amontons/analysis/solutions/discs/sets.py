@@ -47,7 +47,7 @@ NEAR = 0.3  # rad from e0 within which the span replaces the cone
 class Region:
     """What one contact may do: statuses of `letter`, slip within half of `middle`.
 
-    letter: . any, c closed, f free, s stick, l slip.
+    letter: . any, c closed, f free, s stick, l slip; in 2D l both ways, + or - one.
     """
 
     letter: str = "."
@@ -67,6 +67,9 @@ class Region:
             count = max(FEWEST, int(np.ceil(self.half / np.pi * SAMPLES)) + 1)
             own = np.linspace(self.middle - self.half, self.middle + self.half, count)
         return np.concatenate([own, extra])
+
+
+Regions = tuple[Region, ...]
 
 
 def states_of_regions(regions: Sequence[Region]) -> States:

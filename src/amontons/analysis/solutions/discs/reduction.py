@@ -20,10 +20,10 @@ from ....core.clock import Deadline
 from ...multipliers.lmi import Accept, LmiOutcome, find_multipliers
 from ...multipliers.program import Family
 from ...scaled import Scaled
-from ...solutions.branch_proof import diagonal_parts
-from ...solutions.branches import reactions
-from ...solutions.groups import Group, whole
 from ...statuses import States
+from ..branch_proof import diagonal_parts
+from ..branches import reactions
+from ..groups import Group, whole
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from ....core.errors import InvalidInput
 from ....problem.friction import FrictionProblem
 from ...scaled import Scaled
-from ...solutions.branches import reactions, zero_velocities
-from ...solutions.newton_batch import newton
 from ...statuses import FREE, MINUS, PLUS, STICK
 from ...tolerances import REFINED, SLACK
+from ..branches import reactions, zero_velocities
+from ..newton_batch import newton
 
 Array = NDArray[np.float64]
 NEAR = 1e-6  # of the size of reactions: what is known less well proves nothing of use

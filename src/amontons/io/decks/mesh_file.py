@@ -1,0 +1,135 @@
+"""The mesh of a deck alone: cells, groups of elements, surfaces; nothing of its physics.
+
+Elements of any physics count by their shape: shells and membranes on solids, lines on plane
+cells, are what exporters write for groups of sides.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from ...core.errors import FileFormatError
+from ...mechanics.meshes.cells import FACET_KIND
+from ...mechanics.meshes.mesh import Mesh
+from ...mechanics.meshes.raw import RawBlock, RawMesh, to_mesh
+from ...mechanics.meshes.split import Glue, check_glue, split
+from .cards import Card, read_cards
+from .flat import Block, Deck, flatten
+from .scopes import Names
+from .shapes import QUAD, QUAD8, SHAPES, TRI, TRI6, Shape, side_of
+
+MESH_CARDS = {
+    "NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "PART", "ENDPART", "ASSEMBLY",
+    "ENDASSEMBLY", "INSTANCE", "ENDINSTANCE",
+}  # fmt: skip
+SHELLS = {
+    name: Shape(cell, nodes, sides)
+    for cell, nodes, sides, names in (
+        ("tri", 3, TRI, "S3 S3R STRI3 M3D3 R3D3 SFM3D3"),
+        ("quad", 4, QUAD, "S4 S4R M3D4 M3D4R R3D4 SFM3D4 SFM3D4R"),
+        ("tri6", 6, TRI6, "S6 STRI65 M3D6 SFM3D6"),
+        ("quad8", 8, QUAD8, "S8 S8R M3D8 M3D8R SFM3D8 SFM3D8R"),
+        ("line", 2, (), "T2D2 T3D2 B21 B31 B31R R2D2 SAX1"),
+        ("line3", 3, (), "T2D3 T3D3 B22 B32 B32R SAX2"),
+    )
+    for name in names.split()
+}
+SOLIDS = {  # of other physics, or with other ways to integrate
+    f"{head}{tail}": shape
+    for name, shape in SHAPES.items() if name.startswith("C3D")
+    for head, tail in (("DC3D", name[3:]), (name, "H"), (name, "T"), (name, "RH"), (name, "M"))
+}  # fmt: skip
+
+
+def read_deck_mesh(path: str | os.PathLike[str], *, glue: Glue = True) -> Mesh:
+    """Cells, ELSETs as regions or surfaces, NSETs that span sides and SURFACEs as surfaces.
+
+    Names are written as in the file; those of an instance follow it, "Bolt-1.head".  Raises
+    FileFormatError naming file and line.
+    """
+    check_glue(glue)
+    name = os.fspath(path)
+    cards = [card for card in _model(read_cards(Path(name))) if card.keyword in MESH_CARDS]
+    deck = flatten(cards, SHAPES | SOLIDS | SHELLS)
+    if not deck.blocks:
+        raise FileFormatError(f"{name}: expected a mesh, got no elements (*ELEMENT)")
+    chosen = {card.label("ELSET") for card in cards if card.keyword == "ELSET"}
+    return split(to_mesh(_raw(deck, _writing(cards), chosen), name), glue)
+
+
+def _model(cards: list[Card]) -> Iterator[Card]:
+    """The cards before the first step."""
+    for card in cards:
+        if card.keyword == "STEP":
+            return
+        yield card
+
+
+def _writing(cards: list[Card]) -> dict[str, str]:
+    """Names as they were written first, by those in capitals."""
+    found: dict[str, str] = {}
+    for card in cards:
+        for value in card.options.values():
+            found.setdefault(value.upper(), value)
+    return found
+
+
+def _raw(deck: Deck, writing: dict[str, str], chosen: set[str | None]) -> RawMesh:
+    """Blocks split by the sets that their elements are in.
+
+    chosen: sets with a card of their own; before those of *ELEMENT they name equal regions.
+    """
+    count = sum(len(block.nodes) for block in deck.blocks)
+    groups: list[list[str]] = [[] for _ in range(count)]
+    node_sets, faces = {}, []
+    for names in (deck.top.own, *deck.instances.values()):
+
+        def called(key: str, names: Names = names) -> str:
+            own = writing.get(key, key)
+            return f"{writing.get(names.title, names.title)}.{own}" if names.title else own
+
+        for key in sorted(names.element_sets, key=lambda key: key not in chosen):
+            members = names.element_sets[key]
+            for element in members:
+                groups[element].append(called(key))
+        for key, members in (names.node_sets | names.node_surfaces).items():
+            node_sets[called(key)] = members
+        for key, sides in names.faces.items():
+            faces += [b for s in sides for b in _sides(deck, *s, called(key))]
+    blocks = [part for block in deck.blocks for part in _parts(block, groups, deck.shapes)]
+    return RawMesh(deck.points, [*blocks, *faces], node_sets)
+
+
+def _parts(block: Block, groups: list[list[str]], shapes: dict[str, Shape]) -> list[RawBlock]:
+    """The elements of a block, apart where they are in other groups."""
+    rows: dict[tuple[str, ...], list[int]] = {}
+    for k in range(len(block.nodes)):
+        rows.setdefault(tuple(dict.fromkeys(groups[block.first + k])), []).append(k)
+    cell = shapes[block.kind].cell
+    return [RawBlock(cell, block.nodes[own], key) for key, own in rows.items()]
+
+
+def _sides(deck: Deck, elements: np.ndarray, label: str, name: str) -> Iterator[RawBlock]:
+    """Sides of elements as facets, of shells and lines the elements themselves."""
+    for block in deck.blocks:
+        own = elements[(elements >= block.first) & (elements < block.first + len(block.nodes))]
+        if not len(own):
+            continue
+        nodes, shape = block.nodes[own - block.first], deck.shapes[block.kind]
+        side = side_of(label)
+        if side is None:
+            if block.kind in SHELLS:
+                yield RawBlock(shape.cell, nodes, (name,))
+            continue
+        if not 0 <= side < len(shape.sides):
+            raise FileFormatError(
+                f"{block.card.file}: surface {name}: face {label}: expected S1 to "
+                f"S{len(shape.sides)} for {block.kind}"
+            )
+        chosen = nodes[:, shape.sides[side]]
+        dim = 2 if shape.cell.startswith(("tri", "quad")) else 3
+        yield RawBlock(FACET_KIND[dim, chosen.shape[1]], chosen, (name,))

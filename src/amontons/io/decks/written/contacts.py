@@ -1,0 +1,161 @@
+"""Contacts of a model as *CONTACT PAIR and *TIE, slave first, with the laws that decks have."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ....core.errors import InvalidInput, within
+from ....mechanics.contact import pair_contact
+from ....mechanics.model import Contact, Model
+from ....mechanics.model.supports import locate
+from ....mechanics.model.values import is_number
+from ....problem.law import ExponentialOverclosure, OverclosureCurve
+from .bodies import Meshes
+from .lines import listed, value, values
+
+STICK = 0.1  # stick slope over the stiffness of pressure, as CalculiX' manual advises
+HARD = 50.0  # stiffness of hard contact there, over Young's modulus
+WIDER = 1.001  # POSITION TOLERANCE over the largest distance that is tied
+UNSAID = ("tresca", "cohesion", "mu_across", "angle")
+
+
+class Contacts:
+    """The cards of all contacts of a model, whose obstacles are bodies already."""
+
+    def __init__(
+        self, model: Model, meshes: Meshes, dialect: str, penalty: float | None,
+        notes: list[str],
+    ) -> None:  # fmt: skip
+        self.model, self.meshes, self.dialect = model, meshes, dialect
+        self.penalty, self.notes = penalty, notes
+        self.lines: list[str] = []
+        for k, contact in enumerate(model.contacts):
+            with within("contacts", k):
+                self._contact(k, contact)
+
+    def _contact(self, k: int, contact: Contact) -> None:
+        if contact.nitsche is not None:
+            self.notes.append(f"{contact.slave}: Nitsche's method is not said, the law is")
+        assert contact.master is not None
+        slave, master = (locate(self.model.bodies, s) for s in (contact.slave, contact.master))
+        names = self.meshes.surface(*slave), self.meshes.surface(*master)
+        if contact.where is not None:
+            names = self._some(contact, slave, names[0]), names[1]
+        if contact.tied and contact.stiffness is None and contact.stick_stiffness is None:
+            near = value(self._distance(contact))
+            self.lines += [
+                f"*TIE, NAME=TIE_{k + 1}, ADJUST=NO, POSITION TOLERANCE={near}",
+                f"{names[0]}, {names[1]}",
+            ]
+            return
+        self.lines += [f"*SURFACE INTERACTION, NAME=INTERACTION_{k + 1}"]
+        self._law(contact)
+        nodes = names[0].endswith("_SOME")
+        kind = "NODE TO SURFACE" if nodes else "SURFACE TO SURFACE"
+        self.lines += [f"*CONTACT PAIR, INTERACTION=INTERACTION_{k + 1}, TYPE={kind}",
+                       f"{names[0]}, {names[1]}"]  # fmt: skip
+        if contact.clearance is not None:
+            if not is_number(contact.clearance):
+                raise InvalidInput("a deck has one clearance for a pair; expected a number",
+                                   ("clearance",))  # fmt: skip
+            self.lines.append(f"*CLEARANCE, SLAVE={names[0]}, MASTER={names[1]}, "
+                              f"VALUE={value(contact.clearance)}")  # type: ignore[arg-type]  # fmt: skip
+
+    # ------------------------------------------------------------------------ where it is
+    def _some(self, contact: Contact, slave: tuple[int, str], whole: str) -> str:
+        """The name of the slave's nodes that take part, that of the surface if all do."""
+        mesh = self.model.bodies[slave[0]].mesh
+        nodes = mesh.surface_nodes(slave[1])
+        chosen = np.asarray(contact.where(mesh.points[nodes]), dtype=bool)  # type: ignore[misc]
+        if chosen.all():
+            return whole
+        if not (contact.tied or contact.method == "nodal"):
+            raise InvalidInput(
+                "a part of a surface with mortar contact: give it a surface of its own",
+                ("where",),
+            )
+        name = self.meshes.names(("some", len(self.lines)), f"{whole}_SOME")
+        members = listed((nodes[chosen] + self.meshes.nodes[slave[0]] + 1).tolist())
+        rows = [text.strip() for line in members for text in line.split(",") if text.strip()]
+        self.lines += [f"*SURFACE, NAME={name}, TYPE=NODE", *rows]
+        return name
+
+    def _distance(self, contact: Contact) -> float:
+        """The largest distance of nodes that are tied."""
+        bodies = self.model.bodies
+        (a, slave), (b, master) = (locate(bodies, s) for s in (contact.slave, contact.master))  # type: ignore[arg-type]
+        rows, _, _ = pair_contact(bodies[a].mesh, slave, bodies[b].mesh, master)
+        gap = np.abs(rows.gap)
+        if contact.where is not None:
+            gap = gap[np.asarray(contact.where(rows.points), dtype=bool)]
+        size = float(np.ptp(bodies[a].mesh.points, axis=0).max())
+        return WIDER * float(gap.max(initial=0.0)) + 1e-9 * size
+
+    # --------------------------------------------------------------------------- what acts
+    def _law(self, contact: Contact) -> None:
+        for name in UNSAID:
+            if getattr(contact, name) is not None:
+                raise InvalidInput("no deck has this friction; expected a coefficient mu",
+                                   (name,))  # fmt: skip
+        stiffness = self._overclosure(contact)
+        if contact.tied:
+            raise InvalidInput("an elastic bond: expected a tie without stiffness",
+                               ("stiffness",))  # fmt: skip
+        mu = _single(contact.mu, "mu")
+        cap = None if contact.cap is None else _single(contact.cap, "cap")
+        if cap is not None and self.dialect == "calculix":
+            raise InvalidInput("CalculiX has no largest shear stress; expected mu alone",
+                               ("cap",))  # fmt: skip
+        if not mu:
+            return
+        most = "" if cap is None else f", TAUMAX={value(cap)}"
+        numbers = [mu]
+        if contact.stick_stiffness is not None:
+            numbers.append(_single(contact.stick_stiffness, "stick_stiffness"))
+        elif self.dialect == "calculix":
+            numbers.append(STICK * stiffness)
+            self.notes.append(
+                f"{contact.slave}: sticking has a slope of {numbers[1]:.3g}, "
+                "which CalculiX needs"
+            )
+        self.lines += [f"*FRICTION{most}", values(numbers)]
+
+    def _overclosure(self, contact: Contact) -> float:
+        """Write the pressure over overclosure; returns a stiffness that is typical of it."""
+        law, card = contact.stiffness, "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE="
+        if law is None and self.penalty is None:
+            self.lines.append(f"{card}HARD")
+            return HARD * _young(self.model)
+        if isinstance(law, ExponentialOverclosure):
+            if self.dialect == "abaqus":
+                raise InvalidInput("an exponential law is another one in Abaqus; expected an "
+                                   "OverclosureCurve", ("stiffness",))  # fmt: skip
+            self.lines += [f"{card}EXPONENTIAL", values([law.c0, law.p0])]
+            return law.p0 / law.c0
+        if isinstance(law, OverclosureCurve):
+            table = list(zip(np.array(law.pressure), np.array(law.overclosure), strict=True))
+            self.lines += [f"{card}TABULAR", *(values(row) for row in table)]
+            return float((table[-1][0] - table[0][0]) / (table[-1][1] - table[0][1]))
+        size = self.penalty if law is None else _single(law, "stiffness")
+        assert size is not None
+        self.lines += [f"{card}LINEAR", value(size)]
+        return size
+
+
+def _single(given: object, name: str) -> float:
+    """One number; raises InvalidInput for one that changes over the surface."""
+    if not is_number(given) and not (
+        isinstance(given, np.ndarray | list | tuple) and np.ptp(np.asarray(given)) == 0
+    ):
+        raise InvalidInput("changes over the surface or with the state; expected one number",
+                           (name,))  # fmt: skip
+    return float(np.ravel(given)[0])  # type: ignore[arg-type]
+
+
+def _young(model: Model) -> float:
+    """The largest Young's modulus."""
+    found = []
+    for body in model.bodies:
+        laws = body.material.values() if isinstance(body.material, dict) else [body.material]
+        found += [float(np.max(law.young)) for law in laws]  # type: ignore[union-attr]
+    return max(found)

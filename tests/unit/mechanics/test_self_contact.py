@@ -1,0 +1,83 @@
+"""A part in contact with itself: slots that close, beside the half model on a plane."""
+
+import numpy as np
+import pytest
+
+import amontons as am
+
+SOFT = am.LinearElastic(1000.0, 0.3)
+
+
+def fork(gap, cells=(12, 4)):
+    """Two beams 3 x 1 joined at the left, a slot between them, symmetric about y = 0.
+
+    One mesh: the columns of the left third go through, the others leave the slot open.
+    """
+    parts = []
+    for sign in (1, -1):
+        mesh = am.box((3, 1), cells)
+        y = gap / 2 + mesh.points[:, 1]
+        parts.append((np.stack([mesh.points[:, 0], sign * y], axis=1), mesh.cells[0].nodes))
+    bridge = am.box((1, gap), (cells[0] // 3, 2))
+    parts.append((np.stack([bridge.points[:, 0], bridge.points[:, 1] - gap / 2], axis=1),
+                  bridge.cells[0].nodes))  # fmt: skip
+    points = np.concatenate([p for p, _ in parts])
+    starts = np.cumsum([0, *(len(p) for p, _ in parts)])
+    nodes = np.concatenate([c + s for (_, c), s in zip(parts, starts, strict=False)])
+    _, first, same = np.unique(points.round(9), axis=0, return_index=True, return_inverse=True)
+    kept = points[first]
+    return am.Mesh(kept, (am.Cells("quad", same.ravel()[nodes]),),
+                   node_sets={"left": np.flatnonzero(kept[:, 0] < 1e-9),
+                              "up": np.flatnonzero(kept[:, 1] > gap / 2 + 1 - 1e-9),
+                              "down": np.flatnonzero(kept[:, 1] < -gap / 2 - 1 + 1e-9)})
+
+
+def closed(mesh, contacts, bodies):
+    loads = [am.NodalForce("up", (0, -2.0)), am.NodalForce("down", (0, 2.0))]
+    return am.solve(am.Model(bodies, [am.Fix("left", 0)], contacts, loads), tolerance=1e-11)
+
+
+@pytest.mark.parametrize("gap", [0.02, 0.1])
+def test_a_slot_closes_as_its_half_does_on_a_plane(gap):
+    mesh = fork(gap)
+    found = am.find_contacts([am.Body(mesh, SOFT)], mu=0.0, itself=True)
+    (pair,) = found.pairs
+    assert pair.parts == ("body", "body")
+    assert pair.gap == pytest.approx(gap)
+    assert pair.area == pytest.approx(2.0, abs=0.3)
+    whole = closed(mesh, found.contacts, found.bodies)
+    u = whole.displacement[0]
+    mirrored = {(round(x, 9), round(-y, 9)): k for k, (x, y) in enumerate(mesh.points.tolist())}
+    other = np.array([mirrored[round(x, 9), round(y, 9)] for x, y in mesh.points.tolist()])
+    assert np.allclose(u[other] * (1, -1), u, atol=1e-9)
+    assert whole.fields.pressure.max() > 0
+    # the upper half: held along y where it is cut, on a plane in the middle of the slot
+    cells = mesh.cells[0].nodes
+    used, numbers = np.unique(cells[mesh.points[cells][:, :, 1].mean(axis=1) > 0],
+                              return_inverse=True)  # fmt: skip
+    x = mesh.points[used]
+    nodes = numbers.reshape(-1, 4)
+    below = np.isclose(x[nodes][:, :, 1].min(axis=1), gap / 2) & (x[nodes][:, :, 0].min(1) > 1)
+    bottom = am.Facets("line", nodes[below][:, :2])
+    half = am.Mesh(x, (am.Cells("quad", nodes),), {"slot": (bottom,)}, node_sets={
+        "left": np.flatnonzero(x[:, 0] < 1e-9), "cut": np.flatnonzero(np.abs(x[:, 1]) < 1e-9),
+        "up": np.flatnonzero(x[:, 1] > gap / 2 + 1 - 1e-9),
+    })  # fmt: skip
+    contact = am.Contact("slot", am.Plane((0, 1)), mu=0.0, method="mortar")
+    alone = am.solve(
+        am.Model([am.Body(half, SOFT)], [am.Fix("left", 0), am.Fix("cut", (None, 0))],
+                 [contact], [am.NodalForce("up", (0, -2.0))]), tolerance=1e-11,
+    )  # fmt: skip
+    assert np.allclose(alone.displacement[0], u[used], atol=1e-8 * np.abs(u).max())
+    one, other = (dict(zip(f.points[:, 0].round(6).tolist(), f.pressure.tolist(), strict=True))
+                  for f in (alone.fields, whole.fields))  # fmt: skip
+    common = [at for at in one if at in other and at > 1.3]
+    assert len(common) >= 5
+    most = max(other.values())
+    assert [one[at] for at in common] == pytest.approx([other[at] for at in common],
+                                                       rel=1e-6, abs=1e-6 * most)  # fmt: skip
+
+
+def test_what_is_solid_does_not_meet_itself():
+    with pytest.raises(am.InvalidInput, match="no contact found"):
+        am.find_contacts([am.Body(am.box((4, 0.1), (4, 1)), SOFT)], mu=0.1, itself=True)
