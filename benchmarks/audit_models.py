@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import amontons as am
 from amontons.io.readers import read
@@ -25,7 +26,7 @@ def pair(  # noqa: PLR0913  # what kinds of pairs differ by
     bodies = [am.Body(below, STEEL, "low", order=order),
               am.Body(above, STEEL, "high", order=order)]  # fmt: skip
     supports = [am.Fix("low.bottom", 0.0), am.Fix("high.top", (0.004, *along, -0.01))]
-    law = {"tied": True} if tied else {"mu": mu}
+    law: dict[str, Any] = {"tied": True} if tied else {"mu": mu}
     contact = am.Contact("high.bottom", master="low.top", method=method, **law)
     return am.Model(bodies, supports, [contact])
 
