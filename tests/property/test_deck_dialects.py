@@ -158,7 +158,7 @@ BROKEN = [
     ("1, 1, 2, 3, 4, 5, 6, 7, 8", "1, 1, 2, 3, 4, 5, 6, 7, x", 19, "number, got .x."),
     ("*SURFACE, NAME=TOP", "*SURFACE", 22, "NAME: missing"),
     ("*SURFACE, NAME=BOTTOM", "*SURFACE, NAME=TOP", 24, "surface TOP is there already"),
-    ("*SURFACE, NAME=TOP", "*SURFACE, NAME=TOP, TYPE=CUT", 22, "expected ELEMENT or NODE"),
+    ("*SURFACE, NAME=TOP", "*SURFACE, NAME=TOP, TYPE=CUT", 22, "expected ELEMENT, NODE"),
     ("UPPER, S1", "UPPER, S1x", 33, "face S1X: expected S1 to S6"),
     ("*MATERIAL, NAME=STEEL\n", "*MATERIAL\n", 26, "NAME: missing"),
     ("1000., 0.", "1000.", 28, "expected two constants, got 1"),

@@ -10,6 +10,7 @@ from ....mechanics.model import Contact, Model
 from ....mechanics.model.supports import locate
 from ....mechanics.model.values import is_number
 from ....problem.law import ExponentialOverclosure, OverclosureCurve
+from ....problem.nitsche import NitscheProblem
 from .bodies import Meshes
 from .lines import listed, value, values
 
@@ -34,7 +35,7 @@ class Contacts:
                 self._contact(k, contact)
 
     def _contact(self, k: int, contact: Contact) -> None:
-        if contact.nitsche is not None:
+        if self.model.kind is NitscheProblem:
             self.notes.append(f"{contact.slave}: Nitsche's method is not said, the law is")
         assert contact.master is not None
         slave, master = (locate(self.model.bodies, s) for s in (contact.slave, contact.master))
