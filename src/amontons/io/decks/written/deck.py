@@ -20,6 +20,7 @@ from ....mechanics.elements.elasticity import LinearElastic
 from ....mechanics.model import Body, Contact, Fix, Model, Pressure, Temperature
 from ....mechanics.model.beside import Beside
 from ....mechanics.model.constraint_rows import Rows
+from ....mechanics.model.large_deformation import LargeDeformation
 from ....mechanics.model.parts import CURRENT
 from ....mechanics.model.supports import external_load, locate, prescribed_values
 from ....mechanics.model.temperature import changes
@@ -68,7 +69,7 @@ def write_deck(
 
 
 def _check(model: Model) -> None:
-    if model.is_large:
+    if model.kind is LargeDeformation:
         raise InvalidInput("large deformations: can not be said in a linear step of a deck")
     for part in ("supports", "loads"):
         for k, each in enumerate(getattr(model, part)):
