@@ -75,9 +75,9 @@ class Event(_OnPath):
     """Something that happens on a branch, at a precisely located point.
 
     before, after: names of the pieces on the two sides, in the sense of the branch.  smooth:
-    True for a fold inside of a piece.  turns: True where the parameter turns back, at a fold
-    and at some branch points.  directions, (k, n + 1), rows (y', p'): all one-sided tangents at
-    a branch point.  stop: for the kind END.
+    True for a fold inside of a piece.  turns: True for a branch point where the parameter
+    turns back.  directions, (k, n + 1), rows (y', p'): all one-sided tangents at a branch
+    point.  stop: for the kind END.
     """
 
     kind: EventKind
@@ -92,6 +92,11 @@ class Event(_OnPath):
     stop: Stop | None = None
     detail: str = ""
     problem: Any = field(default=None, repr=False)
+
+    @property
+    def is_fold(self) -> bool:
+        """True where the parameter turns back, at a branch point too."""
+        return self.kind is EventKind.FOLD or self.turns
 
     def record(self) -> dict[str, Any]:
         """What the JSON file holds."""

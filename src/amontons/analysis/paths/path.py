@@ -159,7 +159,7 @@ class Branch(Shown):
     @property
     def folds(self) -> tuple[Event, ...]:
         """The events where the parameter turns back, branch points among them."""
-        return tuple(e for e in self.events if e.kind is EventKind.FOLD or e.turns)
+        return tuple(event for event in self.events if event.is_fold)
 
     def table(self) -> list[dict[str, Any]]:
         """One row per point: parameter, arclength, and what the problem tells of it."""

@@ -27,7 +27,7 @@ from .continuation import Continuation
 from .following import Limits, follow_along
 from .friction_path import FrictionPath
 from .load_path import LoadPath
-from .path import Branch, EventKind
+from .path import Branch
 from .starting import polished
 from .tangents import Tangent
 from .ways import way_of
@@ -140,7 +140,7 @@ class PathCrossing:
         followed = share
         walk = way.steps(path, y, share, onward, (-self.back, 1.0))
         for count, (point, event) in enumerate(walk):
-            if event is not None and (event.kind is EventKind.FOLD or event.turns):
+            if event is not None and event.is_fold:
                 folds.append(event.parameter)
             if event is not None and event.stop is not None:
                 if point.parameter == 1.0:

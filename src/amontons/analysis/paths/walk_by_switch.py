@@ -112,9 +112,11 @@ class WalkBySwitch(Walk):
             more = {"directions": np.array(rows)}
         self._enter(chosen)
         turns = self._note_turn()
+        if more:
+            more["turns"] = turns
         kind = EventKind.FOLD if turns else EventKind.STATUS
         kind = EventKind.BRANCH if more else kind
-        return [(self.here(), self._event(kind, before, turns=turns, **more))]
+        return [(self.here(), self._event(kind, before, **more))]
 
     def _straightest(self, ways: list[Tangent]) -> Tangent:
         """The tangent that keeps the orientation and turns least."""

@@ -68,13 +68,15 @@ def run(
     case: str, overrides: Sequence[str], tolerance: float | None, time_limit: float | None,
     folder: str | None, export: str | None, every: int, pictures: bool, restart: bool,
     quiet: bool, export_steps: str | None = None, xdmf: bool = False, report: bool = False,
+    read: Case | None = None,
 ) -> int:  # fmt: skip
-    """Step and write; returns the exit code."""
+    """Step and write; returns the exit code.  read: the case where it has been read before."""
     if time_limit is not None and not time_limit > 0:
         raise InvalidInput(f"--time-limit: expected seconds > 0, got {time_limit}")
     chosen = _chosen(export, export_steps)
     deadline = Deadline.after(time_limit)
-    read = open_source(case, overrides)
+    if read is None:
+        read = open_source(case, overrides)
     if read.evolution is None:
         raise FileFormatError(
             f"{case}: evolution: missing, expected a table with kind, step, until; one state "

@@ -35,6 +35,11 @@ class Block:
     nodes: Index
     card: Card
 
+    def rows_of(self, elements: Index) -> Index:
+        """Which of its elements are among these elements of the deck, in their order."""
+        inside = (elements >= self.first) & (elements < self.first + len(self.nodes))
+        return elements[inside] - self.first
+
 
 @dataclass(frozen=True)
 class Placed:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
 
 from ...core.errors import FileFormatError
@@ -18,7 +19,7 @@ from ...mechanics.meshes.split import Glue, check_glue, split
 from .cards import Card, read_cards
 from .flat import Block, Deck, flatten
 from .scopes import Index, Names
-from .shapes import QUAD, QUAD8, SHAPES, TRI, TRI6, Shape, side_of
+from .shapes import QUAD, QUAD8, SHAPES, TRI, TRI6, Shape, side_named, side_of
 
 MESH_CARDS = {
     "NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "PART", "ENDPART", "ASSEMBLY",
@@ -91,9 +92,9 @@ def _raw(deck: Deck, writing: dict[str, str], chosen: set[str | None]) -> RawMes
             return f"{writing.get(names.title, names.title)}.{own}" if names.title else own
 
         for key in sorted(names.element_sets, key=lambda key: key not in chosen):
-            members = names.element_sets[key]
-            for element in members:
-                groups[element].append(called(key))
+            name = called(key)
+            for element in names.element_sets[key]:
+                groups[element].append(name)
         for key, members in (names.node_sets | names.node_surfaces).items():
             node_sets[called(key)] = members
         for key, sides in names.faces.items():
@@ -114,23 +115,21 @@ def _parts(
     return [RawBlock(cell, block.nodes[own], key) for key, own in rows.items()]
 
 
+def _wrong(where: str, text: str) -> FileFormatError:
+    return FileFormatError(f"{where}: {text}")
+
+
 def _sides(deck: Deck, elements: Index, label: str, name: str) -> Iterator[RawBlock]:
     """Sides of elements as facets, of shells and lines the elements themselves."""
     for block in deck.blocks:
-        own = elements[(elements >= block.first) & (elements < block.first + len(block.nodes))]
-        if not len(own):
+        nodes, shape = block.nodes[block.rows_of(elements)], deck.shapes[block.kind]
+        if not len(nodes):
             continue
-        nodes, shape = block.nodes[own - block.first], deck.shapes[block.kind]
-        side = side_of(label)
-        if side is None:
+        if side_of(label) is None:
             if block.kind in SHELLS:
                 yield RawBlock(shape.cell, nodes, (name,))
             continue
-        if not 0 <= side < len(shape.sides):
-            raise FileFormatError(
-                f"{block.card.file}: surface {name}: face {label}: expected S1 to "
-                f"S{len(shape.sides)} for {block.kind}"
-            )
-        chosen = nodes[:, shape.sides[side]]
+        error = partial(_wrong, f"{block.card.file}: surface {name}")
+        chosen = nodes[:, side_named(label, block.kind, shape, error)]
         dim = 2 if shape.cell.startswith(("tri", "quad")) else 3
         yield RawBlock(FACET_KIND[dim, chosen.shape[1]], chosen, (name,))

@@ -18,7 +18,7 @@ from .cards import Card, Row
 from .flat import Deck, at_element
 from .materials import Section
 from .scopes import Faces, Index
-from .shapes import SHAPES, side_of
+from .shapes import SHAPES, side_named
 
 Array = NDArray[np.float64]
 FACING = 0.3  # cosine from which normals of two facets face each other
@@ -92,16 +92,11 @@ class Region:
             for block_number in np.unique(self.block_of[elements]):
                 block = self.deck.blocks[block_number]
                 own = elements[self.block_of[elements] == block_number] - block.first
-                sides = SHAPES[block.kind].sides
-                if not label:
-                    out += [_facets(self.dim, block.nodes[own][:, side]) for side in sides]
-                    continue
-                side = side_of(label)
-                if side is None or not 0 <= side < len(sides):
-                    raise where.error(
-                        f"face {label}: expected S1 to S{len(sides)} for {block.kind}"
-                    )
-                out.append(_facets(self.dim, block.nodes[own][:, sides[side]]))
+                shape = SHAPES[block.kind]
+                sides = shape.sides if not label else (
+                    side_named(label, block.kind, shape, where.error),
+                )  # fmt: skip
+                out += [_facets(self.dim, block.nodes[own][:, side]) for side in sides]
 
     def covers(self, nodes: Index) -> bool:
         """Whether nodes are all those of some outer facets."""

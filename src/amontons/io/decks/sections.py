@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .cards import Card
 from .flat import Deck
 from .scopes import Faces, Index
-from .shapes import SHAPES, side_of
+from .shapes import SHAPES, side_named
 
 Array = NDArray[np.float64]
 
@@ -19,10 +19,8 @@ Array = NDArray[np.float64]
 def nodes_of(deck: Deck, elements: Index) -> Index:
     """All nodes of some elements."""
     found = [
-        block.nodes[elements[(elements >= block.first)
-                             & (elements < block.first + len(block.nodes))] - block.first]
-        for block in deck.blocks
-    ]  # fmt: skip
+        block.nodes[block.rows_of(elements)] for block in deck.blocks
+    ]
     return np.unique(np.concatenate([nodes.ravel() for nodes in found]))
 
 
@@ -31,13 +29,10 @@ def face_nodes(deck: Deck, faces: Faces, card: Card) -> Index:
     out = []
     for elements, label in faces:
         for block in deck.blocks:
-            inside = (elements >= block.first) & (elements < block.first + len(block.nodes))
-            own = elements[inside] - block.first
-            sides, side = SHAPES[block.kind].sides, side_of(label)
-            if len(own) and (side is None or not 0 <= side < len(sides)):
-                raise card.error(f"face {label}: expected S1 to S{len(sides)}")
-            if len(own) and side is not None:
-                out.append(block.nodes[own][:, sides[side]].ravel())
+            own = block.rows_of(elements)
+            if len(own):
+                side = side_named(label, block.kind, SHAPES[block.kind], card.error)
+                out.append(block.nodes[own][:, side].ravel())
     return np.unique(np.concatenate(out))
 
 

@@ -7,7 +7,7 @@ energy: there it is full, and `note` says so.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from ...core.words import near
@@ -104,6 +104,16 @@ def unread(kind: str, known: Iterable[str]) -> str:
     meant = "" if starts else near(kind, names)
     hint = f"; did you mean {meant}?" if meant else ""
     return f"elements of this type{what} are not read, expected {', '.join(names)}{hint}"
+
+
+def side_named(
+    label: str, kind: str, shape: Shape, error: Callable[[str], Exception]
+) -> tuple[int, ...]:
+    """Nodes of the side that a label names; raises what `error` makes of the words."""
+    side = side_of(label)
+    if side is None or not 0 <= side < len(shape.sides):
+        raise error(f"face {label}: expected S1 to S{len(shape.sides)} for {kind}")
+    return shape.sides[side]
 
 
 def side_of(label: str) -> int | None:

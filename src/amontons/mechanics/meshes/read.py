@@ -34,16 +34,9 @@ TAGS = ("gmsh:physical", "medit:ref", "cell_tags", "MaterialID", "region", "avsu
 
 
 def read_mesh(path: str | os.PathLike[str], *, glue: Glue = True) -> Mesh:
-    """The mesh in a file: gmsh 2.2 or 4.1, or any format that meshio reads.
+    """The mesh in a file of any format but decks, which `io.meshes.read_mesh` reads too.
 
-    Of second order too, with sides curved as in the file.
-    Groups of the highest dimension become regions, groups one dimension lower surfaces, also
-    named node sets (Abaqus NSET).  Groups without a name go by their number.  A mesh of plane
-    cells with constant z is a mesh in 2D.  Raises FileFormatError naming file and line.
-
-    Regions that share nodes are bonded.  glue=False takes them apart where they meet, so that
-    they can be in contact, glue={"joint": False} only along the surface joint; its sides are
-    then called joint-steel and joint-copper after the regions, see `meshes.split.split`.
+    Arguments, groups and errors are those of that function.
     """
     check_glue(glue)
     name = os.fspath(path)
