@@ -1,0 +1,8 @@
+"""Rigid bodies that move far: shapes, contact, joints, steps in time."""
+
+from .bodies import GROUND, Joint, RigidBodies, RigidBody
+from .moving import RigidState, RigidStep, at_start, evolve_rigid
+from .shapes import Ball, Polyhedron, cuboid
+
+__all__ = ["GROUND", "Ball", "Joint", "Polyhedron", "RigidBodies", "RigidBody", "RigidState",
+           "RigidStep", "at_start", "cuboid", "evolve_rigid"]  # fmt: skip

@@ -1,0 +1,273 @@
+"""The contact problem of rigid bodies in compiled passes: W, free velocities, impulses.
+
+A row k of contact c has the axis a_k, its normal or a tangent, and the arms s, m from the
+centres of mass of slave and master, so that
+
+    u_k = a_k . (v + omega x s)_slave - a_k . (v + omega x m)_master
+    W_ij = sum over the bodies b of both, s_i s_j (A_i A_j^T / m_b + B_i I_b^-1 B_j^T)
+
+with the rows A of axes and B of arm x axis, and the inertia I_b = R J R^T in global axes.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.compiled import njit
+from ...linear.blocks import BlockRows
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+STEPS = 30  # of Newton's method for a body that turns freely
+CLOSE = 1e-15  # relative change at which it ends
+
+
+class Rows(NamedTuple):
+    """Contacts and joints: bodies (n,), axes (n, 3, 3) by rows, arms (n, 3)."""
+
+    slave: Index
+    master: Index
+    axes: Array
+    arms: Array  # of the slave
+    master_arms: Array
+
+
+def frames_of(normals: Array) -> Array:
+    """Normal and two tangents, (n, 3, 3) by rows, right-handed."""
+    return _frames(normals)
+
+
+def delassus(rows: Rows, masses: Array, inverse: Array) -> BlockRows:
+    """W in block rows; masses (n,), inverse (n, 3, 3) of the inertia in global axes."""
+    indptr, count = _coupled(rows.slave, rows.master, len(masses))
+    indices, data = np.empty(count, np.int32), np.empty((count, 3, 3))
+    diagonal = np.empty(len(rows.slave), np.int32)
+    _blocks(*rows, masses, inverse, indptr, indices, data, diagonal)
+    for array in (indptr, indices, data, diagonal):
+        array.flags.writeable = False
+    return BlockRows(indptr, indices, data, diagonal)
+
+
+def velocities(rows: Rows, v: Array, omega: Array) -> Array:
+    """u (n, 3) of bodies that move with v and omega, (b, 3), in global axes."""
+    return _velocities(*rows, v, omega)
+
+
+def impulses(rows: Rows, r: Array, bodies: int) -> tuple[Array, Array]:
+    """Impulse and angular impulse about its centre of mass of each body, (b, 3)."""
+    return _impulses(*rows, r, bodies)
+
+
+@njit(cache=True, error_model="numpy")
+def _frames(normals):
+    out = np.empty((len(normals), 3, 3))
+    for i in range(len(normals)):
+        n = normals[i]
+        least = 0
+        for k in range(1, 3):
+            if abs(n[k]) < abs(n[least]):
+                least = k
+        helper = np.zeros(3)
+        helper[least] = 1.0
+        first = np.cross(n, helper)
+        first = first / np.sqrt((first * first).sum())
+        out[i, 0], out[i, 1], out[i, 2] = n, first, np.cross(n, first)
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def _of_bodies(slave, master, bodies):
+    """Contacts of each body: first (b + 1,), contacts in order."""
+    first = np.zeros(bodies + 1, np.int64)
+    for c in range(len(slave)):
+        first[slave[c] + 1] += 1
+        if master[c] >= 0:
+            first[master[c] + 1] += 1
+    for b in range(bodies):
+        first[b + 1] += first[b]
+    place, members = first.copy(), np.empty(first[bodies], np.int64)
+    for c in range(len(slave)):
+        members[place[slave[c]]] = c
+        place[slave[c]] += 1
+        if master[c] >= 0:
+            members[place[master[c]]] = c
+            place[master[c]] += 1
+    return first, members
+
+
+@njit(cache=True, error_model="numpy")
+def _coupled(slave, master, bodies):
+    """indptr (n + 1,) of the contacts that share a body, and how many blocks there are."""
+    first, members = _of_bodies(slave, master, bodies)
+    n = len(slave)
+    seen, indptr = np.full(n, -1, np.int64), np.zeros(n + 1, np.int32)
+    count = 0
+    for i in range(n):
+        for side in range(2):
+            b = slave[i] if side == 0 else master[i]
+            if b >= 0:
+                for k in range(first[b], first[b + 1]):
+                    j = members[k]
+                    if seen[j] != i:
+                        seen[j] = i
+                        count += 1
+        indptr[i + 1] = count
+    return indptr, count
+
+
+@njit(cache=True, error_model="numpy")
+def _blocks(  # noqa: PLR0913
+    slave, master, axes, arms, master_arms, masses, inverse, indptr, indices, data, diagonal
+):
+    """Fill the columns of each row in ascending order, and its blocks."""
+    n = len(slave)
+    first, members = _of_bodies(slave, master, len(masses))
+    turning = np.empty((2, n, 3, 3))  # arm x axis of slave and of master
+    for c in range(n):
+        for k in range(3):
+            turning[0, c, k] = np.cross(arms[c], axes[c, k])
+            turning[1, c, k] = np.cross(master_arms[c], axes[c, k])
+    seen = np.full(n, -1, np.int64)
+    for i in range(n):
+        at = indptr[i]
+        for side in range(2):
+            b = slave[i] if side == 0 else master[i]
+            if b < 0:
+                continue
+            for m in range(first[b], first[b + 1]):
+                j = members[m]
+                if seen[j] != i:
+                    seen[j] = i
+                    indices[at] = j
+                    at += 1
+        indices[indptr[i] : at] = np.sort(indices[indptr[i] : at])
+        for place in range(indptr[i], at):
+            j = indices[place]
+            block = data[place]
+            block[:] = 0.0
+            if i == j:
+                diagonal[i] = place
+            for p in range(2):
+                b = slave[i] if p == 0 else master[i]
+                if b < 0:
+                    continue
+                for s in range(2):
+                    other = slave[j] if s == 0 else master[j]
+                    if other != b:
+                        continue
+                    sign = 1.0 if p == s else -1.0
+                    own, its = turning[p, i], turning[s, j]
+                    for k in range(3):
+                        for e in range(3):
+                            moved = 0.0
+                            for d in range(3):
+                                moved += axes[i, k, d] * axes[j, e, d]
+                            moved = moved / masses[b]
+                            for d in range(3):
+                                spun = 0.0
+                                for f in range(3):
+                                    spun += inverse[b, d, f] * its[e, f]
+                                moved += own[k, d] * spun
+                            block[k, e] += sign * moved
+
+
+@njit(cache=True, error_model="numpy")
+def _velocities(slave, master, axes, arms, master_arms, v, omega):  # noqa: PLR0913
+    u = np.empty((len(slave), 3))
+    for c in range(len(slave)):
+        b = slave[c]
+        at = v[b] + np.cross(omega[b], arms[c])
+        if master[c] >= 0:
+            b = master[c]
+            at = at - v[b] - np.cross(omega[b], master_arms[c])
+        for k in range(3):
+            u[c, k] = (axes[c, k] * at).sum()
+    return u
+
+
+@njit(cache=True, error_model="numpy")
+def _impulses(slave, master, axes, arms, master_arms, r, bodies):  # noqa: PLR0913
+    push, turn = np.zeros((bodies, 3)), np.zeros((bodies, 3))
+    for c in range(len(slave)):
+        p = np.zeros(3)
+        for k in range(3):
+            p += r[c, k] * axes[c, k]
+        push[slave[c]] += p
+        turn[slave[c]] += np.cross(arms[c], p)
+        if master[c] >= 0:
+            push[master[c]] -= p
+            turn[master[c]] -= np.cross(master_arms[c], p)
+    return push, turn
+
+
+@njit(cache=True, error_model="numpy")
+def turned_freely(inertia, spin, h):
+    """Angular velocities (b, 3) in own axes after a step h without torque, from spin (b, 3).
+
+    J (W1 - W0) + h W x J W = 0 with the mean W of both, which keeps the energy exactly.
+    """
+    out = spin.copy()
+    for b in range(len(spin)):
+        J, before = inertia[b], spin[b]
+        after = before.copy()
+        for _ in range(STEPS):
+            mean = 0.5 * (before + after)
+            moment = J @ mean
+            rest = J @ (after - before) + h * np.cross(mean, moment)
+            slope = np.empty((3, 3))
+            for k in range(3):
+                unit = np.zeros(3)
+                unit[k] = 1.0
+                slope[:, k] = J[:, k] + 0.5 * h * (
+                    np.cross(unit, moment) + np.cross(mean, J[:, k])
+                )
+            change = np.linalg.solve(slope, rest)
+            after = after - change
+            if np.abs(change).max() <= CLOSE * np.abs(before).max():
+                break
+        out[b] = after
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def turned(orientation, angle):
+    """Quaternions (b, 4) times those of rotations by angle (b, 3), in own axes."""
+    out = np.empty_like(orientation)
+    for b in range(len(orientation)):
+        size = np.sqrt((angle[b] * angle[b]).sum())
+        half = 0.5 * size
+        factor = np.sin(half) / size if size > 1e-8 else 0.5 - size * size / 48
+        w, x, y, z = orientation[b]
+        c, i, j, k = (
+            np.cos(half),
+            factor * angle[b, 0],
+            factor * angle[b, 1],
+            factor * angle[b, 2],
+        )
+        q = np.array([
+            w * c - x * i - y * j - z * k, w * i + x * c + y * k - z * j,
+            w * j - x * k + y * c + z * i, w * k + x * j - y * i + z * c,
+        ])  # fmt: skip
+        out[b] = q / np.sqrt((q * q).sum())
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def rotations(orientation):
+    """Rotation matrices (b, 3, 3) of unit quaternions (b, 4)."""
+    out = np.empty((len(orientation), 3, 3))
+    for b in range(len(orientation)):
+        w, x, y, z = orientation[b]
+        out[b, 0, 0] = 1 - 2 * (y * y + z * z)
+        out[b, 0, 1] = 2 * (x * y - w * z)
+        out[b, 0, 2] = 2 * (x * z + w * y)
+        out[b, 1, 0] = 2 * (x * y + w * z)
+        out[b, 1, 1] = 1 - 2 * (x * x + z * z)
+        out[b, 1, 2] = 2 * (y * z - w * x)
+        out[b, 2, 0] = 2 * (x * z - w * y)
+        out[b, 2, 1] = 2 * (y * z + w * x)
+        out[b, 2, 2] = 1 - 2 * (x * x + y * y)
+    return out

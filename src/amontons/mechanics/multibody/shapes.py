@@ -1,0 +1,166 @@
+"""Shapes of rigid bodies: balls and convex polyhedra, with volume, centre and inertia.
+
+A polyhedron is cut into tetrahedra between its centre and triangles of its faces.  For one with
+vertices 0, a, b, c and volume V = det(a, b, c) / 6,
+
+    integral of x = V (a + b + c) / 4,
+    integral of x x^T = V / 20 (s s^T + a a^T + b b^T + c c^T),    s = a + b + c
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...core.arrays import finite, number
+from ...core.errors import InvalidInput, shown
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+FLAT = 1e-9  # volume, relative to that of the box around it, below which points lie in a plane
+COPLANAR = 1e-8  # difference of normals and, relative to the size, of offsets of one face
+
+
+class Facets(NamedTuple):
+    """Faces of a polyhedron: outward normals and offsets, normal . x = offset; loops."""
+
+    normals: Array  # (k, 3)
+    offsets: Array  # (k,)
+    loops: tuple[Index, ...]  # vertices of each, anticlockwise as seen from outside
+    edges: Index  # (e, 2), each once
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A ball around its centre of mass; radius in the unit of length."""
+
+    radius: float
+
+    def __post_init__(self) -> None:
+        if not number("radius", self.radius) > 0:
+            raise InvalidInput(f"expected a number > 0, got {self.radius!r}", ("radius",))
+
+    @property
+    def volume(self) -> float:
+        """Unit of length cubed."""
+        return 4 / 3 * np.pi * self.radius**3
+
+    @property
+    def centre(self) -> Array:
+        """The origin, (3,)."""
+        return np.zeros(3)
+
+    @property
+    def inertia(self) -> Array:
+        """About the centre of mass for a density of one, (3, 3)."""
+        return 0.4 * self.volume * self.radius**2 * np.eye(3)
+
+    @property
+    def reach(self) -> float:
+        """Radius of the ball around the centre of mass that holds it."""
+        return self.radius
+
+
+@dataclass(frozen=True, eq=False)
+class Polyhedron:
+    """The convex hull of points, (n, 3), in the unit of length and in axes of its own.
+
+    Raises InvalidInput where the points lie in a plane.
+    """
+
+    points: ArrayLike
+    _triangles: tuple[Index, Array] = field(init=False, repr=False)  # and their planes
+
+    def __post_init__(self) -> None:
+        from scipy.spatial import ConvexHull, QhullError
+
+        points = finite("points", self.points, 2)
+        if points.shape[1:] != (3,) or len(points) < 4:
+            raise InvalidInput(
+                f"expected four points or more in 3D, got shape {points.shape}", ("points",)
+            )
+        try:
+            hull = ConvexHull(points)
+        except QhullError:
+            hull = None
+        if hull is None or hull.volume < FLAT * np.prod(np.ptp(points, axis=0)):
+            raise InvalidInput("expected points that do not lie in a plane", ("points",))
+        corners = np.unique(hull.simplices)
+        object.__setattr__(self, "points", points[corners])
+        number_of = np.searchsorted(corners, hull.simplices)
+        object.__setattr__(self, "_triangles", (number_of, hull.equations))
+
+    @cached_property
+    def facets(self) -> Facets:
+        """Faces and edges: triangles of the hull in one plane are one face."""
+        triangles, equations = self._triangles
+        points = np.asarray(self.points)
+        size = np.ptp(points, axis=0).max()
+        left, faces = list(range(len(triangles))), []
+        while left:
+            normal, offset = equations[left[0], :3], equations[left[0], 3]
+            same = [t for t in left if np.abs(equations[t, :3] - normal).max() <= COPLANAR
+                    and abs(equations[t, 3] - offset) <= COPLANAR * size]  # fmt: skip
+            left = [t for t in left if t not in same]
+            faces.append((normal, -offset, np.unique(triangles[same])))
+        loops = tuple(_around(points, normal, corners) for normal, _, corners in faces)
+        pairs = [np.column_stack([loop, np.roll(loop, -1)]) for loop in loops]
+        edges = np.unique(np.sort(np.concatenate(pairs), axis=1), axis=0)
+        return Facets(np.array([f[0] for f in faces]), np.array([f[1] for f in faces]), loops,
+                      edges)  # fmt: skip
+
+    @cached_property
+    def _moments(self) -> tuple[float, Array, Array]:
+        """Volume, centre and the integral of x x^T about the centre."""
+        triangles, equations = self._triangles
+        points = np.asarray(self.points)
+        origin = points.mean(axis=0)
+        a, b, c = (points[triangles[:, k]] - origin for k in range(3))
+        volumes = np.abs(np.linalg.det(np.stack([a, b, c], axis=1))) / 6
+        s = a + b + c
+        volume = float(volumes.sum())
+        centre = (volumes[:, None] * s).sum(axis=0) / (4 * volume)
+        second = sum(np.einsum("t,ti,tj->ij", volumes, x, x) for x in (s, a, b, c)) / 20
+        return volume, origin + centre, second - volume * np.outer(centre, centre)
+
+    @property
+    def volume(self) -> float:
+        """Unit of length cubed."""
+        return self._moments[0]
+
+    @property
+    def centre(self) -> Array:
+        """Centre of mass in the axes of the points, (3,)."""
+        return self._moments[1]
+
+    @property
+    def inertia(self) -> Array:
+        """About the centre of mass for a density of one, (3, 3), in the axes of the points."""
+        second = self._moments[2]
+        return np.trace(second) * np.eye(3) - second
+
+    @property
+    def reach(self) -> float:
+        """Radius of the ball around the centre of mass that holds it."""
+        return float(np.linalg.norm(np.asarray(self.points) - self.centre, axis=1).max())
+
+
+def cuboid(sides: ArrayLike) -> Polyhedron:
+    """A box with three sides in the unit of length, its centre at the origin."""
+    lengths = finite("sides", sides, 1)
+    if lengths.shape != (3,) or not (lengths > 0).all():
+        raise InvalidInput(f"expected three lengths > 0, got {shown(sides)}", ("sides",))
+    corners = np.array(np.meshgrid(*[(-0.5, 0.5)] * 3, indexing="ij")).reshape(3, -1).T
+    return Polyhedron(corners * lengths)
+
+
+def _around(points: Array, normal: Array, corners: Index) -> Index:
+    """Corners of a face in order, anticlockwise about its normal."""
+    centred = points[corners] - points[corners].mean(axis=0)
+    first = centred[np.linalg.norm(centred, axis=1).argmax()]
+    second = np.cross(normal, first)
+    return corners[np.argsort(np.arctan2(centred @ second, centred @ first))]

@@ -1,0 +1,153 @@
+"""Shapes of rigid bodies, and where they meet."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+from scipy.spatial.transform import Rotation
+
+import amontons as am
+from amontons.mechanics.multibody import Ball, Polyhedron, RigidBodies, RigidBody, cuboid
+from amontons.mechanics.multibody.meeting import meetings
+
+
+def test_a_cuboid_has_volume_and_inertia_of_the_books():
+    shape = cuboid((2.0, 3.0, 4.0))
+    assert shape.volume == pytest.approx(24)
+    np.testing.assert_allclose(shape.centre, 0, atol=1e-14)
+    np.testing.assert_allclose(shape.inertia, 24 / 12 * np.diag([25, 20, 13]), atol=1e-12)
+    assert len(shape.facets.normals) == 6 and len(shape.facets.edges) == 12
+    assert all(len(loop) == 4 for loop in shape.facets.loops)
+
+
+def test_a_tetrahedron_has_its_moments_wherever_it_lies():
+    """Of the corner tetrahedron: volume 1/6, centre 1/4; second moments 1/60 and 1/120."""
+    corner = np.vstack([np.zeros(3), np.eye(3)])
+    shape = Polyhedron(corner + [5.0, -2.0, 1.0])
+    assert shape.volume == pytest.approx(1 / 6)
+    np.testing.assert_allclose(shape.centre, np.array([5.25, -1.75, 1.25]))
+    second = np.full((3, 3), 1 / 120) + np.eye(3) / 120 - np.full((3, 3), 1 / 96)
+    np.testing.assert_allclose(shape.inertia, np.trace(second) * np.eye(3) - second, atol=1e-14)
+
+
+def test_faces_look_outwards_and_turn_anticlockwise():
+    rng = np.random.default_rng(4)
+    shape = Polyhedron(rng.standard_normal((20, 3)))
+    facets, points = shape.facets, shape.points
+    for normal, offset, loop in zip(facets.normals, facets.offsets, facets.loops, strict=True):
+        assert (points @ normal <= offset + 1e-12).all()
+        a, b, c = points[loop[:3]]
+        assert np.cross(b - a, c - b) @ normal > 0
+
+
+@pytest.mark.parametrize("points", [np.zeros((3, 3)), np.eye(4)[:, :3] * [1, 1, 0]])
+def test_points_in_a_plane_are_refused(points):
+    with pytest.raises(am.InvalidInput, match="points"):
+        Polyhedron(points)
+
+
+def met(bodies, planes=(), near=1.0):
+    system = RigidBodies(bodies, planes)
+    x = np.array([b.position for b in bodies])
+    R = Rotation.from_quat(np.array([np.roll(b.orientation, -1) for b in bodies])).as_matrix()
+    return meetings(system.packed, x, np.ascontiguousarray(R), np.full(len(bodies), near / 2))
+
+
+def test_a_box_stands_on_a_plane_with_four_corners():
+    found = met([RigidBody(cuboid((1, 1, 2)), position=(0, 0, 1.1))], [am.Plane((0, 0, 1))])
+    np.testing.assert_allclose(np.sort(found.gaps), 0.1 * np.ones(4), atol=1e-14)
+    np.testing.assert_allclose(found.normals, np.tile([0, 0, 1.0], (4, 1)))
+    assert set(found.master) == {-1}
+
+
+def test_boxes_meet_in_the_corners_of_what_overlaps():
+    """One on the other, moved and turned: eight corners in an octagon, gaps alike."""
+    turn = (np.cos(np.pi / 8), 0, 0, np.sin(np.pi / 8))
+    lower = RigidBody(cuboid((2, 2, 1)))
+    upper = RigidBody(cuboid((2, 2, 1)), position=(0, 0, 1.05), orientation=turn)
+    found = met([lower, upper], near=0.2)
+    assert len(found.gaps) == 8
+    np.testing.assert_allclose(found.gaps, 0.05, atol=1e-14)
+    np.testing.assert_allclose(np.abs(found.normals[:, 2]), 1)
+    half = RigidBody(cuboid((1, 1, 1)), position=(1, 0, 1.05))
+    found = met([lower, half], near=0.2)
+    xs = np.sort(found.points[:, 0])
+    np.testing.assert_allclose(xs, [0.5, 0.5, 1, 1], atol=1e-12)
+
+
+def test_edges_that_cross_meet_in_a_point():
+    """Two boxes turned onto their edges, one across the other."""
+    r = 0.5 * np.sqrt(2)
+    along_x = Rotation.from_euler("x", 45, degrees=True).as_quat()
+    along_y = Rotation.from_euler("y", 45, degrees=True).as_quat()
+    lower = RigidBody(cuboid((4, 1, 1)), orientation=np.roll(along_x, 1))
+    upper = RigidBody(cuboid((1, 4, 1)), position=(0.3, -0.2, 2 * r + 0.01),
+                      orientation=np.roll(along_y, 1))  # fmt: skip
+    found = met([lower, upper], near=0.1)
+    assert len(found.gaps) == 1
+    assert found.gaps[0] == pytest.approx(0.01)
+    np.testing.assert_allclose(found.points[0], [0.3, 0, r + 0.005], atol=1e-9)
+    np.testing.assert_allclose(np.abs(found.normals[0]), [0, 0, 1], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("centre", "gap", "normal"),
+    [((0, 0, 1.2), 0.2, (0, 0, 1)), ((0.5 + 0.6, 0, 0.5 + 0.8), 0.5, (0.6, 0, 0.8)),
+     ((0.9, 0.9, 0.9), 0.4 * np.sqrt(3) - 0.5, np.ones(3) / np.sqrt(3)),
+     ((0, 0, 0.45), -0.55, (0, 0, 1))],
+)  # fmt: skip
+def test_a_ball_meets_a_box_on_a_face_an_edge_a_corner_and_inside(centre, gap, normal):
+    box, ball = RigidBody(cuboid((1, 1, 1))), RigidBody(Ball(0.5), position=centre)
+    found = met([box, ball], near=2.0)
+    assert len(found.gaps) == 1
+    assert found.gaps[0] == pytest.approx(gap)
+    np.testing.assert_allclose(found.normals[0], normal, atol=1e-12)
+    assert (found.slave[0], found.master[0]) == (1, 0)
+
+
+def overlap(first, second):
+    """Whether two clouds of points have a convex combination in common."""
+    n, m = len(first), len(second)
+    A = np.zeros((5, n + m))
+    A[:3, :n], A[:3, n:] = first.T, -second.T
+    A[3, :n], A[4, n:] = 1, 1
+    return linprog(np.zeros(n + m), A_eq=A, b_eq=[0, 0, 0, 1, 1], bounds=(0, None)).success
+
+
+@given(seed=st.integers(0, 10**6), distance=st.floats(0.3, 3.0))
+@settings(max_examples=60, deadline=None)
+def test_polyhedra_overlap_exactly_where_their_gap_is_negative(seed, distance):
+    rng = np.random.default_rng(seed)
+    shapes = [Polyhedron(rng.standard_normal((8, 3))) for _ in range(2)]
+    direction = rng.standard_normal(3)
+    direction *= distance / np.linalg.norm(direction)
+    bodies = [RigidBody(shapes[0], position=(0, 0, 0)),
+              RigidBody(shapes[1], position=direction,
+                        orientation=rng.standard_normal(4))]  # fmt: skip
+    clouds = [
+        (b.shape.points - b.shape.centre) @ Rotation.from_quat(
+            np.roll(b.orientation, -1)).as_matrix().T + b.position for b in bodies
+    ]  # fmt: skip
+    found = met(bodies, near=100.0)
+    gap = found.gaps.min()
+    if abs(gap) > 1e-7:
+        assert (gap < 0) == overlap(*clouds)
+    swapped = met(bodies[::-1], near=100.0)
+    assert swapped.gaps.min() == pytest.approx(gap, abs=5e-3 * distance + 5e-3)
+    # normals lead from the master into the slave
+    between = np.array([b.position for b in bodies])
+    apart = between[found.slave] - between[found.master]
+    if gap > 0.2:
+        assert ((found.normals * apart).sum(axis=1) > 0).all()
+
+
+def test_many_bodies_find_the_pairs_that_all_against_all_find():
+    rng = np.random.default_rng(0)
+    bodies = [RigidBody(Ball(0.3), position=p) for p in rng.uniform(0, 3, (60, 3))]
+    found = met(bodies, near=0.1)
+    x = np.array([b.position for b in bodies])
+    gaps = np.linalg.norm(x[:, None] - x, axis=2) - 0.6
+    expected = {(i, j) for i, j in zip(*np.nonzero(np.triu(gaps <= 0.1, 1)), strict=True)}
+    pairs = {(min(p), max(p)) for p in zip(found.slave, found.master, strict=True)}
+    assert pairs == {(int(i), int(j)) for i, j in expected}
