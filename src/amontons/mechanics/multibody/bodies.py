@@ -138,7 +138,7 @@ class RigidBodies:
                 raise InvalidInput(text, ("apart", k))
 
     def _is_body(self, number: object) -> bool:
-        return isinstance(number, int | np.integer) and 0 <= number < len(self.bodies)
+        return isinstance(number, int | np.integer) and 0 <= int(number) < len(self.bodies)
 
     def _check_joint(self, joint: Joint, at: tuple[str, int]) -> None:
         """Raise InvalidInput for a joint of what is no body, or of one with itself."""
