@@ -1,4 +1,4 @@
-"""Bodies that meet nothing: linear statics, held to exact answers and to contact that is open."""
+"""Bodies that meet nothing: linear statics, by exact answers and contact that is open."""
 
 import json
 
