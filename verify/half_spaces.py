@@ -185,7 +185,7 @@ CASES = (
          "at best only where mesh lines meet the edge, and 1 else."),
     Case("hertz-3d", "Hertz: ball on a block",
          "A ball of radius 1 is pressed on a block of the same material, meshes do not match.",
-         f"{JOHNSON}, eq. (4.22)", hertz_3d, (3, 4, 5), (8,), 1.0,
+         f"{JOHNSON}, eq. (4.22)", hertz_3d, (4, 5, 6), (8,), 1.0,
          "The block is 1.5 wide and deep (a = 0.11); the load is that computed."),
     Case("cattaneo-mindlin", "Cattaneo and Mindlin, with a reversal",
          "A cylinder is pressed, pushed to 0.7 of the friction limit and back to no force.",
