@@ -10,7 +10,7 @@ from verify.__main__ import CASES, main
 from verify.case import Case, Value, run
 
 
-@pytest.mark.parametrize("name", ["wedge", "slope", "wall"])
+@pytest.mark.parametrize("name", ["wedge", "slope", "wall", "keystone"])
 def test_cheap_cases_pass(name):
     outcome = run(replace(CASES[name], sizes=CASES[name].sizes[:1]))
     assert outcome.passed, [(v.name, v.error) for v in outcome.last]
@@ -23,6 +23,11 @@ def test_fracture_and_press_fit_come_closer_with_the_mesh():
         ("press-fit-3d", (2, 3)),
         ("capstan", (8, 16)),
         ("thermal-fit", (2, 4)),
+        ("cone", (4, 8)),
+        ("orthotropic", (6, 12)),
+        ("punch-friction", (8, 16)),
+        ("capped", (101, 201)),
+        ("pin", (16, 32)),
     ):
         outcome = run(replace(CASES[name], sizes=sizes))
         for value in outcome.last:
