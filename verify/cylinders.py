@@ -24,10 +24,12 @@ def lame(size: int) -> list[Value]:
     pressure = found.pressure
     mean = found.weights @ pressure / found.weights.sum()
     exact = _of_both(case)
-    largest = float(np.abs(pressure / exact - 1).max())
+    error = np.abs(pressure / exact - 1)
+    ends = (found.points < 1e-9).any(axis=1)
     return [
         Value("mean pressure, N/mm^2", mean, exact),
-        Value("pressure, largest error", largest, 0.0, 1.0, known=case.overlap),
+        Value("pressure, largest error between the ends", error[~ends].max(), 0.0, 1.0),
+        Value("pressure, error at the ends", error[ends].max(), 0.0, 1.0, known=case.overlap),
     ]
 
 
@@ -139,8 +141,11 @@ CASES = (
          "G. Lamé 1852; any book on elasticity", lame, (8, 16, 32), (64,), 2.0,
          "Plane strain, straight facets for arcs: order 2. Small strains keep the radii of "
          "both rings, which differ by half a percent, and so does the expected pressure. "
-         "At both ends half a percent of a node's area faces nothing: the largest error is "
-         "there."),
+         "At both ends the error is the overlap over the radius, 0.005, on any mesh: the last "
+         "facet is projected along its own normal, which leans off the plane of symmetry by "
+         "half an angle w of a facet, so that of the area w / 2 of the end node the part "
+         "0.005 w / 2 faces nothing, and what is left carries its force. With an overlap "
+         "of 0.0005 it is 0.0005; with the outer ring as slave it is 0.0004 at size 64."),
     Case("press-fit", "Press fit and push-out", PROBLEM, SOURCE, fit(1, 1.0), (4, 8, 16), (32,),
          1.0, REMARKS, HALF),
     Case("press-fit-nonmatching", "Press fit, meshes that do not match", PROBLEM, SOURCE,

@@ -26,7 +26,7 @@ def test_fracture_and_press_fit_come_closer_with_the_mesh():
         ("cone", (4, 8)),
         ("orthotropic", (6, 12)),
         ("punch-friction", (8, 16)),
-        ("capped", (101, 201)),
+        ("capped", (101, 401)),
         ("pin", (16, 32)),
     ):
         outcome = run(replace(CASES[name], sizes=sizes))
