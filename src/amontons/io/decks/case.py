@@ -357,7 +357,7 @@ def _model(
         if kind is NodalForce:
             loads.append(NodalForce(name, [value(c) for c in courses]))
         elif kind is Temperature:
-            loads.append(Temperature(value(courses), on=name))
+            loads.append(Temperature(value(courses), on=name, mean=True))
         elif kind is Pressure:
             loads.append(Pressure(name, value(courses)))
         else:
