@@ -78,16 +78,20 @@ def approach_of(side: Side, young: float, force: float) -> tuple[float, float]:
     friction shears, mu times the latter.  force: the largest at any node of the model, to tell
     what carries load.
     """
-    total = float(np.maximum(side.r[:, 0], 0.0).sum())
-    pressed = _pressed(side, force)
+    tied = bool(side.law.tied.any())
+    carried = np.linalg.norm(side.r, axis=1) if tied else np.maximum(side.r[:, 0], 0.0)
+    total = float(carried.sum())
+    pressed = carried > NOTHING * force if tied else _pressed(side, force)
     if not pressed.any() or not total > 0:
         return float(np.abs(side.start_flat - side.flat).max(initial=0.0)), 0.0
     area = float(side.weight[pressed].sum())
     d = side.points.shape[1]
     size = float(np.ptp(side.points[pressed], axis=0).max(initial=0.0))
     size = max(size, float(area ** (1.0 / (d - 1))))
-    closing = float(np.abs(side.start_flat - side.flat)[pressed].max(initial=0.0))
     deep = total / area * size / young
+    if tied:  # a bond closes nothing
+        return deep, 0.0
+    closing = float(np.abs(side.start_flat - side.flat)[pressed].max(initial=0.0))
     bound = float(side.law.bound(side.r)[pressed].sum()) / total
     return max(closing, deep), bound * deep
 
@@ -133,9 +137,9 @@ def seen(  # noqa: PLR0913
     best = "points" if shares["points"] <= FAIR else best
     gap = views[best]
     deck = min(_pressing(normal, g + soft_gap, side.blur, scale) for g in views.values())
-    lost, hard = _missing(r, bound, slip, rubs, sheared)
+    lost, hard = _missing(side, bound, slip, rubs, sheared)
     elastic = slip + give.shear * r[:, 1:] / weight[:, None]
-    soft = _missing(r, bound, elastic, rubs, sheared)[1]
+    soft = _missing(side, bound, elastic, rubs, sheared)[1]
     why = _statuses(side, (pressed, bound, gap), (push, slip, lost, rubs), (approach, sheared))
     bad = why != ""
     carried = np.maximum(normal, total / max(len(normal), 1))
@@ -158,15 +162,34 @@ def _pressing(normal: Array, gap: Array, blur: Array, scale: float) -> float:
 
 
 def _missing(
-    r: Array, bound: Array, slip: Array, rubs: Mask, sheared: float
+    side: Side, bound: Array, slip: Array, rubs: Mask, sheared: float
 ) -> tuple[Array, float]:
     """Work that friction should have taken, as a length of each contact; their share."""
     length = np.linalg.norm(slip, axis=1)
-    work = np.maximum(bound * length + (r[:, 1:] * slip).sum(axis=1), 0.0) * rubs
+    work = np.maximum(bound * length + (side.r[:, 1:] * slip).sum(axis=1), 0.0) * rubs
     able = (bound > 0) & rubs
     lost = np.where(able, work / np.where(able, bound, 1.0), 0.0)
     longest = float(length[able].max(initial=0.0))
-    return lost, _over(float(work.sum()), float(bound[able].sum()) * max(longest, sheared))
+    left = np.maximum(work - bound * _unsettled(side, slip, bound), 0.0)
+    return lost, _over(float(left.sum()), float(bound[able].sum()) * max(longest, sheared))
+
+
+def _unsettled(side: Side, slip: Array, bound: Array) -> Array:
+    """Slip (nc,) without friction that an average may have where its facets slip in part.
+
+    Half a patch that sticks without friction, and half that slips twice the mean against all of
+    it: a quarter of how slip varies over the patch.  None where all neighbours slip that way,
+    or friction is nowhere near its bound.
+    """
+    length = np.linalg.norm(slip, axis=1)
+    moved = np.einsum("pk,pkc->pc", slip, side.frame[:, 1:])
+    way = moved / np.where(length > 0, length, 1.0)[:, None]
+    own, other = side.around.nonzero()
+    least = length.copy()
+    np.minimum.at(least, own, (way[own] * moved[other]).sum(axis=1))
+    full = np.linalg.norm(side.r[:, 1:], axis=1) >= (1 - RATIO) * bound
+    near = side.around @ full > 0
+    return np.where((least < AWAY * length) & near, (length - least) / 4.0, 0.0)
 
 
 def _statuses(

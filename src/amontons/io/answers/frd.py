@@ -24,6 +24,7 @@ DIGITS = 6
 MOST = 6  # values in one line
 MODEL, NODES, ELEMENTS = "    1C", "    2C", "    3C"
 RESULT, NAME = "  100C", " -4"
+PROGRAM, CALCULIX = "    1UPGM", "CalculiX"
 BINARY = ("2", "3")
 
 
@@ -40,13 +41,14 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """Nodes with their points (n, 3), blocks in their order, nodes of elements."""
+    """Nodes with points (n, 3), blocks in their order, nodes of elements, who wrote it."""
 
     path: Path
     labels: Index
     points: Array
     blocks: list[Block] = field(default_factory=list)
     elements: dict[int, list[int]] = field(default_factory=dict)
+    program: str = ""
 
     def named(self, name: str) -> list[Block]:
         """All blocks of a name; raises FileFormatError that tells what there is without one."""
@@ -69,16 +71,18 @@ def read_frd(path: Path) -> Results:
             f"{path}: expected results of CalculiX (.frd), whose first line begins with 1C"
         )
     found: Results | None = None
-    at, time, step = 0, 0.0, 0
+    at, time, step, program = 0, 0.0, 0, ""
     blocks: list[Block] = []
     while at < len(lines):
         line = lines[at]
         if line.startswith(NODES):
             _check_text(path, at, line)
             at, labels, points = _table(path, lines, at + 1, 3)
-            found = Results(path, labels, points, blocks)
+            found = Results(path, labels, points, blocks, program=program)
         elif line.startswith(ELEMENTS) and found is not None:
             at = _elements(path, lines, at + 1, found.elements)
+        elif line.startswith(PROGRAM):
+            program, at = line[len(PROGRAM) :].strip(), at + 1
         elif line.startswith("    1PSTEP"):
             step, at = _whole(line[48:60]), at + 1
         elif line.startswith(RESULT):
