@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from dataclasses import replace
 
 import pytest
 
@@ -71,9 +72,12 @@ def ring(order: int) -> am.Model:
 @pytest.mark.parametrize("suffix", ["frd", "dat"])
 def test_means_that_calculix_takes_over_its_sector_are_taken_back(order, suffix, tmp_path):
     found = audited_of_calculix(ring(order), tmp_path, suffix, penalty=1e9)
-    balance = found.findings["balance"]
-    assert found.verdict == "right", str(found)
-    assert balance.numbers["residual"] < 1e-3
+    right = {name for name, each in found.findings.items() if each.verdict.value == "right"}
+    assert right >= {"balance", "penetration", "cone", "geometry", "time"}, str(found)
+    assert found.findings["balance"].numbers["residual"] < 1e-3
+    status = found.findings["status"]
+    if order == 1:  # its facets are flat over the sector: closing makes points slip across
+        assert status.verdict.value == "wrong" and "along them by 0.00021" in status.text
 
 
 LAWS = {"mu": 0.3}, {"mu": 0.0}, {"tied": True}
@@ -104,3 +108,42 @@ def test_only_what_calculix_printed_is_taken_back(tmp_path):
         found = am.audit(tmp_path / "model.inp", tmp_path / f"model.{suffix}")
         assert found.is_right, str(found)
         assert found.findings["balance"].numbers["residual"] < 2e-4  # .frd has six digits
+
+
+def test_friction_that_is_missing_around_an_axis_is_missed():
+    model = ring(1)
+    smooth = am.solve(replace(model, contacts=(replace(model.contacts[0], mu=0.0),)))
+    found = am.audit(model, smooth.displacement, digits=6)
+    assert found.findings["status"].verdict.value == "wrong", str(found)
+
+
+def test_what_only_pulls_is_not_right():
+    """A bond that is judged as contact: nothing presses, and all pulls."""
+    tied = am.solve(stacked(motion=(0.05, 0.0, 0.1), tied=True))
+    found = am.audit(stacked(motion=(0.05, 0.0, 0.1)), tied.displacement)
+    assert found.findings["cone"].verdict.value == "wrong"
+    assert found.findings["cone"].numbers["tension"] == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("contact", [{"tied": True}, {"mu": 0.3}])
+def test_a_body_that_is_stiffer_than_said_is_found_at_its_contact(contact):
+    """All its forces are off by one factor: they balance within it, not across the contact."""
+    motion = (0.05, 0.0, 0.1 if "tied" in contact else -0.1)
+    solution = am.solve(stacked(motion=motion, **contact))
+    low, high = solution.model.bodies
+    stiffer = replace(high, material=am.LinearElastic(1050.0, 0.3))
+    model = replace(solution.model, bodies=(low, stiffer))
+    balance = am.audit(model, solution.displacement).findings["balance"]
+    assert balance.verdict.value == "wrong" and "both sides" in balance.text
+    assert balance.numbers["between_sides"] == pytest.approx(0.05, rel=0.2)
+
+
+@CALCULIX
+@pytest.mark.parametrize("slope", [1e3, 1e4])
+def test_a_stick_slope_that_creeps_is_named_and_right_where_it_is_meant(slope, tmp_path):
+    model = stacked(mu=0.3, stick_stiffness=slope)
+    found = audited_of_calculix(model, tmp_path, "frd", penalty=1e5)
+    status = found.findings["status"]
+    assert status.verdict.value == "wrong" and "the deck's stick slope explains" in status.text
+    own = am.audit(tmp_path / "model.inp", tmp_path / "model.frd", law="own")
+    assert own.verdict == "right", str(own)

@@ -52,8 +52,8 @@ class Side:
     displacements are its transpose times those of the model.  law: that of these contacts.
     start_points (nc,): gap of the node itself to the facet before it at zero displacement;
     points_gap (nc,): the smallest one now at points around each.  around (nc, nc): which
-    contacts have a facet in common.  nodal: of all nodes of the surface, points (n, d) and
-    forces (n, d); None where supports or other pairs act on one too.
+    contacts have a facet in common.  turned: around an axis.  nodal: of all nodes of the
+    surface, points (n, d) and forces (n, d); None where supports or other pairs act on one.
     """
 
     contact: Contact
@@ -75,6 +75,7 @@ class Side:
     start_points: Array
     points_gap: Array
     around: sparse.csr_array
+    turned: bool
     nodal: tuple[Array, Array] | None = None
 
     @property
@@ -186,7 +187,7 @@ def _side(
         np.einsum("pkc,pc->pk", np.abs(rows.frames), blur), start + local[:, 0],
         flat + local[:, 0], local[:, 1:], blurred, start, flat, placed.H,
         law_of([contact], replace(parts, placed=(placed,))), *at_points,
-        _around(model, contact, rows.nodes),
+        _around(model, contact, rows.nodes), model.bodies[placed.body].mesh.axisymmetric,
         _on_surface(model, contact, moved[1].reshape(-1, d), forces),
     )  # fmt: skip
 
