@@ -139,7 +139,7 @@ def test_a_body_that_is_stiffer_than_said_is_found_at_its_contact(contact):
 
 
 @CALCULIX
-@pytest.mark.parametrize("slope", [1e3, 1e4])
+@pytest.mark.parametrize("slope", [5e2, 1e3])
 def test_a_stick_slope_that_creeps_is_named_and_right_where_it_is_meant(slope, tmp_path):
     model = stacked(mu=0.3, stick_stiffness=slope)
     found = audited_of_calculix(model, tmp_path, "frd", penalty=1e5)
