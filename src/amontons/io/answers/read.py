@@ -130,7 +130,7 @@ def _tables(path: Path, suffix: str, case: Case) -> list[Table]:
                   [:, : points.shape[1]], about, printed))
             for block in dat.read_dat(path)
         ]  # fmt: skip
-    found = frd.read_frd(path)
+    found = frd.read_frd(path, only="DISP")
     blocks = found.named("DISP")
     if about is not None and (about.plane or not about.are_unique):
         return _by_place(path, found, blocks, points, about)
