@@ -263,7 +263,7 @@ def _pair(
     give = Give(*(_inverse(contact.numbers.get(name)) for name in
                   ("stiffness", "stick_stiffness")), meant=deck_law)  # fmt: skip
     found: list[Seen] = []
-    for side in sides:
+    for side in [one for one in sides if len(one.node)] or sides:  # one that is held tells none
         slip = side.slip if before is None else side.slip - side.slip_of(before)
         one = seen(side, give, approach, sheared, slip, scale)
         if before is not None and answer.one_way:  # both are histories of one straight way
