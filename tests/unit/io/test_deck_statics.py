@@ -1,9 +1,13 @@
 """Decks without contact: statics, by exact values; options and delays of what loads them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import amontons as am
+from amontons.mechanics.elements.elasticity import body_load
+from amontons.mechanics.meshes import second_order
 from tests.unit.io.test_decks import case_of
 
 BRICK = """*NODE, NSET=NALL
@@ -164,3 +168,15 @@ def test_a_turn_that_grows_over_time(tmp_path):
 def test_an_axis_needs_a_point_and_a_direction(tmp_path, line):
     with pytest.raises(am.FileFormatError, match="CENTRIF: expected.*a point and a direction"):
         case_of(tmp_path, loaded(f"EALL, {line}"))
+
+
+def test_reduced_integration_holds_for_loads_in_bodies_too():
+    """On a curved cell they are other numbers; the sum is that of the points' volume."""
+    mesh = replace(am.box((1, 1), 1, origin=(1, 0)), axisymmetric=True)
+    cells = second_order(mesh, serendipity=True)
+    less = tuple(replace(c, integration="reduced") for c in cells.cells)
+    reduced = replace(cells, cells=less)
+    force = np.stack([cells.points[:, 0] ** 2, 0 * cells.points[:, 0]], axis=1)
+    full, less = body_load(cells, force), body_load(reduced, force)
+    assert np.abs(full - less).max() > 1e-3 * np.abs(full).max()
+    np.testing.assert_allclose(less.sum(axis=0), full.sum(axis=0), rtol=2e-3)

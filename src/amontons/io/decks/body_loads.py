@@ -46,12 +46,13 @@ def body_force(
     """The load of a region; the course has the density in it; value: of a course at a time."""
     if len(way) == 1:
         return BodyForce([value(scaled(course, w)) for w in way[0][:dim]], region=region)
-    (point, axis), size = way, value(course)
+    point, axis = way
+    size: Any = value(course)
     across = np.eye(COMPONENTS) - np.outer(axis, axis)
 
     def away(x: Array) -> Array:
         return (across[:, :dim] @ x - across @ point)[:dim]
 
-    if callable(size):
-        return BodyForce(lambda x, t: size(x, t) * away(x), region=region)
-    return BodyForce(lambda x: size * away(x), region=region)
+    if isinstance(size, float):
+        return BodyForce(lambda x: size * away(x), region=region)
+    return BodyForce(lambda x, t: size(x, t) * away(x), region=region)
