@@ -100,8 +100,9 @@ class StoredMatrices:
 def read_matrices(path: str | os.PathLike[str]) -> StoredMatrices:
     """The matrices that CalculiX has stored: path of the .sti, .mas or .dof, or of the deck.
 
-    The .sti and the .dof have to be there, the .mas may be; one of zeros is none.  Raises FileFormatError naming
-    file and line of what is missing, can not be read, or belongs to another run.
+    The .sti and the .dof have to be there, the .mas may be; one of zeros is none.  Raises
+    FileFormatError naming file and line of what is missing, can not be read, or belongs to
+    another run.
     """
     given = Path(path)
     node, axis = _dofs(given.with_suffix(ROWS))
