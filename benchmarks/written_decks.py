@@ -29,7 +29,7 @@ Regenerate: `python benchmarks/written_decks.py`.
 u: largest difference of displacements over the largest displacement, with CalculiX' own hard
 contact, 50 E; "100 K": with contact a hundred times as stiff; "deck": CalculiX beside our own
 answer to the deck as it was written, with its stiffness and slope of sticking; "deck, finer":
-the same on half the mesh width. "audit": what `amontons audit --law own` says of CalculiX' answer:
+the same on half the mesh width. "audit": what `amontons audit --law own` says of it:
 where two answers differ and both are right, the problem has several solutions.
 Where contact carries load, CalculiX sums it up in points of the slave's facets and we as mortar
 averages; that difference falls with the mesh. It takes the mean temperature of each brick.
@@ -227,7 +227,8 @@ def as_written(model, path, program):
 
 def audited(path):
     """The first line of the audit of the .frd beside the deck."""
-    done = CliRunner().invoke(command, ["audit", str(path), str(path.with_suffix(".frd")), "--law", "own"])
+    files = [str(path), str(path.with_suffix(".frd"))]
+    done = CliRunner().invoke(command, ["audit", *files, "--law", "own"])
     return done.output.splitlines()[0].rsplit(":", 1)[-1].strip() if done.output else "?"
 
 
