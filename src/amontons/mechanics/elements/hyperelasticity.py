@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +22,21 @@ from scipy import sparse
 
 from ...core.errors import InvalidInput, InvertedCells
 from ...core.words import helpful
-from ..meshes.cells import CELLS, ReferenceCell
+from ..meshes.cells import CELLS
 from ..meshes.check import determinant
-from ..meshes.linear_cells import Rule
+from ..meshes.facets import Cells
 from ..meshes.mesh import Mesh
 from .cell_loops import energy_of, forces_inplace, tangent_inplace
-from .elasticity import Isotropic, LinearElastic, geometry_of, materials_by_region
+from .cell_matrices import rule_of
+from .elasticity import (
+    Isotropic,
+    LinearElastic,
+    cell_stress,
+    geometry_of,
+    materials_by_region,
+)
+from .hybrid import averaged, curvature, element_formulation, volume_modes
+from .hybrid_loops import volume_ratios_inplace, volume_terms_inplace
 from .pattern import node_pattern
 
 Array = NDArray[np.float64]
@@ -35,9 +45,16 @@ Array = NDArray[np.float64]
 class _Family(Isotropic):
     """What all members of the family have."""
 
+    finite: ClassVar[bool] = True
+
     @property
     def coefficients(self) -> tuple[float, float, float, float, float]:
         """a, b, c, d, e of the family, unit of stress."""
+        raise NotImplementedError
+
+    @property
+    def shape_coefficients(self) -> tuple[float, float, float, float, float]:
+        """The same without the volume term of hybrid cells."""
         raise NotImplementedError
 
     def stress(self, gradient: Array) -> Array:
@@ -45,12 +62,21 @@ class _Family(Isotropic):
 
         Raises InvertedCells where J <= 0.
         """
+        return self._cauchy(gradient, self.coefficients)
+
+    def shape_stress(self, gradient: Array) -> Array:
+        """`stress` without that of the volume term of hybrid cells."""
+        return self._cauchy(gradient, self.shape_coefficients)
+
+    def _cauchy(
+        self, gradient: Array, coefficients: tuple[float, float, float, float, float]
+    ) -> Array:
         dim = gradient.shape[1]
         F = np.tile(np.eye(3), (len(gradient), 1, 1))
         F[:, :dim, :dim] += gradient
         J = np.linalg.det(F)
         _check(float(J.min(initial=np.inf)))
-        a, b, c, d, e = self.coefficients
+        a, b, c, d, e = coefficients
         B = F @ F.swapaxes(1, 2)
         trace = np.trace(B, axis1=1, axis2=2)[:, None, None]
         g = (2 * c * J**2 - d + e * np.log(J))[:, None, None]
@@ -76,6 +102,16 @@ class NeoHookean(_Family):
     def coefficients(self) -> tuple[float, float, float, float, float]:
         """a, b, c, d, e of the family, unit of stress."""
         return self.shear / 2, 0.0, 0.0, self.shear, self.lame_lambda()
+
+    @property
+    def shape_coefficients(self) -> tuple[float, float, float, float, float]:
+        """The same without the volume term of hybrid cells."""
+        return self.shear / 2, 0.0, 0.0, self.shear, 0.0
+
+    def volume(self, J: Array) -> tuple[Array, Array, Array]:
+        """U = lame_lambda / 2 (ln J)^2, U' and U'' of J > 0 of any shape."""
+        log, lame = np.log(J), self.lame_lambda()
+        return lame / 2 * log**2, lame * log / J, lame * (1 - log) / J**2
 
 
 @helpful
@@ -134,6 +170,18 @@ class CiarletGeymonat(_Family):
         quarter = self.lame_lambda() / 4
         return a, half - a, quarter - half + a, 2 * quarter + 2 * half, 0.0
 
+    @property
+    def shape_coefficients(self) -> tuple[float, float, float, float, float]:
+        """The same without the volume term of hybrid cells."""
+        a, half = float(self.a), self.shear / 2  # type: ignore[arg-type]
+        return a, half - a, a - half, 2 * half, 0.0
+
+    def volume(self, J: Array) -> tuple[Array, Array, Array]:
+        """U = lame_lambda / 4 (J^2 - 1 - 2 ln J), U' and U'' of J > 0 of any shape."""
+        half = self.lame_lambda() / 2
+        energy = half / 2 * (J**2 - 1 - 2 * np.log(J))
+        return energy, half * (J - 1 / J), half * (1 + 1 / J**2)
+
 
 Hyperelastic = NeoHookean | CiarletGeymonat
 
@@ -164,37 +212,38 @@ class HyperelasticBody:
                 )
         self.pointers, self.columns = node_pattern(mesh.cells, len(mesh.points))
         self._unit = (1.0,) * mesh.dim
-        self._blocks = [
-            (geometry_of(mesh, cells, _rule(CELLS[cells.kind])),
-             np.array(laws[cells.region].coefficients))  # type: ignore[attr-defined]
-            for cells in mesh.cells
-        ]  # fmt: skip
+        self._blocks = [_Block(mesh, cells, laws[cells.region]) for cells in mesh.cells]
 
     def forces(self, u: Array) -> Array:
         """Nodal forces (n, dim) that hold the displacements u (n, dim): dE/du."""
         u = np.ascontiguousarray(u, dtype=float)
         out = np.zeros_like(u)
-        for geometry, law in self._blocks:
-            _check(forces_inplace(u, *geometry, law, out, self._unit))
+        for block in self._blocks:
+            held = block.pressures(u)[0]
+            _check(forces_inplace(u, *block.geometry, block.numbers, held, out, self._unit))
         return out
 
     def tangent(self, u: Array) -> tuple[Array, Array]:
         """(forces (n, dim), blocks (m, dim, dim) of the derivative by u)."""
         u = np.ascontiguousarray(u, dtype=float)
-        dim = u.shape[1]
+        dim, pattern = u.shape[1], (self.pointers, self.columns)
         out, blocks = np.zeros_like(u), np.zeros((len(self.columns), dim, dim))
-        for geometry, law in self._blocks:
-            _check(tangent_inplace(u, *geometry, law, self.pointers, self.columns, out, blocks,
-                                   self._unit))  # fmt: skip
+        for block in self._blocks:
+            held, bulk, _ = block.pressures(u)
+            _check(tangent_inplace(u, *block.geometry, block.numbers, held, *pattern, out,
+                                   blocks, self._unit))  # fmt: skip
+            if bulk is not None:
+                volume_terms_inplace(u, *block.geometry, block.modes, bulk, *pattern, blocks,
+                                     self._unit)  # fmt: skip
         return out, blocks
 
     def unit_forces(self) -> Array:
         """Sizes of nodal forces (n,) where stresses are as large as moduli, for rounding."""
         out = np.zeros(len(self.mesh.points))
-        for cells, (_, law) in zip(self.mesh.cells, self._blocks, strict=True):
+        for cells, block in zip(self.mesh.cells, self._blocks, strict=True):
             cell, coordinates = CELLS[cells.kind], self.mesh.points[cells.nodes]
-            modulus = law @ [2, 4, 4, 1, 1]
-            for at, weight in zip(*_rule(cell), strict=True):
+            modulus = np.array(block.law.coefficients) @ [2, 4, 4, 1, 1]
+            for at, weight in zip(*rule_of(self.mesh, cells, finite=True), strict=True):
                 volume = weight * determinant(cell.jacobians(coordinates, at))
                 sizes = np.linalg.norm(cell.gradients(coordinates, at), axis=2)
                 np.add.at(out, cells.nodes, modulus * sizes * volume[:, None])
@@ -209,22 +258,44 @@ class HyperelasticBody:
         """Stored energy at displacements u (n, dim), unit of work; zero at rest."""
         u = np.ascontiguousarray(u, dtype=float)
         total = 0.0
-        for geometry, law in self._blocks:
-            part, least = energy_of(u, *geometry, law, self._unit)
+        for block in self._blocks:
+            part, least = energy_of(u, *block.geometry, block.numbers, self._unit)
             _check(least)
-            total += part
+            total += part + block.pressures(u)[2]
         return total
+
+
+class _Block:
+    """Cells of one law: what the loops take, and the pressures of hybrid cells."""
+
+    def __init__(self, mesh: Mesh, cells: Cells, law: Hyperelastic) -> None:
+        rule = rule_of(mesh, cells, finite=True)
+        self.law, self.geometry = law, geometry_of(mesh, cells, rule)
+        self.hybrid = element_formulation(mesh, cells, law) == "hybrid"
+        self.numbers = np.array(law.shape_coefficients if self.hybrid else law.coefficients)
+        self._none = np.zeros((0, len(rule[1])))
+        if self.hybrid:
+            self.modes, self._volumes = volume_modes(mesh, cells, rule)
+
+    def pressures(self, u: Array) -> tuple[Array, Array | None, float]:
+        """Pressures (k, q), N (k, M, M) of `hybrid` and energy of the volume term; or none."""
+        if not self.hybrid:
+            return self._none, None, 0.0
+        J = np.empty_like(self._volumes)
+        volume_ratios_inplace(u, *self.geometry, J, (1.0,) * u.shape[1])
+        _check(float(J.min(initial=np.inf)))
+        theta = averaged(self.modes, self._volumes, J)
+        _check(float(theta.min(initial=np.inf)))
+        energy, slope, bend = self.law.volume(theta)
+        return (averaged(self.modes, self._volumes, slope),
+                curvature(self.modes, self._volumes, bend),
+                float((self._volumes * energy).sum()))  # fmt: skip
 
 
 def _check(least: float) -> None:
     """Raise InvertedCells where J is not positive (or not a number)."""
     if not least > 0:
         raise InvertedCells(f"cells are inverted: the least det F is {least:.3g}")
-
-
-def _rule(cell: ReferenceCell) -> Rule:
-    """First order: as the stiffness; second: more, the laws are no polynomials."""
-    return cell.stiffness if cell.order == 1 else cell.gauss
 
 
 def cauchy_stress(
@@ -234,11 +305,4 @@ def cauchy_stress(
 
     displacement (n, dim); raises InvertedCells where J <= 0.
     """
-    laws = materials_by_region(mesh, material)  # type: ignore[arg-type]
-    parts = []
-    for cells in mesh.cells:
-        cell = CELLS[cells.kind]
-        slopes = cell.gradients(mesh.points[cells.nodes], cell.centre)
-        gradient = np.einsum("kac,kad->kcd", displacement[cells.nodes], slopes)
-        parts.append(laws[cells.region].stress(gradient))  # type: ignore[attr-defined]
-    return np.concatenate(parts)
+    return cell_stress(mesh, material, displacement)  # type: ignore[arg-type]
