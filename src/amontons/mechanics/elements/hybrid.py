@@ -86,7 +86,9 @@ def volume_modes(
     where = rule[0] if at is None else at
     if powers_of(cells.kind, mesh.dim) == 1:
         total = volumes.sum(axis=1)[:, None, None]
-        return np.repeat(1 / np.sqrt(total), len(where), axis=2), volumes
+        constant = np.empty((len(volumes), 1, len(where)))
+        constant[:] = 1 / np.sqrt(total)
+        return constant, volumes
     places = places_of(mesh, cells, rule[0])
     middle = places.mean(axis=1, keepdims=True)
     size = np.abs(places - middle).max(axis=(1, 2))[:, None, None]
@@ -98,7 +100,7 @@ def volume_modes(
     upper = np.linalg.qr(powers(places) * np.sqrt(volumes)[:, :, None])[1]
     taken = powers(places if at is None else places_of(mesh, cells, at))
     basis = np.linalg.solve(np.swapaxes(upper, 1, 2), np.swapaxes(taken, 1, 2))
-    return np.ascontiguousarray(basis), volumes
+    return np.ascontiguousarray(basis, dtype=float), volumes
 
 
 def averaged(modes: Array, volumes: Array, values: Array, at: Array | None = None) -> Array:

@@ -21,6 +21,25 @@ def volume_ratios_inplace(u, points, nodes, slopes, weights, out, unit):
 
 
 @njit(cache=True, error_model="numpy")
+def volume_slopes_inplace(u, du, points, nodes, slopes, weights, out, unit):
+    """Derivative of J by displacements du (n, dim) into out (k, q), at displacements u."""
+    dim = len(unit)
+    F, H, jac, _, _ = _matrices()
+    G = np.zeros((dim, nodes.shape[1]))
+    for k in range(len(nodes)):
+        for q in range(len(weights)):
+            _gradients(points, nodes[k], slopes[q], jac, H, G, unit)
+            _deformation(u, nodes[k], G, F, unit)
+            J = _inverse_transposed(F, H, unit)
+            value = 0.0
+            for a in range(len(nodes[k])):
+                for i in range(dim):
+                    for m in range(dim):
+                        value += H[i, m] * G[m, a] * du[nodes[k, a], i]
+            out[k, q] = J * value
+
+
+@njit(cache=True, error_model="numpy")
 def volume_terms_inplace(
     u, points, nodes, slopes, weights, modes, curvature, pointers, columns, out, unit
 ):

@@ -12,7 +12,7 @@ Cambridge 2008, section 6.4.3.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -36,7 +36,11 @@ from .elasticity import (
     materials_by_region,
 )
 from .hybrid import averaged, curvature, element_formulation, volume_modes
-from .hybrid_loops import volume_ratios_inplace, volume_terms_inplace
+from .hybrid_loops import (
+    volume_ratios_inplace,
+    volume_slopes_inplace,
+    volume_terms_inplace,
+)
 from .pattern import node_pattern
 
 Array = NDArray[np.float64]
@@ -214,28 +218,67 @@ class HyperelasticBody:
         self._unit = (1.0,) * mesh.dim
         self._blocks = [_Block(mesh, cells, laws[cells.region]) for cells in mesh.cells]
 
-    def forces(self, u: Array) -> Array:
-        """Nodal forces (n, dim) that hold the displacements u (n, dim): dE/du."""
+    @property
+    def keeps_volume(self) -> bool:
+        """True where some cells are hybrid."""
+        return any(block.hybrid for block in self._blocks)
+
+    def pressures(self, u: Array, du: Array) -> Array:
+        """Pressures of the hybrid cells at displacements u (n, dim), to first order at u + du.
+
+        (c,), the coefficients of the polynomials of all cells; empty without hybrid cells.
+        """
+        u, du = (np.ascontiguousarray(x, dtype=float) for x in (u, du))
+        parts = [block.coefficients(u, du).ravel() for block in self._blocks if block.hybrid]
+        return np.concatenate([np.zeros(0), *parts])
+
+    @property
+    def pressure_forces(self) -> Array:
+        """Forces (c,) by which changes of volume that those pressures stand for are weighed."""
+        dim = self.mesh.dim
+        parts = [block.forces_of_pressures(dim).ravel() for block in self._blocks]
+        return np.concatenate([np.zeros(0), *parts])
+
+    def forces(self, u: Array, pressures: Array | None = None) -> Array:
+        """Nodal forces (n, dim) that hold the displacements u (n, dim): dE/du.
+
+        pressures (c,): of the hybrid cells, else those of the displacements.
+        """
         u = np.ascontiguousarray(u, dtype=float)
         out = np.zeros_like(u)
-        for block in self._blocks:
-            held = block.pressures(u)[0]
+        for block, given in self._given(pressures):
+            held = block.pressures(u, given)[0]
             _check(forces_inplace(u, *block.geometry, block.numbers, held, out, self._unit))
         return out
 
-    def tangent(self, u: Array) -> tuple[Array, Array]:
-        """(forces (n, dim), blocks (m, dim, dim) of the derivative by u)."""
+    def tangent(self, u: Array, pressures: Array | None = None) -> tuple[Array, Array]:
+        """(forces (n, dim), blocks (m, dim, dim) of the derivative by u).
+
+        pressures (c,): as in `forces`; the derivative is then that of a step in which they
+        change as `pressures` says.
+        """
         u = np.ascontiguousarray(u, dtype=float)
         dim, pattern = u.shape[1], (self.pointers, self.columns)
         out, blocks = np.zeros_like(u), np.zeros((len(self.columns), dim, dim))
-        for block in self._blocks:
-            held, bulk, _ = block.pressures(u)
+        for block, given in self._given(pressures):
+            held, bulk, _ = block.pressures(u, given)
             _check(tangent_inplace(u, *block.geometry, block.numbers, held, *pattern, out,
                                    blocks, self._unit))  # fmt: skip
             if bulk is not None:
                 volume_terms_inplace(u, *block.geometry, block.modes, bulk, *pattern, blocks,
                                      self._unit)  # fmt: skip
         return out, blocks
+
+    def _given(self, pressures: Array | None) -> Iterator[tuple[_Block, Array | None]]:
+        """Every block of cells with what is given of its pressures."""
+        first = 0
+        for block in self._blocks:
+            if pressures is None or not block.hybrid:
+                yield block, None
+                continue
+            last = first + block.modes[:, :, 0].size
+            yield block, pressures[first:last].reshape(block.modes.shape[:2])
+            first = last
 
     def unit_forces(self) -> Array:
         """Sizes of nodal forces (n,) where stresses are as large as moduli, for rounding."""
@@ -277,19 +320,46 @@ class _Block:
         if self.hybrid:
             self.modes, self._volumes = volume_modes(mesh, cells, rule)
 
-    def pressures(self, u: Array) -> tuple[Array, Array | None, float]:
-        """Pressures (k, q), N (k, M, M) of `hybrid` and energy of the volume term; or none."""
+    def pressures(
+        self, u: Array, given: Array | None = None
+    ) -> tuple[Array, Array | None, float]:
+        """Pressures (k, q), N (k, M, M) of `hybrid` and energy of the volume term; or none.
+
+        given (k, M): coefficients of pressures that are not those of u.
+        """
         if not self.hybrid:
             return self._none, None, 0.0
+        energy, slope, bend = self.law.volume(self._mean_ratio(u))
+        held = averaged(self.modes, self._volumes, slope)
+        if given is not None:
+            held = np.einsum("kmq,km->kq", self.modes, given)
+        bulk = curvature(self.modes, self._volumes, bend)
+        return held, bulk, float((self._volumes * energy).sum())
+
+    def _mean_ratio(self, u: Array) -> Array:
+        """theta (k, q) of `hybrid`."""
         J = np.empty_like(self._volumes)
         volume_ratios_inplace(u, *self.geometry, J, (1.0,) * u.shape[1])
         _check(float(J.min(initial=np.inf)))
         theta = averaged(self.modes, self._volumes, J)
         _check(float(theta.min(initial=np.inf)))
-        energy, slope, bend = self.law.volume(theta)
-        return (averaged(self.modes, self._volumes, slope),
-                curvature(self.modes, self._volumes, bend),
-                float((self._volumes * energy).sum()))  # fmt: skip
+        return theta
+
+    def coefficients(self, u: Array, du: Array) -> Array:
+        """Coefficients (k, M) of the pressures at u, to first order at u + du."""
+        _, slope, bend = self.law.volume(self._mean_ratio(u))
+        change = np.empty_like(self._volumes)
+        volume_slopes_inplace(u, du, *self.geometry, change, (1.0,) * u.shape[1])
+        slope = slope + bend * averaged(self.modes, self._volumes, change)
+        return np.einsum("kmq,kq->km", self.modes, self._volumes * slope)
+
+    def forces_of_pressures(self, dim: int) -> Array:
+        """Per unit of the coefficients (k, M): shear modulus times area times strain."""
+        if not self.hybrid:
+            return np.zeros(0)
+        size = self._volumes.sum(axis=1) ** (0.5 - 1 / dim)
+        share = self.law.shear / self.law.lame_lambda()
+        return np.repeat((share * size)[:, None], self.modes.shape[1], axis=1)
 
 
 def _check(least: float) -> None:

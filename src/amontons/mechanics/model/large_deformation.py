@@ -35,12 +35,13 @@ from ...problem.judge import measures as judge
 from ...problem.judge.measures import Measure, Weakest
 from ...problem.law import Law
 from ...problem.protocol import Problem
-from ...solvers.newton.nonlinear import NonlinearProblem
+from ...solvers.newton.nonlinear import NonlinearProblem, PlainStates
 from ..contact.current import STICK, ContactPoint, Pieces
 from ..contact.current_pairs import Meetings
 from ..elements.linear_body import LinearBody
 from .nodal_forces import NodalForces, nodal_forces
 from .nonlinear_parts import NonlinearParts, nonlinear_parts
+from .pressure_states import PressureStates
 
 if TYPE_CHECKING:
     from .model import Model
@@ -118,13 +119,15 @@ class LargeDeformation(NonlinearProblem):
         """The law at displacements u (nodes, d), where the bodies need `rest` (dofs,)."""
         return self.parts.contact.at(rest[self.parts.at], *self._meeting(u))
 
-    def _needed(self, u: Array) -> Array:
-        """f_int - f (dofs,) at displacements u (nodes, d)."""
-        return self.parts.forces(u) - self.load.at(u)
+    def _needed(self, u: Array, pressures: Array | None = None) -> Array:
+        """f_int - f (dofs,) at displacements u (nodes, d), or at given pressures, too."""
+        return self.parts.forces(u, pressures) - self.load.at(u)
 
-    def _needed_slopes(self, u: Array) -> tuple[Array, Array]:
+    def _needed_slopes(
+        self, u: Array, pressures: Array | None = None
+    ) -> tuple[Array, Array]:
         """The same with its derivative in node blocks (m, d, d)."""
-        inner, blocks = self.parts.tangent(u)
+        inner, blocks = self.parts.tangent(u, pressures)
         load, slopes = self.load.slopes(u)
         for nodes, part in slopes:
             self.parts.subtract_inplace(blocks, nodes, part)
@@ -135,13 +138,16 @@ class LargeDeformation(NonlinearProblem):
         u = self.displacement(v)
         return self._point(u, self._needed(u))
 
-    def residual(self, v: Array, pieces: Pieces | None = None) -> Array:
+    def residual(
+        self, v: Array, pieces: Pieces | None = None, pressures: Array | None = None
+    ) -> Array:
         """F(v), (n,), unit of force, or the selection function of given pieces.
 
-        Raises InvertedCells where it is not defined.
+        pressures: of hybrid cells, which are else those of v.  Raises InvertedCells where it
+        is not defined.
         """
         u = self.displacement(v)
-        rest = self._needed(u)
+        rest = self._needed(u, pressures)
         rest[self.parts.at] = self._point(u, rest).residual(pieces)
         return rest[self.parts.free]
 
@@ -150,11 +156,11 @@ class LargeDeformation(NonlinearProblem):
         return self.linearisation(v, pieces).matrix
 
     def linearisation(  # type: ignore[override]  # a cached matrix serves as well
-        self, v: Array, pieces: Pieces | None = None
+        self, v: Array, pieces: Pieces | None = None, pressures: Array | None = None
     ) -> Linearisation:
-        """F and its derivatives at a state."""
+        """F and its derivatives at a state; pressures as in `residual`."""
         u = self.displacement(v)
-        rest, blocks = self._needed_slopes(u)
+        rest, blocks = self._needed_slopes(u, pressures)
         point = self._point(u, rest)
         return Linearisation(self, u, rest, blocks, point, *point.derivatives(pieces))
 
@@ -231,6 +237,14 @@ class LargeDeformation(NonlinearProblem):
     def meets_first(self) -> bool:
         """True where some body keeps small strains: its cells may be inverted."""
         return any(isinstance(body, LinearBody) for body in self.parts.bodies)
+
+    def states(
+        self, v: Array, known: tuple[LargeDeformation, Array] | None = None
+    ) -> PlainStates | PressureStates:
+        """What Newton's method moves: v alone, or with the pressures of hybrid cells."""
+        if not any(self.parts.keeps_volume):
+            return PlainStates(self, v)
+        return PressureStates(self, v, known)
 
     def at_share(self, share: float) -> LargeDeformation:
         """The problem at a share of the way from the known load to this one."""

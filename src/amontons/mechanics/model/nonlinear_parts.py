@@ -6,7 +6,7 @@ columns always have the same pattern, so that they are one `take` away.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -77,15 +77,44 @@ class NonlinearParts:
         """Where the contact pairs meet at displacements u (nodes, d)."""
         return self.contact.meet(self.X + u)
 
-    def forces(self, u: Array) -> Array:
-        """Nodal forces of the bodies (dofs,) at displacements u (nodes, d)."""
-        parts = zip(self.bodies, np.split(u, self.ends), strict=True)
-        return np.concatenate([body.forces(part).ravel() for body, part in parts])
+    @cached_property
+    def keeps_volume(self) -> tuple[bool, ...]:
+        """Of every body: some of its cells have pressures of their own."""
+        return tuple(body.keeps_volume for body in self.bodies)
 
-    def tangent(self, u: Array) -> tuple[Array, Array]:
+    def pressures(self, u: Array, du: Array) -> Array:
+        """Pressures (c,) of hybrid cells at u (nodes, d), to first order at u + du."""
+        parts = zip(self.bodies, np.split(u, self.ends), np.split(du, self.ends), strict=True)
+        return np.concatenate([body.pressures(*both) for body, *both in parts])
+
+    @cached_property
+    def pressure_forces(self) -> Array:
+        """Forces (c,) per unit of them by which they are weighed."""
+        return np.concatenate([body.pressure_forces for body in self.bodies])
+
+    def _given(self, u: Array, pressures: Array | None) -> Iterator[tuple]:
+        """Every body with its displacements and, where given, its pressures."""
+        first = 0
+        for body, part in zip(self.bodies, np.split(u, self.ends), strict=True):
+            if pressures is None or not body.keeps_volume:
+                yield body, part
+                continue
+            last = first + len(body.pressure_forces)
+            yield body, part, pressures[first:last]
+            first = last
+
+    def forces(self, u: Array, pressures: Array | None = None) -> Array:
+        """Nodal forces of the bodies (dofs,) at displacements u (nodes, d).
+
+        pressures (c,): of hybrid cells, else those of the displacements.
+        """
+        return np.concatenate(
+            [body.forces(*given).ravel() for body, *given in self._given(u, pressures)]
+        )
+
+    def tangent(self, u: Array, pressures: Array | None = None) -> tuple[Array, Array]:
         """(forces (dofs,), node blocks (m, d, d) of their derivative) at displacements u."""
-        parts = zip(self.bodies, np.split(u, self.ends), strict=True)
-        both = [body.tangent(part) for body, part in parts]
+        both = [body.tangent(*given) for body, *given in self._given(u, pressures)]
         return np.concatenate([f.ravel() for f, _ in both]), np.concatenate(
             [b for _, b in both]
         )

@@ -59,6 +59,59 @@ class Linear(Protocol):
     matrix: sparse.csc_array
 
 
+class States(Protocol):
+    """States w that Newton's method moves: v, or v and what is eliminated in every step."""
+
+    start: Array
+
+    def v(self, w: Array) -> Array:
+        """v (n,) of a state."""
+        ...
+
+    def residual(self, w: Array) -> Array:
+        """What has to become zero, unit of force; raises InvertedCells."""
+        ...
+
+    def linearisation(self, w: Array) -> Linear:
+        """The linear problem of a step of v."""
+        ...
+
+    def size(self, w: Array, here: Linear) -> float:
+        """|residual(w)|; here: the linear problem there."""
+        ...
+
+    def whole(self, w: Array, step: Array) -> Array:
+        """The step of w that belongs to a step (n,) of v."""
+        ...
+
+
+class PlainStates:
+    """States that are v."""
+
+    def __init__(self, problem: NonlinearProblem, v: Array) -> None:
+        self._problem, self.start = problem, v
+
+    def v(self, w: Array) -> Array:
+        """The state itself."""
+        return w
+
+    def residual(self, w: Array) -> Array:
+        """F (n,)."""
+        return self._problem.residual(w)
+
+    def linearisation(self, w: Array) -> Linear:
+        """F and its derivatives."""
+        return self._problem.linearisation(w)
+
+    def size(self, w: Array, here: Linear) -> float:
+        """|F|, which is at hand."""
+        return float(np.linalg.norm(here.residual))
+
+    def whole(self, w: Array, step: Array) -> Array:
+        """The step itself."""
+        return step
+
+
 class NonlinearProblem(Problem):
     """What the method asks for besides `Problem`; states v (n,), residuals (n,)."""
 
@@ -78,6 +131,10 @@ class NonlinearProblem(Problem):
     def reactions(self, v: Array) -> Array:
         """Contact forces (nc, d)."""
         ...
+
+    def states(self, v: Array, known: Any = None) -> States:
+        """What steps move, from v on; known: problem and state that led there, or None."""
+        return PlainStates(self, v)
 
     def at_share(self, share: float) -> NonlinearProblem:
         """The problem at a share of the load between the known state and the whole load."""
@@ -142,7 +199,7 @@ class NonlinearNewton:
         shown = _Shown()
         if start.v is not None:
             try:
-                yield from shown.best(self._newton(problem, start.v, target))
+                yield from shown.best(self._newton(problem, problem.states(start.v), target))
             except (_Failed, InvertedCells):
                 pass  # the start was no help
         share, step, reason = 0.0, 1.0, ""
@@ -151,7 +208,8 @@ class NonlinearNewton:
             if step < self.smallest_share:
                 if self.crossing is not None:
                     v, told = self.crossing.across(problem, share, v, target)
-                    yield from shown.best(self._newton(problem, v, target), told)
+                    found = self._newton(problem, problem.states(v), target)
+                    yield from shown.best(found, told)
                 hint = "" if self.crossing is not None else JUMP
                 raise Breakdown(
                     f"no equilibrium found beyond {share:.4g} of the load: {reason}{hint}"
@@ -162,8 +220,11 @@ class NonlinearNewton:
                 try:
                     first = predict(problem, share, goal, v, target)
                     if goal == 1.0:
-                        yield from shown.best(self._newton(problem, first, target))
-                    v, steps = self._equilibrium(problem.at_share(goal), first, target)
+                        states = problem.states(first, (problem.at_share(share), v))
+                        yield from shown.best(self._newton(problem, states, target))
+                    then = problem.at_share(goal)
+                    states = then.states(first, (problem.at_share(share), v))
+                    v, steps = self._equilibrium(then, states, target)
                     break
                 except (_Failed, InvertedCells) as failure:
                     reason = str(failure)
@@ -213,35 +274,35 @@ class NonlinearNewton:
         raise _Failed("the tangent problem with contact was not solved")
 
     def _equilibrium(
-        self, problem: NonlinearProblem, v: Array, target: Target
+        self, problem: NonlinearProblem, states: States, target: Target
     ) -> tuple[Array, int]:
         """(v, Newton steps) at a load between, found loosely."""
-        steps = 0
-        found = self._newton(problem, v, target)
+        steps, v = 0, states.v(states.start)
+        found = self._newton(problem, states, target)
         while problem.error(problem.reactions(v), v) > LOOSE:
             v, steps = next(found)[0], steps + 1
         return v, steps
 
     def _newton(
-        self, problem: NonlinearProblem, v: Array, target: Target
+        self, problem: NonlinearProblem, states: States, target: Target
     ) -> Iterator[tuple[Array, Array, float]]:
         """(v, r, |F| one step before) of Newton steps; _Failed when they lead nowhere."""
         sizes: list[float] = []
-        patience = Patience(self.patience)
+        patience, w = Patience(self.patience), states.start
         while target.seconds_left > 0:
+            v = states.v(w)
             try:
-                here = problem.linearisation(v)
-                F = here.residual
-                size = float(np.linalg.norm(F))
+                here = states.linearisation(w)
+                size = states.size(w, here)
                 again = any(abs(size - old) <= REPEATED * size for old in sizes)
                 sizes.append(size)
                 if again or patience.over(size):
                     self._stop(problem, v)
-                step = self._solve(problem, v, here, F)
+                step = states.whole(w, self._solve(problem, v, here, here.residual))
             except SingularOperator as reason:
                 raise _Failed(str(reason)) from reason
-            v = v + self._length(problem, v, step, sizes) * step
-            yield v, problem.reactions(v), size
+            w = w + self._length(states, w, step, sizes) * step
+            yield states.v(w), problem.reactions(states.v(w)), size
         raise Breakdown("out of time between two load steps")
 
     @staticmethod
@@ -267,7 +328,7 @@ class NonlinearNewton:
             raise
 
     def _length(
-        self, problem: NonlinearProblem, v: Array, step: Array, sizes: list[float]
+        self, states: States, w: Array, step: Array, sizes: list[float]
     ) -> float:
         """The part of a Newton step to take; the best of all tried where none is enough."""
         allowed = max(sizes[-MEMORY:])
@@ -275,7 +336,7 @@ class NonlinearNewton:
         for k in range(self.halvings + 1):
             length = 0.5**k
             try:
-                size = float(np.linalg.norm(problem.residual(v + length * step)))
+                size = float(np.linalg.norm(states.residual(w + length * step)))
             except InvertedCells:
                 continue
             if size <= (1 - ENOUGH * length) * allowed:
