@@ -193,17 +193,21 @@ class Watch:
 
         One that hardly moves does not come back: its method may wait for something else.
         """
-        near, size = 1e-12 * error, np.abs(r).max(initial=0.0)
-        same = [
-            not abs(old_error - error) > near
-            and bool(np.abs(old - r).max(initial=0.0) <= 1e-13 * size)
-            for old_error, old in self.seen
-        ]
+        near = 1e-12 * error
+        alike = [not abs(old_error - error) > near for old_error, _ in self.seen]
+        earlier = self.seen.copy()
         self.seen.append((error, r))
         del self.seen[:-MEMORY]
+        if not any(alike):
+            return False
+        size = np.abs(r).max(initial=0.0)
+        same = [
+            like and bool(np.abs(old - r).max(initial=0.0) <= 1e-13 * size)
+            for like, (_, old) in zip(alike, earlier, strict=True)
+        ]
         if not any(same) or same[-1]:
             return False
-        return bool(np.abs(self.seen[-2][1] - r).max(initial=0.0) > AT_REST * size)
+        return bool(np.abs(earlier[-1][1] - r).max(initial=0.0) > AT_REST * size)
 
     @property
     def stagnated(self) -> bool:
