@@ -24,7 +24,7 @@ def block(cells):
     def model(down):
         top = am.Fix("top", lambda x: (x[0] * c, x[0] * s - down))
         contact = am.Contact("bottom", am.Plane((0, 1)), mu=1.8)
-        return am.Model([am.Body(mesh, law)], [top], [contact])
+        return am.Model([am.Body(mesh, law, integration="full")], [top], [contact])
 
     first, last = (large_deformation(model(down)) for down in (0.0, 1.0))
     path = LoadPath(last, first.load, first.prescribed)

@@ -138,3 +138,14 @@ def test_calculix_comes_to_ours_as_its_penalty_grows(mu, tmp_path):
         found = next(b for b in read_frd(tmp_path / f"{name}.frd").blocks if b.name == "DISP")
         theirs = found.values[: len(ours)]
         np.testing.assert_allclose(ours[:, 2] - theirs[:, 2], LOAD / penalty, rtol=0.02)
+
+
+def test_hybrid_elements_are_said_where_the_program_has_them(tmp_path):
+    model = block(material=am.LinearElastic(E, 0.499))
+    there = again(model, tmp_path, "abaqus")
+    assert "TYPE=CPE4H" in (tmp_path / "model.inp").read_text()
+    assert_same(model, there)
+    assert "elements: quad of region" in str(am.solve(there))
+    notes = write_deck(model, tmp_path / "model.inp", "calculix")
+    assert any("CalculiX has no hybrid elements" in note for note in notes)
+    assert "CPE4H" not in (tmp_path / "model.inp").read_text()

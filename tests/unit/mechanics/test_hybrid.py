@@ -14,6 +14,7 @@ from amontons.mechanics.elements.nodal_stress import stress_of
 from amontons.mechanics.elements.thermal import thermal_load
 from amontons.mechanics.meshes import second_order
 from amontons.mechanics.meshes.cells import CELLS
+from amontons.mechanics.model.assembly import GRID_FROM, _grid
 
 KINDS = ["quad", "tri6", "quad8", "quad9", "hex", "tet10", "hex20", "hex27"]
 FIRST = {"tri6": "tri", "quad8": "quad", "quad9": "quad", "tet10": "tet", "hex20": "hex",
@@ -227,3 +228,29 @@ def test_inverted_hybrid_cells_are_named(kind):
             ask(u)
         with pytest.raises(InvertedCells):
             ask(np.full_like(u, np.nan))
+
+
+# ------------------------------------------------------------------ what is said and asked for
+def test_a_body_says_how_its_cells_are_integrated():
+    soft = am.LinearElastic(1.0, 0.4999)
+    floor = [am.Contact("bottom", am.Plane((0, 1)), mu=0.5)]
+
+    def said(**options):
+        body = am.Body(am.box((1, 1), 2), soft, **options)
+        return str(am.solve(am.Model([body], [am.Fix("top", (0, -0.01))], floor)))
+
+    assert "elements: quad hybrid (pressure constant in the cell: no locking)" in said()
+    assert "quad9 hybrid (pressure linear in the cell: no locking)" in said(order=2)
+    assert "elements:" not in said(integration="full")
+    with pytest.raises(am.InvalidInput, match="integration: expected auto or full"):
+        am.Body(am.box((1, 1), 2), soft, integration="reduced")
+
+
+def test_large_boxes_have_the_integration_of_their_cells():
+    """Their stiffness is an operator made of one cell."""
+    mesh = am.box((1, 1, 1), 2 * round((GRID_FROM / 3) ** (1 / 3) / 2 + 1))
+    u = np.random.default_rng(0).normal(size=mesh.points.size)
+    for integration in ("full", "hybrid"):
+        body = am.Body(mesh, am.LinearElastic(1.0, 0.49), integration=integration)
+        force = stiffness(body.mesh, body.material) @ u
+        np.testing.assert_allclose(_grid([body]) @ u, force, atol=1e-10 * abs(force).max())

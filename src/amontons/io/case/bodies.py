@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ...mechanics.model.parts import Body, Material
 
 NUMBERS = ("young", "poisson", "density", "expansion")
-GENERAL = ("name", "order", "move", "axisymmetric")  # keys of every mesh
+GENERAL = ("name", "order", "move", "axisymmetric", "integration")  # keys of every mesh
 LAWS = {  # of materials, with their keys
     "linear-elastic": ("young", "poisson", "plane", "density", "expansion"),
     "orthotropic-elastic": ("young", "poisson", "shear", "axes", "plane", "density",
@@ -59,8 +59,13 @@ def read_bodies(top: Table, path: Path) -> list[Body]:
         if around:
             with table.blamed("axisymmetric"):
                 mesh = mesh.turned()  # noqa: PLW2901
+        integration = table.text("integration", "") or None
         with top.blamed("material"):
-            bodies.append(Body(mesh, law, name, order))
+            body = Body(mesh, law, name, order)
+        if integration is not None:
+            with table.blamed("integration"):
+                body = replace(body, integration=integration)
+        bodies.append(body)
     return bodies
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ...core.errors import InvalidInput, shown
@@ -34,6 +34,8 @@ class Body:
     revolution, x the distance from the axis and y along it.  Nothing twists.  Forces are those
     of the whole body, as loads and in results; tractions and pressures are per area.  A rigid
     one moves along the axis alone, and follows a reference.
+    integration: of all cells, see `Cells`; by default what they say themselves, which is
+    "auto" where nobody says: hybrid, without locking, from a poisson of 0.4 on, else full.
     """
 
     mesh: Mesh
@@ -41,6 +43,7 @@ class Body:
     name: str = ""
     order: int = 1
     axisymmetric: bool = False
+    integration: str | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.mesh, Mesh):
@@ -56,6 +59,9 @@ class Body:
         if self.order == 2:
             object.__setattr__(self, "mesh", second_order(self.mesh))
         object.__setattr__(self, "order", self.mesh.order)
+        if self.integration is not None:
+            cells = (replace(c, integration=self.integration) for c in self.mesh.cells)
+            object.__setattr__(self, "mesh", replace(self.mesh, cells=tuple(cells)))
         if isinstance(self.material, GivenMatrices):
             self.material.check(self.mesh)
         laws = materials_by_region(self.mesh, self.material)

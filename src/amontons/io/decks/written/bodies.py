@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ....core.errors import InvalidInput
 from ....mechanics.elements.elasticity import LinearElastic, materials_by_region
+from ....mechanics.elements.hybrid import element_formulation
 from ....mechanics.elements.orthotropic import OrthotropicElastic
 from ....mechanics.meshes.cells import CELLS
 from ....mechanics.meshes.mesh import Mesh
@@ -24,8 +25,9 @@ WIDTH = 3
 class Meshes:
     """Numbers of nodes and elements from 1, body after body, and the cards of all of them."""
 
-    def __init__(self, model: Model, names: Names) -> None:
-        self.model, self.names = model, names
+    def __init__(self, model: Model, names: Names, notes: list[str] | None = None) -> None:
+        """notes: gets what can not be said, for programs without hybrid elements."""
+        self.model, self.names, self._notes = model, names, notes
         self.lines: list[str] = []
         self.nodes = np.cumsum([0, *(len(b.mesh.points) for b in model.bodies)])
         self._sides: list[dict[tuple[int, ...], tuple[int, int]]] = []
@@ -49,7 +51,14 @@ class Meshes:
         laws = materials_by_region(mesh, body.material)
         for block in mesh.cells:
             law = laws[block.region]
-            kind = element_type(mesh, block.kind, block.integration, law, shown)
+            integration = element_formulation(mesh, block, law)
+            if integration == "hybrid" and self._notes is not None:
+                integration = "full"
+                self._notes.append(
+                    f"body {shown!r}: CalculiX has no hybrid elements, those with full "
+                    "integration lock near incompressibility"
+                )
+            kind = element_type(mesh, block.kind, integration, law, shown)
             name = self.names(("region", k, block.region), f"{shown}_{block.region}")
             out.append(f"*ELEMENT, TYPE={kind}, ELSET={name}")
             for row in block.nodes:

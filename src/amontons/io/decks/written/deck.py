@@ -54,7 +54,7 @@ def write_deck(
     notes: list[str] = []
     whole = _with_planes(model, notes)
     names = Names()
-    meshes = Meshes(whole, names)
+    meshes = Meshes(whole, names, notes if dialect == CALCULIX else None)
     contacts = Contacts(whole, meshes, dialect, penalty, notes)
     beside = Beside.of(whole.bodies, whole.references, whole.constraints)
     labels, extra = _labels(beside)
