@@ -61,9 +61,10 @@ _HOME = {
                           "Revolution", "Sphere"),
     "mechanics.model": ("Axes", "Body", "BodyForce", "CiarletGeymonat", "Contact",
                         "ContactFields", "Coupling", "Equation", "Fix", "FoundContacts",
-                        "FoundPair", "LinearElastic", "Model", "NeoHookean", "NodalForce",
-                        "OrthotropicElastic", "Pressure", "Pretension", "Reference", "Rigid",
-                        "Spring", "Temperature", "Traction", "distributed", "find_contacts"),
+                        "FoundPair", "LinearElastic", "Model", "MooneyRivlin", "NeoHookean",
+                        "NodalForce", "Ogden", "OrthotropicElastic", "Pressure", "Pretension",
+                        "Reference", "Rigid", "SaintVenantKirchhoff", "Spring", "Temperature",
+                        "Traction", "UserEnergy", "distributed", "find_contacts"),
 }  # fmt: skip
 _GONE = {
     "AlgebraicMultigrid": "GeometricMultigrid(levels=()), whose levels are then algebraic ones",

@@ -28,7 +28,8 @@ LAWS = {  # of materials, with their keys
     "orthotropic-elastic": ("young", "poisson", "shear", "axes", "plane", "density",
                             "expansion"),
     "neo-hookean": ("young", "poisson"), "ciarlet-geymonat": ("young", "poisson", "a"),
-    "rigid": ("density",),
+    "mooney-rivlin": ("c10", "c01", "bulk"), "ogden": ("shears", "exponents", "bulk"),
+    "saint-venant-kirchhoff": ("young", "poisson"), "rigid": ("density",),
 }  # fmt: skip
 MAX_NODES = 5_000_000  # of a box: a typing error must not fill the memory
 
@@ -209,7 +210,13 @@ def read_materials(table: Table, mesh: Mesh) -> Any:
 
 def read_material(table: Table) -> Material | Rigid:
     """The law of one table."""
-    from ...mechanics.model import CiarletGeymonat, LinearElastic, NeoHookean, Rigid
+    from ...mechanics.model import (
+        CiarletGeymonat,
+        LinearElastic,
+        NeoHookean,
+        Rigid,
+        SaintVenantKirchhoff,
+    )
 
     law = table.choice("law", tuple(LAWS), "linear-elastic")
     table.only("law", *LAWS[law])
@@ -220,8 +227,12 @@ def read_material(table: Table) -> Material | Rigid:
     plane = table.choice("plane", ("strain", "stress"), "strain")
     if law == "orthotropic-elastic":
         return _orthotropic(table, plane, density)
+    if "bulk" in LAWS[law]:
+        return _rubber(table, law)
     young, poisson = table.number("young"), table.number("poisson")
     with table.blamed():
+        if law == "saint-venant-kirchhoff":
+            return SaintVenantKirchhoff(young, poisson)
         if law == "neo-hookean":
             return NeoHookean(young, poisson)
         if law == "ciarlet-geymonat":
@@ -231,6 +242,20 @@ def read_material(table: Table) -> Material | Rigid:
         return LinearElastic(
             young, poisson, plane, density, table.number("expansion", 0.0)
         )
+
+
+def _rubber(table: Table, law: str) -> Material:
+    """A law of what is isochoric, and a bulk modulus."""
+    from ...mechanics.model import MooneyRivlin, Ogden
+
+    bulk = table.number("bulk")
+    if law == "mooney-rivlin":
+        c10, c01 = table.number("c10"), table.number("c01", 0.0)
+        with table.blamed():
+            return MooneyRivlin(c10, c01, bulk)
+    shears, exponents = (table.numbers(k, range(1, 7)) for k in ("shears", "exponents"))
+    with table.blamed():
+        return Ogden(shears, exponents, bulk)
 
 
 def _orthotropic(table: Table, plane: str, density: float | None) -> Material:

@@ -185,7 +185,7 @@ def stiffness(
         moduli = law.shape_moduli(mesh.dim)  # type: ignore[attr-defined]  # of hybrid cells
         stiffness_inplace(*geometry, moduli, pointers, columns, blocks, unit)
         modes, _ = volume_modes(mesh, cells, rule)
-        bulk = law.lame_lambda(mesh.dim) * np.eye(modes.shape[1])  # type: ignore[attr-defined]
+        bulk = law.volume(np.ones(1))[2] * np.eye(modes.shape[1])  # type: ignore[attr-defined]
         bulk = np.tile(bulk, (len(modes), 1, 1))
         rest = np.zeros(mesh.points.shape)
         volume_terms_inplace(rest, *geometry, modes, bulk, pointers, columns, blocks, unit)

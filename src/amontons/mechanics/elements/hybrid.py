@@ -43,7 +43,8 @@ def element_formulation(mesh: Mesh, cells: Cells, law: object) -> str:
 
     Cells that leave it open ("auto") are hybrid where the law is nearly incompressible.
     """
-    able = hasattr(law, "volume") and cells.kind not in SIMPLEX and not is_thin(law, mesh)
+    able = getattr(law, "volume", None) is not None and cells.kind not in SIMPLEX
+    able = able and not is_thin(law, mesh)
     if cells.integration == "hybrid":
         return "hybrid" if able else "full"
     if cells.integration != "auto":

@@ -20,27 +20,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...core.errors import InvalidInput, InvertedCells
+from ...core.errors import InvalidInput
 from ...core.words import helpful
 from ..meshes.cells import CELLS
 from ..meshes.check import determinant
-from ..meshes.facets import Cells
 from ..meshes.mesh import Mesh
-from .cell_loops import energy_of, forces_inplace, tangent_inplace
 from .cell_matrices import rule_of
 from .elasticity import (
     Isotropic,
     LinearElastic,
     cell_stress,
-    geometry_of,
     materials_by_region,
 )
-from .hybrid import averaged, curvature, element_formulation, volume_modes
-from .hybrid_loops import (
-    volume_ratios_inplace,
-    volume_slopes_inplace,
-    volume_terms_inplace,
-)
+from .energies import PointLaw, deformation
+from .finite_cells import FiniteCells, finite_cells
 from .pattern import node_pattern
 
 Array = NDArray[np.float64]
@@ -75,11 +68,7 @@ class _Family(Isotropic):
     def _cauchy(
         self, gradient: Array, coefficients: tuple[float, float, float, float, float]
     ) -> Array:
-        dim = gradient.shape[1]
-        F = np.tile(np.eye(3), (len(gradient), 1, 1))
-        F[:, :dim, :dim] += gradient
-        J = np.linalg.det(F)
-        _check(float(J.min(initial=np.inf)))
+        F, J = deformation(gradient)
         a, b, c, d, e = coefficients
         B = F @ F.swapaxes(1, 2)
         trace = np.trace(B, axis1=1, axis2=2)[:, None, None]
@@ -187,7 +176,10 @@ class CiarletGeymonat(_Family):
         return energy, half * (J - 1 / J), half * (1 + 1 / J**2)
 
 
-Hyperelastic = NeoHookean | CiarletGeymonat
+Hyperelastic = NeoHookean | CiarletGeymonat | PointLaw
+NAMES = (
+    "NeoHookean, CiarletGeymonat, MooneyRivlin, Ogden, SaintVenantKirchhoff or UserEnergy"
+)
 
 
 def is_hyperelastic(material: object) -> bool:
@@ -211,12 +203,11 @@ class HyperelasticBody:
         for region, law in laws.items():
             if not isinstance(law, Hyperelastic):
                 raise InvalidInput(
-                    f"material of region {region!r}: expected NeoHookean or CiarletGeymonat "
-                    f"as in the other regions, got {law!r}"
+                    f"material of region {region!r}: expected {NAMES}, as in the other "
+                    f"regions, got {law!r}"
                 )
         self.pointers, self.columns = node_pattern(mesh.cells, len(mesh.points))
-        self._unit = (1.0,) * mesh.dim
-        self._blocks = [_Block(mesh, cells, laws[cells.region]) for cells in mesh.cells]
+        self._blocks = [finite_cells(mesh, cells, laws[cells.region]) for cells in mesh.cells]
 
     @property
     def keeps_volume(self) -> bool:
@@ -235,8 +226,7 @@ class HyperelasticBody:
     @property
     def pressure_forces(self) -> Array:
         """Forces (c,) by which changes of volume that those pressures stand for are weighed."""
-        dim = self.mesh.dim
-        parts = [block.forces_of_pressures(dim).ravel() for block in self._blocks]
+        parts = [block.forces_of_pressures().ravel() for block in self._blocks]
         return np.concatenate([np.zeros(0), *parts])
 
     def forces(self, u: Array, pressures: Array | None = None) -> Array:
@@ -247,8 +237,7 @@ class HyperelasticBody:
         u = np.ascontiguousarray(u, dtype=float)
         out = np.zeros_like(u)
         for block, given in self._given(pressures):
-            held = block.pressures(u, given)[0]
-            _check(forces_inplace(u, *block.geometry, block.numbers, held, out, self._unit))
+            block.add_forces(u, given, out)
         return out
 
     def tangent(self, u: Array, pressures: Array | None = None) -> tuple[Array, Array]:
@@ -261,15 +250,10 @@ class HyperelasticBody:
         dim, pattern = u.shape[1], (self.pointers, self.columns)
         out, blocks = np.zeros_like(u), np.zeros((len(self.columns), dim, dim))
         for block, given in self._given(pressures):
-            held, bulk, _ = block.pressures(u, given)
-            _check(tangent_inplace(u, *block.geometry, block.numbers, held, *pattern, out,
-                                   blocks, self._unit))  # fmt: skip
-            if bulk is not None:
-                volume_terms_inplace(u, *block.geometry, block.modes, bulk, *pattern, blocks,
-                                     self._unit)  # fmt: skip
+            block.add_tangent(u, given, pattern, out, blocks)
         return out, blocks
 
-    def _given(self, pressures: Array | None) -> Iterator[tuple[_Block, Array | None]]:
+    def _given(self, pressures: Array | None) -> Iterator[tuple[FiniteCells, Array | None]]:
         """Every block of cells with what is given of its pressures."""
         first = 0
         for block in self._blocks:
@@ -285,11 +269,10 @@ class HyperelasticBody:
         out = np.zeros(len(self.mesh.points))
         for cells, block in zip(self.mesh.cells, self._blocks, strict=True):
             cell, coordinates = CELLS[cells.kind], self.mesh.points[cells.nodes]
-            modulus = np.array(block.law.coefficients) @ [2, 4, 4, 1, 1]
             for at, weight in zip(*rule_of(self.mesh, cells, finite=True), strict=True):
                 volume = weight * determinant(cell.jacobians(coordinates, at))
                 sizes = np.linalg.norm(cell.gradients(coordinates, at), axis=2)
-                np.add.at(out, cells.nodes, modulus * sizes * volume[:, None])
+                np.add.at(out, cells.nodes, block.modulus * sizes * volume[:, None])
         return out
 
     def matrix(self, blocks: Array) -> sparse.bsr_array:
@@ -300,72 +283,7 @@ class HyperelasticBody:
     def energy(self, u: Array) -> float:
         """Stored energy at displacements u (n, dim), unit of work; zero at rest."""
         u = np.ascontiguousarray(u, dtype=float)
-        total = 0.0
-        for block in self._blocks:
-            part, least = energy_of(u, *block.geometry, block.numbers, self._unit)
-            _check(least)
-            total += part + block.pressures(u)[2]
-        return total
-
-
-class _Block:
-    """Cells of one law: what the loops take, and the pressures of hybrid cells."""
-
-    def __init__(self, mesh: Mesh, cells: Cells, law: Hyperelastic) -> None:
-        rule = rule_of(mesh, cells, finite=True)
-        self.law, self.geometry = law, geometry_of(mesh, cells, rule)
-        self.hybrid = element_formulation(mesh, cells, law) == "hybrid"
-        self.numbers = np.array(law.shape_coefficients if self.hybrid else law.coefficients)
-        self._none = np.zeros((0, len(rule[1])))
-        if self.hybrid:
-            self.modes, self._volumes = volume_modes(mesh, cells, rule)
-
-    def pressures(
-        self, u: Array, given: Array | None = None
-    ) -> tuple[Array, Array | None, float]:
-        """Pressures (k, q), N (k, M, M) of `hybrid` and energy of the volume term; or none.
-
-        given (k, M): coefficients of pressures that are not those of u.
-        """
-        if not self.hybrid:
-            return self._none, None, 0.0
-        energy, slope, bend = self.law.volume(self._mean_ratio(u))
-        held = averaged(self.modes, self._volumes, slope)
-        if given is not None:
-            held = np.einsum("kmq,km->kq", self.modes, given)
-        bulk = curvature(self.modes, self._volumes, bend)
-        return held, bulk, float((self._volumes * energy).sum())
-
-    def _mean_ratio(self, u: Array) -> Array:
-        """theta (k, q) of `hybrid`."""
-        J = np.empty_like(self._volumes)
-        volume_ratios_inplace(u, *self.geometry, J, (1.0,) * u.shape[1])
-        _check(float(J.min(initial=np.inf)))
-        theta = averaged(self.modes, self._volumes, J)
-        _check(float(theta.min(initial=np.inf)))
-        return theta
-
-    def coefficients(self, u: Array, du: Array) -> Array:
-        """Coefficients (k, M) of the pressures at u, to first order at u + du."""
-        _, slope, bend = self.law.volume(self._mean_ratio(u))
-        change = np.empty_like(self._volumes)
-        volume_slopes_inplace(u, du, *self.geometry, change, (1.0,) * u.shape[1])
-        slope = slope + bend * averaged(self.modes, self._volumes, change)
-        return np.einsum("kmq,kq->km", self.modes, self._volumes * slope)
-
-    def forces_of_pressures(self, dim: int) -> Array:
-        """Per unit of the coefficients (k, M): shear modulus times area times strain."""
-        if not self.hybrid:
-            return np.zeros(0)
-        size = self._volumes.sum(axis=1) ** (0.5 - 1 / dim)
-        share = self.law.shear / self.law.lame_lambda()
-        return np.repeat((share * size)[:, None], self.modes.shape[1], axis=1)
-
-
-def _check(least: float) -> None:
-    """Raise InvertedCells where J is not positive (or not a number)."""
-    if not least > 0:
-        raise InvertedCells(f"cells are inverted: the least det F is {least:.3g}")
+        return sum(block.energy(u) for block in self._blocks)
 
 
 def cauchy_stress(

@@ -10,13 +10,13 @@ from ...core.errors import InvalidInput, shown
 from ...core.words import helpful
 from ..elements.elasticity import LinearElastic, materials_by_region
 from ..elements.given import GivenMatrices
-from ..elements.hyperelasticity import CiarletGeymonat, NeoHookean
+from ..elements.hyperelasticity import NAMES, Hyperelastic
 from ..elements.orthotropic import OrthotropicElastic
 from ..elements.rigid import Rigid
 from ..meshes.mesh import Mesh
 from ..meshes.order import second_order
 
-Material = LinearElastic | OrthotropicElastic | NeoHookean | CiarletGeymonat
+Material = LinearElastic | OrthotropicElastic | Hyperelastic
 
 
 @helpful
@@ -24,9 +24,10 @@ Material = LinearElastic | OrthotropicElastic | NeoHookean | CiarletGeymonat
 class Body:
     """A mesh and its material, or one per region of it.
 
-    LinearElastic and OrthotropicElastic mean small strains, NeoHookean and CiarletGeymonat
-    finite ones, of all bodies of the model.  Rigid, of the whole body: it moves without
-    deforming, and its mesh only says where it is touched, held and loaded.
+    LinearElastic and OrthotropicElastic mean small strains, NeoHookean, CiarletGeymonat,
+    MooneyRivlin, Ogden, SaintVenantKirchhoff and UserEnergy finite ones, of all bodies of the
+    model.  Rigid, of the whole body: it moves without deforming, and its mesh only says where
+    it is touched, held and loaded.
 
     order: 1 or 2, degree of the displacement.  With 2 the mesh becomes one of second order, see
     `second_order`: its points are then all nodes.
@@ -50,9 +51,8 @@ class Body:
             raise InvalidInput(f"mesh: expected a Mesh (see box, read_mesh), got {self.mesh!r}")
         if not isinstance(self.material, Material | Rigid | GivenMatrices | Mapping):
             raise InvalidInput(
-                "material: expected LinearElastic, OrthotropicElastic, NeoHookean, "
-                "CiarletGeymonat or Rigid, or a dict region -> one of the first four, got "
-                f"{self.material!r}"
+                f"material: expected LinearElastic, OrthotropicElastic, {NAMES}, or Rigid, or "
+                f"a dict region -> one of them, which is not Rigid, got {self.material!r}"
             )
         if self.order not in (1, 2):
             raise InvalidInput(f"order: expected 1 or 2, got {self.order!r}")
@@ -71,7 +71,7 @@ class Body:
                 if not isinstance(law, Material):
                     raise InvalidInput(
                         f"material of region {region!r}: expected LinearElastic, "
-                        f"OrthotropicElastic, NeoHookean or CiarletGeymonat, got {law!r}"
+                        f"OrthotropicElastic, {NAMES}, got {law!r}"
                     )
 
     @classmethod

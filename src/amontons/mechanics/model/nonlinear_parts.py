@@ -210,7 +210,7 @@ def _check_supported(model: Model) -> None:
         if not (asked or is_hyperelastic(body.material)):
             raise UnsupportedForm(
                 "others have hyperelastic laws and this one is linear elastic; give all of "
-                "them NeoHookean or CiarletGeymonat, or say that it keeps small strains by "
+                "them NeoHookean or the like, or say that it keeps small strains by "
                 "kinematics='finite' of the contacts", at, what,
             )  # fmt: skip
     for k, contact in enumerate(model.contacts):

@@ -332,19 +332,20 @@ class NonlinearNewton:
     ) -> float:
         """The part of a Newton step to take; the best of all tried where none is enough."""
         allowed = max(sizes[-MEMORY:])
-        best, found = np.inf, 0.0
+        best, found, reason = np.inf, 0.0, ""
         for k in range(self.halvings + 1):
             length = 0.5**k
             try:
                 size = float(np.linalg.norm(states.residual(w + length * step)))
-            except InvertedCells:
+            except InvertedCells as why:
+                reason = str(why)
                 continue
             if size <= (1 - ENOUGH * length) * allowed:
                 return length
             if size < best:
                 best, found = size, length
         if not np.isfinite(best):
-            raise _Failed("every step inverts cells")
+            raise _Failed(f"every step leads to where {reason}")
         return found
 
 
