@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +28,7 @@ from .sources import open_source
 from .terminal import check_writable, deliver_json, say_notes, show_table
 
 if TYPE_CHECKING:
+    from ...mechanics.model import Model
     from ...mechanics.model.large_deformation import LargeDeformation
 
 RANK_LIMIT = 2000  # rows of W up to which its singular values are computed
@@ -53,6 +55,8 @@ def run(
     opened = open_source(source, overrides)
     problem = opened.solvable()
     facts = {"name": opened.name, **describe(problem)}
+    if opened.has_model:
+        facts["elements"] = _elements(opened.model)
     if isinstance(problem, FrictionProblem) and problem.contacts:
         deadline = deadline_of(time_limit, SECONDS)
         facts |= _ranks(problem.assembled(), deadline.share(RANKS))
@@ -86,6 +90,17 @@ def describe(problem: Any) -> dict[str, Any]:
     facts["scales (a guess)"] = _scales(problem)
     facts["methods that fit"] = fitting_methods(problem)
     return facts
+
+
+def _elements(model: Model) -> list[str]:
+    """How many cells there are of each kind and integration of the stiffness, in words."""
+    found: Counter[str] = Counter()
+    for body in model.bodies:
+        for block in body.mesh.cells:
+            modes = block.integration == "incompatible"
+            how = "incompatible modes" if modes else f"{block.integration} integration"
+            found[f"{block.kind} ({how})"] += len(block.nodes)
+    return [f"{count} {kind}" for kind, count in found.items()]
 
 
 def _law_facts(law: Law) -> dict[str, list[float]]:
