@@ -1,6 +1,9 @@
 """Hybrid cells: no locking near incompressibility, exact where the fields are polynomials."""
 
+import re
 from dataclasses import replace
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -128,6 +131,51 @@ def test_a_pressed_block(axisymmetric, reference):
     assert pressed((16, 8), **options) == pytest.approx(reference, rel=0.02)
     assert pressed((8, 4), order=2, **options) == pytest.approx(reference, rel=0.005)
     assert pressed((16, 8), integration="full", **options) > 4 * reference
+
+
+# ------------------------------------------------------------------ as benchmarks/locking.py
+spec = spec_from_file_location(
+    "locking", Path(__file__).parents[3] / "benchmarks" / "locking.py"
+)
+LOCKING = module_from_spec(spec)
+spec.loader.exec_module(LOCKING)
+BAR = [  # problem, cells, order, their number: what is within 1 percent of the reference
+    ("cook", "quad", 2, 8), ("cook", "tri", 2, 8), ("cook", "hex", 2, 8),
+    ("block", "quad", 2, 4), ("block", "tri", 2, 4), ("block", "quad", 1, 16),
+    ("block", "hex", 2, 4), ("block", "tet", 2, 4),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("law", ["linear", "rubber"])
+@pytest.mark.parametrize(("problem", "kind", "order", "n"), BAR)
+def test_cells_taken_by_default_are_within_one_percent(problem, kind, order, n, law):
+    """Cook's membrane in plane strain, a pressed block; 2D and 3D, small and finite strains."""
+    flat = problem == "cook" or kind in ("quad", "tri")
+    reference = LOCKING.REFERENCE[problem, law, 2 if flat else 3]
+    found = getattr(LOCKING, problem)(n, LOCKING.LAWS[law], kind, order)
+    assert found == pytest.approx(reference, rel=0.01)
+
+
+@pytest.mark.parametrize("law", ["linear", "rubber"])
+def test_a_slice_between_two_planes_is_plane_strain(law):
+    """Quads and hexahedra of first order have the same deflection."""
+    flat, slice_ = (LOCKING.cook(4, LOCKING.LAWS[law], kind, 1) for kind in ("quad", "hex"))
+    assert slice_ == pytest.approx(flat, rel=1e-7)  # two solves to 1e-8
+
+
+@pytest.mark.parametrize("law", ["linear", "rubber"])
+@pytest.mark.parametrize("kind", ["tri", "tet"])
+def test_simplices_of_first_order_lock_and_say_so(kind, law):
+    """The factor that is told is within a third of the true one; planes of symmetry, which are
+    taken for free sides, have it too large."""
+    solution = LOCKING.solved_block(4, LOCKING.LAWS[law], kind, 1)
+    (warning,) = solution.warnings
+    assert warning.name == "volumetric-locking"
+    factor = float(re.search(r"about ([\d.e+]+) times", str(warning)).group(1))
+    reference = LOCKING.REFERENCE["block", law, 2 if kind == "tri" else 3]
+    true = solution.resultant[-1] / reference
+    assert true > 10
+    assert 0.75 < factor / true < (1.5 if kind == "tri" else 6)
 
 
 # ------------------------------------------------------------------ heat
