@@ -60,11 +60,12 @@ _HOME = {
     "mechanics.contact": ("Cylinder", "Extrusion", "LevelSet", "Nitsche", "Plane", "Profile",
                           "Revolution", "Sphere"),
     "mechanics.model": ("Axes", "Body", "BodyForce", "CiarletGeymonat", "Contact",
-                        "ContactFields", "Coupling", "Equation", "Fix", "FoundContacts",
-                        "FoundPair", "LinearElastic", "Model", "MooneyRivlin", "NeoHookean",
-                        "NodalForce", "Ogden", "OrthotropicElastic", "Pressure", "Pretension",
-                        "Reference", "Rigid", "SaintVenantKirchhoff", "Spring", "Temperature",
-                        "Traction", "UserEnergy", "distributed", "find_contacts"),
+                        "ContactFields", "Coupling", "ElastoPlastic", "Equation",
+                        "Fix", "FoundContacts", "FoundPair", "LinearElastic", "Model",
+                        "MooneyRivlin", "NeoHookean", "NodalForce", "Ogden",
+                        "OrthotropicElastic", "Pressure", "Pretension", "Reference", "Rigid",
+                        "SaintVenantKirchhoff", "Spring", "Temperature", "Traction",
+                        "UserEnergy", "distributed", "find_contacts"),
 }  # fmt: skip
 _GONE = {
     "AlgebraicMultigrid": "GeometricMultigrid(levels=()), whose levels are then algebraic ones",

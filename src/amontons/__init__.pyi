@@ -53,7 +53,8 @@ from .mechanics.meshes import (
 from .mechanics.model import (
     Axes as Axes, Body as Body, BodyForce as BodyForce, CiarletGeymonat as CiarletGeymonat,
     Contact as Contact, ContactFields as ContactFields, Coupling as Coupling,
-    Equation as Equation, Fix as Fix, LinearElastic as LinearElastic, Model as Model,
+    ElastoPlastic as ElastoPlastic, Equation as Equation, Fix as Fix,
+    LinearElastic as LinearElastic, Model as Model,
     MooneyRivlin as MooneyRivlin, NeoHookean as NeoHookean, NodalForce as NodalForce,
     Ogden as Ogden, SaintVenantKirchhoff as SaintVenantKirchhoff, UserEnergy as UserEnergy,
     OrthotropicElastic as OrthotropicElastic, Pressure as Pressure,

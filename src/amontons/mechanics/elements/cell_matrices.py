@@ -28,7 +28,7 @@ from ..meshes.check import determinant
 from ..meshes.facets import Cells
 from ..meshes.linear_cells import Rule
 from ..meshes.mesh import Mesh
-from .hybrid import element_formulation, volume_modes
+from .hybrid import element_formulation, volume_modes, volume_modulus
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -109,7 +109,7 @@ def cell_stiffness(mesh: Mesh, cells: Cells, law: object) -> Iterator[tuple[Inde
             K += np.swapaxes(B, 1, 2) @ (C @ B) * (weight * volume)[:, None, None]
         if hybrid:
             b = volume_rows(mesh, Cells(cells.kind, nodes), rule)
-            K += law.lame_lambda() * np.swapaxes(b, 1, 2) @ b  # type: ignore[attr-defined]
+            K += volume_modulus(law) * np.swapaxes(b, 1, 2) @ b
         yield nodes, K
 
 

@@ -26,7 +26,7 @@ from ..meshes.linear_cells import Rule
 from ..meshes.mesh import Mesh, unknown
 from .cell_loops import stiffness_inplace
 from .cell_matrices import add_blocks, cell_stiffness, rule_of
-from .hybrid import averaged, element_formulation, volume_modes
+from .hybrid import averaged, element_formulation, volume_modes, volume_modulus
 from .hybrid_loops import volume_terms_inplace
 from .pattern import node_pattern
 
@@ -185,7 +185,7 @@ def stiffness(
         moduli = law.shape_moduli(mesh.dim)  # type: ignore[attr-defined]  # of hybrid cells
         stiffness_inplace(*geometry, moduli, pointers, columns, blocks, unit)
         modes, _ = volume_modes(mesh, cells, rule)
-        bulk = law.volume(np.ones(1))[2] * np.eye(modes.shape[1])  # type: ignore[attr-defined]
+        bulk = volume_modulus(law) * np.eye(modes.shape[1])
         bulk = np.tile(bulk, (len(modes), 1, 1))
         rest = np.zeros(mesh.points.shape)
         volume_terms_inplace(rest, *geometry, modes, bulk, pointers, columns, blocks, unit)
@@ -303,7 +303,7 @@ def held_stress(law: Any, dim: int, *, axisymmetric: bool = False) -> Array:
 def shape_held(law: Any, mesh: Mesh, *, hybrid: bool) -> Array:
     """`held_stress` in cells of a mesh, in hybrid ones without that of the volume term."""
     held = held_stress(law, mesh.dim, axisymmetric=mesh.axisymmetric)
-    return held - law.lame_lambda() * 3 * law.expansion * np.eye(3) if hybrid else held
+    return held - volume_modulus(law) * 3 * law.expansion * np.eye(3) if hybrid else held
 
 
 def with_hoop(gradient: Array, r: Array, u: Array) -> Array:

@@ -23,6 +23,8 @@ and inelastic analysis", Computers & Structures 26 (1987) 357-409.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -41,7 +43,8 @@ SIMPLEX = ("tri", "tet")  # of first order: their volume changes evenly anyhow
 def element_formulation(mesh: Mesh, cells: Cells, law: object) -> str:
     """"full", "reduced", "incompatible" or "hybrid": how cells of a law are integrated.
 
-    Cells that leave it open ("auto") are hybrid where the law is nearly incompressible.
+    Cells that leave it open ("auto") are hybrid where the law is nearly incompressible, or
+    yields, and so flows at constant volume.
     """
     able = getattr(law, "volume", None) is not None and cells.kind not in SIMPLEX
     able = able and not is_thin(law, mesh)
@@ -49,7 +52,16 @@ def element_formulation(mesh: Mesh, cells: Cells, law: object) -> str:
         return "hybrid" if able else "full"
     if cells.integration != "auto":
         return cells.integration
-    return "hybrid" if able and getattr(law, "poisson", 0.0) >= NEARLY else "full"
+    return "hybrid" if able and _keeps_volume(law) else "full"
+
+
+def _keeps_volume(law: Any) -> bool:
+    return getattr(law, "keeps_volume", False) or getattr(law, "poisson", 0.0) >= NEARLY
+
+
+def volume_modulus(law: Any) -> float:
+    """U'' at rest of the volume term of hybrid cells, unit of stress."""
+    return float(law.volume(np.ones(1))[2][0])
 
 
 def is_thin(law: object, mesh: Mesh) -> bool:

@@ -74,7 +74,7 @@ def _at_nodes(
         try:
             stress = law.shape_stress(mean) if hybrid else law.stress(mean)
         except InvertedCells:  # at corners, though no cell is at its centre
-            return _mean_of_centres(mesh, at_centres)
+            return mean_of_centres(mesh, at_centres)
         if hybrid:
             stress = stress + (pressure[at] / volume[at])[:, None, None] * np.eye(3)
         if warming is not None:
@@ -85,7 +85,7 @@ def _at_nodes(
     missing = weight == 0
     out = total / np.where(missing, 1.0, weight)[:, None, None]
     if missing.any():
-        out[missing] = _mean_of_centres(mesh, at_centres)[missing]
+        out[missing] = mean_of_centres(mesh, at_centres)[missing]
     return out
 
 
@@ -116,7 +116,7 @@ def _places(cell: ReferenceCell) -> Array:
     return (1 - ASIDE) * cell.corners + ASIDE * cell.centre
 
 
-def _mean_of_centres(mesh: Mesh, at_centres: Array) -> Array:
+def mean_of_centres(mesh: Mesh, at_centres: Array) -> Array:
     """Mean of the stresses of the cells around every node, (nodes, 3, 3)."""
     total, count = np.zeros((len(mesh.points), 3, 3)), np.zeros(len(mesh.points))
     first = 0

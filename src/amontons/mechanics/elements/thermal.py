@@ -18,7 +18,7 @@ from ..meshes.facets import Cells
 from ..meshes.mesh import Mesh
 from .cell_matrices import components, gradient_rows, in_parts, rule_of, volume_rows
 from .elasticity import held_stress, materials_by_region
-from .hybrid import element_formulation, volume_modes
+from .hybrid import element_formulation, volume_modes, volume_modulus
 
 Array = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ def thermal_load(mesh: Mesh, material: Any, change: Array) -> Array:
                 "strains; take full integration"
             )
         if element_formulation(mesh, cells, law) == "hybrid":
-            bulk = 3 * law.expansion * law.lame_lambda()
+            bulk = 3 * law.expansion * volume_modulus(law)
             _add_volume_load(load, mesh, cells, bulk * change[cells.nodes])
             stress = stress - bulk * np.eye(3)
         cell, rows = CELLS[cells.kind], np.array([stress[i, k] for i, k in pairs])

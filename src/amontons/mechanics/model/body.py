@@ -24,9 +24,9 @@ Material = LinearElastic | OrthotropicElastic | Hyperelastic
 class Body:
     """A mesh and its material, or one per region of it.
 
-    LinearElastic and OrthotropicElastic mean small strains, NeoHookean, CiarletGeymonat,
-    MooneyRivlin, Ogden, SaintVenantKirchhoff and UserEnergy finite ones, of all bodies of the
-    model.  Rigid, of the whole body: it moves without deforming, and its mesh only says where
+    LinearElastic, ElastoPlastic and OrthotropicElastic mean small strains, NeoHookean,
+    CiarletGeymonat, MooneyRivlin, Ogden, SaintVenantKirchhoff and UserEnergy finite ones, of
+    all bodies of the model.  Rigid, of the whole body: it moves without deforming, and its mesh only says where
     it is touched, held and loaded.
 
     order: 1 or 2, degree of the displacement.  With 2 the mesh becomes one of second order, see
@@ -51,8 +51,9 @@ class Body:
             raise InvalidInput(f"mesh: expected a Mesh (see box, read_mesh), got {self.mesh!r}")
         if not isinstance(self.material, Material | Rigid | GivenMatrices | Mapping):
             raise InvalidInput(
-                f"material: expected LinearElastic, OrthotropicElastic, {NAMES}, or Rigid, or "
-                f"a dict region -> one of them, which is not Rigid, got {self.material!r}"
+                f"material: expected LinearElastic, ElastoPlastic, OrthotropicElastic, {NAMES}, "
+                "or Rigid, or a dict region -> one of them, which is not Rigid, got "
+                f"{self.material!r}"
             )
         if self.order not in (1, 2):
             raise InvalidInput(f"order: expected 1 or 2, got {self.order!r}")
@@ -71,7 +72,7 @@ class Body:
                 if not isinstance(law, Material):
                     raise InvalidInput(
                         f"material of region {region!r}: expected LinearElastic, "
-                        f"OrthotropicElastic, {NAMES}, got {law!r}"
+                        f"ElastoPlastic, OrthotropicElastic, {NAMES}, got {law!r}"
                     )
 
     @classmethod
