@@ -329,7 +329,7 @@ def describe(output: Output) -> str:
     sets = _sets_in_words(output.solution.convergence)
     if sets:
         lines.append(sets)
-    if output.fields is not None:
+    if output.fields is not None and output.solution.problem.contacts:
         names = ("x", "y", "z")[: len(output.fields.resultant)]
         total = output.fields.resultant
         total = np.where(np.abs(total) > 1e-8 * np.abs(total).max(), total, 0.0)
@@ -337,8 +337,11 @@ def describe(output: Output) -> str:
         force = ", ".join(f"{name} {value:.6g}" for name, value in pairs)
         lines.append(f"resultant on the slave: {force}")
         lines.append(f"largest pressure: {output.fields.pressure.max(initial=0.0):.6g}")
-        if output.model is not None:
-            lines += _model_in_words(output.model, output.fields)
+    elif output.fields is not None:
+        moved = max(np.abs(u).max(initial=0.0) for u in output.fields.displacement)
+        lines.append(f"largest displacement: {moved:.6g}")
+    if output.fields is not None and output.model is not None:
+        lines += _model_in_words(output.model, output.fields)
     lines += map(str, output.warnings)
     return "\n".join(lines)
 

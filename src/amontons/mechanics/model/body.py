@@ -26,8 +26,8 @@ class Body:
 
     LinearElastic, ElastoPlastic and OrthotropicElastic mean small strains, NeoHookean,
     CiarletGeymonat, MooneyRivlin, Ogden, SaintVenantKirchhoff and UserEnergy finite ones, of
-    all bodies of the model.  Rigid, of the whole body: it moves without deforming, and its mesh only says where
-    it is touched, held and loaded.
+    all bodies of the model.  Rigid, of the whole body: it moves without deforming, and its mesh
+    only says where it is touched, held and loaded.
 
     order: 1 or 2, degree of the displacement.  With 2 the mesh becomes one of second order, see
     `second_order`: its points are then all nodes.
@@ -51,8 +51,8 @@ class Body:
             raise InvalidInput(f"mesh: expected a Mesh (see box, read_mesh), got {self.mesh!r}")
         if not isinstance(self.material, Material | Rigid | GivenMatrices | Mapping):
             raise InvalidInput(
-                f"material: expected LinearElastic, ElastoPlastic, OrthotropicElastic, {NAMES}, "
-                "or Rigid, or a dict region -> one of them, which is not Rigid, got "
+                "material: expected LinearElastic, ElastoPlastic, OrthotropicElastic, "
+                f"{NAMES}, or Rigid, or a dict region -> one of them, which is not Rigid, got "
                 f"{self.material!r}"
             )
         if self.order not in (1, 2):
