@@ -255,3 +255,35 @@ def test_what_bodies_that_yield_lack_is_said():
         am.Model([*bodies, rubber], supports, contacts)
     with pytest.raises(UnsupportedForm, match="TangentNewton"):
         am.solve(model, am.SemismoothNewton())
+
+
+CASE = """
+[mesh]
+box = [2, 1]
+cells = [4, 2]
+[material.default]
+law = "elasto-plastic"
+young = 210e3
+poisson = 0.3
+{}
+[[contact]]
+slave = "bottom"
+friction = {{ coulomb = 0.1 }}
+obstacle = {{ plane = {{ normal = [0, 1] }} }}
+"""
+
+
+@pytest.mark.parametrize(("rows", "wanted"), [
+    ("yield_stress = 250\nhardening = 2000", LINEAR),
+    ("yield_stress = [[250, 0], [300, 0.01], [320, 0.05]]", TABLE),
+    ("yield_stress = [[250, 0], [200, 0.01]]", "default: yield_stress: row 2"),
+    ("hardening = 1", "default: yield_stress: expected a stress > 0"),
+])  # fmt: skip
+def test_laws_of_case_files(tmp_path, rows, wanted):
+    path = tmp_path / "block.toml"
+    path.write_text(CASE.format(rows))
+    if isinstance(wanted, str):
+        with pytest.raises(am.FileFormatError, match=wanted):
+            am.read_case(path)
+    else:
+        assert am.read_case(path).model.bodies[0].material == wanted

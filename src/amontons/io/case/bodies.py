@@ -27,6 +27,7 @@ LAWS = {  # of materials, with their keys
     "linear-elastic": ("young", "poisson", "plane", "density", "expansion"),
     "orthotropic-elastic": ("young", "poisson", "shear", "axes", "plane", "density",
                             "expansion"),
+    "elasto-plastic": ("young", "poisson", "yield_stress", "hardening", "density", "expansion"),
     "neo-hookean": ("young", "poisson"), "ciarlet-geymonat": ("young", "poisson", "a"),
     "mooney-rivlin": ("c10", "c01", "bulk"), "ogden": ("shears", "exponents", "bulk"),
     "saint-venant-kirchhoff": ("young", "poisson"), "rigid": ("density",),
@@ -212,6 +213,7 @@ def read_material(table: Table) -> Material | Rigid:
     """The law of one table."""
     from ...mechanics.model import (
         CiarletGeymonat,
+        ElastoPlastic,
         LinearElastic,
         NeoHookean,
         Rigid,
@@ -231,6 +233,11 @@ def read_material(table: Table) -> Material | Rigid:
         return _rubber(table, law)
     young, poisson = table.number("young"), table.number("poisson")
     with table.blamed():
+        if law == "elasto-plastic":
+            return ElastoPlastic(
+                young, poisson, "strain", density, table.number("expansion", 0.0),
+                table.data.get("yield_stress"), table.number("hardening", 0.0),
+            )  # fmt: skip
         if law == "saint-venant-kirchhoff":
             return SaintVenantKirchhoff(young, poisson)
         if law == "neo-hookean":

@@ -15,6 +15,7 @@ from typing import Any
 
 from ...core.errors import Address, AmontonsError, FileFormatError, InvalidInput
 from ...mechanics.contact.finding import Reach
+from ...mechanics.elements.plasticity import is_plastic
 from ...mechanics.model import (
     BodyForce,
     Fix,
@@ -195,8 +196,9 @@ def _case(
                 evolution=Evolution(plan, history.until), key_of=found.line_of,
                 tables={"deck": {"cards": deck.digest}}, notes=tuple(notes),
                 about=About.of(deck, history, at, stages, make))  # fmt: skip
-    if later or (len(deck.steps) > 1 and any(c.mu for c in stages[0].contacts)):
-        return case  # friction remembers the steps before
+    remembers = is_plastic(materials) or any(c.mu for c in stages[0].contacts)
+    if later or (len(deck.steps) > 1 and remembers) or is_plastic(materials):
+        return case  # friction and flow remember what was before
     return replace(case, target=make(stages[0], history.until), moving=case.target)
 
 

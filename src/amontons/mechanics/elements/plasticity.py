@@ -131,6 +131,14 @@ class ElastoPlastic(LinearElastic):
         stress, strain = self._table
         return np.interp(p, strain, stress) + self.hardening * np.maximum(p - strain[-1], 0)
 
+    def rows_to(self, strain: float) -> list[tuple[float, float]]:
+        """The rows, with one more at a plastic strain beyond them where it hardens there."""
+        rows = list(self.yield_stress)
+        last = rows[-1][1]
+        if self.hardening and last < strain:
+            rows.append((float(self.yields_at(np.array(strain))), strain))
+        return rows
+
     def _slope(self, p: Array) -> Array:
         """Slope of the yield stress just beyond p."""
         stress, strain = self._table

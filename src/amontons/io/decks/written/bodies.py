@@ -11,6 +11,7 @@ from ....core.errors import InvalidInput
 from ....mechanics.elements.elasticity import LinearElastic, materials_by_region
 from ....mechanics.elements.hybrid import element_formulation
 from ....mechanics.elements.orthotropic import OrthotropicElastic
+from ....mechanics.elements.plasticity import ElastoPlastic
 from ....mechanics.meshes.cells import CELLS
 from ....mechanics.meshes.mesh import Mesh
 from ....mechanics.model import Body, Model
@@ -20,6 +21,7 @@ from .lines import Names, listed, value, values
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 WIDTH = 3
+FAR = 10.0  # plastic strain to which hardening is written
 
 
 class Meshes:
@@ -54,10 +56,11 @@ class Meshes:
             integration = element_formulation(mesh, block, law)
             if integration == "hybrid" and self._notes is not None:
                 integration = "full"
-                self._notes.append(
-                    f"body {shown!r}: CalculiX has no hybrid elements, those with full "
-                    "integration lock near incompressibility"
-                )
+                if not isinstance(law, ElastoPlastic):  # those it takes on the mean, too
+                    self._notes.append(
+                        f"body {shown!r}: CalculiX has no hybrid elements, those with full "
+                        "integration lock near incompressibility"
+                    )
             kind = element_type(mesh, block.kind, integration, law, shown)
             name = self.names(("region", k, block.region), f"{shown}_{block.region}")
             out.append(f"*ELEMENT, TYPE={kind}, ELSET={name}")
@@ -91,6 +94,8 @@ class Meshes:
         turned = ""
         if isinstance(law, LinearElastic):
             out += ["*ELASTIC", values([law.young, law.poisson])]
+            if isinstance(law, ElastoPlastic):
+                out += ["*PLASTIC", *(values(row) for row in law.rows_to(FAR))]
             if law.expansion:
                 out += ["*EXPANSION", value(law.expansion)]
         else:
