@@ -56,11 +56,10 @@ class Meshes:
             integration = element_formulation(mesh, block, law)
             if integration == "hybrid" and self._notes is not None:
                 integration = "full"
-                if not isinstance(law, ElastoPlastic):  # those it takes on the mean, too
-                    self._notes.append(
-                        f"body {shown!r}: CalculiX has no hybrid elements, those with full "
-                        "integration lock near incompressibility"
-                    )
+                self._notes.append(
+                    f"body {shown!r}: CalculiX has no hybrid elements, those with full "
+                    "integration lock near incompressibility, and where they flow"
+                )
             kind = element_type(mesh, block.kind, integration, law, shown)
             name = self.names(("region", k, block.region), f"{shown}_{block.region}")
             out.append(f"*ELEMENT, TYPE={kind}, ELSET={name}")
