@@ -17,14 +17,18 @@ from scipy import sparse
 
 from ...core.errors import UnsupportedForm
 from ..contact.current import CurrentContact
-from ..contact.current_pairs import Meetings, ObstaclePair
+from ..contact.current_mortar import MortarPair
+from ..contact.current_pairs import Meetings, ObstaclePair, Pair
+from ..contact.facing import Skin
 from ..elements.given import GivenMatrices
 from ..elements.hyperelasticity import HyperelasticBody, is_hyperelastic
 from ..elements.linear_body import LinearBody
 from ..elements.rigid import Rigid
 from .parts import FINITE
+from .supports import locate
 
 if TYPE_CHECKING:
+    from .assembly import Discretisation
     from .model import Model
 
 Array = NDArray[np.float64]
@@ -141,9 +145,10 @@ def _nonlinear_parts(model: Model) -> NonlinearParts:
     slaves = [p.rows.nodes + linear.offsets[p.body] // d for p in linear.placed]
     nodes = np.concatenate(slaves)
     _check_single(nodes)
+    pairs = _pairs(model, slaves, linear)
+    _check_apart(pairs, nodes)
     at = nodes[:, None] * d + np.arange(d)
-    is_free = np.zeros(linear.dofs, dtype=bool)
-    is_free[linear.free] = True
+    is_free = free_dofs(linear)
     rows, columns = _pattern(bodies)
     contact_of = np.full(len(X), -1)
     contact_of[nodes] = np.arange(len(nodes))
@@ -153,8 +158,7 @@ def _nonlinear_parts(model: Model) -> NonlinearParts:
     taken.sort_indices()
     taken.data -= 1
     contact = CurrentContact(
-        [ObstaclePair(c.obstacle, part)  # type: ignore[arg-type]
-         for c, part in zip(model.contacts, slaves, strict=True)],
+        pairs,
         model.law,
         _stiffness_at(linear.stored_stiffness, at),
         is_free[at],
@@ -187,12 +191,8 @@ def _check_supported(model: Model) -> None:
     for k, contact in enumerate(model.contacts):
         what = f"contact on {contact.slave!r}"
         if contact.obstacle is None:
-            raise UnsupportedForm(
-                "finite kinematics has nodal contact with an obstacle only, not between two "
-                f"bodies that deform; got the master {contact.master!r}; use an obstacle and "
-                "no master, or LinearElastic and kinematics='small'",
-                ("contacts", k, "kinematics"), what,
-            )  # fmt: skip
+            _check_pair(model, k)
+            continue
         if contact.method != "nodal":
             raise UnsupportedForm(
                 "finite kinematics has nodal contact with an obstacle only; use method='nodal'",
@@ -205,6 +205,66 @@ def _check_supported(model: Model) -> None:
                     f"LevelSet have it; got {contact.obstacle!r}",
                     ("contacts", k, "obstacle"), "obstacle",
                 )  # fmt: skip
+
+
+def _check_pair(model: Model, k: int) -> None:
+    """Raise UnsupportedForm for what a pair of finite kinematics does not have."""
+    contact = model.contacts[k]
+    what = f"contact on {contact.slave!r}"
+    if contact.method != "mortar":
+        raise UnsupportedForm(
+            "two bodies that deform meet by averages in finite kinematics; use "
+            "method='mortar', as by default", ("contacts", k, "method"), what,
+        )  # fmt: skip
+    if contact.tresca is not None:
+        raise UnsupportedForm(
+            "a given friction bound would hold sides that have slid off each other; expected "
+            "mu", ("contacts", k, "tresca"), what,
+        )  # fmt: skip
+    for side in (contact.slave, contact.master):
+        number, name = locate(model.bodies, str(side))
+        kinds = {block.kind for block in model.bodies[number].mesh.surface(name)}
+        if kinds - {"line"}:
+            raise UnsupportedForm(
+                "two bodies that deform meet in finite kinematics on lines of first order, in "
+                f"2D; got facets {', '.join(sorted(kinds))} on {side!r}; take an obstacle, or "
+                "LinearElastic and kinematics='small'", ("contacts", k, "kinematics"), what,
+            )  # fmt: skip
+
+
+def _pairs(model: Model, slaves: list[Index], linear: Discretisation) -> list[Pair]:
+    """The pairs of the contacts; slaves: nodes of their rows."""
+    d = model.dimension
+    is_free = free_dofs(linear).reshape(-1, d)
+    out: list[Pair] = []
+    for contact, nodes in zip(model.contacts, slaves, strict=True):
+        if contact.obstacle is not None:
+            out.append(ObstaclePair(contact.obstacle, nodes))  # type: ignore[arg-type]
+            continue
+        skins = []
+        for side in (contact.slave, str(contact.master)):
+            k, name = locate(model.bodies, side)
+            facets = model.bodies[k].mesh.surface(name)
+            skins.append(Skin.of(facets, int(linear.offsets[k]) // d))
+        out.append(MortarPair(nodes, *skins, is_free[nodes]))
+    return out
+
+
+def free_dofs(linear: Discretisation) -> NDArray[np.bool_]:
+    """Dofs (dofs,) that no support holds."""
+    out = np.zeros(linear.dofs, dtype=bool)
+    out[linear.free] = True
+    return out
+
+
+def _check_apart(pairs: Sequence[Pair], slaves: Index) -> None:
+    """Raise UnsupportedForm where a node of a master carries a contact of its own."""
+    masters = [pair.master.all for pair in pairs if isinstance(pair, MortarPair)]
+    if masters and np.isin(np.concatenate(masters), slaves).any():
+        raise UnsupportedForm(
+            "a node is in a slave and in a master surface, large deformations allow one; "
+            "leave it out of the slave (where), or make the surfaces smaller", ("contacts",),
+        )  # fmt: skip
 
 
 def _check_single(nodes: Index) -> None:
