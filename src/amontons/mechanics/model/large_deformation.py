@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from .model import Model
 
 Array = NDArray[np.float64]
+SLIDING = 0.25  # least part of a Newton step: |F| has a kink wherever two nodes pass each other
 TOUCHING = 1e-9  # gaps up to this part of the size count as closed where nothing holds a body
 
 
@@ -245,6 +246,11 @@ class LargeDeformation(NonlinearProblem):
     def known_state(self) -> Array:
         """The state v (n,) at share 0 of the load."""
         return np.zeros(self.unknowns) if self.known is None else self.known[2]
+
+    @property
+    def shortest(self) -> float:  # type: ignore[override]  # read only
+        """Least part of a Newton step to take in the line search."""
+        return SLIDING if self.parts.has_pairs else 0.0
 
     @property
     def meets_first(self) -> bool:

@@ -77,6 +77,11 @@ class NonlinearParts:
         """2 or 3."""
         return self.X.shape[1]
 
+    @property
+    def has_pairs(self) -> bool:
+        """True where two bodies that deform meet."""
+        return any(isinstance(pair, MortarPair) for pair in self.contact.pairs)
+
     def meet(self, u: Array) -> Meetings:
         """Where the contact pairs meet at displacements u (nodes, d)."""
         return self.contact.meet(self.X + u)

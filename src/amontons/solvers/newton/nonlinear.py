@@ -67,6 +67,8 @@ class NonlinearProblem(Problem):
         "which auto takes"
     )
 
+    shortest: float = 0.0  # least part of a Newton step to take in the line search
+
     def residual(self, v: Array) -> Array:
         """F(v); raises InvertedCells where it is not defined."""
         ...
@@ -274,6 +276,8 @@ class NonlinearNewton:
         best, found = np.inf, 0.0
         for k in range(self.halvings + 1):
             length = 0.5**k
+            if length < problem.shortest and np.isfinite(best):
+                break
             try:
                 size = float(np.linalg.norm(problem.residual(v + length * step)))
             except InvertedCells:
