@@ -39,7 +39,7 @@ from scipy import sparse
 
 from .current_slopes import MortarSlopes, summed
 from .dual import dual_functions, nodes_with_multiplier
-from .facet_integrals import integrals
+from .facet_integrals import FacetPairs
 from .facing import Skin, candidates, nearest
 
 Array = NDArray[np.float64]
@@ -135,8 +135,9 @@ class MortarMeeting:
         """What the facets share."""
         slave, master, x = self.pair.slave, self.pair.master, self.x
         of, other = candidates(slave, master, x)
-        p, q = x[slave.nodes[of]], x[master.nodes[other]]
-        mass, cross = integrals(p, q)
+        pairs = self.facet_pairs(of, other)
+        p, q = pairs.slave, pairs.master
+        mass, cross = pairs.integrals()
         area = mass.sum(axis=(1, 2))
         vectors = slave.areas(x)
         whole = np.linalg.norm(vectors, axis=1)
@@ -156,6 +157,12 @@ class MortarMeeting:
         psi = dual_functions(total, kept, slave.real[facets])
         return _Shared(of, other, facets, numbers, total, cross, psi, kept)
 
+    def facet_pairs(self, of: Index, other: Index) -> FacetPairs:
+        """Facets of the slave (k,) and of the master (k,), where they are."""
+        slave, master, x = self.pair.slave, self.pair.master, self.x
+        return FacetPairs(x[slave.nodes[of]], slave.corners[of],
+                          x[master.nodes[other]], master.corners[other])  # fmt: skip
+
     def _carrying(self, facets: Index, mass: Array, whole: Array) -> Mask:
         """Slots (f, a) of facets (f,) that carry force; whole: areas of all slave facets."""
         skin, n = self.pair.slave, len(self.x)
@@ -174,7 +181,7 @@ class MortarMeeting:
         parts = self.shared
         nodes = self.pair.slave.nodes[parts.facets]
         found = np.bincount(nodes.ravel(), parts.weights.ravel(), minlength=len(self.x))
-        return found[self.pair.slaves]
+        return np.asarray(found[self.pair.slaves], dtype=np.float64)
 
     @property
     def met(self) -> Mask:

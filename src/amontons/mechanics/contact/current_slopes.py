@@ -18,8 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from .facet_integrals import integral_slopes
-
 if TYPE_CHECKING:
     from .current_mortar import MortarMeeting
 
@@ -69,7 +67,7 @@ class MortarSlopes:
         """Derivatives of mass (f a a, nodes d) and cross (k a b, nodes d)."""
         parts, pair = self.at.shared, self.at.pair
         slave, master = pair.slave.nodes[parts.slave], pair.master.nodes[parts.master]
-        mass, cross = integral_slopes(self.at.x[slave], self.at.x[master])
+        mass, cross = self.at.facet_pairs(parts.slave, parts.master).slopes()
         (k, a), b = slave.shape, master.shape[1]
         dofs = _dofs(np.concatenate([slave, master], axis=1), self.at.x.shape[1])
         out = []

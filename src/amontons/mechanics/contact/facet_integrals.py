@@ -15,12 +15,16 @@ solid mechanics", Comput. Methods Appl. Mech. Engrg. 193 (2004) 601-629.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .plane_integrals import plane_integrals, rule
+
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 Values = NDArray[Any]  # real, or complex in the search for derivatives
 STEP = 1e-100
 BESIDE = 0.5 / np.sqrt(3.0)
@@ -53,17 +57,42 @@ def line_integrals(slave: Values, master: Values) -> tuple[Values, Values]:
     return mass, cross
 
 
-def integrals(slave: Array, master: Array) -> tuple[Array, Array]:
-    """mass (k, a, a) and cross (k, a, b) of facets with nodes (k, a, d) and (k, b, d)."""
-    return line_integrals(slave, master)
+@dataclass(frozen=True, eq=False)
+class FacetPairs:
+    """k pairs of facets: nodes at slave (k, a, d), master (k, b, d), padded by the last.
 
+    corners, facing (k,): how many of them are real.
+    """
 
-def integral_slopes(slave: Array, master: Array) -> tuple[Array, Array]:
-    """Their derivatives by all nodes, (k, a, a, (a + b) d) and (k, a, b, (a + b) d)."""
-    (k, a, d), b = slave.shape, master.shape[1]
-    both = np.concatenate([slave, master], axis=1).reshape(k, (a + b) * d)
-    moved = both[:, None, :] + 1j * STEP * np.eye((a + b) * d)
-    moved = moved.reshape(k, (a + b) * d, a + b, d)
-    found = line_integrals(moved[:, :, :a], moved[:, :, a:])
-    mass, cross = (np.moveaxis(part.imag, 1, -1) / STEP for part in found)
-    return mass, cross
+    slave: Array
+    corners: Index
+    master: Array
+    facing: Index
+
+    def integrals(self) -> tuple[Array, Array]:
+        """mass (k, a, a) and cross (k, a, b)."""
+        if self.slave.shape[2] == 2:
+            return line_integrals(self.slave, self.master)
+        mass, cross = self._in_space(1, 0.0)
+        return mass[:, 0], cross[:, 0]
+
+    def slopes(self) -> tuple[Array, Array]:
+        """Their derivatives by all nodes, (k, a, a, (a + b) d) and (k, a, b, (a + b) d)."""
+        (k, a, d), b = self.slave.shape, self.master.shape[1]
+        ways = (a + b) * d
+        if d == 3:
+            mass, cross = self._in_space(ways, STEP)
+            return np.moveaxis(mass, 1, -1), np.moveaxis(cross, 1, -1)
+        both = np.concatenate([self.slave, self.master], axis=1).reshape(k, ways)
+        moved = both[:, None, :] + 1j * STEP * np.eye(ways)
+        moved = moved.reshape(k, ways, a + b, d)
+        found = line_integrals(moved[:, :, :a], moved[:, :, a:])
+        mass, cross = (np.moveaxis(part.imag, 1, -1) / STEP for part in found)
+        return mass, cross
+
+    def _in_space(self, ways: int, step: float) -> tuple[Array, Array]:
+        (k, a, _), b = self.slave.shape, self.master.shape[1]
+        mass, cross = np.zeros((k, ways, a, a)), np.zeros((k, ways, a, b))
+        plane_integrals(self.slave, self.corners, self.master, self.facing, rule(), step,
+                        mass, cross)  # fmt: skip
+        return mass, cross

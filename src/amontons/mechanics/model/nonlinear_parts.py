@@ -20,6 +20,7 @@ from ..contact.current import CurrentContact
 from ..contact.current_mortar import MortarPair
 from ..contact.current_pairs import Meetings, ObstaclePair, Pair
 from ..contact.facing import Skin
+from ..contact.pairs import KINDS
 from ..elements.given import GivenMatrices
 from ..elements.hyperelasticity import HyperelasticBody, is_hyperelastic
 from ..elements.linear_body import LinearBody
@@ -229,11 +230,12 @@ def _check_pair(model: Model, k: int) -> None:
     for side in (contact.slave, contact.master):
         number, name = locate(model.bodies, str(side))
         kinds = {block.kind for block in model.bodies[number].mesh.surface(name)}
-        if kinds - {"line"}:
+        if kinds - set(KINDS):
             raise UnsupportedForm(
-                "two bodies that deform meet in finite kinematics on lines of first order, in "
-                f"2D; got facets {', '.join(sorted(kinds))} on {side!r}; take an obstacle, or "
-                "LinearElastic and kinematics='small'", ("contacts", k, "kinematics"), what,
+                "two bodies that deform meet in finite kinematics on facets of first order; "
+                f"got {', '.join(sorted(kinds))} on {side!r}; give the bodies order=1, or "
+                "take LinearElastic and kinematics='small'",
+                ("contacts", k, "kinematics"), what,
             )  # fmt: skip
 
 
