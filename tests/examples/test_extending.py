@@ -19,7 +19,7 @@ from amontons.io import readers
 from amontons.io.case import settings
 
 PAGE = (Path(__file__).parents[2] / "docs" / "extending.md").read_text()
-SOLVER, _, READER, MATRIX = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+SOLVER, _, _, READER, MATRIX = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
 CASE = (Path(am.__file__).parent / "examples_data" / "cube.toml").read_text()
 METHOD = "fixed_point:FixedPoint"
 

@@ -6,9 +6,10 @@ of the residual.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,9 +38,9 @@ from .settling import Accepted, Motion, accepted_exactly
 from .stored import Matrices
 
 if TYPE_CHECKING:
-
     from .solution import Obstruction
 
+T = TypeVar("T")
 Array = NDArray[np.float64]
 JUDGE_FLOPS = 18, 60  # floating point operations of a judgement per block of W, per contact
 ESTIMATED = 9_000  # unknowns of a mesh above which the size of u is taken from a coarse level
@@ -251,6 +252,13 @@ class Equations(Matrices):
         found = judge.weakest_of(r, u, self.law, self.rho, scale)
         return found._replace(hidden=self.rounding(r))
 
+    def kept(self, make: Callable[[Self], T]) -> T:
+        """make(problem), of M, H or W alone, made once for all variants of this problem.
+
+        make: a function of a module or class, see `Prepared`.
+        """
+        return self._shared.once(make, (self.M, self.H, self.W), self)
+
     def accepted(
         self, r: Array, v: Array | None, error: float, tolerance: float
     ) -> Accepted:
@@ -313,7 +321,7 @@ class Equations(Matrices):
             return 0.0
         assert self.f is not None and self.H is not None
         load = modes.T @ self.f
-        pushes = (self.H.T @ modes).reshape(*r.shape, -1) * r[:, :, None]
+        pushes = (self.H.T @ modes).reshape(*r.shape, modes.shape[1]) * r[:, :, None]
         least = judge.FLOOR * judge.EPSILON * (np.abs(modes).T @ np.abs(self.f))
         size = np.abs(load) + np.abs(pushes).sum(axis=(0, 1)) + least
         rest = np.abs(load + pushes.sum(axis=(0, 1)))

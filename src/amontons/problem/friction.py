@@ -9,7 +9,7 @@ v are n displacements or velocities; r and u are (nc, d) in the local frames, ro
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, TypeVar, cast
@@ -297,6 +297,11 @@ class FrictionProblem(Told, Equations):
         return self.form is Form.GLOBAL
 
     @cached_property
+    def contacts(self) -> int:  # type: ignore[override]
+        """Number of contacts nc."""
+        return len(self.law)
+
+    @cached_property
     def dimension(self) -> int:
         """2 or 3."""
         rows = self.q if self.q is not None else self.w
@@ -321,13 +326,6 @@ class FrictionProblem(Told, Equations):
         given = isinstance(self.law, Tresca)
         why = "it has a bound and no mu" if given else "expected Coulomb's"
         raise UnsupportedLaw(f"mu: this problem has {self.law.name}, {why}")
-
-    def kept(self, make: Callable[[FrictionProblem], T]) -> T:
-        """make(problem), of M, H or W alone, made once for all variants of this problem.
-
-        make: a function of a module or class, see `Prepared`.
-        """
-        return self._shared.once(make, (self.M, self.H, self.W), self)
 
     def fresh(self) -> FrictionProblem:
         """The same problem with nothing prepared: no factor, no W."""

@@ -86,14 +86,37 @@ def negative_contact(problem: Equations) -> NegativeDirection | None:
     blocks = problem.blocks.diagonal_blocks[:, :d, :d]
     if not len(blocks):
         return None
-    values, vectors = np.linalg.eigh((blocks + blocks.swapaxes(1, 2)) / 2)
+    symmetric = (blocks + blocks.swapaxes(1, 2)) / 2
+    doubtful = np.flatnonzero(~_surely_semidefinite(symmetric))
+    if not len(doubtful):
+        return None
+    values, vectors = np.linalg.eigh(symmetric[doubtful])
     relative = values[:, 0] / np.maximum(np.abs(values).max(axis=1), np.finfo(float).tiny)
     at = int(relative.argmin())
     if relative[at] >= -ROUNDING:
         return None
     vector = vectors[at, :, 0]
     vector = vector * (1.0 if vector[np.abs(vector).argmax()] > 0 else -1.0) + 0.0
-    return NegativeDirection("W", float(values[at, 0]), (at,), tuple(map(float, vector)))
+    return NegativeDirection(
+        "W", float(values[at, 0]), (int(doubtful[at]),), tuple(map(float, vector))
+    )
+
+
+@np.errstate(divide="ignore", invalid="ignore", over="ignore")
+def _surely_semidefinite(blocks: Array) -> NDArray[np.bool_]:
+    """Symmetric blocks (n, d, d), lifted by half of what counts as rounding, have pivots > 0.
+
+    Takes a tenth of the time of their eigenvalues; others may be semidefinite too.
+    """
+    rest = blocks + (ROUNDING / 2) * np.abs(blocks).max(axis=(1, 2))[:, None, None] * np.eye(
+        blocks.shape[1]
+    )
+    good = np.ones(len(blocks), dtype=bool)
+    while rest.shape[1]:
+        good &= rest[:, 0, 0] > 0
+        column = rest[:, 1:, :1] / rest[:, :1, :1]
+        rest = rest[:, 1:, 1:] - column * rest[:, :1, 1:]
+    return good
 
 
 def gains_energy(problem: Equations) -> bool:
@@ -103,7 +126,7 @@ def gains_energy(problem: Equations) -> bool:
     """
     if problem.measure is not Measure.EXACT:
         return False
-    return negative_contact(problem.condensed()) is not None
+    return problem.condensed().kept(negative_contact) is not None
 
 
 def obstruction(problem: Equations, u: Array) -> tuple[Obstruction | None, str]:

@@ -40,8 +40,9 @@ def plain_of(problem: FrictionProblem) -> FrictionProblem:
     Errors of r are those of s there: cohesion counts as load.
     """
     law = problem.law
+    problem = _offset(problem)
     if law.give is not None:
-        problem = _with_give(_offset(problem), law.give)
+        problem = _with_give(problem, law.give)
     if law.cohesion.any():
         problem = _without_tension(problem)
     if law.stretch is not None:

@@ -35,6 +35,10 @@ BLUR = 1e-2  # rounding, relative to the tolerance, above which an error is eval
 BLURRED = 20  # iterates that would do if rounding could hide no error in them
 TIGHTER = 0.3  # goal of a second start, relative to what would just do
 TIGHTEST = 1e-300  # smallest goal: contacts far smaller than others need tiny sums
+NOT_HELD = (
+    "M has no inverse, something moves without a strain: a mechanism, or elements whose "
+    "reduced integration feels no bending"
+)
 CONTENT = 5  # iterates with which a solver is content before its goal is tightened: Newton is
 # there with one more, and keeps its history
 EARLY = 100  # iterates after which a problem that no method is made for is given up
@@ -193,17 +197,21 @@ class Watch:
 
         One that hardly moves does not come back: its method may wait for something else.
         """
-        near, size = 1e-12 * error, np.abs(r).max(initial=0.0)
-        same = [
-            not abs(old_error - error) > near
-            and bool(np.abs(old - r).max(initial=0.0) <= 1e-13 * size)
-            for old_error, old in self.seen
-        ]
+        near = 1e-12 * error
+        alike = [not abs(old_error - error) > near for old_error, _ in self.seen]
+        earlier = self.seen.copy()
         self.seen.append((error, r))
         del self.seen[:-MEMORY]
+        if not any(alike):
+            return False
+        size = np.abs(r).max(initial=0.0)
+        same = [
+            like and bool(np.abs(old - r).max(initial=0.0) <= 1e-13 * size)
+            for like, (_, old) in zip(alike, earlier, strict=True)
+        ]
         if not any(same) or same[-1]:
             return False
-        return bool(np.abs(self.seen[-2][1] - r).max(initial=0.0) > AT_REST * size)
+        return bool(np.abs(earlier[-1][1] - r).max(initial=0.0) > AT_REST * size)
 
     @property
     def stagnated(self) -> bool:
@@ -325,7 +333,8 @@ def _once(
             judged = watch.judgement
         if watch.content:
             return None
-        return Outcome.STAGNATED, "the method has nothing left to try"
+        nothing = "the method has nothing left to try"
+        return Outcome.STAGNATED, nothing if watch.problem.contacts else NOT_HELD
     except Breakdown as reason:
         late = target.deadline.passed
         return Outcome.TIME_LIMIT if late else Outcome.BREAKDOWN, str(reason)

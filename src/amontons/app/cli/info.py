@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +27,7 @@ from .sources import open_source
 from .terminal import check_writable, deliver_json, say_notes, show_table
 
 if TYPE_CHECKING:
+    from ...mechanics.model import Model
     from ...mechanics.model.large_deformation import LargeDeformation
 
 RANK_LIMIT = 2000  # rows of W up to which its singular values are computed
@@ -53,6 +54,8 @@ def run(
     opened = open_source(source, overrides)
     problem = opened.solvable()
     facts = {"name": opened.name, **describe(problem)}
+    if opened.has_model:
+        facts["elements"] = _elements(opened.model)
     if isinstance(problem, FrictionProblem) and problem.contacts:
         deadline = deadline_of(time_limit, SECONDS)
         facts |= _ranks(problem.assembled(), deadline.share(RANKS))
@@ -83,15 +86,27 @@ def describe(problem: Any) -> dict[str, Any]:
     facts |= _law_facts(problem.law)
     facts |= _delassus_facts(problem)
     facts |= _sign(problem)
-    facts["scales (a guess)"] = _scales(problem)
+    if problem.contacts:
+        facts["scales (a guess)"] = _scales(problem)
     facts["methods that fit"] = fitting_methods(problem)
     return facts
+
+
+def _elements(model: Model) -> list[str]:
+    """How many cells there are of each kind and integration of the stiffness, in words."""
+    found: Counter[str] = Counter()
+    for body in model.bodies:
+        for block in body.mesh.cells:
+            modes = block.integration == "incompatible"
+            how = "incompatible modes" if modes else f"{block.integration} integration"
+            found[f"{block.kind} ({how})"] += len(block.nodes)
+    return [f"{count} {kind}" for kind, count in found.items()]
 
 
 def _law_facts(law: Law) -> dict[str, list[float]]:
     """Smallest and largest of each number of the law."""
     if not len(law):
-        return {"friction coefficient": [math.inf, 0.0]}
+        return {}
     return {name: [float(x.min()), float(x.max())] for name, x in law.facts.items()}
 
 

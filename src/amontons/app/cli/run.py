@@ -14,7 +14,7 @@ import click
 from ...core.clock import Deadline, now
 from ...core.errors import FileFormatError, InvalidInput, NotConverged, NotWritten
 from ...core.files import make_folder, remove_empty
-from ...io.case import Settings, identity
+from ...io.case import identity
 from ...io.checkpoint import export_fclib, steps_of
 from ...io.readers import Case
 from ...mechanics.steps import Energies, QuasiStatic, TimeStep, at_rest, evolve
@@ -32,16 +32,27 @@ if TYPE_CHECKING:
     from ...io.report import Film
 
 
+@dataclass(frozen=True)
+class Wanted:
+    """What is asked for beside the steps; time_limit in seconds, of all of them together."""
+
+    time_limit: float | None = None
+    every: int = 10
+    pictures: bool = False
+    quiet: bool = False
+    report: bool = False
+    restart: bool = False
+    xdmf: bool = False
+    export: str | None = None
+    exported: list[range] | None = None  # the steps of export, None for all
+
+
 @dataclass
 class _Run:
     """One call: the case, what was asked for, and the frames that are drawn at the end."""
 
     case: Case
-    settings: Settings
-    every: int
-    pictures: bool
-    quiet: bool
-    time_limit: float | None
+    wanted: Wanted
     deadline: Deadline
     stop: Stopping
     frames: list[Frame] = field(default_factory=list)
@@ -68,31 +79,38 @@ def run(
     case: str, overrides: Sequence[str], tolerance: float | None, time_limit: float | None,
     folder: str | None, export: str | None, every: int, pictures: bool, restart: bool,
     quiet: bool, export_steps: str | None = None, xdmf: bool = False, report: bool = False,
-    read: Case | None = None,
 ) -> int:  # fmt: skip
-    """Step and write; returns the exit code.  read: the case where it has been read before."""
+    """Read, step and write; returns the exit code."""
     if time_limit is not None and not time_limit > 0:
         raise InvalidInput(f"--time-limit: expected seconds > 0, got {time_limit}")
     chosen = _chosen(export, export_steps)
+    wanted = Wanted(
+        time_limit, every, pictures, quiet, report, restart, xdmf, export, chosen
+    )
     deadline = Deadline.after(time_limit)
-    if read is None:
-        read = open_source(case, overrides)
+    read = open_source(case, overrides)
     if read.evolution is None:
         raise FileFormatError(
             f"{case}: evolution: missing, expected a table with kind, step, until; one state "
             f"without time is found by: amontons solve {case}"
         )
+    read = replace(read, settings=with_flags(read.settings, tolerance))
+    return make_steps(read, folder, wanted, deadline)
+
+
+def make_steps(read: Case, folder: str | None, wanted: Wanted, deadline: Deadline) -> int:
+    """Make the steps of a case with an evolution, write as they come; the exit code."""
     place = check_folder(f"{read.name}-results" if folder is None else folder)
+    export = wanted.export
     exported = None if export is None else check_folder(export, "--export-fclib")
     with read.naming_keys():
         _ = read.in_time.discretisation, read.in_time.law
-    if not quiet:
+    if not wanted.quiet:
         say_notes(read.notes)
         say_growth(read)
-    settings = with_flags(read.settings, tolerance)
     with Stopping() as stop, ExitStack() as stack:
-        asked = _Run(read, settings, every, pictures, quiet, time_limit, deadline, stop)
-        if report:
+        asked = _Run(read, wanted, deadline, stop)
+        if wanted.report:
             from ...io.report import Film
 
             asked.film = Film(read.model)
@@ -102,13 +120,13 @@ def run(
             clear(each, read.name)
         try:
             with stop.breaking():
-                results, steps = _prepared(asked, place, restart=restart, xdmf=xdmf)
+                results, steps = _prepared(asked, place)
         except KeyboardInterrupt:
             click.echo(f"{stop.word}.", err=True)
             return stop.code
         with _saying_what_is_safe(results), read.naming_keys():
             if exported is not None:
-                steps = export_fclib(steps, exported, read.name, chosen)
+                steps = export_fclib(steps, exported, read.name, wanted.exported)
             return _follow(steps, results, asked)
 
 
@@ -124,19 +142,18 @@ def _chosen(export: str | None, steps: str | None) -> list[range] | None:
         raise InvalidInput(f"--export-steps: {reason.text}") from None
 
 
-def _prepared(
-    asked: _Run, place: Path, *, restart: bool, xdmf: bool
-) -> tuple[RunFolder, Iterator[TimeStep]]:
+def _prepared(asked: _Run, place: Path) -> tuple[RunFolder, Iterator[TimeStep]]:
     """The folder of results and the steps, from the beginning or from the checkpoint."""
-    read, settings = asked.case, asked.settings
+    read, wanted = asked.case, asked.wanted
+    settings = read.settings
     assert read.evolution is not None
-    case, numbers = identity(read, settings), numbers_of(read.model)
-    if restart:
-        results, start, changed = continued(place, case, numbers, read.title, xdmf)
+    case, numbers = identity(read), numbers_of(read.model)
+    if wanted.restart:
+        results, start, changed = continued(place, case, numbers, read.title, wanted.xdmf)
         for text in changed:
             click.echo(f"--restart: {text}, from step {start.index + 1} on", err=True)
     else:
-        results = RunFolder(place, case, numbers, read.title, xdmf)
+        results = RunFolder(place, case, numbers, read.title, wanted.xdmf)
         start = at_rest(read.in_time)
     results.notes = read.notes
     steps = evolve(
@@ -146,7 +163,7 @@ def _prepared(
         time_limit=settings.time_limit,
         deadline=asked.deadline,
     )  # fmt: skip
-    if not restart:
+    if not wanted.restart:
         results.save(start)
     return results, steps
 
@@ -173,12 +190,12 @@ def _follow(steps: Iterator[TimeStep], results: RunFolder, asked: _Run) -> int:
                 break
             results.add(step, now() - began)
             last = step
-            asked.doubts.note(step, quiet=asked.quiet)
+            asked.doubts.note(step, quiet=asked.wanted.quiet)
             if asked.film is not None:
                 asked.film.add(step)
-            if step.state.index % asked.every == 0:
+            if step.state.index % asked.wanted.every == 0:
                 _keep(step, results, asked)
-            if not asked.quiet:
+            if not asked.wanted.quiet:
                 _show(step, asked)
             if asked.stop.received is not None:  # where a library has swallowed it
                 raise KeyboardInterrupt
@@ -199,7 +216,7 @@ def _follow(steps: Iterator[TimeStep], results: RunFolder, asked: _Run) -> int:
         _draw(results, asked)
     if last is not None and asked.film is not None:
         _report(asked.film, results, asked)
-    if not asked.quiet:
+    if not asked.wanted.quiet:
         _summary(results, asked)
         for line in asked.doubts.lines():
             click.echo(line)
@@ -223,7 +240,7 @@ def _stopped(asked: _Run, time: float) -> int:
     assert asked.case.evolution is not None
     sys.stdout.flush()
     click.echo(
-        f"Stopped by --time-limit {asked.time_limit:g} at t = {time:.6g} of "
+        f"Stopped by --time-limit {asked.wanted.time_limit:g} at t = {time:.6g} of "
         f"{asked.case.evolution.until:g}; go on with --restart.", err=True,
     )  # fmt: skip
     return 1
@@ -238,7 +255,7 @@ def _keep(step: TimeStep, results: RunFolder, asked: _Run) -> None:
     """Write the picture of a step and its state."""
     results.draw(step)
     results.keep(step)
-    if asked.pictures:
+    if asked.wanted.pictures:
         from ...io.plots import Frame
 
         asked.frames.append(Frame.of(step))
@@ -271,7 +288,7 @@ def _report(film: Film, results: RunFolder, asked: _Run) -> None:
 def _show(step: TimeStep, asked: _Run) -> None:
     """A line per written step; on a terminal the steps between pass by on one line."""
     assert asked.case.evolution is not None
-    told = step.state.index % asked.every == 0 or asked.ended(step.time)
+    told = step.state.index % asked.wanted.every == 0 or asked.ended(step.time)
     if told or (step.passage is not None and step.passage.jumped):
         click.echo(f"{'' if not sys.stdout.isatty() else chr(13)}{step}")
     elif sys.stdout.isatty():

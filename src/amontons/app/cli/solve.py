@@ -25,6 +25,7 @@ from ...solvers.asked import Asked
 from ..api import solve_as_asked
 from ..model_solution import ModelSolution
 from .group import INTERRUPTED
+from .run import Wanted
 from .solve_deck import solve_in_steps
 from .sources import naming_culprits, open_source, start_from, with_flags
 from .terminal import REPORT, check_folder, check_writable, say_notes, say_when
@@ -45,29 +46,25 @@ def run(
 ) -> int:  # fmt: skip
     """Solve and write; returns the exit code."""
     opened = open_source(source, overrides, method)
-    if opened.evolution is not None and opened.moving is None:
-        if opened.about is not None:
-            flags = {
-                "method": method, "tolerance": tolerance, "max_iterations": max_iterations,
-                "contact_tolerance": contact_tolerance,
-                "time_limit": time_limit, "start": start, "uniqueness": full_verdict,
-                "frd": frd, "fclib-error": fclib_error,
-            }  # fmt: skip
-            return solve_in_steps(
-                source, opened.name, overrides, flags, folder, json_copy, quiet=quiet,
-                report=report,
-            )
-        raise FileFormatError(
-            f"{source}: a case in time, whose state depends on the way; use: amontons run "
-            f"{source}"
-        )
     settings = with_flags(
         opened.settings, tolerance, max_iterations, time_limit, contact_tolerance
     )
+    silent = quiet or json_copy == "-"
+    if opened.evolution is not None and opened.moving is None:
+        if opened.about is None:
+            raise FileFormatError(
+                f"{source}: a case in time, whose state depends on the way; use: amontons run "
+                f"{source}"
+            )
+        return solve_in_steps(
+            replace(opened, settings=replace(settings, time_limit=opened.settings.time_limit)),
+            folder, json_copy, Wanted(time_limit, quiet=silent, report=report),
+            {"start": start, "uniqueness": full_verdict, "frd": frd,
+             "fclib-error": fclib_error},
+        )  # fmt: skip
     place = check_folder(f"{opened.name}-results" if folder is None else folder)
     check_writable(json_copy, "--json")
     begin = None if start is None else start_from(start, opened)
-    silent = quiet or json_copy == "-"
     with naming_culprits(opened, source, settings.method, start):
         asked = Asked(
             settings.tolerance, settings.contact_tolerance, settings.max_iterations,

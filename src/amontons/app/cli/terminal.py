@@ -41,7 +41,10 @@ def show_table(
     for row in rows:
         table.add_row(*row)
     wide = None if sys.stdout.isatty() else 200  # a file or a pipe needs no wrapping
-    Console(width=wide, highlight=False).print(table)
+    console = Console(width=wide, highlight=False)
+    with console.capture() as printed:
+        console.print(table)
+    click.echo("\n".join(line.rstrip() for line in printed.get().splitlines()))
 
 
 def say_when(model: Model | FrictionProblem | None) -> None:

@@ -11,7 +11,6 @@ import numpy as np
 
 from ...mechanics.meshes import Mesh
 from ..readers import Case
-from .settings import Settings
 
 MESH = "the mesh"  # key of the digest of its numbers
 SOLVER = "solver."  # how keys begin that decide how well a step is solved, not what is solved
@@ -20,7 +19,7 @@ ABSENT = "not there"
 EXACT = 2**53  # below it whole numbers are numbers
 
 
-def identity(case: Case, settings: Settings) -> dict[str, Any]:
+def identity(case: Case) -> dict[str, Any]:
     """JSON data by dotted key: two cases with the same take the same steps.
 
     Meshes go in by their numbers: a mesh file may move, and must not change.  Left out: the
@@ -35,6 +34,7 @@ def identity(case: Case, settings: Settings) -> dict[str, Any]:
             else _without_file(given)
         )  # fmt: skip
     assert case.evolution is not None
+    settings = case.settings
     solver = {"method": settings.method, "tolerance": settings.tolerance,
               "contact_tolerance": settings.contact_tolerance, **settings.options}  # fmt: skip
     found = _flat({**tables, "evolution": case.evolution.method, "solver": solver})

@@ -41,13 +41,14 @@ from .cards import Card, Row, read_cards
 from .contact_laws import Options, law_of
 from .contacts import read_contacts
 from .course import Course
-from .flat import Deck, flatten
+from .flat import Deck, Placed, flatten
 from .general import found_pairs, motion_of, part_titles, read_general
 from .history import History, read_history
 from .joints import Joints, tied
-from .keywords import left_out, sorted_out
+from .keywords import left_out, plain, sorted_out
 from .materials import read_interactions, read_sections
 from .meshing import Region
+from .options import PLACED, with_known_options
 from .scopes import Index
 from .special import special_nodes
 from .stages import Held, check_removed, read_stages, times_of
@@ -82,9 +83,11 @@ class Found:
 def read(path: Path, overrides: Sequence[str] = (), method: str | None = None) -> Case:
     """The case in a deck.  Overrides: those of the solver, deck.allow and deck.hard."""
     settings, options = _settings(overrides, method)
+    allow, notes = plain(options.allow), []
     cards = read_cards(path)
+    cards = [with_known_options(c, allow, notes) if c.keyword in PLACED else c for c in cards]
     deck = flatten(cards)
-    notes = _leave_out(deck, options)
+    notes += _leave_out(deck, options)
     if not deck.steps:
         raise cards[-1].error("the deck ends here without a *STEP, it loads nothing")
     try:
@@ -121,18 +124,25 @@ def _settings(overrides: Sequence[str], method: str | None) -> tuple[Settings, O
 def _leave_out(deck: Deck, options: Options) -> list[str]:
     """Take the cards away that are not read, and say so."""
     kept, notes = sorted_out([p.card for p in deck.model], options.allow)
-    chosen = {id(card) for card in kept}
-    deck.model = [p for p in deck.model if id(p.card) in chosen]
+    deck.model = _with(deck.model, kept)
     static = any(p.card.keyword == "STATIC" for step in deck.steps for p in step)
     said = [left_out([p.card for p in s], options.allow, has_static=static) for s in deck.steps]
     deck.steps = [step for step, note in zip(deck.steps, said, strict=True) if not note]
     notes += [note for note in said if note]
     for k, step in enumerate(deck.steps):
         kept, more = sorted_out([p.card for p in step], options.allow)
-        chosen = {id(card) for card in kept}
-        deck.steps[k] = [p for p in step if id(p.card) in chosen]
+        deck.steps[k] = _with(step, kept)
         notes += [note for note in more if note not in notes]
     return notes
+
+
+def _with(placed: list[Placed], cards: list[Card | None]) -> list[Placed]:
+    """Those that have a card left."""
+    return [
+        Placed(card, one.scope)
+        for one, card in zip(placed, cards, strict=True)
+        if card is not None
+    ]
 
 
 def _case(
@@ -150,7 +160,7 @@ def _case(
     stages = read_stages(deck, history, interactions)
     _joined(found, region, history, (joints, turned), stages)
     _name_nodes(region, history, stages)
-    pairs = read_contacts(deck, region, interactions, notes, more=general is not None)
+    pairs = read_contacts(deck, region, interactions, notes)
     check_removed(stages, pairs, deck)
     _name_faces(region, history)
     mesh, at = region.mesh(title)
@@ -163,6 +173,8 @@ def _case(
         )  # fmt: skip
         pairs += more
         notes += said
+    if not pairs:
+        notes.append("no contact in this deck: the bodies meet nothing, linear statics")
     mesh = adjusted(mesh, at, pairs, notes)
     _loads(found, region, history, at, notes)
     law = partial(law_of, options=options, notes=notes)

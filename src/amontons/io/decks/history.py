@@ -199,7 +199,9 @@ def _course(old: Course, value: float, span: Span, card: Card, known: Amplitudes
     if name not in known:
         raise card.error(missing("amplitude", name, known))
     times, factors, total = known[name]
+    delay = card.options.get("TIMEDELAY")
     shift = 0.0 if total else span.begin
+    shift += number(delay, Row(card.file, card.number, []), "TIME DELAY") if delay else 0.0
     inside = (times + shift > span.begin) & (times + shift < span.end)
     at = np.unique([span.begin, *(times[inside] + shift), span.end])
     return old.then(tuple(at), tuple(value * np.interp(at - shift, times, factors)))

@@ -18,9 +18,7 @@ Array = NDArray[np.float64]
 
 def nodes_of(deck: Deck, elements: Index) -> Index:
     """All nodes of some elements."""
-    found = [
-        block.nodes[block.rows_of(elements)] for block in deck.blocks
-    ]
+    found = [block.nodes[block.rows_of(elements)] for block in deck.blocks]
     return np.unique(np.concatenate([nodes.ravel() for nodes in found]))
 
 

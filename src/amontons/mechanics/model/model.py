@@ -72,8 +72,6 @@ class Model(Told):
             object.__setattr__(self, name, tuple_of(name, getattr(self, name), kind))
         if not self.bodies:
             raise InvalidInput("expected at least one, got none", ("bodies",))
-        if not self.contacts:
-            raise InvalidInput("expected at least one, got none", ("contacts",))
         dims = {body.mesh.dim for body in self.bodies}
         if len(dims) > 1:
             raise InvalidInput("expected all in 2D or all in 3D, got both", ("bodies",))

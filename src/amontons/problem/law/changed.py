@@ -60,20 +60,26 @@ class Changed(Law):
         return out if self.stretch is None else _tangents(self.stretch, out)
 
     def stretched(self, u: Array, r: Array | None = None) -> Array:
-        """u' = T (u + C r), (nc, d); without r, T u."""
+        """u' = T (u + C r + o n), (nc, d); without r, T u."""
         if self.give is not None and r is not None:
             u = u + self.give[:, : u.shape[1]] * r
-            u[:, 0] += self.offset
+        if r is not None:
+            u = self._shifted(u, 1.0)
         return u if self.stretch is None else _tangents(self.stretch, np.array(u, dtype=float))
 
     def unstretched(self, u: Array, r: Array) -> Array:
         """u of u', (nc, d)."""
         if self.stretch is not None:
             u = _tangents(self._inverse, np.array(u, dtype=float))
-        if self.give is None:
-            return u
-        u = u - self.give[:, : u.shape[1]] * r
-        u[:, 0] -= self.offset
+        if self.give is not None:
+            u = u - self.give[:, : u.shape[1]] * r
+        return self._shifted(u, -1.0)
+
+    def _shifted(self, u: Array, sign: float) -> Array:
+        """The normal parts moved by the offset of the gap; u itself where there is none."""
+        if np.any(self.offset):
+            u = np.array(u, dtype=float)
+            u[:, 0] += sign * self.offset
         return u
 
     def given(self, r: Array) -> Mask:
@@ -124,7 +130,7 @@ class Changed(Law):
         return self.plain.augmented_reaction_jacobian(self.pressed(x))
 
     def _refuse(self) -> None:
-        if self.stretch is not None or self.give is not None:
+        if self.stretch is not None or self.give is not None or np.any(self.offset):
             raise UnsupportedLaw(f"{self.name} needs reactions and small strains")
 
 

@@ -151,7 +151,7 @@ class Law:
     varies: ClassVar[bool] = False  # True where coefficients follow the state, see `varying`
     stretch: Array | None = None  # T of tangents, (nc, 2, 2), see `changed`
     give: Array | None = None  # diagonal of C, (nc, 3)
-    offset: Array | float = 0.0  # of the gap, (nc,), where there is a C
+    offset: Array | float = 0.0  # of the gap, (nc,)
 
     @property
     def plain(self) -> Law:

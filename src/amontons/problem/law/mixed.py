@@ -63,7 +63,7 @@ def joined(laws: Sequence[Law]) -> Law:
         out = Stretched(out, read_only(np.concatenate(stretches)))
     if cohesion.any():
         out = Cohesive(out, cohesion)
-    if all(law.give is None for law in laws):
+    if all(law.give is None and not np.any(law.offset) for law in laws):
         return out
     give = [np.zeros((len(law), 3)) if law.give is None else law.give for law in laws]
     offset = np.concatenate([np.broadcast_to(law.offset, len(law)) for law in laws])

@@ -6,7 +6,7 @@ Costs are operation counts, so that the same problem takes the same path on ever
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 
 import numpy as np
@@ -48,9 +48,10 @@ class State:
     spent: float = 0.0  # cost of the accelerated sweeps
     budget: float = 0.0  # cost of Newton steps not yet matched by sweeps
     unsaid: float = 0.0  # operations that no iterate has told yet
+    joints: Joints | None = field(init=False)  # of deformable bodies, where not too small
 
     def __post_init__(self) -> None:
-        self.start = self.r
+        self.start, self.joints = self.r, Joints.of(self.problem.whole[0])
         if np.count_nonzero(self.r):
             self.error, self.unsaid = self.judge(self.r), self.problem.judge_flops
         self.goal = self.target.tolerance * self.problem.q_norm
@@ -61,11 +62,6 @@ class State:
     def is_coulomb(self) -> bool:
         """True under Coulomb's law, which has a cone and relaxations."""
         return isinstance(self.problem.law, Coulomb)
-
-    @cached_property
-    def joints(self) -> Joints | None:
-        """Groups of contacts between deformable bodies; None where they are too small."""
-        return Joints.of(self.problem.whole[0])
 
     @cached_property
     def newton_kind(self) -> type[SemismoothNewton]:

@@ -22,7 +22,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -356,8 +355,8 @@ class Acceleration:
 
     def sweep(self, sweeps: int, watch: Array) -> tuple[int, float]:
         """Go on for `sweeps` sweeps or until the judge is content; sweeps done, operations."""
-        done, flops = counted(self.data, partial(
-            anderson_inplace, self.data, self.r, self.x, self.history, self.gram, self.count,
-            sweeps, watch,
-        ))  # fmt: skip
-        return done, flops + done * self.flops
+        s, before = self.data, float(self.data.work[0])
+        done = anderson_inplace(
+            s, self.r, self.x, self.history, self.gram, self.count, sweeps, watch
+        )
+        return done, sweep_flops(s, done, float(s.work[0]) - before) + done * self.flops
