@@ -29,7 +29,12 @@ Mask = NDArray[np.bool_]
 
 
 class Pair(Protocol):
-    """Slave nodes and another side."""
+    """Slave nodes (nc,) and another side."""
+
+    @property
+    def slaves(self) -> Index:
+        """Nodes with a row."""
+        ...
 
     def at(self, positions: Array) -> Meeting | MortarMeeting:
         """Where they meet at the positions (nodes, d) of all nodes of the model."""
@@ -117,6 +122,15 @@ class Meetings:
         forces lambda (nc, d) those on all nodes.
         """
         return sparse.csr_array(sparse.vstack([part.averages for part in self.parts]))
+
+    @cached_property
+    def others(self) -> sparse.csr_array:
+        """Forces on the other nodes per force on the slaves, B^T without 1 at p, (nodes, nc)."""
+        slaves = np.concatenate([part.slaves for part in self.parts])
+        nc = len(slaves)
+        entries = (np.ones(nc), (slaves, np.arange(nc)))
+        onto = sparse.csr_array(self.averages.T)
+        return sparse.csr_array(onto - sparse.csr_array(entries, shape=onto.shape))
 
     def columns(self, axes: Array) -> sparse.csc_array:
         """H (nodes d, nc d): column p d + k holds the forces of a unit along axis k of p.

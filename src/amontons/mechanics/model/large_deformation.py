@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from .model import Model
 
 Array = NDArray[np.float64]
-SLIDING = 0.25  # least part of a Newton step: |F| has a kink wherever two nodes pass each other
+SLIDING = 0.1  # least part of a Newton step: F has a kink wherever two nodes pass each other
 TOUCHING = 1e-9  # gaps up to this part of the size count as closed where nothing holds a body
 
 
@@ -249,7 +249,7 @@ class LargeDeformation(NonlinearProblem):
 
     @property
     def shortest(self) -> float:  # type: ignore[override]  # read only
-        """Least part of a Newton step to take in the line search."""
+        """Least part of a Newton step to take; 0: searched by |F|."""
         return SLIDING if self.parts.has_pairs else 0.0
 
     @property

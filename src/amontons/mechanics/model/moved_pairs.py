@@ -32,16 +32,15 @@ def balanced(parts: NonlinearParts, meeting: Meetings, rest: Array) -> Array:
     """f_int - f (dofs,) without the forces that contacts give to nodes other than the slave."""
     if meeting.only_obstacles:
         return rest
-    return rest - _others(parts, meeting) @ rest[parts.at].ravel()
+    own = rest[parts.at] * parts.contact.free * meeting.met[:, None]
+    return rest - (meeting.others @ own).ravel()
 
 
 def _others(parts: NonlinearParts, meeting: Meetings) -> sparse.csr_array:
     """Forces on other nodes per force on the slaves, (dofs, nc d)."""
-    nc, d = parts.at.shape
-    off = meeting.averages.tolil()
-    off[np.arange(nc), parts.at[:, 0] // d] = 0
+    d = parts.at.shape[1]
     counts = parts.contact.free * meeting.met[:, None]
-    spread = sparse.kron(off.tocsr().T, sparse.eye_array(d), format="csr")
+    spread = sparse.kron(meeting.others, sparse.eye_array(d), format="csr")
     return sparse.csr_array(spread @ sparse.diags_array(counts.ravel().astype(float)))
 
 

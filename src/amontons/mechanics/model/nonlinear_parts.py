@@ -6,6 +6,7 @@ columns always have the same pattern, so that they are one `take` away.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+KEPT = 3  # states whose meetings are kept: now, tried, at the end of the last step
 RESOLVED = 1e-7  # of stresses like moduli, and of displacements like the size
 
 
@@ -84,8 +86,21 @@ class NonlinearParts:
         return any(isinstance(pair, MortarPair) for pair in self.contact.pairs)
 
     def meet(self, u: Array) -> Meetings:
-        """Where the contact pairs meet at displacements u (nodes, d)."""
-        return self.contact.meet(self.X + u)
+        """Where the contact pairs meet at displacements u (nodes, d).
+
+        The last few are kept: one state is asked for its forces, its error and its slopes.
+        """
+        for known, meeting in tuple(self._met):
+            if np.array_equal(known, u):
+                return meeting
+        meeting = self.contact.meet(self.X + u)
+        self._met.append((u.copy(), meeting))
+        return meeting
+
+    @cached_property
+    def _met(self) -> deque[tuple[Array, Meetings]]:
+        """States and where pairs met there."""
+        return deque(maxlen=KEPT)
 
     def forces(self, u: Array) -> Array:
         """Nodal forces of the bodies (dofs,) at displacements u (nodes, d)."""
@@ -166,7 +181,7 @@ def _nonlinear_parts(model: Model) -> NonlinearParts:
     contact = CurrentContact(
         pairs,
         model.law,
-        _stiffness_at(linear.stored_stiffness, at),
+        _resistance(pairs, linear.stored_stiffness, at),
         is_free[at],
     )  # fmt: skip
     return NonlinearParts(bodies, X, linear.offsets[1:-1] // d, linear.free, contact, at,
@@ -302,6 +317,22 @@ def _matrix(blocks: NDArray, columns: Index, pointers: Index) -> sparse.bsr_arra
     """The matrix of node blocks in rows of nodes."""
     size = (len(pointers) - 1) * blocks.shape[1]
     return sparse.bsr_array((blocks, columns, pointers), shape=(size, size))
+
+
+def _resistance(pairs: Sequence[Pair], K: sparse.csr_array, at: Index) -> Array:
+    """Stiffness of every contact, (nc,): of its node, in series with a node of the master.
+
+    Of the softer body where they differ: with more, slips of a stiff slave change sign in
+    every Newton step.
+    """
+    own, d, start = _stiffness_at(K, at), at.shape[1], 0
+    for pair in pairs:
+        mine = slice(start, start + len(pair.slaves))
+        start = mine.stop
+        if isinstance(pair, MortarPair):
+            other = np.median(_stiffness_at(K, pair.master.all[:, None] * d + np.arange(d)))
+            own[mine] = own[mine] * other / (own[mine] + other)
+    return own
 
 
 def _stiffness_at(K: sparse.csr_array, at: Index) -> Array:

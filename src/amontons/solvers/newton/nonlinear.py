@@ -12,7 +12,11 @@ contact: many contacts that close at once find their statuses together.  Bodies 
 be inverted begin with it, as nothing else keeps them from passing through their obstacles.
 
 Line search: halving until |F| falls below the largest of the last few values; states with
-inverted cells are never accepted.
+inverted cells are never accepted.  Where problems say so by `shortest`, it halves until the
+step that the same matrix asks for at the new state is shorter: the natural monotonicity test of
+[D], which does not change with the units of rows, while |F| hears most of the stiffest nodes.
+
+[D] P. Deuflhard, "Newton methods for nonlinear problems", Springer (2004), section 3.3.
 """
 
 from __future__ import annotations
@@ -28,6 +32,7 @@ from scipy import sparse
 from ...core.errors import InvertedCells, SingularOperator
 from ...core.options import check_options
 from ...linear import Direct, LinearSolver
+from ...linear.base import Factor
 from ...problem.friction import FrictionProblem
 from ...problem.protocol import Problem
 from ..contract import (
@@ -44,6 +49,7 @@ from ..judging import first_of, sent
 Array = NDArray[np.float64]
 MEMORY = 5  # values of |F| of which the largest counts in the line search
 ENOUGH = 1e-4  # least relative decrease of |F| over a full step
+NATURAL = 0.25  # least relative decrease of the next step over a full step, natural test
 LOOSE = 1e-5  # error, unit-free, at which a load step is good enough to go on
 REPEATED = 1e-12  # relative difference of |F| below which steps go round in circles
 JUMP = "; if the body jumps there, crossing=PathCrossing() of this solver follows it (2D)"
@@ -67,7 +73,7 @@ class NonlinearProblem(Problem):
         "which auto takes"
     )
 
-    shortest: float = 0.0  # least part of a Newton step to take in the line search
+    shortest: float = 0.0  # least part of a Newton step to take, if > 0 by the natural test
 
     def residual(self, v: Array) -> Array:
         """F(v); raises InvertedCells where it is not defined."""
@@ -183,7 +189,7 @@ class NonlinearNewton:
         try:
             here, change = problem.predicted(share, goal, v)
             now = problem.at_share(share)
-            return v + self._solve(now, v, here, here.residual + change)
+            return v + self._solve(now, v, here, here.residual + change)[0]
         except (InvertedCells, SingularOperator) as reason:
             raise _Failed(str(reason)) from reason
 
@@ -239,10 +245,13 @@ class NonlinearNewton:
                 sizes.append(size)
                 if again or patience.over(size):
                     self._stop(problem, v)
-                step = self._solve(problem, v, here, F)
+                step, factor = self._solve(problem, v, here, F)
             except SingularOperator as reason:
                 raise _Failed(str(reason)) from reason
-            v = v + self._length(problem, v, step, sizes) * step
+            if problem.shortest > 0:
+                v = v + self._natural_length(problem, v, step, factor) * step
+            else:
+                v = v + self._length(problem, v, step, sizes) * step
             yield v, problem.reactions(v), size
         raise Breakdown("out of time between two load steps")
 
@@ -254,10 +263,12 @@ class NonlinearNewton:
             raise Breakdown(reason)
         raise _Failed(reason)
 
-    def _solve(self, problem: NonlinearProblem, v: Array, here: Linear, F: Array) -> Array:
-        """-dF/dv^-1 F; with more contacts closed where open ones leave a body loose."""
+    def _solve(
+        self, problem: NonlinearProblem, v: Array, here: Linear, F: Array
+    ) -> tuple[Array, Factor]:
+        """-dF/dv^-1 F and the factors; with more contacts closed where a body is loose."""
         try:
-            return self.linear.factor(here.matrix).solve(-F)
+            factor = self.linear.factor(here.matrix)
         except SingularOperator:
             for pieces in problem.closed_pieces(v):
                 closed = problem.linearisation(v, pieces)
@@ -265,8 +276,9 @@ class NonlinearNewton:
                     factor = self.linear.factor(closed.matrix)
                 except SingularOperator:
                     continue
-                return factor.solve(-F)
+                return factor.solve(-F), factor
             raise
+        return factor.solve(-F), factor
 
     def _length(
         self, problem: NonlinearProblem, v: Array, step: Array, sizes: list[float]
@@ -276,8 +288,6 @@ class NonlinearNewton:
         best, found = np.inf, 0.0
         for k in range(self.halvings + 1):
             length = 0.5**k
-            if length < problem.shortest and np.isfinite(best):
-                break
             try:
                 size = float(np.linalg.norm(problem.residual(v + length * step)))
             except InvertedCells:
@@ -286,6 +296,28 @@ class NonlinearNewton:
                 return length
             if size < best:
                 best, found = size, length
+        if not np.isfinite(best):
+            raise _Failed("every step inverts cells")
+        return found
+
+    def _natural_length(
+        self, problem: NonlinearProblem, v: Array, step: Array, factor: Factor
+    ) -> float:
+        """The same by the natural monotonicity test, no shorter than `problem.shortest`."""
+        size, best, found = float(np.linalg.norm(step)), np.inf, 0.0
+        for k in range(self.halvings + 1):
+            length = 0.5**k
+            if length < problem.shortest and np.isfinite(best):
+                break
+            try:
+                F = problem.residual(v + length * step)
+            except InvertedCells:
+                continue
+            again = float(np.linalg.norm(factor.solve(-F)))
+            if again <= (1 - NATURAL * length) * size:
+                return length
+            if again < best:
+                best, found = again, length
         if not np.isfinite(best):
             raise _Failed("every step inverts cells")
         return found
