@@ -125,7 +125,7 @@ class Meetings:
 
     @cached_property
     def others(self) -> sparse.csr_array:
-        """Forces on the other nodes per force on the slaves, B^T without 1 at p, (nodes, nc)."""
+        """B^T without 1 at p: forces on the other nodes, (nodes, nc)."""
         slaves = np.concatenate([part.slaves for part in self.parts])
         nc = len(slaves)
         entries = (np.ones(nc), (slaves, np.arange(nc)))
