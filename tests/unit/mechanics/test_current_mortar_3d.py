@@ -35,20 +35,26 @@ def surfaces(*, split=(False, False), apart=0.02):
 
 
 def told(meeting, earlier, force):
+    """What has derivatives, of the nodes that meet now and did so before."""
     both = (meeting.met & earlier.met)[:, None]
     return [meeting.normals, meeting.distances * meeting.met[:, None],
             meeting.gap * meeting.met, meeting.averages.T @ force,
             meeting.motion(earlier) * both]  # fmt: skip
 
 
+def alike(one, other):
+    """Whether the same facets face each other, and the same nodes carry force."""
+    same = one.met.tolist() == other.met.tolist()
+    return same and all(
+        getattr(one.shared, name).tolist() == getattr(other.shared, name).tolist()
+        for name in ("slave", "master", "kept")
+    )
+
+
 def worst_slope(pair, earlier, x, way, rng):
     """Largest relative error of all slopes along a way; None where they have a kink."""
     here, behind, ahead = (pair.at(x + k * STEP * way) for k in (0, -1, 1))
-    same = all((one.met == here.met).all()
-               and np.array_equal(one.shared.master, here.shared.master)
-               and np.array_equal(one.shared.kept, here.shared.kept)
-               for one in (behind, ahead) if len(one.shared.of) == len(here.shared.of))  # fmt: skip
-    if not same or not len(behind.shared.of) == len(here.shared.of) == len(ahead.shared.of):
+    if not all(alike(here, side) for side in (behind, ahead)):
         return None
     force = rng.standard_normal((len(here.met), 3)) * here.met[:, None]
     slopes, both = here.slopes, np.repeat(here.met & earlier.met, 3)
