@@ -9,8 +9,10 @@ from click.testing import CliRunner
 from verify.__main__ import CASES, main
 from verify.case import Case, Value, run
 
+CHEAP = "wedge slope wall keystone tie reference spring tool overlap slot"
 
-@pytest.mark.parametrize("name", ["wedge", "slope", "wall", "keystone"])
+
+@pytest.mark.parametrize("name", CHEAP.split())
 def test_cheap_cases_pass(name):
     outcome = run(replace(CASES[name], sizes=CASES[name].sizes[:1]))
     assert outcome.passed, [(v.name, v.error) for v in outcome.last]
@@ -28,6 +30,9 @@ def test_fracture_and_press_fit_come_closer_with_the_mesh():
         ("punch-friction", (8, 16)),
         ("capped", (101, 401)),
         ("pin", (16, 32)),
+        ("sector", (1, 2)),
+        ("disc", (1, 2)),
+        ("layers", (1, 2)),
     ):
         outcome = run(replace(CASES[name], sizes=sizes))
         for value in outcome.last:

@@ -1,9 +1,13 @@
 """Decks without contact: statics, by exact values; options and delays of what loads them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import amontons as am
+from amontons.mechanics.elements.elasticity import body_load
+from amontons.mechanics.meshes import second_order
 from tests.unit.io.test_decks import case_of
 
 BRICK = """*NODE, NSET=NALL
@@ -121,3 +125,58 @@ def test_bricks_that_feel_no_bending_are_no_answer(tmp_path):
     text = head + "\n" + BRICK[BRICK.index("*MATERIAL") :]
     with pytest.raises(am.NotConverged, match="without a strain"):
         am.solve(case_of(tmp_path, text).model)
+
+
+def pulls(case):
+    """What the supports hold, (3,), and its moment about the origin."""
+    found = am.solve(case.model)
+    return found.fields.reaction[0].sum(axis=0)
+
+
+SPUN = BRICK.replace("*SOLID", "*DENSITY\n2.\n*SOLID")
+
+
+def loaded(*lines):
+    begin, end = SPUN.index("*CLOAD"), SPUN.index("*END STEP")
+    return SPUN[:begin] + "\n".join(["*DLOAD", *lines, SPUN[end:]])
+
+
+def test_a_brick_that_turns_about_an_axis(tmp_path):
+    """The load: rho omega^2 V times the way of the middle from the axis, 2 * 9 * (1, -1/2)."""
+    case = case_of(tmp_path, loaded("EALL, CENTRIF, 9., -.5, 1., 7., 0., 0., 2."))
+    np.testing.assert_allclose(pulls(case), [-18.0, 9.0, 0.0], atol=1e-10)
+    tilted = case_of(tmp_path, loaded("EALL, CENTRIF, 9., 0., 0., 0., 1., 1., 0."))
+    np.testing.assert_allclose(pulls(tilted), [0.0, 0.0, -9.0], atol=1e-10)
+
+
+def test_loads_along_two_directions_add_up_and_along_one_replace_each_other(tmp_path):
+    lines = ("EALL, GRAV, 3., 1., 0., 0.", "EALL, GRAV, 4., 0., 0., -2.",
+             "EALL, GRAV, 5., 2., 0., 0.")  # fmt: skip
+    np.testing.assert_allclose(pulls(case_of(tmp_path, loaded(*lines))), [-10, 0, 8], atol=1e-9)
+
+
+def test_a_turn_that_grows_over_time(tmp_path):
+    case = case_of(tmp_path, loaded("EALL, CENTRIF, 9., 0., 0., 0., 0., 0., 1."))
+    ends = ends_of(case)
+    np.testing.assert_allclose(ends[2.0], 4 * ends[0.5], atol=1e-12)
+    assert ends[2.0][6, 0] > 0
+
+
+@pytest.mark.parametrize(
+    "line", ["CENTRIF, 9., 0., 0., 1.", "CENTRIF, 9., 0., 0., 0., 0., 0., 0."]
+)
+def test_an_axis_needs_a_point_and_a_direction(tmp_path, line):
+    with pytest.raises(am.FileFormatError, match="CENTRIF: expected.*a point and a direction"):
+        case_of(tmp_path, loaded(f"EALL, {line}"))
+
+
+def test_reduced_integration_holds_for_loads_in_bodies_too():
+    """On a curved cell they are other numbers; the sum is that of the points' volume."""
+    mesh = replace(am.box((1, 1), 1, origin=(1, 0)), axisymmetric=True)
+    cells = second_order(mesh, serendipity=True)
+    less = tuple(replace(c, integration="reduced") for c in cells.cells)
+    reduced = replace(cells, cells=less)
+    force = np.stack([cells.points[:, 0] ** 2, 0 * cells.points[:, 0]], axis=1)
+    full, less = body_load(cells, force), body_load(reduced, force)
+    assert np.abs(full - less).max() > 1e-3 * np.abs(full).max()
+    np.testing.assert_allclose(less.sum(axis=0), full.sum(axis=0), rtol=2e-3)

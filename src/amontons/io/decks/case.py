@@ -37,6 +37,7 @@ from ..readers import Case
 from .about import About
 from .adjusting import adjusted
 from .axes import Turned
+from .body_loads import body_force, scaled
 from .cards import Card, Row, read_cards
 from .contact_laws import Options, law_of
 from .contacts import read_contacts
@@ -159,7 +160,7 @@ def _case(
     general = read_general(deck, region, interactions)
     stages = read_stages(deck, history, interactions)
     _joined(found, region, history, (joints, turned), stages)
-    _name_nodes(region, history, stages)
+    _name_nodes(region, deck, history, stages)
     pairs = read_contacts(deck, region, interactions, notes)
     check_removed(stages, pairs, deck)
     _name_faces(region, history)
@@ -203,7 +204,7 @@ def _title(deck: Deck) -> str:
     for placed in deck.model:
         if placed.card.keyword == "HEADING":
             for row in placed.card.rows():
-                return ",".join(row.fields)[:80]
+                return ", ".join(row.fields)[:80]
     return ""
 
 
@@ -241,18 +242,19 @@ def _joined(
             found.add(kind, part, card)
     for number, name, courses, card in loads:
         if number is None:
-            found.add("loads", (NodalForce, name, [_scaled(c, share) for c in courses]), card)
+            found.add("loads", (NodalForce, name, [scaled(c, share) for c in courses]), card)
             continue
         stages[number].supports.append((name, courses))
         if not number:
             found.cards["supports"].append(card)
 
 
-def _name_nodes(region: Region, history: History, stages: Sequence[Held]) -> None:
-    """Node sets of supports and forces: named after the line of their card."""
+def _name_nodes(region: Region, deck: Deck, history: History, stages: Sequence[Held]) -> None:
+    """Node sets of supports and forces: supports have the name of the same set of the deck."""
+    sets = deck.node_sets()
     for stage in stages:
         groups = history.supports.groups(region.dim, stage.held)
-        stage.name([nodes for nodes, _, _ in groups], region.node_sets)
+        stage.name([nodes for nodes, _, _ in groups], region.node_sets, sets)
     for k, (nodes, _, _) in enumerate(history.forces.groups(region.dim)):
         region.node_sets[f"force {k + 1}"] = nodes
     for k, (nodes, _, _) in enumerate(history.heat.groups() if history.heat else ()):
@@ -298,7 +300,7 @@ def _loads(
         if _without_elements(region, name, nodes, at):
             label = region.deck.node_name(int(nodes[at[nodes] < 0][0]))
             raise card.error(f"node {label}: belongs to no element, where does its force go?")
-        found.add("loads", (NodalForce, name, [_scaled(c, share) for c in courses]), card)
+        found.add("loads", (NodalForce, name, [scaled(c, share) for c in courses]), card)
     grows = any(section.material.grows for section in region.sections)
     for k, (nodes, change, card) in enumerate(history.heat.groups() if history.heat else ()):
         if not grows:
@@ -310,18 +312,18 @@ def _loads(
             found.add("loads", (Temperature, name, change), card)
     for (name, label), (course, card, _) in history.faces.items():
         found.add("loads", (Pressure, _loaded(name, label), course), card)
-    for name, (course, way, card, scope) in history.bodies.items():
+    for (name, _), (course, way, card, scope) in history.bodies.items():
         chosen = set(scope.elements(name, Row(card.file, card.number, [])).tolist())
         for section in region.sections:
             own = set(section.elements.tolist())
             if not own & chosen:
                 continue
             if own - chosen:
-                raise card.error(f"GRAV: {name} holds only a part of {section.name}")
+                raise card.error(f"{name} holds only a part of {section.name}")
             density = section.material.density
             if density is None:
-                raise card.error(f"GRAV: the material of {section.name} has no *DENSITY")
-            found.add("loads", (BodyForce, section.name, (course, density * way[:dim])), card)
+                raise card.error(f"the material of {section.name} has no *DENSITY")
+            found.add("loads", (BodyForce, section.name, (scaled(course, density), way)), card)
 
 
 def _without_elements(region: Region, name: str, nodes: Index, at: Index) -> bool:
@@ -329,12 +331,6 @@ def _without_elements(region: Region, name: str, nodes: Index, at: Index) -> boo
     kept = nodes[at[nodes] >= 0]
     region.node_sets[name] = kept
     return len(kept) < len(nodes)
-
-
-def _scaled(course: Course | None, factor: float) -> Course:
-    if course is None:
-        return Course()
-    return replace(course, values=tuple(factor * v for v in course.values))
 
 
 def _of_state(make: Callable[..., Model], stage: Held, state: State) -> Model:
@@ -362,12 +358,11 @@ def _model(
         if kind is NodalForce:
             loads.append(NodalForce(name, [value(c) for c in courses]))
         elif kind is Temperature:
-            loads.append(Temperature(value(courses), on=name))
+            loads.append(Temperature(value(courses), on=name, mean=True))
         elif kind is Pressure:
             loads.append(Pressure(name, value(courses)))
         else:
-            course, way = courses
-            loads.append(BodyForce([value(_scaled(course, w)) for w in way], region=name))
+            loads.append(body_force(name, *courses, value, bodies[0].mesh.dim))
     return Model(
         bodies, supports, stage.contacts, loads, name=title, references=found.references,
         constraints=found.constraints, springs=found.springs,

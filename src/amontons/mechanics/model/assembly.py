@@ -60,7 +60,8 @@ class Discretisation:
     are the free dofs; beside: dofs that are no nodes, by name; gap (nc,); carried (nc, d):
     part of the local displacement that the supports prescribe; levels: prolongations of the
     free dofs from coarser meshes, finest first (none where K is an operator, which has its
-    own); nodal_levels: of the nodes, body by body.
+    own); nodal_levels: of the nodes, body by body; stretched (k, dofs): springs by rows, whose
+    product with displacements is their stretch.
     """
 
     offsets: Index
@@ -80,6 +81,7 @@ class Discretisation:
     nodal_levels: tuple[Levels, ...] = ()
     eliminated: Elimination | None = None
     beside: Beside = None  # type: ignore[assignment]  # always given
+    stretched: sparse.csr_array = None  # type: ignore[assignment]  # always given
 
     def continued(self, prescribed: Array) -> Array | None:
         """Prescribed values (dofs,) continued into the bodies, (n,); None without levels."""
@@ -217,7 +219,7 @@ def discretise(
     offsets = beside.offsets
     given = Prescribed.of(bodies, supports, beside)
     is_fixed = given.is_fixed
-    springs = spring_stiffness(ties.springs, beside)
+    springs, stretched = spring_stiffness(ties.springs, beside)
     sprung = np.unique(springs.indices).astype(np.int64)
     eliminated = Elimination.of(beside, ties.constraints, is_fixed, sprung)
     fixed = np.flatnonzero(is_fixed)
@@ -265,7 +267,7 @@ def discretise(
             [b.mesh.levels for b in bodies], [len(b.mesh.points) for b in bodies], d, is_fixed
         ),
         nodal_levels=tuple(body.mesh.levels for body in bodies),
-        eliminated=eliminated, beside=beside,
+        eliminated=eliminated, beside=beside, stretched=stretched,
     )  # fmt: skip
 
 
