@@ -68,9 +68,7 @@ class PressureStates:
         here = self.problem.linearisation(v, pressures=c)
         parts = self.problem.parts
         missing = parts.forces(here.u) - parts.forces(here.u, c)
-        at = parts.at
-        missing[at] = np.einsum("pij,pj->pi", here.by_force, missing[at])
-        return Reduced(here.matrix, here.residual + missing[parts.free])
+        return Reduced(here.matrix, here.residual + here.passed(missing))
 
     def size(self, w: Array, here: Linear) -> float:
         """|residual(w)|: that of `here` contains pressures that volumes do not ask for."""

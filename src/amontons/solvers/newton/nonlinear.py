@@ -12,7 +12,11 @@ contact: many contacts that close at once find their statuses together.  Bodies 
 be inverted begin with it, as nothing else keeps them from passing through their obstacles.
 
 Line search: halving until |F| falls below the largest of the last few values; states with
-inverted cells are never accepted.
+inverted cells are never accepted.  Where problems say so by `shortest`, it halves until the
+step that the same matrix asks for at the new state is shorter: the natural monotonicity test of
+[D], which does not change with the units of rows, while |F| hears most of the stiffest nodes.
+
+[D] P. Deuflhard, "Newton methods for nonlinear problems", Springer (2004), section 3.3.
 """
 
 from __future__ import annotations
@@ -28,6 +32,7 @@ from scipy import sparse
 from ...core.errors import InvertedCells, SingularOperator
 from ...core.options import check_options
 from ...linear import Direct, LinearSolver
+from ...linear.base import Factor
 from ...problem.friction import FrictionProblem
 from ...problem.protocol import Problem
 from ..contract import (
@@ -44,6 +49,7 @@ from ..judging import first_of, sent
 Array = NDArray[np.float64]
 MEMORY = 5  # values of |F| of which the largest counts in the line search
 ENOUGH = 1e-4  # least relative decrease of |F| over a full step
+NATURAL = 0.25  # least relative decrease of the next step over a full step, natural test
 LOOSE = 1e-5  # error, unit-free, at which a load step is good enough to go on
 REPEATED = 1e-12  # relative difference of |F| below which steps go round in circles
 JUMP = "; if the body jumps there, crossing=PathCrossing() of this solver follows it (2D)"
@@ -119,6 +125,8 @@ class NonlinearProblem(Problem):
         "large deformations are no linear problem with contact: NonlinearNewton solves them, "
         "which auto takes"
     )
+
+    shortest: float = 0.0  # least part of a Newton step to take, if > 0 by the natural test
 
     def residual(self, v: Array) -> Array:
         """F(v); raises InvertedCells where it is not defined."""
@@ -242,7 +250,7 @@ class NonlinearNewton:
         try:
             here, change = problem.predicted(share, goal, v)
             now = problem.at_share(share)
-            return v + self._solve(now, v, here, here.residual + change)
+            return v + self._solve(now, v, here, here.residual + change)[0]
         except (InvertedCells, SingularOperator) as reason:
             raise _Failed(str(reason)) from reason
 
@@ -298,10 +306,14 @@ class NonlinearNewton:
                 sizes.append(size)
                 if again or patience.over(size):
                     self._stop(problem, v)
-                step = states.whole(w, self._solve(problem, v, here, here.residual))
+                moved, factor = self._solve(problem, v, here, here.residual)
             except SingularOperator as reason:
                 raise _Failed(str(reason)) from reason
-            w = w + self._length(states, w, step, sizes) * step
+            step = states.whole(w, moved)
+            if problem.shortest > 0:
+                w = w + self._natural_length(problem, states, w, step, factor) * step
+            else:
+                w = w + self._length(states, w, step, sizes) * step
             yield states.v(w), problem.reactions(states.v(w)), size
         raise Breakdown("out of time between two load steps")
 
@@ -313,10 +325,12 @@ class NonlinearNewton:
             raise Breakdown(reason)
         raise _Failed(reason)
 
-    def _solve(self, problem: NonlinearProblem, v: Array, here: Linear, F: Array) -> Array:
-        """-dF/dv^-1 F; with more contacts closed where open ones leave a body loose."""
+    def _solve(
+        self, problem: NonlinearProblem, v: Array, here: Linear, F: Array
+    ) -> tuple[Array, Factor]:
+        """-dF/dv^-1 F and the factors; with more contacts closed where a body is loose."""
         try:
-            return self.linear.factor(here.matrix).solve(-F)
+            factor = self.linear.factor(here.matrix)
         except SingularOperator:
             for pieces in problem.closed_pieces(v):
                 closed = problem.linearisation(v, pieces)
@@ -324,8 +338,9 @@ class NonlinearNewton:
                     factor = self.linear.factor(closed.matrix)
                 except SingularOperator:
                     continue
-                return factor.solve(-F)
+                return factor.solve(-F), factor
             raise
+        return factor.solve(-F), factor
 
     def _length(
         self, states: States, w: Array, step: Array, sizes: list[float]
@@ -344,6 +359,30 @@ class NonlinearNewton:
                 return length
             if size < best:
                 best, found = size, length
+        if not np.isfinite(best):
+            raise _Failed(f"every step leads to where {reason}")
+        return found
+
+    def _natural_length(
+        self, problem: NonlinearProblem, states: States, w: Array, step: Array, factor: Factor
+    ) -> float:
+        """The same by the natural monotonicity test, no shorter than `problem.shortest`."""
+        size = float(np.linalg.norm(states.v(w + step) - states.v(w)))
+        best, found, reason = np.inf, 0.0, ""
+        for k in range(self.halvings + 1):
+            length = 0.5**k
+            if length < problem.shortest and np.isfinite(best):
+                break
+            try:
+                F = problem.residual(states.v(w + length * step))
+            except InvertedCells as why:
+                reason = str(why)
+                continue
+            again = float(np.linalg.norm(factor.solve(-F)))
+            if again <= (1 - NATURAL * length) * size:
+                return length
+            if again < best:
+                best, found = again, length
         if not np.isfinite(best):
             raise _Failed(f"every step leads to where {reason}")
         return found
