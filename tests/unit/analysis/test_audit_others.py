@@ -7,8 +7,10 @@ import subprocess
 from dataclasses import replace
 
 import pytest
+from click.testing import CliRunner
 
 import amontons as am
+from amontons.app.cli import main
 from amontons.io.decks.written import write_deck
 from amontons.mechanics.meshes import second_order
 
@@ -147,3 +149,53 @@ def test_a_stick_slope_that_creeps_is_named_and_right_where_it_is_meant(slope, t
     assert status.verdict.value == "wrong" and "the deck's stick slope explains" in status.text
     own = am.audit(tmp_path / "model.inp", tmp_path / "model.frd", law="own")
     assert own.verdict == "right", str(own)
+
+
+def of_calculix(model, tmp_path, penalty=None):
+    """CalculiX' answer to the model as it was written: (deck, .frd)."""
+    deck = tmp_path / "model.inp"
+    write_deck(model, deck, penalty=penalty)
+    subprocess.run(["ccx", "model"], cwd=tmp_path, capture_output=True, check=True, timeout=60)
+    return deck, tmp_path / "model.frd"
+
+
+def verdict_of(deck, frd):
+    done = CliRunner().invoke(main, ["audit", str(deck), str(frd), "--law", "own"])
+    assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
+    return done.output.splitlines()[0].rsplit(": ", 1)[1]
+
+
+@CALCULIX
+def test_decks_without_contact_are_audited(tmp_path):
+    body = am.Body(am.box((3, 1, 1), (3, 1, 1)), STEEL)
+    model = am.Model([body], [am.Fix("left", 0)], loads=[am.Traction("right", (0, 0, -1.0))])
+    assert verdict_of(*of_calculix(model, tmp_path)) == "right"
+
+
+@CALCULIX
+def test_a_temperature_that_varies(tmp_path):
+    """CalculiX takes its mean in each brick, and so does what we read of the deck."""
+    body = am.Body(am.box((3, 1, 1), (3, 2, 2)), replace(STEEL, expansion=1e-4))
+    model = am.Model([body], [am.Fix("left", 0)], loads=[am.Temperature(lambda x: 10 * x[2])])
+    assert verdict_of(*of_calculix(model, tmp_path)) == "right"
+
+
+@CALCULIX
+def test_a_master_that_is_held_all_over(tmp_path):
+    """Seen from the master there is no contact: no node of it moves."""
+    body = am.Body(am.box((2, 1), (4, 2)), STEEL)
+    model = am.Model([body], [am.Fix("left", (0, None)), am.Fix("top", (None, -0.01))],
+                     [am.Contact("bottom", am.Plane((0, 1)), mu=0.0)])  # fmt: skip
+    assert verdict_of(*of_calculix(model, tmp_path, penalty=5e4)) == "right"
+
+
+@CALCULIX
+def test_plane_stress_of_calculix_is_only_bounded(tmp_path):
+    """Its cells are solids, which no law of ours has: what misses a little is not wrong."""
+    law = replace(STEEL, plane="stress")
+    lower = am.Body(am.box((3, 1), (7, 3)), law, "lower")
+    upper = am.Body(am.box((1, 1), (4, 4), origin=(1, 1)), law, "upper")
+    held = [am.Fix("lower.bottom", 0), am.Fix("upper.top", (0.003, -0.01))]
+    model = am.Model([lower, upper], held,
+                     [am.Contact("upper.bottom", master="lower.top", mu=0.2)])  # fmt: skip
+    assert verdict_of(*of_calculix(model, tmp_path, penalty=5e4)) in ("right", "undecided")

@@ -66,6 +66,8 @@ def _nodes(model: Model, pair: int) -> Index:
 
 def _groups(nodes: Sequence[Index], total: int) -> list[list[int]]:
     """Pairs that have nodes in common, directly or through others."""
+    if not nodes:
+        return []
     pair = np.repeat(np.arange(len(nodes)), [len(each) for each in nodes])
     on = sparse.csr_array(
         (np.ones(len(pair)), (pair, np.concatenate(nodes))), shape=(len(nodes), total)

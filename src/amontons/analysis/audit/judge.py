@@ -94,8 +94,13 @@ def audit_answer(model: Model, answer: Answer, *, deck_law: bool = True) -> Audi
         findings["forces"] = _stated(model, every, answer.reactions, scale, answer)
     if answer.until is not None and answer.time is not None:
         findings["time"] = _time(answer.time, answer.until)
-    if findings["balance"].verdict is UNDECIDED and answer.other:
-        findings = {name: _only_bounded(name, f) for name, f in findings.items()}
+    blind = findings["balance"].verdict is UNDECIDED
+    rough = findings["balance"].numbers.get("residual", 0.0) > FORMULATED
+    if answer.other and (blind or rough):  # what fits although it is rough does fit
+        findings = {
+            name: _only_bounded(name, f) if blind or f.verdict is WRONG else f
+            for name, f in findings.items()
+        }
     hidden = float(np.max(forces.bound * off, initial=0.0)) / scale if scale > 0 else 0.0
     return Audit(model.name or "model", findings, pairs, hidden, answer.displacement, model,
                  _notes(answer, forces))  # fmt: skip
@@ -263,7 +268,7 @@ def _pair(
     give = Give(*(_inverse(contact.numbers.get(name)) for name in
                   ("stiffness", "stick_stiffness")), meant=deck_law)  # fmt: skip
     found: list[Seen] = []
-    for side in sides:
+    for side in [one for one in sides if len(one.node)] or sides:  # one that is held tells none
         slip = side.slip if before is None else side.slip - side.slip_of(before)
         one = seen(side, give, approach, sheared, slip, scale)
         if before is not None and answer.one_way:  # both are histories of one straight way

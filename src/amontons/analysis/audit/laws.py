@@ -153,13 +153,13 @@ def seen(  # noqa: PLR0913
     why = _statuses(side, (pressed, bound, gap), (push, slip, lost, rubs), (approach, sheared))
     bad = why != ""
     carried = np.maximum(normal, total / max(len(normal), 1))
-    worst = int(gap.argmin()) if len(gap) else 0
+    deepest = int(side.node[gap.argmin()]) if len(gap) else 0
     return Seen(
         side, pressed, shares["curved"], min(shares["flat"], shares["points"]), deck,
         hard, soft,
         _over(float(excess.sum()), most), _over(float(pull.sum()), most),
         _over(float(side.bound[:, 0].sum()), total), _over(float(side.blur.max(initial=0.0)),
-        approach), max(-float(gap.min(initial=0.0)), 0.0), int(side.node[worst]), bad, why,
+        approach), max(-float(gap.min(initial=0.0)), 0.0), deepest, bad, why,
         _over(float(carried[bad & (why != INSIDE)].sum()), float(carried.sum())),
         pressed & rubs & (push >= (1 - RATIO) * bound),
     )  # fmt: skip

@@ -160,7 +160,7 @@ def _case(
     general = read_general(deck, region, interactions)
     stages = read_stages(deck, history, interactions)
     _joined(found, region, history, (joints, turned), stages)
-    _name_nodes(region, history, stages)
+    _name_nodes(region, deck, history, stages)
     pairs = read_contacts(deck, region, interactions, notes)
     check_removed(stages, pairs, deck)
     _name_faces(region, history)
@@ -204,7 +204,7 @@ def _title(deck: Deck) -> str:
     for placed in deck.model:
         if placed.card.keyword == "HEADING":
             for row in placed.card.rows():
-                return ",".join(row.fields)[:80]
+                return ", ".join(row.fields)[:80]
     return ""
 
 
@@ -249,11 +249,12 @@ def _joined(
             found.cards["supports"].append(card)
 
 
-def _name_nodes(region: Region, history: History, stages: Sequence[Held]) -> None:
-    """Node sets of supports and forces: named after the line of their card."""
+def _name_nodes(region: Region, deck: Deck, history: History, stages: Sequence[Held]) -> None:
+    """Node sets of supports and forces: supports have the name of the same set of the deck."""
+    sets = deck.node_sets()
     for stage in stages:
         groups = history.supports.groups(region.dim, stage.held)
-        stage.name([nodes for nodes, _, _ in groups], region.node_sets)
+        stage.name([nodes for nodes, _, _ in groups], region.node_sets, sets)
     for k, (nodes, _, _) in enumerate(history.forces.groups(region.dim)):
         region.node_sets[f"force {k + 1}"] = nodes
     for k, (nodes, _, _) in enumerate(history.heat.groups() if history.heat else ()):
@@ -357,7 +358,7 @@ def _model(
         if kind is NodalForce:
             loads.append(NodalForce(name, [value(c) for c in courses]))
         elif kind is Temperature:
-            loads.append(Temperature(value(courses), on=name))
+            loads.append(Temperature(value(courses), on=name, mean=True))
         elif kind is Pressure:
             loads.append(Pressure(name, value(courses)))
         else:

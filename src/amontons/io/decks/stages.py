@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -42,13 +42,19 @@ class Held:
     contacts: list[Contact] = field(default_factory=list)
     names: list[str] = field(default_factory=list)  # of the node sets of its supports
 
-    def name(self, groups: Sequence[Index], known: dict[str, Index]) -> None:
-        """Name the node sets of groups of supports; those that are known keep their names."""
+    def name(
+        self, groups: Sequence[Index], known: dict[str, Index], sets: Mapping[bytes, str]
+    ) -> None:
+        """Name the node sets of groups of supports; those that are known keep their names.
+
+        sets: names of the deck's own sets, by their nodes.
+        """
         names = {own.tobytes(): name for name, own in known.items()
                  if name.startswith("support")}  # fmt: skip
         for k, nodes in enumerate(groups):
             same = names.get(nodes.tobytes())
-            new = f"support {k + 1}" + (f" of stage {self.number + 1}" if self.number else "")
+            new = f"support {sets.get(nodes.tobytes(), k + 1)}"
+            new += f" of stage {self.number + 1}" if self.number else ""
             self.names.append(same or new)
             known[self.names[-1]] = nodes
 
