@@ -98,7 +98,8 @@ def cells(row):
     newton = f"{row['newton'] / max(row['steps'], 1):.1f}"
     most = row.get("most") or ""
     return [row["case"], row["program"], row["unknowns"], whole, row["steps"], newton, most,
-            f"{row['seconds']:.1f}", f"{row['penetration'] / row['facet']:.1e}", *told]  # fmt: skip
+            f"{row['seconds']:.1f}", f"{row['penetration'] / row['facet']:.1e}",
+            *told]  # fmt: skip
 
 
 HEAD = ["case", "program", "unknowns", "whole path", "load steps", "Newton steps each", "most",
