@@ -90,14 +90,16 @@ def cells(row):
     """A line of the table."""
     forces = np.array(row["forces"]).reshape(-1, 3)
     late = forces[forces[:, 0] > row["late"]]
-    late = late if row["reached"] > 0.999 else np.full((1, 3), np.nan)
     whole = "yes" if row["reached"] > 0.999 else f"to {row['reached']:.0%}"
-    mean, ripple = np.abs(late[:, 1:].mean(axis=0)), late[:, 1:].std(axis=0)
+    told = ["", "", ""]  # of a path that ended
+    if whole == "yes":
+        mean, ripple = np.abs(late[:, 1:].mean(axis=0)), late[:, 1:].std(axis=0)
+        told = [f"{mean[1]:.4f}", f"{mean[0]:.4f}", f"{ripple[1] / mean[1]:.1%}"]
     newton = f"{row['newton'] / max(row['steps'], 1):.1f}"
     most = row.get("most") or ""
     return [row["case"], row["program"], row["unknowns"], whole, row["steps"], newton, most,
             f"{row['seconds']:.1f}", f"{row['penetration'] / row['facet']:.1e}",
-            f"{mean[1]:.4f}", f"{mean[0]:.4f}", f"{ripple[1] / mean[1]:.1%}"]  # fmt: skip
+            *told]  # fmt: skip
 
 
 HEAD = ["case", "program", "unknowns", "whole path", "load steps", "Newton steps each", "most",
