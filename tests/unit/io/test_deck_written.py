@@ -138,3 +138,23 @@ def test_calculix_comes_to_ours_as_its_penalty_grows(mu, tmp_path):
         found = next(b for b in read_frd(tmp_path / f"{name}.frd").blocks if b.name == "DISP")
         theirs = found.values[: len(ours)]
         np.testing.assert_allclose(ours[:, 2] - theirs[:, 2], LOAD / penalty, rtol=0.02)
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
+@pytest.mark.parametrize("young", [(E, 3 * E), (3 * E, E)])
+def test_hard_contact_of_calculix_is_that_of_the_stiffest_body(young, tmp_path):
+    """CalculiX' penalty is 50 times the first modulus of a deck, whichever bodies touch."""
+    lower = am.box((1.0, 1.0), cells=2, origin=(0.0, -1.0))
+    made = am.Model(
+        [am.Body(lower, am.LinearElastic(young[0], 0.0), "lower"),
+         am.Body(am.box((1.0, 1.0), cells=2), am.LinearElastic(young[1], 0.0), "upper")],
+        [am.Fix("lower.bottom", 0), am.Fix("upper.left", (0.0, None))],
+        [am.Contact("upper.bottom", master="lower.top", mu=0.0)],
+        [am.Traction("upper.top", (0.0, -LOAD))],
+    )  # fmt: skip
+    ours = am.solve(made).displacement[1][:, 1].min()
+    write_deck(made, tmp_path / "pair.inp")
+    subprocess.run(["ccx", "pair"], cwd=tmp_path, check=True, capture_output=True, timeout=100)
+    found = next(b for b in read_frd(tmp_path / "pair.frd").blocks if b.name == "DISP")
+    theirs = found.values[: 2 * len(lower.points), 1].min()
+    assert ours - theirs == pytest.approx(LOAD / (50 * 3 * E), rel=0.01)  # six digits

@@ -12,7 +12,7 @@ from .tables import Table
 if TYPE_CHECKING:
     from ...mechanics.model import Body, Contact, FoundContacts
 
-KEYS = ("pairs", "friction", "method", "gap", "exclude")
+KEYS = ("pairs", "friction", "method", "gap", "exclude", "itself")
 
 
 def found_contacts(
@@ -37,8 +37,10 @@ def found_contacts(
             raise table.error("gap", f"expected a distance >= 0, got {gap}")
     law = friction(table)
     with table.blamed():
-        return find_contacts(bodies, gap=gap, exclude=_names(table), known=known,
-                             method=contact_method(table), **law)  # fmt: skip
+        return find_contacts(
+            bodies, gap=gap, exclude=_names(table), known=known,
+            itself=table.flag("itself", False), method=contact_method(table), **law,
+        )  # fmt: skip
 
 
 def _names(table: Table) -> list[str | tuple[str, ...]]:
