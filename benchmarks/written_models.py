@@ -40,6 +40,7 @@ def dragged(dim=2, mu=0.3, **more):
 
 def stacked(dim=2, *, order=1, kind=None, fitting=False, loads=None, **law):
     """A block on a wider one, whose meshes do not fit."""
+    law = law if "tied" in law else {"mu": 0.0} | law
     size = (2.0, 1.0) if dim == 2 else (2.0, 2.0, 1.0)
     at = (-0.5, -1.0) if dim == 2 else (-0.5, -0.5, -1.0)
     cells = 8 if fitting else 5
@@ -51,7 +52,7 @@ def stacked(dim=2, *, order=1, kind=None, fitting=False, loads=None, **law):
     return am.Model(
         [am.Body(lower, am.LinearElastic(E, 0.3, expansion=2e-4), "lower", order=order),
          am.Body(upper, am.LinearElastic(3 * E, 0.2, expansion=1e-4), "upper", order=order)],
-        supports, [am.Contact("upper.bottom", master="lower.top", **({"mu": 0.0} | law if "tied" not in law else law))],
+        supports, [am.Contact("upper.bottom", master="lower.top", **law)],
         loads or [am.Traction("upper.top", down)],
     )  # fmt: skip
 
@@ -124,7 +125,8 @@ MODELS = {
     "overlap": lambda: block(clearance=-0.002),
     "nodal": lambda: block(method="nodal"),
     "gravity": lambda: block(loads=[am.BodyForce((0.0, -LOAD))]),
-    "points": lambda: block(loads=[am.BodyForce((0.0, -LOAD)), am.NodalForce("top", (0.0, -1.0))]),
+    "points": lambda: block(
+        loads=[am.BodyForce((0.0, -LOAD)), am.NodalForce("top", (0.0, -1.0))]),
     "uneven pressure": lambda: block(loads=[am.Pressure("top", lambda x: LOAD * x[0])]),
     "friction, stuck 2D": lambda: pushed(),
     "friction, dragged 2D": lambda: dragged(),
