@@ -21,7 +21,6 @@ from written_models import MODELS
 
 import amontons as am
 from amontons.io.answers.frd import read_frd
-from amontons.io.decks.written import write_deck
 from amontons.io.readers import read
 
 HERE = Path(__file__).parent
@@ -36,13 +35,13 @@ HEAD = """# Decks that are written, and what CalculiX makes of them
 `am.write_deck` of every model, CalculiX {version} on that deck, and our own solve of the model.
 Regenerate: `python benchmarks/written_decks.py`.
 
-again: the deck read and solved by us (`deck.hard` where contact is hard), beside the model: what
-writing and reading lose.  HARD: largest difference of displacements between CalculiX and our
-solve, over the largest displacement; its hard contact is a penalty of 50 E.  same law: beside
-our solve of the same deck with that penalty; what is left is the discretisation of contact.
+again: the deck read and solved by us (`deck.hard` where contact is hard), beside the model:
+what writing and reading lose.  HARD: largest difference of displacements between CalculiX and
+our solve, over the largest displacement; its hard contact is a penalty of 50 E.  same law:
+beside our solve of the same deck with that penalty; what is left is how contact is discretised.
 {times} K: both again with the penalty {times} times as stiff, hard here: what comes from the
-stiffness is {times} times smaller.  F: largest difference of the resultant of outside forces on a
-body, over the largest of them.
+stiffness is {times} times smaller.  F: largest difference of the resultant of outside forces on
+a body, over the largest of them.
 
 """
 
@@ -96,8 +95,8 @@ def theirs(program, folder, name, count, dim):
 
 
 def apart(one, other):
-    """Largest difference over the largest of the second."""
-    size = np.abs(other).max(initial=0.0)
+    """Largest difference over the largest of both."""
+    size = max(np.abs(one).max(initial=0.0), np.abs(other).max(initial=0.0))
     return float(np.abs(one - other).max(initial=0.0) / size) if size else 0.0
 
 
@@ -109,7 +108,7 @@ def resultants(model, force):
 
 def compared(name, model, program, folder):
     """One row of the table."""
-    write_deck(model, folder / "a.inp")
+    am.write_deck(model, folder / "a.inp")
     hard = [c for c in model.contacts if not c.tied]
     given = [c for c in hard if c.stiffness is not None]
     u, force = solved(model)
@@ -124,11 +123,11 @@ def compared(name, model, program, folder):
     if not hard:
         return row
     penalty = HARD * max(young(model))
-    write_deck(model, folder / "b.inp", penalty=penalty)
+    am.write_deck(model, folder / "b.inp", penalty=penalty)
     soft, _ = solved(read(folder / "b.inp", []).model)
     row["law"] = apart(other, soft[:count])
     if not given:
-        write_deck(model, folder / "c.inp", penalty=STIFFER * penalty)
+        am.write_deck(model, folder / "c.inp", penalty=STIFFER * penalty)
         row["stiff"] = apart(theirs(program, folder, "c", count, dim)[0], u)
     return row
 
@@ -217,7 +216,9 @@ def page(rows, refused, program):
     return f"{head}{chr(10).join(lines)}\n\n{about}\n"
 
 
-REASONS: dict[str, str] = {}
+REASONS = {
+    "example brake": "two solutions: released, and jammed",
+}
 
 
 if __name__ == "__main__":

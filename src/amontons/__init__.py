@@ -33,6 +33,7 @@ _HOME = {
     "analysis.paths.path_crossing": ("PathCrossing",),
     "solvers.driver": ("drive",),
     "io.fclib": ("read_fclib", "write_fclib"),
+    "io.decks.written": ("write_deck",),
     "mechanics.ready.walls": ("Bond", "Wall"),
     "mechanics.ready.packings": ("SpherePacking",),
     "mechanics.steps": ("MoreauJean", "Passage", "QuasiStatic", "State", "TimeStep", "at_rest",

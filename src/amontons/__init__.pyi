@@ -37,6 +37,7 @@ from .io.checkpoint import (
     export_fclib as export_fclib, load_start as load_start, load_state as load_state,
     save_state as save_state,
 )
+from .io.decks.written import write_deck as write_deck
 from .io.fclib import read_fclib as read_fclib, write_fclib as write_fclib
 from .io.meshes import read_mesh as read_mesh
 from .io.readers import read_case as read_case

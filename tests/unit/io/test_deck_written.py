@@ -12,7 +12,6 @@ import amontons as am
 from amontons.app.cli import main
 from amontons.core.errors import InvalidInput
 from amontons.io.answers.frd import read_frd
-from amontons.io.decks.written import write_deck
 from amontons.io.readers import read_case
 
 E, LOAD = 1000.0, 5.0
@@ -51,7 +50,7 @@ def stacked(**law):
 
 def again(model, tmp_path, dialect="calculix"):
     """The model of the deck that is written, with hard contact and rigid sticking."""
-    write_deck(model, tmp_path / "model.inp", dialect)
+    am.write_deck(model, tmp_path / "model.inp", dialect)
     return read_case(tmp_path / "model.inp", ["deck.hard=true"]).model
 
 
@@ -108,7 +107,7 @@ def test_equations_and_springs_are_read_back(tmp_path):
 ])  # fmt: skip
 def test_what_no_deck_says_is_refused_and_nothing_written(model, word, tmp_path):
     with pytest.raises(InvalidInput, match=word):
-        write_deck(model(), tmp_path / "model.inp")
+        am.write_deck(model(), tmp_path / "model.inp")
     assert not list(tmp_path.iterdir())
 
 
@@ -132,7 +131,7 @@ def test_calculix_comes_to_ours_as_its_penalty_grows(mu, tmp_path):
     assert ours[:, 2].min() == pytest.approx(-LOAD / E)
     for penalty in (1e4, 1e6):
         name = f"block{penalty:.0f}"
-        write_deck(made, tmp_path / f"{name}.inp", penalty=penalty)
+        am.write_deck(made, tmp_path / f"{name}.inp", penalty=penalty)
         run = ["ccx", name]
         subprocess.run(run, cwd=tmp_path, check=True, capture_output=True, timeout=100)
         found = next(b for b in read_frd(tmp_path / f"{name}.frd").blocks if b.name == "DISP")
@@ -153,7 +152,7 @@ def test_hard_contact_of_calculix_is_that_of_the_stiffest_body(young, tmp_path):
         [am.Traction("upper.top", (0.0, -LOAD))],
     )  # fmt: skip
     ours = am.solve(made).displacement[1][:, 1].min()
-    write_deck(made, tmp_path / "pair.inp")
+    am.write_deck(made, tmp_path / "pair.inp")
     subprocess.run(["ccx", "pair"], cwd=tmp_path, check=True, capture_output=True, timeout=100)
     found = next(b for b in read_frd(tmp_path / "pair.frd").blocks if b.name == "DISP")
     theirs = found.values[: 2 * len(lower.points), 1].min()

@@ -35,11 +35,14 @@ def found_contacts(
         gap = table.number("gap")
         if gap < 0:
             raise table.error("gap", f"expected a distance >= 0, got {gap}")
+    itself = table.data.get("itself", False)
+    if not isinstance(itself, bool):
+        raise table.error("itself", f"expected true or false, got {shown(itself)}")
     law = friction(table)
     with table.blamed():
         return find_contacts(
             bodies, gap=gap, exclude=_names(table), known=known,
-            itself=table.flag("itself", False), method=contact_method(table), **law,
+            itself=itself, method=contact_method(table), **law,
         )  # fmt: skip
 
 

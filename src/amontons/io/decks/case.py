@@ -42,7 +42,7 @@ from .contact_laws import Options, law_of
 from .contacts import read_contacts
 from .course import Course
 from .flat import Deck, flatten
-from .general import found_pairs, motion_of, part_titles, read_general
+from .general import found_pairs, motion_of, part_titles, read_general, self_contact
 from .history import History, read_history
 from .joints import Joints, tied
 from .keywords import left_out, sorted_out
@@ -156,9 +156,14 @@ def _case(
     mesh, at = region.mesh(title)
     sections = [s for s in sections if s.name in mesh.regions]  # others are given again
     materials = {s.name: s.law(region.plane) for s in sections}
+    near = Reach(more=motion_of(history))
+    if any(pair.itself for pair in pairs):
+        titles = part_titles(deck, at, piece_labels(mesh))
+        mesh, pairs, said = self_contact(Body(mesh, materials), pairs, near, titles)
+        notes += said
     if general is not None:
         mesh, more, said = found_pairs(
-            general, Body(mesh, materials), pairs, Reach(more=motion_of(history)),
+            general, Body(mesh, materials), pairs, near,
             part_titles(deck, at, piece_labels(mesh)),
         )  # fmt: skip
         pairs += more
