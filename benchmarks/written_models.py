@@ -38,7 +38,7 @@ def dragged(dim=2, mu=0.3, **more):
                  mu=mu, **more)  # fmt: skip
 
 
-def stacked(dim=2, *, order=1, kind=None, fitting=False, loads=None, **law):
+def stacked(dim=2, *, order=1, kind=None, fitting=False, loads=None, down=None, **law):
     """A block on a wider one, whose meshes do not fit."""
     law = law if "tied" in law else {"mu": 0.0} | law
     size = (2.0, 1.0) if dim == 2 else (2.0, 2.0, 1.0)
@@ -46,14 +46,16 @@ def stacked(dim=2, *, order=1, kind=None, fitting=False, loads=None, **law):
     cells = 8 if fitting else 5
     lower = am.box(size, cells=(*[cells] * (dim - 1), 3), origin=at, kind=kind)
     upper = am.box((1.0,) * dim, cells=(*[4] * (dim - 1), 3), kind=kind)
-    down = (0.0,) * (dim - 1) + (-LOAD,)
+    force = (0.0,) * (dim - 1) + (-LOAD if down is None else 0.0,)
     supports = [am.Fix("lower.bottom", 0), am.Fix("upper.left", (0.0, *(None,) * (dim - 1)))]
     supports += [am.Fix("upper.front", (None, 0.0, None))] if dim == 3 else []
+    if down is not None:
+        supports += [am.Fix("upper.top", (*(None,) * (dim - 1), -down))]
     return am.Model(
         [am.Body(lower, am.LinearElastic(E, 0.3, expansion=2e-4), "lower", order=order),
          am.Body(upper, am.LinearElastic(3 * E, 0.2, expansion=1e-4), "upper", order=order)],
         supports, [am.Contact("upper.bottom", master="lower.top", **law)],
-        loads or [am.Traction("upper.top", down)],
+        loads or [am.Traction("upper.top", force)],
     )  # fmt: skip
 
 
@@ -146,7 +148,7 @@ MODELS = {
         loads=[am.Temperature(10.0), am.Traction("upper.top", (0.0, -LOAD))]),
     "pair linear law": lambda: stacked(stiffness=2e4),
     "pair table": lambda: stacked(
-        stiffness=am.OverclosureCurve([0.0, 1e-3, 3e-3], [0.0, 5.0, 30.0])),
+        down=0.01, stiffness=am.OverclosureCurve([0.0, 5.0, 30.0], [0.0, 1e-3, 3e-3])),
     "pair exponential": lambda: stacked(stiffness=am.ExponentialOverclosure(1e-3, 2.0)),
     "tied 2D": lambda: stacked(tied=True),
     "tied 3D": lambda: stacked(3, tied=True),
