@@ -102,6 +102,8 @@ def apart(one, other):
 
 def resultants(model, force):
     """Sums over each body (bodies, dim)."""
+    if model.axisymmetric:  # along the radius hoops push too
+        force = force[:, 1:]
     ends = np.cumsum([len(b.mesh.points) for b in model.bodies])[:-1]
     return np.array([part.sum(axis=0) for part in np.split(force, ends)])
 
@@ -219,6 +221,30 @@ def page(rows, refused, program):
 
 REASONS = {
     "example brake": "two solutions: released, and jammed",
+    "example hild": "several solutions: CalculiX jumps to another one at 100 K",
+    "example cube": "CalculiX takes longer than is waited for",
+    "tied 2D": "CalculiX ties 2D elements by a penalty at points, which locks at 100 K",
+    "pair table": "NODE TO SURFACE there",
+    **dict.fromkeys(
+        (
+            "pair 2D",
+            "pair 3D",
+            "pair 3D tetrahedra",
+            "pair friction 2D",
+            "pair friction 3D",
+            "pair clearance",
+            "pair heated",
+            "pair linear law",
+            "rings",
+        ),
+        "meshes that do not fit: points there, averages here",
+    ),
+    "pair 2D twice as fine": "half of that",
+    "tied 3D": "meshes that do not fit: nodes are tied there",
+    **dict.fromkeys(
+        ("contact1", "contact4", "plate", "punch1", "punch2", "cubef2f1", "cubef2f3"),
+        "few facets under an edge, see [the decks](decks.md)",
+    ),
 }
 
 

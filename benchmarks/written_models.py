@@ -38,14 +38,15 @@ def dragged(dim=2, mu=0.3, **more):
                  mu=mu, **more)  # fmt: skip
 
 
-def stacked(dim=2, *, order=1, kind=None, fitting=False, loads=None, down=None, **law):
+def stacked(dim=2, *, order=1, kind=None, fitting=False, loads=None, down=None,
+            times=1, **law):  # fmt: skip
     """A block on a wider one, whose meshes do not fit."""
     law = law if "tied" in law else {"mu": 0.0} | law
     size = (2.0, 1.0) if dim == 2 else (2.0, 2.0, 1.0)
     at = (-0.5, -1.0) if dim == 2 else (-0.5, -0.5, -1.0)
-    cells = 8 if fitting else 5
-    lower = am.box(size, cells=(*[cells] * (dim - 1), 3), origin=at, kind=kind)
-    upper = am.box((1.0,) * dim, cells=(*[4] * (dim - 1), 3), kind=kind)
+    cells, high = (8 if fitting else 5) * times, 3 * times
+    lower = am.box(size, cells=(*[cells] * (dim - 1), high), origin=at, kind=kind)
+    upper = am.box((1.0,) * dim, cells=(*[4 * times] * (dim - 1), high), kind=kind)
     force = (0.0,) * (dim - 1) + (-LOAD if down is None else 0.0,)
     supports = [am.Fix("lower.bottom", 0), am.Fix("upper.left", (0.0, *(None,) * (dim - 1)))]
     supports += [am.Fix("upper.front", (None, 0.0, None))] if dim == 3 else []
@@ -137,6 +138,8 @@ MODELS = {
     "springs": spring,
     "coupling": coupled,
     "pair 2D": stacked,
+    "pair 2D twice as fine": lambda: stacked(times=2),
+    "pair 2D four times as fine": lambda: stacked(times=4),
     "pair 3D": lambda: stacked(3),
     "pair 2D fitting": lambda: stacked(fitting=True),
     "pair 3D fitting": lambda: stacked(3, fitting=True),

@@ -157,3 +157,50 @@ def test_hard_contact_of_calculix_is_that_of_the_stiffest_body(young, tmp_path):
     found = next(b for b in read_frd(tmp_path / "pair.frd").blocks if b.name == "DISP")
     theirs = found.values[: 2 * len(lower.points), 1].min()
     assert ours - theirs == pytest.approx(LOAD / (50 * 3 * E), rel=0.01)  # six digits
+
+
+def by_calculix(model, path):
+    """Displacements and outside forces (nodes, 3) of CalculiX on the deck of a model."""
+    am.write_deck(model, path / "model.inp")
+    subprocess.run(["ccx", "model"], cwd=path, check=True, capture_output=True, timeout=100)
+    blocks = {block.name: block.values for block in read_frd(path / "model.frd").blocks}
+    count = sum(len(body.mesh.points) for body in model.bodies)
+    return blocks["DISP"][:count], blocks["FORC"][:count]
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
+def test_ties_in_2d_hold_in_calculix(tmp_path):
+    """Its *TIE does nothing between 2D elements, so a bond is written."""
+    made = replace(stacked(tied=True), loads=[am.Traction("upper.top", (0.3, LOAD))])
+    ours = am.solve(made).displacement[1]
+    theirs = by_calculix(made, tmp_path)[0][-len(ours) :, :2]
+    np.testing.assert_allclose(theirs, ours, atol=0.03 * np.abs(ours).max())
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
+def test_tables_press_in_calculix(tmp_path):
+    """CalculiX 2.20 takes no force from a table of surfaces, so nodes are written."""
+    law = am.OverclosureCurve([0.0, 5.0, 30.0], [0.0, 1e-3, 3e-3])
+    made = stacked(mu=0.0, stiffness=law)
+    top = am.Fix("upper.top", (None, -0.01))
+    made = replace(made, loads=[], supports=[*made.supports, top])
+    ours = am.solve(made)
+    _, force = by_calculix(made, tmp_path)
+    upper = force[len(made.bodies[0].mesh.points) :, 1].sum()
+    assert ours.resultant[1] == pytest.approx(-upper, rel=0.1)  # nodes there, averages here
+
+
+def test_bonds_and_the_line_of_nodes_are_read_back(tmp_path):
+    from amontons.io.decks.contact_laws import bend
+
+    for law in ({"tied": True, "stiffness": 5e3, "stick_stiffness": 2e3},
+                {"mu": 0.0, "stiffness": bend(1e5, 2.0)}):  # fmt: skip
+        am.write_deck(stacked(**law), tmp_path / "model.inp")
+        (found,) = read_case(tmp_path / "model.inp").model.contacts
+        assert found.tied == law.get("tied", False)
+        assert found.stick_stiffness == law.get("stick_stiffness")
+        if found.tied:
+            assert found.stiffness == 5e3
+    text = (tmp_path / "model.inp").read_text()
+    row = text.split("PRESSURE-OVERCLOSURE=LINEAR\n")[1].split("\n")[0]
+    np.testing.assert_allclose([float(x) for x in row.split(",")], [1e5, 2.0], rtol=1e-9)

@@ -54,7 +54,11 @@ class Contacts:
             return
         self.lines += [f"*SURFACE INTERACTION, NAME=INTERACTION_{k + 1}"]
         self._law(contact)
-        nodes = names[0].endswith("_SOME") or _bent(contact) is not None
+        curve = isinstance(contact.stiffness, OverclosureCurve) and self.dialect == "calculix"
+        if curve:
+            self.notes.append(f"{contact.slave}: NODE TO SURFACE, for CalculiX 2.20 takes no "
+                              "force from a table of a contact of surfaces")  # fmt: skip
+        nodes = names[0].endswith("_SOME") or curve
         kind = "NODE TO SURFACE" if nodes else "SURFACE TO SURFACE"
         self.lines += [f"*CONTACT PAIR, INTERACTION=INTERACTION_{k + 1}, TYPE={kind}",
                        f"{names[0]}, {names[1]}"]  # fmt: skip
