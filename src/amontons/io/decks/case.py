@@ -48,7 +48,9 @@ from .joints import Joints, tied
 from .keywords import left_out, sorted_out
 from .materials import read_interactions, read_sections
 from .meshing import Region
+from .rigid_surfaces import SHELLS, section_of, solid_shells
 from .scopes import Index
+from .shapes import SHAPES
 from .special import special_nodes
 from .stages import Held, check_removed, read_stages, times_of
 from .tools import OWN, own_nodes, tool_bodies
@@ -83,7 +85,7 @@ def read(path: Path, overrides: Sequence[str] = (), method: str | None = None) -
     """The case in a deck.  Overrides: those of the solver, deck.allow and deck.hard."""
     settings, options = _settings(overrides, method)
     cards = read_cards(path)
-    deck = flatten(cards)
+    deck = flatten(cards, SHAPES | SHELLS)
     notes = _leave_out(deck, options)
     if not deck.steps:
         raise cards[-1].error("the deck ends here without a *STEP, it loads nothing")
@@ -138,7 +140,10 @@ def _leave_out(deck: Deck, options: Options) -> list[str]:
 def _case(
     path: Path, deck: Deck, settings: Settings, options: Options, notes: list[str]
 ) -> Case:
+    shells = solid_shells(deck)
     sections = read_sections(deck, deck.model)
+    if len(shells):
+        sections.append(section_of(shells, sections[0]))
     joints, turned = Joints.of(deck), Turned.of(deck)
     region = Region.of(deck, sections)
     history = read_history(deck, deck.model, deck.steps)
@@ -202,8 +207,6 @@ def _title(deck: Deck) -> str:
 
 def _formulations(deck: Deck) -> list[str]:
     """What elements of the deck do otherwise than ours."""
-    from .shapes import SHAPES
-
     kinds = dict.fromkeys(block.kind for block in deck.blocks)
     notes = [f"{kind}: {SHAPES[kind].note}" for kind in kinds if SHAPES[kind].note]
     for step in deck.steps:
