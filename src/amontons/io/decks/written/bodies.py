@@ -31,6 +31,7 @@ class Meshes:
         """notes: gets what can not be said, for programs without hybrid elements."""
         self.model, self.names, self._notes = model, names, notes
         self.lines: list[str] = []
+        self._laws: list[tuple[float, list[str]]] = []  # Young's modulus and cards of each
         self.nodes = np.cumsum([0, *(len(b.mesh.points) for b in model.bodies)])
         self._sides: list[dict[tuple[int, ...], tuple[int, int]]] = []
         self._surfaces: set[str] = set()
@@ -86,10 +87,17 @@ class Meshes:
         """Numbers of nodes of a body, in lines."""
         return listed((nodes + self.nodes[body] + 1).tolist())
 
+    @property
+    def materials(self) -> list[str]:
+        """The cards of all materials, the stiffest first: CalculiX' HARD is 50 times that."""
+        ranked = sorted(self._laws, key=lambda law: -law[0])
+        return [line for _, cards in ranked for line in cards]
+
     def _material(self, elset: str, law: LinearElastic | OrthotropicElastic) -> None:
         self._materials += 1
-        name, out = f"MATERIAL_{self._materials}", self.lines
-        out.append(f"*MATERIAL, NAME={name}")
+        name = f"MATERIAL_{self._materials}"
+        out = [f"*MATERIAL, NAME={name}"]
+        self._laws.append((float(np.max(law.young)), out))
         turned = ""
         if isinstance(law, LinearElastic):
             out += ["*ELASTIC", values([law.young, law.poisson])]
@@ -106,6 +114,7 @@ class Meshes:
             turned = f", ORIENTATION=AXES_{self._materials}"
         if law.density is not None:
             out += ["*DENSITY", value(law.density)]
+        out = self.lines
         if isinstance(law, OrthotropicElastic):
             axes = np.array(law.axes)
             out += [f"*ORIENTATION, NAME=AXES_{self._materials}", values(axes[:2].ravel())]
