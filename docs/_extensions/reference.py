@@ -54,7 +54,8 @@ GROUPS = {
         "evolve QuasiStatic MoreauJean TimeStep State Passage at_rest save_state load_state "
         "load_start export_fclib",
     ),
-    "Files": ("What is read and written.", "read_case read_fclib write_fclib export_xdmf"),
+    "Files": ("What is read and written.", "read_case write_deck read_fclib write_fclib "
+              "export_xdmf"),
     "Ready-made problems": (
         "Walls of blocks and packings of spheres.", "Wall Bond SpherePacking",
     ),

@@ -51,7 +51,8 @@ def block(cells: int, mu: float = 1.8) -> am.Model:
     c, s = -2 * np.sin(TURN / 2) ** 2, np.sin(TURN)
     return am.Model(
         [am.Body(am.box((40, 80), cells=(cells, 2 * cells)),
-                 am.CiarletGeymonat.from_lame(4000.0, 120.0, 30.0))],
+                 am.CiarletGeymonat.from_lame(4000.0, 120.0, 30.0),
+                 integration="full")],
         supports=[am.Fix("top", lambda x, t: (x[0] * c, x[0] * s - t))],
         contacts=[am.Contact("bottom", am.Plane(normal=(0, 1)), mu=mu)],
         name=f"block {cells}x{2 * cells}",

@@ -62,10 +62,12 @@ _HOME = {
     "mechanics.contact": ("Cylinder", "Extrusion", "LevelSet", "Nitsche", "Plane", "Profile",
                           "Revolution", "Sphere"),
     "mechanics.model": ("Axes", "Body", "BodyForce", "CiarletGeymonat", "Contact",
-                        "ContactFields", "Coupling", "Equation", "Fix", "FoundContacts",
-                        "FoundPair", "LinearElastic", "Model", "NeoHookean", "NodalForce",
+                        "ContactFields", "Coupling", "ElastoPlastic", "Equation",
+                        "Fix", "FoundContacts", "FoundPair", "LinearElastic", "Model",
+                        "MooneyRivlin", "NeoHookean", "NodalForce", "Ogden",
                         "OrthotropicElastic", "Pressure", "Pretension", "Reference", "Rigid",
-                        "Spring", "Temperature", "Traction", "distributed", "find_contacts"),
+                        "SaintVenantKirchhoff", "Spring", "Temperature", "Traction",
+                        "UserEnergy", "distributed", "find_contacts"),
 }  # fmt: skip
 _GONE = {
     "AlgebraicMultigrid": "GeometricMultigrid(levels=()), whose levels are then algebraic ones",

@@ -39,6 +39,7 @@ from .io.checkpoint import (
 )
 from .io.decks.written import write_deck as write_deck
 from .io.fclib import read_fclib as read_fclib, write_fclib as write_fclib
+from .io.matrices import StoredMatrices as StoredMatrices, read_matrices as read_matrices
 from .io.meshes import read_mesh as read_mesh
 from .io.readers import read_case as read_case
 from .io.series import export_xdmf as export_xdmf
@@ -54,8 +55,10 @@ from .mechanics.meshes import (
 from .mechanics.model import (
     Axes as Axes, Body as Body, BodyForce as BodyForce, CiarletGeymonat as CiarletGeymonat,
     Contact as Contact, ContactFields as ContactFields, Coupling as Coupling,
-    Equation as Equation, Fix as Fix, LinearElastic as LinearElastic, Model as Model,
-    NeoHookean as NeoHookean, NodalForce as NodalForce,
+    ElastoPlastic as ElastoPlastic, Equation as Equation, Fix as Fix,
+    LinearElastic as LinearElastic, Model as Model,
+    MooneyRivlin as MooneyRivlin, NeoHookean as NeoHookean, NodalForce as NodalForce,
+    Ogden as Ogden, SaintVenantKirchhoff as SaintVenantKirchhoff, UserEnergy as UserEnergy,
     OrthotropicElastic as OrthotropicElastic, Pressure as Pressure,
     Pretension as Pretension, Reference as Reference, Rigid as Rigid, Spring as Spring,
     Temperature as Temperature, Traction as Traction, distributed as distributed,

@@ -146,6 +146,8 @@ def _put_state(file: h5py.File, state: State) -> None:
     group["index"], group["time"] = state.index, state.time
     for name in (*ARRAYS, *RUBBED):
         group[name] = getattr(state, name)
+    if state.plastic.size:
+        group["plastic"] = state.plastic
 
 
 def _read(
@@ -173,7 +175,8 @@ def _state(path: Path, file: h5py.File) -> State:
     if GROUP not in file:
         raise FileFormatError(f"{path}: /{GROUP}: missing group")
     group: Any = file[GROUP]
-    known = ARRAYS | {name: k for name, k in RUBBED.items() if name in group}
+    more = RUBBED | {"plastic": 1}
+    known = ARRAYS | {name: k for name, k in more.items() if name in group}
     values = {name: np.asarray(group[name][()], dtype=float) for name in known}
     for name, dimensions in known.items():
         if values[name].ndim != dimensions:
@@ -208,6 +211,7 @@ def _digest(checkpoint: Checkpoint, case: str) -> bytes:
     names = (*ARRAYS, *RUBBED) if checkpoint.counts_slip else tuple(ARRAYS)
     parts = [np.array([state.index]), np.array([state.time]),
              *(getattr(state, name) for name in names),
+             *([state.plastic] if state.plastic.size else []),
              checkpoint.table, checkpoint.pictures]  # fmt: skip
     whole = hashlib.sha256(case.encode())
     if checkpoint.counts_slip:  # older versions have no record either

@@ -337,24 +337,25 @@ def describe(output: Output) -> str:
         force = ", ".join(f"{name} {value:.6g}" for name, value in pairs)
         lines.append(f"resultant on the slave: {force}")
         lines.append(f"largest pressure: {output.fields.pressure.max(initial=0.0):.6g}")
-        if output.model is not None and 1 < len(output.model.contacts) <= MOST_PAIRS:
-            lines += _pairs_in_words(output.model, output.fields)
     elif output.fields is not None:
         moved = max(np.abs(u).max(initial=0.0) for u in output.fields.displacement)
         lines.append(f"largest displacement: {moved:.6g}")
+    if output.fields is not None and output.model is not None:
+        lines += _model_in_words(output.model, output.fields)
     lines += map(str, output.warnings)
     return "\n".join(lines)
 
 
-def _pairs_in_words(model: Model, fields: ContactFields) -> list[str]:
-    """A line for every contact pair."""
-    from ..mechanics.model.pairs import pair_results
+def _model_in_words(model: Model, fields: ContactFields) -> list[str]:
+    """A line for every contact pair, where there are few, and one about hybrid elements."""
+    from ..mechanics.model import element_words, pairs
 
-    return [
+    few = 1 < len(model.contacts) <= MOST_PAIRS
+    return element_words.in_words(model) + [
         f"  {pair.name}: force {', '.join(f'{value:.6g}' for value in pair.force)}; area "
         f"{pair.area:.6g}, {pair.share_sticking:.0%} of it sticks; largest pressure "
         f"{pair.largest_pressure:.6g}"
-        for pair in pair_results(model, fields).values()
+        for pair in (pairs.pair_results(model, fields).values() if few else ())
     ]
 
 

@@ -14,6 +14,7 @@ from ..mechanics.elements import von_mises
 from ..mechanics.elements.given import GivenMatrices
 from ..mechanics.elements.nodal_stress import stress_of
 from ..mechanics.elements.rigid import Rigid
+from ..mechanics.elements.yielding import plastic_strain, relieved
 from ..mechanics.meshes import Mesh
 from ..mechanics.meshes.write import write_meshes
 from ..mechanics.model.temperature import warming
@@ -68,9 +69,7 @@ def model_fields(
     from .results import versions
 
     starts = np.cumsum([0, *(len(body.mesh.points) for body in model.bodies)])
-    pairs = list(zip(model.bodies, fields.displacement, strict=True))
-    warm = warming(model, getattr(solution, "time", None))
-    stress = [body_stress(*pair, each) for pair, each in zip(pairs, warm, strict=True)]
+    stress = stresses(model, fields, getattr(solution, "time", None))
     centres, nodes = (np.concatenate(each) for each in zip(*stress, strict=True))
     record = getattr(solution, "solution", solution).convergence  # of a step in time, too
     converged = int(not record.stamp)
@@ -86,6 +85,12 @@ def model_fields(
         "stress": _six(centres), "von_mises": von_mises(centres), "body": owner,
         "region": region, "CONVERGED": np.full(len(owner), converged, dtype=np.int8),
     }  # fmt: skip
+    if fields.plastic:
+        cell["plastic_strain"] = np.concatenate([
+            plastic_strain(body.mesh, body.material, fields.plastic[k])
+            if k in fields.plastic else np.zeros(body.mesh.cell_count)
+            for k, body in enumerate(model.bodies)
+        ])  # fmt: skip
     whole: dict[str, Any] = {"CONVERGED": converged, "ERROR": float(record.error)}
     if hasattr(solution, "time"):
         whole["TimeValue"] = float(solution.time)  # as ParaView calls it
@@ -101,16 +106,26 @@ def model_fields(
     return ModelFields(meshes, point, cell, whole, record.stamp)
 
 
+def stresses(
+    model: Model, fields: ContactFields, time: float | None
+) -> list[tuple[Array, Array]]:
+    """Stress of cells and nodes of every body; time: of a step."""
+    flown = fields.plastic or {}
+    each = zip(model.bodies, fields.displacement, warming(model, time), strict=True)
+    return [body_stress(*given, flown.get(k)) for k, given in enumerate(each)]
+
+
 def body_stress(
-    body: Body, moved: Array, warm: Array | None = None
+    body: Body, moved: Array, warm: Array | None = None, flown: Array | None = None
 ) -> tuple[Array, Array]:
     """Stress of cells and nodes at displacements (nodes, d); 0 without a law.
 
-    warm (nodes,): change of temperature.
+    warm (nodes,): change of temperature; flown (h,): history of a body that yields.
     """
     if isinstance(body.material, Rigid | GivenMatrices):
         return np.zeros((body.mesh.cell_count, 3, 3)), np.zeros((len(moved), 3, 3))
-    return stress_of(body.mesh, body.material, moved, warm)
+    found = stress_of(body.mesh, body.material, moved, warm)
+    return found if flown is None else relieved(body.mesh, body.material, found, flown)
 
 
 def _six(stress: Array) -> Array:

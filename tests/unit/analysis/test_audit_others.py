@@ -199,3 +199,20 @@ def test_plane_stress_of_calculix_is_only_bounded(tmp_path):
     model = am.Model([lower, upper], held,
                      [am.Contact("upper.bottom", master="lower.top", mu=0.2)])  # fmt: skip
     assert verdict_of(*of_calculix(model, tmp_path, penalty=5e4)) in ("right", "undecided")
+
+
+@CALCULIX
+def test_nodes_that_calculix_has_adjusted_are_those_of_the_deck(tmp_path):
+    """Plane decks are matched by place: slave nodes were moved onto the master before."""
+    low = am.Body(am.box((4, 2), (8, 4)), STEEL, "low")
+    high = am.Body(am.box((2, 2), (5, 4), origin=(1, 2.02)), STEEL, "high")
+    model = am.Model([low, high], [am.Fix("low.bottom", 0.0), am.Fix("high.top", (0.0, -0.01))],
+                     [am.Contact("high.bottom", master="low.top", mu=0.3)])  # fmt: skip
+    write_deck(model, tmp_path / "model.inp", penalty=1e6)
+    text = (tmp_path / "model.inp").read_text()
+    (tmp_path / "model.inp").write_text(text.replace("TO SURFACE", "TO SURFACE, ADJUST=0.03"))
+    run = subprocess.run(["ccx", "model"], cwd=tmp_path, capture_output=True, timeout=200)
+    assert run.returncode == 0, run.stdout[-2000:]
+    found = am.audit(tmp_path / "model.inp", tmp_path / "model.frd")
+    assert found.verdict == "right", str(found)
+    assert int(found.pairs[0].seen[0].pressed.sum()) > 0

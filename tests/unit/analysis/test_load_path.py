@@ -24,7 +24,7 @@ def block(cells):
     def model(down):
         top = am.Fix("top", lambda x: (x[0] * c, x[0] * s - down))
         contact = am.Contact("bottom", am.Plane((0, 1)), mu=1.8)
-        return am.Model([am.Body(mesh, law)], [top], [contact])
+        return am.Model([am.Body(mesh, law, integration="full")], [top], [contact])
 
     first, last = (large_deformation(model(down)) for down in (0.0, 1.0))
     path = LoadPath(last, first.load, first.prescribed)
@@ -39,7 +39,7 @@ def sphere_path():
                      [am.Contact("bottom", am.Sphere((0.4, -1), 1.0), mu=0.5)],
                      [am.Traction("left", (0.02, 0))])  # fmt: skip
     step = large_deformation(model)
-    drift = 0.01 * np.random.default_rng(0).standard_normal(step.before.shape)
+    drift = 0.01 * np.random.default_rng(0).standard_normal(step.drift.shape)
     return LoadPath(step, 0.3 * step.load, 0.2 * step.prescribed, drift)
 
 

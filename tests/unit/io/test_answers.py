@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import shutil
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -61,3 +63,18 @@ def test_what_we_write_we_read(tmp_path):
     assert moved == pytest.approx(solution.displacement[0], rel=1e-5, abs=1e-12)
     assert {b.name for b in found.blocks} == {"DISP", "STRESS", "CONTACT"}
     assert np.array_equal(found.elements[1][:4], [1, 2, 5, 4]) or len(found.elements) == 8
+
+
+@pytest.mark.skipif(not (shutil.which("cgx") and shutil.which("xvfb-run")),
+                    reason="cgx, or a display for it, is not installed")  # fmt: skip
+def test_cgx_reads_our_results(tmp_path):
+    body = am.Body(am.box((1, 1, 1), cells=(3, 2, 2)), am.LinearElastic(1000.0, 0.3))
+    model = am.Model([body], [am.Fix("top", (0.0, 0.0, -0.01))],
+                     [am.Contact("bottom", am.Plane((0, 0, 1)), mu=0.3)])  # fmt: skip
+    am.solve(model).write(tmp_path / "own.frd")
+    (tmp_path / "see.fbd").write_text("read own.frd new\nds 1 e 3\nplot fv all\nquit\n")
+    run = subprocess.run(["xvfb-run", "-a", "cgx", "-b", "see.fbd"], cwd=tmp_path,
+                         capture_output=True, text=True, timeout=60, check=True)  # fmt: skip
+    assert "Elements: 12 Nodes:36 Datasets:3" in run.stdout
+    for name in ("own.frd opened", "DISP     D3", "min:-1.000000e-02 at node:"):
+        assert name in run.stdout

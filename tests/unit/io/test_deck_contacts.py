@@ -108,7 +108,7 @@ def test_a_slave_of_single_nodes(tmp_path):
         ((HARD, "OVERCLOSURE=USER"), "USER: this law .* is not read, expected one of HARD"),
         (("TYPE=SURFACE", "ADJUST=-1, TYPE=SURFACE"), "ADJUST: expected a distance >= 0"),
         (("TYPE=SURFACE", "ADJUST=nowhere, TYPE=SURFACE"), "node set nowhere: not found"),
-        (("BOTTOM, TOP\n", "BOTTOM,\n"), "contact of a surface with itself is not read"),
+        (("BOTTOM, TOP\n", "BOTTOM,\n"), "surface BOTTOM: no contact with itself found"),
         (("*BOUNDARY\n1,", "*CLEARANCE, MASTER=TOP, SLAVE=BOTTOM\n*BOUNDARY\n1,"),
          "VALUE: missing"),
         (("*BOUNDARY\n1,", "*CLEARANCE, MASTER=TOP, SLAVE=UP, VALUE=1\n*BOUNDARY\n1,"),

@@ -12,7 +12,6 @@ import amontons as am
 from amontons.app.cli import main
 from amontons.core.errors import InvalidInput
 from amontons.io.answers.frd import read_frd
-from amontons.io.decks.written import write_deck
 from amontons.io.readers import read_case
 
 E, LOAD = 1000.0, 5.0
@@ -51,7 +50,7 @@ def stacked(**law):
 
 def again(model, tmp_path, dialect="calculix"):
     """The model of the deck that is written, with hard contact and rigid sticking."""
-    write_deck(model, tmp_path / "model.inp", dialect)
+    am.write_deck(model, tmp_path / "model.inp", dialect)
     return read_case(tmp_path / "model.inp", ["deck.hard=true"]).model
 
 
@@ -108,7 +107,7 @@ def test_equations_and_springs_are_read_back(tmp_path):
 ])  # fmt: skip
 def test_what_no_deck_says_is_refused_and_nothing_written(model, word, tmp_path):
     with pytest.raises(InvalidInput, match=word):
-        write_deck(model(), tmp_path / "model.inp")
+        am.write_deck(model(), tmp_path / "model.inp")
     assert not list(tmp_path.iterdir())
 
 
@@ -132,9 +131,87 @@ def test_calculix_comes_to_ours_as_its_penalty_grows(mu, tmp_path):
     assert ours[:, 2].min() == pytest.approx(-LOAD / E)
     for penalty in (1e4, 1e6):
         name = f"block{penalty:.0f}"
-        write_deck(made, tmp_path / f"{name}.inp", penalty=penalty)
+        am.write_deck(made, tmp_path / f"{name}.inp", penalty=penalty)
         run = ["ccx", name]
         subprocess.run(run, cwd=tmp_path, check=True, capture_output=True, timeout=100)
         found = next(b for b in read_frd(tmp_path / f"{name}.frd").blocks if b.name == "DISP")
         theirs = found.values[: len(ours)]
         np.testing.assert_allclose(ours[:, 2] - theirs[:, 2], LOAD / penalty, rtol=0.02)
+
+
+def test_hybrid_elements_are_said_where_the_program_has_them(tmp_path):
+    model = block(material=am.LinearElastic(E, 0.499))
+    there = again(model, tmp_path, "abaqus")
+    assert "TYPE=CPE4H" in (tmp_path / "model.inp").read_text()
+    assert_same(model, there)
+    assert "elements: quad of region" in str(am.solve(there))
+    notes = am.write_deck(model, tmp_path / "model.inp", "calculix")
+    assert any("CalculiX has no hybrid elements" in note for note in notes)
+    assert "CPE4H" not in (tmp_path / "model.inp").read_text()
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
+@pytest.mark.parametrize("young", [(E, 3 * E), (3 * E, E)])
+def test_hard_contact_of_calculix_is_that_of_the_stiffest_body(young, tmp_path):
+    """CalculiX' penalty is 50 times the first modulus of a deck, whichever bodies touch."""
+    lower = am.box((1.0, 1.0), cells=2, origin=(0.0, -1.0))
+    made = am.Model(
+        [am.Body(lower, am.LinearElastic(young[0], 0.0), "lower"),
+         am.Body(am.box((1.0, 1.0), cells=2), am.LinearElastic(young[1], 0.0), "upper")],
+        [am.Fix("lower.bottom", 0), am.Fix("upper.left", (0.0, None))],
+        [am.Contact("upper.bottom", master="lower.top", mu=0.0)],
+        [am.Traction("upper.top", (0.0, -LOAD))],
+    )  # fmt: skip
+    ours = am.solve(made).displacement[1][:, 1].min()
+    am.write_deck(made, tmp_path / "pair.inp")
+    subprocess.run(["ccx", "pair"], cwd=tmp_path, check=True, capture_output=True, timeout=100)
+    found = next(b for b in read_frd(tmp_path / "pair.frd").blocks if b.name == "DISP")
+    theirs = found.values[: 2 * len(lower.points), 1].min()
+    assert ours - theirs == pytest.approx(LOAD / (50 * 3 * E), rel=0.01)  # six digits
+
+
+def by_calculix(model, path):
+    """Displacements and outside forces (nodes, 3) of CalculiX on the deck of a model."""
+    am.write_deck(model, path / "model.inp")
+    subprocess.run(["ccx", "model"], cwd=path, check=True, capture_output=True, timeout=100)
+    blocks = {block.name: block.values for block in read_frd(path / "model.frd").blocks}
+    count = sum(len(body.mesh.points) for body in model.bodies)
+    return blocks["DISP"][:count], blocks["FORC"][:count]
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
+def test_ties_in_2d_hold_in_calculix(tmp_path):
+    """Its *TIE does nothing between 2D elements, so a bond is written."""
+    made = replace(stacked(tied=True), loads=[am.Traction("upper.top", (0.3, LOAD))])
+    ours = am.solve(made).displacement[1]
+    theirs = by_calculix(made, tmp_path)[0][-len(ours) :, :2]
+    np.testing.assert_allclose(theirs, ours, atol=0.03 * np.abs(ours).max())
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
+def test_tables_press_in_calculix(tmp_path):
+    """CalculiX 2.20 takes no force from a table of surfaces, so nodes are written."""
+    law = am.OverclosureCurve([0.0, 5.0, 30.0], [0.0, 1e-3, 3e-3])
+    made = stacked(mu=0.0, stiffness=law)
+    top = am.Fix("upper.top", (None, -0.01))
+    made = replace(made, loads=[], supports=[*made.supports, top])
+    ours = am.solve(made)
+    _, force = by_calculix(made, tmp_path)
+    upper = force[len(made.bodies[0].mesh.points) :, 1].sum()
+    assert ours.resultant[1] == pytest.approx(-upper, rel=0.1)  # nodes there, averages here
+
+
+def test_bonds_and_the_line_of_nodes_are_read_back(tmp_path):
+    from amontons.io.decks.contact_laws import bend
+
+    for law in ({"tied": True, "stiffness": 5e3, "stick_stiffness": 2e3},
+                {"mu": 0.0, "stiffness": bend(1e5, 2.0)}):  # fmt: skip
+        am.write_deck(stacked(**law), tmp_path / "model.inp")
+        (found,) = read_case(tmp_path / "model.inp").model.contacts
+        assert found.tied == law.get("tied", False)
+        assert found.stick_stiffness == law.get("stick_stiffness")
+        if found.tied:
+            assert found.stiffness == 5e3
+    text = (tmp_path / "model.inp").read_text()
+    row = text.split("PRESSURE-OVERCLOSURE=LINEAR\n")[1].split("\n")[0]
+    np.testing.assert_allclose([float(x) for x in row.split(",")], [1e5, 2.0], rtol=1e-9)

@@ -8,7 +8,6 @@ from scipy.optimize import brentq
 from tangent_checker import checked_tangents
 
 import amontons as am
-from amontons.mechanics.contact.current_pairs import Meeting, Meetings, ObstaclePair
 from amontons.mechanics.meshes import Cells, Facets, Mesh
 from amontons.mechanics.model.large_deformation import large_deformation
 
@@ -177,34 +176,6 @@ def test_kinematics_is_said_on_the_contact():
         assert model.is_large == large
     with pytest.raises(am.InvalidInput, match="kinematics='finite', as by default"):
         block(ground, 0, rubber, configuration=None, kinematics="small")
-
-
-def test_two_bodies_that_deform_are_refused_in_words():
-    lower = am.Body(am.box((2, 1), 2, origin=(-0.5, -1)), SOFT, name="lower")
-    upper = am.Body(am.box((1, 1), 2), SOFT, name="upper")
-    pair = am.Contact("upper.bottom", master="lower.top", mu=0.2, kinematics="finite")
-    supports = [am.Fix("lower.bottom", 0), am.Fix("upper.top", (0, -0.01))]
-    with pytest.raises(am.UnsupportedForm, match="two bodies that deform.*kinematics='small'"):
-        am.solve(am.Model([lower, upper], supports, [pair]))
-
-
-def test_forces_of_a_pair_balance_and_do_the_work_of_its_motion():
-    obstacle = ObstaclePair(am.Plane((0, 1)), np.array([4]))
-    rng = np.random.default_rng(0)
-    masters, shapes = np.array([[2, 3], [2, 3]]), np.array([[0.25, 0.75], [0.5, 0.5]])
-    segment = Meeting(am.Plane((0, 1)), np.array([0, 1]), np.zeros((2, 2)), masters, shapes)
-    meeting = Meetings([segment, obstacle.at(rng.normal(size=(5, 2)))])
-    axes = np.linalg.qr(rng.normal(size=(3, 2, 2)))[0]
-    r, u = rng.normal(size=(3, 2)), rng.normal(size=(5, 2))
-    H, D = meeting.columns(axes, 5), meeting.shares(5)
-    pushed = (H @ r.ravel()).reshape(5, 2)
-    force = np.einsum("pkc,pk->pc", axes, r)
-    np.testing.assert_allclose(pushed, D.T @ force)
-    np.testing.assert_allclose(pushed[4], force[2])
-    np.testing.assert_allclose(pushed[:4].sum(axis=0), 0, atol=1e-15)
-    motion = np.stack([u[0] - 0.25 * u[2] - 0.75 * u[3], u[1] - 0.5 * u[2] - 0.5 * u[3], u[4]])
-    np.testing.assert_allclose(D @ u, motion)
-    np.testing.assert_allclose(H.T @ u.ravel(), np.einsum("pkc,pc->pk", axes, motion).ravel())
 
 
 # ---------------------------------------------------------------- example 5 of the 2014 paper

@@ -9,6 +9,7 @@ from scipy.sparse.linalg import spsolve
 import amontons as am
 from amontons.io.decks.shapes import SHAPES
 from amontons.mechanics.elements import stiffness
+from amontons.mechanics.elements.hyperelasticity import HyperelasticBody
 from amontons.mechanics.meshes import second_order
 from amontons.mechanics.meshes.cells import CELLS, FIRST
 
@@ -98,3 +99,25 @@ def test_incompatible_modes_bend():
     exact = 1e-3 * 20**3 / (3 * 1000 / 12)
     assert found["incompatible"] == pytest.approx(exact, rel=0.02)
     assert found["full"] < 0.5 * exact
+
+
+RUBBER = [  # law, work of loads times 1e9 by *HYPERELASTIC with D1 = 0.5 (D2 = 1e20)
+    (am.MooneyRivlin(0.4, 0.0, 4.0), 1638901.0574829567),
+    (am.MooneyRivlin(0.3, 0.1, 4.0), 1638075.6676598628),
+    (am.Ogden((0.8,), (1.7,), 4.0), 1638753.0851837667),
+    (am.Ogden((0.63, 0.2), (1.3, -2.0), 4.0), 1586388.7295716238),
+]
+
+
+@pytest.mark.parametrize(("law", "work"), RUBBER, ids=repr)
+def test_work_of_loads_on_rubber(law, work):
+    """Two distorted C3D20 with strains of 10 percent; displacements of seven digits."""
+    mesh = mesh_of("C3D20")
+    held, force = loads(mesh)
+    force, free = 0.004 * force, np.repeat(~held, 3)
+    body, u = HyperelasticBody(mesh, law), np.zeros_like(force)
+    for _ in range(8):
+        inner, blocks = body.tangent(u)
+        K = body.matrix(blocks).tocsc()[free][:, free]
+        u.ravel()[free] += spsolve(K, (force - inner).ravel()[free])
+    assert (u * force).sum() * 1e9 == pytest.approx(work, rel=2 * DIGITS)

@@ -182,14 +182,14 @@ def _balance(
     u, scale = state
     left = np.where(off, np.abs(forces.missing), 0.0)
     over = np.where(off, left - forces.known, 0.0)
-    if scale <= ZERO * forces.size:
+    moved, at = _misplaced(model, u, forces.blur)
+    if scale <= ZERO * forces.size and moved <= PLACED:
         names = ("residual", "excess", "bound", "largest_force", "between_sides", "supports")
         return Finding(RIGHT, "no forces at all", dict.fromkeys(names, 0.0))
-    unit = scale
+    unit = scale or 1.0
     residual, excess = float(left.max(initial=0.0)) / unit, float(over.max(initial=0.0)) / unit
     bound = float((forces.known * off).max(initial=0.0)) / unit
     between, pair = between_sides(model, forces, every)
-    moved, at = _misplaced(model, u, forces.blur)
     numbers = {"residual": residual, "excess": excess, "bound": bound, "largest_force": scale,
                "between_sides": between, "supports": moved}  # fmt: skip
     name = _namer(model, answer)

@@ -140,7 +140,8 @@ def status(
         text += ("; facets turn from node to node, and closing alone moves points along them "
                  f"by {turned:.2g}, against friction that the curved surface has not"
                  )  # fmt: skip
-    text += f"; the statuses of {count} contacts are impossible ({_reasons(seen)})"
+    if count:
+        text += f"; the statuses of {count} contacts are impossible ({_reasons(seen)})"
     if not history and min(shares) <= IMPOSSIBLE:
         return Finding(UNDECIDED, "the loads do not grow along one straight way, and friction "
                        "needs the slip of the last increment, which one state does not tell; "

@@ -66,7 +66,7 @@ class LoadPath:
         if self.step.dimension != 2:
             raise UnsupportedForm("path: expected a model in 2D, this one is in 3D")
         if self.drift is None:
-            object.__setattr__(self, "drift", np.zeros_like(self.step.before))
+            object.__setattr__(self, "drift", np.zeros_like(self.step.drift))
 
     def at(self, p: float) -> LargeDeformation:
         """The problem at a share p of the load."""

@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 NEAR = 2e-5  # of the model's size: how far a printed point may be from its node
 SECTOR = np.radians(1.0)  # between the plane of a deck and the front of CalculiX' bricks
+BETWEEN = 0.4  # of the distance of an element's nodes: the one that is meant is no other
 MOVED = 5e-2  # of it: by how much nodes may have been moved onto the master before the start
 
 
@@ -89,6 +90,7 @@ def by_element(
     order = np.argsort(found.labels)
     labels, flat = found.labels[order], _flat(found.points, wanted.shape[1], plane)[order]
     near = NEAR * (float(np.abs(wanted).max(initial=0.0)) or 1.0)
+    size = float(np.ptp(wanted, axis=0).max(initial=0.0)) or 1.0
     node: list[Index] = []
     rows: list[Index] = []
     for numbers, nodes in cells:
@@ -96,7 +98,12 @@ def by_element(
             given = np.array(found.elements.get(number, []), dtype=np.int64)
             at = np.minimum(np.searchsorted(labels, given), len(labels) - 1)
             off = np.abs(flat[at][None] - wanted[own][:, None]).max(axis=2, initial=0.0)
-            which, slot = np.nonzero(off <= near)
+            if (off.min(axis=1, initial=np.inf) > near).any():  # *CONTACT PAIR, ADJUST
+                apart = np.abs(wanted[own][None] - wanted[own][:, None]).max(axis=2)
+                reach = min(MOVED * size, BETWEEN * float(apart[apart > 0].min(initial=size)))
+            else:
+                reach = near
+            which, slot = np.nonzero(off <= reach)
             node.append(own[which])
             rows.append(order[at[slot]])
     pairs = np.unique(np.stack([np.concatenate(node), np.concatenate(rows)]), axis=1)

@@ -22,13 +22,15 @@ if TYPE_CHECKING:
     from ...mechanics.model.parts import Body, Material
 
 NUMBERS = ("young", "poisson", "density", "expansion")
-GENERAL = ("name", "order", "move", "axisymmetric")  # keys of every mesh
+GENERAL = ("name", "order", "move", "axisymmetric", "integration")  # keys of every mesh
 LAWS = {  # of materials, with their keys
     "linear-elastic": ("young", "poisson", "plane", "density", "expansion"),
     "orthotropic-elastic": ("young", "poisson", "shear", "axes", "plane", "density",
                             "expansion"),
+    "elasto-plastic": ("young", "poisson", "yield_stress", "hardening", "density", "expansion"),
     "neo-hookean": ("young", "poisson"), "ciarlet-geymonat": ("young", "poisson", "a"),
-    "rigid": ("density",),
+    "mooney-rivlin": ("c10", "c01", "bulk"), "ogden": ("shears", "exponents", "bulk"),
+    "saint-venant-kirchhoff": ("young", "poisson"), "rigid": ("density",),
 }  # fmt: skip
 MAX_NODES = 5_000_000  # of a box: a typing error must not fill the memory
 
@@ -59,8 +61,13 @@ def read_bodies(top: Table, path: Path) -> list[Body]:
         if around:
             with table.blamed("axisymmetric"):
                 mesh = mesh.turned()  # noqa: PLW2901
+        integration = table.text("integration", "") or None
         with top.blamed("material"):
-            bodies.append(Body(mesh, law, name, order))
+            body = Body(mesh, law, name, order)
+        if integration is not None:
+            with table.blamed("integration"):
+                body = replace(body, integration=integration)
+        bodies.append(body)
     return bodies
 
 
@@ -204,7 +211,14 @@ def read_materials(table: Table, mesh: Mesh) -> Any:
 
 def read_material(table: Table) -> Material | Rigid:
     """The law of one table."""
-    from ...mechanics.model import CiarletGeymonat, LinearElastic, NeoHookean, Rigid
+    from ...mechanics.model import (
+        CiarletGeymonat,
+        ElastoPlastic,
+        LinearElastic,
+        NeoHookean,
+        Rigid,
+        SaintVenantKirchhoff,
+    )
 
     law = table.choice("law", tuple(LAWS), "linear-elastic")
     table.only("law", *LAWS[law])
@@ -215,8 +229,17 @@ def read_material(table: Table) -> Material | Rigid:
     plane = table.choice("plane", ("strain", "stress"), "strain")
     if law == "orthotropic-elastic":
         return _orthotropic(table, plane, density)
+    if "bulk" in LAWS[law]:
+        return _rubber(table, law)
     young, poisson = table.number("young"), table.number("poisson")
     with table.blamed():
+        if law == "elasto-plastic":
+            return ElastoPlastic(
+                young, poisson, "strain", density, table.number("expansion", 0.0),
+                table.data.get("yield_stress"), table.number("hardening", 0.0),
+            )  # fmt: skip
+        if law == "saint-venant-kirchhoff":
+            return SaintVenantKirchhoff(young, poisson)
         if law == "neo-hookean":
             return NeoHookean(young, poisson)
         if law == "ciarlet-geymonat":
@@ -226,6 +249,20 @@ def read_material(table: Table) -> Material | Rigid:
         return LinearElastic(
             young, poisson, plane, density, table.number("expansion", 0.0)
         )
+
+
+def _rubber(table: Table, law: str) -> Material:
+    """A law of what is isochoric, and a bulk modulus."""
+    from ...mechanics.model import MooneyRivlin, Ogden
+
+    bulk = table.number("bulk")
+    if law == "mooney-rivlin":
+        c10, c01 = table.number("c10"), table.number("c01", 0.0)
+        with table.blamed():
+            return MooneyRivlin(c10, c01, bulk)
+    shears, exponents = (table.numbers(k, range(1, 7)) for k in ("shears", "exponents"))
+    with table.blamed():
+        return Ogden(shears, exponents, bulk)
 
 
 def _orthotropic(table: Table, plane: str, density: float | None) -> Material:

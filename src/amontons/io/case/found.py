@@ -12,7 +12,7 @@ from .tables import Table
 if TYPE_CHECKING:
     from ...mechanics.model import Body, Contact, FoundContacts
 
-KEYS = ("pairs", "friction", "method", "gap", "exclude")
+KEYS = ("pairs", "friction", "method", "gap", "exclude", "itself")
 
 
 def found_contacts(
@@ -35,10 +35,15 @@ def found_contacts(
         gap = table.number("gap")
         if gap < 0:
             raise table.error("gap", f"expected a distance >= 0, got {gap}")
+    itself = table.data.get("itself", False)
+    if not isinstance(itself, bool):
+        raise table.error("itself", f"expected true or false, got {shown(itself)}")
     law = friction(table)
     with table.blamed():
-        return find_contacts(bodies, gap=gap, exclude=_names(table), known=known,
-                             method=contact_method(table), **law)  # fmt: skip
+        return find_contacts(
+            bodies, gap=gap, exclude=_names(table), known=known,
+            itself=itself, method=contact_method(table), **law,
+        )  # fmt: skip
 
 
 def _names(table: Table) -> list[str | tuple[str, ...]]:

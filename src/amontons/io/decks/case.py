@@ -13,8 +13,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ...core.errors import Address, AmontonsError, FileFormatError, InvalidInput
 from ...mechanics.contact.finding import Reach
+from ...mechanics.elements.plasticity import is_plastic
 from ...mechanics.model import (
     BodyForce,
     Fix,
@@ -43,14 +46,16 @@ from .contact_laws import Options, law_of
 from .contacts import read_contacts
 from .course import Course
 from .flat import Deck, Placed, flatten
-from .general import found_pairs, motion_of, part_titles, read_general
+from .general import found_pairs, motion_of, part_titles, read_general, self_contact
 from .history import History, read_history
 from .joints import Joints, tied
 from .keywords import left_out, plain, sorted_out
 from .materials import read_interactions, read_sections
 from .meshing import Region
 from .options import PLACED, with_known_options
+from .rigid_surfaces import SHELLS, section_of, solid_shells
 from .scopes import Index
+from .shapes import SHAPES
 from .special import special_nodes
 from .stages import Held, check_removed, read_stages, times_of
 from .tools import OWN, own_nodes, tool_bodies
@@ -87,7 +92,7 @@ def read(path: Path, overrides: Sequence[str] = (), method: str | None = None) -
     allow, notes = plain(options.allow), []
     cards = read_cards(path)
     cards = [with_known_options(c, allow, notes) if c.keyword in PLACED else c for c in cards]
-    deck = flatten(cards)
+    deck = flatten(cards, SHAPES | SHELLS)
     notes += _leave_out(deck, options)
     if not deck.steps:
         raise cards[-1].error("the deck ends here without a *STEP, it loads nothing")
@@ -149,7 +154,10 @@ def _with(placed: list[Placed], cards: list[Card | None]) -> list[Placed]:
 def _case(
     path: Path, deck: Deck, settings: Settings, options: Options, notes: list[str]
 ) -> Case:
+    shells = solid_shells(deck)
     sections = read_sections(deck, deck.model)
+    if len(shells):
+        sections.append(section_of(shells, sections[0]))
     joints, turned = Joints.of(deck), Turned.of(deck)
     region = Region.of(deck, sections)
     history = read_history(deck, deck.model, deck.steps)
@@ -167,9 +175,14 @@ def _case(
     mesh, at = region.mesh(title)
     sections = [s for s in sections if s.name in mesh.regions]  # others are given again
     materials = {s.name: s.law(region.plane) for s in sections}
+    near = Reach(more=motion_of(history))
+    if any(pair.itself for pair in pairs):
+        titles = part_titles(deck, at, piece_labels(mesh))
+        mesh, pairs, said = self_contact(Body(mesh, materials), pairs, near, titles)
+        notes += said
     if general is not None:
         mesh, more, said = found_pairs(
-            general, Body(mesh, materials), pairs, Reach(more=motion_of(history)),
+            general, Body(mesh, materials), pairs, near,
             part_titles(deck, at, piece_labels(mesh)),
         )  # fmt: skip
         pairs += more
@@ -195,8 +208,9 @@ def _case(
                 evolution=Evolution(plan, history.until), key_of=found.line_of,
                 tables={"deck": {"cards": deck.digest}}, notes=tuple(notes),
                 about=About.of(deck, history, at, stages, make))  # fmt: skip
-    if later or (len(deck.steps) > 1 and any(c.mu for c in stages[0].contacts)):
-        return case  # friction remembers the steps before
+    remembers = is_plastic(materials) or any(c.mu for c in stages[0].contacts)
+    if later or (len(deck.steps) > 1 and remembers) or is_plastic(materials):
+        return case  # friction and flow remember what was before
     return replace(case, target=make(stages[0], history.until), moving=case.target)
 
 
@@ -210,8 +224,6 @@ def _title(deck: Deck) -> str:
 
 def _formulations(deck: Deck) -> list[str]:
     """What elements of the deck do otherwise than ours."""
-    from .shapes import SHAPES
-
     kinds = dict.fromkeys(block.kind for block in deck.blocks)
     notes = [f"{kind}: {SHAPES[kind].note}" for kind in kinds if SHAPES[kind].note]
     for step in deck.steps:
@@ -251,7 +263,11 @@ def _joined(
 
 def _name_nodes(region: Region, deck: Deck, history: History, stages: Sequence[Held]) -> None:
     """Node sets of supports and forces: supports have the name of the same set of the deck."""
-    sets = deck.node_sets()
+    sets: dict[bytes, str] = {}  # the first name of each
+    for scope in (deck.top.own, *deck.instances.values()):
+        for name, members in scope.node_sets.items():
+            called = f"{scope.title}.{name}" if scope.title else name
+            sets.setdefault(np.asarray(members, dtype=np.int64).tobytes(), called)
     for stage in stages:
         groups = history.supports.groups(region.dim, stage.held)
         stage.name([nodes for nodes, _, _ in groups], region.node_sets, sets)

@@ -13,6 +13,7 @@ from .cards import Card, Row, number
 from .materials import Interaction
 
 TABLE = 60  # points of the law with a tension far away
+SAME = 1e-9  # of numbers of a curve that are the same but for rounding
 
 
 @dataclass(frozen=True)
@@ -95,10 +96,30 @@ def _linear(interaction: Interaction, card: Card, nodal: bool) -> dict[str, Any]
     tension = values[1] if len(values) > 1 else 0.0
     if not nodal or not tension > 0:
         return {"stiffness": values[0]}
+    return {"stiffness": bend(values[0], tension)}
+
+
+def bend(stiffness: float, tension: float) -> OverclosureCurve:
+    """The line of nodes with its smooth corner: stress / length, stress."""
     x = np.concatenate([[0.0], np.geomspace(1e-2, 1e4, TABLE)])
-    width = np.pi * tension / values[0]
+    width = np.pi * tension / stiffness
     pressure = np.pi * tension * x * (0.5 + np.arctan(x) / np.pi)
-    return {"stiffness": OverclosureCurve(pressure, width * x)}
+    return OverclosureCurve(pressure, width * x)
+
+
+def bend_of(curve: OverclosureCurve) -> tuple[float, float] | None:
+    """Stiffness and tension of a curve that `bend` has made, None of another one."""
+    pressure, overclosure = np.asarray(curve.pressure), np.asarray(curve.overclosure)
+    unit = bend(1.0, 1.0)
+    if len(pressure) != len(np.asarray(unit.pressure)):
+        return None
+    tension = float(pressure[-1] / np.asarray(unit.pressure)[-1])
+    stiffness = tension * float(np.asarray(unit.overclosure)[-1] / overclosure[-1])
+    other = bend(stiffness, tension)
+    same = np.allclose(pressure, other.pressure, rtol=SAME, atol=0.0) and np.allclose(
+        overclosure, other.overclosure, rtol=SAME, atol=0.0
+    )
+    return (stiffness, tension) if same else None
 
 
 def _exponential(interaction: Interaction, card: Card, nodal: bool) -> dict[str, Any]:

@@ -36,6 +36,7 @@ class Pair:
 
     adjust: nodes of the slave at most so far from the master are put onto it, or nodes of the
     deck that are; nodes: of the deck, those of the slave that take part, None for all.
+    itself: a surface against itself, `self_contact` finds its sides.
     """
 
     slave: str
@@ -50,6 +51,7 @@ class Pair:
     within: float | None = None
     glued: Array | None = None
     tool: Tool | None = None
+    itself: bool = False
     follows: str | None = None
 
     def contact(self, law: dict[str, Any], far: float | None = None) -> Contact:
@@ -110,11 +112,7 @@ def _pairs(
     out = []
     for row in card.rows():
         names = [text for text in row.fields if text]
-        if len(names) == 1 and len(row.fields) <= 2:
-            raise row.error(
-                f"*CONTACT PAIR: {names[0]}: contact of a surface with itself is not read; "
-                "expected slave, master: two surfaces of what may meet"
-            )
+        names = names * 2 if len(names) == 1 and len(row.fields) <= 2 else names
         if len(names) != 2:
             raise row.error(
                 f"*CONTACT PAIR: expected slave, master, got {len(row.fields)} names"
@@ -127,6 +125,7 @@ def _pairs(
         else:
             pair.master = ask_surface(region, placed, names[1], row)
             pair.slave, pair.nodes = _slave(region, placed, names[0], pair.master, row)
+            pair.itself = pair.slave == pair.master
         pair.adjust = _adjust(placed)
         out.append(pair)
     if smooth and out:

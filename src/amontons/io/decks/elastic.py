@@ -10,9 +10,11 @@ import numpy as np
 from ...core.errors import InvalidInput
 from ...mechanics.elements.elasticity import LinearElastic
 from ...mechanics.elements.orthotropic import X_AND_Y, OrthotropicElastic
+from ...mechanics.elements.plasticity import ElastoPlastic
 from .cards import Card, Row, number
 from .scopes import missing
 
+Flow = tuple[tuple[tuple[float, float], ...], Card]
 PLANES = {"": "strain", "strain": "strain", "stress": "stress", "axisymmetric": "strain"}
 CONSTANTS = 9  # of an orthotropic material
 Three = tuple[float, float, float]
@@ -23,7 +25,8 @@ Axes = Sequence[Sequence[float]]
 class Elastic:
     """Young's moduli and Poisson's ratios, three of each where they differ; then also shear.
 
-    density: where one is given; expansion: strain per temperature, one or three.
+    density: where one is given; expansion: strain per temperature, one or three; flow: rows
+    (yield stress, plastic strain) and their card, None of a material that does not yield.
     """
 
     young: float | Three
@@ -32,10 +35,13 @@ class Elastic:
     card: Card
     shear: Three | None = None
     expansion: float | Three = 0.0
+    flow: Flow | None = None
 
     def law(self, plane: str, axes: Axes | None = None) -> LinearElastic | OrthotropicElastic:
         """The material for a plane state, its axes turned; FileFormatError for what is none."""
         state = PLANES[plane]
+        if self.flow is not None:
+            return self._yielding(state)
         try:
             if self.shear is None and not isinstance(self.expansion, tuple):
                 assert not isinstance(self.young, tuple | list)
@@ -49,6 +55,17 @@ class Elastic:
             )
         except InvalidInput as reason:
             raise self.card.error(str(reason)) from None
+
+    def _yielding(self, state: str) -> ElastoPlastic:
+        assert self.flow is not None
+        rows, card = self.flow
+        if self.shear is not None or isinstance(self.expansion, tuple):
+            raise card.error("expected isotropic *ELASTIC and *EXPANSION beside it")
+        young, poisson = float(self.young), float(self.poisson)  # type: ignore[arg-type]
+        try:
+            return ElastoPlastic(young, poisson, state, self.density, self.expansion, rows)
+        except InvalidInput as reason:
+            raise card.error(str(reason)) from None
 
     @property
     def grows(self) -> bool:
@@ -109,6 +126,27 @@ def _of_stiffness(values: Sequence[float], card: Card) -> Elastic:
     young = _of((1 / S.diagonal()).tolist())
     poisson = _of([-S[0, 1] * young[0], -S[0, 2] * young[0], -S[1, 2] * young[1]])
     return Elastic(young, poisson, None, card, _of(values[6:9]))
+
+
+def flow(card: Card) -> Flow:
+    """The rows of *PLASTIC; raises FileFormatError for other hardening and temperatures."""
+    kind = card.label("HARDENING") or "ISOTROPIC"
+    if kind != "ISOTROPIC":
+        raise card.error(f"HARDENING={kind}: is not read, expected ISOTROPIC")
+    rows, first = [], None
+    for row in card.rows():
+        values = [number(text, row, "*PLASTIC") for text in row.fields if text]
+        if len(values) not in (2, 3):
+            raise row.error(
+                f"*PLASTIC: expected a stress and a strain, got {len(values)} numbers"
+            )
+        if first is not None and values[2:] != first:
+            raise row.error("*PLASTIC: yield stresses at several temperatures are not read")
+        first = values[2:]
+        rows.append((values[0], values[1]))
+    if not rows:
+        raise card.error("expected a line of data, got none")
+    return tuple(rows), card
 
 
 def expansion(card: Card) -> float | Three:

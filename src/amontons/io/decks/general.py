@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ...mechanics.contact.finding import Allowed, Reach
 from ...mechanics.meshes import Mesh
-from ...mechanics.model.finding import FoundPair, Parts, Side, find_between
+from ...mechanics.model.finding import FoundContacts, FoundPair, Parts, Side, find_between
 from ...mechanics.model.names import named_bodies
 from ...mechanics.model.parts import Body
 from .cards import Card
@@ -115,9 +115,7 @@ def found_pairs(
     pairs: those of the deck, whose facets are not found again; titles: names of parts.
     Raises FileFormatError where nothing is found.
     """
-    parts = Parts.of(named_bodies([body]))
-    if titles is not None and len(titles) == len(parts.titles[0]):
-        parts = replace(parts, titles=[titles])
+    parts = _parts(body, titles)
     skin, mesh = parts.skins[0], body.mesh
     everywhere = np.ones(len(skin.part), dtype=bool)
     masks = {name: skin.holds(mesh.surface(name)) for name in made.names} | {"": everywhere}
@@ -125,17 +123,12 @@ def found_pairs(
     no = [(masks[a], masks[b]) for a, b in made.excluded]
     no += [(skin.holds(mesh.surface(p.slave)), skin.holds(mesh.surface(p.master)))
            for p in pairs]  # fmt: skip
-    rule: Allowed = partial(_allowed, yes, no)
-
-    def allowed(one: Side, other: Side) -> Allowed:
-        return rule
-
-    found = find_between(parts, reach, {"mu": 0.0}, allowed)
+    found = _found(parts, reach, yes, no)
     if not (found.contacts or pairs):
         count = len(parts.titles[0])
         raise made.card.error(
             f"no contact found: the deck has {count} part{'s' if count > 1 else ''} that share "
-            "no nodes, none of which faces another nearby; name the pairs"
+            "no nodes, none of which faces another or itself nearby; name the pairs"
         )
     mesh = found.bodies[0].mesh
     out, said = [], []
@@ -146,6 +139,59 @@ def found_pairs(
         out.append(Pair(contact.slave, contact.master, made.card, name))
         said.append(_told(pair, name))
     return mesh, out, said
+
+
+def self_contact(
+    body: Body, pairs: Sequence[Pair], reach: Reach, titles: list[str] | None
+) -> tuple[Mesh, list[Pair], list[str]]:
+    """The mesh, pairs of two sides in the place of those of a surface with itself, and words.
+
+    Raises FileFormatError for a surface that faces itself nowhere nearby.
+    """
+    out, said, mesh = [], [], body.mesh
+    for pair in pairs:
+        if not pair.itself:
+            out.append(pair)
+            continue
+        parts = _parts(replace(body, mesh=mesh), titles)
+        own = parts.skins[0].holds(mesh.surface(pair.slave))
+        found = _found(parts, reach, [(own, own)], [])
+        if not found.contacts:
+            raise pair.card.error(
+                f"surface {pair.slave}: no contact with itself found: it faces itself nowhere "
+                "closer than a facet is wide plus the farthest that supports move anything; "
+                "expected slave, master: two surfaces of what may meet"
+            )
+        named = {f"{pair.slave}: {name}": facets
+                 for name, facets in found.bodies[0].mesh.surfaces.items()
+                 if name not in mesh.surfaces}  # fmt: skip
+        mesh = mesh.with_surfaces(named)
+        for contact, seen in zip(found.contacts, found.pairs, strict=True):
+            slave, master = (f"{pair.slave}: {n}" for n in (contact.slave, contact.master))
+            out.append(replace(pair, slave=slave, master=master, itself=False))
+            said.append(_told(seen, pair.interaction))
+    return mesh, out, said
+
+
+def _parts(body: Body, titles: list[str] | None) -> Parts:
+    """The parts of the mesh of a deck, under their names where these are known."""
+    parts = Parts.of(named_bodies([body]))
+    if titles is not None and len(titles) == len(parts.titles[0]):
+        parts = replace(parts, titles=[titles])
+    return parts
+
+
+def _found(
+    parts: Parts, reach: Reach, yes: Sequence[tuple[Mask, Mask]],
+    no: Sequence[tuple[Mask, Mask]],
+) -> FoundContacts:  # fmt: skip
+    """Contacts between facets that may meet, of a part with itself too."""
+    rule: Allowed = partial(_allowed, yes, no)
+
+    def allowed(one: Side, other: Side) -> Allowed:
+        return rule
+
+    return find_between(parts, reach, {"mu": 0.0}, allowed, itself=True)
 
 
 def _allowed(
@@ -194,4 +240,3 @@ def part_titles(deck: Deck, at: Index, label: Index) -> list[str] | None:
         for part in np.unique(label[nodes[nodes >= 0]]):
             titles[part] = f"{titles[part]} and {name}" if titles[part] else name
     return titles if all(titles) and len(set(titles)) == len(titles) else None
-

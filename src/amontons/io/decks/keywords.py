@@ -13,7 +13,8 @@ from .cards import Card
 from .options import with_known_options
 
 READ = {
-    "HEADING", "MATERIAL", "ELASTIC", "DENSITY", "SOLIDSECTION", "SURFACEINTERACTION",
+    "HEADING", "MATERIAL", "ELASTIC", "PLASTIC", "DENSITY", "SOLIDSECTION",
+    "SURFACEINTERACTION",
     "SURFACEBEHAVIOR", "FRICTION", "CONTACTPAIR", "BOUNDARY", "AMPLITUDE", "STEP", "STATIC",
     "CLOAD", "DLOAD", "DSLOAD", "EQUATION", "MPC", "TIE", "TRANSFORM", "COUPLING", "KINEMATIC",
     "DISTRIBUTING", "RIGIDBODY", "PRE-TENSIONSECTION", "SPRING", "CLEARANCE",
@@ -45,7 +46,7 @@ PROCEDURES = {  # what a step may do instead of *STATIC
 }  # fmt: skip
 EMPTY = {"SYSTEM"}  # of no effect without an option
 MEANS = {  # what a card would have done
-    "PLASTIC": "the material would yield", "HYPERELASTIC": "the material would be rubber",
+    "HYPERELASTIC": "the material would be rubber",
     "GAP": "contact elements would act",
 }  # fmt: skip
 

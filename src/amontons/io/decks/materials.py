@@ -10,7 +10,16 @@ from ...core.errors import InvalidInput
 from ...mechanics.elements.elasticity import LinearElastic
 from ...mechanics.elements.orthotropic import OrthotropicElastic
 from .cards import Card, Row, number
-from .elastic import Axes, Elastic, axes_of, elastic, expansion, first_row, read_orientations
+from .elastic import (
+    Axes,
+    Elastic,
+    axes_of,
+    elastic,
+    expansion,
+    first_row,
+    flow,
+    read_orientations,
+)
 from .flat import Deck, Placed
 from .scopes import Index, missing
 
@@ -53,13 +62,14 @@ def read_materials(cards: Sequence[Card]) -> dict[str, Elastic]:
     found: dict[str, Elastic] = {}
     density: dict[str, float] = {}
     grows: dict[str, Any] = {}
+    flows: dict[str, Any] = {}
     current: Card | None = None
     for card in cards:
         if card.keyword == "MATERIAL":
             current = card
             if card.name("NAME") in found:
                 raise card.error(f"NAME: material {card.name('NAME')} is there already")
-        elif card.keyword in ("ELASTIC", "DENSITY", "EXPANSION"):
+        elif card.keyword in ("ELASTIC", "DENSITY", "EXPANSION", "PLASTIC"):
             if current is None:
                 raise card.error("stands before the first *MATERIAL")
             name = current.name("NAME")
@@ -67,10 +77,13 @@ def read_materials(cards: Sequence[Card]) -> dict[str, Elastic]:
                 density[name] = number(first_row(card).fields[0], first_row(card), "density")
             elif card.keyword == "EXPANSION":
                 grows[name] = expansion(card)
+            elif card.keyword == "PLASTIC":
+                flows[name] = flow(card)
             else:
                 found[name] = elastic(card)
     return {
-        name: replace(e, density=density.get(name), expansion=grows.get(name, 0.0))
+        name: replace(e, density=density.get(name), expansion=grows.get(name, 0.0),
+                      flow=flows.get(name))
         for name, e in found.items()
     }
 

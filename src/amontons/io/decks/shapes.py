@@ -52,6 +52,8 @@ WEDGE15 = (
 REDUCED = "one point of integration there, full here: no motions without energy"
 INCOMPATIBLE = "incompatible modes there, none here"
 MODES = "incompatible modes that pass the patch test; those of CalculiX do on parallelepipeds"
+REDUCED_HYBRID = "fewer points of integration there, full here; the pressure is the same"
+CONSTANT = "linear pressure there, constant here"
 THIN = "no stress across the plane; CalculiX has a solid there, whose thickness changes evenly"
 
 
@@ -67,6 +69,12 @@ def _planes() -> dict[str, Shape]:
             found[prefix + name] = Shape(cell, nodes, sides, plane, thin, few)
             if name == "8":
                 found[f"{prefix}8R"] = Shape(cell, nodes, sides, plane, thin, "reduced")
+            if plane != "stress" and name != "3":
+                note = CONSTANT if name == "6" else ""
+                found[f"{prefix}{name}H"] = Shape(cell, nodes, sides, plane, note, "hybrid")
+            if plane != "stress" and name in ("4", "8"):
+                note = REDUCED_HYBRID if name == "8" else REDUCED
+                found[f"{prefix}{name}RH"] = Shape(cell, nodes, sides, plane, note, "hybrid")
             if name == "4":
                 found[f"{prefix}4R"] = Shape(cell, nodes, sides, plane, REDUCED)
                 found[f"{prefix}4I"] = (
@@ -83,6 +91,11 @@ SHAPES = {
     "C3D6": Shape("wedge", 6, WEDGE, integration="reduced"),
     "C3D15": Shape("wedge15", 15, WEDGE15, integration="reduced"),
     "C3D20": Shape("hex20", 20, HEX20),
+    "C3D8H": Shape("hex", 8, HEX, integration="hybrid"),
+    "C3D8RH": Shape("hex", 8, HEX, note=REDUCED, integration="hybrid"),
+    "C3D10H": Shape("tet10", 10, TET10, integration="hybrid"),
+    "C3D20H": Shape("hex20", 20, HEX20, integration="hybrid"),
+    "C3D20RH": Shape("hex20", 20, HEX20, note=REDUCED_HYBRID, integration="hybrid"),
     "C3D20R": Shape("hex20", 20, HEX20, integration="reduced"),
 } | _planes()  # fmt: skip
 

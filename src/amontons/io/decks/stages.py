@@ -146,6 +146,11 @@ def check_removed(stages: Sequence[Held], pairs: Sequence[Pair], deck: Deck) -> 
     steps = [placed.card for step in deck.steps for placed in step]
     cards: list[Card] = [card for card in steps if card.keyword == "MODELCHANGE"]
     for stage in stages:
+        for pair in pairs:
+            if pair.itself and (pair.slave, pair.master) in stage.removed:
+                raise cards[0].error(
+                    f"{pair.slave}: contact with itself that comes and goes is not read"
+                )
         for slave, master in sorted(stage.removed - known):
             names = [", ".join(each) for each in known]
             raise cards[0].error(missing("contact pair", f"{slave}, {master}", names))

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...analysis.audit import Audit, PairAudit
+from ...analysis.audit.verdict import RIGHT
 from ...problem.law.states import ContactStatus
 from .bodies import draw_bodies
 from .layout import Sheet
@@ -14,8 +15,8 @@ from .scene import Frame, Scene, magnification
 from .style import ALARM, INK
 
 ROW, BODIES, PANEL = 3.9, 3.9, 4.2  # height of a row, widths of the panels, inches
+NEAR = 1e-3  # of the largest extent: points that lie on each other
 MOST = 4  # pairs that are drawn, each a row
-
 
 
 def audit_figure(found: Audit, title: str = "") -> Figure:
@@ -45,7 +46,7 @@ def statuses(pair: PairAudit) -> np.ndarray:
 
 
 def _draw(axes: Axes, pair: PairAudit) -> None:
-    """Contacts of one pair seen along their smallest extent, coloured by traction."""
+    """Contacts of one pair seen along an axis, coloured by traction."""
     one = max(pair.seen, key=lambda s: int(s.impossible.sum()))
     side = one.side
     traction = side.r[:, 0] / side.weight
@@ -55,7 +56,7 @@ def _draw(axes: Axes, pair: PairAudit) -> None:
         names = "xy"[axis], "pressure"
         axes.plot(*where, "o", color=INK, markersize=4)
     else:
-        first, second = np.sort(np.argsort(-np.ptp(side.points, axis=0))[:2])
+        first, second = _plane(side.points)
         where = side.points[:, first], side.points[:, second]
         names = "xyz"[first], "xyz"[second]
         drawn = axes.scatter(*where, c=traction, s=24, cmap="viridis")
@@ -64,4 +65,17 @@ def _draw(axes: Axes, pair: PairAudit) -> None:
     bad = one.impossible
     axes.plot(where[0][bad], where[1][bad], "o", markersize=11, fillstyle="none", color=ALARM)
     axes.set(xlabel=names[0], ylabel=names[1])
-    axes.set_title(f"{pair.name}: {int(bad.sum())} contacts can not be so")
+    wrong = [name for name, one in pair.findings.items() if one.verdict is not RIGHT]
+    fails = f"{', '.join(wrong)} not right, " if wrong else ""
+    axes.set_title(f"{pair.name}: {fails}{int(bad.sum())} contacts can not be so")
+
+
+def _plane(points: np.ndarray) -> tuple[int, int]:
+    """The two axes along which most points (n, 3) lie apart, and furthest."""
+    span = np.ptp(points, axis=0)
+    places = np.round(points / (NEAR * (float(span.max()) or 1.0)))
+
+    def apart(axes: tuple[int, int]) -> tuple[int, float]:
+        return len(np.unique(places[:, list(axes)], axis=0)), float(span[list(axes)].sum())
+
+    return max(((0, 1), (0, 2), (1, 2)), key=apart)

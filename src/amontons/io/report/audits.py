@@ -35,7 +35,7 @@ def audit_page(found: Audit, title: str, units: Units) -> Page:
                for key, value in one.numbers.items()]  # fmt: skip
     stage = Stage(Skin(found.model))
     return Page(
-        "audit", title or found.title, headline=f"This answer is {found.verdict}.",
+        "audit", title or found.title, headline=_headline(found),
         outcome=OUTCOMES[found.verdict], stamp="" if found.is_right else found.verdict,
         facts=[Table("Numbers", ("", ""), numbers), Table("Judged by", ("", ""),
                                                           version_rows())],
@@ -44,6 +44,14 @@ def audit_page(found: Audit, title: str, units: Units) -> Page:
                                         "carry load", "verdicts"), pairs)],
         warnings=found.notes, stage=stage, states=[_state(found, stage)], units=units,
     )  # fmt: skip
+
+
+def _headline(found: Audit) -> str:
+    """The verdict, and the questions that make it."""
+    worst = found.verdict
+    failed = [name for name, one in found.findings.items() if one.verdict.value == worst]
+    why = "" if found.is_right else f": {', '.join(failed)}"
+    return f"This answer is {found.verdict}{why}."
 
 
 def _shown(value: Any) -> str:

@@ -25,6 +25,7 @@ STATIC = files("amontons.io.report") / "static"
 SCRIPTS = ("format.js", "charts.js", "bodies.js", "camera.js", "view.js", "page.js")
 FULL_NUMBERS = 250_000  # numbers of all states up to which they keep 32 bits
 FIELDS = ("status", "pressure", "shear", "slip", "gap", "displacement", "von Mises stress")
+SENTENCE = 60  # letters from which a cell of a table takes several lines
 TOKEN = re.compile(r"\{\{(\w+)\}\}")
 
 
@@ -177,13 +178,18 @@ def _table(table: Table) -> str:
         head = f"<thead><tr>{cells}</tr></thead>"
     rows = []
     for first, *rest in table.rows:
-        cells = "".join(f"<td>{escape(_clean(cell))}</td>" for cell in rest)
+        cells = "".join(f"<td{_words(cell)}>{escape(_clean(cell))}</td>" for cell in rest)
         rows.append(f'<tr><th scope="row">{escape(_clean(first))}</th>{cells}</tr>')
     kind = "table" if head else "facts"
     wide = " span" if len(table.columns) > 3 else ""
     return (f'<section class="card{wide}"><h2>{escape(_clean(table.title))}</h2>'
             f'<div class="scroll"><table class="{kind}">{head}<tbody>{"".join(rows)}</tbody>'
             "</table></div></section>")  # fmt: skip
+
+
+def _words(cell: str) -> str:
+    """The class of a cell with a sentence, which may go on in the next line."""
+    return ' class="words"' if len(str(cell)) > SENTENCE else ""
 
 
 @cache

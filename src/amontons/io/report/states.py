@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from ...linear.blocks import spatial
 from ...mechanics.elements import von_mises
-from ...mechanics.model.temperature import warming
 from ..contact_fields import SLAVE, contact_fields
-from ..vtk import body_stress
+from ..vtk import stresses
 from .skin import Skin
 
 if TYPE_CHECKING:
@@ -76,9 +75,8 @@ class Stage:
         at = skin.whole
         mine = at[self.contacts]
         moved = spatial(np.concatenate(fields.displacement))[at]
-        warm = warming(model, getattr(solution, "time", None))
-        parts = zip(model.bodies, fields.displacement, warm, strict=True)
-        stress = von_mises(np.concatenate([body_stress(*part)[1] for part in parts]))
+        parts = stresses(model, fields, getattr(solution, "time", None))
+        stress = von_mises(np.concatenate([nodes for _, nodes in parts]))
         told = getattr(solution, "solution", solution)
         counts = {name: int((solution.status == k).sum())
                   for k, name in enumerate(("open", "slip", "stick"))}  # fmt: skip

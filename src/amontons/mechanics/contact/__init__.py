@@ -1,5 +1,6 @@
 """Contact: obstacles, local frames, and the matrices that tie contacts to nodes."""
 
+from .current_rows import current_contact
 from .geometry import LevelSet, Obstacle, Plane, Sphere, frames
 from .mismatch import Mismatch, mismatch
 from .mortar import mortar_contact, mortar_nodes, mortar_obstacle
@@ -10,6 +11,6 @@ from .profiles import Cylinder, Extrusion, Profile, Revolution
 
 __all__ = ["ContactRows", "Cylinder", "Extrusion", "LevelSet", "Mismatch", "Nitsche",
            "NitscheTerms", "Obstacle", "Plane", "Profile", "Revolution", "Sphere",
-           "contact_nodes", "forces", "frames", "mismatch", "mortar_contact", "mortar_nodes",
-           "mortar_obstacle", "nitsche_obstacle", "nitsche_pair", "nodal_contact",
-           "pair_contact"]  # fmt: skip
+           "contact_nodes", "current_contact", "forces", "frames", "mismatch", "mortar_contact",
+           "mortar_nodes", "mortar_obstacle", "nitsche_obstacle", "nitsche_pair",
+           "nodal_contact", "pair_contact"]  # fmt: skip

@@ -98,8 +98,9 @@ class ContactPoint:
 
     @cached_property
     def z_normal(self) -> Array:
-        """z_N, (nc,): positive where closed."""
-        return (self.n * self.force).sum(axis=1) - self.contact.rho * self.meeting.gap
+        """z_N, (nc,): positive where closed; negative where nobody is met."""
+        along, apart = (self.n * self.force).sum(axis=1), self.contact.rho * self.meeting.gap
+        return np.where(self.meeting.met, along - apart, -np.abs(along) - np.abs(apart))
 
     @cached_property
     def z_tangent(self) -> Array:
@@ -188,33 +189,36 @@ class ContactPoint:
     def derivatives(self, pieces: Pieces | None = None) -> tuple[Array, Array, Array]:
         """Derivatives of (2) by lambda, x and s, each (nc, d, d), on some (the active) pieces.
 
-        x moves n and g only: its part in s is the third array.
+        With obstacles alone: x moves n and g only, its part in s is the third array.
         """
+        by_force, by_normal, by_gap, by_motion = self.partials(pieces)
+        by_x = by_normal @ self.meeting.normal_slopes
+        by_x += by_gap[:, :, None] * self.meeting.gap_slopes[:, None, :]
+        return by_force, by_x * self.contact.free[:, None, :], by_motion
+
+    def partials(self, pieces: Pieces | None = None) -> tuple[Array, Array, Array, Array]:
+        """Derivatives of (2) by lambda, n, g (nc, d) and s; the others (nc, d, d)."""
         pieces = self.pieces if pieces is None else pieces
         n, d = self.n, self.n.shape[1]
-        bend, slope = self.meeting.normal_slopes, self.meeting.gap_slopes
         closed = ((pieces > 0) & (pieces < 4)).astype(float)
         rho = self.contact.rho[:, None, None]
         eye = np.eye(d)
         tangential = eye - n[:, :, None] * n[:, None, :]
-        # z_N: row vectors by lambda and by x
-        z_x = np.einsum("pi,pij->pj", self.force, bend) - self.contact.rho[:, None] * slope
-        # z_T by x at fixed y
-        turned = -bend * self.y_normal[:, None, None]
-        turned -= n[:, :, None] * np.einsum("pi,pij->pj", self.y, bend)[:, None, :]
         in_z, in_bound = self._friction(pieces)
         law, z = self.contact.law, np.where(closed > 0, self.z_normal, 0.0)[:, None]
         slope = np.where(law.given(z), 0.0, law.parameters[:, MU])
         in_bound = in_bound * (slope * closed)[:, None]
         normal = closed[:, None] * n + in_bound  # of the force, per z_N
         by_force = eye - normal[:, :, None] * n[:, None, :] - in_z @ tangential
-        by_x = -normal[:, :, None] * z_x[:, None, :] - in_z @ turned
-        by_x -= (closed * self.z_normal)[:, None, None] * bend
+        # z_T by n at fixed y
+        turned = -eye * self.y_normal[:, None, None] - n[:, :, None] * self.y[:, None, :]
+        by_normal = -normal[:, :, None] * self.force[:, None, :] - in_z @ turned
+        by_normal -= (closed * self.z_normal)[:, None, None] * eye
         if d == 2:
-            by_x -= self._turned_slip(pieces, bend)
-        by_motion = rho * (in_z @ tangential)
+            by_normal -= self._turned_slip(pieces)
+        by_gap = normal * self.contact.rho[:, None]
         free = self.contact.free[:, None, :]
-        return by_force * free, by_x * free, by_motion * free
+        return by_force * free, by_normal, by_gap, rho * (in_z @ tangential) * free
 
     def _friction(self, pieces: Pieces) -> tuple[Array, Array]:
         """Derivatives of P by z_T, (nc, d, d), and by the bound, (nc, d)."""
@@ -231,13 +235,12 @@ class ContactPoint:
         in_z = np.where(slip[:, None, None], turning, in_z)
         return in_z, np.where(slip[:, None], s, 0.0)
 
-    def _turned_slip(self, pieces: Pieces, bend: Array) -> Array:
-        """2D: the derivative of +-t at a fixed bound, (nc, 2, 2): dt = -n (t . dn)."""
+    def _turned_slip(self, pieces: Pieces) -> Array:
+        """2D: the derivative of +-t by n at a fixed bound, (nc, 2, 2): dt = -n (t . dn)."""
         kind = pieces % 4
         sign = np.select([kind == SLIP, kind == BACK], [1.0, -1.0], 0.0)
         size = sign * self._bound((pieces > 0) & (pieces < 4))
-        along = np.einsum("pi,pij->pj", _tangents(self.n), bend)
-        return -size[:, None, None] * self.n[:, :, None] * along[:, None, :]
+        return -size[:, None, None] * self.n[:, :, None] * _tangents(self.n)[:, None, :]
 
 
 def _slides(kind: Pieces) -> NDArray[np.bool_]:

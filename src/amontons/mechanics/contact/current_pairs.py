@@ -1,12 +1,12 @@
-"""Contact pairs where the bodies are now: gap, normal, and who takes the force.
+"""Contact pairs where the bodies are now: gap, normal, motion, and who takes the force.
 
 A pair is a set of slave nodes and another side.  At the positions x of all nodes it says of
-each slave node p, with N_a the shape functions of the nodes that stand in front of it,
+each slave node p, with the averages B of `current_mortar`,
 
-    gap g_p(x), normal n_p(x); a force lambda_p acts on p and -N_a lambda_p on node a.     (1)
+    gap g_p(x), normal n_p(x), motion s_p(x) since the last step;
+    a force lambda_p acts on p and -B_pj lambda_p on the other nodes j.                    (1)
 
-An obstacle is a pair whose other side has no unknowns: nobody takes -lambda.  Another side that
-deforms needs a second `Pair`, and rows of its nodes in `LargeDeformation`.
+An obstacle is a pair whose other side has no unknowns: B is 1 at p, nobody takes -lambda.
 """
 
 from __future__ import annotations
@@ -20,32 +20,60 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from .current_mortar import MortarMeeting
 from .geometry import Obstacle
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 
 class Pair(Protocol):
-    """Slave nodes and another side."""
+    """Slave nodes (nc,) and another side."""
 
-    def at(self, positions: Array) -> Meeting:
+    @property
+    def slaves(self) -> Index:
+        """Nodes with a row."""
+        ...
+
+    def at(self, positions: Array) -> Meeting | MortarMeeting:
         """Where they meet at the positions (nodes, d) of all nodes of the model."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class Meeting:
-    """A pair at some positions; side: the other side at rest, as an obstacle.
+    """A pair with an obstacle `side` at some positions.
 
-    slaves (nc,), masters (nc, a): nodes; x (nc, d): where the slaves are; shapes (nc, a): N_a.
+    slaves (nc,): nodes; x (nc, d): where the slaves are; nodes: of the model.
     """
 
     side: Obstacle
     slaves: Index
     x: Array
-    masters: Index
-    shapes: Array
+    nodes: int
+
+    @property
+    def met(self) -> Mask:
+        """All slaves, (nc,)."""
+        return np.ones(len(self.slaves), dtype=bool)
+
+    @property
+    def averages(self) -> sparse.csr_array:
+        """B, (nc, nodes)."""
+        nc = len(self.slaves)
+        entries = (np.ones(nc), (np.arange(nc), self.slaves))
+        return sparse.csr_array(entries, shape=(nc, self.nodes))
+
+    @cached_property
+    def gap(self) -> Array:
+        """(nc,)."""
+        return self.side.gap(self.x)
+
+    @cached_property
+    def normals(self) -> Array:
+        """(nc, d)."""
+        return self.side.normals(self.x)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,64 +84,85 @@ class ObstaclePair:
     slaves: Index
 
     def at(self, positions: Array) -> Meeting:
-        """Without masters."""
-        none = np.zeros((len(self.slaves), 0))
-        return Meeting(
-            self.obstacle, self.slaves, positions[self.slaves], none.astype(np.int64), none
-        )
+        """The slaves and where they are."""
+        return Meeting(self.obstacle, self.slaves, positions[self.slaves], len(positions))
 
 
 @dataclass(frozen=True, eq=False)
 class Meetings:
     """All pairs of a model at some positions, one after another: nc contacts."""
 
-    parts: Sequence[Meeting]
+    parts: Sequence[Meeting | MortarMeeting]
 
-    def _joined(self, name: str) -> Array:
-        return np.concatenate([getattr(part.side, name)(part.x) for part in self.parts])
+    @property
+    def only_obstacles(self) -> bool:
+        """True where derivatives are those by the place of the slave alone."""
+        return all(isinstance(part, Meeting) for part in self.parts)
 
     @cached_property
     def gap(self) -> Array:
         """(nc,)."""
-        return self._joined("gap")
+        return np.concatenate([part.gap for part in self.parts])
 
     @cached_property
     def normals(self) -> Array:
         """(nc, d)."""
-        return self._joined("normals")
+        return np.concatenate([part.normals for part in self.parts])
 
     @cached_property
-    def gap_slopes(self) -> Array:
-        """Derivatives of the gaps by the place of the slave, (nc, d)."""
-        return self._joined("gap_slopes")
+    def met(self) -> Mask:
+        """Contacts that meet their other side, (nc,); the others are open."""
+        return np.concatenate([part.met for part in self.parts])
 
     @cached_property
-    def normal_slopes(self) -> Array:
-        """Derivatives of the normals by the place of the slave, (nc, d, d)."""
-        return self._joined("normal_slopes")
-
-    def shares(self, nodes: int) -> sparse.csr_array:
-        """(1) as a matrix (nc, nodes): 1 at the slave, -N_a at the nodes in front of it.
+    def averages(self) -> sparse.csr_array:
+        """B of (1), (nc, nodes).
 
         Times displacements (nodes, d) the motion against the other side; its transpose times
         forces lambda (nc, d) those on all nodes.
         """
-        values, columns, counts = [], [], []
-        for part in self.parts:
-            own = np.ones((len(part.slaves), 1))
-            values.append(np.hstack([own, -part.shapes]).ravel())
-            columns.append(np.hstack([part.slaves[:, None], part.masters]).ravel())
-            counts.append(np.full(len(own), 1 + part.shapes.shape[1]))
-        pointers = np.concatenate([[0], np.cumsum(np.concatenate(counts))])
-        entries = (np.concatenate(values), np.concatenate(columns), pointers)
-        return sparse.csr_array(entries, shape=(len(pointers) - 1, nodes))
+        return sparse.csr_array(sparse.vstack([part.averages for part in self.parts]))
 
-    def columns(self, axes: Array, nodes: int) -> sparse.csc_array:
+    @cached_property
+    def others(self) -> sparse.csr_array:
+        """B^T without 1 at p: forces on the other nodes, (nodes, nc)."""
+        slaves = np.concatenate([part.slaves for part in self.parts])
+        nc = len(slaves)
+        entries = (np.ones(nc), (slaves, np.arange(nc)))
+        onto = sparse.csr_array(self.averages.T)
+        return sparse.csr_array(onto - sparse.csr_array(entries, shape=onto.shape))
+
+    def columns(self, axes: Array) -> sparse.csc_array:
         """H (nodes d, nc d): column p d + k holds the forces of a unit along axis k of p.
 
         axes (nc, d, d): the frames of the contacts.
         """
         nc, d = axes.shape[:2]
-        spread = sparse.kron(self.shares(nodes).T, np.eye(d), format="csr")
+        spread = sparse.kron(self.averages.T, np.eye(d), format="csr")
         local = (axes.swapaxes(1, 2), np.arange(nc), np.arange(nc + 1))
         return sparse.csc_array(spread @ sparse.bsr_array(local, shape=(nc * d,) * 2).tocsr())
+
+    def motion(self, u: Array, before: Array, earlier: Meetings) -> Array:
+        """s, (nc, d), from displacements `before` to u (nodes, d), where earlier met then."""
+        out = []
+        for part, old in zip(self.parts, earlier.parts, strict=True):
+            if isinstance(part, Meeting) or isinstance(old, Meeting):
+                out.append(u[part.slaves] - before[part.slaves])
+            else:
+                out.append(part.motion(old))
+        return np.concatenate(out)
+
+    # ------------------------------------------- derivatives by the place of the slave
+    def _joined(self, name: str) -> Array:
+        sides = [part for part in self.parts if isinstance(part, Meeting)]
+        return np.concatenate([getattr(part.side, name)(part.x) for part in sides])
+
+    @cached_property
+    def gap_slopes(self) -> Array:
+        """Of the gaps, (nc, d), with obstacles only."""
+        return self._joined("gap_slopes")
+
+    @cached_property
+    def normal_slopes(self) -> Array:
+        """Of the normals, (nc, d, d), with obstacles only."""
+        return self._joined("normal_slopes")

@@ -33,8 +33,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...core.errors import within
-from ..elements.cell_matrices import around
 from ..meshes.cells import CELLS, FIRST
+from ..meshes.check import around
 from ..meshes.facets import Facets, corner_facets, turned
 from ..meshes.mesh import Mesh
 from ..meshes.surfaces import nodal_normals, nodal_weights, outward

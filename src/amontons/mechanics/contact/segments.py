@@ -244,7 +244,7 @@ def _candidates(slave: Surface, master: Surface) -> Iterator[tuple[Index, Index]
     trees = [(cKDTree(master.centre[c]), c, master.radius[c].max()) for c in classes]
     for start in range(0, len(slave.nodes), CHUNK):
         chunk = np.arange(start, min(start + CHUNK, len(slave.nodes)))
-        foot, beside = _feet(slave.centre[chunk], slave.normal[chunk], tree, normals)
+        foot, beside = feet(slave.centre[chunk], slave.normal[chunk], tree, normals)
         reach = 2 * slave.radius[chunk] + beside
         for centres, members, size in trees:
             lists = centres.query_ball_point(foot, reach + size, return_sorted=True)
@@ -258,7 +258,7 @@ def _candidates(slave: Surface, master: Surface) -> Iterator[tuple[Index, Index]
             yield of[facing], facet[facing]
 
 
-def _feet(centre: Array, normal: Array, tree: cKDTree, normals: Array) -> tuple[Array, Array]:
+def feet(centre: Array, normal: Array, tree: cKDTree, normals: Array) -> tuple[Array, Array]:
     """Points (k, dim) in front of the facets about where the other side is; by how much beside.
 
     The closest node that faces the facet gives the depth, then the one closest to that point.

@@ -197,11 +197,14 @@ def _deformed(u, points, cell, slopes, weight, jac, G, F, C, B, H, unit):
 
 
 @njit(cache=True, error_model="numpy")
-def _add_forces(cell, G, F, C, H, trace, J, law, volume, out, unit):
-    """Add the nodal forces of (3) at one point to out (n, dim); returns p."""
+def _add_forces(cell, G, F, C, H, trace, J, law, held, volume, out, unit):
+    """Add the nodal forces of (3) at one point to out (n, dim); returns p.
+
+    held: a pressure dU/dJ that does not change at the point, unit of stress.
+    """
     dim = len(unit)
     two_a, two_b = 2.0 * law[0], 2.0 * law[1]
-    p = 2.0 * law[2] * J * J - law[3]
+    p = 2.0 * law[2] * J * J - law[3] + held * J
     if law[4] != 0.0:
         p += law[4] * math.log(J)
     for i in range(dim):
@@ -215,15 +218,16 @@ def _add_forces(cell, G, F, C, H, trace, J, law, volume, out, unit):
 
 
 @njit(cache=True, error_model="numpy")
-def forces_inplace(u, points, nodes, slopes, weights, law, out, unit):
+def forces_inplace(u, points, nodes, slopes, weights, law, held, out, unit):
     """Add nodal forces (n, dim) of displacements u (n, dim) to out; returns the least J.
 
-    law (5,): a, b, c, d, e of (2).
+    law (5,): a, b, c, d, e of (2); held (k, q): pressures of hybrid cells, or none, (0, q).
     """
     F, C, B, H, jac = _matrices()
     G = np.zeros((len(unit), nodes.shape[1]))
     least = np.inf
-    for cell in nodes:
+    for k in range(len(nodes)):
+        cell = nodes[k]
         for q in range(len(weights)):
             volume, trace, J = _deformed(
                 u, points, cell, slopes[q], weights[q], jac, G, F, C, B, H, unit
@@ -231,7 +235,8 @@ def forces_inplace(u, points, nodes, slopes, weights, law, out, unit):
             least = min(least, J)
             if not J > 0.0:
                 return J
-            _add_forces(cell, G, F, C, H, trace, J, law, volume, out, unit)
+            pressure = held[k, q] if len(held) else 0.0
+            _add_forces(cell, G, F, C, H, trace, J, law, pressure, volume, out, unit)
     return least
 
 
@@ -263,7 +268,7 @@ def energy_of(u, points, nodes, slopes, weights, law, unit):
 
 @njit(cache=True, error_model="numpy")
 def tangent_inplace(
-    u, points, nodes, slopes, weights, law, pointers, columns, out, blocks, unit
+    u, points, nodes, slopes, weights, law, held, pointers, columns, out, blocks, unit
 ):
     """Add forces to out (n, dim) and (4) to blocks (m, dim, dim); returns the least J."""
     dim, count = len(unit), nodes.shape[1]
@@ -271,8 +276,8 @@ def tangent_inplace(
     G, f, g = np.zeros((dim, count)), np.zeros((dim, count)), np.zeros((dim, count))
     local, dots = np.zeros((dim, dim, count, count)), np.zeros(count)
     least = np.inf
-    for cell in nodes:
-        local[:] = 0.0
+    for k in range(len(nodes)):
+        cell, local[:] = nodes[k], 0.0
         for q in range(len(weights)):
             volume, trace, J = _deformed(
                 u, points, cell, slopes[q], weights[q], jac, G, F, C, B, H, unit
@@ -280,8 +285,11 @@ def tangent_inplace(
             least = min(least, J)
             if not J > 0.0:
                 return J
-            p = volume * _add_forces(cell, G, F, C, H, trace, J, law, volume, out, unit)
-            bulk = volume * (4.0 * law[2] * J * J + law[4])  # J p'
+            pressure = held[k, q] if len(held) else 0.0
+            p = volume * _add_forces(
+                cell, G, F, C, H, trace, J, law, pressure, volume, out, unit
+            )
+            bulk = volume * (4.0 * law[2] * J * J + law[4] + pressure * J)  # J p'
             _pushed(F, G, f, unit)
             _pushed(H, G, g, unit)
             two_b = 2.0 * law[1] * volume

@@ -28,25 +28,26 @@ from ..meshes.check import determinant
 from ..meshes.facets import Cells
 from ..meshes.linear_cells import Rule
 from ..meshes.mesh import Mesh
+from .hybrid import element_formulation, volume_modes, volume_modulus
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 AT_ONCE = 2000  # cells, for memory
 
 
-def rule_of(mesh: Mesh, cells: Cells) -> Rule:
-    """The points at which the stiffness of these cells is summed up."""
+def rule_of(mesh: Mesh, cells: Cells, *, finite: bool = False) -> Rule:
+    """The points at which the stiffness of these cells is summed up.
+
+    finite: at finite strains; more at second order, as their laws are no polynomials.
+    """
     cell = CELLS[cells.kind]
+    if finite:
+        return cell.stiffness if cell.order == 1 else cell.gauss
     if cells.integration == "reduced" and cell.reduced is not None:
         return cell.reduced
     if mesh.axisymmetric and cells.kind == "tri":
         return cell.gauss  # one point does not see how u / r changes
     return cell.stiffness
-
-
-def around(points: Array, *, axisymmetric: bool) -> Array:
-    """Length of the way around the axis at points (…, dim): 2 pi r, (…); else 1."""
-    return 2 * np.pi * points[..., 0] if axisymmetric else np.ones(points.shape[:-1])
 
 
 def components(dim: int, *, axisymmetric: bool) -> list[tuple[int, int]]:
@@ -55,10 +56,11 @@ def components(dim: int, *, axisymmetric: bool) -> list[tuple[int, int]]:
     return [*pairs, (2, 2)] if axisymmetric else pairs
 
 
-def moduli_of(law: object, mesh: Mesh) -> Array:
-    """C (s, s) of a law at the components of the gradient of a mesh."""
+def moduli_of(law: object, mesh: Mesh, *, hybrid: bool = False) -> Array:
+    """C (s, s) of a law at the components of the gradient; hybrid: without the volume term."""
     pairs = components(mesh.dim, axisymmetric=mesh.axisymmetric)
-    T = law.moduli(3 if mesh.axisymmetric else mesh.dim)  # type: ignore[attr-defined]
+    moduli = law.shape_moduli if hybrid else law.moduli  # type: ignore[attr-defined]
+    T = moduli(3 if mesh.axisymmetric else mesh.dim)
     return np.array([[T[i, j, k, l] for j, l in pairs] for i, k in pairs])
 
 
@@ -94,7 +96,8 @@ def _rows(G: Array) -> Array:
 
 def cell_stiffness(mesh: Mesh, cells: Cells, law: object) -> Iterator[tuple[Index, Array]]:
     """Nodes (k, a) and stiffness (k, a dim, a dim) of some cells at a time."""
-    C = moduli_of(law, mesh)
+    hybrid = element_formulation(mesh, cells, law) == "hybrid"
+    C = moduli_of(law, mesh, hybrid=hybrid)
     rule = rule_of(mesh, cells)
     for nodes in in_parts(cells):
         if cells.integration == "incompatible":
@@ -104,7 +107,22 @@ def cell_stiffness(mesh: Mesh, cells: Cells, law: object) -> Iterator[tuple[Inde
         for at, weight in zip(*rule, strict=True):
             B, volume = gradient_rows(mesh, cells.kind, nodes, at)
             K += np.swapaxes(B, 1, 2) @ (C @ B) * (weight * volume)[:, None, None]
+        if hybrid:
+            b = volume_rows(mesh, Cells(cells.kind, nodes), rule)
+            K += volume_modulus(law) * np.swapaxes(b, 1, 2) @ b
         yield nodes, K
+
+
+def volume_rows(mesh: Mesh, cells: Cells, rule: Rule) -> Array:
+    """b (k, M, a dim) of `hybrid` at rest: what the changes of volume are of displacements."""
+    modes, volumes = volume_modes(mesh, cells, rule)
+    pairs = components(mesh.dim, axisymmetric=mesh.axisymmetric)
+    trace = np.array([float(i == k) for i, k in pairs])
+    b = np.zeros((*modes.shape[:2], cells.nodes.shape[1] * mesh.dim))
+    for q, at in enumerate(rule[0]):
+        B, _ = gradient_rows(mesh, cells.kind, cells.nodes, at)
+        b += (modes[:, :, q] * volumes[:, q, None])[:, :, None] * (trace @ B)[:, None]
+    return b
 
 
 def _with_modes(mesh: Mesh, kind: str, nodes: Index, rule: Rule, C: Array) -> Array:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
+from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +20,14 @@ from ...core.arrays import number, read_only
 from ...core.errors import InvalidInput
 from ...core.words import helpful
 from ..meshes.cells import CELLS
-from ..meshes.check import determinant
+from ..meshes.check import around, determinant
 from ..meshes.facets import Cells
 from ..meshes.linear_cells import Rule
 from ..meshes.mesh import Mesh, unknown
 from .cell_loops import stiffness_inplace
-from .cell_matrices import add_blocks, around, cell_stiffness, rule_of
+from .cell_matrices import add_blocks, cell_stiffness, rule_of
+from .hybrid import averaged, element_formulation, volume_modes, volume_modulus
+from .hybrid_loops import volume_terms_inplace
 from .pattern import node_pattern
 
 Array = NDArray[np.float64]
@@ -45,6 +47,7 @@ class Isotropic:
 
     young: float
     poisson: float
+    finite: ClassVar[bool] = False  # a law of finite strains
 
     @property
     def shear(self) -> float:
@@ -57,10 +60,20 @@ class Isotropic:
 
     def moduli(self, dim: int) -> Array:
         """d stress_ik / d gradient_jl at [i, j, k, l], (dim, dim, dim, dim), unit of stress."""
-        eye, shear = np.eye(dim), self.shear
+        eye = np.eye(dim)
         out = self.lame_lambda(dim) * np.einsum("ik,jl->ijkl", eye, eye)
-        out += shear * np.einsum("ij,kl->ijkl", eye, eye)
+        return out + self.shape_moduli(dim)
+
+    def shape_moduli(self, dim: int) -> Array:
+        """`moduli` without the volume term lame_lambda (tr eps)^2 / 2 of hybrid cells."""
+        eye, shear = np.eye(dim), self.shear
+        out = shear * np.einsum("ij,kl->ijkl", eye, eye)
         return out + shear * np.einsum("il,jk->ijkl", eye, eye)
+
+    def volume(self, J: Array) -> tuple[Array, Array, Array]:
+        """U, U' and U'' of the volume term of hybrid cells, at J = 1 + tr eps of any shape."""
+        change, lame = J - 1, self.lame_lambda()
+        return lame / 2 * change**2, lame * change, np.full_like(change, lame)
 
 
 @helpful
@@ -108,14 +121,18 @@ class LinearElastic(Isotropic):
             return 2 * value * self.shear / (value + 2 * self.shear)
         return value
 
+    def shape_stress(self, gradient: Array) -> Array:
+        """`stress` without that of the volume term of hybrid cells."""
+        dim = gradient.shape[1]
+        out = np.zeros((len(gradient), 3, 3))
+        out[:, :dim, :dim] = self.shear * (gradient + gradient.swapaxes(1, 2))
+        return out
+
     def stress(self, gradient: Array) -> Array:
         """Stress (k, 3, 3) of displacement gradients (k, dim, dim); see `cell_stress`."""
-        dim = gradient.shape[1]
-        strain = 0.5 * (gradient + gradient.swapaxes(1, 2))
-        out = np.zeros((len(strain), 3, 3))
-        out[:, :dim, :dim] = 2 * self.shear * strain
+        dim, out = gradient.shape[1], self.shape_stress(gradient)
         across = 3 if dim == 3 or self.plane == "strain" else 2
-        lame = self.lame_lambda(dim) * np.trace(strain, axis1=1, axis2=2)
+        lame = self.lame_lambda(dim) * np.trace(gradient, axis1=1, axis2=2)
         for k in range(across):
             out[:, k, k] += lame
         return out
@@ -147,19 +164,31 @@ def stiffness(
 
     Exactly symmetric.  Integrated exactly where the sides of quadrilaterals and hexahedra are
     parallel; otherwise with mesh.order + 1 Gauss points per direction, and with fewer where
-    cells ask for reduced integration.  Axisymmetric meshes: of the whole body around the axis.
+    cells ask for reduced integration.  Near incompressibility see `element_formulation`.
+    Axisymmetric meshes: of the whole body around the axis.
     """
     by_region = materials_by_region(mesh, material)
     pointers, columns = node_pattern(mesh.cells, len(mesh.points))
     blocks = np.zeros((len(columns), mesh.dim, mesh.dim))
     for cells in mesh.cells:
         law = by_region[cells.region]
-        if mesh.axisymmetric or cells.integration == "incompatible":
+        formulation = element_formulation(mesh, cells, law)
+        if mesh.axisymmetric or formulation == "incompatible":
             add_blocks(blocks, (pointers, columns), cell_stiffness(mesh, cells, law))
             continue
-        geometry = geometry_of(mesh, cells, rule_of(mesh, cells))
-        moduli = law.moduli(mesh.dim)
-        stiffness_inplace(*geometry, moduli, pointers, columns, blocks, (1.0,) * mesh.dim)
+        rule, unit = rule_of(mesh, cells), (1.0,) * mesh.dim
+        geometry = geometry_of(mesh, cells, rule)
+        if formulation != "hybrid":
+            moduli = law.moduli(mesh.dim)
+            stiffness_inplace(*geometry, moduli, pointers, columns, blocks, unit)
+            continue
+        moduli = law.shape_moduli(mesh.dim)  # type: ignore[attr-defined]  # of hybrid cells
+        stiffness_inplace(*geometry, moduli, pointers, columns, blocks, unit)
+        modes, _ = volume_modes(mesh, cells, rule)
+        bulk = volume_modulus(law) * np.eye(modes.shape[1])
+        bulk = np.tile(bulk, (len(modes), 1, 1))
+        rest = np.zeros(mesh.points.shape)
+        volume_terms_inplace(rest, *geometry, modes, bulk, pointers, columns, blocks, unit)
     return sparse.bsr_array((blocks, columns, pointers), shape=(mesh.points.size,) * 2)
 
 
@@ -205,25 +234,56 @@ def cell_stress(
 
     displacement (n, dim).  In 2D the third row holds the stress across the plane: zero in plane
     stress, poisson (s_xx + s_yy) in plane strain, that around the axis in axisymmetric meshes.
-    warming (n,): change of temperature.
+    warming (n,): change of temperature.  Hybrid cells have the pressure of their mean volume.
     """
     by_region = materials_by_region(mesh, material)
     parts = []
     for block in mesh.cells:
         cell, law = CELLS[block.kind], by_region[block.region]
-        x, u = mesh.points[block.nodes], displacement[block.nodes]
-        gradient = np.einsum("kac,kad->kcd", u, cell.gradients(x, cell.centre))
-        if mesh.axisymmetric:
-            shape = cell.shape(cell.centre)
-            gradient = with_hoop(gradient, x[:, :, 0] @ shape, u[:, :, 0] @ shape)
-        stress = law.stress(gradient)
+        gradient = gradient_at(mesh, block, displacement, cell.centre)
+        hybrid = element_formulation(mesh, block, law) == "hybrid"
+        stress = law.shape_stress(gradient) if hybrid else law.stress(gradient)
+        if hybrid:
+            p = volume_stress(mesh, block, law, displacement, cell.centre[None], warming)
+            stress += p[:, :1, None] * np.eye(3)
         if warming is not None:
             change = warming[block.nodes] @ cell.shape(cell.centre)
-            stress -= change[:, None, None] * held_stress(
-                law, mesh.dim, axisymmetric=mesh.axisymmetric
-            )
+            stress -= change[:, None, None] * shape_held(law, mesh, hybrid=hybrid)
         parts.append(stress)
     return np.concatenate(parts)
+
+
+def gradient_at(mesh: Mesh, block: Cells, displacement: Array, at: Array) -> Array:
+    """Displacement gradients (k, dim, dim) of cells at a point, (k, 3, 3) around an axis."""
+    cell = CELLS[block.kind]
+    x, u = mesh.points[block.nodes], displacement[block.nodes]
+    gradient = np.einsum("kac,kad->kcd", u, cell.gradients(x, at))
+    if mesh.axisymmetric:
+        shape = cell.shape(at)
+        gradient = with_hoop(gradient, x[:, :, 0] @ shape, u[:, :, 0] @ shape)
+    return gradient
+
+
+def volume_stress(  # noqa: PLR0913  # as cell_stress, and where
+    mesh: Mesh, block: Cells, law: Any, displacement: Array, at: Array,
+    warming: Array | None = None,
+) -> Array:  # fmt: skip
+    """U'(theta) (k, p) of hybrid cells at reference points (p, dim), unit of stress.
+
+    warming (n,): change of temperature, whose expansion is taken off.
+    """
+    rule, cell = rule_of(mesh, block, finite=law.finite), CELLS[block.kind]
+    slopes = np.stack([gradient_at(mesh, block, displacement, x) for x in rule[0]], axis=1)
+    if law.finite:
+        ratio = np.linalg.det(np.eye(slopes.shape[-1]) + slopes)
+    else:
+        ratio = 1 + np.trace(slopes, axis1=2, axis2=3)
+    if warming is not None:
+        ratio -= 3 * law.expansion * (warming[block.nodes] @ cell.shape(rule[0]).T)
+    modes, volumes = volume_modes(mesh, block, rule)
+    there, _ = volume_modes(mesh, block, rule, at)
+    pressure = law.volume(averaged(modes, volumes, ratio))[1]
+    return averaged(modes, volumes, pressure, there)
 
 
 def held_stress(law: Any, dim: int, *, axisymmetric: bool = False) -> Array:
@@ -242,6 +302,12 @@ def held_stress(law: Any, dim: int, *, axisymmetric: bool = False) -> Array:
         out[:2, :2] = np.einsum("ijkl,jl->ik", law.moduli(2), strain[:2, :2])
         return out
     return np.einsum("ijkl,jl->ik", law.moduli(3), strain)
+
+
+def shape_held(law: Any, mesh: Mesh, *, hybrid: bool) -> Array:
+    """`held_stress` in cells of a mesh, in hybrid ones without that of the volume term."""
+    held = held_stress(law, mesh.dim, axisymmetric=mesh.axisymmetric)
+    return held - volume_modulus(law) * 3 * law.expansion * np.eye(3) if hybrid else held
 
 
 def with_hoop(gradient: Array, r: Array, u: Array) -> Array:

@@ -12,21 +12,28 @@ Cambridge 2008, section 6.4.3.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...core.errors import InvalidInput, InvertedCells
+from ...core.errors import InvalidInput
 from ...core.words import helpful
-from ..meshes.cells import CELLS, ReferenceCell
+from ..meshes.cells import CELLS
 from ..meshes.check import determinant
-from ..meshes.linear_cells import Rule
 from ..meshes.mesh import Mesh
-from .cell_loops import energy_of, forces_inplace, tangent_inplace
-from .elasticity import Isotropic, LinearElastic, geometry_of, materials_by_region
+from .cell_matrices import rule_of
+from .elasticity import (
+    Isotropic,
+    LinearElastic,
+    cell_stress,
+    materials_by_region,
+)
+from .energies import PointLaw, deformation
+from .finite_cells import FiniteCells, finite_cells
 from .pattern import node_pattern
 
 Array = NDArray[np.float64]
@@ -35,9 +42,16 @@ Array = NDArray[np.float64]
 class _Family(Isotropic):
     """What all members of the family have."""
 
+    finite: ClassVar[bool] = True
+
     @property
     def coefficients(self) -> tuple[float, float, float, float, float]:
         """a, b, c, d, e of the family, unit of stress."""
+        raise NotImplementedError
+
+    @property
+    def shape_coefficients(self) -> tuple[float, float, float, float, float]:
+        """The same without the volume term of hybrid cells."""
         raise NotImplementedError
 
     def stress(self, gradient: Array) -> Array:
@@ -45,12 +59,17 @@ class _Family(Isotropic):
 
         Raises InvertedCells where J <= 0.
         """
-        dim = gradient.shape[1]
-        F = np.tile(np.eye(3), (len(gradient), 1, 1))
-        F[:, :dim, :dim] += gradient
-        J = np.linalg.det(F)
-        _check(float(J.min(initial=np.inf)))
-        a, b, c, d, e = self.coefficients
+        return self._cauchy(gradient, self.coefficients)
+
+    def shape_stress(self, gradient: Array) -> Array:
+        """`stress` without that of the volume term of hybrid cells."""
+        return self._cauchy(gradient, self.shape_coefficients)
+
+    def _cauchy(
+        self, gradient: Array, coefficients: tuple[float, float, float, float, float]
+    ) -> Array:
+        F, J = deformation(gradient)
+        a, b, c, d, e = coefficients
         B = F @ F.swapaxes(1, 2)
         trace = np.trace(B, axis1=1, axis2=2)[:, None, None]
         g = (2 * c * J**2 - d + e * np.log(J))[:, None, None]
@@ -76,6 +95,16 @@ class NeoHookean(_Family):
     def coefficients(self) -> tuple[float, float, float, float, float]:
         """a, b, c, d, e of the family, unit of stress."""
         return self.shear / 2, 0.0, 0.0, self.shear, self.lame_lambda()
+
+    @property
+    def shape_coefficients(self) -> tuple[float, float, float, float, float]:
+        """The same without the volume term of hybrid cells."""
+        return self.shear / 2, 0.0, 0.0, self.shear, 0.0
+
+    def volume(self, J: Array) -> tuple[Array, Array, Array]:
+        """U = lame_lambda / 2 (ln J)^2, U' and U'' of J > 0 of any shape."""
+        log, lame = np.log(J), self.lame_lambda()
+        return lame / 2 * log**2, lame * log / J, lame * (1 - log) / J**2
 
 
 @helpful
@@ -134,8 +163,23 @@ class CiarletGeymonat(_Family):
         quarter = self.lame_lambda() / 4
         return a, half - a, quarter - half + a, 2 * quarter + 2 * half, 0.0
 
+    @property
+    def shape_coefficients(self) -> tuple[float, float, float, float, float]:
+        """The same without the volume term of hybrid cells."""
+        a, half = float(self.a), self.shear / 2  # type: ignore[arg-type]
+        return a, half - a, a - half, 2 * half, 0.0
 
-Hyperelastic = NeoHookean | CiarletGeymonat
+    def volume(self, J: Array) -> tuple[Array, Array, Array]:
+        """U = lame_lambda / 4 (J^2 - 1 - 2 ln J), U' and U'' of J > 0 of any shape."""
+        half = self.lame_lambda() / 2
+        energy = half / 2 * (J**2 - 1 - 2 * np.log(J))
+        return energy, half * (J - 1 / J), half * (1 + 1 / J**2)
+
+
+Hyperelastic = NeoHookean | CiarletGeymonat | PointLaw
+NAMES = (
+    "NeoHookean, CiarletGeymonat, MooneyRivlin, Ogden, SaintVenantKirchhoff or UserEnergy"
+)
 
 
 def is_hyperelastic(material: object) -> bool:
@@ -159,45 +203,76 @@ class HyperelasticBody:
         for region, law in laws.items():
             if not isinstance(law, Hyperelastic):
                 raise InvalidInput(
-                    f"material of region {region!r}: expected NeoHookean or CiarletGeymonat "
-                    f"as in the other regions, got {law!r}"
+                    f"material of region {region!r}: expected {NAMES}, as in the other "
+                    f"regions, got {law!r}"
                 )
         self.pointers, self.columns = node_pattern(mesh.cells, len(mesh.points))
-        self._unit = (1.0,) * mesh.dim
-        self._blocks = [
-            (geometry_of(mesh, cells, _rule(CELLS[cells.kind])),
-             np.array(laws[cells.region].coefficients))  # type: ignore[attr-defined]
-            for cells in mesh.cells
-        ]  # fmt: skip
+        self._blocks = [finite_cells(mesh, cells, laws[cells.region]) for cells in mesh.cells]
 
-    def forces(self, u: Array) -> Array:
-        """Nodal forces (n, dim) that hold the displacements u (n, dim): dE/du."""
+    @property
+    def keeps_volume(self) -> bool:
+        """True where some cells are hybrid."""
+        return any(block.hybrid for block in self._blocks)
+
+    def pressures(self, u: Array, du: Array) -> Array:
+        """Pressures of the hybrid cells at displacements u (n, dim), to first order at u + du.
+
+        (c,), the coefficients of the polynomials of all cells; empty without hybrid cells.
+        """
+        u, du = (np.ascontiguousarray(x, dtype=float) for x in (u, du))
+        parts = [block.coefficients(u, du).ravel() for block in self._blocks if block.hybrid]
+        return np.concatenate([np.zeros(0), *parts])
+
+    @property
+    def pressure_forces(self) -> Array:
+        """Forces (c,) by which changes of volume that those pressures stand for are weighed."""
+        parts = [block.forces_of_pressures().ravel() for block in self._blocks]
+        return np.concatenate([np.zeros(0), *parts])
+
+    def forces(self, u: Array, pressures: Array | None = None) -> Array:
+        """Nodal forces (n, dim) that hold the displacements u (n, dim): dE/du.
+
+        pressures (c,): of the hybrid cells, else those of the displacements.
+        """
         u = np.ascontiguousarray(u, dtype=float)
         out = np.zeros_like(u)
-        for geometry, law in self._blocks:
-            _check(forces_inplace(u, *geometry, law, out, self._unit))
+        for block, given in self._given(pressures):
+            block.add_forces(u, given, out)
         return out
 
-    def tangent(self, u: Array) -> tuple[Array, Array]:
-        """(forces (n, dim), blocks (m, dim, dim) of the derivative by u)."""
+    def tangent(self, u: Array, pressures: Array | None = None) -> tuple[Array, Array]:
+        """(forces (n, dim), blocks (m, dim, dim) of the derivative by u).
+
+        pressures (c,): as in `forces`; the derivative is then that of a step in which they
+        change as `pressures` says.
+        """
         u = np.ascontiguousarray(u, dtype=float)
-        dim = u.shape[1]
+        dim, pattern = u.shape[1], (self.pointers, self.columns)
         out, blocks = np.zeros_like(u), np.zeros((len(self.columns), dim, dim))
-        for geometry, law in self._blocks:
-            _check(tangent_inplace(u, *geometry, law, self.pointers, self.columns, out, blocks,
-                                   self._unit))  # fmt: skip
+        for block, given in self._given(pressures):
+            block.add_tangent(u, given, pattern, out, blocks)
         return out, blocks
+
+    def _given(self, pressures: Array | None) -> Iterator[tuple[FiniteCells, Array | None]]:
+        """Every block of cells with what is given of its pressures."""
+        first = 0
+        for block in self._blocks:
+            if pressures is None or not block.hybrid:
+                yield block, None
+                continue
+            last = first + block.modes[:, :, 0].size
+            yield block, pressures[first:last].reshape(block.modes.shape[:2])
+            first = last
 
     def unit_forces(self) -> Array:
         """Sizes of nodal forces (n,) where stresses are as large as moduli, for rounding."""
         out = np.zeros(len(self.mesh.points))
-        for cells, (_, law) in zip(self.mesh.cells, self._blocks, strict=True):
+        for cells, block in zip(self.mesh.cells, self._blocks, strict=True):
             cell, coordinates = CELLS[cells.kind], self.mesh.points[cells.nodes]
-            modulus = law @ [2, 4, 4, 1, 1]
-            for at, weight in zip(*_rule(cell), strict=True):
+            for at, weight in zip(*rule_of(self.mesh, cells, finite=True), strict=True):
                 volume = weight * determinant(cell.jacobians(coordinates, at))
                 sizes = np.linalg.norm(cell.gradients(coordinates, at), axis=2)
-                np.add.at(out, cells.nodes, modulus * sizes * volume[:, None])
+                np.add.at(out, cells.nodes, block.modulus * sizes * volume[:, None])
         return out
 
     def matrix(self, blocks: Array) -> sparse.bsr_array:
@@ -208,23 +283,7 @@ class HyperelasticBody:
     def energy(self, u: Array) -> float:
         """Stored energy at displacements u (n, dim), unit of work; zero at rest."""
         u = np.ascontiguousarray(u, dtype=float)
-        total = 0.0
-        for geometry, law in self._blocks:
-            part, least = energy_of(u, *geometry, law, self._unit)
-            _check(least)
-            total += part
-        return total
-
-
-def _check(least: float) -> None:
-    """Raise InvertedCells where J is not positive (or not a number)."""
-    if not least > 0:
-        raise InvertedCells(f"cells are inverted: the least det F is {least:.3g}")
-
-
-def _rule(cell: ReferenceCell) -> Rule:
-    """First order: as the stiffness; second: more, the laws are no polynomials."""
-    return cell.stiffness if cell.order == 1 else cell.gauss
+        return sum(block.energy(u) for block in self._blocks)
 
 
 def cauchy_stress(
@@ -234,11 +293,4 @@ def cauchy_stress(
 
     displacement (n, dim); raises InvertedCells where J <= 0.
     """
-    laws = materials_by_region(mesh, material)  # type: ignore[arg-type]
-    parts = []
-    for cells in mesh.cells:
-        cell = CELLS[cells.kind]
-        slopes = cell.gradients(mesh.points[cells.nodes], cell.centre)
-        gradient = np.einsum("kac,kad->kcd", displacement[cells.nodes], slopes)
-        parts.append(laws[cells.region].stress(gradient))  # type: ignore[attr-defined]
-    return np.concatenate(parts)
+    return cell_stress(mesh, material, displacement)  # type: ignore[arg-type]

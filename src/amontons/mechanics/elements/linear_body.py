@@ -16,11 +16,22 @@ Array = NDArray[np.float64]
 class LinearBody:
     """Nodal forces and tangent of a mesh of small strains, as functions of displacements."""
 
+    keeps_volume = False  # its forces are linear
+
     def __init__(self, mesh: Mesh, material: LinearElastic | Mapping[str, LinearElastic]):
         self.mesh = mesh
         self._K = K = stiffness(mesh, material)
         self.pointers, self.columns, blocks = K.indptr, K.indices, K.data
         self._blocks: Array = blocks  # type: ignore[assignment]  # scipy guesses any number
+
+    def pressures(self, u: Array, du: Array) -> Array:
+        """None of its own."""
+        return np.zeros(0)
+
+    @property
+    def pressure_forces(self) -> Array:
+        """None of its own."""
+        return np.zeros(0)
 
     def forces(self, u: Array) -> Array:
         """Nodal forces (n, dim) that hold the displacements u (n, dim)."""

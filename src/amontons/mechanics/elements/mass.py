@@ -10,9 +10,8 @@ from scipy import sparse
 
 from ...core.errors import InvalidInput
 from ..meshes.cells import CELLS
-from ..meshes.check import determinant
+from ..meshes.check import around, determinant
 from ..meshes.mesh import Mesh
-from .cell_matrices import around
 from .elasticity import LinearElastic, materials_by_region
 from .given import GivenMatrices
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,17 +10,21 @@ from numpy.typing import NDArray
 
 from ...core.errors import InvertedCells
 from ..meshes.cells import CELLS, ReferenceCell
+from ..meshes.check import determinant
 from .cell_loops import nodal_gradients_inplace
 from .elasticity import (
     cell_stress,
     geometry_of,
-    held_stress,
     materials_by_region,
+    shape_held,
+    volume_stress,
     with_hoop,
 )
+from .hybrid import element_formulation
 from .hyperelasticity import cauchy_stress, is_hyperelastic
 
 if TYPE_CHECKING:
+    from ..meshes.facets import Cells
     from ..meshes.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -51,32 +56,57 @@ def _at_nodes(
     n, dim = u.shape
     unit = (1.0,) * dim
     total, weight = np.zeros((n, 3, 3)), np.zeros(n)
-    for law in {id(law): law for law in laws.values()}.values():
-        gradient, volume = np.zeros((n, dim, dim)), np.zeros(n)
+    for law, hybrid in _groups(mesh, laws):
+        gradient, volume, pressure = np.zeros((n, dim, dim)), np.zeros(n), np.zeros(n)
         for cells in mesh.cells:
-            if laws[cells.region] is law:
+            if laws[cells.region] is law and _is_hybrid(mesh, cells, law) == hybrid:
                 cell = CELLS[cells.kind]
                 rule = (_places(cell), np.ones(cell.nodes))
                 points, nodes, slopes, _ = geometry_of(mesh, cells, rule)
                 nodal_gradients_inplace(u, points, nodes, slopes, gradient, volume, unit)
+                if hybrid:
+                    p = volume_stress(mesh, cells, law, u, rule[0], warming)
+                    np.add.at(pressure, nodes, p * _corner_volumes(mesh, cells, rule[0]))
         at = np.flatnonzero(volume)
         mean = gradient[at] / volume[at, None, None]
         if mesh.axisymmetric:
             mean = with_hoop(mean, mesh.points[at, 0], u[at, 0])
         try:
-            stress = law.stress(mean)
+            stress = law.shape_stress(mean) if hybrid else law.stress(mean)
         except InvertedCells:  # at corners, though no cell is at its centre
-            return _mean_of_centres(mesh, at_centres)
+            return mean_of_centres(mesh, at_centres)
+        if hybrid:
+            stress = stress + (pressure[at] / volume[at])[:, None, None] * np.eye(3)
         if warming is not None:
-            held = held_stress(law, mesh.dim, axisymmetric=mesh.axisymmetric)
+            held = shape_held(law, mesh, hybrid=hybrid)
             stress = stress - warming[at, None, None] * held
         total[at] += volume[at, None, None] * stress
         weight += volume
     missing = weight == 0
     out = total / np.where(missing, 1.0, weight)[:, None, None]
     if missing.any():
-        out[missing] = _mean_of_centres(mesh, at_centres)[missing]
+        out[missing] = mean_of_centres(mesh, at_centres)[missing]
     return out
+
+
+def _groups(mesh: Mesh, laws: Mapping[str, Any]) -> list[tuple[Any, bool]]:
+    """The laws of a mesh, each with whether its cells are hybrid; both where some are."""
+    found = {}
+    for cells in mesh.cells:
+        law = laws[cells.region]
+        hybrid = _is_hybrid(mesh, cells, law)
+        found[id(law), hybrid] = (law, hybrid)
+    return list(found.values())
+
+
+def _is_hybrid(mesh: Mesh, cells: Cells, law: Any) -> bool:
+    return element_formulation(mesh, cells, law) == "hybrid"
+
+
+def _corner_volumes(mesh: Mesh, cells: Cells, places: Array) -> Array:
+    """Weights (k, nodes) of the cells at their nodes, as in `nodal_gradients_inplace`."""
+    cell, x = CELLS[cells.kind], mesh.points[cells.nodes]
+    return np.stack([np.maximum(determinant(cell.jacobians(x, at)), 0) for at in places], 1)
 
 
 def _places(cell: ReferenceCell) -> Array:
@@ -86,7 +116,7 @@ def _places(cell: ReferenceCell) -> Array:
     return (1 - ASIDE) * cell.corners + ASIDE * cell.centre
 
 
-def _mean_of_centres(mesh: Mesh, at_centres: Array) -> Array:
+def mean_of_centres(mesh: Mesh, at_centres: Array) -> Array:
     """Mean of the stresses of the cells around every node, (nodes, 3, 3)."""
     total, count = np.zeros((len(mesh.points), 3, 3)), np.zeros(len(mesh.points))
     first = 0

@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 
 from ...core.errors import InvalidInput
 from ..meshes.cells import CELLS
+from ..meshes.facets import Cells
 from ..meshes.mesh import Mesh
-from .cell_matrices import components, gradient_rows, in_parts, rule_of
+from .cell_matrices import components, gradient_rows, in_parts, rule_of, volume_rows
 from .elasticity import held_stress, materials_by_region
+from .hybrid import element_formulation, volume_modes, volume_modulus
 
 Array = NDArray[np.float64]
 
@@ -42,8 +44,12 @@ def thermal_load(mesh: Mesh, material: Any, change: Array, *, mean: bool = False
                 f"temperature: {cells.kind} cells with incompatible modes have no thermal "
                 "strains; take full integration"
             )
+        if element_formulation(mesh, cells, law) == "hybrid":
+            bulk = 3 * law.expansion * volume_modulus(law)
+            _add_volume_load(load, mesh, cells, bulk * change[cells.nodes])
+            stress = stress - bulk * np.eye(3)
         cell, rows = CELLS[cells.kind], np.array([stress[i, k] for i, k in pairs])
-        averaged = mean and cells.kind in MEAN and cells.integration == "full"
+        averaged = mean and cells.kind in MEAN and cells.integration in ("full", "auto")
         for nodes in in_parts(cells):
             for at, weight in zip(*rule_of(mesh, cells), strict=True):
                 B, volume = gradient_rows(mesh, cells.kind, nodes, at)
@@ -52,3 +58,13 @@ def thermal_load(mesh: Mesh, material: Any, change: Array, *, mean: bool = False
                 force = np.einsum("s,ksa,k->ka", rows, B, here)
                 np.add.at(load, nodes, force.reshape(*nodes.shape, mesh.dim))
     return load
+
+
+def _add_volume_load(load: Array, mesh: Mesh, cells: Cells, pressure: Array) -> None:
+    """Add the forces of a pressure (k, a), given at the nodes, in hybrid cells."""
+    rule = rule_of(mesh, cells)
+    here = pressure @ CELLS[cells.kind].shape(rule[0]).T
+    modes, volumes = volume_modes(mesh, cells, rule)
+    kept = np.einsum("kmq,kq->km", modes, volumes * here)
+    force = np.einsum("km,kma->ka", kept, volume_rows(mesh, cells, rule))
+    np.add.at(load, cells.nodes, force.reshape(*cells.nodes.shape, mesh.dim))

@@ -87,7 +87,7 @@ def check_repeated(points: Array, blocks: Sequence[Cells]) -> None:
 
 def check_integration(block: Cells) -> None:
     """Raise InvalidInput for an integration that cells of this kind do not have."""
-    known = ["full"]
+    known = ["auto", "full", "hybrid"]
     if CELLS[block.kind].reduced is not None:
         known.append("reduced")
     if block.kind in ("quad", "hex"):
@@ -97,6 +97,11 @@ def check_integration(block: Cells) -> None:
             f"{block.kind} cells: integration: expected {' or '.join(known)}, got "
             f"{block.integration!r}"
         )
+
+
+def around(points: Array, *, axisymmetric: bool) -> Array:
+    """Length of the way around the axis at points (…, dim): 2 pi r, (…); else 1."""
+    return 2 * np.pi * points[..., 0] if axisymmetric else np.ones(points.shape[:-1])
 
 
 def check_half_section(points: Array) -> None:

@@ -19,15 +19,17 @@ Index = NDArray[np.int64]
 class Cells:
     """Cells of one kind in one region: nodes (k, nodes per cell) in VTK order.
 
-    integration: of the stiffness of small strains, "full", or "reduced", with fewer points:
-    1 for tri around an axis, 2 per direction for quad8, quad9, hex20 and hex27, 2 for wedge, 9
-    for wedge15; or "incompatible", bending modes inside of each quad or hex on its own.
+    integration: of the stiffness, "full", or "hybrid", the volume changing on the mean of each
+    cell (`elements/hybrid`; the same for tri and tet, whose volume changes evenly); at small
+    strains "reduced", with fewer points: 1 for tri around an axis, 2 per direction for quad8,
+    quad9, hex20 and hex27, 2 for wedge, 9 for wedge15; or "incompatible", bending modes inside
+    of each quad or hex on its own.  "auto": hybrid from a poisson of 0.4 on, else full.
     """
 
     kind: str
     nodes: Index
     region: str = "default"
-    integration: str = "full"
+    integration: str = "auto"
 
 
 @dataclass(frozen=True, eq=False)

@@ -40,7 +40,7 @@ def second_order(mesh: Mesh, *, serendipity: bool = False) -> Mesh:
     parents = {first: CELLS[second].parents for first, second in seconds.items()}
     prolongation, tables = with_middles(len(mesh.points), blocks, parents)
     cells = tuple(
-        Cells(seconds[b.kind], nodes, b.region)
+        Cells(seconds[b.kind], nodes, b.region, _kept(b.integration))
         for b, nodes in zip(mesh.cells, tables, strict=False)
     )
     rest = iter(tables[len(mesh.cells) :])
@@ -52,6 +52,11 @@ def second_order(mesh: Mesh, *, serendipity: bool = False) -> Mesh:
     return Mesh(points, cells, surfaces, name=mesh.name, levels=(prolongation, *mesh.levels),
                 node_sets=carried(mesh.node_sets, prolongation),
                 axisymmetric=mesh.axisymmetric)  # fmt: skip
+
+
+def _kept(integration: str) -> str:
+    """What cells of second order keep of it: others are integrated in ways of their own."""
+    return integration if integration in ("full", "hybrid") else "auto"
 
 
 def carried(sets: Mapping[str, Index], prolongation: sparse.csr_array) -> dict[str, Index]:

@@ -55,7 +55,7 @@ def _once(mesh: Mesh) -> Mesh:
     prolongation, tables = with_middles(len(mesh.points), blocks, MIDDLES)
     points = prolongation @ mesh.points
     cells = tuple(
-        Cells(kind, nodes, block.region, block.integration if kind == block.kind else "full")
+        Cells(kind, nodes, block.region, block.integration if kind == block.kind else "auto")
         for block, table in zip(mesh.cells, tables, strict=False)
         for kind, nodes in _children(block.kind, table, points)
     )

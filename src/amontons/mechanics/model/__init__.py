@@ -1,9 +1,12 @@
 """Models: bodies, supports, loads, contacts; assembled to a discrete problem and recovered."""
 
 from ..elements.elasticity import LinearElastic
+from ..elements.energies import MooneyRivlin, Ogden, SaintVenantKirchhoff
 from ..elements.hyperelasticity import CiarletGeymonat, NeoHookean
 from ..elements.orthotropic import OrthotropicElastic
+from ..elements.plasticity import ElastoPlastic
 from ..elements.rigid import Rigid
+from ..elements.user_energy import UserEnergy
 from .constraints import Axes, Coupling, Equation, Pretension, Reference, Spring
 from .fields import ContactFields
 from .finding import FoundContacts, FoundPair, find_contacts
@@ -12,7 +15,8 @@ from .parts import Body, BodyForce, Contact, Fix, NodalForce, Pressure, Temperat
 from .processes import distributed
 
 __all__ = ["Axes", "Body", "BodyForce", "CiarletGeymonat", "Contact", "ContactFields",
-           "Coupling", "Equation", "Fix", "FoundContacts", "FoundPair", "LinearElastic",
-           "Model", "NeoHookean", "NodalForce", "OrthotropicElastic", "Pressure", "Pretension",
-           "Reference", "Rigid", "Spring", "Temperature", "Traction", "distributed",
-           "find_contacts"]  # fmt: skip
+           "Coupling", "ElastoPlastic", "Equation", "Fix", "FoundContacts", "FoundPair",
+           "LinearElastic", "Model", "MooneyRivlin", "NeoHookean", "NodalForce", "Ogden",
+           "OrthotropicElastic", "Pressure", "Pretension", "Reference", "Rigid",
+           "SaintVenantKirchhoff", "Spring", "Temperature", "Traction", "UserEnergy",
+           "distributed", "find_contacts"]  # fmt: skip

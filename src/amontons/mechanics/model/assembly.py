@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -349,7 +349,7 @@ def _stiffness_of(body: Body) -> sparse.csr_array:
 def _grid(bodies: Sequence[Body]) -> GridMatrix | None:
     """The stiffness as an operator for one large box of equal hexahedra, of one material."""
     body, mesh = bodies[0], bodies[0].mesh
-    if not isinstance(body.material, LinearElastic) or len(mesh.cells) != 1:
+    if type(body.material) is not LinearElastic or len(mesh.cells) != 1:
         return None
     if len(bodies) > 1 or mesh.grid is None or mesh.cells[0].kind != "hex":
         return None
@@ -359,6 +359,8 @@ def _grid(bodies: Sequence[Body]) -> GridMatrix | None:
         return None  # stretched cells, coarsened in some directions only
     low, high = mesh.bounding_box()
     cell = box(tuple((high - low) / mesh.grid), cells=1)
+    own = replace(cell.cells[0], integration=mesh.cells[0].integration)
+    cell = replace(cell, cells=(own,))
     dofs = (cell.cells[0].nodes[0][:, None] * 3 + np.arange(3)).ravel()
     element = stiffness(cell, body.material).toarray()[np.ix_(dofs, dofs)]
     return GridMatrix(mesh.grid, element, np.arange(mesh.points.size), mesh.levels)  # type: ignore[arg-type]

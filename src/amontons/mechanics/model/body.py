@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ...core.errors import InvalidInput, shown
 from ...core.words import helpful
 from ..elements.elasticity import LinearElastic, materials_by_region
 from ..elements.given import GivenMatrices
-from ..elements.hyperelasticity import CiarletGeymonat, NeoHookean
+from ..elements.hyperelasticity import NAMES, Hyperelastic
 from ..elements.orthotropic import OrthotropicElastic
 from ..elements.rigid import Rigid
 from ..meshes.mesh import Mesh
 from ..meshes.order import second_order
 
-Material = LinearElastic | OrthotropicElastic | NeoHookean | CiarletGeymonat
+Material = LinearElastic | OrthotropicElastic | Hyperelastic
 
 
 @helpful
@@ -24,9 +24,10 @@ Material = LinearElastic | OrthotropicElastic | NeoHookean | CiarletGeymonat
 class Body:
     """A mesh and its material, or one per region of it.
 
-    LinearElastic and OrthotropicElastic mean small strains, NeoHookean and CiarletGeymonat
-    finite ones, of all bodies of the model.  Rigid, of the whole body: it moves without
-    deforming, and its mesh only says where it is touched, held and loaded.
+    LinearElastic, ElastoPlastic and OrthotropicElastic mean small strains, NeoHookean,
+    CiarletGeymonat, MooneyRivlin, Ogden, SaintVenantKirchhoff and UserEnergy finite ones, of
+    all bodies of the model.  Rigid, of the whole body: it moves without deforming, and its mesh
+    only says where it is touched, held and loaded.
 
     order: 1 or 2, degree of the displacement.  With 2 the mesh becomes one of second order, see
     `second_order`: its points are then all nodes.
@@ -34,6 +35,8 @@ class Body:
     revolution, x the distance from the axis and y along it.  Nothing twists.  Forces are those
     of the whole body, as loads and in results; tractions and pressures are per area.  A rigid
     one moves along the axis alone, and follows a reference.
+    integration: of all cells, see `Cells`; by default what they say themselves, which is
+    "auto" where nobody says: hybrid, without locking, from a poisson of 0.4 on, else full.
     """
 
     mesh: Mesh
@@ -41,14 +44,15 @@ class Body:
     name: str = ""
     order: int = 1
     axisymmetric: bool = False
+    integration: str | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.mesh, Mesh):
             raise InvalidInput(f"mesh: expected a Mesh (see box, read_mesh), got {self.mesh!r}")
         if not isinstance(self.material, Material | Rigid | GivenMatrices | Mapping):
             raise InvalidInput(
-                "material: expected LinearElastic, OrthotropicElastic, NeoHookean, "
-                "CiarletGeymonat or Rigid, or a dict region -> one of the first four, got "
+                "material: expected LinearElastic, ElastoPlastic, OrthotropicElastic, "
+                f"{NAMES}, or Rigid, or a dict region -> one of them, which is not Rigid, got "
                 f"{self.material!r}"
             )
         if self.order not in (1, 2):
@@ -56,6 +60,9 @@ class Body:
         if self.order == 2:
             object.__setattr__(self, "mesh", second_order(self.mesh))
         object.__setattr__(self, "order", self.mesh.order)
+        if self.integration is not None:
+            cells = (replace(c, integration=self.integration) for c in self.mesh.cells)
+            object.__setattr__(self, "mesh", replace(self.mesh, cells=tuple(cells)))
         if isinstance(self.material, GivenMatrices):
             self.material.check(self.mesh)
         laws = materials_by_region(self.mesh, self.material)
@@ -65,7 +72,7 @@ class Body:
                 if not isinstance(law, Material):
                     raise InvalidInput(
                         f"material of region {region!r}: expected LinearElastic, "
-                        f"OrthotropicElastic, NeoHookean or CiarletGeymonat, got {law!r}"
+                        f"ElastoPlastic, OrthotropicElastic, {NAMES}, got {law!r}"
                     )
 
     @classmethod

@@ -35,6 +35,7 @@ from .rigid import rigid_modes
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+CANCELLED = 1e-12  # of the sum of sizes: a sum that is rounding
 LOST = 1e-9  # force on what nothing resists, relative to the largest, that is none
 
 
@@ -200,6 +201,7 @@ class Elimination:
     def matrix(self, whole: sparse.csr_array) -> sparse.csc_array:
         """S^T A S for A (dofs, dofs), with the mean of its diagonal at what is driven."""
         inner = sparse.csc_array(self.spread.T @ whole @ self.spread)
+        inner = _without_rounding(inner, self.spread, whole)
         size = np.abs(inner.diagonal())
         mean = float(size[size > 0].mean()) if (size > 0).any() else 1.0
         return sparse.csc_array(inner + sparse.diags_array(np.where(self.driven, mean, 0.0)))
@@ -298,3 +300,14 @@ def _words(beside: Beside, found: Independent, columns: Index, dofs: Index) -> s
     names = ", ".join(beside.where(int(dof)) for dof in dofs[:3])
     return (f"what they prescribe of {names}{', ...' if len(dofs) > 3 else ''} contradicts the "
             "constraints between these")  # fmt: skip
+
+
+def _without_rounding(
+    inner: sparse.csc_array, spread: sparse.csc_array, whole: sparse.csr_array
+) -> sparse.csc_array:
+    """Without what rounding leaves where all cancels: bodies that move as one hold nothing."""
+    size = sparse.csc_array(abs(spread).T @ abs(whole) @ abs(spread))
+    kept = abs(inner) > CANCELLED * size
+    out = sparse.csc_array(inner.multiply(kept))
+    out.eliminate_zeros()
+    return out

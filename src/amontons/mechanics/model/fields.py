@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,7 @@ class ContactFields:
     What has slid: slid (nc, d-1), net, path (nc,), the length of the way, friction_work (nc,),
     energy that it took.  reaction: forces of supports at the nodes, (nodes, dim) per body;
     load: resultant of all loads.  references: of what is beside the nodes, None without.
+    plastic: of bodies that yield, by number, the history (h,) of their points of integration.
     """
 
     displacement: tuple[Array, ...]
@@ -63,6 +64,7 @@ class ContactFields:
     reaction: tuple[Array, ...]
     load: Wrench
     references: ReferenceFields | None = None
+    plastic: Mapping[int, Array] | None = None
 
 
 def recover_fields(
@@ -100,7 +102,7 @@ def recover_fields(
     )  # fmt: skip
 
 
-def at_once(solution: FrictionSolution) -> dict[str, Array]:
+def at_once(solution: FrictionSolution) -> dict[str, Any]:
     """slid, path, friction_work of a static solution: one way from the undeformed state.
 
     Friction grows along it in proportion, so that half of its last value acts on the way.

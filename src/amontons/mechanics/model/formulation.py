@@ -1,6 +1,7 @@
 """How the contact of a model is formulated: chosen once, by `formulation_of`.
 
     Reactions   small strains, pairs of the undeformed state; contact forces are unknowns
+    Flowing     the same of bodies that yield
     Stresses    the same with Nitsche's method: stresses take the place of contact forces
     Moved       contact is found where the nodes are now, and loads may follow the bodies
 
@@ -26,18 +27,21 @@ from ...problem.nitsche import NitscheProblem
 from ...problem.protocol import Problem
 from ...problem.solution import FrictionSolution
 from ..elements.hyperelasticity import is_hyperelastic
+from ..elements.plasticity import is_plastic
 from .assembly import Discretisation
 from .doubts import CHECKS, OF_THE_START, Check
 from .fields import ContactFields, recover_fields
 from .held import HeldNodes
 from .large_deformation import LargeDeformation, large_deformation
 from .large_fields import recover_large
-from .laws import NEEDS_FORCES, NEEDS_THE_START, check_law
+from .laws import NEEDS_FORCES, NEEDS_THE_START, OF_LINEAR_BODIES, check_law
 from .nitsche import nitsche_matrices, nitsche_problem
 from .nodal_forces import NodalForces, follows, nodal_forces
 from .parts import FINITE, SMALL, Body, BodyForce, Contact, Load, Pressure
 from .placing import Placed
 from .supports import external_load
+from .yielding import YieldingProblem, yielding_step
+from .yielding_fields import with_flow
 
 if TYPE_CHECKING:
     from .model import Model
@@ -148,6 +152,41 @@ class Reactions(Formulation):
     def assembled(self, model: Model) -> FrictionProblem:
         """The static problem itself."""
         return model.discrete_problem()  # type: ignore[return-value]  # as `with_load` says
+
+
+class Flowing(Reactions):
+    """The same of bodies that yield."""
+
+    problem = YieldingProblem
+    lacks = OF_LINEAR_BODIES
+
+    def at_load_factor(self, model: Model) -> YieldingProblem:  # type: ignore[override]
+        """The static problem of a body that has not flown yet."""
+        parts, factor = model.discretisation, model.load_factor
+        prescribed = factor * parts.prescribed
+        model.check_outside(prescribed)
+        load = external_load(model.bodies, model.loads, model.beside)
+        return yielding_step(model, factor * load, prescribed)
+
+    def elastic(
+        self, model: Model, load: Array, prescribed: Array, before: Array
+    ) -> FrictionProblem:
+        """The step without flow, as `Model.increment` has it."""
+        return model.increment(load, prescribed, before)  # type: ignore[return-value]
+
+    def assembled(self, model: Model) -> FrictionProblem:
+        """Raises UnsupportedForm: tangents are linear, each at its own state."""
+        raise UnsupportedForm(
+            "model: bodies that yield have no one linear problem; use solve(model), whose "
+            "solution.problem is the tangent one, or LinearElastic"
+        )
+
+    def recover(
+        self, model: Model, surfaces: tuple[tuple[int, str], ...], solution: FrictionSolution
+    ) -> ContactFields:
+        """The same fields; supports hold what the flow leaves, and the history is there."""
+        fields = recover_fields(model, surfaces, solution)
+        return with_flow(model, fields, solution)
 
 
 class Stresses(Formulation):
@@ -261,7 +300,16 @@ def formulation_of(bodies: Sequence[Body], contacts: Sequence[Contact]) -> Formu
         raise InvalidInput(
             "expected Nitsche's method in all of them or in none, got both", ("contacts",)
         )
-    if has_finite_strains(bodies) or any(c.kinematics == FINITE for c in contacts):
+    finite = has_finite_strains(bodies) or any(c.kinematics == FINITE for c in contacts)
+    if any(is_plastic(body.material) for body in bodies):
+        if finite or by_stresses == {True}:
+            raise InvalidInput(
+                "bodies that yield have small strains, contact of kinematics='small' and of "
+                "method 'nodal' or 'mortar'; got hyperelastic laws beside them, "
+                "kinematics='finite' or 'nitsche'", ("contacts",),
+            )  # fmt: skip
+        return Flowing()
+    if finite:
         return Moved()
     return Stresses() if by_stresses == {True} else Reactions()
 

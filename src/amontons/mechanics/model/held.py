@@ -62,9 +62,14 @@ class HeldNodes:
         return self.gap + self.normal.T @ prescribed[: self.normal.shape[0]]
 
     def left_where_moved(self, prescribed: Array, is_fixed: NDArray[np.bool_]) -> Array:
-        """The same at finite strains: at their new places, if all their components are held."""
+        """The same at finite strains: at their new places, if all their components are held.
+
+        Infinite between bodies: where both are held they may have slid off each other.
+        """
+        if self.obstacle is None:
+            return np.full(self.gap.shape, np.inf)
         gap = self.left(prescribed)
-        if self.obstacle is None or not len(gap):
+        if not len(gap):
             return gap
         moved = self.obstacle.gap(self.points + prescribed[self.dofs])
         return np.where(is_fixed[self.dofs].all(axis=1), moved, gap)

@@ -9,10 +9,11 @@ at its node.  The displacements v of the free dofs are all the unknowns of
 
 which is continuous and piecewise smooth; all its entries are forces.  Friction speaks of the
 motion since `before`, the displacements at the end of the last step: [LR] section 3.
+With two bodies that deform (1) has the forces of contacts on other nodes, see `moved_pairs`.
 `linearised` is the tangent problem at a state, as a `FrictionProblem`: it has the same
 reactions, gaps and slips there, so that statuses, files and pictures need nothing else.
 
-Left out: master surfaces, friction on components of a contact's motion that supports hold.
+Left out: friction on components of a contact's motion that supports hold.
 
 [LR] T. Ligurský, Y. Renard, "A continuation problem for computing solutions of discretised
 evolution problems with application to plane quasi-static contact problems with friction",
@@ -35,17 +36,20 @@ from ...problem.judge import measures as judge
 from ...problem.judge.measures import Measure, Weakest
 from ...problem.law import Law
 from ...problem.protocol import Problem
-from ...solvers.newton.nonlinear import NonlinearProblem
+from ...solvers.newton.nonlinear import NonlinearProblem, PlainStates
 from ..contact.current import STICK, ContactPoint, Pieces
 from ..contact.current_pairs import Meetings
 from ..elements.linear_body import LinearBody
+from .moved_pairs import Linearisation, PairLinearisation, balanced
 from .nodal_forces import NodalForces, nodal_forces
 from .nonlinear_parts import NonlinearParts, nonlinear_parts
+from .pressure_states import PressureStates
 
 if TYPE_CHECKING:
     from .model import Model
 
 Array = NDArray[np.float64]
+SLIDING = 0.1  # least part of a Newton step: F has a kink wherever two nodes pass each other
 TOUCHING = 1e-9  # gaps up to this part of the size count as closed where nothing holds a body
 
 
@@ -55,9 +59,9 @@ class LargeDeformation(NonlinearProblem):
 
     load, prescribed (dofs,): nodal forces, also as an array of dead ones, and values on the
     fixed dofs, zero on the free ones;
-    before (nc, d): displacements of the contacts since which friction counts; drift (nc, d):
-    motion added to that since then; known: load, prescribed values (dofs,) and state v (n,)
-    from which load steps may begin, by default the undeformed state.
+    before (dofs,): displacements of all nodes since which friction counts; drift (nc, d):
+    motion added to that of the contacts since then; known: load, prescribed values (dofs,)
+    and state v (n,) from which load steps may begin, by default the undeformed state.
     """
 
     parts: NonlinearParts
@@ -110,21 +114,35 @@ class LargeDeformation(NonlinearProblem):
         out[self.parts.free] = v
         return out.reshape(self.parts.X.shape)
 
+    @cached_property
+    def earlier(self) -> Meetings:
+        """Where the contacts met at the end of the last step."""
+        return self.parts.meet(self.before.reshape(self.parts.X.shape))
+
     def _meeting(self, u: Array) -> tuple[Array, Meetings]:
         """Motions of the contacts since the last step, (nc, d), and where they meet now."""
-        return u.ravel()[self.parts.at] - self.before + self.drift, self.parts.meet(u)
+        meeting = self.parts.meet(u)
+        before = self.before.reshape(u.shape)
+        return meeting.motion(u, before, self.earlier) + self.drift, meeting
 
-    def _point(self, u: Array, rest: Array) -> ContactPoint:
-        """The law at displacements u (nodes, d), where the bodies need `rest` (dofs,)."""
-        return self.parts.contact.at(rest[self.parts.at], *self._meeting(u))
+    def _point(self, u: Array, rest: Array) -> tuple[ContactPoint, Array]:
+        """The law at displacements u (nodes, d), where the bodies need `rest` (dofs,).
 
-    def _needed(self, u: Array) -> Array:
-        """f_int - f (dofs,) at displacements u (nodes, d)."""
-        return self.parts.forces(u) - self.load.at(u)
+        And these without what contacts give to other nodes.
+        """
+        motion, meeting = self._meeting(u)
+        rest = balanced(self.parts, meeting, rest)
+        return self.parts.contact.at(rest[self.parts.at], motion, meeting), rest
 
-    def _needed_slopes(self, u: Array) -> tuple[Array, Array]:
+    def _needed(self, u: Array, pressures: Array | None = None) -> Array:
+        """f_int - f (dofs,) at displacements u (nodes, d), or at given pressures, too."""
+        return self.parts.forces(u, pressures) - self.load.at(u)
+
+    def _needed_slopes(
+        self, u: Array, pressures: Array | None = None
+    ) -> tuple[Array, Array]:
         """The same with its derivative in node blocks (m, d, d)."""
-        inner, blocks = self.parts.tangent(u)
+        inner, blocks = self.parts.tangent(u, pressures)
         load, slopes = self.load.slopes(u)
         for nodes, part in slopes:
             self.parts.subtract_inplace(blocks, nodes, part)
@@ -133,16 +151,19 @@ class LargeDeformation(NonlinearProblem):
     def contact_point(self, v: Array) -> ContactPoint:
         """The contact law at a state."""
         u = self.displacement(v)
-        return self._point(u, self._needed(u))
+        return self._point(u, self._needed(u))[0]
 
-    def residual(self, v: Array, pieces: Pieces | None = None) -> Array:
+    def residual(
+        self, v: Array, pieces: Pieces | None = None, pressures: Array | None = None
+    ) -> Array:
         """F(v), (n,), unit of force, or the selection function of given pieces.
 
-        Raises InvertedCells where it is not defined.
+        pressures: of hybrid cells, which are else those of v.  Raises InvertedCells where it
+        is not defined.
         """
         u = self.displacement(v)
-        rest = self._needed(u)
-        rest[self.parts.at] = self._point(u, rest).residual(pieces)
+        point, rest = self._point(u, self._needed(u, pressures))
+        rest[self.parts.at] = point.residual(pieces)
         return rest[self.parts.free]
 
     def tangent(self, v: Array, pieces: Pieces | None = None) -> sparse.csc_array:
@@ -150,13 +171,17 @@ class LargeDeformation(NonlinearProblem):
         return self.linearisation(v, pieces).matrix
 
     def linearisation(  # type: ignore[override]  # a cached matrix serves as well
-        self, v: Array, pieces: Pieces | None = None
-    ) -> Linearisation:
-        """F and its derivatives at a state."""
+        self, v: Array, pieces: Pieces | None = None, pressures: Array | None = None
+    ) -> Linearisation | PairLinearisation:
+        """F and its derivatives at a state; pressures as in `residual`."""
         u = self.displacement(v)
-        rest, blocks = self._needed_slopes(u)
-        point = self._point(u, rest)
-        return Linearisation(self, u, rest, blocks, point, *point.derivatives(pieces))
+        needed, blocks = self._needed_slopes(u, pressures)
+        point, rest = self._point(u, needed)
+        if not point.meeting.only_obstacles:
+            return PairLinearisation(
+                self.parts, u, needed, rest, blocks, point, self.earlier, point.partials(pieces)
+            )
+        return Linearisation(self.parts, u, rest, blocks, point, *point.derivatives(pieces))
 
     def pieces(self, v: Array) -> Pieces:
         """The active piece of the law at every contact, see `ContactPoint.pieces`."""
@@ -168,10 +193,11 @@ class LargeDeformation(NonlinearProblem):
         return self._local(v)[0]
 
     def _local(self, v: Array) -> tuple[Array, Array, Array, Array]:
-        """r, u, frames of `CurrentContact.local`, and f_int - f (dofs,)."""
+        """r, u, frames of `CurrentContact.local`, and f_int - f, balanced (dofs,)."""
         u = self.displacement(v)
-        rest = self._needed(u)
-        return *self.parts.contact.local(rest[self.parts.at], *self._meeting(u)), rest
+        motion, meeting = self._meeting(u)
+        rest = balanced(self.parts, meeting, self._needed(u))
+        return *self.parts.contact.local(rest[self.parts.at], motion, meeting), rest
 
     def local_velocity(self, v: Array) -> Array:
         """u = [gap, slip since the last step], (nc, d), in the frames at the state v."""
@@ -228,9 +254,22 @@ class LargeDeformation(NonlinearProblem):
         return np.zeros(self.unknowns) if self.known is None else self.known[2]
 
     @property
+    def shortest(self) -> float:  # type: ignore[override]  # read only
+        """Least part of a Newton step to take; 0: searched by |F|."""
+        return SLIDING if self.parts.has_pairs else 0.0
+
+    @property
     def meets_first(self) -> bool:
         """True where some body keeps small strains: its cells may be inverted."""
         return any(isinstance(body, LinearBody) for body in self.parts.bodies)
+
+    def states(
+        self, v: Array, known: tuple[LargeDeformation, Array] | None = None
+    ) -> PlainStates | PressureStates:
+        """What Newton's method moves: v alone, or with the pressures of hybrid cells."""
+        if not any(self.parts.keeps_volume):
+            return PlainStates(self, v)
+        return PressureStates(self, v, known)
 
     def at_share(self, share: float) -> LargeDeformation:
         """The problem at a share of the way from the known load to this one."""
@@ -245,7 +284,7 @@ class LargeDeformation(NonlinearProblem):
 
     def predicted(  # type: ignore[override]  # as above
         self, share: float, goal: float, v: Array
-    ) -> tuple[Linearisation, Array]:
+    ) -> tuple[Linearisation | PairLinearisation, Array]:
         """The linearisation at a share, and the first-order change of F, (n,), to another."""
         now, then = self.at_share(share), self.at_share(goal)
         here = now.linearisation(v)
@@ -259,9 +298,10 @@ class LargeDeformation(NonlinearProblem):
         displaced = now.displacement(v)
         _, blocks = now._needed_slopes(displaced)
         force = (then.load - now.load).at(displaced) - self.parts.matrix(blocks) @ moved
-        normals = self.parts.meet(displaced).normals
+        meeting = self.parts.meet(displaced)
+        across = meeting.averages @ moved.reshape(displaced.shape)
         w = np.array(tangent.w)
-        w[:, 0] += (normals * moved[self.parts.at]).sum(axis=1)
+        w[:, 0] += (meeting.normals * across).sum(axis=1)
         return replace(tangent, f=tangent.f + force[self.parts.free], w=w)
 
     def closed_pieces(self, v: Array) -> list[Pieces]:
@@ -269,8 +309,9 @@ class LargeDeformation(NonlinearProblem):
         point = self.contact_point(v)
         size = np.ptp(self.parts.X, axis=0).max()
         gap = point.meeting.gap
+        loose = (point.pieces % 4 == 0) & point.meeting.met
         return [
-            np.where((point.pieces % 4 == 0) & (gap <= limit), STICK, point.pieces)
+            np.where(loose & (gap <= limit), STICK, point.pieces)
             for limit in (TOUCHING * size, np.inf)
         ]
 
@@ -284,69 +325,25 @@ class LargeDeformation(NonlinearProblem):
             return self, u, v
 
     def linearised(self, v: Array) -> FrictionProblem:
-        """The tangent problem at v: same reactions, gaps and slips there, frames of there."""
+        """The tangent problem at v: same reactions, gaps and slips there, frames of there.
+
+        Between bodies that deform frames and averages stay as they are there.
+        """
         parts = self.parts
         moved = self.displacement(v)
-        _, blocks = self._needed_slopes(moved)
+        needed, blocks = self._needed_slopes(moved)
         r, u, axes, rest = self._local(v)
         meeting = parts.meet(moved)
-        blocks[parts.diagonal] -= _turned(axes, r, meeting.normal_slopes)
-        H = sparse.csc_array(meeting.columns(axes, len(parts.X)).tocsr()[parts.free])
+        if meeting.only_obstacles:
+            blocks[parts.diagonal] -= _turned(axes, r, meeting.normal_slopes)
+        H = sparse.csc_array(meeting.columns(axes).tocsr()[parts.free])
         M = parts.on_free(blocks)
         load, length = self._sizes(v, r, u, rest)
         w = u - (H.T @ v).reshape(u.shape)
         return FrictionProblem.from_global(
-            M, H, M @ v - rest[parts.free], w, self.law, load_scale=load, u_scale=length,
+            M, H, M @ v - needed[parts.free], w, self.law, load_scale=load, u_scale=length,
             name=self.name,
         )  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
-class Linearisation:
-    """F and its derivatives at one state.
-
-    u (nodes, d): displacements; rest (dofs,): f_int - f; blocks: its derivative; by_force,
-    by_x, by_motion (nc, d, d): those of the contact law.
-    """
-
-    problem: LargeDeformation
-    u: Array
-    rest: Array
-    blocks: Array
-    point: ContactPoint
-    by_force: Array
-    by_x: Array
-    by_motion: Array
-
-    @property
-    def residual(self) -> Array:
-        """F, (n,)."""
-        parts = self.problem.parts
-        out = self.rest.copy()
-        out[parts.at] = self.point.residual()
-        return out[parts.free]
-
-    @cached_property
-    def matrix(self) -> sparse.csc_array:
-        """dF/dv, (n, n)."""
-        parts = self.problem.parts
-        blocks = self.blocks.copy()
-        rows = np.flatnonzero(parts.row_contact >= 0)
-        blocks[rows] = self.by_force[parts.row_contact[rows]] @ blocks[rows]
-        blocks[parts.diagonal] += self.by_x + self.by_motion
-        return parts.on_free(blocks)
-
-    def shifted(
-        self, load: NodalForces | Array, prescribed: Array, drift: Array | None = None
-    ) -> Array:
-        """First-order change of F, (n,), with changes of load, prescribed (dofs,) and drift."""
-        parts = self.problem.parts
-        change = parts.matrix(self.blocks) @ prescribed - NodalForces.of(load).at(self.u)
-        at = np.einsum("pij,pj->pi", self.by_force, change[parts.at])
-        if drift is not None:
-            at += np.einsum("pij,pj->pi", self.by_motion, drift)
-        change[parts.at] = at
-        return change[parts.free]
 
 
 def _turned(axes: Array, r: Array, bend: Array) -> Array:
@@ -377,10 +374,10 @@ def large_step(
 ) -> LargeDeformation:  # fmt: skip
     """One step under nodal forces and prescribed values (dofs,), since displacements `before`.
 
-    before (nc, d): of the contacts, zero by default; known: see `LargeDeformation`.
+    before (dofs,): of all nodes, zero by default; known: see `LargeDeformation`.
     """
     parts = nonlinear_parts(model)
     _ = model.rests_on_contact  # raises where nothing holds a body
-    before = np.zeros(parts.at.shape) if before is None else before
+    before = np.zeros(parts.X.size) if before is None else before
     return LargeDeformation(parts, NodalForces.of(load), prescribed, before,
-                            np.zeros_like(before), known, model.name)  # fmt: skip
+                            np.zeros(parts.at.shape), known, model.name)  # fmt: skip

@@ -41,7 +41,7 @@ def recover_large(
     force = np.einsum("pkc,pk->pc", axes, r)
     traction = r / sites.weights[:, None]
     load = (model.load_factor * nodal_forces(model, model.loads)).at(moved)
-    pushed = meeting.columns(axes, len(moved)) @ r.ravel()
+    pushed = meeting.columns(axes) @ r.ravel()
     try:
         held = support_forces(linear, parts.forces(moved) - load - pushed)
     except InvertedCells:  # of a state that has not converged: nobody knows its forces

@@ -42,6 +42,9 @@ NEEDS_FORCES = {  # numbers of laws that need both r and u, and why some formula
     for name, what in (("mu_across", "orthotropic friction"), ("mu", VaryingFriction.name),
                        *((name, "compliance of contact") for name in SPRINGS))
 }  # fmt: skip
+OF_LINEAR_BODIES = {
+    "mu": f"{VaryingFriction.name} needs bodies that do not yield",
+}
 NEEDS_THE_START = {  # the same of those that count from the undeformed state
     name: f"{what} small strains and contact in the reference configuration"
     for name, what in (("cohesion", "cohesion needs"), ("tied", "ties need"),

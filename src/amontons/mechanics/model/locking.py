@@ -1,7 +1,8 @@
 """Volumetric locking: how much too stiff elements of first order are near incompressibility.
 
-They can not keep their volume and follow a bending or bulging body at the same time.  The
-excess stiffness was measured on a block of 2 x 1 (2 x 2 x 1) between a bonded and a rubbing
+Triangles, tetrahedra and cells with full integration (`elements.hybrid` has others) can not
+keep their volume and follow a bending or bulging body at the same time.  The excess stiffness
+was measured on a block of 2 x 1 (2 x 2 x 1) between a bonded and a rubbing
 side, 2 to 32 cells high, poisson 0.3 to 0.4999, against second order on a fine mesh.  With
 
     x = (h / L)^2 lame_lambda / shear,    h the size of a cell, L = 2 volume / surface,
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 from ...core.warned import ResultWarning
 from ..elements.elasticity import LinearElastic, materials_by_region
 from ..elements.given import GivenMatrices
+from ..elements.hybrid import element_formulation
 from ..elements.orthotropic import OrthotropicElastic
 from ..elements.rigid import Rigid
 from ..meshes.cells import CELLS
@@ -48,19 +50,33 @@ def volumetric_locking(model: Model, fields: ContactFields) -> list[ResultWarnin
         for region, law in materials_by_region(body.mesh, body.material).items():  # type: ignore[arg-type]
             if not _nearly_incompressible(law, model.dimension):
                 continue
-            excess = _excess(body.mesh, region, law)
+            kinds = _locking_kinds(body.mesh, region, law)
+            excess = _excess(body.mesh, region, law) if kinds else 0.0
             if excess >= EXCESS:
                 where = f"region {region!r} of body {body.name!r}"
-                out.append(_warning(where, law, excess, _remedy(model)))
+                out.append(_warning(where, law, excess, _remedy(model, kinds)))
     return out
 
 
-def _remedy(model: Model) -> str:
+def _locking_kinds(mesh: Mesh, region: str, law: Material) -> set[str]:
+    """Kinds of cells of a region that lock: others keep their volume on the mean."""
+    return {
+        block.kind for block in mesh.cells
+        if block.region == region
+        and element_formulation(mesh, block, law) in ("full", "reduced")
+    }  # fmt: skip
+
+
+def _remedy(model: Model, kinds: set[str]) -> str:
     """What helps: contact between bodies needs first order."""
+    simplices = {"tri": "quadrilaterals", "tet": "hexahedra"}
+    other = [simplices[kind] for kind in sorted(kinds) if kind in simplices]
+    hybrid = " or ".join(other) or 'integration "hybrid" of the cells (elements CPE4H, C3D8H)'
     finer = "a finer mesh (half the cell size: a quarter of the excess)"
     if any(contact.master is not None for contact in model.contacts):
-        return finer
-    return f"second order (Body(..., order=2), in case files order = 2 in [mesh]), or {finer}"
+        return f"{hybrid}, or {finer}"
+    second = "second order (Body(..., order=2), in case files order = 2 in [mesh])"
+    return f"{second}, {hybrid}, or {finer}"
 
 
 def _warning(where: str, law: Material, excess: float, remedy: str) -> ResultWarning:
@@ -85,10 +101,11 @@ def _excess(mesh: Mesh, region: str, law: Material) -> float:
     volumes, squares, kinds = [], [], []
     for block in mesh.cells:
         cell = CELLS[block.kind]
+        locks = element_formulation(mesh, block, law) in ("full", "reduced")
         slope = cell.jacobians(mesh.points[block.nodes], cell.centre)
         size = np.abs(np.linalg.det(slope))
         volumes.append(size * cell.gauss[1].sum())
-        if block.region == region:
+        if block.region == region and locks:
             squares.append(size ** (2 / mesh.dim))
             kinds.append((block.kind, volumes[-1]))
     surface = sum(facet_areas(mesh.points, facets).sum() for facets in mesh.boundary)

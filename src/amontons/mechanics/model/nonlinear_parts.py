@@ -6,7 +6,8 @@ columns always have the same pattern, so that they are one `take` away.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -17,18 +18,24 @@ from scipy import sparse
 
 from ...core.errors import UnsupportedForm
 from ..contact.current import CurrentContact
-from ..contact.current_pairs import Meetings, ObstaclePair
+from ..contact.current_mortar import MortarPair
+from ..contact.current_pairs import Meetings, ObstaclePair, Pair
+from ..contact.facing import Skin
+from ..contact.pairs import KINDS
 from ..elements.given import GivenMatrices
 from ..elements.hyperelasticity import HyperelasticBody, is_hyperelastic
 from ..elements.linear_body import LinearBody
 from ..elements.rigid import Rigid
 from .parts import FINITE
+from .supports import locate
 
 if TYPE_CHECKING:
+    from .assembly import Discretisation
     from .model import Model
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+KEPT = 3  # states whose meetings are kept: now, tried, at the end of the last step
 RESOLVED = 1e-7  # of stresses like moduli, and of displacements like the size
 
 
@@ -73,19 +80,66 @@ class NonlinearParts:
         """2 or 3."""
         return self.X.shape[1]
 
+    @property
+    def has_pairs(self) -> bool:
+        """True where two bodies that deform meet."""
+        return any(isinstance(pair, MortarPair) for pair in self.contact.pairs)
+
     def meet(self, u: Array) -> Meetings:
-        """Where the contact pairs meet at displacements u (nodes, d)."""
-        return self.contact.meet(self.X + u)
+        """Where the contact pairs meet at displacements u (nodes, d).
 
-    def forces(self, u: Array) -> Array:
-        """Nodal forces of the bodies (dofs,) at displacements u (nodes, d)."""
-        parts = zip(self.bodies, np.split(u, self.ends), strict=True)
-        return np.concatenate([body.forces(part).ravel() for body, part in parts])
+        The last few are kept: one state is asked for its forces, its error and its slopes.
+        """
+        for known, meeting in tuple(self._met):
+            if np.array_equal(known, u):
+                return meeting
+        meeting = self.contact.meet(self.X + u)
+        self._met.append((u.copy(), meeting))
+        return meeting
 
-    def tangent(self, u: Array) -> tuple[Array, Array]:
+    @cached_property
+    def _met(self) -> deque[tuple[Array, Meetings]]:
+        """States and where pairs met there."""
+        return deque(maxlen=KEPT)
+
+    @cached_property
+    def keeps_volume(self) -> tuple[bool, ...]:
+        """Of every body: some of its cells have pressures of their own."""
+        return tuple(body.keeps_volume for body in self.bodies)
+
+    def pressures(self, u: Array, du: Array) -> Array:
+        """Pressures (c,) of hybrid cells at u (nodes, d), to first order at u + du."""
+        parts = zip(self.bodies, np.split(u, self.ends), np.split(du, self.ends), strict=True)
+        return np.concatenate([body.pressures(*both) for body, *both in parts])
+
+    @cached_property
+    def pressure_forces(self) -> Array:
+        """Forces (c,) per unit of them by which they are weighed."""
+        return np.concatenate([body.pressure_forces for body in self.bodies])
+
+    def _given(self, u: Array, pressures: Array | None) -> Iterator[tuple]:
+        """Every body with its displacements and, where given, its pressures."""
+        first = 0
+        for body, part in zip(self.bodies, np.split(u, self.ends), strict=True):
+            if pressures is None or not body.keeps_volume:
+                yield body, part
+                continue
+            last = first + len(body.pressure_forces)
+            yield body, part, pressures[first:last]
+            first = last
+
+    def forces(self, u: Array, pressures: Array | None = None) -> Array:
+        """Nodal forces of the bodies (dofs,) at displacements u (nodes, d).
+
+        pressures (c,): of hybrid cells, else those of the displacements.
+        """
+        return np.concatenate(
+            [body.forces(*given).ravel() for body, *given in self._given(u, pressures)]
+        )
+
+    def tangent(self, u: Array, pressures: Array | None = None) -> tuple[Array, Array]:
         """(forces (dofs,), node blocks (m, d, d) of their derivative) at displacements u."""
-        parts = zip(self.bodies, np.split(u, self.ends), strict=True)
-        both = [body.tangent(part) for body, part in parts]
+        both = [body.tangent(*given) for body, *given in self._given(u, pressures)]
         return np.concatenate([f.ravel() for f, _ in both]), np.concatenate(
             [b for _, b in both]
         )
@@ -141,9 +195,10 @@ def _nonlinear_parts(model: Model) -> NonlinearParts:
     slaves = [p.rows.nodes + linear.offsets[p.body] // d for p in linear.placed]
     nodes = np.concatenate(slaves)
     _check_single(nodes)
+    pairs = _pairs(model, slaves, linear)
+    _check_apart(pairs, nodes)
     at = nodes[:, None] * d + np.arange(d)
-    is_free = np.zeros(linear.dofs, dtype=bool)
-    is_free[linear.free] = True
+    is_free = free_dofs(linear)
     rows, columns = _pattern(bodies)
     contact_of = np.full(len(X), -1)
     contact_of[nodes] = np.arange(len(nodes))
@@ -153,10 +208,9 @@ def _nonlinear_parts(model: Model) -> NonlinearParts:
     taken.sort_indices()
     taken.data -= 1
     contact = CurrentContact(
-        [ObstaclePair(c.obstacle, part)  # type: ignore[arg-type]
-         for c, part in zip(model.contacts, slaves, strict=True)],
+        pairs,
         model.law,
-        _stiffness_at(linear.stored_stiffness, at),
+        _resistance(pairs, linear.stored_stiffness, at),
         is_free[at],
     )  # fmt: skip
     return NonlinearParts(bodies, X, linear.offsets[1:-1] // d, linear.free, contact, at,
@@ -186,18 +240,14 @@ def _check_supported(model: Model) -> None:
         if not (asked or is_hyperelastic(body.material)):
             raise UnsupportedForm(
                 "others have hyperelastic laws and this one is linear elastic; give all of "
-                "them NeoHookean or CiarletGeymonat, or say that it keeps small strains by "
+                "them NeoHookean or the like, or say that it keeps small strains by "
                 "kinematics='finite' of the contacts", at, what,
             )  # fmt: skip
     for k, contact in enumerate(model.contacts):
         what = f"contact on {contact.slave!r}"
         if contact.obstacle is None:
-            raise UnsupportedForm(
-                "finite kinematics has nodal contact with an obstacle only, not between two "
-                f"bodies that deform; got the master {contact.master!r}; use an obstacle and "
-                "no master, or LinearElastic and kinematics='small'",
-                ("contacts", k, "kinematics"), what,
-            )  # fmt: skip
+            _check_pair(model, k)
+            continue
         if contact.method != "nodal":
             raise UnsupportedForm(
                 "finite kinematics has nodal contact with an obstacle only; use method='nodal'",
@@ -210,6 +260,67 @@ def _check_supported(model: Model) -> None:
                     f"LevelSet have it; got {contact.obstacle!r}",
                     ("contacts", k, "obstacle"), "obstacle",
                 )  # fmt: skip
+
+
+def _check_pair(model: Model, k: int) -> None:
+    """Raise UnsupportedForm for what a pair of finite kinematics does not have."""
+    contact = model.contacts[k]
+    what = f"contact on {contact.slave!r}"
+    if contact.method != "mortar":
+        raise UnsupportedForm(
+            "two bodies that deform meet by averages in finite kinematics; use "
+            "method='mortar', as by default", ("contacts", k, "method"), what,
+        )  # fmt: skip
+    if contact.tresca is not None:
+        raise UnsupportedForm(
+            "a given friction bound would hold sides that have slid off each other; expected "
+            "mu", ("contacts", k, "tresca"), what,
+        )  # fmt: skip
+    for side in (contact.slave, contact.master):
+        number, name = locate(model.bodies, str(side))
+        kinds = {block.kind for block in model.bodies[number].mesh.surface(name)}
+        if kinds - set(KINDS):
+            raise UnsupportedForm(
+                "two bodies that deform meet in finite kinematics on facets of first order; "
+                f"got {', '.join(sorted(kinds))} on {side!r}; give the bodies order=1, or "
+                "take LinearElastic and kinematics='small'",
+                ("contacts", k, "kinematics"), what,
+            )  # fmt: skip
+
+
+def _pairs(model: Model, slaves: list[Index], linear: Discretisation) -> list[Pair]:
+    """The pairs of the contacts; slaves: nodes of their rows."""
+    d = model.dimension
+    is_free = free_dofs(linear).reshape(-1, d)
+    out: list[Pair] = []
+    for contact, nodes in zip(model.contacts, slaves, strict=True):
+        if contact.obstacle is not None:
+            out.append(ObstaclePair(contact.obstacle, nodes))  # type: ignore[arg-type]
+            continue
+        skins = []
+        for side in (contact.slave, str(contact.master)):
+            k, name = locate(model.bodies, side)
+            facets = model.bodies[k].mesh.surface(name)
+            skins.append(Skin.of(facets, int(linear.offsets[k]) // d))
+        out.append(MortarPair(nodes, *skins, is_free[nodes]))
+    return out
+
+
+def free_dofs(linear: Discretisation) -> NDArray[np.bool_]:
+    """Dofs (dofs,) that no support holds."""
+    out = np.zeros(linear.dofs, dtype=bool)
+    out[linear.free] = True
+    return out
+
+
+def _check_apart(pairs: Sequence[Pair], slaves: Index) -> None:
+    """Raise UnsupportedForm where a node of a master carries a contact of its own."""
+    masters = [pair.master.all for pair in pairs if isinstance(pair, MortarPair)]
+    if masters and np.isin(np.concatenate(masters), slaves).any():
+        raise UnsupportedForm(
+            "a node is in a slave and in a master surface, large deformations allow one; "
+            "leave it out of the slave (where), or make the surfaces smaller", ("contacts",),
+        )  # fmt: skip
 
 
 def _check_single(nodes: Index) -> None:
@@ -235,6 +346,22 @@ def _matrix(blocks: NDArray, columns: Index, pointers: Index) -> sparse.bsr_arra
     """The matrix of node blocks in rows of nodes."""
     size = (len(pointers) - 1) * blocks.shape[1]
     return sparse.bsr_array((blocks, columns, pointers), shape=(size, size))
+
+
+def _resistance(pairs: Sequence[Pair], K: sparse.csr_array, at: Index) -> Array:
+    """Stiffness of every contact, (nc,): of its node, in series with a node of the master.
+
+    Of the softer body where they differ: with more, slips of a stiff slave change sign in
+    every Newton step.
+    """
+    own, d, start = _stiffness_at(K, at), at.shape[1], 0
+    for pair in pairs:
+        mine = slice(start, start + len(pair.slaves))
+        start = mine.stop
+        if isinstance(pair, MortarPair):
+            other = np.median(_stiffness_at(K, pair.master.all[:, None] * d + np.arange(d)))
+            own[mine] = own[mine] * other / (own[mine] + other)
+    return own
 
 
 def _stiffness_at(K: sparse.csr_array, at: Index) -> Array:

@@ -169,7 +169,8 @@ class Contact:
     clearance: the gap of the undeformed sides, < 0 where they overlap, in the place of the one
     that their meshes give: a number, or a function of points (n, dim) -> (n,).
     kinematics: "small", gap and normal are those of the undeformed bodies, or "finite", those
-    where the nodes are now (nodal, obstacles only); by default "finite" with hyperelastic laws.
+    where the nodes are now (nodal with obstacles, mortar with a master); by default "finite"
+    with hyperelastic laws.
     configuration: the same in older words, "reference" or "current".
     follows: the name of a rigid body that the obstacle moves with, a tool: what supports and
     loads give to it, moves and presses the obstacle.  Small kinematics.

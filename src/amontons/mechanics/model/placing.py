@@ -18,6 +18,7 @@ from ..contact import (
     Nitsche,
     NitscheTerms,
     contact_nodes,
+    current_contact,
     mismatch,
     mortar_contact,
     mortar_nodes,
@@ -30,13 +31,14 @@ from ..contact import (
 from ..contact.segments import Surface
 from ..elements.elasticity import LinearElastic, materials_by_region
 from ..elements.given import GivenMatrices
+from ..elements.hyperelasticity import is_hyperelastic
 from ..elements.rigid import Rigid
 from ..meshes.mesh import Mesh
 from ..meshes.surfaces import facet_normals
 from .elimination import Elimination
 from .following import followed, following_columns
 from .held import HeldNodes
-from .parts import Body, Contact
+from .parts import FINITE, Body, Contact
 from .supports import Prescribed, locate
 
 Array = NDArray[np.float64]
@@ -214,7 +216,8 @@ def _met(
         return _met_by_nitsche(bodies, contact, contact.nitsche, offsets)
     k, surface = locate(bodies, contact.slave)
     slave, size = bodies[k].mesh, int(offsets[-1])
-    mortar = is_mortar(slave, surface, contact)
+    far = slides_far(bodies, contact)
+    mortar = is_mortar(slave, surface, contact) and not far
     points = slave.points[
         mortar_nodes(slave, surface) if mortar else contact_nodes(slave, surface)[0]
     ]
@@ -229,7 +232,9 @@ def _met(
     assert contact.master is not None
     j, other = locate(bodies, contact.master)
     master = bodies[j].mesh
-    if mortar:
+    if far:
+        rows, on_master, met = current_contact(slave, surface, master, other, held[k])
+    elif mortar:
         rows, on_master, met = mortar_contact(
             slave, surface, master, other, held=held[k], lasting=lasting[k],
             master_lasting=lasting[j], tied=contact.tied,
@@ -238,6 +243,12 @@ def _met(
         rows, on_master, met = pair_contact(slave, surface, master, other)
     H = _shifted(rows.H, int(offsets[k]), size) + _shifted(on_master, int(offsets[j]), size)
     return rows, sparse.csc_array(H), met, points, None
+
+
+def slides_far(bodies: Sequence[Body], contact: Contact) -> bool:
+    """Whether a pair of two bodies meets where they are now."""
+    finite = contact.kinematics == FINITE or any(is_hyperelastic(b.material) for b in bodies)
+    return finite and contact.master is not None and contact.method == "mortar"
 
 
 def is_mortar(mesh: Mesh, surface: str, contact: Contact) -> bool:

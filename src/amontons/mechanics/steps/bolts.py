@@ -12,7 +12,7 @@ from ..model import Model, Pretension
 
 if TYPE_CHECKING:
     from .moreau_jean import Solve
-    from .quasi_static import SlowModel
+    from .slow_model import SlowModel
     from .state import State, TimeStep
 
 SAME_TIME = 1e-9  # difference of times that is none, relative to the step

@@ -57,8 +57,7 @@ class LargeSlowModel:
         load, prescribed = self.motion.applied(time)
         q0 = state.displacement
         problem = large_step(
-            self.motion.body, load, prescribed, at_contacts(self.motion.body, q0),
-            self._known(state),
+            self.motion.body, load, prescribed, q0, self._known(state),
         )  # fmt: skip
         arrive = None
         if self.crossing is not None:
@@ -116,7 +115,7 @@ class LargeSlowModel:
         parts = nonlinear_parts(self.motion.body)
         moved = q.reshape(parts.X.shape)
         meeting = parts.meet(moved)
-        pushed = meeting.columns(frames(meeting.normals), len(moved)) @ r.ravel()
+        pushed = meeting.columns(frames(meeting.normals)) @ r.ravel()
         return Forces(parts.forces(moved), load.at(moved), pushed, parts.energy(moved))
 
 

@@ -24,6 +24,7 @@ from ..model.reactions import SupportResult, support_results
 from ..model.references import ReferenceResult, reference_fields, reference_results
 from ..model.supports import locate, prescribed_values, with_held
 from ..model.values import VectorValue, check_vector, vector_at
+from ..model.yielding import yielding_of
 from .energy import Energies
 from .passage import Passage
 from .system import Motion
@@ -43,7 +44,8 @@ class State:
     force (nc, d): contact forces on the slaves in the local frames, zero where none is active;
     slip (nc, d-1): tangential displacement since the start.  What no step needs, zero where
     it is not given: slid (nc, d-1), what the contacts have slid, net; path (nc,), the length of
-    that way; friction_work (nc,), the energy that it took.
+    that way; friction_work (nc,), the energy that it took.  plastic (h,): the history of bodies
+    that yield, none or empty where nothing has flown.
     """
 
     index: int
@@ -55,6 +57,7 @@ class State:
     slid: Array = None  # type: ignore[assignment]  # zeros where none
     path: Array = None  # type: ignore[assignment]
     friction_work: Array = None  # type: ignore[assignment]
+    plastic: Array = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         index = integers("state: index", self.index)
@@ -73,6 +76,8 @@ class State:
             if array.shape != shape:
                 raise InvalidInput(f"state: {name}: expected shape {shape}, got {array.shape}")
             object.__setattr__(self, name, array)
+        given = np.zeros(0) if self.plastic is None else self.plastic
+        object.__setattr__(self, "plastic", finite("state: plastic", given, 1))
 
     @property
     def is_unloaded(self) -> bool:
@@ -156,10 +161,17 @@ class TimeStep(Shown):
             facets=tuple((k, self.model.bodies[k].mesh.surface(name)) for k, name in surfaces),
             status=self.status, slid=self.state.slid, path=self.state.path,
             friction_work=self.state.friction_work, reaction=self._split(self.reaction),
-            load=load_wrench(self.model, self.displacement, self.load),
+            load=load_wrench(self.model, self.displacement, self.load), plastic=self._plastic,
             references=reference_fields(self.model.discretisation, self.state.displacement,
                                         self.reaction, self.load),
         )  # fmt: skip
+
+    @property
+    def _plastic(self) -> dict[int, Array] | None:
+        """Histories of the bodies that yield, by number."""
+        if not self.state.plastic.size:
+            return None
+        return yielding_of(self.model).histories(self.state.plastic)
 
     @cached_property
     def pairs(self) -> dict[str, PairResult]:

@@ -15,6 +15,7 @@
                                     active sets; proximal points (`tethers`)
     Nitsche's method                Newton, then proximal points (`newton.nitsche`)
     large deformations              `NonlinearNewton`
+    bodies that yield               `TangentNewton`
 
 A mesh is what has levels or rigid modes (`FrictionProblem.levels`, `near_nullspace`).
 
@@ -65,6 +66,7 @@ from ..newton.functions import NaturalMap
 from ..newton.nitsche import robust_iterates
 from ..newton.nonlinear import NonlinearNewton, NonlinearProblem
 from ..newton.semismooth import SemismoothNewton
+from ..newton.tangents import TangentNewton, TangentProblem
 from ..sweeps.gauss_seidel import GaussSeidel
 from .compressed import CompressedDelassus
 from .portfolio import FIRST, JOINTS, Portfolio
@@ -150,13 +152,17 @@ class _Best:
 class Auto:
     """Tries, watches the error, switches; see the table of this module."""
 
-    solves: ClassVar[tuple[type, ...]] = (FrictionProblem, NitscheProblem, NonlinearProblem)
+    solves: ClassVar[tuple[type, ...]] = (
+        FrictionProblem, NitscheProblem, NonlinearProblem, TangentProblem
+    )  # fmt: skip
     form: ClassVar[Form] = Form.ANY
     matrix_free: ClassVar[bool] = True
     changes_method: ClassVar[bool] = True
 
-    def choice(self, problem: Problem) -> Auto | NonlinearNewton:
+    def choice(self, problem: Problem) -> Auto | NonlinearNewton | TangentNewton:
         """The method of a problem that one alone solves, else itself."""
+        if isinstance(problem, TangentProblem):
+            return TangentNewton()
         return NonlinearNewton() if isinstance(problem, NonlinearProblem) else self
 
     def iterates(

@@ -12,7 +12,11 @@ contact: many contacts that close at once find their statuses together.  Bodies 
 be inverted begin with it, as nothing else keeps them from passing through their obstacles.
 
 Line search: halving until |F| falls below the largest of the last few values; states with
-inverted cells are never accepted.
+inverted cells are never accepted.  Where problems say so by `shortest`, it halves until the
+step that the same matrix asks for at the new state is shorter: the natural monotonicity test of
+[D], which does not change with the units of rows, while |F| hears most of the stiffest nodes.
+
+[D] P. Deuflhard, "Newton methods for nonlinear problems", Springer (2004), section 3.3.
 """
 
 from __future__ import annotations
@@ -28,6 +32,7 @@ from scipy import sparse
 from ...core.errors import InvertedCells, SingularOperator
 from ...core.options import check_options
 from ...linear import Direct, LinearSolver
+from ...linear.base import Factor
 from ...problem.friction import FrictionProblem
 from ...problem.protocol import Problem
 from ..contract import (
@@ -44,6 +49,7 @@ from ..judging import first_of, sent
 Array = NDArray[np.float64]
 MEMORY = 5  # values of |F| of which the largest counts in the line search
 ENOUGH = 1e-4  # least relative decrease of |F| over a full step
+NATURAL = 0.25  # least relative decrease of the next step over a full step, natural test
 LOOSE = 1e-5  # error, unit-free, at which a load step is good enough to go on
 REPEATED = 1e-12  # relative difference of |F| below which steps go round in circles
 JUMP = "; if the body jumps there, crossing=PathCrossing() of this solver follows it (2D)"
@@ -59,6 +65,59 @@ class Linear(Protocol):
     matrix: sparse.csc_array
 
 
+class States(Protocol):
+    """States w that Newton's method moves: v, or v and what is eliminated in every step."""
+
+    start: Array
+
+    def v(self, w: Array) -> Array:
+        """v (n,) of a state."""
+        ...
+
+    def residual(self, w: Array) -> Array:
+        """What has to become zero, unit of force; raises InvertedCells."""
+        ...
+
+    def linearisation(self, w: Array) -> Linear:
+        """The linear problem of a step of v."""
+        ...
+
+    def size(self, w: Array, here: Linear) -> float:
+        """|residual(w)|; here: the linear problem there."""
+        ...
+
+    def whole(self, w: Array, step: Array) -> Array:
+        """The step of w that belongs to a step (n,) of v."""
+        ...
+
+
+class PlainStates:
+    """States that are v."""
+
+    def __init__(self, problem: NonlinearProblem, v: Array) -> None:
+        self._problem, self.start = problem, v
+
+    def v(self, w: Array) -> Array:
+        """The state itself."""
+        return w
+
+    def residual(self, w: Array) -> Array:
+        """F (n,)."""
+        return self._problem.residual(w)
+
+    def linearisation(self, w: Array) -> Linear:
+        """F and its derivatives."""
+        return self._problem.linearisation(w)
+
+    def size(self, w: Array, here: Linear) -> float:
+        """|F|, which is at hand."""
+        return float(np.linalg.norm(here.residual))
+
+    def whole(self, w: Array, step: Array) -> Array:
+        """The step itself."""
+        return step
+
+
 class NonlinearProblem(Problem):
     """What the method asks for besides `Problem`; states v (n,), residuals (n,)."""
 
@@ -66,6 +125,8 @@ class NonlinearProblem(Problem):
         "large deformations are no linear problem with contact: NonlinearNewton solves them, "
         "which auto takes"
     )
+
+    shortest: float = 0.0  # least part of a Newton step to take, if > 0 by the natural test
 
     def residual(self, v: Array) -> Array:
         """F(v); raises InvertedCells where it is not defined."""
@@ -78,6 +139,10 @@ class NonlinearProblem(Problem):
     def reactions(self, v: Array) -> Array:
         """Contact forces (nc, d)."""
         ...
+
+    def states(self, v: Array, known: Any = None) -> States:
+        """What steps move, from v on; known: problem and state that led there, or None."""
+        return PlainStates(self, v)
 
     def at_share(self, share: float) -> NonlinearProblem:
         """The problem at a share of the load between the known state and the whole load."""
@@ -142,7 +207,7 @@ class NonlinearNewton:
         shown = _Shown()
         if start.v is not None:
             try:
-                yield from shown.best(self._newton(problem, start.v, target))
+                yield from shown.best(self._newton(problem, problem.states(start.v), target))
             except (_Failed, InvertedCells):
                 pass  # the start was no help
         share, step, reason = 0.0, 1.0, ""
@@ -151,7 +216,8 @@ class NonlinearNewton:
             if step < self.smallest_share:
                 if self.crossing is not None:
                     v, told = self.crossing.across(problem, share, v, target)
-                    yield from shown.best(self._newton(problem, v, target), told)
+                    found = self._newton(problem, problem.states(v), target)
+                    yield from shown.best(found, told)
                 hint = "" if self.crossing is not None else JUMP
                 raise Breakdown(
                     f"no equilibrium found beyond {share:.4g} of the load: {reason}{hint}"
@@ -162,8 +228,11 @@ class NonlinearNewton:
                 try:
                     first = predict(problem, share, goal, v, target)
                     if goal == 1.0:
-                        yield from shown.best(self._newton(problem, first, target))
-                    v, steps = self._equilibrium(problem.at_share(goal), first, target)
+                        states = problem.states(first, (problem.at_share(share), v))
+                        yield from shown.best(self._newton(problem, states, target))
+                    then = problem.at_share(goal)
+                    states = then.states(first, (problem.at_share(share), v))
+                    v, steps = self._equilibrium(then, states, target)
                     break
                 except (_Failed, InvertedCells) as failure:
                     reason = str(failure)
@@ -181,7 +250,7 @@ class NonlinearNewton:
         try:
             here, change = problem.predicted(share, goal, v)
             now = problem.at_share(share)
-            return v + self._solve(now, v, here, here.residual + change)
+            return v + self._solve(now, v, here, here.residual + change)[0]
         except (InvertedCells, SingularOperator) as reason:
             raise _Failed(str(reason)) from reason
 
@@ -213,35 +282,39 @@ class NonlinearNewton:
         raise _Failed("the tangent problem with contact was not solved")
 
     def _equilibrium(
-        self, problem: NonlinearProblem, v: Array, target: Target
+        self, problem: NonlinearProblem, states: States, target: Target
     ) -> tuple[Array, int]:
         """(v, Newton steps) at a load between, found loosely."""
-        steps = 0
-        found = self._newton(problem, v, target)
+        steps, v = 0, states.v(states.start)
+        found = self._newton(problem, states, target)
         while problem.error(problem.reactions(v), v) > LOOSE:
             v, steps = next(found)[0], steps + 1
         return v, steps
 
     def _newton(
-        self, problem: NonlinearProblem, v: Array, target: Target
+        self, problem: NonlinearProblem, states: States, target: Target
     ) -> Iterator[tuple[Array, Array, float]]:
         """(v, r, |F| one step before) of Newton steps; _Failed when they lead nowhere."""
         sizes: list[float] = []
-        patience = Patience(self.patience)
+        patience, w = Patience(self.patience), states.start
         while target.seconds_left > 0:
+            v = states.v(w)
             try:
-                here = problem.linearisation(v)
-                F = here.residual
-                size = float(np.linalg.norm(F))
+                here = states.linearisation(w)
+                size = states.size(w, here)
                 again = any(abs(size - old) <= REPEATED * size for old in sizes)
                 sizes.append(size)
                 if again or patience.over(size):
                     self._stop(problem, v)
-                step = self._solve(problem, v, here, F)
+                moved, factor = self._solve(problem, v, here, here.residual)
             except SingularOperator as reason:
                 raise _Failed(str(reason)) from reason
-            v = v + self._length(problem, v, step, sizes) * step
-            yield v, problem.reactions(v), size
+            step = states.whole(w, moved)
+            if problem.shortest > 0:
+                w = w + self._natural_length(problem, states, w, step, factor) * step
+            else:
+                w = w + self._length(states, w, step, sizes) * step
+            yield states.v(w), problem.reactions(states.v(w)), size
         raise Breakdown("out of time between two load steps")
 
     @staticmethod
@@ -252,10 +325,12 @@ class NonlinearNewton:
             raise Breakdown(reason)
         raise _Failed(reason)
 
-    def _solve(self, problem: NonlinearProblem, v: Array, here: Linear, F: Array) -> Array:
-        """-dF/dv^-1 F; with more contacts closed where open ones leave a body loose."""
+    def _solve(
+        self, problem: NonlinearProblem, v: Array, here: Linear, F: Array
+    ) -> tuple[Array, Factor]:
+        """-dF/dv^-1 F and the factors; with more contacts closed where a body is loose."""
         try:
-            return self.linear.factor(here.matrix).solve(-F)
+            factor = self.linear.factor(here.matrix)
         except SingularOperator:
             for pieces in problem.closed_pieces(v):
                 closed = problem.linearisation(v, pieces)
@@ -263,27 +338,53 @@ class NonlinearNewton:
                     factor = self.linear.factor(closed.matrix)
                 except SingularOperator:
                     continue
-                return factor.solve(-F)
+                return factor.solve(-F), factor
             raise
+        return factor.solve(-F), factor
 
     def _length(
-        self, problem: NonlinearProblem, v: Array, step: Array, sizes: list[float]
+        self, states: States, w: Array, step: Array, sizes: list[float]
     ) -> float:
         """The part of a Newton step to take; the best of all tried where none is enough."""
         allowed = max(sizes[-MEMORY:])
-        best, found = np.inf, 0.0
+        best, found, reason = np.inf, 0.0, ""
         for k in range(self.halvings + 1):
             length = 0.5**k
             try:
-                size = float(np.linalg.norm(problem.residual(v + length * step)))
-            except InvertedCells:
+                size = float(np.linalg.norm(states.residual(w + length * step)))
+            except InvertedCells as why:
+                reason = str(why)
                 continue
             if size <= (1 - ENOUGH * length) * allowed:
                 return length
             if size < best:
                 best, found = size, length
         if not np.isfinite(best):
-            raise _Failed("every step inverts cells")
+            raise _Failed(f"every step leads to where {reason}")
+        return found
+
+    def _natural_length(
+        self, problem: NonlinearProblem, states: States, w: Array, step: Array, factor: Factor
+    ) -> float:
+        """The same by the natural monotonicity test, no shorter than `problem.shortest`."""
+        size = float(np.linalg.norm(states.v(w + step) - states.v(w)))
+        best, found, reason = np.inf, 0.0, ""
+        for k in range(self.halvings + 1):
+            length = 0.5**k
+            if length < problem.shortest and np.isfinite(best):
+                break
+            try:
+                F = problem.residual(states.v(w + length * step))
+            except InvertedCells as why:
+                reason = str(why)
+                continue
+            again = float(np.linalg.norm(factor.solve(-F)))
+            if again <= (1 - NATURAL * length) * size:
+                return length
+            if again < best:
+                best, found = again, length
+        if not np.isfinite(best):
+            raise _Failed(f"every step leads to where {reason}")
         return found
 
 

@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from ....core.errors import InvalidInput
 from ....mechanics.elements.elasticity import LinearElastic, materials_by_region
+from ....mechanics.elements.hybrid import element_formulation
 from ....mechanics.elements.orthotropic import OrthotropicElastic
+from ....mechanics.elements.plasticity import ElastoPlastic
 from ....mechanics.meshes.cells import CELLS
 from ....mechanics.meshes.mesh import Mesh
 from ....mechanics.model import Body, Model
@@ -19,14 +21,17 @@ from .lines import Names, listed, value, values
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 WIDTH = 3
+FAR = 10.0  # plastic strain to which hardening is written
 
 
 class Meshes:
     """Numbers of nodes and elements from 1, body after body, and the cards of all of them."""
 
-    def __init__(self, model: Model, names: Names) -> None:
-        self.model, self.names = model, names
+    def __init__(self, model: Model, names: Names, notes: list[str] | None = None) -> None:
+        """notes: gets what can not be said, for programs without hybrid elements."""
+        self.model, self.names, self._notes = model, names, notes
         self.lines: list[str] = []
+        self._laws: list[tuple[float, list[str]]] = []  # Young's modulus and cards of each
         self.nodes = np.cumsum([0, *(len(b.mesh.points) for b in model.bodies)])
         self._sides: list[dict[tuple[int, ...], tuple[int, int]]] = []
         self._surfaces: set[str] = set()
@@ -49,7 +54,14 @@ class Meshes:
         laws = materials_by_region(mesh, body.material)
         for block in mesh.cells:
             law = laws[block.region]
-            kind = element_type(mesh, block.kind, block.integration, law, shown)
+            integration = element_formulation(mesh, block, law)
+            if integration == "hybrid" and self._notes is not None:
+                integration = "full"
+                self._notes.append(
+                    f"body {shown!r}: CalculiX has no hybrid elements, those with full "
+                    "integration lock near incompressibility, and where they flow"
+                )
+            kind = element_type(mesh, block.kind, integration, law, shown)
             name = self.names(("region", k, block.region), f"{shown}_{block.region}")
             out.append(f"*ELEMENT, TYPE={kind}, ELSET={name}")
             for row in block.nodes:
@@ -75,13 +87,22 @@ class Meshes:
         """Numbers of nodes of a body, in lines."""
         return listed((nodes + self.nodes[body] + 1).tolist())
 
+    @property
+    def materials(self) -> list[str]:
+        """The cards of all materials, the stiffest first: CalculiX' HARD is 50 times that."""
+        ranked = sorted(self._laws, key=lambda law: -law[0])
+        return [line for _, cards in ranked for line in cards]
+
     def _material(self, elset: str, law: LinearElastic | OrthotropicElastic) -> None:
         self._materials += 1
-        name, out = f"MATERIAL_{self._materials}", self.lines
-        out.append(f"*MATERIAL, NAME={name}")
+        name = f"MATERIAL_{self._materials}"
+        out = [f"*MATERIAL, NAME={name}"]
+        self._laws.append((float(np.max(law.young)), out))
         turned = ""
         if isinstance(law, LinearElastic):
             out += ["*ELASTIC", values([law.young, law.poisson])]
+            if isinstance(law, ElastoPlastic):
+                out += ["*PLASTIC", *(values(row) for row in law.rows_to(FAR))]
             if law.expansion:
                 out += ["*EXPANSION", value(law.expansion)]
         else:
@@ -93,6 +114,7 @@ class Meshes:
             turned = f", ORIENTATION=AXES_{self._materials}"
         if law.density is not None:
             out += ["*DENSITY", value(law.density)]
+        out = self.lines
         if isinstance(law, OrthotropicElastic):
             axes = np.array(law.axes)
             out += [f"*ORIENTATION, NAME=AXES_{self._materials}", values(axes[:2].ravel())]

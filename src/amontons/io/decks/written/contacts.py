@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from ....core.errors import InvalidInput, within
-from ....mechanics.contact import pair_contact
+from ....mechanics.contact.pairs import project
+from ....mechanics.meshes.facets import linear_parts
 from ....mechanics.model import Contact, Model
 from ....mechanics.model.supports import locate
 from ....mechanics.model.values import is_number
 from ....problem.law import ExponentialOverclosure, OverclosureCurve
 from ....problem.nitsche import NitscheProblem
+from ..contact_laws import bend_of
 from .bodies import Meshes
 from .lines import listed, value, values
 
@@ -42,7 +44,8 @@ class Contacts:
         names = self.meshes.surface(*slave), self.meshes.surface(*master)
         if contact.where is not None:
             names = self._some(contact, slave, names[0]), names[1]
-        if contact.tied and contact.stiffness is None and contact.stick_stiffness is None:
+        elastic = contact.stiffness is not None or contact.stick_stiffness is not None
+        if contact.tied and not elastic and not self._is_flat:
             near = value(self._distance(contact))
             self.lines += [
                 f"*TIE, NAME=TIE_{k + 1}, ADJUST=NO, POSITION TOLERANCE={near}",
@@ -51,7 +54,11 @@ class Contacts:
             return
         self.lines += [f"*SURFACE INTERACTION, NAME=INTERACTION_{k + 1}"]
         self._law(contact)
-        nodes = names[0].endswith("_SOME")
+        curve = isinstance(contact.stiffness, OverclosureCurve) and self.dialect == "calculix"
+        if curve:
+            self.notes.append(f"{contact.slave}: NODE TO SURFACE, for CalculiX 2.20 takes no "
+                              "force from a table of a contact of surfaces")  # fmt: skip
+        nodes = names[0].endswith("_SOME") or curve
         kind = "NODE TO SURFACE" if nodes else "SURFACE TO SURFACE"
         self.lines += [f"*CONTACT PAIR, INTERACTION=INTERACTION_{k + 1}, TYPE={kind}",
                        f"{names[0]}, {names[1]}"]  # fmt: skip
@@ -61,6 +68,11 @@ class Contacts:
                                    ("clearance",))  # fmt: skip
             self.lines.append(f"*CLEARANCE, SLAVE={names[0]}, MASTER={names[1]}, "
                               f"VALUE={value(contact.clearance)}")  # type: ignore[arg-type]  # fmt: skip
+
+    @property
+    def _is_flat(self) -> bool:
+        """Whether CalculiX makes solid elements of the model's, which it can not tie."""
+        return self.dialect == "calculix" and self.model.dimension == 2
 
     # ------------------------------------------------------------------------ where it is
     def _some(self, contact: Contact, slave: tuple[int, str], whole: str) -> str:
@@ -85,12 +97,16 @@ class Contacts:
         """The largest distance of nodes that are tied."""
         bodies = self.model.bodies
         (a, slave), (b, master) = (locate(bodies, s) for s in (contact.slave, contact.master))  # type: ignore[arg-type]
-        rows, _, _ = pair_contact(bodies[a].mesh, slave, bodies[b].mesh, master)
-        gap = np.abs(rows.gap)
+        mesh, other = bodies[a].mesh, bodies[b].mesh
+        nodes = mesh.surface_nodes(slave)
         if contact.where is not None:
-            gap = gap[np.asarray(contact.where(rows.points), dtype=bool)]
-        size = float(np.ptp(bodies[a].mesh.points, axis=0).max())
-        return WIDER * float(gap.max(initial=0.0)) + 1e-9 * size
+            nodes = nodes[np.asarray(contact.where(mesh.points[nodes]), dtype=bool)]
+        x = mesh.points[nodes]
+        hit = project(x, other.points, linear_parts(other.surface(master)),
+                      own=nodes if a == b else None)  # fmt: skip
+        away = np.linalg.norm(x - hit.closest, axis=1)[hit.found]
+        size = float(np.ptp(mesh.points, axis=0).max())
+        return WIDER * float(away.max(initial=0.0)) + 1e-9 * size
 
     # --------------------------------------------------------------------------- what acts
     def _law(self, contact: Contact) -> None:
@@ -98,10 +114,10 @@ class Contacts:
             if getattr(contact, name) is not None:
                 raise InvalidInput("no deck has this friction; expected a coefficient mu",
                                    (name,))  # fmt: skip
-        stiffness = self._overclosure(contact)
         if contact.tied:
-            raise InvalidInput("an elastic bond: expected a tie without stiffness",
-                               ("stiffness",))  # fmt: skip
+            self._bond(contact)
+            return
+        stiffness = self._overclosure(contact)
         mu = _single(contact.mu, "mu")
         cap = None if contact.cap is None else _single(contact.cap, "cap")
         if cap is not None and self.dialect == "calculix":
@@ -121,6 +137,23 @@ class Contacts:
             )
         self.lines += [f"*FRICTION{most}", values(numbers)]
 
+    def _bond(self, contact: Contact) -> None:
+        """An elastic bond, or what CalculiX has for a tie in 2D."""
+        if self.dialect == "abaqus":
+            raise InvalidInput("an elastic bond: expected a tie without stiffness in a deck "
+                               "for Abaqus", ("stiffness",))  # fmt: skip
+        given = (contact.stiffness, contact.stick_stiffness)
+        sizes = []
+        for law, name in zip(given, ("stiffness", "stick_stiffness"), strict=True):
+            rigid = self.penalty if self.penalty is not None else HARD * _young(self.model)
+            sizes.append(rigid if law is None else _single(law, name))
+        if None in given:
+            self.notes.append(f"{contact.slave}: tied by a stiffness of {sizes[0]:.3g} "
+                              f"({sizes[1]:.3g} along it), for CalculiX ties no 2D elements "
+                              "and nothing rigidly in one direction alone")  # fmt: skip
+        self.lines += ["*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TIED", value(sizes[0]),
+                       "*FRICTION", values([1.0, sizes[1]])]  # fmt: skip
+
     def _overclosure(self, contact: Contact) -> float:
         """Write the pressure over overclosure; returns a stiffness that is typical of it."""
         law, card = contact.stiffness, "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE="
@@ -133,6 +166,10 @@ class Contacts:
                                    "OverclosureCurve", ("stiffness",))  # fmt: skip
             self.lines += [f"{card}EXPONENTIAL", values([law.c0, law.p0])]
             return law.p0 / law.c0
+        bent = _bent(contact)
+        if bent:
+            self.lines += [f"{card}LINEAR", values(bent)]
+            return bent[0]
         if isinstance(law, OverclosureCurve):
             table = list(zip(np.array(law.pressure), np.array(law.overclosure), strict=True))
             self.lines += [f"{card}TABULAR", *(values(row) for row in table)]
@@ -141,6 +178,12 @@ class Contacts:
         assert size is not None
         self.lines += [f"{card}LINEAR", value(size)]
         return size
+
+
+def _bent(contact: Contact) -> tuple[float, float] | None:
+    """Stiffness and tension of nodes in contact as CalculiX has them, read from a deck."""
+    law = contact.stiffness
+    return bend_of(law) if isinstance(law, OverclosureCurve) else None
 
 
 def _single(given: object, name: str) -> float:

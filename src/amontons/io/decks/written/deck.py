@@ -42,7 +42,7 @@ def write_deck(
     """Write a model as an `.inp` deck, whole or not at all; returns what differs, in words.
 
     dialect: "calculix" or "abaqus".  penalty: pressure over overclosure of hard contact, stress
-    / length, > 0; by default hard, which CalculiX takes as 50 times the first Young's modulus.
+    / length, > 0; by default hard, which CalculiX takes as 50 times the largest modulus.
     Raises InvalidInput for what no deck says, such as obstacles that are no planes, Tresca's
     friction, values that depend on time, and large deformations.
     """
@@ -54,7 +54,7 @@ def write_deck(
     notes: list[str] = []
     whole = _with_planes(model, notes)
     names = Names()
-    meshes = Meshes(whole, names)
+    meshes = Meshes(whole, names, notes if dialect == CALCULIX else None)
     contacts = Contacts(whole, meshes, dialect, penalty, notes)
     heat = [load for load in model.loads if isinstance(load, Temperature)]
     if any(not (load.mean or is_number(load.value)) for load in heat):
@@ -64,8 +64,9 @@ def write_deck(
     own = Beside.of(model.bodies, model.references, model.constraints)
     known = labels[: own.first] + labels[beside.first :]  # planes come after the bodies
     title = " ".join((model.name or "a model of amontons").replace("*", " ").split())[:80]
-    lines = ["*HEADING", title, *extra, *meshes.lines, *_springs(model, own, known, meshes),
-             *_equations(model, own, known), *contacts.lines]  # fmt: skip
+    lines = ["*HEADING", title, *meshes.materials, *extra, *meshes.lines,
+             *_springs(model, own, known, meshes), *_equations(model, own, known),
+             *contacts.lines]  # fmt: skip
     lines += _step(whole, beside, labels, meshes, dialect)
     write_bytes(Path(path), ("\n".join(lines) + "\n").encode("ascii", "replace"))
     return tuple(dict.fromkeys(notes))

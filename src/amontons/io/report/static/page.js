@@ -112,7 +112,7 @@ if (DATA.view) {
   } catch (reason) {
     view = null;
     byId("no3d").hidden = false;
-    byId("no3d").textContent = `No 3D here: ${reason.message}. All numbers below can be read without it.`;
+    byId("no3d").textContent = `No 3D here: ${reason.message.replace(/\.$/, "")}. All numbers below can be read without it.`;
     for (const id of ["stage", "picked", "contacts"]) byId(id).hidden = true;
   }
 }

@@ -1,0 +1,264 @@
+"""Dual mortar contact of two deforming bodies where they are now.
+
+A pair has slave nodes p and a master surface.  All is taken at the positions x of all nodes:
+n_p is the unit normal at p, the area average of the facets around it, out of the master into
+the slave.  On every slave facet psi are the dual functions of `dual` on that part of it that
+faces the master ([PSG]), D_p = int psi_p over all facets, and
+
+    B_pp = 1,   B_pq = - int psi_p N_q / D_p  of master nodes q,   sum_j B_pj = 0,         (1)
+    G_p = sum_j B_pj x_j,      g_p = n_p . G_p,                                             (2)
+    s_p = sum_j B'_pj x_j - G_p,                                                            (3)
+
+G the distance vector, g the gap, and s the motion since the last step, whose B is B' ([PL]):
+what slides is the change of B, not of x.  Rotations of everything leave B as it is: s = 0.
+A force lambda_p acts on p, and -B_pj lambda_p on the other nodes j: together no force, and no
+moment but G_p x lambda_p, which is none where the sides touch all along.
+A node that met nobody at the end of the last step has as s_p its motion against the master node
+that was closest then.
+
+Nodes of which hardly anything faces the master, and those without a row, carry no force of
+their own: the others of their facets take their share, and B_ps > 0 at such a node s ([PW]).
+A node that does not meet is open, its gap the distance from the closest master node.
+
+Left out: facets of second order, and one surface against itself.
+
+[PL] M. Puso, T. Laursen, CMAME 193 (2004) 601-629 and 4891-4913 (friction).
+[PSG] A. Popp, A. Seitz, M. Gee, W. Wall, "Improved robustness and consistency of 3D contact
+algorithms based on a dual mortar approach", CMAME 264 (2013).
+[PW] A. Popp, B. Wohlmuth, M. Gee, W. Wall, SIAM J. Sci. Comput. 34 (2012).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from .current_slopes import MortarSlopes, summed
+from .dual import dual_functions, nodes_with_multiplier
+from .facet_integrals import FacetPairs
+from .facing import Skin, candidates, nearest
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+HARDLY = 0.1  # part of a node's area that has to face the master for it to carry force
+SLIVER = 1e-8  # part of a facet; biorthogonal functions on less are lost in rounding
+
+
+@dataclass(frozen=True, eq=False)
+class MortarPair:
+    """Slave nodes (nc,) of the model, those of the slave facets that have a row, and a master.
+
+    free (nc, d): components of the slaves without a support; normals lie in these.
+    """
+
+    slaves: Index
+    slave: Skin
+    master: Skin
+    free: Mask
+
+    def at(self, positions: Array) -> MortarMeeting:
+        """Where they meet at the positions (nodes, d) of all nodes of the model."""
+        return MortarMeeting(self, positions)
+
+
+@dataclass(frozen=True, eq=False)
+class _Shared:
+    """k pairs of facets, slave and master (k,), on `facets` (f,) of the slave; of (k,): which.
+
+    cross (k, a, b); mass, psi (f, a, a): A of `current_slopes`; kept (f, a): slots that carry
+    force.
+    """
+
+    slave: Index
+    master: Index
+    facets: Index
+    of: Index
+    mass: Array
+    cross: Array
+    psi: Array
+    kept: Mask
+
+    @property
+    def weights(self) -> Array:
+        """W, (f, a)."""
+        return np.where(self.kept, self.mass.sum(axis=2), 0.0)
+
+    @property
+    def inverse(self) -> Array:
+        """Q, (f, a, a)."""
+        return self.psi / np.where(self.kept, self.weights, 1.0)[:, :, None]
+
+
+@dataclass(frozen=True, eq=False)
+class MortarMeeting:
+    """A pair at positions x (nodes, d); arrays are made when they are asked for."""
+
+    pair: MortarPair
+    x: Array
+
+    @property
+    def slaves(self) -> Index:
+        """Nodes with a row, (nc,)."""
+        return self.pair.slaves
+
+    # ---------------------------------------------------------------- normals
+    @cached_property
+    def sums(self) -> Array:
+        """Area vectors around the slaves, into the slave, in free directions, (nc, d)."""
+        skin = self.pair.slave
+        share = -skin.areas(self.x) / skin.corners[:, None]
+        out = np.zeros(self.x.shape)
+        for slot in range(skin.nodes.shape[1]):
+            np.add.at(out, skin.nodes[:, slot], share * skin.real[:, slot, None])
+        return out[self.pair.slaves] * self.pair.free
+
+    @cached_property
+    def normals(self) -> Array:
+        """n, (nc, d)."""
+        return self.sums / np.linalg.norm(self.sums, axis=1)[:, None]
+
+    # ---------------------------------------------------------------- averages
+    @cached_property
+    def row(self) -> Index:
+        """Row of every node, (nodes,), -1 for none."""
+        out = np.full(len(self.x), -1, dtype=np.int64)
+        out[self.pair.slaves] = np.arange(len(self.pair.slaves))
+        return out
+
+    @cached_property
+    def shared(self) -> _Shared:
+        """What the facets share."""
+        slave, master, x = self.pair.slave, self.pair.master, self.x
+        of, other = candidates(slave, master, x)
+        pairs = self.facet_pairs(of, other)
+        p, q = pairs.slave, pairs.master
+        mass, cross = pairs.integrals()
+        area = mass.sum(axis=(1, 2))
+        vectors = slave.areas(x)
+        whole = np.linalg.norm(vectors, axis=1)
+        between = np.einsum("kb,kbc->kc", cross.sum(axis=1), q)
+        between -= np.einsum("ka,kac->kc", mass.sum(axis=1), p)
+        gap = np.einsum("kc,kc->k", between, vectors[of])
+        gap /= np.where(area > 0, area, 1.0) * whole[of]
+        there = np.flatnonzero(area > 0)
+        there = there[nearest(of[there], area[there], gap[there], whole)]
+        reached = np.bincount(of[there], area[there], minlength=len(whole))
+        there = there[(reached > SLIVER * whole)[of[there]]]
+        of, other, cross = of[there], other[there], cross[there]
+        facets, numbers = np.unique(of, return_inverse=True)
+        total = np.zeros((len(facets), *mass.shape[1:]))
+        np.add.at(total, numbers, mass[there])
+        kept = self._carrying(facets, total, whole)
+        psi = dual_functions(total, kept, slave.real[facets])
+        return _Shared(of, other, facets, numbers, total, cross, psi, kept)
+
+    def facet_pairs(self, of: Index, other: Index) -> FacetPairs:
+        """Facets of the slave (k,) and of the master (k,), where they are."""
+        slave, master, x = self.pair.slave, self.pair.master, self.x
+        return FacetPairs(x[slave.nodes[of]], slave.corners[of],
+                          x[master.nodes[other]], master.corners[other])  # fmt: skip
+
+    def _carrying(self, facets: Index, mass: Array, whole: Array) -> Mask:
+        """Slots (f, a) of facets (f,) that carry force; whole: areas of all slave facets."""
+        skin, n = self.pair.slave, len(self.x)
+        share = (whole / skin.corners)[:, None] * skin.real
+        around = np.bincount(skin.nodes.ravel(), share.ravel(), minlength=n)
+        nodes, real = skin.nodes[facets], skin.real[facets]
+        reached = np.bincount(nodes.ravel(), mass.sum(axis=2).ravel(), minlength=n)
+        reached = reached / np.where(around > 0, around, 1.0)
+        without = self.row < 0
+        kept = nodes_with_multiplier(nodes, real, without, reached < HARDLY, reached)
+        return kept[nodes] & real
+
+    @cached_property
+    def _weights(self) -> Array:
+        """D, (nc,), zero where nobody meets."""
+        parts = self.shared
+        nodes = self.pair.slave.nodes[parts.facets]
+        found = np.bincount(nodes.ravel(), parts.weights.ravel(), minlength=len(self.x))
+        return np.asarray(found[self.pair.slaves], dtype=np.float64)
+
+    @property
+    def met(self) -> Mask:
+        """Slaves that meet the master, (nc,)."""
+        return self._weights > 0
+
+    @cached_property
+    def by_weight(self) -> Array:
+        """1 / D, (nc,), zero where nobody meets."""
+        return np.where(self.met, 1.0, 0.0) / np.where(self.met, self._weights, 1.0)
+
+    @cached_property
+    def rows(self) -> Index:
+        """Rows of the slots that carry, (f, a), -1 for the others."""
+        parts = self.shared
+        of = np.append(self.row, -1)  # the last one: of none
+        return of[np.where(parts.kept, self.pair.slave.nodes[parts.facets], -1)]
+
+    @cached_property
+    def averages(self) -> sparse.csr_array:
+        """B, (nc, nodes); of nodes that do not meet nothing but 1 at the slave."""
+        parts, pair = self.shared, self.pair
+        nc, shape = len(pair.slaves), (len(pair.slaves), len(self.x))
+        own = sparse.csr_array((np.ones(nc), (np.arange(nc), pair.slaves)), shape=shape)
+        row = self.rows
+        left = parts.psi @ parts.mass * ~parts.kept[:, None, :]
+        here = np.broadcast_to(pair.slave.nodes[parts.facets][:, None], left.shape)
+        beside = summed(left, np.broadcast_to(row[:, :, None], left.shape), here, shape)
+        onto = parts.psi[parts.of] @ parts.cross
+        there = np.broadcast_to(pair.master.nodes[parts.master][:, None], onto.shape)
+        across = summed(
+            onto, np.broadcast_to(row[parts.of][:, :, None], onto.shape), there, shape
+        )
+        scale = sparse.diags_array(self.by_weight)
+        return sparse.csr_array(own + scale @ (beside - across))
+
+    @property
+    def met_averages(self) -> sparse.csr_array:
+        """B without the rows of nodes that do not meet, (nc, nodes)."""
+        return sparse.csr_array(sparse.diags_array(self.met.astype(float)) @ self.averages)
+
+    @cached_property
+    def closest(self) -> Index:
+        """The master node closest to each slave, (nc,)."""
+        from scipy.spatial import cKDTree
+
+        nodes = self.pair.master.all
+        nearby = cKDTree(self.x[nodes]).query(self.x[self.pair.slaves])[1]
+        return nodes[np.asarray(nearby, dtype=np.int64)]
+
+    @cached_property
+    def references(self) -> sparse.csr_array:
+        """B, (nc, nodes), of nodes that do not meet: 1 at the slave, -1 at the closest."""
+        away = np.flatnonzero(~self.met)
+        entries = (-np.ones(len(away)), (away, self.closest[away]))
+        return sparse.csr_array(
+            self.averages + sparse.csr_array(entries, shape=self.averages.shape)
+        )
+
+    @cached_property
+    def distances(self) -> Array:
+        """G, (nc, d)."""
+        return self.references @ self.x
+
+    @cached_property
+    def gap(self) -> Array:
+        """g, (nc,); of nodes that do not meet their distance."""
+        along = (self.normals * self.distances).sum(axis=1)
+        return np.where(self.met, along, np.linalg.norm(self.distances, axis=1))
+
+    def motion(self, earlier: MortarMeeting) -> Array:
+        """s of (3), (nc, d), since `earlier`, at the end of the last step."""
+        both = (self.met & earlier.met)[:, None]
+        return earlier.references @ self.x - np.where(both, self.distances, earlier.distances)
+
+    @cached_property
+    def slopes(self) -> MortarSlopes:
+        """Derivatives by the positions of all nodes."""
+        return MortarSlopes(self)
+

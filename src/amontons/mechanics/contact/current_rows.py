@@ -1,0 +1,58 @@
+"""Contacts of two bodies that slide far, as they are in the undeformed state.
+
+Every slave node that can carry a force has one, also where it does not face the master yet.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..meshes.mesh import Mesh
+from .current_mortar import MortarPair
+from .facing import Skin
+from .geometry import frames
+from .mortar import coupled_columns
+from .nodal import ContactRows, check_exterior, contact_nodes
+from .overlap import check_different
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+FREE = 1e-9  # free part of a normal up to which supports hold it
+
+
+def current_contact(
+    slave: Mesh, surface: str, master: Mesh, master_surface: str, held: Mask
+) -> tuple[ContactRows, sparse.csc_array, Mask]:
+    """Rows, their part on the master, and found, as `mortar_contact` has them.
+
+    held (n, dim): components of the slave that supports prescribe; nodes that can not move
+    along their normal have no row.
+    """
+    check_exterior(slave, surface)
+    check_exterior(master, master_surface, "master")
+    check_different(slave, surface, master, master_surface)
+    nodes, weights = contact_nodes(slave, surface)
+    joined = slave is master
+    points = slave.points if joined else np.concatenate([slave.points, master.points])
+    over = Skin.of(slave.surface(surface), 0)
+    under = Skin.of(master.surface(master_surface), 0 if joined else len(slave.points))
+    free = ~held[nodes]
+    whole = MortarPair(nodes, over, under, np.ones_like(free)).at(points).normals
+    found = np.linalg.norm(whole * free, axis=1) > FREE
+    chosen = nodes[found]
+    meeting = MortarPair(chosen, over, under, free[found]).at(points)
+    axes = frames(meeting.normals)
+    columns = coupled_columns(
+        meeting.references, axes, np.zeros(axes.shape[:2], dtype=bool)
+    ).tocsr()
+    size = slave.points.size
+    rows = ContactRows(
+        chosen, slave.points[chosen], weights[found], meeting.gap, axes,
+        sparse.csc_array(columns[:size]),
+    )  # fmt: skip
+    on_master = sparse.csc_array((master.points.size, axes.shape[0] * axes.shape[1]))
+    if not joined:
+        on_master = sparse.csc_array(columns[size:])
+    return rows, on_master, found

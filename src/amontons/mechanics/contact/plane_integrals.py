@@ -1,0 +1,188 @@
+"""Integrals over what two facets in 3D share where they are now, compiled.
+
+Both are projected along the slave's normal onto the plane through it, the master's outline is
+cut by the sides of the slave's, and the part they share is filled with triangles from its first
+corner.  Numbers are complex: real parts decide, imaginary ones carry derivatives along.
+
+Arguments of all loops: corners (n, 2) in the plane with their number; facets (a, 3) padded,
+with their numbers of corners; rule (q, 3): points and weights on the unit triangle.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...core.compiled import njit
+from .clipping import triangle_rule
+
+ROOM = 10  # corners of what two quadrilaterals share, and two to spare
+NEWTON = 20  # steps to the reference point of a quadrilateral
+AGAIN = 2  # steps after the last, for the imaginary parts
+ENOUGH = 1e-14
+
+
+def rule() -> np.ndarray:
+    """Points and weights (9, 3) on the unit triangle, exact for products of shape functions."""
+    at, weight = triangle_rule(3)
+    return np.concatenate([at, weight[:, None]], axis=1)
+
+
+@njit(cache=True, error_model="numpy")
+def _axes(x, n, axes):
+    """Axes (2, 3) of the plane of a facet."""
+    last = n - 1
+    a, b = np.empty(3, np.complex128), np.empty(3, np.complex128)
+    normal = np.empty(3, np.complex128)
+    for i in range(3):
+        a[i], b[i] = x[2, i] - x[0, i], x[last, i] - x[1, i]
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        normal[i] = a[j] * b[k] - a[k] * b[j]
+    size = np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
+    along = 0j
+    for i in range(3):
+        normal[i] /= size
+        a[i] = x[1, i] - x[0, i]
+        along += a[i] * normal[i]
+    square = 0j
+    for i in range(3):
+        a[i] -= along * normal[i]
+        square += a[i] ** 2
+    for i in range(3):
+        axes[0, i] = a[i] / np.sqrt(square)
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        axes[1, i] = normal[j] * axes[0, k] - normal[k] * axes[0, j]
+
+
+@njit(cache=True, error_model="numpy")
+def _flat(x, n, origin, axes, out):
+    """Corners (n, 2) of a facet seen in the plane."""
+    for p in range(n):
+        for e in range(2):
+            out[p, e] = 0j
+            for i in range(3):
+                out[p, e] += (x[p, i] - origin[i]) * axes[e, i]
+
+
+@njit(cache=True, error_model="numpy")
+def _cut(corners, count, start, end, out):
+    """What lies to the left of start -> end into out; how many corners."""
+    kept = 0
+    for p in range(count):
+        q = (p + 1) % count
+        h = (end[0] - start[0]) * (corners[p, 1] - start[1]) - (end[1] - start[1]) * (
+            corners[p, 0] - start[0]
+        )
+        g = (end[0] - start[0]) * (corners[q, 1] - start[1]) - (end[1] - start[1]) * (
+            corners[q, 0] - start[0]
+        )
+        if h.real >= 0:
+            out[kept, 0], out[kept, 1] = corners[p, 0], corners[p, 1]
+            kept += 1
+        if h.real * g.real < 0:
+            share = h / (h - g)
+            for e in range(2):
+                out[kept, e] = corners[p, e] + share * (corners[q, e] - corners[p, e])
+            kept += 1
+    return kept
+
+
+@njit(cache=True, error_model="numpy")
+def _shapes(x, n, at0, at1, phi):
+    """Shape functions of a facet with corners x (n, 2) at a point of the plane."""
+    for p in range(phi.shape[0]):
+        phi[p] = 0j
+    if n == 3:
+        a0, a1 = x[1, 0] - x[0, 0], x[1, 1] - x[0, 1]
+        b0, b1 = x[2, 0] - x[0, 0], x[2, 1] - x[0, 1]
+        r0, r1 = at0 - x[0, 0], at1 - x[0, 1]
+        det = a0 * b1 - a1 * b0
+        s, t = (r0 * b1 - r1 * b0) / det, (a0 * r1 - a1 * r0) / det
+        phi[0], phi[1], phi[2] = 1 - s - t, s, t
+        return
+    s, t, left = 0.5 + 0j, 0.5 + 0j, NEWTON
+    while left > 0:
+        left -= 1
+        a0 = (1 - t) * (x[1, 0] - x[0, 0]) + t * (x[2, 0] - x[3, 0])
+        a1 = (1 - t) * (x[1, 1] - x[0, 1]) + t * (x[2, 1] - x[3, 1])
+        b0 = (1 - s) * (x[3, 0] - x[0, 0]) + s * (x[2, 0] - x[1, 0])
+        b1 = (1 - s) * (x[3, 1] - x[0, 1]) + s * (x[2, 1] - x[1, 1])
+        r0 = at0 - (1 - s) * (1 - t) * x[0, 0] - s * (1 - t) * x[1, 0]
+        r0 -= s * t * x[2, 0] + (1 - s) * t * x[3, 0]
+        r1 = at1 - (1 - s) * (1 - t) * x[0, 1] - s * (1 - t) * x[1, 1]
+        r1 -= s * t * x[2, 1] + (1 - s) * t * x[3, 1]
+        det = a0 * b1 - a1 * b0
+        ds, dt = (r0 * b1 - r1 * b0) / det, (a0 * r1 - a1 * r0) / det
+        s, t = s + ds, t + dt
+        if left > AGAIN and abs(ds.real) + abs(dt.real) < ENOUGH:
+            left = AGAIN
+    phi[0], phi[1], phi[2], phi[3] = (1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t
+
+
+@njit(cache=True, error_model="numpy")
+def _shared(slave, na, master, nb, rule, mass, cross):  # noqa: PLR0913
+    """int phi phi into mass (a, a) and int phi N into cross (a, b) of one pair."""
+    mass[:], cross[:] = 0j, 0j
+    axes = np.empty((2, 3), np.complex128)
+    _axes(slave, na, axes)
+    x, y = np.empty((4, 2), np.complex128), np.empty((4, 2), np.complex128)
+    _flat(slave, na, slave[0], axes, x)
+    _flat(master, nb, slave[0], axes, y)
+    one, other = np.empty((ROOM, 2), np.complex128), np.empty((ROOM, 2), np.complex128)
+    for p in range(nb):  # seen from behind it goes round the other way
+        one[p, 0], one[p, 1] = y[nb - 1 - p, 0], y[nb - 1 - p, 1]
+    count = nb
+    for side in range(na):
+        count = _cut(one, count, x[side], x[(side + 1) % na], other)
+        one, other = other, one
+        if count < 3:
+            return
+    phi = np.empty(mass.shape[0], np.complex128)
+    opposite = np.empty(cross.shape[1], np.complex128)
+    for p in range(1, count - 1):
+        a0, a1 = one[p, 0] - one[0, 0], one[p, 1] - one[0, 1]
+        b0, b1 = one[p + 1, 0] - one[0, 0], one[p + 1, 1] - one[0, 1]
+        double = a0 * b1 - a1 * b0
+        if double.real <= 0:
+            continue
+        for q in range(rule.shape[0]):
+            at0 = one[0, 0] + rule[q, 0] * a0 + rule[q, 1] * b0
+            at1 = one[0, 1] + rule[q, 0] * a1 + rule[q, 1] * b1
+            _shapes(x, na, at0, at1, phi)
+            _shapes(y, nb, at0, at1, opposite)
+            for r in range(na):
+                weight = rule[q, 2] * double * phi[r]
+                for t in range(na):
+                    mass[r, t] += weight * phi[t]
+                for b in range(nb):
+                    cross[r, b] += weight * opposite[b]
+
+
+@njit(cache=True, error_model="numpy")
+def plane_integrals(slave, corners, master, facing, rule, step, mass, cross):  # noqa: PLR0913
+    """Integrals of k pairs of facets (k, a, 3), (k, b, 3), with corners, facing (k,) corners.
+
+    step 0: mass (k, 1, a, a) and cross (k, 1, a, b) themselves; else their derivatives by the
+    (a + b) 3 coordinates in the second place, of a complex step.
+    """
+    k, a, b = slave.shape[0], slave.shape[1], master.shape[1]
+    x, y = np.empty((a, 3), np.complex128), np.empty((b, 3), np.complex128)
+    m, c = np.empty((a, a), np.complex128), np.empty((a, b), np.complex128)
+    for i in range(k):
+        for way in range(mass.shape[1]):
+            x[:], y[:] = slave[i], master[i]
+            if step > 0:
+                node, e = way // 3, way % 3
+                if (node < a and node >= corners[i]) or node - a >= facing[i]:
+                    continue  # of the padding
+                if node < a:
+                    x[node, e] += 1j * step
+                else:
+                    y[node - a, e] += 1j * step
+            _shared(x, corners[i], y, facing[i], rule, m, c)
+            for r in range(a):
+                for t in range(a):
+                    mass[i, way, r, t] = m[r, t].imag / step if step > 0 else m[r, t].real
+                for t in range(b):
+                    cross[i, way, r, t] = c[r, t].imag / step if step > 0 else c[r, t].real

@@ -1,0 +1,214 @@
+"""Contact of two deforming bodies in the equations of large deformations.
+
+The force lambda_p on a slave node is all that its body needs there, f_int - f, as the dual
+functions leave no other slave's force on it.  The other nodes j of its pair carry
+
+    f_int - f = sum_p B_pj lambda_p,                                                        (1)
+
+B of `contact.current_mortar`.  With both eliminated that way the displacements are all
+unknowns; `PairLinearisation` has the derivative of (1) and of the law in them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..contact.current import ContactPoint
+from ..contact.current_mortar import MortarMeeting
+from ..contact.current_pairs import Meeting, Meetings
+from ..contact.current_slopes import blocks_of
+from .nodal_forces import NodalForces
+from .nonlinear_parts import NonlinearParts
+
+Array = NDArray[np.float64]
+
+
+def balanced(parts: NonlinearParts, meeting: Meetings, rest: Array) -> Array:
+    """f_int - f (dofs,) without the forces that contacts give to nodes other than the slave."""
+    if meeting.only_obstacles:
+        return rest
+    own = rest[parts.at] * parts.contact.free * meeting.met[:, None]
+    return rest - (meeting.others @ own).ravel()
+
+
+def _others(parts: NonlinearParts, meeting: Meetings) -> sparse.csr_array:
+    """Forces on other nodes per force on the slaves, (dofs, nc d)."""
+    d = parts.at.shape[1]
+    counts = parts.contact.free * meeting.met[:, None]
+    spread = sparse.kron(meeting.others, sparse.eye_array(d), format="csr")
+    return sparse.csr_array(spread @ sparse.diags_array(counts.ravel().astype(float)))
+
+
+@dataclass(frozen=True, eq=False)
+class Linearisation:
+    """F and its derivatives at one state, with obstacles alone.
+
+    u (nodes, d): displacements; rest (dofs,): f_int - f; blocks: its derivative; by_force,
+    by_x, by_motion (nc, d, d): those of the contact law.
+    """
+
+    parts: NonlinearParts
+    u: Array
+    rest: Array
+    blocks: Array
+    point: ContactPoint
+    by_force: Array
+    by_x: Array
+    by_motion: Array
+
+    @property
+    def residual(self) -> Array:
+        """F, (n,)."""
+        parts = self.parts
+        out = self.rest.copy()
+        out[parts.at] = self.point.residual()
+        return out[parts.free]
+
+    @cached_property
+    def matrix(self) -> sparse.csc_array:
+        """dF/dv, (n, n)."""
+        parts = self.parts
+        blocks = self.blocks.copy()
+        rows = np.flatnonzero(parts.row_contact >= 0)
+        blocks[rows] = self.by_force[parts.row_contact[rows]] @ blocks[rows]
+        blocks[parts.diagonal] += self.by_x + self.by_motion
+        return parts.on_free(blocks)
+
+    def shifted(
+        self, load: NodalForces | Array, prescribed: Array, drift: Array | None = None
+    ) -> Array:
+        """First-order change of F, (n,), with changes of load, prescribed (dofs,) and drift."""
+        parts = self.parts
+        change = parts.matrix(self.blocks) @ prescribed - NodalForces.of(load).at(self.u)
+        at = np.einsum("pij,pj->pi", self.by_force, change[parts.at])
+        if drift is not None:
+            at += np.einsum("pij,pj->pi", self.by_motion, drift)
+        change[parts.at] = at
+        return change[parts.free]
+
+    def passed(self, change: Array) -> Array:
+        """First-order change of F, (n,), with a change of f_int - f, (dofs,)."""
+        parts, out = self.parts, change.copy()
+        out[parts.at] = np.einsum("pij,pj->pi", self.by_force, change[parts.at])
+        return out[parts.free]
+
+
+@dataclass(frozen=True, eq=False)
+class PairLinearisation:
+    """F and its derivatives at one state, displacements u (nodes, d).
+
+    needed, rest (dofs,): f_int - f, and balanced; blocks: derivative of the first in node
+    blocks; partials: of the law, see `ContactPoint.partials`.
+    """
+
+    parts: NonlinearParts
+    u: Array
+    needed: Array
+    rest: Array
+    blocks: Array
+    point: ContactPoint
+    earlier: Meetings
+    partials: tuple[Array, Array, Array, Array]
+
+    @cached_property
+    def residual(self) -> Array:
+        """F, (n,)."""
+        out = self.rest.copy()
+        out[self.parts.at] = self.point.residual()
+        return out[self.parts.free]
+
+    @cached_property
+    def _passing(self) -> sparse.csr_array:
+        """Derivative of F by f_int - f on all nodes, (dofs, dofs), at fixed positions."""
+        parts = self.parts
+        at, dofs = parts.at.ravel(), len(self.rest)
+        own = sparse.csr_array((np.ones(len(at)), (np.arange(len(at)), at)),
+                               shape=(len(at), dofs))  # fmt: skip
+        eye = sparse.eye_array(dofs, format="csr")
+        passed = eye - _others(parts, self.point.meeting) @ own
+        kept = np.ones(dofs)
+        kept[at] = 0.0
+        law = own.T @ (blocks_of(self.partials[0]) @ own)
+        return sparse.csr_array((sparse.diags_array(kept) + law) @ passed)
+
+    def passed(self, change: Array) -> Array:
+        """First-order change of F, (n,), with a change of f_int - f, (dofs,)."""
+        return (self._passing @ change)[self.parts.free]
+
+    @cached_property
+    def whole(self) -> sparse.csr_array:
+        """dF/dx, (dofs, dofs), as if no node were held."""
+        parts, meeting = self.parts, self.point.meeting
+        dofs, at = len(self.rest), parts.at.ravel()
+        _, by_normal, by_gap, by_motion = self.partials
+        force = self.needed[parts.at] * parts.contact.free * meeting.met[:, None]
+        rows, turned = [], sparse.csr_array((dofs, dofs))
+        start = 0
+        for part, old in zip(meeting.parts, self.earlier.parts, strict=True):
+            mine = slice(start, start + len(part.slaves))
+            start = mine.stop
+            if isinstance(part, MortarMeeting) and isinstance(old, MortarMeeting):
+                turned = turned + part.slopes.spread(force[mine])
+            rows.append(
+                blocks_of(by_normal[mine]) @ normal_slopes(part, dofs)
+                + blocks_of(by_gap[mine][:, :, None]) @ gap_slopes(part, dofs)
+                + blocks_of(by_motion[mine]) @ motion_slopes(part, old, dofs)
+            )
+        out = self._passing @ parts.matrix(self.blocks).tocsr() - turned
+        local = sparse.csr_array(sparse.vstack(rows))
+        own = sparse.csr_array((np.ones(len(at)), (at, np.arange(len(at)))),
+                               shape=(dofs, len(at)))  # fmt: skip
+        return sparse.csr_array(out + own @ local)
+
+    @cached_property
+    def matrix(self) -> sparse.csc_array:
+        """dF/dv, (n, n)."""
+        free = self.parts.free
+        return sparse.csc_array(self.whole[free].tocsc()[:, free])
+
+    def shifted(
+        self, load: NodalForces | Array, prescribed: Array, drift: Array | None = None
+    ) -> Array:
+        """First-order change of F, (n,), with changes of load, prescribed (dofs,) and drift."""
+        change = self.whole @ prescribed - self._passing @ NodalForces.of(load).at(self.u)
+        if drift is not None:
+            change[self.parts.at] += np.einsum("pij,pj->pi", self.partials[3], drift)
+        return change[self.parts.free]
+
+
+def normal_slopes(part: Meeting | MortarMeeting, dofs: int) -> sparse.csr_array:
+    """Derivatives of the normals by the positions of all nodes, (nc d, dofs)."""
+    if isinstance(part, MortarMeeting):
+        return part.slopes.normals
+    return _at_slaves(part, part.side.normal_slopes(part.x), dofs)
+
+
+def gap_slopes(part: Meeting | MortarMeeting, dofs: int) -> sparse.csr_array:
+    """The same of the gaps, (nc, dofs)."""
+    if isinstance(part, MortarMeeting):
+        return part.slopes.gap
+    return _at_slaves(part, part.side.gap_slopes(part.x)[:, None], dofs)
+
+
+def motion_slopes(
+    part: Meeting | MortarMeeting, old: Meeting | MortarMeeting, dofs: int
+) -> sparse.csr_array:
+    """The same of the motion since `old`, (nc d, dofs)."""
+    if isinstance(part, MortarMeeting) and isinstance(old, MortarMeeting):
+        return part.slopes.motion(old)
+    d = part.x.shape[1]
+    return _at_slaves(part, np.broadcast_to(np.eye(d), (len(part.slaves), d, d)), dofs)
+
+
+def _at_slaves(part: Meeting | MortarMeeting, values: Array, dofs: int) -> sparse.csr_array:
+    """Rows (nc, m, d) by the place of the slave alone, (nc m, dofs)."""
+    nc, m, d = values.shape
+    rows = np.broadcast_to(np.arange(nc * m).reshape(nc, m, 1), values.shape)
+    columns = part.slaves[:, None, None] * d + np.arange(d)
+    entries = (values.ravel(), (rows.ravel(), np.broadcast_to(columns, values.shape).ravel()))
+    return sparse.coo_array(entries, shape=(nc * m, dofs)).tocsr()

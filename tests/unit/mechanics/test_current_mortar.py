@@ -1,0 +1,150 @@
+"""Two deforming bodies where they are now: slopes, patch test, rotations, momentum, words."""
+
+import numpy as np
+import pytest
+from tangent_checker import checked_tangents
+
+import amontons as am
+from amontons.mechanics.contact.current_mortar import MortarPair
+from amontons.mechanics.contact.facing import Skin
+from amontons.mechanics.meshes import Facets
+from amontons.mechanics.model.large_deformation import large_deformation, large_step
+
+NEO, SOFT = am.NeoHookean(1.0, 0.3), am.LinearElastic(1.0, 0.3)
+STEP = 1e-6
+
+
+def lines(slaves=6, masters=8, apart=0.02):
+    """A wavy line over another, which it overhangs at one end: (pair, positions)."""
+    upper = np.stack([np.linspace(0.1, 1.3, slaves), np.full(slaves, apart)], axis=1)
+    lower = np.stack([np.linspace(0, 1, masters), np.zeros(masters)], axis=1)
+    over = np.stack([np.arange(slaves - 1), np.arange(1, slaves)], axis=1)
+    under = slaves + np.stack([np.arange(1, masters), np.arange(masters - 1)], axis=1)
+    skins = [Skin.of((Facets("line", nodes),), 0) for nodes in (over, under)]
+    nodes = np.arange(slaves)
+    free = np.ones((slaves, 2), dtype=bool)
+    free[0, 0] = False
+    return MortarPair(nodes, *skins, free), np.concatenate([upper, lower])
+
+
+def moments(arms, forces):
+    """Sum of the moments of forces (k, 2)."""
+    return (arms[:, 0] * forces[:, 1] - arms[:, 1] * forces[:, 0]).sum()
+
+
+def without(pair, node):
+    """The pair without a row for a slave node: its neighbours take its share."""
+    kept = pair.slaves != node
+    return MortarPair(pair.slaves[kept], pair.slave, pair.master, pair.free[kept])
+
+
+def told(meeting, earlier, force):
+    """What has derivatives, of the nodes that meet now and did so before."""
+    both = (meeting.met & earlier.met)[:, None]
+    return [meeting.normals, meeting.distances * meeting.met[:, None],
+            meeting.gap * meeting.met, meeting.averages.T @ force,
+            meeting.motion(earlier) * both]  # fmt: skip
+
+
+@pytest.mark.parametrize("left_out", [None, 2])
+def test_slopes_are_exact_at_random_states(left_out):
+    pair, rest = lines()
+    pair = pair if left_out is None else without(pair, left_out)
+    earlier, rng = pair.at(rest), np.random.default_rng(0)
+    checked = 0
+    for _ in range(100):
+        x, way = rest + 0.03 * rng.standard_normal(rest.shape), rng.standard_normal(rest.shape)
+        here, behind, ahead = (pair.at(x + k * STEP * way) for k in (0, -1, 1))
+        if not ((behind.met == ahead.met).all() and (here.met == ahead.met).all()):
+            continue
+        force = rng.standard_normal((len(here.met), 2)) * here.met[:, None]
+        slopes, both = here.slopes, np.repeat(here.met & earlier.met, 2)
+        found = [one @ way.ravel() for one in (
+            slopes.normals, slopes.distances, slopes.gap, slopes.spread(force),
+            slopes.motion(earlier),
+        )]  # fmt: skip
+        found[-1] = found[-1] * both
+        differences = (told(side, earlier, force) for side in (ahead, behind))
+        for mine, after, before in zip(found, *differences, strict=True):
+            difference = (after - before).ravel() / (2 * STEP)
+            assert np.abs(mine - difference).max() < 1e-7 * np.abs(difference).max()
+        checked += 1
+    assert checked > 90
+
+
+def test_forces_balance_and_rotations_are_no_slip():
+    pair, rest = lines()
+    rng = np.random.default_rng(1)
+    x = rest + 0.02 * rng.standard_normal(rest.shape)
+    here = pair.at(x)
+    assert 4 <= here.met.sum() < len(here.met)
+    force = rng.standard_normal((len(here.met), 2)) * here.met[:, None]
+    spread = here.averages.T @ force
+    assert np.abs(spread.sum(axis=0)).max() < 1e-14
+    moment = moments(x, spread) - moments(here.distances, force)
+    assert abs(moment) < 1e-14
+    for angle in (0.3, 1.7, 3.0, -2.2):
+        c, s = np.cos(angle), np.sin(angle)
+        turn = np.array([[c, -s], [s, c]])
+        free = MortarPair(pair.slaves, pair.slave, pair.master, np.ones_like(pair.free))
+        before, after = free.at(x), free.at(x @ turn.T + [3.0, -1.0])
+        both = before.met
+        assert (after.met == both).all()
+        np.testing.assert_allclose(after.averages.toarray(), before.averages.toarray(),
+                                   atol=1e-12)  # fmt: skip
+        np.testing.assert_allclose(after.motion(before)[both], 0, atol=1e-13)
+        np.testing.assert_allclose(after.gap[both], before.gap[both], atol=1e-13)
+
+
+def two_blocks(top, *, mu, law=NEO, cells=(3, 5), swap=False, **options):
+    """A block on a wider one, whose bottom is held."""
+    n, m = cells
+    lower = am.Body(am.box((2, 1), (m, 3), origin=(-0.5, -1)), law, name="lower")
+    upper = am.Body(am.box((1, 1), n), law, name="upper")
+    sides = ("upper.bottom", "lower.top")[:: -1 if swap else 1]
+    pair = am.Contact(sides[0], master=sides[1], mu=mu, kinematics="finite", **options)
+    return am.Model([lower, upper], [am.Fix("lower.bottom", 0), am.Fix("upper.top", top)],
+                    [pair])  # fmt: skip
+
+
+@pytest.mark.parametrize("law", [NEO, SOFT])
+@pytest.mark.parametrize("swap", [False, True])
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+def test_the_tangent_is_exact(mu, swap, law):
+    model = two_blocks(0, mu=mu, swap=swap, law=law)
+    rng = np.random.default_rng(3)
+    dofs = large_deformation(model).parts.X.size
+    before = 0.02 * rng.standard_normal(dofs)
+    problem = large_step(model, np.zeros(dofs), np.zeros(dofs), before)
+    draws = (rng.standard_normal((2, problem.unknowns)) * [[0.03], [1.0]] for _ in range(20))
+    assert checked_tangents(problem, draws) > 12
+
+
+@pytest.mark.parametrize("swap", [False, True])
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+def test_patch(swap, mu):
+    """Two blocks of meshes that do not match, 30 % shorter: one stretch everywhere."""
+    lower = am.Body(am.box((1, 1), (5, 3), origin=(0, -1)), NEO, name="lower")
+    upper = am.Body(am.box((1, 1), (3, 4), kind="tri"), NEO, name="upper")
+    supports = [am.Fix("lower.bottom", (None, 0)), am.Fix("upper.top", (None, -0.6)),
+                am.Fix("lower.left", (0, None)), am.Fix("upper.left", (0, None))]  # fmt: skip
+    sides = ("upper.bottom", "lower.top")[:: -1 if swap else 1]
+    pair = am.Contact(sides[0], master=sides[1], mu=mu, kinematics="finite")
+    model = am.Model([lower, upper], supports, [pair])
+    solution = am.solve(model, tolerance=1e-12)
+    stretches = []
+    for body, moved in zip(model.bodies, solution.displacement, strict=True):
+        basis = np.c_[body.mesh.points, np.ones(len(body.mesh.points))]
+        fit = np.linalg.lstsq(basis, moved, rcond=None)[0]
+        assert np.abs(basis @ fit - moved).max() < 1e-10
+        stretches.append(fit[:2])
+    assert np.abs(stretches[0] - stretches[1]).max() < 1e-10
+    assert np.ptp(solution.pressure) < 1e-10
+    assert solution.convergence.iterations <= 6
+
+
+def test_what_two_bodies_do_not_have_is_said():
+    with pytest.raises(am.UnsupportedForm, match="method='mortar'"):
+        am.solve(two_blocks((0, -0.1), mu=0.1, method="nodal"))
+    with pytest.raises(am.UnsupportedForm, match="friction bound"):
+        am.solve(two_blocks((0, -0.1), mu=None, tresca=0.1))

@@ -1,0 +1,147 @@
+"""Two surfaces in space where they are now: slopes, also beside edges, rotations, momentum."""
+
+import numpy as np
+import pytest
+
+from amontons.mechanics.contact.current_mortar import MortarPair
+from amontons.mechanics.contact.facing import Skin
+from amontons.mechanics.meshes import Facets
+
+STEP = 1e-7
+
+
+def grid(n, size, at, *, split=False, down=False):
+    """n x n facets over a square with its corner at (x, y, z): (facets, points)."""
+    line = np.linspace(0, size, n + 1)
+    x, y = (values.ravel() for values in np.meshgrid(line, line, indexing="ij"))
+    points = np.stack([x, y, np.zeros(len(x))], axis=1) + at
+    i, j = (k.ravel() for k in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
+    first = i * (n + 1) + j
+    quads = np.stack([first, first + n + 1, first + n + 2, first + 1], axis=1)
+    quads = quads[:, ::-1] if down else quads
+    if split:
+        return Facets("tri", np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]])), points
+    return Facets("quad", quads), points
+
+
+def surfaces(*, split=(False, False), apart=0.02):
+    """A square over a wider one, whose edge it passes: (pair, positions)."""
+    over, upper = grid(3, 1.2, (0.3, 0.2, apart), split=split[0], down=True)
+    under, lower = grid(3, 1.1, (0, 0, 0), split=split[1])
+    skins = [Skin.of((over,), 0), Skin.of((under,), len(upper))]
+    nodes = np.arange(len(upper))
+    return (MortarPair(nodes, *skins, np.ones((len(nodes), 3), dtype=bool)),
+            np.concatenate([upper, lower]))  # fmt: skip
+
+
+def told(meeting, earlier, force):
+    """What has derivatives, of the nodes that meet now and did so before."""
+    both = (meeting.met & earlier.met)[:, None]
+    return [meeting.normals, meeting.distances * meeting.met[:, None],
+            meeting.gap * meeting.met, meeting.averages.T @ force,
+            meeting.motion(earlier) * both]  # fmt: skip
+
+
+def alike(one, other):
+    """Whether the same facets face each other, and the same nodes carry force."""
+    same = one.met.tolist() == other.met.tolist()
+    return same and all(
+        getattr(one.shared, name).tolist() == getattr(other.shared, name).tolist()
+        for name in ("slave", "master", "kept")
+    )
+
+
+def worst_slope(pair, earlier, x, way, rng):
+    """Largest relative error of all slopes along a way; None where they have a kink."""
+    here, behind, ahead = (pair.at(x + k * STEP * way) for k in (0, -1, 1))
+    if not all(alike(here, side) for side in (behind, ahead)):
+        return None
+    force = rng.standard_normal((len(here.met), 3)) * here.met[:, None]
+    slopes, both = here.slopes, np.repeat(here.met & earlier.met, 3)
+    found = [one @ way.ravel() for one in (
+        slopes.normals, slopes.distances, slopes.gap, slopes.spread(force),
+        slopes.motion(earlier))]  # fmt: skip
+    found[-1] = found[-1] * both
+    sides = (told(side, earlier, force) for side in (ahead, behind))
+    worst = 0.0
+    for mine, after, before in zip(found, *sides, strict=True):
+        difference = (after - before).ravel() / (2 * STEP)
+        worst = max(worst, np.abs(mine - difference).max() / np.abs(difference).max())
+    return worst
+
+
+def put_beside_edges(pair, x, rng):
+    """Moves slave nodes to 1e-4 beside nodes and middles of edges of the master; how many."""
+    at = x[pair.master.nodes]
+    marks = np.concatenate([at, (at + np.roll(at, 1, axis=1)) / 2]).reshape(-1, 3)[:, :2]
+    apart = np.linalg.norm(x[pair.slaves, None, :2] - marks, axis=2)
+    near = apart.min(axis=1) < 0.12
+    x[pair.slaves[near], :2] = marks[apart.argmin(axis=1)[near]]
+    x[pair.slaves[near], :2] += 1e-4 * rng.standard_normal((near.sum(), 2))
+    return int(near.sum())
+
+
+@pytest.mark.parametrize("split", [(False, False), (True, False), (False, True), (True, True)])
+def test_slopes_at_random_states(split):
+    """Also of states whose nodes lie 1e-4 of a facet beside an edge of the other side."""
+    pair, rest = surfaces(split=split)
+    earlier, rng = pair.at(rest), np.random.default_rng(0)
+    errors, beside = [], 0
+    for k in range(60):
+        x = rest + 0.03 * rng.standard_normal(rest.shape)
+        if k % 2:
+            beside += put_beside_edges(pair, x, rng)
+        worst = worst_slope(pair, earlier, x, rng.standard_normal(rest.shape), rng)
+        if worst is not None:
+            errors.append(worst)
+    assert len(errors) > 50
+    assert beside > 60
+    assert max(errors) < 1e-7
+
+
+@pytest.mark.parametrize("split", [(False, False), (True, True)])
+def test_forces_balance_and_rotations_change_nothing(split):
+    pair, rest = surfaces(split=split)
+    rng = np.random.default_rng(1)
+    x = rest + 0.02 * rng.standard_normal(rest.shape)
+    here = pair.at(x)
+    assert 4 <= here.met.sum() < len(here.met)
+    force = rng.standard_normal((len(here.met), 3)) * here.met[:, None]
+    spread = here.averages.T @ force
+    assert np.abs(spread.sum(axis=0)).max() < 1e-14
+    moment = np.cross(x, spread).sum(axis=0) - np.cross(here.distances, force).sum(axis=0)
+    assert np.abs(moment).max() < 1e-14
+    for _ in range(5):
+        turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+        turn *= np.sign(np.linalg.det(turn))
+        after = pair.at(x @ turn.T + [3.0, -1.0, 2.0])
+        assert (after.met == here.met).all()
+        np.testing.assert_allclose(after.averages.toarray(), here.averages.toarray(),
+                                   atol=1e-11)  # fmt: skip
+        both = here.met
+        np.testing.assert_allclose(after.motion(here)[both], 0, atol=1e-11)
+        np.testing.assert_allclose(after.gap[both], here.gap[both], atol=1e-12)
+        np.testing.assert_allclose(after.normals, here.normals @ turn.T, atol=1e-12)
+
+
+def test_the_moment_of_forces_vanishes_as_gaps_do():
+    """Sides that touch all along have none; bent ones one of the size of force times gap."""
+    pair, rest = surfaces(apart=0.0)
+    rng = np.random.default_rng(2)
+    flat = rest.copy()
+    flat[:, :2] += 0.02 * rng.standard_normal(flat[:, :2].shape)
+    for bend, limit in ((0.0, 1e-14), (0.1, None)):
+        x = flat.copy()
+        x[:, 2] += bend * (flat[:, 0] - 0.5) ** 2
+        here = pair.at(x)
+        force = here.normals * here.met[:, None]
+        spread = here.averages.T @ force
+        moment = np.abs(np.cross(x, spread).sum(axis=0)).max()
+        along = np.linalg.norm(here.distances[here.met], axis=1).sum()
+        assert moment < (along if limit is None else limit)
+        if limit is None:
+            # the part along the normal makes none
+            across = here.distances - here.normals * here.gap[:, None]
+            left = np.linalg.norm(across[here.met], axis=1).sum()
+            assert moment <= left + 1e-14
+            assert left < 0.2 * along + 1e-3

@@ -1,0 +1,168 @@
+"""A body that meets itself, small strains that slide far, and the laws of sliding pairs."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tangent_checker import checked_tangents
+
+import amontons as am
+from amontons.mechanics.meshes import Facets
+from amontons.mechanics.model.large_deformation import large_deformation, large_step
+
+NEO, LINEAR = am.NeoHookean(1.0, 0.3), am.LinearElastic(1.0, 0.3)
+ARM, GAP, THICK = 2.0, 0.3, 0.2
+
+
+# ------------------------------------------------------------------------ folded beam
+def hairpin():
+    """A strip bent to a U, arms along x: surfaces "low" and "high" inside, "press" outside."""
+    radius = (GAP + THICK) / 2
+    half = np.pi * radius
+    mesh = am.box((2 * ARM + half, THICK), (48, 4))
+    s, h = mesh.points.T
+    angle = np.clip((s - ARM) / radius, 0, np.pi) - np.pi / 2
+    past = np.maximum(s - ARM - half, 0)
+    centre = np.stack([np.minimum(s, ARM) - past + radius * np.cos(angle),
+                       radius * np.sin(angle)], axis=1)  # fmt: skip
+    inward = -np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    mesh = replace(mesh, points=centre + (h - THICK / 2)[:, None] * inward)
+    (inside,), (outside,) = mesh.surface("top"), mesh.surface("bottom")
+    first, second = (mesh.points[f.nodes].mean(axis=1) for f in (inside, outside))
+    tip = (second[:, 1] > 0) & (second[:, 0] < 0.4)
+    return mesh.with_surfaces({
+        "low": (Facets("line", inside.nodes[first[:, 1] < 0]),),
+        "high": (Facets("line", inside.nodes[first[:, 1] > 0]),),
+        "press": (Facets("line", outside.nodes[tip]),),
+    })  # fmt: skip
+
+
+def test_a_folded_beam_meets_itself_and_slides():
+    """Its arms are pressed together, one is pulled along the other; forces balance."""
+
+    def along(x, t):
+        return 0.5 * max(t - 1, 0)
+
+    def down(x, t):
+        return -0.45 * min(t, 1)
+
+    mesh = hairpin()
+    model = am.Model([am.Body(mesh, NEO, name="beam")],
+                     [am.Fix("left", 0), am.Fix("press", (along, down))],
+                     [am.Contact("high", master="low", mu=0.3)])  # fmt: skip
+    closed, counts = [], []
+    for step in am.evolve(model, am.QuasiStatic(0.1), until=1.6):
+        counts.append(step.solution.convergence.iterations)
+        parts = large_deformation(step.model).parts
+        u = step.state.displacement.reshape(parts.X.shape)
+        spread = parts.meet(u).columns(step.frames) @ step.state.force.ravel()
+        size = np.abs(spread).sum()
+        assert np.abs(spread.reshape(-1, 2).sum(axis=0)).max() <= 1e-12 * size
+        closed.append(int((step.state.force[:, 0] > 0).sum()))
+        moved = parts.X + u  # the arms do not pass through each other
+        high, low = (moved[mesh.surface_nodes(name)] for name in ("high", "low"))
+        flat = low[low[:, 0] < ARM]
+        under = np.interp(high[:, 0], *flat[np.argsort(flat[:, 0])].T)
+        assert (high[:, 1] - under > -0.02)[high[:, 0] < 1.5].all()
+    assert closed[0] == 0
+    assert closed[9] >= 2
+    assert closed[-1] >= 1
+    assert np.mean(counts) <= 6
+
+
+def test_a_surface_is_not_its_own_master():
+    body = am.Body(hairpin(), NEO, name="beam")
+    model = am.Model([body], [am.Fix("left", 0)], [am.Contact("top", master="top", mu=0.1)])
+    with pytest.raises(am.InvalidInput, match="name the two sides as separate surfaces"):
+        am.solve(model)
+
+
+# --------------------------------------------------------------------- small strains
+def blocks(law, top, order=1, **options):
+    lower = am.Body(am.box((3, 1), (8, 3), origin=(-0.5, -1)), law, name="lower", order=order)
+    upper = am.Body(am.box((1, 1), 3), law, name="upper", order=order)
+    pair = am.Contact("upper.bottom", master="lower.top", kinematics="finite", **options)
+    return am.Model([lower, upper], [am.Fix("lower.bottom", 0), am.Fix("upper.top", top)],
+                    [pair])  # fmt: skip
+
+
+def test_small_strains_slide_far():
+    """A block pressed by 1e-4 and dragged by its width: the force stays mu N.
+
+    Pairs are found again on the way: contact found once would end where the block began.
+    """
+
+    def along(x, t):
+        return 1.0 * max(t - 1, 0)
+
+    def down(x, t):
+        return -1e-4 * min(t, 1)
+
+    model = blocks(LINEAR, (along, down), mu=0.3)
+    steps = list(am.evolve(model, am.QuasiStatic(0.1), until=2.0))
+    forces = [np.einsum("pkc,pk->pc", s.frames, s.state.force).sum(axis=0) for s in steps]
+    first, last = forces[len(forces) // 2 + 1], forces[-1]
+    for force in (first, last):
+        assert abs(force[0] / force[1] + 0.3) < 1e-3
+    assert abs(last[1] / first[1] - 1) < 0.1  # as far from one end as from the other before
+    assert np.mean([s.solution.convergence.iterations for s in steps]) <= 6
+
+
+# -------------------------------------------------------------------------------- laws
+def test_shear_stays_below_a_cap():
+    cap = 0.002
+    model = blocks(NEO, (0.05, -0.05), mu=0.3, cap=cap)
+    solution = am.solve(model)
+    assert (solution.pressure > 2 * cap / 0.3).all()
+    np.testing.assert_allclose(np.abs(solution.shear[:, 0]), cap, rtol=1e-7)
+
+
+def test_the_tangent_with_a_cap_is_exact():
+    model = blocks(NEO, 0, mu=0.3, cap=0.002)
+    rng = np.random.default_rng(3)
+    dofs = large_deformation(model).parts.X.size
+    problem = large_step(model, np.zeros(dofs), np.zeros(dofs),
+                         0.02 * rng.standard_normal(dofs))  # fmt: skip
+    draws = (rng.standard_normal((2, problem.unknowns)) * [[0.03], [1.0]] for _ in range(10))
+    assert checked_tangents(problem, draws) > 5
+
+
+@pytest.mark.parametrize(("options", "word"), [
+    ({"mu": 0.3, "cohesion": 0.1}, "cohesion"),
+    ({"mu": 0.3, "stiffness": 10.0}, "compliance"),
+    ({"mu": 0.3, "clearance": 0.01}, "clearance"),
+    ({"tied": True}, "ties"),
+    ({"tresca": 0.1}, "friction bound"),
+    ({"mu": 0.3, "order": 2}, "facets of first order"),
+])  # fmt: skip
+def test_what_sliding_pairs_do_not_have_is_said(options, word):
+    with pytest.raises((am.UnsupportedLaw, am.UnsupportedForm), match=word):
+        am.solve(blocks(NEO, (0.05, -0.05), **options))
+
+
+def test_orthotropic_friction_is_refused():
+    lower = am.Body(am.box((2, 2, 1), (3, 3, 1), origin=(-0.5, -0.5, -1)), NEO, name="lower")
+    upper = am.Body(am.box((1, 1, 1), 2), NEO, name="upper")
+    pair = am.Contact("upper.bottom", master="lower.top", mu=0.3, mu_across=0.1,
+                      direction=(1, 0, 0), kinematics="finite")  # fmt: skip
+    supports = [am.Fix("lower.bottom", 0), am.Fix("upper.top", 0)]
+    with pytest.raises(am.UnsupportedLaw, match="orthotropic"):
+        am.solve(am.Model([lower, upper], supports, [pair]))
+
+
+def test_a_held_node_may_pass_beside_the_master():
+    """Ends of both blocks are held, one lower in the end than the side that it has left."""
+
+    def along(x, t):
+        return 3.2 * min(t, 1)
+
+    def down(x, t):
+        return 0.02 - 0.3 * max(t - 1, 0)
+
+    lower = am.Body(am.box((2, 1), (5, 3), origin=(0, -1)), NEO, name="lower")
+    upper = am.Body(am.box((1, 1), 3), NEO, name="upper")
+    model = am.Model([lower, upper],
+                     [am.Fix("lower.left", 0), am.Fix("upper.left", (along, down))],
+                     [am.Contact("upper.bottom", master="lower.top", mu=0.1)])  # fmt: skip
+    steps = list(am.evolve(model, am.QuasiStatic(0.25), until=2.0))
+    assert all((step.state.force == 0).all() for step in steps)
