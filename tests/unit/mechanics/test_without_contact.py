@@ -77,11 +77,22 @@ def test_a_body_that_nothing_holds():
         am.solve(bar(2, supports=[am.Fix("left", (0.0, None))]))
 
 
-def test_finite_strains_want_a_contact():
-    mesh = am.box((1, 1), 2)
-    model = am.Model([am.Body(mesh, am.NeoHookean(YOUNG, NU))], [am.Fix("left", 0.0)])
-    with pytest.raises(am.UnsupportedForm, match="finite strains"):
-        am.solve(model)
+def test_finite_strains_as_with_a_contact_that_stays_open():
+    """A block pulled to twice its length: in 2D and 3D, loads and supports that follow."""
+    for dim in (2, 3):
+        mesh = am.box((1,) * dim, 2)
+        far = am.Contact("right", am.Plane((-1,) + (0,) * (dim - 1), (9.0,) * dim), mu=0.3)
+        both = [
+            am.solve(am.Model(
+                [am.Body(mesh, am.NeoHookean(YOUNG, NU))], [am.Fix("left", 0.0)], contacts,
+                [am.Traction("right", (150.0,) + (0.0,) * (dim - 1))],
+            ))
+            for contacts in ([], [far])
+        ]  # fmt: skip
+        assert both[0].displacement[0][:, 0].max() > 0.5
+        np.testing.assert_allclose(
+            both[0].displacement[0], both[1].displacement[0], rtol=0, atol=1e-7
+        )
 
 
 CASE = """title = "pull"

@@ -224,6 +224,8 @@ class LargeDeformation(NonlinearProblem):
         load, length = self._sizes(v, r, u, rest)
         rest[self.parts.at] -= np.einsum("pkc,pk->pc", axes, r)
         balance = float(np.linalg.norm(rest[self.parts.free]))
+        if not self.contacts:
+            return balance / load
         law = judge.scaled_residual(r, u, self.law, self.rho)
         return max(balance / load, law / length)
 

@@ -21,6 +21,7 @@ from ..contact.current import CurrentContact
 from ..contact.current_mortar import MortarPair
 from ..contact.current_pairs import Meetings, ObstaclePair, Pair
 from ..contact.facing import Skin
+from ..contact.geometry import Plane
 from ..contact.pairs import KINDS
 from ..elements.given import GivenMatrices
 from ..elements.hyperelasticity import HyperelasticBody, is_hyperelastic
@@ -193,7 +194,7 @@ def _nonlinear_parts(model: Model) -> NonlinearParts:
     X = np.concatenate([body.mesh.points for body in model.bodies])
     d = X.shape[1]
     slaves = [p.rows.nodes + linear.offsets[p.body] // d for p in linear.placed]
-    nodes = np.concatenate(slaves)
+    nodes = np.concatenate([np.zeros(0, dtype=np.int64), *slaves])
     _check_single(nodes)
     pairs = _pairs(model, slaves, linear)
     _check_apart(pairs, nodes)
@@ -219,11 +220,6 @@ def _nonlinear_parts(model: Model) -> NonlinearParts:
 
 
 def _check_supported(model: Model) -> None:
-    if not model.contacts:
-        raise UnsupportedForm(
-            "finite strains are solved with contacts; got none; add a Contact, which may stay "
-            "open, or take LinearElastic", ("contacts",), "",
-        )  # fmt: skip
     asked = all(contact.kinematics == FINITE for contact in model.contacts)
     for k, body in enumerate(model.bodies):
         at, what = ("bodies", k, "material"), f"body {body.name!r}"
@@ -293,6 +289,8 @@ def _pairs(model: Model, slaves: list[Index], linear: Discretisation) -> list[Pa
     d = model.dimension
     is_free = free_dofs(linear).reshape(-1, d)
     out: list[Pair] = []
+    if not model.contacts:  # a floor that no node can meet
+        out.append(ObstaclePair(Plane(np.eye(d)[-1]), np.zeros(0, dtype=np.int64)))
     for contact, nodes in zip(model.contacts, slaves, strict=True):
         if contact.obstacle is not None:
             out.append(ObstaclePair(contact.obstacle, nodes))  # type: ignore[arg-type]
