@@ -238,6 +238,11 @@ class YieldingProblem(TangentProblem):
         """The unknowns v (n,) at share 0 of the load."""
         return np.zeros(self.unknowns) if self.known is None else self.known[2]
 
+    def towards(self, goal: YieldingProblem, v: Array) -> FrictionProblem:
+        """The linear problem at a state v of this problem, under the load of another."""
+        q = self.displacement(v)
+        return goal._tangent(q, self.yielding.respond(q, self.history))
+
     def at_share(self, share: float) -> YieldingProblem:
         """The problem at a share of the way from the known load to this one."""
         nothing = np.zeros_like(self.load)

@@ -34,6 +34,10 @@ class TangentProblem(Problem):
         """The linear problem with contact at a state v (n,)."""
         raise NotImplementedError
 
+    def towards(self, goal: Any, v: Array) -> FrictionProblem:
+        """The linear problem at a state v of this problem, under the load of another."""
+        raise NotImplementedError
+
     def at_share(self, share: float) -> Any:
         """The problem at a share of the load between the known state and the whole load."""
         raise NotImplementedError
@@ -69,7 +73,8 @@ class TangentNewton:
         """
         r, v = start.r, problem.known_state if start.v is None else start.v
         r_new, v_new = r, v
-        share, step, reason, hidden = 0.0, 1.0, "", 0
+        known = np.zeros_like(r), problem.known_state
+        share, step, reason, hidden, given = 0.0, 1.0, "", 0, start.v is not None
         while True:
             if step < self.smallest_share:
                 raise Breakdown(
@@ -79,6 +84,8 @@ class TangentNewton:
             now = problem if goal == 1.0 else problem.at_share(goal)
             count = 0
             try:
+                if not given:  # what supports move would yield alone
+                    r, v = solved(problem.at_share(share).towards(now, v), r, target)
                 for r_new, v_new, error in self._steps(now, r, v, target):
                     count += 1
                     if goal == 1.0:
@@ -88,10 +95,10 @@ class TangentNewton:
                         break
             except (_Failed, SingularOperator) as failure:
                 reason, step = str(failure), step / (4 if share == 0 and step == 1.0 else 2)
-                if share == 0:
-                    r, v = np.zeros_like(start.r), problem.known_state
+                (r, v), given = known, False
                 continue
-            r, v, share, hidden = r_new, v_new, goal, hidden + count
+            known = r, v = r_new, v_new
+            share, hidden = goal, hidden + count
             step *= 2 if count <= EASY else 1
 
     def _steps(
