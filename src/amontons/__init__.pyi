@@ -42,6 +42,7 @@ from .io.fclib import read_fclib as read_fclib, write_fclib as write_fclib
 from .io.matrices import StoredMatrices as StoredMatrices, read_matrices as read_matrices
 from .io.meshes import read_mesh as read_mesh
 from .io.readers import read_case as read_case
+from .io.rigid_bodies import write_rigid as write_rigid
 from .io.series import export_xdmf as export_xdmf
 from .linear import Direct as Direct, GeometricMultigrid as GeometricMultigrid, Petsc as Petsc
 from .mechanics.contact import (
@@ -65,6 +66,11 @@ from .mechanics.model import (
     FoundContacts as FoundContacts, FoundPair as FoundPair, find_contacts as find_contacts,
 )
 from .mechanics.ready.packings import SpherePacking as SpherePacking
+from .mechanics.multibody import (
+    Ball as Ball, Joint as Joint, Polyhedron as Polyhedron, RigidBodies as RigidBodies,
+    RigidBody as RigidBody, RigidState as RigidState, RigidStep as RigidStep,
+    cuboid as cuboid, evolve_rigid as evolve_rigid,
+)
 from .mechanics.ready.walls import Bond as Bond, Wall as Wall
 from .mechanics.steps import (
     MoreauJean as MoreauJean, Passage as Passage, QuasiStatic as QuasiStatic, State as State,

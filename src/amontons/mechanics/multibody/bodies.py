@@ -98,10 +98,9 @@ class Joint:
 class RigidBodies:
     """Bodies, planes that they stand on, friction between all, gravity and joints.
 
-    mu: coefficient of friction, one number, or a function of two body numbers, GROUND (-1) for
-    planes; restitution: normal velocity after over before an impact, from 0 to 1, of all;
-    gravity (3,): acceleration.  apart: pairs of bodies that pass through each other, such as
-    those with a joint.
+    mu: coefficient of friction of all; restitution: normal velocity after over before an
+    impact, from 0 to 1, of all; gravity (3,): acceleration.  apart: pairs of bodies that pass
+    through each other, such as those with a joint.
     """
 
     bodies: Sequence[RigidBody]

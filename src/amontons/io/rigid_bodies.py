@@ -1,0 +1,79 @@
+"""Rigid bodies where they are at the end of a step, as surfaces for viewers."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.files import replacing
+from ..mechanics.multibody import Ball, Polyhedron
+
+if TYPE_CHECKING:
+    from ..mechanics.multibody import RigidStep
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+AROUND = 24  # points of a ball on its equator
+
+
+def write_rigid(step: RigidStep, path: str | os.PathLike[str]) -> None:
+    """Write the surfaces of all bodies at the end of a step: .vtu, .vtk, .stl, .ply, .obj.
+
+    Cells have the number of their `body`, points the `velocity` of the material there, where
+    the format has fields.  Files of many steps with numbers in their names are a film for
+    ParaView.  Raises NotWritten where the file can not be, and meshio's error for a suffix
+    that it does not know.
+    """
+    import meshio
+
+    motion, rotation = step.state.motion, step.rotation
+    points, triangles, velocity, body = [], [], [], []
+    first = 0
+    for k, one in enumerate(step.system.bodies):
+        own, faces = _surface(one.shape)
+        arms = own @ rotation[k].T
+        points.append(motion.position[k] + arms)
+        spin = rotation[k] @ motion.spin[k]
+        velocity.append(motion.velocity[k] + np.cross(spin, arms))
+        triangles.append(faces + first)
+        body.append(np.full(len(faces), k))
+        first += len(own)
+    mesh = meshio.Mesh(
+        np.concatenate(points), [("triangle", np.concatenate(triangles))],
+        point_data={"velocity": np.concatenate(velocity)},
+        cell_data={"body": [np.concatenate(body)]},
+    )  # fmt: skip
+    if not os.fspath(path).lower().endswith((".vtu", ".vtk")):
+        mesh.point_data, mesh.cell_data = {}, {}
+    with replacing(path) as place:
+        meshio.write(place, mesh)
+
+
+def _surface(shape: Ball | Polyhedron) -> tuple[Array, Index]:
+    """Points from the centre of mass (n, 3), and triangles (k, 3), anticlockwise outside."""
+    if isinstance(shape, Polyhedron):
+        fans = [
+            (loop[0], loop[k], loop[k + 1])
+            for loop in shape.facets.loops for k in range(1, len(loop) - 1)
+        ]  # fmt: skip
+        return np.asarray(shape.points) - shape.centre, np.array(fans, dtype=np.int64)
+    half = AROUND // 2
+    polar, round_ = np.pi * np.arange(1, half) / half, 2 * np.pi * np.arange(AROUND) / AROUND
+    ring = np.stack([
+        np.outer(np.sin(polar), np.cos(round_)), np.outer(np.sin(polar), np.sin(round_)),
+        np.repeat(np.cos(polar)[:, None], AROUND, axis=1),
+    ], axis=-1).reshape(-1, 3)  # fmt: skip
+    points = shape.radius * np.vstack([ring, [[0, 0, 1.0]], [[0, 0, -1.0]]])
+    at = np.arange((half - 1) * AROUND).reshape(half - 1, AROUND)
+    beside = np.roll(at, -1, axis=1)
+    top, bottom = len(ring), len(ring) + 1
+    faces = [
+        np.stack([at[:-1], at[1:], beside[1:]], axis=-1).reshape(-1, 3),
+        np.stack([at[:-1], beside[1:], beside[:-1]], axis=-1).reshape(-1, 3),
+        np.stack([np.full(AROUND, top), at[0], beside[0]], axis=-1),
+        np.stack([np.full(AROUND, bottom), beside[-1], at[-1]], axis=-1),
+    ]
+    return points, np.concatenate(faces)
