@@ -60,6 +60,13 @@ def stacked(dim=2, *, order=1, kind=None, fitting=False, loads=None, down=None,
     )  # fmt: skip
 
 
+def freed(model):
+    """The same with nothing held but the bottom."""
+    from dataclasses import replace
+
+    return replace(model, supports=model.supports[:1])
+
+
 def turned_block():
     """A block on a slope, held along the slope by turned supports."""
     from dataclasses import replace
@@ -155,6 +162,9 @@ MODELS = {
     "pair exponential": lambda: stacked(stiffness=am.ExponentialOverclosure(1e-3, 2.0)),
     "tied 2D": lambda: stacked(tied=True),
     "tied 3D": lambda: stacked(3, tied=True),
+    "tied 3D fitting": lambda: stacked(3, fitting=True, tied=True),
+    "tied 3D fitting, slave free": lambda: freed(stacked(3, fitting=True, tied=True)),
+    "tied 3D, slave free": lambda: freed(stacked(3, tied=True)),
     "tied fitting": lambda: stacked(fitting=True, tied=True),
     "rings": ring,
 }  # fmt: skip

@@ -13,6 +13,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ...core.errors import Address, AmontonsError, FileFormatError, InvalidInput
 from ...mechanics.contact.finding import Reach
 from ...mechanics.model import (
@@ -245,10 +247,14 @@ def _joined(
 
 
 def _name_nodes(region: Region, history: History, stages: Sequence[Held]) -> None:
-    """Node sets of supports and forces: named after the line of their card."""
+    """Node sets of supports and forces: named after their set or the line of their card."""
+    given: dict[bytes, str] = {}
+    sets = {np.sort(nodes).tobytes(): f"{names.title}.{title}" if names.title else title
+            for names in (region.deck.top.own, *region.deck.instances.values())
+            for title, nodes in names.node_sets.items()}  # fmt: skip
     for stage in stages:
         groups = history.supports.groups(region.dim, stage.held)
-        stage.name([nodes for nodes, _, _ in groups], region.node_sets)
+        stage.name(groups, region.node_sets, given, sets)
     for k, (nodes, _, _) in enumerate(history.forces.groups(region.dim)):
         region.node_sets[f"force {k + 1}"] = nodes
     for k, (nodes, _, _) in enumerate(history.heat.groups() if history.heat else ()):

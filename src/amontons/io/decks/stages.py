@@ -17,7 +17,7 @@ from .cards import Card
 from .contacts import Pair
 from .course import Course
 from .flat import Deck, Placed
-from .history import FREE, History
+from .history import FREE, Group, History
 from .materials import Interaction, changed_interactions
 from .scopes import Index, missing
 
@@ -42,15 +42,26 @@ class Held:
     contacts: list[Contact] = field(default_factory=list)
     names: list[str] = field(default_factory=list)  # of the node sets of its supports
 
-    def name(self, groups: Sequence[Index], known: dict[str, Index]) -> None:
-        """Name the node sets of groups of supports; those that are known keep their names."""
-        names = {own.tobytes(): name for name, own in known.items()
-                 if name.startswith("support")}  # fmt: skip
-        for k, nodes in enumerate(groups):
-            same = names.get(nodes.tobytes())
-            new = f"support {k + 1}" + (f" of stage {self.number + 1}" if self.number else "")
-            self.names.append(same or new)
-            known[self.names[-1]] = nodes
+    def name(
+        self, groups: Sequence[Group], known: dict[str, Index], given: dict[bytes, str],
+        sets: dict[bytes, str],
+    ) -> None:  # fmt: skip
+        """Name the node sets of groups of supports after the set or line they come from.
+
+        known: all node sets, added to; given: names by nodes, those of stages before too, which
+        are kept; sets: names that the deck has for nodes.
+        """
+        for nodes, _, card in groups:
+            key = nodes.tobytes()
+            if key not in given:
+                title = sets.get(key)
+                base = f"{title} (line {card.number})" if title else f"line {card.number}"
+                new, k = base, 2
+                while new in known:
+                    new, k = f"{base} part {k}", k + 1
+                given[key] = new
+            self.names.append(given[key])
+            known[given[key]] = nodes
 
     def contacts_of(
         self, pairs: Sequence[Pair], mesh: Mesh, law: Callable[..., dict[str, Any]]
