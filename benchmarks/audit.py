@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 import amontons as am
 from amontons.analysis.audit import Answer, Audit, audit_answer
 from amontons.io.answers.read import half_units
+from amontons.io.decks.written import write_deck
 
 from .audit_models import KINDS, SYSTEMS, Units, deck_in, frd_in, models
 from .machine import describe
@@ -217,14 +218,18 @@ def speed() -> list[str]:
         run = [sys.executable, "-m", "amontons"]
         subprocess.run([*run, "solve", "cube.toml", "--no-figures", "--quiet"], cwd=made,
                        check=True)  # fmt: skip
-        for what in ("first", "again"):
-            before = resource.getrusage(resource.RUSAGE_CHILDREN)
-            code = subprocess.run([*run, "audit", "cube.toml", "cube-results", "--quiet"],
-                                  cwd=made, check=False).returncode  # fmt: skip
-            after = resource.getrusage(resource.RUSAGE_CHILDREN)
-            spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-            rows.append(f"| `amontons audit`, {what} | {3 * 33**3} | "
-                        f"{'right' if code == 0 else 'wrong'} | {spent:.2f} |")  # fmt: skip
+        solution.write(Path(made) / "pair.frd")
+        write_deck(model, Path(made) / "pair.inp")
+        asked = [("cube.toml", "cube-results", 3 * 33**3), ("pair.inp", "pair.frd", unknowns)]
+        for source, result, size in asked:
+            for what in ("first", "again"):
+                before = resource.getrusage(resource.RUSAGE_CHILDREN)
+                code = subprocess.run([*run, "audit", source, result, "--quiet"], cwd=made,
+                                      check=False).returncode  # fmt: skip
+                after = resource.getrusage(resource.RUSAGE_CHILDREN)
+                spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+                rows.append(f"| `amontons audit {source} {result}`, {what} | {size} | "
+                            f"{'right' if code == 0 else 'wrong'} | {spent:.2f} |")  # fmt: skip
     for row in rows:
         click.echo(row)
     return rows

@@ -194,6 +194,14 @@ def theirs(program, text, name, folder):
 
 
 # ------------------------------------------------------------------------------------- table
+def remarks(text, by):
+    """What makes another's answer another one: large rotations, solvers that stop early."""
+    found = [] if by == "reference" else [f"beside {by}"]
+    upper = text.upper()
+    found += ["NLGEOM: theirs at finite rotations"] if "NLGEOM" in upper else []
+    return found + (["theirs solved to few digits"] if "SOLVER=ITERATIVE" in upper else [])
+
+
 def compared(path, name, program):
     """A row: what deviates from what."""
     moved, forces = references(path.parent, name)
@@ -206,7 +214,7 @@ def compared(path, name, program):
     row = {
         "name": name, "u": deviation(part(found, 0), moved, nodes), "seconds": seconds,
         "rf": deviation(part(found, 1), forces, nodes), "contacts": len(fields.gap),
-        "nodes": len(nodes), "said": "" if by == "reference" else f"beside {by}",
+        "nodes": len(nodes), "said": ", ".join(remarks(text_of(path), by)),
     }  # fmt: skip
     hard = contextlib.suppress(am.AmontonsError)
     with hard:

@@ -1,4 +1,4 @@
-"""Small models for written_decks.py: one of everything that a deck can say."""
+"""Small models for written_examples.py: one of everything that a deck can say."""
 
 import numpy as np
 

@@ -24,10 +24,12 @@ def lame(size: int) -> list[Value]:
     pressure = found.pressure
     mean = found.weights @ pressure / found.weights.sum()
     exact = _of_both(case)
-    largest = float(np.abs(pressure / exact - 1).max())
+    error = np.abs(pressure / exact - 1)
+    ends = (found.points < 1e-9).any(axis=1)
     return [
         Value("mean pressure, N/mm^2", mean, exact),
-        Value("pressure, largest error", largest, 0.0, 1.0, known=case.overlap),
+        Value("pressure, largest error between the ends", error[~ends].max(), 0.0, 1.0),
+        Value("pressure, error at the ends", error[ends].max(), 0.0, 1.0, known=case.overlap),
     ]
 
 
@@ -139,34 +141,37 @@ CASES = (
          "G. Lamé 1852; any book on elasticity", lame, (8, 16, 32), (64,), 2.0,
          "Plane strain, straight facets for arcs: order 2. Small strains keep the radii of "
          "both rings, which differ by half a percent, and so does the expected pressure. "
-         "At both ends half a percent of a node's area faces nothing: the largest error is "
-         "there."),
+         "At both ends the error is the overlap over the radius, 0.005, on any mesh: the last "
+         "facet is projected along its own normal, which leans off the plane of symmetry by "
+         "half an angle w of a facet, so that of the area w / 2 of the end node the part "
+         "0.005 w / 2 faces nothing, and what is left carries its force. With an overlap "
+         "of 0.0005 it is 0.0005; with the outer ring as slave it is 0.0004 at size 64."),
     Case("press-fit", "Press fit and push-out", PROBLEM, SOURCE, fit(1, 1.0), (4, 8, 16), (32,),
          1.0, REMARKS, HALF),
-    Case("press-fit-nonmatching", "The same, meshes that do not match", PROBLEM, SOURCE,
+    Case("press-fit-nonmatching", "Press fit, meshes that do not match", PROBLEM, SOURCE,
          fit(1, 1.3), (4, 8, 16), (32,), 1.0, REMARKS, HALF),
-    Case("press-fit-second-order", "The same, second order", PROBLEM, SOURCE, fit(2, 1.3),
+    Case("press-fit-second-order", "Press fit, second order", PROBLEM, SOURCE, fit(2, 1.3),
          (3, 6, 12), (24,), 1.0, REMARKS, HALF),
-    Case("press-fit-nu", "The same, nu = 0.3", PROBLEM.replace("nu 0,", "nu 0.3,"), SOURCE,
+    Case("press-fit-nu", "Press fit, nu = 0.3", PROBLEM.replace("nu 0,", "nu 0.3,"), SOURCE,
          with_poisson, (3, 6, 12), (24,), 1.0,
          "The pressure is that of nu = 0 as long as nothing keeps the tubes from changing "
          "their length, for Poisson's parts of both cancel. With friction they do not slide "
          "freely, and the one that is pushed becomes shorter and thicker: the push-out force "
          "is 0.35 percent larger, 1474.0 N, which no theory of thick tubes gives.", HALF),
-    Case("press-fit-3d", "The same in 3D, meshes that do not match", PROBLEM, SOURCE,
+    Case("press-fit-3d", "Press fit in 3D, meshes that do not match", PROBLEM, SOURCE,
          solid((1, 4.5, 1.5), (1, 6.5, 2)), (2, 3, 4), (6,), 2.0, SOLID, HALF),
-    Case("press-fit-3d-finer-slave", "The same, the slave finer", PROBLEM, SOURCE,
+    Case("press-fit-3d-finer-slave", "Press fit in 3D, the slave finer", PROBLEM, SOURCE,
          solid((1, 6.5, 2), (1, 4.5, 1.5)), (2, 3, 4), (6,), 2.0, SOLID, HALF),
-    Case("press-fit-3d-matching", "The same, meshes that match", PROBLEM, SOURCE,
+    Case("press-fit-3d-matching", "Press fit in 3D, meshes that match", PROBLEM, SOURCE,
          solid((1, 4.5, 1.5), (1, 4.5, 1.5)), (2, 3, 4), (6,), 2.0, SOLID, HALF),
-    Case("press-fit-3d-uneven", "The same, uneven facets", PROBLEM, SOURCE,
+    Case("press-fit-3d-uneven", "Press fit in 3D, uneven facets", PROBLEM, SOURCE,
          solid((1, 4, 2), (1, 5, 2.5), uneven=0.25), (2, 3, 4), (6,), 2.0,
          SOLID + " Nodes are moved along the cylinders by up to a quarter of a cell.", HALF),
-    Case("press-fit-3d-tetrahedra", "The same, tetrahedra", PROBLEM, SOURCE,
+    Case("press-fit-3d-tetrahedra", "Press fit in 3D, tetrahedra", PROBLEM, SOURCE,
          solid((1, 4.5, 2.5), (1, 6.5, 3.5), kind="tet"), (2, 3, 4), (6,), 2.0, SOLID, HALF),
-    Case("press-fit-3d-second-order", "The same, second order", PROBLEM, SOURCE,
+    Case("press-fit-3d-second-order", "Press fit in 3D, second order", PROBLEM, SOURCE,
          solid((1, 4, 2), (1, 5, 2), order=2), (1, 2), (3,), 4.0, SOLID, HALF),
-    Case("press-fit-3d-ten-nodes", "The same, tetrahedra of ten nodes", PROBLEM, SOURCE,
+    Case("press-fit-3d-ten-nodes", "Press fit in 3D, tetrahedra of ten nodes", PROBLEM, SOURCE,
          solid((1, 4, 2), (1, 5, 3), order=2, kind="tet"), (1, 2), (3,), 4.0, SOLID, HALF),
     Case("thermal-fit", "Fit by heat",
          "Tubes 20/40 and 40/60 mm; the inner one is heated until it would be 5 µm wider.",

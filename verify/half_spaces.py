@@ -23,7 +23,7 @@ def stretched(share: Array, cells: float, reach: float, fine: float) -> Array:
     return reach * np.sinh(k * share) / np.sinh(k)
 
 
-def _half_plane(cells: tuple[int, int], fine: float, reach: float) -> am.Mesh:
+def half_plane(cells: tuple[int, int], fine: float, reach: float) -> am.Mesh:
     """A rectangle under y = 0, `reach` deep and twice as wide."""
     base = am.box((2, 1), cells)
     across, down = base.points[:, 0] - 1, 1 - base.points[:, 1]
@@ -32,10 +32,25 @@ def _half_plane(cells: tuple[int, int], fine: float, reach: float) -> am.Mesh:
     return am.Mesh(points, base.cells, base.surfaces)
 
 
+def lines_beside(first: Array, cells: int, reach: float) -> Array:
+    """`cells` cells up to `reach`: those between `first`, then wider ones."""
+    rest, fine = cells + 1 - len(first), first[-1] - first[-2]
+    grown = stretched(np.linspace(0, 1, rest + 1), rest, reach - first[-1], fine)
+    return np.concatenate([first, first[-1] + grown[1:]])
+
+
+def on_lines(across: Array, down: Array) -> am.Mesh:
+    """The quarter x > 0 > y with nodes at all (across, -down), both ascending from 0."""
+    mesh = am.box((1, 1), (len(across) - 1, len(down) - 1))
+    x = np.interp(mesh.points[:, 0], np.linspace(0, 1, len(across)), across)
+    y = -np.interp(1 - mesh.points[:, 1], np.linspace(0, 1, len(down)), down)
+    return am.Mesh(np.stack([x, y], axis=1), mesh.cells, mesh.surfaces)
+
+
 def hertz_2d(size: int) -> list[Value]:
     """A rigid disc of radius 100 pressed into a half plane; contact half width 0.54."""
     radius = 100.0
-    mesh = _half_plane((8 * size, 4 * size), 0.8 / size, 20.0)
+    mesh = half_plane((8 * size, 4 * size), 0.8 / size, 20.0)
     model = am.Model(
         [am.Body(mesh, am.LinearElastic(YOUNG, POISSON))], [am.Fix("bottom", 0)],
         [am.Contact("top", am.Sphere((0, radius - 0.003), radius), mu=0.0)],
@@ -106,19 +121,8 @@ def _drive(problem: am.FrictionProblem) -> am.FrictionSolution:
 def flat_punch(size: int) -> list[Value]:
     """A rigid frictionless disc of radius 1 on a half space, axisymmetric."""
     reach, depth = 400.0, 0.01
-    cells = 4 * size
-    mesh = am.box((1, 1), (cells, cells))
-    inner = size  # cells under the punch
-    fine = 1.0 / inner
-    grown = stretched(np.linspace(0, 1, cells - inner + 1), cells - inner, reach - 1, fine)
-    lines = np.concatenate([np.linspace(0, 1, inner + 1), 1 + grown[1:]])
-    at = np.linspace(0, 1, cells + 1)
-    points = np.stack([np.interp(mesh.points[:, 0], at, lines),
-                       -np.interp(1 - mesh.points[:, 1], at, lines)], axis=1)  # fmt: skip
-    body = am.Body(
-        am.Mesh(points, mesh.cells, mesh.surfaces), am.LinearElastic(YOUNG, POISSON),
-        axisymmetric=True,
-    )  # fmt: skip
+    lines = lines_beside(np.linspace(0, 1, size + 1), 4 * size, reach)
+    body = am.Body(on_lines(lines, lines), am.LinearElastic(YOUNG, POISSON), axisymmetric=True)
     model = am.Model(
         [body], [am.Fix("bottom", 0), am.Fix("left", (0, None))],
         [am.Contact("top", am.Plane((0, -1), point=(0, -depth)), mu=0.0,
@@ -185,7 +189,7 @@ CASES = (
          "at best only where mesh lines meet the edge, and 1 else."),
     Case("hertz-3d", "Hertz: ball on a block",
          "A ball of radius 1 is pressed on a block of the same material, meshes do not match.",
-         f"{JOHNSON}, eq. (4.22)", hertz_3d, (3, 4, 5), (8,), 1.0,
+         f"{JOHNSON}, eq. (4.22)", hertz_3d, (4, 5, 6), (8,), 1.0,
          "The block is 1.5 wide and deep (a = 0.11); the load is that computed."),
     Case("cattaneo-mindlin", "Cattaneo and Mindlin, with a reversal",
          "A cylinder is pressed, pushed to 0.7 of the friction limit and back to no force.",

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from amontons.core.files import replacing
 
 from .case import ROUNDING, Case, Outcome, Value
@@ -13,9 +15,11 @@ from .case import ROUNDING, Case, Outcome, Value
 HEAD = """# Verification manual
 
 Cases with a number that theory gives or somebody else has published. `python -m verify`
-computes them again and exits with 1 if one fails; `python -m verify hertz-2d` takes one,
-`--fine` adds larger sizes, `--list` names them. `python -m verify --results verify` makes this
-page.
+computes them again and exits with 1 if one fails, saying which and by how much;
+`python -m verify hertz-2d` or `--only 'press-fit*'` takes some, `--fine` adds larger sizes,
+`--list` names them. `--quick` takes the smallest size of each, for checks at every change: a
+case that converges with order k is then allowed (largest / smallest size)^k of its tolerance.
+`python -m verify --results verify` makes this page.
 
 One rule for all tolerances. A case is *exact* where the discrete problem has the answer of
 theory: every size is within 1e-6. Else it *converges*: the largest size is within 1 %, and its
@@ -40,9 +44,12 @@ def text_of(outcome: Outcome) -> str:
         order = outcome.order(value.name)
         lines.append(
             f"      {_verdict(outcome.passes(value))}  {value.name}: {value.computed:.6g}, "
-            f"expected {value.expected:.6g}, error {value.error:.1e} of {case.tolerance:.0e}"
+            f"expected {value.expected:.6g}, error {value.error:.1e} of {outcome.tolerance:.0e}"
             + ("" if order is None else f", order {order:.2f} of {case.order}")
         )
+        wrong = outcome.failure(value)
+        if wrong is not None:
+            lines.append(f"            {wrong}; expected from {case.source}")
     return "\n".join(lines)
 
 
@@ -111,7 +118,10 @@ def figure(outcome: Outcome, path: Path) -> None:
         first = max(_shown(outcome, value)[0] for value in outcome.last)
         slope = [first * (size / sizes[0]) ** -case.order for size in sizes]
         axes.loglog(sizes, slope, ":", color="grey", label=f"order {case.order:g}")
-    axes.axhline(case.tolerance, color="black", lw=0.8)
+    axes.axhline(case.tolerance, color="black", lw=0.8, label="tolerance")
+    shown = [case.tolerance, *(e for value in outcome.last for e in _shown(outcome, value))]
+    axes.set_ylim(10 ** np.floor(np.log10(min(shown)) - 0.05),
+                  10 ** np.ceil(np.log10(max(shown)) + 0.05))  # fmt: skip
     axes.set(xlabel="size (1 / mesh width or step)", ylabel="relative error", title=case.title)
     axes.set_xticks(sizes, [str(s) for s in sizes])
     axes.minorticks_off()

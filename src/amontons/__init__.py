@@ -57,6 +57,7 @@ _HOME = {
                  "Verdict", "Witness", "graded", "performance_profile"),
     "mechanics.meshes": ("Cells", "Facets", "Mesh", "box", "mesh_shape", "opened",
                          "read_cad", "refined"),
+    "io.matrices": ("StoredMatrices", "read_matrices"),
     "io.meshes": ("read_mesh",),
     "mechanics.contact": ("Cylinder", "Extrusion", "LevelSet", "Nitsche", "Plane", "Profile",
                           "Revolution", "Sphere"),

@@ -23,7 +23,8 @@ PAGES = sorted(
     for path in (*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("examples/*.md"))
     if not MADE & set(path.relative_to(ROOT / "docs").parts[:1] if "docs" in path.parts else ())
 )
-NEEDS = {"docs/distributed.md": "petsc4py", "docs/notebooks.md": "xarray"}  # an extra each
+NEEDS = {"docs/distributed.md": ["petsc4py"], "docs/notebooks.md": ["xarray"],
+         "docs/other-libraries.md": ["skfem", "ngsolve"]}  # fmt: skip
 SLOW = {"docs/choosing-a-solver.md", "docs/tutorial.md"}  # commands of more than a minute
 ELSEWHERE = re.compile(  # other programs, and what .ci/run and .ci/full do themselves
     r"^(\w+=\S+ +)*(python -m (pip|pytest|venv|sphinx|reproduce)|mpirun|ruff|\.ci/|MPICC=)"
@@ -59,9 +60,9 @@ def folder(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("page", list(pages("python")))
 def test_python_blocks_run(page, folder):
-    needed = NEEDS.get(str(page.relative_to(ROOT)))
-    if needed and find_spec(needed) is None:
-        pytest.skip(f"needs {needed}")
+    for needed in NEEDS.get(str(page.relative_to(ROOT)), ()):
+        if find_spec(needed) is None:
+            pytest.skip(f"needs {needed}")
     names = {"__name__": "block"}
     for k, block in enumerate(blocks(page, "python")):
         exec(compile(block, f"{page.name}, block {k}", "exec"), names)  # noqa: S102

@@ -12,7 +12,7 @@ from mistakes import made, mistakes, page_entries
 ALL = list(mistakes())
 HELP = re.compile(
     "[Dd]id you mean|known: |write |expected|such as|needs|is not one of|mesh it with|ends in"
-    "|does not exist|have a point|Invalid value|in 3D"
+    "|does not exist|have a point|hold it with|Invalid value|in 3D"
 )
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core.clock import TimeLimit, deadline_of
-from ..core.errors import InvalidInput, TimeUp, UnsupportedLaw
+from ..core.errors import InvalidInput, TimeUp, UnsupportedForm, UnsupportedLaw
 from ..problem.friction import FrictionProblem
 from ..problem.law import Coulomb, Tresca
 from ..problem.solution import FrictionSolution
@@ -226,8 +226,14 @@ def _check_followed(problem: Any, verb: str, limit: TimeLimit) -> None:
     """Raise where a problem is no PathProblem, and has no load and friction to follow."""
     from ..analysis.paths.path import PathProblem
 
-    if not isinstance(problem, PathProblem):
-        _check_has_W(checked(problem), verb, limit)
+    if isinstance(problem, PathProblem):
+        return
+    discrete = checked(problem)
+    _check_has_W(discrete, verb, limit)
+    if not discrete.contacts:
+        raise UnsupportedForm(
+            f"{verb}: without contacts the state is in proportion to the load, one solve is all"
+        )
 
 
 def diagram(

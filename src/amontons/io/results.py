@@ -329,7 +329,7 @@ def describe(output: Output) -> str:
     sets = _sets_in_words(output.solution.convergence)
     if sets:
         lines.append(sets)
-    if output.fields is not None:
+    if output.fields is not None and output.solution.problem.contacts:
         names = ("x", "y", "z")[: len(output.fields.resultant)]
         total = output.fields.resultant
         total = np.where(np.abs(total) > 1e-8 * np.abs(total).max(), total, 0.0)
@@ -339,6 +339,9 @@ def describe(output: Output) -> str:
         lines.append(f"largest pressure: {output.fields.pressure.max(initial=0.0):.6g}")
         if output.model is not None and 1 < len(output.model.contacts) <= MOST_PAIRS:
             lines += _pairs_in_words(output.model, output.fields)
+    elif output.fields is not None:
+        moved = max(np.abs(u).max(initial=0.0) for u in output.fields.displacement)
+        lines.append(f"largest displacement: {moved:.6g}")
     lines += map(str, output.warnings)
     return "\n".join(lines)
 

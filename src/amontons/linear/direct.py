@@ -340,8 +340,12 @@ def _mumps(matrix: sparse.csc_array, threads: int) -> tuple[Solve, float | None]
 
 
 def _superlu(matrix: sparse.csc_array, threads: int) -> tuple[Solve, float | None]:
+    from scipy.sparse import csgraph
     from scipy.sparse import linalg as sparse_linalg
 
+    pivots = csgraph.structural_rank(sparse.csc_matrix(matrix))
+    if pivots < matrix.shape[0]:  # its kernels would print complaints about their arguments
+        raise RuntimeError(f"at most {pivots} of {matrix.shape[0]} pivots are not zero")
     with warnings.catch_warnings():
         warnings.simplefilter("error", sparse_linalg.MatrixRankWarning)
         factor = sparse_linalg.splu(sparse.csc_matrix(matrix), permc_spec="MMD_AT_PLUS_A")

@@ -321,7 +321,7 @@ class Equations(Matrices):
             return 0.0
         assert self.f is not None and self.H is not None
         load = modes.T @ self.f
-        pushes = (self.H.T @ modes).reshape(*r.shape, -1) * r[:, :, None]
+        pushes = (self.H.T @ modes).reshape(*r.shape, modes.shape[1]) * r[:, :, None]
         least = judge.FLOOR * judge.EPSILON * (np.abs(modes).T @ np.abs(self.f))
         size = np.abs(load) + np.abs(pushes).sum(axis=(0, 1)) + least
         rest = np.abs(load + pushes.sum(axis=(0, 1)))

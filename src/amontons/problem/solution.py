@@ -264,6 +264,8 @@ class FrictionSolution(Shown):
         """The problem and its numbers of contacts by status, in words."""
         c = self.counts
         name = self.problem.name or "friction problem"
+        if not self.problem.contacts:
+            return f"{name}: no contacts in {self.problem.dimension}D"
         return (
             f"{name}: {self.problem.contacts} contacts in {self.problem.dimension}D: "
             f"{c['open']} open, {c['slip']} slip, {c['stick']} stick"

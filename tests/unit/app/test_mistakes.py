@@ -109,7 +109,6 @@ FILES = {  # what is written: (in the place of, in the file), the answer
     "[[load]]": ("[[fix]]", "[[load]]", "did you mean 'traction'"),
     "[[force]]": ("[[fix]]", "[[force]]", "did you mean 'traction'"),
     "[[boundary]]": ("[[fix]]", "[[boundary]]", "did you mean 'fix'"),
-    "no contact": (CASE[CASE.index("[[contact]]") :], "", r"one table \[\[contact\]\]"),
     "plane outside": ("obstacle = { plane = { normal = [0, 0, 1] } }",
                       "plane = { normal = [0, 0, 1] }", "did you mean 'obstacle'"),
     "normal of a plane problem": ("[0, 0, 1]", "[0, 1]", "3 numbers"),

@@ -231,3 +231,13 @@ def test_a_singular_small_block_is_named():
     A[3:5, 3:5] = 1
     with pytest.raises(SingularOperator, match=r"unknowns \[3, 4\]"):
         block_diagonal_inverse(sparse.csc_array(A))
+
+
+def test_superlu_is_not_asked_for_what_no_permutation_can_factorise(capfd):
+    """Its kernels print complaints about their own arguments then, into any output."""
+    free, held = 60, 40  # more unknowns without stiffness than rows that hold them
+    rows = sparse.random(free, held, 0.3, random_state=49)
+    matrix = sparse.block_array([[None, rows], [rows.T, None]], format="csc")
+    with pytest.raises(SingularOperator, match="at most 80 of 100 pivots"):
+        Direct(Backend.SUPERLU).factor(matrix)
+    assert capfd.readouterr().out == ""

@@ -1,5 +1,7 @@
 """Equations, couplings, pretension, turned axes, springs: held against mechanics."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -496,3 +498,64 @@ def test_finite_deformations_refuse_constraints():
     soft = am.Body(base.bodies[0].mesh, am.NeoHookean(1000.0, 0.3))
     with pytest.raises(am.UnsupportedForm, match="small strains alone have constraints"):
         am.Model([soft], base.supports, base.contacts, constraints=base.constraints)
+
+
+# ------------------------------------------------------------------ held by springs alone
+def on_springs(*springs, supports=(), contacts=()):
+    """A stiff block 2 x 1, pressed down by 6 at its top."""
+    body = am.Body(am.box((2, 1), (2, 1)), am.LinearElastic(1e6, 0.0))
+    return am.Model([body], supports, contacts, [am.Traction("top", (0, -3.0))],
+                    springs=springs)  # fmt: skip
+
+
+DOWN = am.Spring([("bottom", 1, 1.0)], 10.0)  # one at each of 3 nodes
+ASIDE = am.Spring([("left", 0, 1.0)], 10.0)
+
+
+def test_springs_hold_a_body():
+    u = am.solve(on_springs(DOWN, ASIDE)).displacement[0]
+    np.testing.assert_allclose(u[:, 1], -6 / 30, rtol=1e-4)
+
+
+def test_springs_that_leave_a_motion():
+    with pytest.raises(am.SingularOperator, match="free to move: translation along x;"):
+        am.solve(on_springs(DOWN))
+    with pytest.raises(am.SingularOperator, match="free to move: translation along y"):
+        am.solve(on_springs(replace(DOWN, stiffness=0.0), ASIDE))
+
+
+def test_springs_and_contact_share_a_load():
+    floor = am.Contact("bottom", am.Plane((0, 1), (0, -0.1)), mu=0.3)
+    model = on_springs(DOWN, ASIDE, contacts=[floor])
+    assert not model.rests_on_contact
+    assert am.solve(model).resultant[1] == pytest.approx(6 - 30 * 0.1, rel=1e-4)
+
+
+def test_a_spring_between_bodies_joins_them():
+    """Two blocks, the upper one hangs at the lower one by springs: it sinks by both."""
+    lower = am.Body(am.box((2, 1), (2, 1)), am.LinearElastic(1e6, 0.0), "lower")
+    upper = am.Body(am.box((2, 1), (2, 1), origin=(0, 2)), am.LinearElastic(1e6, 0.0), "upper")
+    between = [
+        am.Spring([(("upper", k), c, 1.0), (("lower", k), c, -1.0)], 10.0)
+        for k in range(3) for c in (0, 1)
+    ]  # fmt: skip
+    model = am.Model([lower, upper], [], loads=[am.Traction("upper.top", (0, -3.0))],
+                     springs=[*between, am.Spring([("lower.bottom", 1, 1.0)], 10.0),
+                              am.Spring([("lower.left", 0, 1.0)], 10.0)])  # fmt: skip
+    u = am.solve(model).displacement
+    np.testing.assert_allclose(u[0][:, 1], -0.2, rtol=1e-4)
+    np.testing.assert_allclose(u[1][:, 1], -0.4, rtol=1e-4)
+    with pytest.raises(am.SingularOperator, match="free to move"):
+        am.solve(replace(model, springs=model.springs[:-1]))
+
+
+def test_a_reference_that_a_spring_alone_holds_aside():
+    body = am.Body(am.box((2, 1), (2, 1)), am.LinearElastic(100.0, 0.3))
+    model = am.Model([body], [am.Fix("R.rotation", 0), am.Fix("left", (0, None))],
+                     loads=[am.NodalForce("R", (2.0, -1.0))],
+                     references=[am.Reference("R", (1.0, 1.0))],
+                     constraints=[am.Coupling("top", "R", components=(1,))],
+                     springs=[am.Spring([("R", 1, 1.0)], 10.0),
+                              am.Spring([("R", 0, 1.0)], 10.0)])  # fmt: skip
+    moved = am.solve(model).references["R"].displacement
+    np.testing.assert_allclose(moved, [0.2, -0.1], rtol=1e-9)

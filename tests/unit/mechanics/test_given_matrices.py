@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy import sparse
+from scipy.sparse.linalg import LinearOperator
 
 import amontons as am
 from amontons.mechanics.elements import stiffness
 from amontons.mechanics.elements.mass import mass
+from amontons.mechanics.meshes import second_order
 
 STEEL = am.LinearElastic(200.0, 0.3, density=2.0)
 
@@ -212,3 +214,44 @@ def test_its_load_counts_once_beside_loads_in_time(plate):
         *_, step = am.evolve(model, am.QuasiStatic(0.5), until=1.0)
         found.append(step.displacement[0])
     np.testing.assert_allclose(found[0], found[1], atol=1e-10)
+
+
+@pytest.mark.parametrize("mesh", [
+    am.box((2, 1), (6, 3)), am.box((2, 1), (6, 3), "tri"), am.box((1, 1, 1), (3, 4, 2)),
+    am.box((1, 1, 1), 2, "tet"), second_order(am.box((1, 1, 1), 2), serendipity=True),
+], ids=["quad", "tri", "hex", "tet", "hex20"])  # fmt: skip
+@pytest.mark.parametrize("rows", ["nodes", "components"])
+def test_an_operator_is_asked_for_its_entries(mesh, rows):
+    K = stiffness(mesh, STEEL).tocsr()
+    n, dim = mesh.points.shape
+    order = np.arange(n * dim)
+    if rows == "components":
+        order = order.reshape(dim, n).T.ravel()
+    back = np.argsort(order)
+    theirs = K[back][:, back]
+    products = []
+
+    def product(x):
+        products.append(1)
+        return theirs @ x
+
+    operator = LinearOperator(K.shape, matvec=product, dtype=float)
+    given = am.Body.from_matrix(mesh, operator, rows=rows, mass=operator).material
+    np.testing.assert_allclose(given.K.toarray(), K.toarray(), atol=1e-12 * abs(K).max())
+    np.testing.assert_allclose(given.mass.toarray(), K.toarray(), atol=1e-12 * abs(K).max())
+    assert len(products) <= 2 * (dim * n + 1)
+
+
+def test_operators_that_have_no_such_entries_are_refused(plate):
+    mesh, K = plate
+    last, size = K.shape[0] - 1, abs(K).max()
+    ends = sparse.csr_array(([size, size], ([0, last], [last, 0])), shape=K.shape)
+    refused = {
+        "no cell of the mesh in common": K + ends, "finite products": K * np.nan,
+        "expected shape": K[:-1, :-1], "real numbers": K * 1j,
+    }  # fmt: skip
+    for says, matrix in refused.items():
+        operator = LinearOperator(matrix.shape, matvec=lambda x, A=matrix: A @ x,
+                                  dtype=matrix.dtype)  # fmt: skip
+        with pytest.raises(am.InvalidInput, match=says):
+            am.Body.from_matrix(mesh, operator)

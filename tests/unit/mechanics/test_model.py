@@ -298,7 +298,6 @@ MESH2 = am.box((2, 1), (4, 2))
         ({"bodies": []}, "at least one"),
         ({"bodies": ["cube"]}, "bodies: expected Body"),
         ({"bodies": 3}, "bodies: expected a list"),
-        ({"contacts": []}, "contacts: expected at least one"),
         ({"supports": [am.Fix("tpo", 0)]}, "bottom, left, right, top; did you mean 'top'"),
         ({"contacts": [am.Contact("floor", FLOOR2, mu=1)]}, "surface 'floor'"),
         ({"loads": [am.Traction("side", (0, 1))]}, "surface 'side'"),

@@ -144,11 +144,42 @@ def test_curved_sides_keep_uniform_strains():
         am.Mesh(bent, mesh.cells)
 
 
-def test_mixed_orders_are_refused():
+def test_cells_of_both_orders_share_no_nodes():
     mesh = second_order(am.box((1, 1), 1, "tri"))
     first = am.Mesh(mesh.points[:4], (Cells("quad", np.array([[0, 1, 3, 2]])),))
-    with pytest.raises(InvalidInput, match="one order"):
+    with pytest.raises(InvalidInput, match=r"points\[0\]: .*first and of second order"):
         am.Mesh(mesh.points, (*mesh.cells, *first.cells))
+
+
+@pytest.mark.parametrize("kind", ["quad", "tri"])
+def test_parts_of_both_orders_in_one_mesh_are_as_in_two(kind):
+    """A block of second order on one of first order, in one mesh or as two bodies."""
+    upper = second_order(am.box((2, 1), (3, 2), kind, origin=(0, 1)))
+    lower = am.box((2, 1), (4, 2), kind)
+    n = len(lower.points)
+    sides = {"on": lower.surfaces["top"], "floor": lower.surfaces["bottom"]}
+    sides |= {
+        name: tuple(type(f)(f.kind, f.nodes + n) for f in upper.surfaces[old])
+        for name, old in (("under", "bottom"), ("push", "top"))
+    }
+    cells = (*lower.cells, *(Cells(c.kind, c.nodes + n, "upper") for c in upper.cells))
+    one = am.Mesh(np.vstack([lower.points, upper.points]), cells, sides)
+    assert one.order == 2
+
+    def solved(bodies, under, on, floor, push):
+        contact = am.Contact(under, master=on, mu=0.2)
+        return am.solve(am.Model(bodies, [am.Fix(floor, 0.0)], [contact],
+                                 [am.Traction(push, (0.1, -1.0))]))  # fmt: skip
+
+    law = am.LinearElastic(100.0, 0.3)
+    alone = solved([am.Body(one, law)], "under", "on", "floor", "push")
+    two = solved(
+        [am.Body(lower, law, name="low"), am.Body(upper, law, name="up")],
+        "up.bottom", "low.top", "low.bottom", "up.top",
+    )
+    np.testing.assert_allclose(
+        alone.displacement[0], np.vstack([*two.displacement]), rtol=0, atol=1e-9
+    )
 
 
 @pytest.mark.parametrize("kind", ["tri6", "tet10", "quad9", "hex27", "line3"])

@@ -81,3 +81,28 @@ def test_a_slot_closes_as_its_half_does_on_a_plane(gap):
 def test_what_is_solid_does_not_meet_itself():
     with pytest.raises(am.InvalidInput, match="no contact found"):
         am.find_contacts([am.Body(am.box((4, 0.1), (4, 1)), SOFT)], mu=0.1, itself=True)
+
+
+def test_pressure_at_the_tips_of_a_closed_slot():
+    """A slot inside a block that is pressed across it carries the pressure of the block."""
+    whole = am.box((2, 2), 8)
+    x, y = whole.points.T
+    inside = np.flatnonzero((np.abs(y - 1) < 1e-9) & (x > 0.51) & (x < 1.49))
+    twin = np.arange(len(x))
+    twin[inside] = len(x) + np.arange(len(inside))
+    (block,) = whole.cells
+    above = whole.points[block.nodes].mean(axis=1)[:, 1] > 1
+    nodes = np.where(above[:, None], twin[block.nodes], block.nodes)
+    bare = am.Mesh(np.vstack([whole.points, whole.points[inside]]), (am.Cells("quad", nodes),))
+    (rim,) = bare.boundary
+    lips = rim.nodes[(np.abs(bare.points[rim.nodes][:, :, 1] - 1) < 1e-9).all(axis=1)]
+    upper = (lips >= len(x)).any(axis=1)
+    surfaces = {"upper": (am.Facets("line", lips[upper]),),
+                "lower": (am.Facets("line", lips[~upper]),), **whole.surfaces}  # fmt: skip
+    mesh = am.Mesh(bare.points, bare.cells, surfaces)
+    found = am.solve(am.Model(
+        [am.Body(mesh, SOFT)], [am.Fix("bottom", (None, 0)), am.Fix("left", (0, None))],
+        [am.Contact("upper", master="lower", mu=0.3)], [am.Traction("top", (0, -1.0))],
+    ), tolerance=1e-11)  # fmt: skip
+    np.testing.assert_allclose(found.fields.points[:, 0], [0.75, 1.0, 1.25], atol=1e-12)
+    np.testing.assert_allclose(found.fields.pressure, 1.0, rtol=1e-8)

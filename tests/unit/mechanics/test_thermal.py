@@ -225,3 +225,26 @@ obstacle = { plane = { point = [0, 1], normal = [0, -1] } }
     path.write_text(wood)
     law = read_case(path).target.bodies[0].material
     assert law.young == (100, 80, 60) and law.expansion == (1e-5,) * 3
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_mean_of_each_cell(dim):
+    """As with cells that have one temperature each, which bends a beam by 1 - 1 / n^2 of it."""
+    n = 2
+    law = am.LinearElastic(100.0, 0.0, expansion=1e-3)
+    mesh = am.box((1, 1, 1)[:dim], (1, n, n)[:dim])
+    up = np.array(mesh.points[:, -1])
+    bent = [
+        thermal_load(mesh, law, up, mean=mean)[:, 0] @ ((up - 0.5) * mesh.points[:, 0])
+        for mean in (False, True)
+    ]
+    assert bent[0] == pytest.approx(100 * 1e-3 / 12)
+    assert bent[1] == pytest.approx(bent[0] * (1 - 1 / n**2))
+    heat = [am.Temperature(lambda x: x[-1], mean=mean) for mean in (False, True)]
+    model = am.Model([am.Body(mesh, law)], [am.Fix("left", 0)], loads=heat)
+    twice = am.Model([am.Body(mesh, law)], [am.Fix("left", 0)],
+                     loads=[am.Traction("right", (0.0,) * dim)])
+    force = model.assemble().f - twice.assemble().f
+    free = model.discretisation.free
+    both = sum(thermal_load(mesh, law, up, mean=m).ravel()[free] for m in (False, True))
+    np.testing.assert_allclose(force, both, atol=1e-15)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from ...mechanics.elements.rigid import Rigid
 from ...mechanics.model.supports import external_load, locate
 from ...problem.friction import FrictionProblem
 from . import questions
+from .action import between_sides
 from .culprit import culprits
 from .forces import NodalForces, allowed, nodal_forces
 from .laws import Give, Seen, approach_of, seen
@@ -93,8 +94,13 @@ def audit_answer(model: Model, answer: Answer, *, deck_law: bool = True) -> Audi
         findings["forces"] = _stated(model, every, answer.reactions, scale, answer)
     if answer.until is not None and answer.time is not None:
         findings["time"] = _time(answer.time, answer.until)
-    if findings["balance"].verdict is UNDECIDED and answer.other:
-        findings = {name: _only_bounded(name, f) for name, f in findings.items()}
+    blind = findings["balance"].verdict is UNDECIDED
+    rough = findings["balance"].numbers.get("residual", 0.0) > FORMULATED
+    if answer.other and (blind or rough):  # what fits although it is rough does fit
+        findings = {
+            name: _only_bounded(name, f) if blind or f.verdict is WRONG else f
+            for name, f in findings.items()
+        }
     hidden = float(np.max(forces.bound * off, initial=0.0)) / scale if scale > 0 else 0.0
     return Audit(model.name or "model", findings, pairs, hidden, answer.displacement, model,
                  _notes(answer, forces))  # fmt: skip
@@ -182,7 +188,7 @@ def _balance(
     unit = scale
     residual, excess = float(left.max(initial=0.0)) / unit, float(over.max(initial=0.0)) / unit
     bound = float((forces.known * off).max(initial=0.0)) / unit
-    between, pair = _action(every, model)
+    between, pair = between_sides(model, forces, every)
     moved, at = _misplaced(model, u, forces.blur)
     numbers = {"residual": residual, "excess": excess, "bound": bound, "largest_force": scale,
                "between_sides": between, "supports": moved}  # fmt: skip
@@ -235,20 +241,6 @@ def _unbalanced(
     return Finding(WRONG, text, numbers, nodes)
 
 
-def _action(every: Sequence[tuple[Side, ...]], model: Model) -> tuple[float, str]:
-    """Largest difference of the two sides' forces over the pressure, and its pair."""
-    worst, found = 0.0, ""
-    for sides, name in zip(every, model.pair_names, strict=True):
-        if len(sides) < 2 or not all(side.known.all() for side in sides):
-            continue
-        total = max(float(np.abs(side.r[:, 0]).sum()) for side in sides)
-        loose = sum(float(side.bound[:, 0].sum()) for side in sides)
-        off = float(np.linalg.norm(sides[0].force + sides[1].force)) - loose
-        if total > 0 and off / total > worst:
-            worst, found = off / total, name
-    return worst, found
-
-
 def _misplaced(model: Model, u: Array, blur: Array) -> tuple[float, int]:
     """How far held dofs are from what supports and constraints ask, over the largest; node."""
     parts = model.discretisation
@@ -274,14 +266,16 @@ def _pair(
     lengths = [approach_of(side, young, scale) for side in sides]
     approach, sheared = (max(each) for each in zip(*lengths, strict=True))
     give = Give(*(_inverse(contact.numbers.get(name)) for name in
-                  ("stiffness", "stick_stiffness")))  # fmt: skip
+                  ("stiffness", "stick_stiffness")), meant=deck_law)  # fmt: skip
     found: list[Seen] = []
-    for side in sides:
+    for side in [one for one in sides if len(one.node)] or sides:  # one that is held tells none
         slip = side.slip if before is None else side.slip - side.slip_of(before)
         one = seen(side, give, approach, sheared, slip, scale)
         if before is not None and answer.one_way:  # both are histories of one straight way
             other = seen(side, give, approach, sheared, side.slip, scale)
+            soft = min(one.missing_deck, other.missing_deck)
             one = min(one, other, key=lambda s: (s.missing, s.impossible_share))
+            one = replace(one, missing_deck=soft)
         found.append(one)
     views = tuple(found)
     name, size = _namer(model, answer), float(np.abs(u).max(initial=0.0))

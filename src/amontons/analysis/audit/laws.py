@@ -29,6 +29,8 @@ PRESSED = 0.02  # of the largest force per area, above which a contact carries l
 AWAY = 0.25  # of the approach: a contact that is so far open, inside or slid is no mistake
 NOTHING = 1e-9  # of the largest nodal force: contact forces that are none
 FAIR = 0.02  # share of gaps at points with which an answer holds contact there
+UNEVEN = 5.0  # pressure at points over its mean around a node, as stiff penalties have it
+SECTOR = np.sin(np.radians(1.0))  # of half the angle of CalculiX' bricks around an axis
 RATIO = 0.1  # of mu: friction that is off its bound by more is off
 INSIDE = "inside the other side"
 FLAT = 0.99  # length of the mean of unit normals from which a surface is flat
@@ -36,10 +38,14 @@ FLAT = 0.99  # length of the mean of unit normals from which a surface is flat
 
 @dataclass(frozen=True, eq=False)
 class Give:
-    """What the deck's own law gives way by: lengths per traction, 0 for hard and rigid."""
+    """What the deck's own law gives way by: lengths per traction, 0 for hard and rigid.
+
+    meant: it counts as the law, not as a means.
+    """
 
     normal: float = 0.0
     shear: float = 0.0
+    meant: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,16 +84,21 @@ def approach_of(side: Side, young: float, force: float) -> tuple[float, float]:
     friction shears, mu times the latter.  force: the largest at any node of the model, to tell
     what carries load.
     """
-    total = float(np.maximum(side.r[:, 0], 0.0).sum())
-    pressed = _pressed(side, force)
+    tied = bool(side.law.tied.any())
+    carried = np.linalg.norm(side.r, axis=1) if tied else np.maximum(side.r[:, 0], 0.0)
+    total = float(carried.sum())
+    pressed = carried > NOTHING * force if tied else _pressed(side, force)
     if not pressed.any() or not total > 0:
         return float(np.abs(side.start_flat - side.flat).max(initial=0.0)), 0.0
     area = float(side.weight[pressed].sum())
     d = side.points.shape[1]
     size = float(np.ptp(side.points[pressed], axis=0).max(initial=0.0))
-    size = max(size, float(area ** (1.0 / (d - 1))))
-    closing = float(np.abs(side.start_flat - side.flat)[pressed].max(initial=0.0))
+    around = 2 * np.pi * float(side.points[pressed, 0].mean()) if side.turned else 1.0
+    size = max(size, float((area / around) ** (1.0 / (d - 1))))
     deep = total / area * size / young
+    if tied:  # a bond closes nothing
+        return deep, 0.0
+    closing = float(np.abs(side.start_flat - side.flat)[pressed].max(initial=0.0))
     bound = float(side.law.bound(side.r)[pressed].sum()) / total
     return max(closing, deep), bound * deep
 
@@ -120,6 +131,7 @@ def seen(  # noqa: PLR0913
     if side.law.tied.any():
         return _tied(side, give, approach)
     total = float(normal.sum())
+    most = max(total, float(np.maximum(-r[:, 0], 0.0).sum()))
     pressed = _pressed(side, force)
     scale = approach * total
     bound = side.law.bound(r)
@@ -133,19 +145,21 @@ def seen(  # noqa: PLR0913
     best = "points" if shares["points"] <= FAIR else best
     gap = views[best]
     deck = min(_pressing(normal, g + soft_gap, side.blur, scale) for g in views.values())
-    lost, hard = _missing(r, bound, slip, rubs, sheared)
-    elastic = slip + give.shear * r[:, 1:] / weight[:, None]
-    soft = _missing(r, bound, elastic, rubs, sheared)[1]
+    lost, hard = _missing(side, bound, slip, rubs, sheared)
+    plastic = _plastic(side, give, slip, bound)
+    soft = min(_missing(side, bound, each, rubs, sheared)[1] for each in plastic)
+    if give.meant:
+        lost, slip = _missing(side, bound, plastic[1], rubs, sheared)[0], plastic[1]
     why = _statuses(side, (pressed, bound, gap), (push, slip, lost, rubs), (approach, sheared))
     bad = why != ""
     carried = np.maximum(normal, total / max(len(normal), 1))
-    worst = int(gap.argmin()) if len(gap) else 0
+    deepest = int(side.node[gap.argmin()]) if len(gap) else 0
     return Seen(
         side, pressed, shares["curved"], min(shares["flat"], shares["points"]), deck,
         hard, soft,
-        _over(float(excess.sum()), total), _over(float(pull.sum()), total),
+        _over(float(excess.sum()), most), _over(float(pull.sum()), most),
         _over(float(side.bound[:, 0].sum()), total), _over(float(side.blur.max(initial=0.0)),
-        approach), max(-float(gap.min(initial=0.0)), 0.0), int(side.node[worst]), bad, why,
+        approach), max(-float(gap.min(initial=0.0)), 0.0), deepest, bad, why,
         _over(float(carried[bad & (why != INSIDE)].sum()), float(carried.sum())),
         pressed & rubs & (push >= (1 - RATIO) * bound),
     )  # fmt: skip
@@ -158,15 +172,47 @@ def _pressing(normal: Array, gap: Array, blur: Array, scale: float) -> float:
 
 
 def _missing(
-    r: Array, bound: Array, slip: Array, rubs: Mask, sheared: float
+    side: Side, bound: Array, slip: Array, rubs: Mask, sheared: float
 ) -> tuple[Array, float]:
     """Work that friction should have taken, as a length of each contact; their share."""
     length = np.linalg.norm(slip, axis=1)
-    work = np.maximum(bound * length + (r[:, 1:] * slip).sum(axis=1), 0.0) * rubs
+    work = np.maximum(bound * length + (side.r[:, 1:] * slip).sum(axis=1), 0.0) * rubs
     able = (bound > 0) & rubs
     lost = np.where(able, work / np.where(able, bound, 1.0), 0.0)
     longest = float(length[able].max(initial=0.0))
-    return lost, _over(float(work.sum()), float(bound[able].sum()) * max(longest, sheared))
+    left = np.maximum(work - bound * _unsettled(side, slip, bound), 0.0)
+    return lost, _over(float(left.sum()), float(bound[able].sum()) * max(longest, sheared))
+
+
+def _plastic(side: Side, give: Give, slip: Array, bound: Array) -> tuple[Array, Array]:
+    """Slips (nc, d-1) less what the deck's stick slope gives way: by the force, and at most.
+
+    Where pressure varies over a facet, friction is at its bound at some points, and below at
+    others that have not slipped as far: the mean is below either, until all points slip.
+    """
+    weight = side.weight[:, None]
+    length = np.linalg.norm(slip, axis=1)
+    most = UNEVEN * give.shear * bound / side.weight
+    left = np.maximum(1.0 - most / np.where(length > 0, length, 1.0), 0.0)
+    return slip + give.shear * side.r[:, 1:] / weight, slip * left[:, None]
+
+
+def _unsettled(side: Side, slip: Array, bound: Array) -> Array:
+    """Slip (nc,) without friction that an average may have where its facets slip in part.
+
+    Half a patch that sticks without friction, and half that slips twice the mean against all of
+    it: a quarter of how slip varies over the patch.  None where all neighbours slip that way,
+    or friction is nowhere near its bound.
+    """
+    length = np.linalg.norm(slip, axis=1)
+    moved = np.einsum("pk,pkc->pc", slip, side.frame[:, 1:])
+    way = moved / np.where(length > 0, length, 1.0)[:, None]
+    own, other = side.around.nonzero()
+    least = length.copy()
+    np.minimum.at(least, own, (way[own] * moved[other]).sum(axis=1))
+    full = np.linalg.norm(side.r[:, 1:], axis=1) >= (1 - RATIO) * bound
+    near = side.around @ full > 0
+    return np.where((least < AWAY * length) & near, (length - least) / 4.0, 0.0)
 
 
 def _statuses(
@@ -193,6 +239,20 @@ def _statuses(
     why[gap < -far] = INSIDE
     why[(traction < -PRESSED * most) & (-side.r[:, 0] > off)] = "pulls"
     return why
+
+
+def along_facets(side: Side) -> float:
+    """How far closing moves points of facets along them, where these turn from node to node.
+
+    Around an axis facets are flat over the sector of 2 degrees that programs with bricks have.
+    """
+    normals = side.frame[:, 0]
+    own, other = side.around.nonzero()
+    cosine = np.clip((normals[own] * normals[other]).sum(axis=1), -1.0, 1.0)
+    closing = np.abs(side.start_flat - side.flat)[own]
+    half = np.sqrt((1.0 - cosine) / 2.0)
+    half = np.maximum(half, SECTOR) if side.turned else half
+    return float((closing * half).max(initial=0.0))
 
 
 def _tied(side: Side, give: Give, approach: float) -> Seen:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from .laws import INSIDE, Seen, pair_as_one
+from .laws import INSIDE, Seen, along_facets, pair_as_one
 from .verdict import RIGHT, UNDECIDED, WRONG, Finding
 
 Array = NDArray[np.float64]
@@ -20,6 +20,7 @@ IMPOSSIBLE = 0.05  # part of the load on contacts whose status can not be
 BULGE = 0.05  # share of the approach that facets may take from the curved surfaces
 HIDDEN = 0.3  # part of the contact forces that rounding may hide before they say nothing
 OFF = 0.1  # of the approach: facets this far off the surface spoil the pressure
+FACETED = 0.25  # of the longest slip: slip on facets by closing alone that spoils friction
 NAMED = 10
 Name = Callable[[int], str]
 
@@ -115,7 +116,8 @@ def status(
     count = max(int(one.impossible.sum()) for one in seen)
     numbers = {"missing_friction": min(missing), "missing_other_side": max(missing),
                "missing_by_deck_law": min(one.missing_deck for one in seen),
-               "impossible": count, "impossible_share": min(shares)}  # fmt: skip
+               "impossible": count, "impossible_share": min(shares),
+               "slip_along_facets": along_facets(seen[0].side)}  # fmt: skip
     if min(one.hidden for one in seen) > HIDDEN:
         return _as_one(seen, sheared, numbers)
     wrong = min(missing) > MISSING or max(missing) > ONE_SIDED or min(shares) > IMPOSSIBLE
@@ -133,12 +135,22 @@ def status(
         text = "friction and slip do not fit as the other side sees them"
     else:
         text = "forces and motions do not fit"
+    turned = numbers["slip_along_facets"]
+    if turned > FACETED * _slipped(seen[0]):
+        text += ("; facets turn from node to node, and closing alone moves points along them "
+                 f"by {turned:.2g}, against friction that the curved surface has not"
+                 )  # fmt: skip
     text += f"; the statuses of {count} contacts are impossible ({_reasons(seen)})"
     if not history and min(shares) <= IMPOSSIBLE:
         return Finding(UNDECIDED, "the loads do not grow along one straight way, and friction "
                        "needs the slip of the last increment, which one state does not tell; "
                        "against all slip since the start, " + text, numbers)  # fmt: skip
     return Finding(WRONG if history else UNDECIDED, text, numbers, _nodes(seen, name, None))
+
+
+def _slipped(one: Seen) -> float:
+    """Longest slip of contacts that carry load."""
+    return float(np.linalg.norm(one.side.slip, axis=1)[one.pressed].max(initial=0.0))
 
 
 def _as_one(seen: tuple[Seen, ...], sheared: float, numbers: dict) -> Finding:
@@ -190,7 +202,7 @@ def geometry(seen: tuple[Seen, ...], approach: float) -> Finding:
         "pressure_spread": float(traction.std() / traction.mean()) if len(traction) else 0.0,
         "share": min(s.overlap for s in seen),
     }  # fmt: skip
-    force = np.where(pressed, side.r[:, 0], 0.0)  # a contact beside an edge is not all of them
+    force = np.abs(side.r[:, 0]) * pressed  # a contact beside an edge is not all of them
     bulge = float(np.abs(side.start - side.start_flat) @ force) / (float(force.sum()) or 1.0)
     numbers["facets_off"] = bulge / approach if approach > 0 else 0.0
     low, high = numbers["initial_gap_of_facets"] or (0.0, 0.0)

@@ -51,7 +51,9 @@ class Side:
     both.  start, start_flat (nc,): gaps at zero displacement.  matrix (dofs, nc d): local
     displacements are its transpose times those of the model.  law: that of these contacts.
     start_points (nc,): gap of the node itself to the facet before it at zero displacement;
-    points_gap (nc,): the smallest one now at points around each.
+    points_gap (nc,): the smallest one now at points around each.  around (nc, nc): which
+    contacts have a facet in common.  turned: around an axis.  nodal: of all nodes of the
+    surface, points (n, d) and forces (n, d); None where supports or other pairs act on one.
     """
 
     contact: Contact
@@ -72,17 +74,27 @@ class Side:
     law: Law
     start_points: Array
     points_gap: Array
+    around: sparse.csr_array
+    turned: bool
+    nodal: tuple[Array, Array] | None = None
 
     @property
     def force(self) -> Array:
         """On this side, (d,), of what is known."""
-        return np.einsum("pk,pkc->c", self.r, self.frame)
+        return self._forces[1].sum(axis=0)
 
     def moment(self) -> Array:
         """Of these forces about the origin, (3,), in 2D (1,)."""
         from ...mechanics.model.wrench import Wrench
 
-        return Wrench.of(self.points, np.einsum("pk,pkc->pc", self.r, self.frame)).moment
+        return Wrench.of(*self._forces).moment
+
+    @property
+    def _forces(self) -> tuple[Array, Array]:
+        """Points and forces; nodes that are hardly covered have no contact, but forces."""
+        if self.nodal is not None:
+            return self.nodal
+        return self.points, np.einsum("pk,pkc->pc", self.r, self.frame)
 
     def slip_of(self, u: Array) -> Array:
         """Tangential displacement (nc, d-1) of other displacements (dofs,)."""
@@ -127,7 +139,8 @@ def _seen(
         _side(model, contact, one, forces, (u, points), gaps)
         for contact, one, gaps in zip(contacts, placed, near, strict=True)
     ]
-    if not (_shared(model, contacts) or any(_turn(model, one) for one in placed)):
+    shared = _shared(model, contacts)
+    if not (shared or any(_turn(model, one) for one in placed)):
         return pairs
     whole = sparse.csr_array(sparse.hstack([p.H for p in placed], format="csr"))
     fixed = parts.is_fixed[: parts.beside.first]
@@ -138,7 +151,8 @@ def _seen(
                  iter_lim=2000)[0] * size  # fmt: skip
     ends = np.cumsum([side.r.size for side in pairs])[:-1]
     return [
-        replace(side, r=np.where(side.known, part.reshape(-1, d), 0.0))
+        replace(side, r=np.where(side.known, part.reshape(-1, d), 0.0),
+                nodal=None if shared else side.nodal)
         for side, part in zip(pairs, np.split(found, ends), strict=True)
     ]
 
@@ -173,7 +187,36 @@ def _side(
         np.einsum("pkc,pc->pk", np.abs(rows.frames), blur), start + local[:, 0],
         flat + local[:, 0], local[:, 1:], blurred, start, flat, placed.H,
         law_of([contact], replace(parts, placed=(placed,))), *at_points,
+        _around(model, contact, rows.nodes), model.bodies[placed.body].mesh.axisymmetric,
+        _on_surface(model, contact, moved[1].reshape(-1, d), forces),
     )  # fmt: skip
+
+
+def _around(model: Model, contact: Contact, nodes: Index) -> sparse.csr_array:
+    """Which of the contacts at these nodes have a facet in common, (nc, nc)."""
+    k, surface = locate(model.bodies, contact.slave)
+    mesh, total = model.bodies[k].mesh, len(model.bodies[k].mesh.points)
+    on = [block.nodes for block in mesh.surface(surface)]
+    of = np.concatenate([np.repeat(np.arange(len(b)), b.shape[1]) for b in on])
+    starts = np.repeat(np.cumsum([0, *(len(b) for b in on)])[:-1], [b.size for b in on])
+    table = sparse.csr_array(
+        (np.ones(len(of)), (of + starts, np.concatenate([b.ravel() for b in on]))),
+        shape=(sum(len(b) for b in on), total),
+    )[:, nodes]
+    return sparse.csr_array(table.T @ table)
+
+
+def _on_surface(
+    model: Model, contact: Contact, points: Array, forces: NodalForces
+) -> tuple[Array, Array] | None:  # fmt: skip
+    """Points and forces of all nodes of the slave surface; None where supports act on one."""
+    k, surface = locate(model.bodies, contact.slave)
+    d = model.dimension
+    nodes = model.bodies[k].mesh.surface_nodes(surface)
+    nodes = int(model.discretisation.offsets[k]) // d + nodes
+    if contact.where is not None or forces.is_held.reshape(-1, d)[nodes].any():
+        return None
+    return points[nodes], forces.missing.reshape(-1, d)[nodes]
 
 
 def _facets(placed: Placed, points: Array) -> Array:

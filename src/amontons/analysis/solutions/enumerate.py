@@ -226,8 +226,10 @@ def _without_load(scaled: Scaled) -> Solutions:
     """What can be said where q is zero, or without contacts."""
     r = np.zeros(scaled.shape)
     rest = PieceSolution("f" * len(r), (), r, r.copy(), 0.0, 1, 0.0)
+    if not len(r):
+        return Solutions((rest,), True, "no contacts: what is linear has one solution", 0)
     reason = "q is zero: only r = 0 can be judged, others were not looked for"
-    return Solutions((rest,), not len(r), reason, 0)
+    return Solutions((rest,), False, reason, 0)
 
 
 # ------------------------------------------------------------------- the search

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -87,7 +86,8 @@ def describe(problem: Any) -> dict[str, Any]:
     facts |= _law_facts(problem.law)
     facts |= _delassus_facts(problem)
     facts |= _sign(problem)
-    facts["scales (a guess)"] = _scales(problem)
+    if problem.contacts:
+        facts["scales (a guess)"] = _scales(problem)
     facts["methods that fit"] = fitting_methods(problem)
     return facts
 
@@ -106,7 +106,7 @@ def _elements(model: Model) -> list[str]:
 def _law_facts(law: Law) -> dict[str, list[float]]:
     """Smallest and largest of each number of the law."""
     if not len(law):
-        return {"friction coefficient": [math.inf, 0.0]}
+        return {}
     return {name: [float(x.min()), float(x.max())] for name, x in law.facts.items()}
 
 

@@ -6,8 +6,9 @@ with six digits.  A file may end early, hold several steps, and blocks that nobo
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +25,9 @@ DIGITS = 6
 MOST = 6  # values in one line
 MODEL, NODES, ELEMENTS = "    1C", "    2C", "    3C"
 RESULT, NAME = "  100C", " -4"
+PROGRAM, CALCULIX = "    1UPGM", "CalculiX"
 BINARY = ("2", "3")
+NO_LABELS = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,15 +41,21 @@ class Block:
     values: Array
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Results:
-    """Nodes with their points (n, 3), blocks in their order, nodes of elements."""
+    """Nodes with points (n, 3), blocks in their order, nodes of elements, who wrote it."""
 
     path: Path
     labels: Index
     points: Array
     blocks: list[Block] = field(default_factory=list)
-    elements: dict[int, list[int]] = field(default_factory=dict)
+    program: str = ""
+    of_elements: Callable[[], dict[int, list[int]]] = dict
+
+    @cached_property
+    def elements(self) -> dict[int, list[int]]:
+        """Nodes of every element by its number, read when they are asked for."""
+        return self.of_elements()
 
     def named(self, name: str) -> list[Block]:
         """All blocks of a name; raises FileFormatError that tells what there is without one."""
@@ -61,24 +70,30 @@ class Results:
         return found
 
 
-def read_frd(path: Path) -> Results:
-    """Read a file; raises FileFormatError with the line of what can not be read."""
+def read_frd(path: Path, only: str | None = None) -> Results:
+    """Read a file; raises FileFormatError with the line of what can not be read.
+
+    only: the name of blocks that are read, by default all; others are there without values.
+    """
     lines = _lines(path)
     if not any(line.startswith(MODEL) for line in lines[:3]):
         raise FileFormatError(
             f"{path}: expected results of CalculiX (.frd), whose first line begins with 1C"
         )
     found: Results | None = None
-    at, time, step = 0, 0.0, 0
+    at, time, step, program = 0, 0.0, 0, ""
     blocks: list[Block] = []
     while at < len(lines):
         line = lines[at]
         if line.startswith(NODES):
             _check_text(path, at, line)
             at, labels, points = _table(path, lines, at + 1, 3)
-            found = Results(path, labels, points, blocks)
+            found = Results(path, labels, points, blocks, program=program)
         elif line.startswith(ELEMENTS) and found is not None:
-            at = _elements(path, lines, at + 1, found.elements)
+            found.of_elements = partial(_elements, path, lines, at + 1)
+            at = _end(lines, at) + 1
+        elif line.startswith(PROGRAM):
+            program, at = line[len(PROGRAM) :].strip(), at + 1
         elif line.startswith("    1PSTEP"):
             step, at = _whole(line[48:60]), at + 1
         elif line.startswith(RESULT):
@@ -87,7 +102,10 @@ def read_frd(path: Path) -> Results:
         elif line.startswith(NAME):
             name, count = line[5:13].strip(), max(_whole(line[13:18]), 1)
             start, used = _components(lines, at + 1)
-            at, labels, values = _table(path, lines, start, min(count, used))
+            if only in (None, name):
+                at, labels, values = _table(path, lines, start, min(count, used))
+            else:
+                at, labels, values = _end(lines, start) + 1, NO_LABELS, np.zeros((0, count))
             blocks.append(Block(name, time, step, labels, values))
         else:
             at += 1
@@ -123,11 +141,21 @@ def _components(lines: list[str], at: int) -> tuple[int, int]:
     return at, max(used, 1)
 
 
-def _elements(path: Path, lines: list[str], at: int, found: dict[int, list[int]]) -> int:
-    """Fill in the nodes of every element, by its number; the line after them."""
+def _end(lines: list[str], at: int) -> int:
+    """The next line -3, or the end of the file."""
+    try:
+        return lines.index(" -3", at)
+    except ValueError:
+        rest = (k for k in range(at, len(lines)) if lines[k].startswith(" -3"))
+        return next(rest, len(lines))
+
+
+def _elements(path: Path, lines: list[str], at: int) -> dict[int, list[int]]:
+    """The nodes of every element, by its number."""
+    found: dict[int, list[int]] = {}
     label = 0
-    while at < len(lines) and not lines[at].startswith(" -3"):
-        line = lines[at]
+    for number in range(at, _end(lines, at)):
+        line = lines[number]
         try:
             if line.startswith(" -1"):
                 label = int(line[3:13])
@@ -137,34 +165,33 @@ def _elements(path: Path, lines: list[str], at: int, found: dict[int, list[int]]
                 found[label] += [int(line[k : k + 10]) for k in ends]
         except (ValueError, KeyError):
             raise FileFormatError(
-                f"{path}: line {at + 1}: expected an element or its nodes, got {line[:40]!r}"
+                f"{path}: line {number + 1}: expected an element or its nodes, got "
+                f"{line[:40]!r}"
             ) from None
-        at += 1
-    return at + 1
+    return found
 
 
 def _table(path: Path, lines: list[str], at: int, width: int) -> tuple[int, Index, Array]:
     """Rows up to -3: the line after it, labels (n,), values (n, width)."""
-    end = at
-    while end < len(lines) and not lines[end].startswith(" -3"):
-        if lines[end][:3] not in (" -1", " -2"):
-            raise FileFormatError(
-                f"{path}: line {end + 1}: expected a node (-1) or the end (-3), got "
-                f"{lines[end][:30]!r}; is the file cut off?"
-            )
-        end += 1
+    end = _end(lines, at)
+    rows = lines[at:end]
+    marks = {row[:3] for row in rows}
+    if marks - {" -1", " -2"}:
+        bad = next(k for k, row in enumerate(rows) if row[:3] not in (" -1", " -2"))
+        raise FileFormatError(
+            f"{path}: line {at + bad + 1}: expected a node (-1) or the end (-3), got "
+            f"{rows[bad][:30]!r}; is the file cut off?"
+        )
     if end == len(lines):
         raise FileFormatError(f"{path}: ends within a table that begins at line {at + 1}")
-    rows = list(_joined(lines[at:end]))
+    if " -2" in marks:
+        rows = list(_joined(rows))
     labels, values = _columns(path, at, rows, width)
     return end + 1, labels, values
 
 
 def _joined(rows: list[str]) -> Iterator[str]:
     """Rows with those that go on (-2) appended."""
-    if not any(row.startswith(" -2") for row in rows):
-        yield from rows
-        return
     whole = ""
     for row in rows:
         if row.startswith(" -1"):
@@ -177,14 +204,23 @@ def _joined(rows: list[str]) -> Iterator[str]:
         yield whole
 
 
+def _characters(rows: list[str], size: int) -> NDArray[np.bytes_]:
+    """The first characters of all rows, (n, size)."""
+    lengths = set(map(len, rows))
+    if len(lengths) == 1 and min(lengths) >= size:  # as programs write them: no copy of each
+        flat = np.frombuffer("".join(rows).encode("latin-1"), dtype="S1")
+        return flat.reshape(len(rows), -1)[:, :size]
+    text = np.array([row[:size].ljust(size) for row in rows], dtype=f"S{size}")
+    return text.view("S1").reshape(len(rows), size)
+
+
 def _columns(path: Path, at: int, rows: list[str], width: int) -> tuple[Index, Array]:
     """Labels and values by their columns."""
     head = SHORT if rows and len(rows[0].rstrip()) <= SHORT + width * WIDTH else HEAD
     if not rows:
-        return np.zeros(0, dtype=np.int64), np.zeros((0, width))
+        return NO_LABELS, np.zeros((0, width))
     size = head + width * WIDTH
-    text = np.array([row[:size].ljust(size) for row in rows], dtype=f"S{size}")
-    cut = text.view("S1").reshape(len(rows), size)
+    cut = _characters(rows, size)
     try:
         labels = np.ascontiguousarray(cut[:, 3:head]).view(f"S{head - 3}").astype(np.int64)
         values = np.ascontiguousarray(cut[:, head:]).view(f"S{WIDTH}").astype(np.float64)

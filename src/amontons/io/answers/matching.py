@@ -20,6 +20,7 @@ from .frd import Results
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 NEAR = 2e-5  # of the model's size: how far a printed point may be from its node
+SECTOR = np.radians(1.0)  # between the plane of a deck and the front of CalculiX' bricks
 MOVED = 5e-2  # of it: by how much nodes may have been moved onto the master before the start
 
 
@@ -132,3 +133,17 @@ def mean_of(pairs: tuple[Index, Index], points: Array, values: Array, count: int
     out = np.zeros((count, given.shape[1]))
     np.add.at(out, node, given)
     return out / np.bincount(node, minlength=count)[:, None]
+
+
+def shortened(cells: Sequence[tuple[Index, Index]], count: int) -> Array:
+    """What CalculiX makes of a radial displacement 1 at the nodes of a plane deck, (count,).
+
+    Nodes that stand for a front one and a back one have the mean of both, corners of second
+    order have one between them too, and Simpson's mean.  cells: as in `by_element`.
+    """
+    out = np.full(count, np.cos(SECTOR))
+    for _, nodes in cells:
+        size = nodes.shape[1]
+        if size > 4:  # quadrilaterals and triangles of second order, corners first
+            out[nodes[:, : size // 2]] = (2.0 + np.cos(SECTOR)) / 3.0
+    return out

@@ -14,7 +14,7 @@ from ...analysis.audit import Answer
 from ...core.errors import FileFormatError
 from ..readers import Case
 from . import dat, frd
-from .matching import by_element, by_label, by_place, check_points, mean_of
+from .matching import by_element, by_label, by_place, check_points, mean_of, shortened
 
 if TYPE_CHECKING:
     from ...mechanics.model import Model
@@ -124,12 +124,13 @@ def _tables(path: Path, suffix: str, case: Case) -> list[Table]:
         return [_from_vtu(path, points)]
     labels = np.arange(1, len(points) + 1) if about is None else about.labels
     if suffix == ".dat":
+        printed = dat.digits_of(path) == dat.DIGITS
         return [
-            Table(block.time, block.values[by_label(path, block.labels, labels)]
-                  [:, : points.shape[1]])
+            Table(block.time, _full(block.values[by_label(path, block.labels, labels)]
+                  [:, : points.shape[1]], about, printed))
             for block in dat.read_dat(path)
         ]  # fmt: skip
-    found = frd.read_frd(path)
+    found = frd.read_frd(path, only="DISP")
     blocks = found.named("DISP")
     if about is not None and (about.plane or not about.are_unique):
         return _by_place(path, found, blocks, points, about)
@@ -158,12 +159,22 @@ def _by_place(
     else:
         pairs = by_place(path, found.points, points, plane)
     out = []
+    single = np.bincount(pairs[0], minlength=len(points)) == 1
+    printed = single & (found.program == frd.CALCULIX)
     for block in blocks:
         rows = by_label(path, block.labels, found.labels[pairs[1]])
         moved = mean_of((pairs[0], np.arange(len(rows))), found.points[pairs[1]],
                         block.values[rows], len(points), plane)  # fmt: skip
-        out.append(Table(block.time, moved))
+        out.append(Table(block.time, _full(moved, about, printed)))
     return out
+
+
+def _full(moved: Array, about: About | None, printed: NDArray[np.bool_] | bool) -> Array:
+    """Displacements (n, d) without what CalculiX takes from them where it printed means."""
+    if about is None or about.plane != "axisymmetric":
+        return moved
+    factor = np.where(printed, shortened(about.cells, len(moved)), 1.0)
+    return moved / np.column_stack([factor, np.ones(len(moved))])
 
 
 def _from_vtu(path: Path, points: Array) -> Table:

@@ -37,6 +37,7 @@ SLIPS = {  # values that are no TOML, and what is meant
     r"[-+]?\.\d+": "numbers begin with a digit, 0.1 and not .1",
     r"(?!true$|false$|inf$|nan$)[A-Za-z][\w-]*": "words stand in quotes",
 }
+NO_CONTACT = "no [[contact]]: the bodies meet nothing, linear statics"
 LARGEST_FILE = 2**24  # bytes of a case file; meshes stand in files of their own
 TOP = ("title", "mesh", "wall", "material", "fix", "traction", "pressure", "body_force",
        "temperature", "contact", "solver", "continuation", "evolution", "units",
@@ -151,12 +152,10 @@ def _model(top: Table, path: Path, title: str) -> tuple[Model, tuple[str, ...]]:
         value = vector(table, "value", dim)
         loads.append(BodyForce(value, region=region, **configuration(table)))
     loads += [temperature_of(table, bodies) for table in top.tables("temperature")]
-    if "contact" not in top.data:
-        raise top.error("contact", "missing, expected at least one table [[contact]]")
     named = [table for table in top.tables("contact") if "pairs" not in table.data]
     contacts = [read_contact(table, bodies) for table in named]
     refuse_repeated(top)
-    notes: tuple[str, ...] = ()
+    notes = () if contacts or "contact" in top.data else (NO_CONTACT,)
     if (found := found_contacts(top.tables("contact"), bodies, contacts)) is not None:
         bodies, notes = found.bodies, found.lines
         contacts += found.contacts

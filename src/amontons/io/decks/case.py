@@ -13,8 +13,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ...core.errors import Address, AmontonsError, FileFormatError, InvalidInput
 from ...mechanics.contact.finding import Reach
 from ...mechanics.model import (
@@ -39,17 +37,19 @@ from ..readers import Case
 from .about import About
 from .adjusting import adjusted
 from .axes import Turned
+from .body_loads import body_force, scaled
 from .cards import Card, Row, read_cards
 from .contact_laws import Options, law_of
 from .contacts import read_contacts
 from .course import Course
-from .flat import Deck, flatten
+from .flat import Deck, Placed, flatten
 from .general import found_pairs, motion_of, part_titles, read_general, self_contact
 from .history import History, read_history
 from .joints import Joints, tied
-from .keywords import left_out, sorted_out
+from .keywords import left_out, plain, sorted_out
 from .materials import read_interactions, read_sections
 from .meshing import Region
+from .options import PLACED, with_known_options
 from .rigid_surfaces import SHELLS, section_of, solid_shells
 from .scopes import Index
 from .shapes import SHAPES
@@ -86,9 +86,11 @@ class Found:
 def read(path: Path, overrides: Sequence[str] = (), method: str | None = None) -> Case:
     """The case in a deck.  Overrides: those of the solver, deck.allow and deck.hard."""
     settings, options = _settings(overrides, method)
+    allow, notes = plain(options.allow), []
     cards = read_cards(path)
+    cards = [with_known_options(c, allow, notes) if c.keyword in PLACED else c for c in cards]
     deck = flatten(cards, SHAPES | SHELLS)
-    notes = _leave_out(deck, options)
+    notes += _leave_out(deck, options)
     if not deck.steps:
         raise cards[-1].error("the deck ends here without a *STEP, it loads nothing")
     try:
@@ -125,18 +127,25 @@ def _settings(overrides: Sequence[str], method: str | None) -> tuple[Settings, O
 def _leave_out(deck: Deck, options: Options) -> list[str]:
     """Take the cards away that are not read, and say so."""
     kept, notes = sorted_out([p.card for p in deck.model], options.allow)
-    chosen = {id(card) for card in kept}
-    deck.model = [p for p in deck.model if id(p.card) in chosen]
+    deck.model = _with(deck.model, kept)
     static = any(p.card.keyword == "STATIC" for step in deck.steps for p in step)
     said = [left_out([p.card for p in s], options.allow, has_static=static) for s in deck.steps]
     deck.steps = [step for step, note in zip(deck.steps, said, strict=True) if not note]
     notes += [note for note in said if note]
     for k, step in enumerate(deck.steps):
         kept, more = sorted_out([p.card for p in step], options.allow)
-        chosen = {id(card) for card in kept}
-        deck.steps[k] = [p for p in step if id(p.card) in chosen]
+        deck.steps[k] = _with(step, kept)
         notes += [note for note in more if note not in notes]
     return notes
+
+
+def _with(placed: list[Placed], cards: list[Card | None]) -> list[Placed]:
+    """Those that have a card left."""
+    return [
+        Placed(card, one.scope)
+        for one, card in zip(placed, cards, strict=True)
+        if card is not None
+    ]
 
 
 def _case(
@@ -156,8 +165,8 @@ def _case(
     general = read_general(deck, region, interactions)
     stages = read_stages(deck, history, interactions)
     _joined(found, region, history, (joints, turned), stages)
-    _name_nodes(region, history, stages)
-    pairs = read_contacts(deck, region, interactions, notes, more=general is not None)
+    _name_nodes(region, deck, history, stages)
+    pairs = read_contacts(deck, region, interactions, notes)
     check_removed(stages, pairs, deck)
     _name_faces(region, history)
     mesh, at = region.mesh(title)
@@ -175,6 +184,8 @@ def _case(
         )  # fmt: skip
         pairs += more
         notes += said
+    if not pairs:
+        notes.append("no contact in this deck: the bodies meet nothing, linear statics")
     mesh = adjusted(mesh, at, pairs, notes)
     _loads(found, region, history, at, notes)
     law = partial(law_of, options=options, notes=notes)
@@ -203,7 +214,7 @@ def _title(deck: Deck) -> str:
     for placed in deck.model:
         if placed.card.keyword == "HEADING":
             for row in placed.card.rows():
-                return ",".join(row.fields)[:80]
+                return ", ".join(row.fields)[:80]
     return ""
 
 
@@ -239,22 +250,19 @@ def _joined(
             found.add(kind, part, card)
     for number, name, courses, card in loads:
         if number is None:
-            found.add("loads", (NodalForce, name, [_scaled(c, share) for c in courses]), card)
+            found.add("loads", (NodalForce, name, [scaled(c, share) for c in courses]), card)
             continue
         stages[number].supports.append((name, courses))
         if not number:
             found.cards["supports"].append(card)
 
 
-def _name_nodes(region: Region, history: History, stages: Sequence[Held]) -> None:
-    """Node sets of supports and forces: named after their set or the line of their card."""
-    given: dict[bytes, str] = {}
-    sets = {np.sort(nodes).tobytes(): f"{names.title}.{title}" if names.title else title
-            for names in (region.deck.top.own, *region.deck.instances.values())
-            for title, nodes in names.node_sets.items()}  # fmt: skip
+def _name_nodes(region: Region, deck: Deck, history: History, stages: Sequence[Held]) -> None:
+    """Node sets of supports and forces: supports are named after their set or line."""
+    sets = deck.node_sets()
     for stage in stages:
         groups = history.supports.groups(region.dim, stage.held)
-        stage.name(groups, region.node_sets, given, sets)
+        stage.name(groups, region.node_sets, sets)
     for k, (nodes, _, _) in enumerate(history.forces.groups(region.dim)):
         region.node_sets[f"force {k + 1}"] = nodes
     for k, (nodes, _, _) in enumerate(history.heat.groups() if history.heat else ()):
@@ -300,7 +308,7 @@ def _loads(
         if _without_elements(region, name, nodes, at):
             label = region.deck.node_name(int(nodes[at[nodes] < 0][0]))
             raise card.error(f"node {label}: belongs to no element, where does its force go?")
-        found.add("loads", (NodalForce, name, [_scaled(c, share) for c in courses]), card)
+        found.add("loads", (NodalForce, name, [scaled(c, share) for c in courses]), card)
     grows = any(section.material.grows for section in region.sections)
     for k, (nodes, change, card) in enumerate(history.heat.groups() if history.heat else ()):
         if not grows:
@@ -312,18 +320,18 @@ def _loads(
             found.add("loads", (Temperature, name, change), card)
     for (name, label), (course, card, _) in history.faces.items():
         found.add("loads", (Pressure, _loaded(name, label), course), card)
-    for name, (course, way, card, scope) in history.bodies.items():
+    for (name, _), (course, way, card, scope) in history.bodies.items():
         chosen = set(scope.elements(name, Row(card.file, card.number, [])).tolist())
         for section in region.sections:
             own = set(section.elements.tolist())
             if not own & chosen:
                 continue
             if own - chosen:
-                raise card.error(f"GRAV: {name} holds only a part of {section.name}")
+                raise card.error(f"{name} holds only a part of {section.name}")
             density = section.material.density
             if density is None:
-                raise card.error(f"GRAV: the material of {section.name} has no *DENSITY")
-            found.add("loads", (BodyForce, section.name, (course, density * way[:dim])), card)
+                raise card.error(f"the material of {section.name} has no *DENSITY")
+            found.add("loads", (BodyForce, section.name, (scaled(course, density), way)), card)
 
 
 def _without_elements(region: Region, name: str, nodes: Index, at: Index) -> bool:
@@ -331,12 +339,6 @@ def _without_elements(region: Region, name: str, nodes: Index, at: Index) -> boo
     kept = nodes[at[nodes] >= 0]
     region.node_sets[name] = kept
     return len(kept) < len(nodes)
-
-
-def _scaled(course: Course | None, factor: float) -> Course:
-    if course is None:
-        return Course()
-    return replace(course, values=tuple(factor * v for v in course.values))
 
 
 def _of_state(make: Callable[..., Model], stage: Held, state: State) -> Model:
@@ -364,12 +366,11 @@ def _model(
         if kind is NodalForce:
             loads.append(NodalForce(name, [value(c) for c in courses]))
         elif kind is Temperature:
-            loads.append(Temperature(value(courses), on=name))
+            loads.append(Temperature(value(courses), on=name, mean=True))
         elif kind is Pressure:
             loads.append(Pressure(name, value(courses)))
         else:
-            course, way = courses
-            loads.append(BodyForce([value(_scaled(course, w)) for w in way], region=name))
+            loads.append(body_force(name, *courses, value, bodies[0].mesh.dim))
     return Model(
         bodies, supports, stage.contacts, loads, name=title, references=found.references,
         constraints=found.constraints, springs=found.springs,

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ...core.errors import InvalidInput
 from ...mechanics.model import Contact
 from .cards import Card, Row, number
 from .flat import Deck, Placed
@@ -81,9 +80,8 @@ def near(points: Array, x: Array) -> NDArray[np.bool_]:
 
 def read_contacts(
     deck: Deck, region: Region, interactions: dict[str, Interaction], notes: list[str],
-    *, more: bool = False,
 ) -> list[Pair]:  # fmt: skip
-    """The pairs of a deck; raises FileFormatError with file and line.  more: others follow."""
+    """The pairs of a deck; raises FileFormatError with file and line."""
     for step in deck.steps:
         for placed in step:
             if placed.card.keyword in ("CONTACTPAIR", "SURFACEINTERACTION", "CLEARANCE"):
@@ -98,8 +96,6 @@ def read_contacts(
             pairs += _ties(placed, region)
         elif placed.card.keyword == "CLEARANCE":
             _clear(placed, pairs, region)
-    if not (pairs or more):
-        raise InvalidInput("*CONTACT PAIR: missing, a deck without contact")
     return pairs
 
 

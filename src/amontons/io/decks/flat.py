@@ -81,6 +81,15 @@ class Deck:
                 return f"{names.title}.{label}" if names.title else str(label)
         return str(node)
 
+    def node_sets(self) -> dict[bytes, str]:
+        """Names of all node sets by their nodes, the first one where several are the same."""
+        found: dict[bytes, str] = {}
+        for scope in (self.top.own, *self.instances.values()):
+            for name, nodes in scope.node_sets.items():
+                called = f"{scope.title}.{name}" if scope.title else name
+                found.setdefault(np.asarray(nodes, dtype=np.int64).tobytes(), called)
+        return found
+
     def element_labels(self) -> Index:
         """Numbers of all elements in the deck, those of their part in an instance."""
         labels = np.zeros(sum(len(block.nodes) for block in self.blocks), dtype=np.int64)

@@ -17,6 +17,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from .body_loads import Way, way_of
 from .cards import Card, Row, is_whole, number, whole
 from .course import Course
 from .flat import Deck, Placed
@@ -107,7 +108,9 @@ class History:
     supports: Prescribed
     forces: Prescribed
     faces: dict[tuple[str, str], tuple[Course, Card, Scope]] = field(default_factory=dict)
-    bodies: dict[str, tuple[Course, Array, Card, Scope]] = field(default_factory=dict)
+    bodies: dict[tuple[str, bytes], tuple[Course, Way, Card, Scope]] = field(
+        default_factory=dict
+    )
     spans: list[Span] = field(default_factory=list)
     heat: Heat | None = None
     held: list[Index] = field(default_factory=list)
@@ -199,7 +202,9 @@ def _course(old: Course, value: float, span: Span, card: Card, known: Amplitudes
     if name not in known:
         raise card.error(missing("amplitude", name, known))
     times, factors, total = known[name]
+    delay = card.options.get("TIMEDELAY")
     shift = 0.0 if total else span.begin
+    shift += number(delay, Row(card.file, card.number, []), "TIME DELAY") if delay else 0.0
     inside = (times + shift > span.begin) & (times + shift < span.end)
     at = np.unique([span.begin, *(times[inside] + shift), span.end])
     return old.then(tuple(at), tuple(value * np.interp(at - shift, times, factors)))
@@ -331,25 +336,26 @@ def _same_amplitude(row: Row, card: Card, other: Card) -> None:
 
 
 def _distributed(history: History, each: Placed, span: Span, known: Amplitudes) -> None:
-    """Pressures on faces and gravity."""
+    """Pressures on faces, gravity and centrifugal loads; those along other axes add up."""
     card = each.card
     for row in card.rows():
         if len(row.fields) < 3:
             raise row.error(f"{card}: expected a name, the kind of the load, a value")
         name, label = row.fields[0].upper(), row.fields[1].upper()
         value = number(row.fields[2], row, str(card))
-        if label == "GRAV":
-            way = np.array([number(text, row, "GRAV") for text in row.fields[3:6]])
-            if way.shape != (TRANSLATIONS,) or not way.any():
-                raise row.error("GRAV: expected a value and three components of a direction")
-            old = history.bodies.get(name)
+        if label in ("GRAV", "CENTRIF"):
+            way = way_of(row, label)
+            one = (name, np.concatenate(way).tobytes())
+            old = history.bodies.get(one)
             course = _course(old[0] if old else Course(), value, span, card, known)
-            history.bodies[name] = (course, way / np.linalg.norm(way), card, each.scope)
+            history.bodies[one] = (course, way, card, each.scope)
             continue
         if card.keyword == "DSLOAD" and label != "P":
             raise row.error(f"*DSLOAD {label}: is not read, expected P, a pressure")
         if card.keyword == "DLOAD" and not (label[:1] == "P" and is_whole(label[1:])):
-            raise row.error(f"*DLOAD {label}: is not read, expected P1, P2, ... or GRAV")
+            raise row.error(
+                f"*DLOAD {label}: is not read, expected P1, P2, ..., GRAV or CENTRIF"
+            )
         key = (name, label if card.keyword == "DLOAD" else "")
         before = history.faces.get(key)
         course = _course(before[0] if before else Course(), value, span, card, known)

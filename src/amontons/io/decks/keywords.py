@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 
 from .cards import Card
+from .options import with_known_options
 
 READ = {
     "HEADING", "MATERIAL", "ELASTIC", "DENSITY", "SOLIDSECTION", "SURFACEINTERACTION",
@@ -51,21 +52,26 @@ MEANS = {  # what a card would have done
 SLIP = 0.85  # share of letters that keywords have in common from which one is a slip
 
 
-def sorted_out(cards: Iterable[Card], allowed: Sequence[str]) -> tuple[list[Card], list[str]]:
-    """The cards that are read, and what is to be said of those that are left out.
+def sorted_out(
+    cards: Iterable[Card], allowed: Sequence[str]
+) -> tuple[list[Card | None], list[str]]:
+    """The cards that are read, None for others, and what is to be said of what is left out.
 
-    Raises FileFormatError for the first one that changes the answer and is not allowed.
+    Raises FileFormatError for the first one that changes the answer and is not allowed, and
+    for options that are not read.
     """
-    kept: list[Card] = []
+    kept: list[Card | None] = []
     skipped: dict[str, list[int]] = {}
     notes: list[str] = []
-    allow = {"".join(word.upper().split()).removeprefix("*") for word in allowed}
+    allow = plain(allowed)
     for card in cards:
         key = card.keyword
+        reads = key not in allow and (key in READ or _is_first_temperature(card))
+        kept.append(with_known_options(card, allow, notes) if reads else None)
+        if reads:
+            continue
         if key in allow:
             notes.append(f"AT YOUR RISK: {card} (line {card.number}) is left out{_would(key)}")
-        elif key in READ or _is_first_temperature(card):
-            kept.append(card)
         elif key == "RESTART" and "READ" in card.options:
             raise card.error("READ: the results of another run are not read, give its deck")
         elif key in OUTPUT | NUMERICS | EMPTY or _is_thermal(card):
@@ -83,12 +89,17 @@ def sorted_out(cards: Iterable[Card], allowed: Sequence[str]) -> tuple[list[Card
     return kept, notes
 
 
+def plain(allowed: Iterable[str]) -> set[str]:
+    """Keywords that may go, in capitals without blanks and stars."""
+    return {"".join(word.upper().split()).removeprefix("*") for word in allowed}
+
+
 def left_out(step: Sequence[Card], allowed: Sequence[str], *, has_static: bool) -> str:
     """What to say of a step that is not static and is left out, "" for one that is read.
 
     Raises FileFormatError for one that is not allowed; has_static: other steps are static.
     """
-    allow = {"".join(word.upper().split()).removeprefix("*") for word in allowed}
+    allow = plain(allowed)
     for card in step:
         if card.keyword in PROCEDURES:
             what = f"{card} (line {card.number}), a step of {PROCEDURES[card.keyword]}"

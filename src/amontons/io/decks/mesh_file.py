@@ -11,6 +11,8 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from ...core.errors import FileFormatError
 from ...mechanics.meshes.cells import FACET_KIND
 from ...mechanics.meshes.mesh import Mesh
@@ -51,13 +53,35 @@ def read_deck_mesh(path: str | os.PathLike[str], *, glue: Glue = True) -> Mesh:
     FileFormatError naming file and line.
     """
     check_glue(glue)
-    name = os.fspath(path)
-    cards = [card for card in _model(read_cards(Path(name))) if card.keyword in MESH_CARDS]
+    return split(_whole(Path(path))[0], glue)
+
+
+def read_numbered_mesh(path: Path) -> tuple[Mesh, Index]:
+    """The mesh of a deck, and the number that every node (nodes,) has there.
+
+    Raises FileFormatError for a deck that calls two nodes alike, in several instances.
+    """
+    mesh, deck = _whole(path)
+    labels = np.zeros(len(deck.points), dtype=np.int64)
+    for names, _ in deck.point_labels:
+        labels[names.node_at] = names.node_labels
+    used = np.unique(np.concatenate([block.nodes.ravel() for block in deck.blocks]))
+    if len(used) != len(mesh.points) or len(np.unique(labels[used])) != len(used):
+        raise FileFormatError(
+            f"{path}: expected a deck whose nodes have one number each, without elements on "
+            "sides of others alone"
+        )
+    return mesh, labels[used]
+
+
+def _whole(path: Path) -> tuple[Mesh, Deck]:
+    """The mesh of a file, bonded where regions meet, and the flat deck."""
+    cards = [card for card in _model(read_cards(path)) if card.keyword in MESH_CARDS]
     deck = flatten(cards, SHAPES | SOLIDS | SHELLS)
     if not deck.blocks:
-        raise FileFormatError(f"{name}: expected a mesh, got no elements (*ELEMENT)")
+        raise FileFormatError(f"{path}: expected a mesh, got no elements (*ELEMENT)")
     chosen = {card.label("ELSET") for card in cards if card.keyword == "ELSET"}
-    return split(to_mesh(_raw(deck, _writing(cards), chosen), name), glue)
+    return to_mesh(_raw(deck, _writing(cards), chosen), os.fspath(path)), deck
 
 
 def _model(cards: list[Card]) -> Iterator[Card]:

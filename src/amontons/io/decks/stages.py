@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -43,25 +43,25 @@ class Held:
     names: list[str] = field(default_factory=list)  # of the node sets of its supports
 
     def name(
-        self, groups: Sequence[Group], known: dict[str, Index], given: dict[bytes, str],
-        sets: dict[bytes, str],
-    ) -> None:  # fmt: skip
-        """Name the node sets of groups of supports after the set or line they come from.
+        self, groups: Sequence[Group], known: dict[str, Index], sets: Mapping[bytes, str]
+    ) -> None:
+        """Name the node sets of groups of supports; those that are known keep their names.
 
-        known: all node sets, added to; given: names by nodes, those of stages before too, which
-        are kept; sets: names that the deck has for nodes.
+        sets: names of the deck's own sets, by their nodes; others are named after the line of
+        their card.
         """
+        names = {own.tobytes(): name for name, own in known.items()
+                 if name.startswith("support")}  # fmt: skip
         for nodes, _, card in groups:
             key = nodes.tobytes()
-            if key not in given:
-                title = sets.get(key)
-                base = f"{title} (line {card.number})" if title else f"line {card.number}"
-                new, k = base, 2
-                while new in known:
-                    new, k = f"{base} part {k}", k + 1
-                given[key] = new
-            self.names.append(given[key])
-            known[given[key]] = nodes
+            if key not in names:
+                base = f"support {sets[key]}" if key in sets else (
+                    f"support of line {card.number}")  # fmt: skip
+                names[key], k = base, 2
+                while names[key] in known:
+                    names[key], k = f"{base} part {k}", k + 1
+            self.names.append(names[key])
+            known[names[key]] = nodes
 
     def contacts_of(
         self, pairs: Sequence[Pair], mesh: Mesh, law: Callable[..., dict[str, Any]]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mechanics.model.matching import pairs_of
 from ...problem.solution import FrictionSolution
 
 if TYPE_CHECKING:
@@ -39,10 +40,9 @@ def contact_pairs(
 ) -> list[ContactPair]:
     """The pairs of a model that have contacts, in its order."""
     bound = solution.problem.law.bound(solution.r) / fields.weights
-    ends = np.cumsum([len(placed.rows.nodes) for placed in model.discretisation.placed])
     found = []
-    for contact, (body, facets), rows in zip(
-        model.contacts, fields.facets, np.split(np.arange(len(bound)), ends[:-1]), strict=True
+    for (contact, _, rows), (body, facets) in zip(
+        pairs_of(model), fields.facets, strict=True
     ):
         if len(rows):
             pair = ContactPair(

@@ -33,7 +33,8 @@ def status_figure(
 ) -> Figure:
     """The deformed bodies, and status and pressure on the contact surfaces beside them.
 
-    Without geometry, the reactions in the friction cone, and ranked.
+    Without geometry, the reactions in the friction cone, and ranked; without contacts, the
+    bodies alone.
     """
     name = title or solution.problem.name or "contact status"
     note = solution.convergence.stamp
@@ -42,6 +43,10 @@ def status_figure(
         left, right = (sheet.panel(x, 0.6, 3.7, 2.95) for x in (0.85, 5.7))
         _reactions(left, right, solution)
         _legend(sheet, solution, patches=False)
+        return sheet.done()
+    if not solution.problem.contacts:
+        sheet = Sheet(BODIES + 0.6, ROW, title=name, note=note, rows=1)
+        _bodies(sheet.panel(*_place(model, 1)), solution, fields, model)
         return sheet.done()
     pairs = contact_pairs(solution, fields, model)
     maps = solution.problem.dimension == 3 and 0 < len(pairs) <= MAX_MAPS

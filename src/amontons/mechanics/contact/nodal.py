@@ -78,9 +78,12 @@ def _part(average: Callable[[Field], Array], kept: NDArray[np.bool_], field: Fie
 
 def forces(pairs: Sequence[ContactRows], r: Array) -> Array:
     """Forces on the slaves in global axes, (nc, d), of the reactions r of several pairs."""
-    ends = np.cumsum([len(rows.nodes) for rows in pairs])[:-1]
-    parts = zip(pairs, np.split(r, ends), strict=True)
-    return np.concatenate([rows.force(part) for rows, part in parts])
+    out, begin = np.empty_like(r), 0
+    for rows in pairs:
+        end = begin + len(rows.nodes)
+        out[begin:end] = rows.force(r[begin:end])
+        begin = end
+    return out
 
 
 def nodal_contact(mesh: Mesh, surface: str, obstacle: Obstacle) -> ContactRows:

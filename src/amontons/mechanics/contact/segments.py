@@ -33,6 +33,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 FLAT_FACET = 1e-12  # area, relative to the square of the longest side, of a degenerate facet
+ROUNDING = 1e-9  # of a size, below which facets lie on each other
 SLIVER = 1e-8  # part of a facet; biorthogonal functions on less are lost in rounding
 TWICE = 1e-6  # coverage above 1 by less is rounding
 TWICE_CURVED = 1e-2  # the same where areas are no polynomials
@@ -162,14 +163,17 @@ class Segments:
 def segments(slave: Surface, master: Surface, *, joined: bool = False) -> Segments:
     """All segments of two surfaces that face each other.
 
-    joined: both are in one mesh, with common numbers; facets that share a node are no pair.
+    joined: both are in one mesh, with common numbers; facets that share a node are a pair at
+    the tip of a slot, but not around an edge, where the body is between them.
     """
     found = []
     for chunk, facet in _candidates(slave, master):
         if joined:
             same = slave.nodes[chunk][:, :, None] == master.nodes[facet][:, None, :]
-            apart = ~same.any(axis=(1, 2))
-            chunk, facet = chunk[apart], facet[apart]
+            way = master.centre[facet] - slave.centre[chunk]
+            ahead = np.einsum("kc,kc->k", way, slave.normal[chunk])
+            counts = ~same.any(axis=(1, 2)) | (ahead > -ROUNDING * slave.radius[chunk])
+            chunk, facet = chunk[counts], facet[counts]
         for of, opposite, parts in cuts(slave, master, chunk, facet):
             found.append(_summed(slave, master, of, opposite, parts))
     every = _joined(found, slave, master)

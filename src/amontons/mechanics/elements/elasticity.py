@@ -173,7 +173,10 @@ def geometry_of(mesh: Mesh, cells: Cells, rule: Rule) -> tuple[Array, Index, Arr
 
 
 def body_load(mesh: Mesh, force: Array, region: str | None = None) -> Array:
-    """Nodal forces (n, dim) of a force per volume (n, dim) given at the nodes."""
+    """Nodal forces (n, dim) of a force per volume (n, dim) given at the nodes.
+
+    Cells of reduced integration sum it up at the points of their stiffness, as CalculiX does.
+    """
     if region is not None and region not in mesh.regions:
         raise InvalidInput("body force: " + unknown("region", region, mesh.regions))
     load = np.zeros_like(mesh.points)
@@ -182,7 +185,8 @@ def body_load(mesh: Mesh, force: Array, region: str | None = None) -> Array:
             continue
         cell = CELLS[block.kind]
         coordinates = mesh.points[block.nodes]
-        for at, weight in zip(*cell.gauss, strict=True):
+        reduced = block.integration == "reduced" and cell.reduced is not None
+        for at, weight in zip(*(rule_of(mesh, block) if reduced else cell.gauss), strict=True):
             shape = cell.shape(at)
             volume = weight * determinant(cell.jacobians(coordinates, at))
             where = np.einsum("a,kac->kc", shape, coordinates)

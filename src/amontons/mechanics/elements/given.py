@@ -12,10 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.sparse.linalg import LinearOperator
 
 from ...core.arrays import integers, read_only, real, sparse_matrix
 from ...core.errors import InvalidInput, shown
 from ..meshes.mesh import Mesh
+from .probed import probed
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -124,14 +126,17 @@ def rows_of(mesh: Mesh, rows: Any) -> Index:
 
 def _ordered(name: str, matrix: Any, order: Index, mesh: Mesh) -> sparse.csr_array:
     """A symmetric matrix by node."""
-    found = sparse_matrix(name, matrix)
     n, dim = mesh.points.shape
+    operator = isinstance(matrix, LinearOperator)
+    found = matrix if operator else sparse_matrix(name, matrix)
     if found.shape != (n * dim, n * dim):
         raise InvalidInput(
             f"{name}: expected shape {(n * dim, n * dim)} of {n} nodes in {dim}D, got "
             f"{found.shape}; unknowns that are no displacement of a node of the mesh have to "
             "be eliminated before"
         )
+    if operator:
+        found = probed(name, matrix, order, mesh)
     out = sparse.csr_array(found)[order][:, order]
     size = float(np.abs(out.data).max(initial=0.0))
     apart = abs(out - out.T).max() if out.nnz else 0.0

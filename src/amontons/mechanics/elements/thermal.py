@@ -21,8 +21,14 @@ from .elasticity import held_stress, materials_by_region
 Array = NDArray[np.float64]
 
 
-def thermal_load(mesh: Mesh, material: Any, change: Array) -> Array:
-    """Nodal forces (n, dim) of a change of temperature (n,) given at the nodes."""
+MEAN = {"quad", "hex"}  # cells that CalculiX and Abaqus give one temperature
+
+
+def thermal_load(mesh: Mesh, material: Any, change: Array, *, mean: bool = False) -> Array:
+    """Nodal forces (n, dim) of a change of temperature (n,) given at the nodes.
+
+    mean: fully integrated quad and hex cells take the mean of their nodes.
+    """
     laws: Mapping[str, Any] = materials_by_region(mesh, material)
     load = np.zeros_like(mesh.points)
     pairs = components(mesh.dim, axisymmetric=mesh.axisymmetric)
@@ -37,10 +43,12 @@ def thermal_load(mesh: Mesh, material: Any, change: Array) -> Array:
                 "strains; take full integration"
             )
         cell, rows = CELLS[cells.kind], np.array([stress[i, k] for i, k in pairs])
+        averaged = mean and cells.kind in MEAN and cells.integration == "full"
         for nodes in in_parts(cells):
             for at, weight in zip(*rule_of(mesh, cells), strict=True):
                 B, volume = gradient_rows(mesh, cells.kind, nodes, at)
-                here = change[nodes] @ cell.shape(at) * weight * volume
+                shares = cell.shape(cell.centre if averaged else at)
+                here = change[nodes] @ shares * weight * volume
                 force = np.einsum("s,ksa,k->ka", rows, B, here)
                 np.add.at(load, nodes, force.reshape(*nodes.shape, mesh.dim))
     return load

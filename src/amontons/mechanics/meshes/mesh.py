@@ -79,11 +79,17 @@ class Mesh:
     def _check_use(self) -> None:
         if not self.cells:
             raise InvalidInput(f"mesh: expected cells of dimension {self.dim}, got none")
-        if len({CELLS[block.kind].order for block in self.cells}) > 1:
-            raise InvalidInput("mesh: expected cells of one order, got both")
         used = np.zeros(len(self.points), dtype=bool)
+        second = np.zeros(len(self.points), dtype=bool)
         for block in self.cells:
-            used[block.nodes] = True
+            (second if CELLS[block.kind].order == 2 else used)[block.nodes] = True
+        if len(both := np.flatnonzero(used & second)):
+            raise InvalidInput(
+                f"points[{int(both[0])}]: belongs to cells of first and of second order, which "
+                f"would part between their corners; {len(both)} such points; expected parts "
+                "of different order to share none, and to be tied or in contact"
+            )
+        used |= second
         if not used.all():
             raise InvalidInput(
                 f"points[{int(np.flatnonzero(~used)[0])}]: belongs to no cell; "
@@ -120,8 +126,8 @@ class Mesh:
 
     @property
     def order(self) -> int:
-        """1, or 2 with nodes also in the middle of edges, quadrilaterals and hexahedra."""
-        return CELLS[self.cells[0].kind].order
+        """1, or 2 where cells have nodes also in the middle of edges; the larger of parts."""
+        return max(CELLS[block.kind].order for block in self.cells)
 
     @property
     def regions(self) -> tuple[str, ...]:

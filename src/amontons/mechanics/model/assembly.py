@@ -28,6 +28,7 @@ from .held import check_outside
 from .parts import Body, Contact, Fix, Load
 from .placing import Placed, place
 from .rigid import Piece, near_nullspace, pieces
+from .sites import Sites
 from .supports import Prescribed, external_load, locate
 
 Array = NDArray[np.float64]
@@ -59,7 +60,8 @@ class Discretisation:
     are the free dofs; beside: dofs that are no nodes, by name; gap (nc,); carried (nc, d):
     part of the local displacement that the supports prescribe; levels: prolongations of the
     free dofs from coarser meshes, finest first (none where K is an operator, which has its
-    own); nodal_levels: of the nodes, body by body.
+    own); nodal_levels: of the nodes, body by body; stretched (k, dofs): springs by rows, whose
+    product with displacements is their stretch.
     """
 
     offsets: Index
@@ -79,12 +81,13 @@ class Discretisation:
     nodal_levels: tuple[Levels, ...] = ()
     eliminated: Elimination | None = None
     beside: Beside = None  # type: ignore[assignment]  # always given
+    stretched: sparse.csr_array = None  # type: ignore[assignment]  # always given
 
     def continued(self, prescribed: Array) -> Array | None:
         """Prescribed values (dofs,) continued into the bodies, (n,); None without levels."""
         if not any(self.nodal_levels) or self.eliminated is not None:
             return None
-        counts = np.diff(self.offsets) // self.placed[0].rows.points.shape[1]
+        counts = np.diff(self.offsets) // self.carried.shape[1]
         return continued(
             self.nodal_levels, counts.tolist(), prescribed, self.is_fixed
         )[self.free]  # fmt: skip
@@ -136,8 +139,13 @@ class Discretisation:
         piece = np.empty(int(self.offsets[-1]) // d, dtype=np.int32)
         for k, part in enumerate(self.parts):
             piece[part.dofs[::d] // d] = k
-        slave = [self.offsets[p.body] // d + p.rows.nodes for p in self.placed]
-        return Structure(self.free, d, piece, np.concatenate(slave))
+        slave = self.offsets[self.sites.body] // d + self.sites.node
+        return Structure(self.free, d, piece, slave)
+
+    @cached_property
+    def sites(self) -> Sites:
+        """Where the contacts are."""
+        return Sites.of(self.placed, self.carried.shape[1])
 
     # ------------------------------------------------------------------ unknowns
     @property
@@ -211,7 +219,7 @@ def discretise(
     offsets = beside.offsets
     given = Prescribed.of(bodies, supports, beside)
     is_fixed = given.is_fixed
-    springs = spring_stiffness(ties.springs, beside)
+    springs, stretched = spring_stiffness(ties.springs, beside)
     sprung = np.unique(springs.indices).astype(np.int64)
     eliminated = Elimination.of(beside, ties.constraints, is_fixed, sprung)
     fixed = np.flatnonzero(is_fixed)
@@ -227,7 +235,7 @@ def discretise(
     placed = _placed(bodies, contacts, given, eliminated)
     _check_once(bodies, contacts, placed)
     whole_H = _of_all([p.H for p in placed], beside)
-    if not whole_H.shape[1]:
+    if contacts and not whole_H.shape[1]:
         for k, held in enumerate(p.held for p in placed):
             with within("contacts", k):
                 if held is not None:
@@ -241,8 +249,9 @@ def discretise(
     return Discretisation(
         offsets, K, free, fixed, prescribed, M=M, H=H, load=load,
         gap=np.concatenate([
-            np.zeros_like(p.rows.gap) if contact.tied else p.rows.gap
-            for contact, p in zip(contacts, placed, strict=True)
+            np.zeros(0),
+            *(np.zeros_like(p.rows.gap) if contact.tied else p.rows.gap
+              for contact, p in zip(contacts, placed, strict=True)),
         ]),
         carried=_local(whole_H, abs(whole_H), prescribed, d),
         placed=placed,
@@ -258,7 +267,7 @@ def discretise(
             [b.mesh.levels for b in bodies], [len(b.mesh.points) for b in bodies], d, is_fixed
         ),
         nodal_levels=tuple(body.mesh.levels for body in bodies),
-        eliminated=eliminated, beside=beside,
+        eliminated=eliminated, beside=beside, stretched=stretched,
     )  # fmt: skip
 
 
@@ -280,7 +289,8 @@ def _unknowns(
 
 def _of_all(blocks: list[sparse.csc_array], beside: Beside) -> sparse.csc_array:
     """Columns of all contacts on all dofs, those beside the nodes too."""
-    H = sparse.csc_array(sparse.hstack(blocks, format="csc"))
+    none = sparse.csc_array((int(beside.offsets[-1]), 0))
+    H = sparse.csc_array(sparse.hstack([none, *blocks], format="csc"))
     if not beside.count:
         return H
     none = sparse.csc_array((beside.count, H.shape[1]))

@@ -78,8 +78,9 @@ class Body:
         mesh: its nodes, cells and surfaces; cells say which facets a surface has, and are not
         integrated but for tractions and body forces.  Surfaces in contact have the shape
         functions of the mesh.
-        K, mass (dofs, dofs): sparse or dense, symmetric, force per length and mass; dynamics
-        need the mass.  load (dofs,): forces besides those of the model.  dofs = nodes * dim.
+        K, mass (dofs, dofs): sparse, dense or an operator of scipy (`LinearOperator`, whose
+        entries are asked for), symmetric, force per length and mass; dynamics need the mass.
+        load (dofs,): forces besides those of the model.  dofs = nodes * dim.
         rows: the order of their rows, "nodes" (x1 y1 z1 x2 …; scikit-fem's vector elements,
         dolfinx, CalculiX), "components" (x1 x2 …, y1 y2 …; NGSolve's VectorH1) or a table
         (nodes, dim) with the row of every component, such as scikit-fem's nodal_dofs.T.

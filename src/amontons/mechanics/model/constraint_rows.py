@@ -265,11 +265,15 @@ def is_rigid(part: Coupling, beside: Beside) -> bool:
     return isinstance(beside.bodies[beside._numbered(part.on)[0]].material, Rigid)
 
 
-def spring_stiffness(springs: Sequence[Spring], beside: Beside) -> sparse.csr_array:
-    """Stiffness (dofs, dofs) of all springs."""
-    out = sparse.csr_array((beside.total, beside.total))
+def spring_stiffness(
+    springs: Sequence[Spring], beside: Beside
+) -> tuple[sparse.csr_array, sparse.csr_array]:
+    """Stiffness (dofs, dofs) of all springs, and rows (k, dofs) whose product is a stretch."""
+    none = sparse.csr_array((0, beside.total))
+    out, every = sparse.csr_array((beside.total, beside.total)), [none]
     for k, spring in enumerate(springs):
         with within("springs", k):
             rows, _ = equations(spring.terms, beside)
         out = out + spring.stiffness * (rows.T @ rows)
-    return sparse.csr_array(out)
+        every.append(rows if spring.stiffness else none)
+    return sparse.csr_array(out), sparse.csr_array(sparse.vstack(every, format="csr"))

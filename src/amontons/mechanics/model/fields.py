@@ -70,11 +70,10 @@ def recover_fields(
 ) -> ContactFields:
     """Fields of a solution at the load factor; surfaces: (body, slave surface) per pair."""
     bodies, parts = model.bodies, model.discretisation
-    rows = [placed.rows for placed in parts.placed]
-    frames = np.concatenate([r.frames for r in rows])
-    if solution.r.shape != frames.shape[:2]:
+    sites = parts.sites
+    if solution.r.shape != sites.points.shape:
         raise InvalidInput(
-            f"solution: expected r of shape {frames.shape[:2]}, got {solution.r.shape}: "
+            f"solution: expected r of shape {sites.points.shape}, got {solution.r.shape}: "
             "it belongs to another model"
         )
     if solution.v is None:
@@ -85,16 +84,14 @@ def recover_fields(
     load = model.load_factor * external_load(bodies, model.loads, parts.beside)
     displacement = by_body(bodies, parts, whole)
     held = support_forces(parts, parts.missing(whole, load, solution.r))
-    weights = np.concatenate([r.weights for r in rows])
-    force = forces(rows, solution.r)
-    traction = solution.r / weights[:, None]
+    force = forces([placed.rows for placed in parts.placed], solution.r)
+    traction = solution.r / sites.weights[:, None]
     return ContactFields(
         displacement=displacement,
-        points=np.concatenate([r.points for r in rows]),
-        frames=frames, weights=weights, gap=solution.u[:, 0], pressure=traction[:, 0],
-        shear=traction[:, 1:], slip=solution.u[:, 1:], force=force, resultant=force.sum(axis=0),
-        body=np.concatenate([np.full(len(p.rows.nodes), p.body) for p in parts.placed]),
-        node=np.concatenate([r.nodes for r in rows]),
+        points=sites.points, frames=sites.frames, weights=sites.weights,
+        gap=solution.u[:, 0], pressure=traction[:, 0], shear=traction[:, 1:],
+        slip=solution.u[:, 1:], force=force, resultant=force.sum(axis=0),
+        body=sites.body, node=sites.node,
         facets=tuple((k, bodies[k].mesh.surface(name)) for k, name in surfaces),
         reaction=by_body(bodies, parts, held),
         load=load_wrench(model, displacement, load), status=solution.status,

@@ -303,6 +303,6 @@ def _bonded(parts: Discretisation, f: Array, w: Array) -> tuple[Array, float]:
 
 def _load_by_length(parts: Discretisation, f: Array) -> float:
     """A stiffness where nothing deforms: the load moves contacts by about their distance."""
-    points = np.concatenate([placed.rows.points for placed in parts.placed])
-    length = float(np.ptp(points, axis=0).max())
+    points = parts.sites.points
+    length = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
     return (float(np.linalg.norm(f)) or 1.0) / (length or 1.0)

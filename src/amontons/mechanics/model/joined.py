@@ -7,6 +7,7 @@ motions of all its members, of which a basis is left.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,12 +35,41 @@ class _Columns:
 
 
 def joined_loose(
-    parts: list[Piece], eliminated: Elimination, is_fixed: Mask
+    parts: list[Piece], eliminated: Elimination, is_fixed: Mask, stretched: sparse.csr_array
 ) -> list[tuple[Piece, Array]]:
-    """As `loose_modes`, with pieces joined; raises SingularOperator for a loose reference."""
+    """As `loose_modes`, with pieces joined; raises SingularOperator for a loose reference.
+
+    stretched (k, dofs): springs, as rows.
+    """
     columns = _columns(parts, eliminated)
     z_of = _independent_motions(columns, eliminated)
-    rows = _conditions(columns, z_of, eliminated, is_fixed)
+    rows = _conditions(columns, z_of, eliminated, is_fixed, stretched)
+    return _left(parts, columns, rows, eliminated)
+
+
+def sprung_loose(
+    parts: list[Piece], is_fixed: Mask, stretched: sparse.csr_array
+) -> list[tuple[Piece, Array]]:
+    """As `loose_modes`, with pieces that springs hold, stretched (k, dofs) by rows, or join."""
+    starts, entries = _of_pieces(parts)
+    shape = (stretched.shape[1], int(starts[-1]))
+    motions = sparse.csr_array(sparse.coo_array(entries, shape=shape))
+    columns = _Columns(starts, motions, np.zeros(0, dtype=np.int64))
+    rows = [motions[np.flatnonzero(is_fixed)], _lengths(stretched) @ motions]
+    return _left(parts, columns, sparse.csr_array(sparse.vstack(rows, format="csr")), None)
+
+
+def _lengths(rows: sparse.csr_array) -> sparse.csr_array:
+    """Rows of length 1."""
+    size = np.sqrt(np.asarray(rows.multiply(rows).sum(axis=1)).ravel())
+    return sparse.csr_array(sparse.diags_array(1.0 / np.where(size > 0, size, 1.0)) @ rows)
+
+
+def _left(
+    parts: list[Piece], columns: _Columns, rows: sparse.csr_array,
+    eliminated: Elimination | None,
+) -> list[tuple[Piece, Array]]:  # fmt: skip
+    """Pieces with the motions for which all rows are zero, those that rows join as one."""
     rows = sparse.csr_array(sparse.vstack([rows, _straining(parts, columns)], format="csr"))
     count = rows.shape[1]
     starts, ends = columns.starts[:-1], columns.starts[1:]
@@ -61,6 +91,7 @@ def joined_loose(
         u, s, _ = np.linalg.svd(of_pieces, full_matrices=False)
         rank = int((s > ZERO).sum())
         if rank < null.shape[1]:
+            assert eliminated is not None  # pieces alone have all motions that are left
             _refuse(mine, columns, null, eliminated)
         basis = np.where(np.abs(u) > ROUNDING, u, 0.0)[:, :rank]  # else contacts would feel it
         out.append((_joined([parts[k] for k in members]), basis))
@@ -70,16 +101,21 @@ def joined_loose(
 def _columns(parts: list[Piece], eliminated: Elimination) -> _Columns:
     """All motions, and those of the nodes, (dofs, columns)."""
     found, first = eliminated.independent, eliminated.beside.first
+    starts, entries = _of_pieces(parts)
+    z = np.flatnonzero((found.own < 0) | (found.own >= first))
+    z = np.setdiff1d(z, eliminated.idle)
+    shape = (eliminated.beside.total, int(starts[-1]) + len(z))
+    return _Columns(starts, sparse.csr_array(sparse.coo_array(entries, shape=shape)), z)
+
+
+def _of_pieces(parts: list[Piece]) -> tuple[Index, Any]:
+    """Where the motions of each piece begin, and their entries as those of a matrix."""
     starts = np.cumsum([0, *(piece.modes.shape[1] for piece in parts)])
     i = [np.repeat(piece.dofs, piece.modes.shape[1]) for piece in parts]
     j = [np.tile(a + np.arange(piece.modes.shape[1]), len(piece.dofs))
          for a, piece in zip(starts[:-1], parts, strict=True)]  # fmt: skip
-    z = np.flatnonzero((found.own < 0) | (found.own >= first))
-    z = np.setdiff1d(z, eliminated.idle)
-    shape = (eliminated.beside.total, int(starts[-1]) + len(z))
     values = np.concatenate([piece.modes.ravel() for piece in parts])
-    entries = (values, (np.concatenate(i), np.concatenate(j)))
-    return _Columns(starts, sparse.csr_array(sparse.coo_array(entries, shape=shape)), z)
+    return starts, (values, (np.concatenate(i), np.concatenate(j)))
 
 
 def _independent_motions(columns: _Columns, eliminated: Elimination) -> sparse.csr_array:
@@ -98,9 +134,10 @@ def _independent_motions(columns: _Columns, eliminated: Elimination) -> sparse.c
 
 
 def _conditions(
-    columns: _Columns, z_of: sparse.csr_array, eliminated: Elimination, is_fixed: Mask
-) -> sparse.csr_array:
-    """Rows that are zero for motions that supports and constraints allow."""
+    columns: _Columns, z_of: sparse.csr_array, eliminated: Elimination, is_fixed: Mask,
+    stretched: sparse.csr_array,
+) -> sparse.csr_array:  # fmt: skip
+    """Rows that are zero for motions that supports, constraints and springs allow."""
     found, first = eliminated.independent, eliminated.beside.first
     moved = sparse.csr_array(found.map @ z_of)
     follow = np.ones(first, dtype=bool)
@@ -108,8 +145,8 @@ def _conditions(
     follow[own] = False
     follow = np.flatnonzero(follow)
     differ = sparse.csr_array(columns.motions[follow] - moved[follow])
-    held = moved[np.flatnonzero(is_fixed)]
-    return sparse.csr_array(sparse.vstack([differ, held], format="csr"))
+    held = [moved[np.flatnonzero(is_fixed)], _lengths(stretched) @ moved]
+    return sparse.csr_array(sparse.vstack([differ, *held], format="csr"))
 
 
 def _straining(parts: list[Piece], columns: _Columns) -> sparse.csr_array:

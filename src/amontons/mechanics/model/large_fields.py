@@ -35,12 +35,11 @@ def recover_large(
         raise InvalidInput("solution: it belongs to another model, or holds no displacements")
     whole[linear.free] = solution.v
     r, u, moved = solution.r, solution.u, whole.reshape(parts.X.shape)
-    rows = [placed.rows for placed in linear.placed]
+    sites = linear.sites
     meeting = parts.meet(moved)
     axes = frames(meeting.normals)
-    weights = np.concatenate([row.weights for row in rows])
     force = np.einsum("pkc,pk->pc", axes, r)
-    traction = r / weights[:, None]
+    traction = r / sites.weights[:, None]
     load = (model.load_factor * nodal_forces(model, model.loads)).at(moved)
     pushed = meeting.columns(axes, len(moved)) @ r.ravel()
     try:
@@ -49,11 +48,10 @@ def recover_large(
         held = np.zeros_like(whole)
     displacement = by_body(model.bodies, linear, whole)
     return ContactFields(
-        displacement=displacement, points=parts.points, frames=axes, weights=weights,
+        displacement=displacement, points=parts.points, frames=axes, weights=sites.weights,
         gap=u[:, 0], pressure=traction[:, 0], shear=traction[:, 1:], slip=u[:, 1:],
         force=force, resultant=force.sum(axis=0),
-        body=np.concatenate([np.full(len(p.rows.nodes), p.body) for p in linear.placed]),
-        node=np.concatenate([row.nodes for row in rows]),
+        body=sites.body, node=sites.node,
         facets=tuple((k, model.bodies[k].mesh.surface(name)) for k, name in surfaces),
         reaction=by_body(model.bodies, linear, held),
         load=load_wrench(model, displacement, load), status=solution.status,

@@ -22,8 +22,8 @@ UNEVEN = 1e-2  # of a pressure, above which what does not match is told
 
 def pairs_of(model: Model) -> Iterator[tuple[Contact, Placed, NDArray[np.int64]]]:
     """Contacts, what they are placed to, and their numbers in the fields."""
-    counts = [len(placed.rows.nodes) for placed in model.discretisation.placed]
-    numbers = np.split(np.arange(sum(counts)), np.cumsum(counts)[:-1])
+    ends = np.cumsum([0, *(len(p.rows.nodes) for p in model.discretisation.placed)])
+    numbers = [np.arange(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
     return zip(model.contacts, model.discretisation.placed, numbers, strict=True)
 
 

@@ -26,7 +26,7 @@ from .fields import ContactFields
 from .following import check_follows
 from .formulation import Formulation, formulation_of
 from .held import check_outside
-from .joined import joined_loose
+from .joined import joined_loose, sprung_loose
 from .laws import law_of, rubs
 from .names import named_bodies, pair_names, tuple_of
 from .parts import Body, Contact, Fix, Load, NodalForce, Temperature
@@ -72,8 +72,6 @@ class Model(Told):
             object.__setattr__(self, name, tuple_of(name, getattr(self, name), kind))
         if not self.bodies:
             raise InvalidInput("expected at least one, got none", ("bodies",))
-        if not self.contacts:
-            raise InvalidInput("expected at least one, got none", ("contacts",))
         dims = {body.mesh.dim for body in self.bodies}
         if len(dims) > 1:
             raise InvalidInput("expected all in 2D or all in 3D, got both", ("bodies",))
@@ -231,10 +229,12 @@ class Model(Told):
         return "a body" if alone else f"a body ({names})"  # the only one needs no name
 
     def _loose(self, parts: Discretisation) -> list[tuple[Piece, Array]]:
-        """Pieces with the rigid modes that supports leave free."""
+        """Pieces with the rigid modes that supports and springs leave free."""
         if parts.eliminated is not None and not parts.eliminated.only_rigid:
             return self._shared.once(joined_loose, (), parts.parts, parts.eliminated,
-                                     parts.is_fixed)  # fmt: skip
+                                     parts.is_fixed, parts.stretched)  # fmt: skip
+        if parts.stretched.shape[0]:
+            return sprung_loose(parts.parts, parts.is_fixed, parts.stretched)
         return loose_modes(parts.parts, parts.is_fixed)
 
     @property

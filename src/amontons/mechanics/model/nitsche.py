@@ -26,7 +26,7 @@ def nitsche_matrices(parts: Discretisation, held: bool) -> NitscheMatrices:
         M,
         parts.H,
         sparse.csc_array(_tractions(parts).tocsr()[parts.free]),
-        weights=np.concatenate([p.rows.weights for p in parts.placed]),
+        weights=parts.sites.weights,
         kappa=np.concatenate([t.kappa for t in terms]),
         theta=np.concatenate([t.theta for t in terms]),
         stiffness=np.concatenate([t.stiffness for t in terms]),

@@ -165,6 +165,11 @@ def _nonlinear_parts(model: Model) -> NonlinearParts:
 
 
 def _check_supported(model: Model) -> None:
+    if not model.contacts:
+        raise UnsupportedForm(
+            "finite strains are solved with contacts; got none; add a Contact, which may stay "
+            "open, or take LinearElastic", ("contacts",), "",
+        )  # fmt: skip
     asked = all(contact.kinematics == FINITE for contact in model.contacts)
     for k, body in enumerate(model.bodies):
         at, what = ("bodies", k, "material"), f"body {body.name!r}"

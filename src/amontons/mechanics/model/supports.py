@@ -176,14 +176,17 @@ def _add_temperature(
         return
     with within("loads", where[0]):
         check_expansion(bodies)
-        for k, change in enumerate(changes(bodies, loads)):
-            if change is not None and isinstance(bodies[k].material, GivenMatrices):
-                raise InvalidInput(
-                    f"temperature: body {bodies[k].name!r} has a given K; give "
-                    "the forces of its temperature as load of Body.from_matrix"
-                )
-            if change is not None:
-                part = thermal_load(bodies[k].mesh, bodies[k].material, change)
+        for mean in {loads[at].mean for at in where}:
+            kind = [loads[at] for at in where if loads[at].mean == mean]
+            for k, change in enumerate(changes(bodies, kind)):
+                if change is None:
+                    continue
+                if isinstance(bodies[k].material, GivenMatrices):
+                    raise InvalidInput(
+                        f"temperature: body {bodies[k].name!r} has a given K; give "
+                        "the forces of its temperature as load of Body.from_matrix"
+                    )
+                part = thermal_load(bodies[k].mesh, bodies[k].material, change, mean=mean)
                 out[offsets[k] : offsets[k + 1]] += part.ravel()
 
 

@@ -129,7 +129,7 @@ class MovingModel:
         h, theta = method.step, method.theta
         self.M, self.C, self.K = inertia.M, inertia.C, parts.stored_stiffness
         self.M_hat = sparse.csr_array(self.M + theta * h * self.C + theta**2 * h**2 * self.K)
-        self.closed = TOUCHING * np.concatenate([p.rows.weights for p in parts.placed]) ** (
+        self.closed = TOUCHING * parts.sites.weights ** (
             1 / (model.dimension - 1)
         )
         nc, d = parts.carried.shape

@@ -67,7 +67,10 @@ def carried_over(state: State, old: Motion, new: Motion) -> State:
     before, after = old.parts, new.parts
     if before.dofs != after.dofs or len(before.placed) != len(after.placed):
         raise InvalidInput("stages: expected models of the same bodies and contact pairs")
-    kept = [np.concatenate([p.kept for p in parts.placed]) for parts in (before, after)]
+    kept = [
+        np.concatenate([np.zeros(0, dtype=bool), *(p.kept for p in parts.placed)])
+        for parts in (before, after)
+    ]
     if len(kept[0]) != len(kept[1]):
         raise InvalidInput("stages: expected models with the same contact surfaces")
 

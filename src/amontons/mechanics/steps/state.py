@@ -142,22 +142,17 @@ class TimeStep(Shown):
     @cached_property
     def fields(self) -> ContactFields:
         """Displacements, tractions and slip since the start, for writers and plots."""
-        placed = self.model.discretisation.placed
+        sites = self.model.discretisation.sites
         surfaces = [locate(self.model.bodies, c.slave) for c in self.model.contacts]
-        rows = [p.rows for p in placed]
-        frames = self.frames
-        if frames is None:
-            frames = np.concatenate([r.frames for r in rows])
-        weights = np.concatenate([r.weights for r in rows])
+        frames = sites.frames if self.frames is None else self.frames
         force = self._force
-        traction = self.state.force / weights[:, None]
+        traction = self.state.force / sites.weights[:, None]
         return ContactFields(
-            displacement=self.displacement, points=np.concatenate([r.points for r in rows]),
-            frames=frames, weights=weights, gap=self.gap, pressure=traction[:, 0],
+            displacement=self.displacement, points=sites.points,
+            frames=frames, weights=sites.weights, gap=self.gap, pressure=traction[:, 0],
             shear=traction[:, 1:], slip=self.state.slip, force=force,
             resultant=force.sum(axis=0),
-            body=np.concatenate([np.full(len(p.rows.nodes), p.body) for p in placed]),
-            node=np.concatenate([r.nodes for r in rows]),
+            body=sites.body, node=sites.node,
             facets=tuple((k, self.model.bodies[k].mesh.surface(name)) for k, name in surfaces),
             status=self.status, slid=self.state.slid, path=self.state.path,
             friction_work=self.state.friction_work, reaction=self._split(self.reaction),

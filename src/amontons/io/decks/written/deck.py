@@ -56,6 +56,9 @@ def write_deck(
     names = Names()
     meshes = Meshes(whole, names)
     contacts = Contacts(whole, meshes, dialect, penalty, notes)
+    heat = [load for load in model.loads if isinstance(load, Temperature)]
+    if any(not (load.mean or is_number(load.value)) for load in heat):
+        notes.append("temperature: other programs take its mean in quad and hex cells")
     beside = Beside.of(whole.bodies, whole.references, whole.constraints)
     labels, extra = _labels(beside)
     own = Beside.of(model.bodies, model.references, model.constraints)
