@@ -39,6 +39,7 @@ from .io.checkpoint import (
 )
 from .io.decks.written import write_deck as write_deck
 from .io.fclib import read_fclib as read_fclib, write_fclib as write_fclib
+from .io.matrices import StoredMatrices as StoredMatrices, read_matrices as read_matrices
 from .io.meshes import read_mesh as read_mesh
 from .io.readers import read_case as read_case
 from .io.series import export_xdmf as export_xdmf
