@@ -1,4 +1,4 @@
-"""Small models for written_decks.py: one of everything that a deck can say."""
+"""Small models for written_examples.py: one of everything that a deck can say."""
 
 import numpy as np
 
@@ -58,6 +58,13 @@ def stacked(dim=2, *, order=1, kind=None, fitting=False, loads=None, down=None,
         supports, [am.Contact("upper.bottom", master="lower.top", **law)],
         loads or [am.Traction("upper.top", force)],
     )  # fmt: skip
+
+
+def freed(model):
+    """The same with nothing held but the bottom."""
+    from dataclasses import replace
+
+    return replace(model, supports=model.supports[:1])
 
 
 def turned_block():
@@ -155,6 +162,9 @@ MODELS = {
     "pair exponential": lambda: stacked(stiffness=am.ExponentialOverclosure(1e-3, 2.0)),
     "tied 2D": lambda: stacked(tied=True),
     "tied 3D": lambda: stacked(3, tied=True),
+    "tied 3D fitting": lambda: stacked(3, fitting=True, tied=True),
+    "tied 3D fitting, slave free": lambda: freed(stacked(3, fitting=True, tied=True)),
+    "tied 3D, slave free": lambda: freed(stacked(3, tied=True)),
     "tied fitting": lambda: stacked(fitting=True, tied=True),
     "rings": ring,
 }  # fmt: skip

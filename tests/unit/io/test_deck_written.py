@@ -215,3 +215,22 @@ def test_bonds_and_the_line_of_nodes_are_read_back(tmp_path):
     text = (tmp_path / "model.inp").read_text()
     row = text.split("PRESSURE-OVERCLOSURE=LINEAR\n")[1].split("\n")[0]
     np.testing.assert_allclose([float(x) for x in row.split(",")], [1e5, 2.0], rtol=1e-9)
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
+@pytest.mark.parametrize("held", [True, False])
+def test_ties_of_held_nodes_hold_in_calculix(held, tmp_path):
+    """Its *TIE leaves held components of slave nodes out, and the master there goes free."""
+    lower, upper = (am.box((1.0, 1.0, 1.0), cells=2, origin=(0.0, 0.0, z)) for z in (-1.0, 0.0))
+    made = am.Model(
+        [am.Body(mesh, am.LinearElastic(E, 0.3), name)
+         for mesh, name in ((lower, "lower"), (upper, "upper"))],
+        [am.Fix("lower.bottom", 0), am.Fix("upper.left", (0.0, None, None))][: 1 + held],
+        [am.Contact("upper.bottom", master="lower.top", tied=True)],
+        [am.Traction("upper.top", (1.0, 0.0, LOAD))],
+    )  # fmt: skip
+    ours = np.concatenate([*am.solve(made).displacement])
+    theirs, _ = by_calculix(made, tmp_path)
+    assert ("*TIE" in (tmp_path / "model.inp").read_text()) is not held
+    rough = 0.03 if held else 1e-5  # a penalty of 50 E, or six digits
+    np.testing.assert_allclose(theirs, ours, atol=rough * np.abs(ours).max())

@@ -97,3 +97,16 @@ def test_a_plate_is_a_stiff_body(tmp_path):
 def test_what_is_wrong_is_said_with_its_line(tmp_path, text, words):
     with pytest.raises(am.FileFormatError, match=rf"deck.inp:\d+: .*{words}"):
         case_of(tmp_path, text())
+
+
+def test_supports_are_named_after_their_set_and_line(tmp_path):
+    text = block().replace("LOW, 1, 3\n", "LOW, 1, 3\n901, 1, 1\n1, 1, 1, 0.\n", 1)
+    path = tmp_path / "deck.inp"
+    names = [s.on for s in case_of(tmp_path, block()).model.supports]
+    line = path.read_text().splitlines().index("*BOUNDARY") + 1
+    assert "support LOW" in names
+    again = text.replace("901, 1, 1\n", "2, 1, 1, 1e-3\n")
+    split = [s.on for s in case_of(tmp_path, again).model.supports]
+    assert {name for name in split if "line" in name} == {
+        f"support of line {line}", f"support of line {line} part 2"}  # fmt: skip
+    assert "support LOW" in solved(tmp_path, block()).supports

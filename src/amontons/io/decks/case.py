@@ -270,7 +270,7 @@ def _name_nodes(region: Region, deck: Deck, history: History, stages: Sequence[H
             sets.setdefault(np.asarray(members, dtype=np.int64).tobytes(), called)
     for stage in stages:
         groups = history.supports.groups(region.dim, stage.held)
-        stage.name([nodes for nodes, _, _ in groups], region.node_sets, sets)
+        stage.name(groups, region.node_sets, sets)
     for k, (nodes, _, _) in enumerate(history.forces.groups(region.dim)):
         region.node_sets[f"force {k + 1}"] = nodes
     for k, (nodes, _, _) in enumerate(history.heat.groups() if history.heat else ()):

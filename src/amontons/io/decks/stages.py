@@ -17,7 +17,7 @@ from .cards import Card
 from .contacts import Pair
 from .course import Course
 from .flat import Deck, Placed
-from .history import FREE, History
+from .history import FREE, Group, History
 from .materials import Interaction, changed_interactions
 from .scopes import Index, missing
 
@@ -43,20 +43,25 @@ class Held:
     names: list[str] = field(default_factory=list)  # of the node sets of its supports
 
     def name(
-        self, groups: Sequence[Index], known: dict[str, Index], sets: Mapping[bytes, str]
+        self, groups: Sequence[Group], known: dict[str, Index], sets: Mapping[bytes, str]
     ) -> None:
         """Name the node sets of groups of supports; those that are known keep their names.
 
-        sets: names of the deck's own sets, by their nodes.
+        sets: names of the deck's own sets, by their nodes; others are named after the line of
+        their card.
         """
         names = {own.tobytes(): name for name, own in known.items()
                  if name.startswith("support")}  # fmt: skip
-        for k, nodes in enumerate(groups):
-            same = names.get(nodes.tobytes())
-            new = f"support {sets.get(nodes.tobytes(), k + 1)}"
-            new += f" of stage {self.number + 1}" if self.number else ""
-            self.names.append(same or new)
-            known[self.names[-1]] = nodes
+        for nodes, _, card in groups:
+            key = nodes.tobytes()
+            if key not in names:
+                base = f"support {sets[key]}" if key in sets else (
+                    f"support of line {card.number}")  # fmt: skip
+                names[key], k = base, 2
+                while names[key] in known:
+                    names[key], k = f"{base} part {k}", k + 1
+            self.names.append(names[key])
+            known[names[key]] = nodes
 
     def contacts_of(
         self, pairs: Sequence[Pair], mesh: Mesh, law: Callable[..., dict[str, Any]]

@@ -8,7 +8,8 @@ from ....core.errors import InvalidInput, within
 from ....mechanics.contact.pairs import project
 from ....mechanics.meshes.facets import linear_parts
 from ....mechanics.model import Contact, Model
-from ....mechanics.model.supports import locate
+from ....mechanics.model.beside import Beside
+from ....mechanics.model.supports import locate, prescribed_values
 from ....mechanics.model.values import is_number
 from ....problem.law import ExponentialOverclosure, OverclosureCurve
 from ....problem.nitsche import NitscheProblem
@@ -45,7 +46,7 @@ class Contacts:
         if contact.where is not None:
             names = self._some(contact, slave, names[0]), names[1]
         elastic = contact.stiffness is not None or contact.stick_stiffness is not None
-        if contact.tied and not elastic and not self._is_flat:
+        if contact.tied and not elastic and self._can_tie(slave):
             near = value(self._distance(contact))
             self.lines += [
                 f"*TIE, NAME=TIE_{k + 1}, ADJUST=NO, POSITION TOLERANCE={near}",
@@ -69,10 +70,17 @@ class Contacts:
             self.lines.append(f"*CLEARANCE, SLAVE={names[0]}, MASTER={names[1]}, "
                               f"VALUE={value(contact.clearance)}")  # type: ignore[arg-type]  # fmt: skip
 
-    @property
-    def _is_flat(self) -> bool:
-        """Whether CalculiX makes solid elements of the model's, which it can not tie."""
-        return self.dialect == "calculix" and self.model.dimension == 2
+    def _can_tie(self, slave: tuple[int, str]) -> bool:
+        """Whether *TIE ties all that is tied: CalculiX' leaves held slave nodes and 2D out."""
+        if self.dialect != "calculix":
+            return True
+        if self.model.dimension == 2:
+            return False
+        model, (body, surface) = self.model, slave
+        beside = Beside.of(model.bodies, model.references, model.constraints)
+        held = ~np.isnan(prescribed_values(model.bodies, model.supports, beside))
+        nodes = model.bodies[body].mesh.surface_nodes(surface) + self.meshes.nodes[body]
+        return not held[: beside.first].reshape(-1, beside.dim)[nodes].any()
 
     # ------------------------------------------------------------------------ where it is
     def _some(self, contact: Contact, slave: tuple[int, str], whole: str) -> str:
@@ -149,8 +157,8 @@ class Contacts:
             sizes.append(rigid if law is None else _single(law, name))
         if None in given:
             self.notes.append(f"{contact.slave}: tied by a stiffness of {sizes[0]:.3g} "
-                              f"({sizes[1]:.3g} along it), for CalculiX ties no 2D elements "
-                              "and nothing rigidly in one direction alone")  # fmt: skip
+                              f"({sizes[1]:.3g} along it), for CalculiX ties no 2D elements, "
+                              "no held nodes and not one direction alone")  # fmt: skip
         self.lines += ["*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TIED", value(sizes[0]),
                        "*FRICTION", values([1.0, sizes[1]])]  # fmt: skip
 
