@@ -66,7 +66,7 @@ def temperature_of(table: Table, bodies: Sequence[Body]) -> Any:
     table.only("value", "region", "on")
     given = table.need("value", "a number or an expression")
     value: Any = _entry(table, "value", given, bodies[0].mesh.dim)
-    where = {key: table.text(key) for key in ("region", "on") if key in table.data}
+    where: dict[str, Any] = {k: table.text(k) for k in ("region", "on") if k in table.data}
     if "on" in where:
         with table.blamed("on"):
             locate(bodies, where["on"], sets=True)
