@@ -326,17 +326,14 @@ def describe(output: Output) -> str:
     lines = [text, str(record)]
     if output.solution.convergence.stamp:
         lines.append("NOT CONVERGED: what follows is no solution")
-    sets = _sets_in_words(output.solution.convergence)
-    if sets:
+    if sets := _sets_in_words(output.solution.convergence):
         lines.append(sets)
     if output.fields is not None and output.solution.problem.contacts:
-        names = ("x", "y", "z")[: len(output.fields.resultant)]
         total = output.fields.resultant
         total = np.where(np.abs(total) > 1e-8 * np.abs(total).max(), total, 0.0)
-        pairs = zip(names, total, strict=True)
-        force = ", ".join(f"{name} {value:.6g}" for name, value in pairs)
-        lines.append(f"resultant on the slave: {force}")
-        lines.append(f"largest pressure: {output.fields.pressure.max(initial=0.0):.6g}")
+        force = ", ".join(f"{n} {value:.6g}" for n, value in zip("xyz", total, strict=False))
+        lines += [f"resultant on the slave: {force}",
+                  f"largest pressure: {output.fields.pressure.max(initial=0.0):.6g}"]
     elif output.fields is not None:
         moved = max(np.abs(u).max(initial=0.0) for u in output.fields.displacement)
         lines.append(f"largest displacement: {moved:.6g}")

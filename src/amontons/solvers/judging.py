@@ -35,10 +35,8 @@ BLUR = 1e-2  # rounding, relative to the tolerance, above which an error is eval
 BLURRED = 20  # iterates that would do if rounding could hide no error in them
 TIGHTER = 0.3  # goal of a second start, relative to what would just do
 TIGHTEST = 1e-300  # smallest goal: contacts far smaller than others need tiny sums
-NOT_HELD = (
-    "M has no inverse, something moves without a strain: a mechanism, or elements whose "
-    "reduced integration feels no bending"
-)
+NOT_HELD = ("M has no inverse, something moves without a strain: a mechanism, or elements "
+            "whose reduced integration feels no bending")  # fmt: skip
 CONTENT = 5  # iterates with which a solver is content before its goal is tightened: Newton is
 # there with one more, and keeps its history
 EARLY = 100  # iterates after which a problem that no method is made for is given up

@@ -176,15 +176,12 @@ def _case(
     sections = [s for s in sections if s.name in mesh.regions]  # others are given again
     materials = {s.name: s.law(region.plane) for s in sections}
     near = Reach(more=motion_of(history))
+    titles = part_titles(deck, at, piece_labels(mesh))
     if any(pair.itself for pair in pairs):
-        titles = part_titles(deck, at, piece_labels(mesh))
         mesh, pairs, said = self_contact(Body(mesh, materials), pairs, near, titles)
         notes += said
     if general is not None:
-        mesh, more, said = found_pairs(
-            general, Body(mesh, materials), pairs, near,
-            part_titles(deck, at, piece_labels(mesh)),
-        )  # fmt: skip
+        mesh, more, said = found_pairs(general, Body(mesh, materials), pairs, near, titles)
         pairs += more
         notes += said
     if not pairs:

@@ -24,7 +24,7 @@ from .beside import Beside
 from .constraint_rows import spring_stiffness
 from .constraints import Constraint, Reference, Spring
 from .elimination import Elimination
-from .held import check_outside
+from .held import refuse_held
 from .parts import Body, Contact, Fix, Load
 from .placing import Placed, place
 from .rigid import Piece, near_nullspace, pieces
@@ -236,13 +236,7 @@ def discretise(
     _check_once(bodies, contacts, placed)
     whole_H = _of_all([p.H for p in placed], beside)
     if contacts and not whole_H.shape[1]:
-        for k, held in enumerate(p.held for p in placed):
-            with within("contacts", k):
-                if held is not None:
-                    gap = held.left(prescribed)
-                    check_outside(held, gap, bodies, supports, offsets, "")
-        text = "every slave node is fixed by a support, no contact is left"
-        raise InvalidInput(text, ("contacts",))
+        refuse_held([p.held for p in placed], bodies, supports, offsets, prescribed)
     load = external_load(bodies, loads, beside)
     d = bodies[0].mesh.dim
     M, H, load = _unknowns(K, whole_H, load, prescribed, free, eliminated)

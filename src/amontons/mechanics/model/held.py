@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...core.errors import InvalidInput
+from ...core.errors import InvalidInput, within
 from ..contact import ContactRows, Obstacle
 from .parts import Body, Contact, Fix
 from .supports import locate
@@ -73,6 +73,20 @@ class HeldNodes:
             return gap
         moved = self.obstacle.gap(self.points + prescribed[self.dofs])
         return np.where(is_fixed[self.dofs].all(axis=1), moved, gap)
+
+
+def refuse_held(
+    every: Sequence[HeldNodes | None], bodies: Sequence[Body], supports: Sequence[Fix],
+    offsets: Index, prescribed: Array,
+) -> None:  # fmt: skip
+    """Raise InvalidInput: supports fix the slaves of all contacts."""
+    for k, held in enumerate(every):
+        with within("contacts", k):
+            if held is not None:
+                gap = held.left(prescribed)
+                check_outside(held, gap, bodies, supports, offsets, "")
+    text = "every slave node is fixed by a support, no contact is left"
+    raise InvalidInput(text, ("contacts",))
 
 
 def check_outside(

@@ -36,7 +36,8 @@ from ...problem.judge import measures as judge
 from ...problem.judge.measures import Measure, Weakest
 from ...problem.law import Law
 from ...problem.protocol import Problem
-from ...solvers.newton.nonlinear import NonlinearProblem, PlainStates
+from ...solvers.newton.nonlinear import NonlinearProblem
+from ...solvers.newton.states import PlainStates
 from ..contact.current import STICK, ContactPoint, Pieces
 from ..contact.current_pairs import Meetings
 from ..elements.linear_body import LinearBody

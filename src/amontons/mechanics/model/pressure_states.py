@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...solvers.newton.nonlinear import Linear
+from ...solvers.newton.states import Linear
 
 if TYPE_CHECKING:
     from .large_deformation import LargeDeformation

@@ -27,7 +27,6 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from ...core.errors import InvertedCells, SingularOperator
 from ...core.options import check_options
@@ -45,6 +44,7 @@ from ..contract import (
     check_positive,
 )
 from ..judging import first_of, sent
+from .states import Linear, PlainStates, States
 
 Array = NDArray[np.float64]
 MEMORY = 5  # values of |F| of which the largest counts in the line search
@@ -56,66 +56,6 @@ JUMP = "; if the body jumps there, crossing=PathCrossing() of this solver follow
 STATUSES = 1e-8  # error of a tangent problem with contact
 CONTACT_STEPS = 300  # iterates in which it has to be reached
 EASY = 8  # Newton steps up to which the next load step may be longer
-
-
-class Linear(Protocol):
-    """F and its derivatives at one state."""
-
-    residual: Array
-    matrix: sparse.csc_array
-
-
-class States(Protocol):
-    """States w that Newton's method moves: v, or v and what is eliminated in every step."""
-
-    start: Array
-
-    def v(self, w: Array) -> Array:
-        """v (n,) of a state."""
-        ...
-
-    def residual(self, w: Array) -> Array:
-        """What has to become zero, unit of force; raises InvertedCells."""
-        ...
-
-    def linearisation(self, w: Array) -> Linear:
-        """The linear problem of a step of v."""
-        ...
-
-    def size(self, w: Array, here: Linear) -> float:
-        """|residual(w)|; here: the linear problem there."""
-        ...
-
-    def whole(self, w: Array, step: Array) -> Array:
-        """The step of w that belongs to a step (n,) of v."""
-        ...
-
-
-class PlainStates:
-    """States that are v."""
-
-    def __init__(self, problem: NonlinearProblem, v: Array) -> None:
-        self._problem, self.start = problem, v
-
-    def v(self, w: Array) -> Array:
-        """The state itself."""
-        return w
-
-    def residual(self, w: Array) -> Array:
-        """F (n,)."""
-        return self._problem.residual(w)
-
-    def linearisation(self, w: Array) -> Linear:
-        """F and its derivatives."""
-        return self._problem.linearisation(w)
-
-    def size(self, w: Array, here: Linear) -> float:
-        """|F|, which is at hand."""
-        return float(np.linalg.norm(here.residual))
-
-    def whole(self, w: Array, step: Array) -> Array:
-        """The step itself."""
-        return step
 
 
 class NonlinearProblem(Problem):
