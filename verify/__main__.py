@@ -18,12 +18,12 @@ from amontons.core.files import replacing
 from amontons.core.words import near
 from benchmarks.machine import describe
 
-from . import blocks, cylinders, half_spaces, indenters, joints, masonry, parts, spheres
+from . import blocks, cylinders, half_spaces, indenters, joints, masonry, parts, rigid, spheres
 from .case import Outcome, run
 from .page import figure, page, recorded, text_of
 
 HERE = Path(__file__).parent
-ROOMS = (half_spaces, spheres, indenters, cylinders, blocks, joints, parts, masonry)
+ROOMS = (half_spaces, spheres, indenters, cylinders, blocks, joints, parts, masonry, rigid)
 CASES = {case.name: case for room in ROOMS for case in room.CASES}
 
 

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from verify.__main__ import CASES, main
 from verify.case import Case, Value, run
 
-CHEAP = "wedge slope wall keystone tie reference spring tool overlap slot"
+CHEAP = "wedge slope wall keystone tie reference spring tool overlap slot rolling"
 
 
 @pytest.mark.parametrize("name", CHEAP.split())
