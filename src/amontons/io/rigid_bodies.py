@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.files import replacing
+from ..mechanics.meshes.write import with_all_kinds
 from ..mechanics.multibody import Ball, Polyhedron
 
 if TYPE_CHECKING:
@@ -24,11 +25,10 @@ def write_rigid(step: RigidStep, path: str | os.PathLike[str]) -> None:
 
     Cells have the number of their `body`, points the `velocity` of the material there, where
     the format has fields.  Files of many steps with numbers in their names are a film for
-    ParaView.  Raises NotWritten where the file can not be, and meshio's error for a suffix
-    that it does not know.
+    ParaView.  Raises NotWritten where the file can not be, and the error of the writer for a
+    suffix that it does not know.
     """
-    import meshio
-
+    meshio = with_all_kinds()
     motion, rotation = step.state.motion, step.rotation
     points, triangles, velocity, body = [], [], [], []
     first = 0

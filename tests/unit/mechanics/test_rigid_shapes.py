@@ -1,5 +1,6 @@
 """Shapes of rigid bodies, and where they meet."""
 
+import meshio
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -151,3 +152,24 @@ def test_many_bodies_find_the_pairs_that_all_against_all_find():
     expected = {(i, j) for i, j in zip(*np.nonzero(np.triu(gaps <= 0.1, 1)), strict=True)}
     pairs = {(min(p), max(p)) for p in zip(found.slave, found.master, strict=True)}
     assert pairs == {(int(i), int(j)) for i, j in expected}
+
+
+def test_surfaces_for_viewers(tmp_path):
+    """Closed, of the volume of the bodies, where these are; velocities are those of points."""
+    spin = (0.0, 0.0, 2.0)
+    brick = am.cuboid((1, 2, 3))
+    bodies = [am.RigidBody(brick, position=(5, 0, 9), spin=spin, velocity=(1, 0, 0)),
+              am.RigidBody(am.Ball(0.5), position=(0, 0, 9))]  # fmt: skip
+    system = am.RigidBodies(bodies, gravity=(0, 0, 0))
+    (step,) = am.evolve_rigid(system, step=1e-3, until=1e-3)
+    am.write_rigid(step, tmp_path / "bodies.vtu")
+    read = meshio.read(tmp_path / "bodies.vtu")
+    corners, body = read.points[read.cells[0].data], read.cell_data["body"][0]
+    volume = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
+    assert volume[body == 0].sum() == pytest.approx(6)
+    assert volume[body == 1].sum() == pytest.approx(np.pi / 6, rel=0.05)
+    arms = read.points[:8] - step.position[0]
+    expected = np.array([1, 0, 0]) + np.cross(spin, arms)
+    np.testing.assert_allclose(read.point_data["velocity"][:8], expected, atol=1e-12)
+    am.write_rigid(step, tmp_path / "bodies.ply")
+    assert len(meshio.read(tmp_path / "bodies.ply").cells[0].data) == len(body)
