@@ -138,7 +138,7 @@ def main():
     lines = ["# Two bodies that slide far", "", "`python -m benchmarks.large_sliding`", "",
              "; ".join(f"{k} {v}" for k, v in describe().items()), "",
              *(f"| {' | '.join(map(str, line))} |" for line in table), ""]  # fmt: skip
-    notes = HERE / "results" / "large_sliding_notes.md"
+    notes = HERE / "results" / "large_sliding_notes.txt"
     text = "\n".join(lines) + ("\n" + notes.read_text() if notes.exists() else "")
     (HERE / "results" / "large_sliding.md").write_text(text)
 
