@@ -29,12 +29,18 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from large_sliding_ccx import solved as by_calculix
 from large_sliding_models import CASES, by_getfem, corners, penetration
+from large_sliding_more import MORE
 from machine import describe
 
 import amontons as am
 
 HERE = Path(__file__).parent
 PROGRAMS = ("amontons", "amontons, exchanged", "CalculiX", "CalculiX, exchanged", "GetFEM")
+
+
+ALONE = (  # cases of amontons alone
+    "ironing, second order", "ironing in 3D, fine", "ironing, beyond the rim", *MORE,
+)  # fmt: skip
 
 
 def by_amontons(case, swap=False, limit=600):
@@ -49,15 +55,17 @@ def by_amontons(case, swap=False, limit=600):
         for step in steps:
             count = step.solution.convergence.iterations
             newton, most = newton + count, max(most, count)
-            f = np.einsum("pkc,pk->pc", step.frames, step.state.force).sum(axis=0)
+            f = step.resultant()
             forces.append([step.time, *(-(-1 if swap else 1) * f)[[0, -1]]])
+            reached = step.time / case.steps
+            if not hasattr(case, "lower"):
+                continue
             paused = time.process_time()
             u = step.state.displacement.reshape(-1, case.lower.points.shape[1])
             n = len(case.lower.points)
             moved = [case.lower.points + u[:n], case.upper.points + u[n:]]
             worst = max(worst, penetration(case, moved))
             began += time.process_time() - paused
-            reached = step.time / case.steps
     except am.AmontonsError as error:
         why = str(error)
     return {"steps": len(forces), "newton": newton, "most": most,
@@ -67,7 +75,7 @@ def by_amontons(case, swap=False, limit=600):
 
 def child(name, program, limit):
     """One run; its row as JSON on the last line."""
-    case = CASES[name]()
+    case = (CASES | MORE)[name]()
     swap = program.endswith("exchanged")
     if program.startswith("amontons"):
         row = by_amontons(case, swap, limit)
@@ -75,6 +83,12 @@ def child(name, program, limit):
         with tempfile.TemporaryDirectory() as folder:
             row = (by_getfem(case, folder, limit) if program == "GetFEM"
                    else by_calculix(case, folder, swap, limit))  # fmt: skip
+    if name in MORE:
+        parts = case.model().bodies
+        row |= {"facet": 0.0, "late": case.steps / 2, "unknowns": sum(
+            body.mesh.points.size for body in parts)}  # fmt: skip
+        print(json.dumps({"case": name, "program": program, **row}))
+        return
     points = [mesh.points for mesh in (case.lower, case.upper)]
     side = ("lower", "top") if swap else ("upper", "bottom")
     count = len(corners(getattr(case, side[0]), side[1]))
@@ -95,11 +109,13 @@ def cells(row):
     if whole == "yes":
         mean, ripple = np.abs(late[:, 1:].mean(axis=0)), late[:, 1:].std(axis=0)
         told = [f"{mean[1]:.4f}", f"{mean[0]:.4f}", f"{ripple[1] / mean[1]:.1%}"]
+    if row["case"] in MORE:
+        told = ["", "", ""]
     newton = f"{row['newton'] / max(row['steps'], 1):.1f}"
     most = row.get("most") or ""
+    deep = f"{row['penetration'] / row['facet']:.1e}" if row["facet"] else ""
     return [row["case"], row["program"], row["unknowns"], whole, row["steps"], newton, most,
-            f"{row['seconds']:.1f}", f"{row['penetration'] / row['facet']:.1e}",
-            *told]  # fmt: skip
+            f"{row['seconds']:.1f}", deep, *told]  # fmt: skip
 
 
 HEAD = ["case", "program", "unknowns", "whole path", "load steps", "Newton steps each", "most",
@@ -118,8 +134,8 @@ def main():
         return
     stored = HERE / "results" / "large_sliding.json"
     rows = json.loads(stored.read_text()) if stored.exists() else []
-    for name in CASES:
-        for program in PROGRAMS:
+    for name in CASES | MORE:
+        for program in PROGRAMS[:2] if name in ALONE else PROGRAMS:
             if asked.only not in f"{name}; {program}" or f"{program}{name[-2:]}" == "GetFEM3D":
                 continue
             command = [sys.executable, __file__, "--limit", str(asked.limit)]
@@ -132,7 +148,7 @@ def main():
             rows = [r for r in rows if (r["case"], r["program"]) != (name, program)] + [row]
             print(*cells(row), row.get("why", ""), sep=" | ", flush=True)
             stored.write_text(json.dumps(rows) + "\n")
-    order = {name: k for k, name in enumerate(CASES)}
+    order = {name: k for k, name in enumerate(CASES | MORE)}
     rows.sort(key=lambda r: (order[r["case"]], PROGRAMS.index(r["program"])))
     table = [HEAD, ["---"] * len(HEAD), *map(cells, rows)]
     lines = ["# Two bodies that slide far", "", "`python -m benchmarks.large_sliding`", "",

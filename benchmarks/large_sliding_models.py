@@ -14,6 +14,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 import amontons as am
+from amontons.mechanics.meshes import Facets
+from amontons.mechanics.meshes.order import second_order
 
 POISSON = 0.32
 
@@ -91,11 +93,29 @@ def shallow():
     return Case(slab, upper, (1.0, 10.0), 0.4, 2.0, 0.3, 20, 40)
 
 
+def of_second_order():
+    """As `shallow`, with half the cells in both directions and a die that is curved."""
+    slab = second_order(am.box((6, 2), (16, 5)))
+    upper = second_order(am.box((1.2, 0.75), (5, 3)))
+    points = rounded(upper, 1.0) + [1.5, 2.0]
+    return Case(slab, replace(upper, points=points), (1.0, 10.0), 0.4, 2.0, 0.3, 20, 40)
+
+
 def deep():
     """The same with a die of a smaller radius, as deep as its half width."""
     slab = am.box((6, 2), (40, 13))
     upper = die((1.2, 1.0), (12, 6), (1.5, 2.0), radius=0.75)
     return Case(slab, upper, (1.0, 10.0), 0.6, 2.0, 0.3, 20, 50)
+
+
+def beyond_the_rim():
+    """A die pressed in beyond its rim: its sides are in the contact, too."""
+    slab = am.box((6, 2), (40, 13))
+    upper = die((1.2, 1.0), (12, 6), (1.5, 2.0))
+    round_it = [f.nodes for side in ("bottom", "left", "right") for f in upper.surface(side)]
+    outline = {"bottom": (Facets("line", np.concatenate(round_it)),)}
+    upper = replace(upper, surfaces=dict(upper.surfaces) | outline)
+    return Case(slab, upper, (1.0, 10.0), 1.0, 2.0, 0.3, 20, 50)
 
 
 def hertz():
@@ -112,18 +132,21 @@ def _upside_down(mesh):
     return {other[name]: mesh.surfaces[name] for name in mesh.surfaces}
 
 
-def ironing_in_space():
-    """A die of 0.8 x 1 on a slab of 3 x 1.6 x 1, which is wider."""
-    slab = am.box((3, 1.6, 1), (15, 8, 4))
-    upper = die((0.8, 1.0, 0.5), (5, 6, 3), (0.9, 1.0, 0.3))
+def ironing_in_space(fine=1):
+    """A die of 0.8 x 1 on a slab of 3 x 1.6 x 1, which is wider; fine: times as many cells."""
+    slab = am.box((3, 1.6, 1), (15 * fine, 8 * fine, 4 * fine))
+    upper = die((0.8, 1.0, 0.5), (5 * fine, 6 * fine, 3 * fine), (0.9, 1.0, 0.3))
     return Case(slab, upper, (1.0, 10.0), 0.2, 1.0, 0.3, 8, 20)
 
 
 CASES = {
     "ironing, shallow": shallow,
+    "ironing, second order": of_second_order,
     "ironing, deep": deep,
+    "ironing, beyond the rim": beyond_the_rim,
     "Hertz, large": hertz,
     "ironing in 3D": ironing_in_space,
+    "ironing in 3D, fine": lambda: ironing_in_space(2),
 }
 
 

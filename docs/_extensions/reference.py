@@ -40,8 +40,8 @@ GROUPS = {
         "Is it the only solution, which others are there, and where do they go?",
         "uniqueness Uniqueness Verdict Witness critical_friction CriticalFriction "
         "p_matrix_friction full_contact_friction CriterionFriction existence Existence Opening "
-        "all_solutions multistart Solutions PieceSolution basins Basins BasinMethod BasinRun "
-        "Claim",
+        "all_solutions multistart Solutions LargeSolutions PieceSolution basins Basins "
+        "BasinMethod BasinRun Claim",
     ),
     "Following": (
         "Solution curves over a load, over friction, or over a parameter of your own.",

@@ -5,12 +5,13 @@ from .analysis import (
     Claim as Claim, ContactRates as ContactRates, Continuation as Continuation,
     CriterionFriction as CriterionFriction, CriticalFriction as CriticalFriction,
     Diagram as Diagram, Event as Event, EventKind as EventKind, Existence as Existence,
-    FirstOrder as FirstOrder, IndexSets as IndexSets, MidpointRule as MidpointRule,
-    Opening as Opening, PathProblem as PathProblem, PieceSolution as PieceSolution,
-    RateEquation as RateEquation, Solutions as Solutions, StepPath as StepPath, Stop as Stop,
-    Switch as Switch, Tangent as Tangent, TangentCone as TangentCone,
-    ThetaMethod as ThetaMethod, Uniqueness as Uniqueness, Verdict as Verdict,
-    Witness as Witness, graded as graded, performance_profile as performance_profile,
+    FirstOrder as FirstOrder, IndexSets as IndexSets, LargeSolutions as LargeSolutions,
+    MidpointRule as MidpointRule, Opening as Opening, PathProblem as PathProblem,
+    PieceSolution as PieceSolution, RateEquation as RateEquation, Solutions as Solutions,
+    StepPath as StepPath, Stop as Stop, Switch as Switch, Tangent as Tangent,
+    TangentCone as TangentCone, ThetaMethod as ThetaMethod, Uniqueness as Uniqueness,
+    Verdict as Verdict, Witness as Witness, graded as graded,
+    performance_profile as performance_profile,
 )
 from .analysis.audit.verdict import Audit as Audit
 from .analysis.paths.path_crossing import PathCrossing as PathCrossing
@@ -43,6 +44,7 @@ from .io.matrices import StoredMatrices as StoredMatrices, read_matrices as read
 from .io.meshes import read_mesh as read_mesh
 from .io.readers import read_case as read_case
 from .io.rigid_bodies import write_rigid as write_rigid
+from .io.plots.film import film as film
 from .io.series import export_xdmf as export_xdmf
 from .linear import Direct as Direct, GeometricMultigrid as GeometricMultigrid, Petsc as Petsc
 from .mechanics.contact import (
@@ -61,7 +63,8 @@ from .mechanics.model import (
     MooneyRivlin as MooneyRivlin, NeoHookean as NeoHookean, NodalForce as NodalForce,
     Ogden as Ogden, SaintVenantKirchhoff as SaintVenantKirchhoff, UserEnergy as UserEnergy,
     OrthotropicElastic as OrthotropicElastic, Pressure as Pressure,
-    Pretension as Pretension, Reference as Reference, Rigid as Rigid, Spring as Spring,
+    Pretension as Pretension, ReducedPolynomial as ReducedPolynomial,
+    Reference as Reference, Rigid as Rigid, Spring as Spring,
     Temperature as Temperature, Traction as Traction, distributed as distributed,
     FoundContacts as FoundContacts, FoundPair as FoundPair, find_contacts as find_contacts,
 )

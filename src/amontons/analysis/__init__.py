@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from .paths.tangents import FirstOrder, Tangent
     from .profiles import performance_profile
     from .solutions.enumerate import PieceSolution, Solutions
+    from .solutions.large_multistart import LargeSolutions
 
 _HOME = {
     "basins.methods": ("BasinMethod", "Ended", "RunLimits",),
@@ -49,6 +50,7 @@ _HOME = {
     "paths.tangents": ("FirstOrder", "Tangent",),
     "profiles": ("performance_profile",),
     "solutions.enumerate": ("PieceSolution", "Solutions",),
+    "solutions.large_multistart": ("LargeSolutions",),
 }
 _MODULE = {name: module for module, names in _HOME.items() for name in names}
 
@@ -70,6 +72,7 @@ __all__ = [
     "FirstOrder",
     "IndexSets",
     "KnownSolution",
+    "LargeSolutions",
     "MidpointRule",
     "Opening",
     "PathProblem",

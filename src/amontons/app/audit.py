@@ -46,7 +46,7 @@ def audit(
     if isinstance(model, str | os.PathLike):
         from ..io.readers import read
 
-        case = read(Path(model), overrides)
+        case = read(Path(model), [*overrides, *_small(Path(model))])
         target = case.model
     else:
         target = model
@@ -58,6 +58,12 @@ def audit(
         answer = replace(answer, blur=_rounded(answer.displacement, digits))
     own = law == "own" or (law is None and (case is None or case.about is None))
     return audit_answer(target, answer, deck_law=own)
+
+
+def _small(path: Path) -> list[str]:
+    """What has a deck read with small strains: those of an answer are judged by them."""
+    is_deck = path.name.lower().endswith((".inp", ".inp.gz"))
+    return ["deck.small=true"] if is_deck else []
 
 
 def _from_file(

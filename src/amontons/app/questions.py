@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from ..analysis.paths.path import Branch, PathProblem
     from ..analysis.paths.tangents import FirstOrder, Tangent
     from ..analysis.solutions.enumerate import Solutions
+    from ..analysis.solutions.large_multistart import LargeSolutions
     from ..mechanics.model import Model
 
 FEW = 10  # starts of Newton's method where a search ends without any solution
@@ -62,28 +63,49 @@ def all_solutions(
 
         return enumerate_discs(discrete, time_limit=limit, keep_proof=keep_proof)
     if discrete.dimension == 2 and discrete.contacts > exact.CONTACTS:
-        found = multistart(discrete, time_limit=limit)
+        found = _many_starts(discrete, time_limit=limit)
         reason = f"more than {exact.CONTACTS} contacts: {found.reason}"
         return replace(found, reason=reason)
     found = exact.enumerate_solutions(discrete, time_limit=limit, keep_proof=keep_proof)
     if found.complete or found.solutions:
         return found
-    some = multistart(discrete, starts=FEW, time_limit=None if limit is None else LEAST)
+    some = _many_starts(discrete, starts=FEW, time_limit=None if limit is None else LEAST)
     # the search did not come to any
     return replace(found, solutions=some.solutions, resolution=some.resolution)
 
 
 @searching("solutions from many starts")
 def multistart(
+    problem: FrictionProblem | Model, *, starts: int | None = None, seed: int = 0,
+    time_limit: TimeLimit = None,
+) -> Solutions | LargeSolutions:  # fmt: skip
+    """Solutions of a Coulomb problem, 2D or 3D, by Newton's method from many starts; no proof.
+
+    starts: their number, 1000 by default and 60 at large strains; seed: of their random choice;
+    time_limit: seconds.  Finds in seconds what there is up to some hundred contacts, as far as
+    it can be checked; at large strains what lies beside known solutions, along their softest
+    modes.  Raises UnsupportedForm under Tresca's law; NotConverged where load steps of large
+    strains find no solution.
+    """
+    limit = _begun(time_limit)
+    problem = checked(problem)
+    if not isinstance(problem, FrictionProblem):
+        from ..analysis.solutions import large_multistart as large
+        from ..mechanics.model.large_deformation import LargeDeformation
+
+        moved = problem.discrete_problem()
+        if isinstance(moved, LargeDeformation):
+            count = large.LARGE_STARTS if starts is None else starts
+            return large.large_multistart(moved, starts=count, seed=seed, time_limit=limit)
+    count = 1000 if starts is None else starts
+    return _many_starts(problem, starts=count, seed=seed, time_limit=limit)
+
+
+def _many_starts(
     problem: FrictionProblem | Model, *, starts: int = 1000, seed: int = 0,
     time_limit: TimeLimit = None,
 ) -> Solutions:  # fmt: skip
-    """Solutions of a Coulomb problem, 2D or 3D, by Newton's method from many starts; no proof.
-
-    starts: their number; seed: of their random choice; time_limit: seconds.  Finds in seconds
-    what there is up to some hundred contacts, as far as it can be checked.  Raises
-    UnsupportedForm under Tresca's law.
-    """
+    """`multistart` of a problem that is linear but for its law."""
     from ..analysis.solutions.multistart import multistart as search
 
     limit = _begun(time_limit)
@@ -320,17 +342,18 @@ def critical_friction(
     problem: FrictionProblem | Model, *, gap: float = 1e-2,
     time_limit: TimeLimit = None,
 ) -> CriticalFriction:
-    """Bounds on the friction below which every load of a 2D problem has exactly one solution.
+    """Bounds on the friction below which every load of a problem has exactly one solution.
 
     gap: relative distance of the bounds that is good enough.  time_limit: seconds, by default
-    the work of about 60 s, counted in operations.  Exact up to
-    13 contacts.  Raises UnsupportedForm in 3D and under Tresca's law.
+    the work of about 60 s, counted in operations.  Exact in 2D up to 13 contacts; in 3D the
+    lower bound is one of multipliers of every contact, the upper one of a search.  Raises
+    UnsupportedForm under Tresca's law.
     """
     from ..analysis.certificates.critical_friction import critical_friction as bounds
 
     limit = _begun(time_limit)
     discrete = _discrete(problem)
-    if discrete.dimension == 2 and isinstance(discrete.law, Coulomb):  # else it says so
+    if isinstance(discrete.law, Coulomb):  # else it says so
         _check_has_W(problem, "critical friction", limit)
     return bounds(discrete, gap=gap, time_limit=limit)
 

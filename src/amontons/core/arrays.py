@@ -136,22 +136,32 @@ def contact_rows(name: str, values: ArrayLike, nc: int) -> Array:
 
 def sparse_matrix(name: str, matrix: Matrix) -> sparse.csc_array:
     """A canonical read-only copy: columns sorted, duplicates summed, every entry finite."""
+    return _canonical(name, matrix, sparse.csc_array)
+
+
+def sparse_rows(name: str, matrix: Matrix) -> sparse.csr_array:
+    """The same by rows."""
+    return _canonical(name, matrix, sparse.csr_array)
+
+
+def _canonical(name: str, matrix: Any, kind: Any) -> Any:
     if sparse.issparse(matrix):
         matrix = compressed(name, matrix)
     else:
         matrix = real(name, matrix)
         if matrix.ndim != 2:
             raise InvalidInput(f"{name}: expected a matrix, got shape {matrix.shape}")
-    out = sparse.csc_array(matrix, dtype=float, copy=True)
+    out = kind(matrix, dtype=float, copy=True)
     out.sum_duplicates()
-    bad = np.flatnonzero(~np.isfinite(out.data))
-    if bad.size:
-        row = out.indices[bad[0]]
-        column = int(np.searchsorted(out.indptr, bad[0], side="right")) - 1
+    size = float(np.abs(out.data).max(initial=0.0))
+    if not np.isfinite(size):
+        k = int(np.flatnonzero(~np.isfinite(out.data))[0])
+        line = int(np.searchsorted(out.indptr, k, side="right")) - 1
+        row, column = (line, out.indices[k]) if out.format == "csr" else (out.indices[k], line)
         raise InvalidInput(
-            f"{name}[{row}, {column}]: expected a finite number, got {out.data[bad[0]]}"
+            f"{name}[{row}, {column}]: expected a finite number, got {out.data[k]}"
         )
-    _squarable(name, np.asarray(out.data, dtype=float))
+    _squarable(name, size)
     return locked(out)
 
 
@@ -263,7 +273,8 @@ def locked(matrix):
 
 def squarable(name: str, array: Array, largest: float = LARGEST) -> Array:
     """The same array, locked, of finite numbers whose squares are numbers, or as `largest`."""
-    _squarable(name, _finite(name, array), largest)
+    size = float(np.abs(_finite(name, array)).max(initial=0.0))
+    _squarable(name, size, largest)
     return array
 
 
@@ -278,9 +289,8 @@ def _finite(name: str, array: Array) -> Array:
     return array
 
 
-def _squarable(name: str, values: Array, largest: float = LARGEST) -> None:
-    """Refuse what is so large or small in all entries that its square is no number any more."""
-    size = float(np.abs(values).max(initial=0.0))
+def _squarable(name: str, size: float, largest: float = LARGEST) -> None:
+    """Refuse a largest entry so large or small that its square is no number any more."""
     if size > largest or 0 < size < 1 / largest:
         raise InvalidInput(
             f"{name}: its largest entry is {size:.1e}, which can not be squared; use units in "

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..core.compiled import njit
+from .block_kernels import blocks_of_dense, blocks_of_rows, contact_data
 
 Array = NDArray[np.float64]
-WELL_CONDITIONED = 1e-6  # |det A| / max|A|^3 from which A^-1 loses no digits that matter
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,25 +39,24 @@ class BlockRows:
         return self.data[self.diagonal]
 
     @cached_property
+    def _contact_data(self) -> tuple[Array, Array]:
+        eliminated, inverse_norms = contact_data(self.data, self.diagonal)
+        eliminated.flags.writeable = inverse_norms.flags.writeable = False
+        return eliminated, inverse_norms
+
+    @property
     def eliminated(self) -> Array:
         """What the exact solution of one contact needs of W_ii = A, (nc, 17).
 
         Columns: 0: 1 where A is well enough conditioned for its inverse to be used; 1-9: A^-1
         by rows; 10-11: k = A_TN / A_NN; 12-15: A_TT - k A_NT by rows; 16: (trace |A|)^2.
         """
-        A = self.diagonal_blocks
-        size = np.abs(A).max(axis=(1, 2), initial=0.0)
-        a = np.where(A[:, 0, 0] > 0, A[:, 0, 0], 1.0)
-        out = np.zeros((len(A), 17))
-        regular = (np.abs(np.linalg.det(A)) > WELL_CONDITIONED * size**3) & (A[:, 0, 0] > 0)
-        out[:, 0] = regular
-        out[regular, 1:10] = np.linalg.inv(A[regular]).reshape(-1, 9)
-        k = A[:, 1:, 0] / a[:, None]
-        out[:, 10:12] = k
-        out[:, 12:16] = (A[:, 1:, 1:] - k[:, :, None] * A[:, :1, 1:]).reshape(-1, 4)
-        out[:, 16] = np.abs(np.diagonal(A, axis1=1, axis2=2)).sum(axis=1) ** 2
-        out.flags.writeable = False
-        return out
+        return self._contact_data[0]
+
+    @property
+    def inverse_norms(self) -> Array:
+        """1 / |W_ii|_2, (nc,); 0 where W_ii is 0."""
+        return self._contact_data[1]
 
     @property
     def density(self) -> float:
@@ -67,18 +66,16 @@ class BlockRows:
 
 def block_rows(W: sparse.csr_array | Array, d: int) -> BlockRows:
     """Block rows of a Delassus matrix W, (nc d, nc d), dense or sparse; d = 2 or 3."""
-    nc = W.shape[0] // d
-    dense = isinstance(W, np.ndarray)
-    rows, columns, tiles = _dense_tiles(W, nc, d) if dense else _sparse_tiles(W, d)
-    absent = np.setdiff1d(np.arange(nc), rows[rows == columns])
-    rows = np.concatenate([rows, absent])
-    columns = np.concatenate([columns, absent])
-    tiles = np.concatenate([tiles, np.zeros((len(absent), d, d))])
-    order = np.lexsort((columns, rows))
-    rows, columns = rows[order].astype(np.int32), columns[order].astype(np.int32)
-    indptr = np.searchsorted(rows, np.arange(nc + 1)).astype(np.int32)
-    diagonal = np.flatnonzero(rows == columns).astype(np.int32)
-    return embedded(indptr, columns, np.ascontiguousarray(tiles[order]), diagonal)
+    if isinstance(W, np.ndarray):
+        W = np.ascontiguousarray(W, dtype=float)
+        return BlockRows(*map(_locked, blocks_of_dense(W, d)))
+    values = np.asarray(W.data, dtype=float)
+    return BlockRows(*map(_locked, blocks_of_rows(W.indptr, W.indices, values, d)))
+
+
+def _locked(array: NDArray) -> NDArray:
+    array.flags.writeable = False
+    return array
 
 
 def embedded(
@@ -89,9 +86,7 @@ def embedded(
 ) -> BlockRows:
     """Block rows of sorted tiles (k, d, d), the diagonal among them; locks the arrays."""
     data = _embed(tiles, diagonal) if tiles.shape[1] == 2 else tiles
-    for array in (indptr, indices, data, diagonal):
-        array.flags.writeable = False
-    return BlockRows(indptr, indices, data, diagonal)
+    return BlockRows(*map(_locked, (indptr, indices, data, diagonal)))
 
 
 def block_part(blocks: BlockRows, contacts: NDArray[np.int64]) -> BlockRows:
@@ -120,20 +115,6 @@ def velocity_inplace(indptr, indices, data, q, r, u):  # noqa: PLR0913
             u1 += data[k, 1, 0] * r0 + data[k, 1, 1] * r1 + data[k, 1, 2] * r2
             u2 += data[k, 2, 0] * r0 + data[k, 2, 1] * r1 + data[k, 2, 2] * r2
         u[i, 0], u[i, 1], u[i, 2] = u0, u1, u2
-
-
-def _sparse_tiles(W: sparse.csr_array, d: int) -> tuple[NDArray, NDArray, Array]:
-    """Block row, block column and values (k, d, d) of the stored blocks."""
-    blocks = sparse.csr_array(W).tobsr((d, d))
-    rows = np.repeat(np.arange(len(blocks.indptr) - 1), np.diff(blocks.indptr))
-    return rows, blocks.indices.astype(np.int64), np.asarray(blocks.data, dtype=float)
-
-
-def _dense_tiles(W: Array, nc: int, d: int) -> tuple[NDArray, NDArray, Array]:
-    """Block row, block column and values (k, d, d) of the blocks that are not all zero."""
-    tiles = np.asarray(W).reshape(nc, d, nc, d).swapaxes(1, 2)
-    rows, columns = np.nonzero(tiles.reshape(nc, nc, d * d).any(axis=2))
-    return rows, columns, tiles[rows, columns]
 
 
 def _embed(planar: Array, diagonal: NDArray[np.int32]) -> Array:

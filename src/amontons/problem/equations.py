@@ -72,8 +72,8 @@ class Equations(Matrices):
         b = self.blocks
         assert self.q is not None
         q = read_only(spatial(self.q))
-        rho = read_only(inverse_norms(b.diagonal_blocks))
-        return b.indptr, b.indices, b.data, q, self.law.kind, self.law.parameters, rho
+        kind, parameters = self.law.kind, self.law.parameters
+        return b.indptr, b.indices, b.data, q, kind, parameters, b.inverse_norms
 
     @cached_property
     def judge_flops(self) -> float:

@@ -29,6 +29,7 @@ from ..core.arrays import (
     numbers,
     real,
     sparse_matrix,
+    sparse_rows,
 )
 from ..core.clock import NEVER, Deadline
 from ..core.errors import InvalidInput, UnsupportedLaw, shown
@@ -165,7 +166,7 @@ class FrictionProblem(Told, Equations):
         q = contact_rows("q", q, len(law))
         check_dimension(law, q.shape[1])
         if sparse.issparse(W):
-            W = locked(sparse_matrix("W", W).tocsr())
+            W = sparse_rows("W", W)
             expect_shape("W", W.shape, (q.size, q.size))
         else:
             W = numbers("W", cast(Array, W), (q.size, q.size))

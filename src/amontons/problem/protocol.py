@@ -16,6 +16,7 @@ the member.  A solver for it names its class in `solves` (`solvers.contract`).
 
 from __future__ import annotations
 
+from dataclasses import replace
 from enum import Enum
 from typing import TYPE_CHECKING, ClassVar, Protocol, Self
 
@@ -96,6 +97,10 @@ class Problem:
     def plain(self) -> Problem:
         """The problem that a solver is given after a change of variables; else itself."""
         return self
+
+    def with_law(self, law: Law) -> Self:
+        """The same problem under another law of its contacts."""
+        return replace(self, law=law)  # type: ignore[type-var]  # problems are dataclasses
 
     def start(self, given: Start | None = None) -> Motion:
         """(r, v) to begin with: checked copies of what is given, else no reactions.

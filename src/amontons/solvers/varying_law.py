@@ -147,7 +147,7 @@ def varying_law(problem: Any, given: Asked, start: Any, solve: Solve) -> Frictio
             done = sum(found.convergence.iterations for found in rounds)
             left = max(given.max_iterations - done, 1)
         options = replace(given, tolerance=goal, max_iterations=left)
-        found = solve(replace(problem, law=way.fixed), options, start)
+        found = solve(problem.with_law(way.fixed), options, start)
         rounds.append(found)
         change = way.changes(found.r, found.u)
         error, weakest = _judged(problem, found)

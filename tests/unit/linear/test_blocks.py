@@ -45,3 +45,48 @@ def test_spatial_is_a_copy():
     y[:] = 5
     assert x.max() == 1
     np.testing.assert_array_equal(spatial(x), [[1, 1, 0], [1, 1, 0]])
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_rows_in_any_order_with_doubles(d):
+    rng = np.random.default_rng(d)
+    row, column = rng.integers(0, 6 * d, (2, 200))
+    order = np.argsort(row, kind="stable")
+    row, column, values = row[order], column[order], rng.standard_normal(200)
+    indptr = np.searchsorted(row, np.arange(6 * d + 1))
+    W = sparse.csr_array((values, column, indptr), shape=(6 * d, 6 * d))
+    assert not W.has_canonical_format
+    np.testing.assert_allclose(dense(block_rows(W, d), d)[0], W.toarray(), atol=1e-14)
+
+
+def contacts(A):
+    """Block rows of contacts without others, A (nc, 3, 3)."""
+    return block_rows(sparse.csr_array(sparse.block_diag(list(A))), 3)
+
+
+@pytest.mark.parametrize("size", [1e-140, 1e-3, 1.0, 1e120])
+def test_inverse_norms_and_what_one_contact_needs(size):
+    rng = np.random.default_rng(0)
+    A = rng.standard_normal((40, 3, 3))
+    A[:10] = A[:10] @ A[:10].swapaxes(1, 2)
+    A[10:14] = np.eye(3) * np.array([1.0, 2.0, 0.5, 3.0])[:, None, None]
+    A[14, :, 2] = A[14, :, 0]  # singular
+    A[15] = 0.0
+    rows = contacts(size * A)
+    norms = np.linalg.norm(A, 2, axis=(1, 2))
+    there = norms > 0
+    np.testing.assert_allclose(rows.inverse_norms[there] * norms[there] * size, 1, rtol=1e-14)
+    assert rows.inverse_norms[15] == 0
+    e = rows.eliminated
+    for i in np.flatnonzero(e[:, 0]):
+        product = e[i, 1:10].reshape(3, 3) @ (size * A[i])
+        np.testing.assert_allclose(product, np.eye(3), atol=1e-9)
+    assert e[:14, 0].sum() >= 10
+    assert not e[14:16, 0].any()
+    own = np.where(A[:, 0, 0] > 0, A[:, 0, 0], 1 / size)
+    k = A[:, 1:, 0] / own[:, None]
+    left = A[:, 1:, 1:] - k[:, :, None] * A[:, :1, 1:]
+    if size >= 1e-3:
+        np.testing.assert_allclose(e[there, 12:16], size * left.reshape(-1, 4)[there],
+                                   atol=1e-13 * size * abs(left).max())  # fmt: skip
+        np.testing.assert_allclose(e[:, 16], (size * abs(np.diagonal(A, 0, 1, 2)).sum(1)) ** 2)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from body_checker import check_energy_forces_and_tangent
 
 import amontons as am
 from amontons.core.errors import InvalidInput, InvertedCells
@@ -17,7 +18,8 @@ from amontons.mechanics.meshes import second_order
 MOONEY = MooneyRivlin(0.3, 0.1, 50.0)
 OGDEN = Ogden((0.63, 0.0012, -0.01), (1.3, 5.0, -2.0), 40.0)  # Ogden 1972, MPa
 KIRCHHOFF = SaintVenantKirchhoff(2.0, 0.3)
-LAWS = (MOONEY, OGDEN, KIRCHHOFF, MooneyRivlin(0.5, 0.0, 2.0))
+YEOH = am.ReducedPolynomial((0.3, -0.05, 0.02), 50.0)
+LAWS = (MOONEY, OGDEN, KIRCHHOFF, MooneyRivlin(0.5, 0.0, 2.0), YEOH)
 
 
 def cauchy(law, F):
@@ -132,20 +134,7 @@ def deformed(mesh, size=0.15):
 @pytest.mark.parametrize("integration", ["full", "hybrid"])
 def test_energy_forces_and_tangent_belong_together(law, kind, integration):
     mesh = mesh_of(kind, integration)
-    body, u = HyperelasticBody(mesh, law), deformed(mesh)
-    forces, blocks = body.tangent(u)
-    np.testing.assert_allclose(body.forces(u), forces, atol=1e-13 * abs(forces).max())
-    K = body.matrix(blocks)
-    assert abs((K - K.T).data).max(initial=0.0) <= 1e-13 * abs(blocks).max()
-    way = np.random.default_rng(5).standard_normal(u.shape)
-
-    def central(function, h=2e-4):
-        first, second = (function(u + s * way) - function(u - s * way) for s in (h, 2 * h))
-        return (8 * first - second) / (12 * h)
-
-    slope = (K @ way.ravel()).reshape(u.shape)
-    assert abs(central(body.forces) - slope).max() < 1e-7 * abs(slope).max()
-    assert central(body.energy) == pytest.approx((forces * way).sum(), rel=1e-7)
+    check_energy_forces_and_tangent(HyperelasticBody(mesh, law), deformed(mesh))
 
 
 @pytest.mark.parametrize("law", LAWS, ids=repr)
@@ -273,6 +262,8 @@ def test_an_energy_that_ends_somewhere_keeps_the_last_good_state():
 @pytest.mark.parametrize(("make", "message"), [
     (lambda: MooneyRivlin(0.3, 0.1, -1.0), "bulk: expected a stress > 0"),
     (lambda: MooneyRivlin(0.3, -0.4, 10.0), "shear modulus > 0"),
+    (lambda: am.ReducedPolynomial((), 10.0), "coefficients: expected finite numbers"),
+    (lambda: am.ReducedPolynomial((-1.0, 2.0), 10.0), "shear modulus > 0"),
     (lambda: MooneyRivlin(0.5, 0.5, 1.0), "two thirds of the shear"),
     (lambda: MooneyRivlin("1", 0.5, 1.0), "c10: expected a number"),
     (lambda: Ogden((1.0, 2.0), (2.0,), 9.0), "one for each of 2 shears"),
@@ -304,6 +295,7 @@ obstacle = {{ plane = {{ normal = [0, 1] }} }}
 @pytest.mark.parametrize(("law", "wanted"), [
     ('law = "mooney-rivlin"\nc10 = 0.3\nc01 = 0.1\nbulk = 50', MOONEY),
     ('law = "mooney-rivlin"\nc10 = 0.5\nbulk = 2', LAWS[3]),
+    ('law = "reduced-polynomial"\ncoefficients = [0.3, -0.05, 0.02]\nbulk = 50', YEOH),
     ('law = "ogden"\nshears = [0.63, 0.0012, -0.01]\nexponents = [1.3, 5, -2]\nbulk = 40', 
      OGDEN),
     ('law = "saint-venant-kirchhoff"\nyoung = 2\npoisson = 0.3', KIRCHHOFF),

@@ -75,8 +75,6 @@ def test_a_body_slows_down_by_its_stribeck_curve():
 def test_what_has_no_reactions_refuses():
     with pytest.raises(UnsupportedLaw, match="follows pressure or slip speed needs"):
         block(OVER_SPEED, method="nitsche")
-    with pytest.raises(UnsupportedLaw, match="follows pressure or slip speed needs"):
-        block(OVER_SPEED, kinematics="finite")
     with pytest.raises(am.InvalidInput, match="nor with a curve"):
         block(OVER_SPEED, mu_across=0.3, direction=(1, 0, 0))
 

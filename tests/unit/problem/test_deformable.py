@@ -9,9 +9,9 @@ from amontons.linear.bodies import Bodies, BodyFactor
 from amontons.linear.multifrontal import Fronts
 from amontons.problem import matrices as global_matrices
 from amontons.problem.condensation import Condensation
-from amontons.solvers.auto import stages
 from amontons.solvers.auto import state as portfolio_state
-from amontons.solvers.contract import Iterate
+from amontons.solvers.auto.portfolio import TRACKS, Portfolio
+from amontons.solvers.contract import Iterate, Target
 from amontons.solvers.newton import inexact
 from amontons.solvers.newton.joints import Joints
 
@@ -217,16 +217,16 @@ def test_parts_use_the_factor_of_the_whole(wall):
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize(("work", "name"), [(0, "inexact Newton"), (1e6, "semismooth Newton")])
-def test_auto_takes_newton_on_walls(dim, work, name, monkeypatch):
+@pytest.mark.parametrize(("work", "kind"), [(0, am.InexactNewton), (1e6, am.SemismoothNewton)])
+def test_auto_has_a_track_of_newton_on_walls(dim, work, kind, monkeypatch):
     """Inexact, or exact where an LU in blocks is little work."""
-    problem = one_step(dim, rows=4)
+    problem = one_step(dim, rows=4).condensed()
     monkeypatch.setattr(portfolio_state, "EXACT_WORK", work)
-    monkeypatch.setattr(stages, "CHUNK", 5)  # sweeps alone would do on a wall so small
-    monkeypatch.setattr(Joints, "newton_cost", lambda self, digits: 0.0)
-    solution = am.drive(problem, tolerance=1e-9)
-    assert solution.converged
-    assert solution.convergence.detail == name
+    start, target = np.zeros((problem.contacts, 3)), Target(1e-9)
+    assert portfolio_state.State(problem, target, start).newton_kind is kind
+    table = [entry for entry in TRACKS if entry.name == "inexact Newton"]
+    found = Portfolio(problem, target, start, tuple(table)).iterates()
+    assert any(problem.error(iterate.r) <= 1e-9 for iterate in found)
 
 
 def test_where_newton_stalls_the_portfolio_goes_on(wall, monkeypatch):

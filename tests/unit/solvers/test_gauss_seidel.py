@@ -12,6 +12,9 @@ from amontons.problem.law.single import solve_one
 from amontons.solvers import GaussSeidel
 from amontons.solvers.contract import Iterate, Target
 from amontons.solvers.driver import drive
+from amontons.solvers.sweeps.gauss_seidel import Batch
+from amontons.solvers.sweeps.kernels import sweep_data, watch_for
+from amontons.solvers.sweeps.momentum import Momentum
 
 
 def random_problem(d=3, law=Coulomb, nc=5):
@@ -120,3 +123,41 @@ def test_local_options_are_checked(options):
         GaussSeidel(local=am.LocalSolver.NEWTON, **options)
     with pytest.raises(InvalidInput, match="exact solution"):
         GaussSeidel(**{name: 3 if name == "local_steps" else 0.1 for name in options})
+
+
+# ------------------------------------------------------------------ momentum
+def test_momentum_goes_on_where_it_ended():
+    problem = random_delassus(3, 12, rank=20)
+    whole, parts = (Momentum(sweep_data(problem), np.zeros((12, 3))) for _ in range(2))
+    whole.sweep(30, watch_for(0.0))
+    for _ in range(3):
+        assert parts.sweep(10, watch_for(0.0))[0] == 10
+    np.testing.assert_allclose(parts.r, whole.r, atol=1e-13)
+
+
+def test_momentum_solves_and_ends_when_the_judge_is_content():
+    problem = random_delassus(3, 12, rank=40, mu=0.3)
+    memory, watch = Momentum(sweep_data(problem), np.zeros((12, 3))), watch_for(
+        1e-9 * problem.q_norm)  # fmt: skip
+    done, flops = memory.sweep(5000, watch)
+    assert done < 5000
+    assert flops > 0
+    assert problem.error(memory.r) <= 1e-9
+    assert watch[2] == pytest.approx(problem.error(memory.r) * problem.q_norm, rel=1e-3)
+
+
+def test_momentum_keeps_the_start_that_it_was_given():
+    problem, start = random_delassus(3, 12), np.zeros((12, 3))
+    Momentum(sweep_data(problem), start).sweep(3, watch_for(0.0))
+    assert not start.any()
+
+
+def test_momentum_as_an_option():
+    problem = random_delassus(3, 12, rank=40, mu=0.3)
+    found = drive(problem, GaussSeidel(momentum=True, batch=20))
+    assert found.converged
+    np.testing.assert_allclose(found.u, drive(problem).u, atol=1e-6 * abs(found.u).max())
+    with pytest.raises(InvalidInput, match="anderson_depth already"):
+        GaussSeidel(momentum=True, anderson_depth=5)
+    with pytest.raises(InvalidInput, match="with momentum give a number"):
+        GaussSeidel(momentum=True, batch=Batch.ADAPTIVE)

@@ -1,5 +1,6 @@
-"""The table of stages that Auto walks on the Delassus form."""
+"""The race of methods that Auto runs on the Delassus form: its table, and who goes on."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -7,12 +8,52 @@ import pytest
 
 import amontons as am
 from amontons.mechanics.ready.gallery import random_delassus
-from amontons.solvers.auto.portfolio import FIRST, JOINTS, MOST_TURNS, TURNS, Portfolio
+from amontons.solvers.auto.portfolio import MOST_TURNS, RESTARTS, TRACKS, Portfolio, restarts
+from amontons.solvers.auto.race import Chunk, Entry, Race
+from amontons.solvers.auto.state import State
 from amontons.solvers.contract import Target
 
 
-def walked(problem, first=JOINTS + FIRST, turns=TURNS):
-    """Names of the stages that run when none of them finds anything, turn by turn."""
+def state_of(problem, tolerance=1e-8):
+    return State(problem, Target(tolerance), np.zeros((problem.contacts, 3)))
+
+
+def names_of(problem):
+    race = Race(state_of(problem), TRACKS)
+    race.enter()
+    return [track.entry.name for track in race.tracks]
+
+
+# ------------------------------------------------------------------ the table
+def test_names_are_different():
+    names = [entry.name for entry in TRACKS] + [stage.name for stage in RESTARTS]
+    assert len(set(names)) == len(names)
+
+
+def test_few_contacts_under_coulombs_law():
+    names = names_of(random_delassus(0, 10))
+    assert names[0] == "Anderson Gauss-Seidel"
+    assert {"interior point", "smoothing Newton", "semismooth Newton", "restarts"} < set(names)
+    assert "inexact Newton" not in names
+
+
+def test_laws_without_a_cone_have_the_methods_that_need_none():
+    names = names_of(replace(random_delassus(0, 10), law=am.Tresca(np.full(10, 0.3))))
+    assert "semismooth Newton" in names
+    assert not {"interior point", "smoothing Newton"} & set(names)
+
+
+def test_contacts_that_gain_energy_are_swept_only():
+    problem = random_delassus(0, 10)
+    W = np.array(problem.W)
+    W[0, 1] -= 3 * abs(W[0, 0])  # contact 0 alone
+    other = am.FrictionProblem.from_delassus(W, problem.q, problem.mu)
+    assert other.gains_energy
+    assert all("Gauss-Seidel" in name for name in names_of(other))
+
+
+def restarted(problem):
+    """(turn, name) of the stages that run when none of them finds anything."""
     seen = []
 
     def nothing(stage):
@@ -22,42 +63,120 @@ def walked(problem, first=JOINTS + FIRST, turns=TURNS):
 
         return replace(stage, run=run)
 
-    first, turns = (tuple(map(nothing, table)) for table in (first, turns))
-    start = np.zeros((problem.contacts, 3))
-    assert not list(Portfolio(problem, Target(1e-8), start, first, turns).stages())
+    assert not list(restarts(state_of(problem), tuple(map(nothing, RESTARTS))))
     return seen
 
 
-def test_names_are_different():
-    names = [stage.name for stage in JOINTS + FIRST + TURNS]
-    assert len(set(names)) == len(names)
-
-
-def test_few_contacts_under_coulombs_law():
-    seen = walked(random_delassus(0, 10))
-    first = ["accelerated sweeps", "semismooth Newton, dense"]
-    again = ["interior point", "smoothing Newton", "proximal point"]
-    assert [name for turn, name in seen if name in first] == first
-    assert [n for t, n in seen if t == 0][-5:] == [*again, "matching sweeps", "methods alone"]
-    assert [n for t, n in seen if t == 1] == [
-        *again, "semismooth Newton, small", "matching sweeps",
-    ]  # fmt: skip
+def test_restarts_turn_after_turn():
+    seen = restarted(random_delassus(0, 10))
+    assert [n for t, n in seen if t == 0] == ["proximal point", "methods alone"]
+    assert [n for t, n in seen if t == 1] == ["proximal point", "semismooth Newton, small"]
     assert max(turn for turn, _ in seen) == MOST_TURNS - 1
-    assert not {name for _, name in seen} & {stage.name for stage in JOINTS}
+    bounds = replace(random_delassus(0, 10), law=am.Tresca(np.full(10, 0.3)))
+    assert "proximal point" not in {name for _, name in restarted(bounds)}
 
 
-def test_laws_without_a_cone_have_the_stages_that_need_none():
-    problem = replace(random_delassus(0, 10), law=am.Tresca(np.full(10, 0.3)))
-    seen = walked(problem)
-    assert "semismooth Newton, no cone" in [name for turn, name in seen if turn == 0]
-    assert {name for turn, name in seen if turn == 1} == {
-        "semismooth Newton, small", "matching sweeps",
-    }  # fmt: skip
-
-
-@pytest.mark.parametrize("stage", FIRST + TURNS, ids=lambda stage: stage.name)
-def test_no_stage_is_needed_by_an_easy_problem(stage):
+@pytest.mark.parametrize("entry", TRACKS, ids=lambda entry: entry.name)
+def test_no_track_is_needed_by_an_easy_problem(entry):
     problem = random_delassus(3, 12, rank=20)
-    first, turns = (tuple(s for s in t if s is not stage) for t in (FIRST, TURNS))
-    found = Portfolio(problem, Target(1e-8), np.zeros((12, 3)), first, turns).stages()
+    table = tuple(e for e in TRACKS if e is not entry)
+    found = Portfolio(problem, Target(1e-8), np.zeros((12, 3)), table).iterates()
     assert any(problem.error(iterate.r) < 1e-8 for iterate in found)
+
+
+@pytest.mark.parametrize("entry", TRACKS, ids=lambda entry: entry.name)
+def test_every_track_alone_solves_an_easy_problem(entry):
+    problem = random_delassus(3, 12, rank=40, mu=0.3)
+    if not entry.when(state_of(problem)):
+        pytest.skip("not for such a problem")
+    found = Portfolio(problem, Target(1e-8), np.zeros((12, 3)), (entry,)).iterates()
+    errors = [problem.error(iterate.r) for iterate, _ in zip(found, range(400), strict=False)]
+    assert min(errors) < 1e-8
+    assert all(b <= a * (1 + 1e-9) for a, b in zip(errors, errors[1:], strict=False))
+
+
+# ------------------------------------------------------------------ who goes on
+def falling(factor, cost, count=10**6):
+    """A method whose error falls by a factor with every chunk of that cost; it may end."""
+
+    def chunks(state):
+        error = state.first_error
+        yield Chunk(state.start, 0, 0.0)
+        for _ in range(count):
+            error *= factor
+            _ = yield Chunk(state.start, 1, cost, error=error)
+
+    return chunks
+
+
+def costs(*entries, chunks=200):
+    """Cost of each track after some chunks, or at the goal."""
+    state = state_of(random_delassus(0, 10))
+    race = Race(state, entries)
+    for k, _ in enumerate(race.iterates()):
+        if state.error <= state.goal or k + 1 >= chunks:
+            break
+    return {t.entry.name: t.cost for t in race.tracks}, state.error <= state.goal
+
+
+def test_the_track_that_promises_the_end_first_goes_on():
+    spent, done = costs(Entry("slow", falling(0.9, 1.0), share=0.1),
+                        Entry("fast", falling(0.5, 1.0), share=0.1))  # fmt: skip
+    assert done
+    assert spent["fast"] > 20
+    assert spent["slow"] <= 30
+
+
+def test_dear_steps_count_by_their_cost():
+    spent, done = costs(Entry("cheap", falling(0.9, 1.0), share=0.1),
+                        Entry("dear", falling(0.5, 100.0), share=0.1))  # fmt: skip
+    assert done
+    assert spent["cheap"] > 150
+    assert spent["dear"] <= 300
+
+
+def test_tracks_without_progress_share_what_they_cost():
+    spent, done = costs(Entry("a", falling(1.0, 1.0)), Entry("b", falling(1.0, 3.0)))
+    assert not done
+    assert spent["a"] == pytest.approx(spent["b"], rel=0.1)
+
+
+def test_a_method_of_newtons_kind_is_given_time():
+    def late(state):
+        yield Chunk(state.start, 0, 0.0)
+        for k in range(20):
+            error = state.first_error * (1e-12 if k == 9 else 1.0)
+            _ = yield Chunk(state.start, 1, 1.0, error=error)
+
+    spent, done = costs(Entry("slow", falling(0.999, 1.0)),
+                        Entry("late", late, needs=lambda state: 20.0))  # fmt: skip
+    assert done
+    assert spent["late"] == 10
+
+
+def test_a_method_that_ends_leaves_the_race():
+    ending = Entry("ends", falling(0.1, 1.0, count=3))
+    spent, done = costs(ending, Entry("on", falling(0.5, 1.0)))
+    assert done
+    assert list(spent) == ["on"]
+
+
+def test_the_race_ends_when_every_method_has():
+    race = Race(state_of(random_delassus(0, 10)), (Entry("a", falling(0.9, 1.0, count=5)),))
+    assert len(list(race.iterates())) == 5
+    assert not race.tracks
+
+
+def test_the_race_ends_where_nothing_helps():
+    state = state_of(random_delassus(0, 10))
+    step = state.step_cost
+    entries = (Entry("a", falling(1.0, step)), Entry("b", falling(1.0, 3 * step)))
+    assert 300 < len(list(Race(state, entries).iterates())) < 2000
+
+
+def test_first_error_is_that_of_a_given_start():
+    problem = random_delassus(3, 12)
+    r = am.drive(problem, tolerance=1e-4).r
+    state = State(problem, Target(1e-8), r)
+    assert state.first_error == pytest.approx(state.judge(r))
+    assert state_of(problem).first_error == problem.q_norm < math.inf

@@ -1,10 +1,11 @@
-"""The critical friction of a 2D problem: below it every load has one solution, above not.
+"""The critical friction of a problem: below it every load has one solution, above not.
 
 Where no pattern of statuses has a singular linear piece, all pieces have the orientation that
 they have without friction, and the solution is unique for every load.  Just above the smallest
 friction with a singular piece some pieces have the other orientation, and there are loads with
 three solutions.  That smallest friction is bounded here from both sides; friction is t times
 the shape of the coefficients given, whose largest entry is one, and all bounds are values of t.
+In 3D there are no linear pieces but directions; `bounds_in_space` bounds it there.
 
 Two older criteria are there for comparison: the P-matrix property asks the same of patterns in
 which only the tangent of a contact is closed, which no state of contact is (a safe bound, but
@@ -25,12 +26,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.clock import NEVER, Deadline, TimeLimit, deadline_of, now
-from ...core.errors import InvalidInput, TimeUp, UnsupportedForm
+from ...core.errors import InvalidInput, TimeUp
 from ...core.faces import Told
 from ...core.onlookers import say
 from ...problem.friction import FrictionProblem
 from ..scaled import Scaled
 from ..statuses import STICK
+from . import bounds_in_space as space
+from .contact_multipliers import ContactMultipliers
 from .determinant_search import NEGATIVE, POSITIVE, STOPPED, UNKNOWN
 from .energy_bound import energy_bound
 from .exact_threshold import LARGEST, Threshold, exact_threshold, search_windows
@@ -40,11 +43,13 @@ from .status_pieces import Pieces
 Array = NDArray[np.float64]
 ENUMERATED = 13  # contacts up to which all 4^n patterns are examined: 5 s
 SECONDS = 60.0  # whose work a search without a time limit may take
+CONTACTS = 0.2  # part of the time for multipliers of every contact
 WINDOWS = 0.2  # part of the time for windows of contacts
 COMPARED = 10  # contacts up to which the P-matrix threshold is computed: 5^n patterns
 DIRECT = 18  # contacts up to which the whole gap is tried at once
 PATIENCE = 0.75  # part of the time left for one attempt
 EASY = 20.0  # contacts times the part of the upper bound that takes one matrix inequality
+SINGULAR = "W is singular: reactions are not unique without friction either"
 FULL_CONTACT = 12  # contacts up to which the full contact threshold is: 3^n patterns
 
 
@@ -53,9 +58,11 @@ class Witness:
     """A linear piece that is singular: with it friction `friction` is not safe for every load.
 
     pattern: f free, s stick, slip + or -, of every contact.  coefficients (nc,): m in
-    r_T = m r_N of slipping contacts, |m| = friction * shape.  null_vector (nc, 2): r != 0 with
+    r_T = m r_N of slipping contacts, |m| = friction * shape.  null_vector (nc, d): r != 0 with
     r = 0 at free and r_T = m r_N at slipping contacts, for which W r vanishes along u_N of
     all closed and u_T of sticking contacts, up to `residual`, relative to |W_ij| |r_j|.
+    In 3D slip is l or h along t = directions (nc, 2), t.r_T = -m r_N; across t the reaction
+    is zero with l, and the velocity with h.
     """
 
     friction: float
@@ -63,6 +70,7 @@ class Witness:
     coefficients: Array
     null_vector: Array
     residual: float
+    directions: Array | None = None
 
     def __str__(self) -> str:
         return f"the pattern {self.pattern} is singular at friction {self.friction:.6g}"
@@ -73,11 +81,11 @@ class CriticalFriction(Told):
     """Bounds on the critical friction, lower <= mu_* <= upper, in terms of t (largest mu).
 
     criterion: what proves lower: "determinants" (all patterns), "multipliers" (`proof`),
-    "energy", or "none" where there is no proof.  upper is inf where no singular piece was found
-    up to LARGEST.  witness: the piece behind upper.  p_matrix, full_contact: the two older
-    thresholds, None where they would take too long.  proof: groups of patterns that together
-    are all of them.  examined: determinants and linear matrix inequalities.  reason: why the
-    bounds are not closer.
+    "contact multipliers" (`multipliers`), "energy", or "none" where there is no proof.  upper
+    is inf where no singular piece was found up to LARGEST.  witness: the piece behind upper.
+    p_matrix, full_contact: the two older thresholds, None where they would take too long.
+    proof: groups of patterns that together are all of them.  examined: determinants and linear
+    matrix inequalities.  reason: why the bounds are not closer.
     """
 
     lower: float
@@ -90,6 +98,7 @@ class CriticalFriction(Told):
     seconds: float
     reason: str = ""
     proof: tuple[Leaf, ...] = ()
+    multipliers: ContactMultipliers | None = None
 
     def __str__(self) -> str:
         upper = "no upper bound found" if np.isinf(self.upper) else f"{self.upper:.5g}"
@@ -104,12 +113,10 @@ def critical_friction(
 
     gap: relative distance of the bounds that is good enough.  time_limit: seconds; without it
     operations are counted, as many as take about SECONDS.  first: a friction of interest, which
-    is proved to be safe before others if it can be.  Raises UnsupportedForm in 3D and under
-    Tresca's law.
+    is proved to be safe before others if it can be; in 3D a lower bound above it is enough.
+    Raises UnsupportedForm under Tresca's law.
     """
     deadline = deadline_of(time_limit, SECONDS)
-    if problem.dimension != 2:
-        raise UnsupportedForm("critical friction: expected a 2D problem, this one is 3D")
     if not 0 < gap < 1:
         raise InvalidInput(f"gap: expected a number between 0 and 1, got {gap!r}")
     began = now()
@@ -124,6 +131,8 @@ def critical_friction(
         why = "no tangential force moves a contact along its normal"
         return CriticalFriction(np.inf, np.inf, "determinants", None, None, None, 0,
                                 now() - began, why)  # fmt: skip
+    if problem.dimension == 3:
+        return _in_space(pieces, energy, deadline, first, began)
     search = _Search(pieces, deadline, energy, gap, first)
     search.run()
     found = search.found
@@ -131,7 +140,31 @@ def critical_friction(
     comparison = _comparison(pieces, found, deadline)
     return CriticalFriction(found.lower, found.upper, search.criterion, witness, *comparison,
                             found.seen, now() - began, search.reason,
-                            search.proof)  # fmt: skip
+                            search.proof, search.multipliers)  # fmt: skip
+
+
+def _in_space(
+    pieces: Pieces, energy: float, deadline: Deadline, first: float | None, began: float
+) -> CriticalFriction:
+    """Bounds of a 3D problem."""
+    by, late = None, ""
+    if first is None or energy <= first:
+        by, late = space.lower_bound(pieces, deadline.share(space.LOWER), first)
+    lower, criterion = energy, "energy" if energy > 0 else "none"
+    if by is not None and by.t > energy:
+        lower, criterion = by.t, "contact multipliers"
+    upper, witness = np.inf, None
+    found = space.upper_bound(pieces, deadline) if energy > 0 else None
+    if found is not None:
+        upper = found.t
+        witness = Witness(
+            found.t, space.pattern(pieces, found), space.coefficients(pieces, found),
+            pieces.reaction(found.null), space.residual(pieces, found),
+            space.directions(pieces, found),
+        )  # fmt: skip
+    why = "in 3D nothing closes bounds" if energy > 0 else SINGULAR
+    return CriticalFriction(lower, upper, criterion, witness, None, None, 0, now() - began,
+                            late or why, multipliers=by)  # fmt: skip
 
 
 @dataclass(eq=False)
@@ -147,6 +180,7 @@ class _Search:
     criterion: str = "none"
     reason: str = ""
     proof: tuple[Leaf, ...] = ()
+    multipliers: ContactMultipliers | None = None
 
     def run(self) -> None:
         """Close the bounds as far as time allows."""
@@ -160,10 +194,19 @@ class _Search:
                 return
         found.lower = min(self.energy, found.upper)
         if found.lower == 0:
-            self.reason = "W is singular: reactions are not unique without friction either"
+            self.reason = SINGULAR
             return
         self.criterion = "energy"
+        self._by_contacts()
         self._branch()
+
+    def _by_contacts(self) -> None:
+        """Raise the lower bound by multipliers of every contact."""
+        share = self.deadline.share(CONTACTS)
+        by, _ = space.lower_bound(self.pieces, share, self.first)
+        if by is not None and by.t > self.found.lower:
+            self.found.lower, self.criterion = by.t, "contact multipliers"
+            self.multipliers = by
 
     def _branch(self) -> None:
         """Raise the lower bound by branch and bound, in steps that cost more and more.

@@ -181,7 +181,7 @@ def _by_energy(scaled: Scaled, deadline: Deadline) -> Uniqueness:
 def _every_load(scaled: Scaled, deadline: Deadline) -> Uniqueness:
     """The verdict of the bounds on the critical friction."""
     cheap = _by_energy(scaled, deadline)
-    if scaled.dimension != 2 or not scaled.contacts or deadline.passed:
+    if cheap.lower > cheap.friction or not scaled.contacts or deadline.passed:
         return cheap
     above = cheap.friction * (1 + ABOVE)  # safe up to there means safe at the friction itself
     bounds = critical_friction(scaled, time_limit=deadline, first=above)

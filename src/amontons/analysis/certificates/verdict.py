@@ -120,6 +120,7 @@ class Uniqueness(Told):
             "friction": w.friction, "pattern": w.pattern,
             "coefficients": w.coefficients.tolist(), "null_vector": w.null_vector.tolist(),
             "residual": w.residual,
+            "directions": None if w.directions is None else w.directions.tolist(),
         }  # fmt: skip
         other = None if s is None else {
             "pattern": s.pattern, "r": s.r.tolist(), "u": s.u.tolist(), "error": s.error,

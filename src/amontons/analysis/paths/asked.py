@@ -17,7 +17,7 @@ from .corrector import Curve
 from .first_order import first_order
 from .following import Limits, continue_both, follow_along
 from .friction_path import FrictionPath
-from .load_path import LoadPath
+from .large_path import LargePath
 from .parametrised import first_state, path_of, state_of
 from .path import Branch, Event, PathProblem, Point, timed
 from .probes import by_probes
@@ -53,11 +53,11 @@ def on_path(
         raise InvalidInput("base: expected none, a PathProblem has a parameter of its own")
     else:
         path = problem
-    own = isinstance(path, FrictionPath | LoadPath)
+    own = isinstance(path, FrictionPath | LargePath)
     if start is None and not own:
         raise InvalidInput("start: a PathProblem needs the unknowns of a solution at `at`")
     if start is None:
-        assert isinstance(path, FrictionPath | LoadPath)
+        assert isinstance(path, FrictionPath | LargePath)
         y = first_state(path, p)
     else:
         y = real("start", start).ravel() if known else state_of(path, start)
@@ -66,7 +66,7 @@ def on_path(
             f"start: expected {path.start.contacts * path.start.dimension} unknowns, "
             f"got {len(y)}"
         )
-    if isinstance(path, LoadPath):
+    if isinstance(path, LargePath):
         checks.check_size(path, y)
     else:
         checks.check_start(path, y, p)

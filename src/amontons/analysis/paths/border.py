@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 NUDGE = 1e-7  # step along the tangent, by which slopes of margins are measured
 HALVINGS = 54  # of an interval in which a cubic has a zero
 PATIENCE = 4  # predictions between two halvings of the interval that is left
+RISING = 1e-7  # slope of a margin with which a curve leaves a border
 NONE = 1e-15  # an interval too short to be halved
 
 
@@ -45,15 +46,20 @@ class Border:
         self.problem, self.curve, self.start = problem, curve, start
         self.tolerances = tolerances
 
-    def located(self, step: float, end: Spot, zero: float) -> Spot | None:
+    def located(
+        self, step: float, end: Spot, zero: float, shorter: bool = False
+    ) -> Spot | None:
         """Where the first margin vanishes, up to `zero`; end: the point a step ahead.
 
-        None where the corrector fails.
+        None where the corrector fails or, if it can be shorter, where the step passes the piece
+        from one border to another, as where a contact opens and closes again.
         """
         low, high = self._knot(0.0, self.start), self._knot(step, end)
         watched = np.flatnonzero(high.margins < 0)
-        if (low.margins[watched] <= 0).any():
-            return low.spot
+        on_border = low.margins[watched] <= 0
+        if on_border.any():
+            entering = low.slopes[watched][on_border] > RISING
+            return None if shorter and entering.all() else low.spot
         for count in range(1, 61):
             h = _first_zero(low, high, watched)
             if count % PATIENCE == 0:

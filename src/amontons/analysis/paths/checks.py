@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...core.errors import InvalidInput
 from .continuation import Continuation
 from .friction_path import FrictionPath
-from .load_path import LoadPath
+from .large_path import LargePath
 from .path import PathProblem, is_number, name_of, weight_of
 
 Array = NDArray[np.float64]
@@ -67,9 +67,9 @@ def check_options(options: object) -> None:
         raise InvalidInput(f"options: expected a Continuation, got {options!r}")
 
 
-def check_size(path: FrictionPath | LoadPath, y: Array) -> None:
+def check_size(path: FrictionPath | LargePath, y: Array) -> None:
     """Raise InvalidInput for unknowns that a problem at finite strains does not have."""
-    if isinstance(path, LoadPath) and len(y) != path.step.unknowns:
+    if isinstance(path, LargePath) and len(y) != path.step.unknowns:
         raise InvalidInput(
             f"start: expected a solution, or its v of {path.step.unknowns} entries, "
             f"got {len(y)} numbers"

@@ -22,7 +22,7 @@ from scipy.linalg import lapack
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
-from .path import Matrix, PathProblem, weight_of
+from .path import Matrix, PathProblem, resolution_of, weight_of
 
 Array = NDArray[np.float64]
 ROUNDED = 1e-12  # residual of a trial solve, relative, of a factor that is good enough
@@ -139,9 +139,10 @@ class Curve:
         return None
 
     def rounding(self, y: Array, p: float) -> float:
-        """What the last digits of y and p change in H."""
+        """What the last digits of y and p change in H, or its resolution if that is more."""
         J, Jp = self.jacobian(y, p)
-        return UNIT * float(np.linalg.norm(abs(J) @ np.abs(y) + np.abs(Jp * p)))
+        least = resolution_of(self.problem)
+        return least + UNIT * float(np.linalg.norm(abs(J) @ np.abs(y) + np.abs(Jp * p)))
 
     def orientation(self, y: Array, p: float, ty: Array, tp: float) -> int:
         """Sign of the determinant of the matrix bordered by a direction, 0 if singular."""

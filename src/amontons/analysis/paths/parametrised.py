@@ -18,8 +18,10 @@ from ...problem.protocol import Problem
 from ...problem.solution import Outcome
 from ...solvers.driver import drive
 from .friction_path import FrictionPath
+from .large_path import LargePath
 from .load_path import LoadPath, load_path
 from .path import PathProblem
+from .rubbing_path import rubbing_path
 from .starting import exact_state
 
 if TYPE_CHECKING:
@@ -33,7 +35,7 @@ START = 1e-10  # error of the solution from which continuation starts
 def path_of(
     problem: Model | FrictionProblem, parameter: str, interval: tuple[float, float],
     base: Model | FrictionProblem | None = None,
-) -> FrictionPath | LoadPath:  # fmt: skip
+) -> FrictionPath | LargePath:  # fmt: skip
     """The problems that a parameter runs through.
 
     "load": loads and supports that depend on time t are taken at t; where none does, all of
@@ -50,8 +52,13 @@ def path_of(
             raise InvalidInput("base: expected none where friction is the parameter")
         if interval[0] < 0:
             raise InvalidInput(f"interval: expected friction >= 0, got {interval[0]:g}")
-        return FrictionPath.friction(_discrete(problem))
+        over = rubbing_path if problem.kind is LargeDeformation else _rubbing
+        return over(cast(Any, problem))
     return UNDER_LOAD.get(problem.kind, _of_reactions)(problem, interval, base)
+
+
+def _rubbing(problem: Model | FrictionProblem) -> FrictionPath:
+    return FrictionPath.friction(_discrete(problem))
 
 
 def _of_displacements(problem: Any, interval: tuple[float, float], base: Any) -> LoadPath:
@@ -116,7 +123,7 @@ def _discrete(problem: Model | FrictionProblem) -> FrictionProblem:
 
 def state_of(path: PathProblem, start: object) -> Array:
     """The unknowns of a start: a solution, reactions (nc, d), or the unknowns themselves."""
-    if isinstance(path, LoadPath):
+    if isinstance(path, LargePath):
         start = getattr(start, "v", start)
     r = getattr(start, "r", start)
     values = real("start", r)
@@ -128,12 +135,12 @@ def state_of(path: PathProblem, start: object) -> Array:
     return path.state(values)
 
 
-def first_state(path: FrictionPath | LoadPath, p: float) -> Array:
+def first_state(path: FrictionPath | LargePath, p: float) -> Array:
     """A solution to begin with: exact in 2D under Coulomb's law, else from a solver.
 
     Raises NotConverged where the solver finds none.
     """
-    if isinstance(path, LoadPath):
+    if isinstance(path, LargePath):
         return path.found_at(p)
     if path.start.dimension == 2 and not path.tresca:
         try:

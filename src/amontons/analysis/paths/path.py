@@ -63,6 +63,7 @@ class PathProblem(Protocol):
 
     And, where it has them, continuation makes use of
     - `weight`, a float: kappa of the weighted norm, by default 1 / n;
+    - `resolution`, a float: of the residual, below which Newton's steps may get no further;
     - `smooth`: True where there is one selection function, which allows for longer steps;
     - `start`, (n,): a solution with which `follow` begins, at the parameter `start_at` or else
       the lower end of the interval;
@@ -255,6 +256,11 @@ def weight_of(problem: PathProblem, n: int) -> float:
     return 1.0 / max(n, 1) if given is None else float(given)
 
 
+def resolution_of(problem: PathProblem) -> float:
+    """The problem's `resolution`, by default 0."""
+    return float(getattr(problem, "resolution", 0.0))
+
+
 def is_number(value: object) -> bool:
     """True for one finite or infinite real number that is no truth value."""
     return isinstance(value, int | float | np.number) and not isinstance(value, bool)
@@ -275,8 +281,9 @@ def corrected(
 ) -> Array | None:
     """y after Newton steps at a fixed parameter, None where they do not converge.
 
-    tolerance bounds the last step, relative to the size of y.
+    tolerance bounds the last step, relative to the size of y, with the problem's `resolution`.
     """
+    tolerance = max(tolerance, resolution_of(problem))
     for _ in range(steps):
         jacobian, _ = problem.jacobian(y, p)
         try:

@@ -81,7 +81,7 @@ class PathCrossing:
     ) -> Arrival:
         """From the state that a step knows to the step; drift (nc, d): V of the memory.
 
-        Raises Breakdown like `between`, UnsupportedForm in 3D and under Tresca's law.
+        Raises Breakdown like `between`, UnsupportedLaw under Tresca's law.
         """
         load, prescribed, v = step.known  # type: ignore[misc]
         path = LoadPath(step, load, prescribed, drift)

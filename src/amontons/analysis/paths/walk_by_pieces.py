@@ -42,7 +42,8 @@ class WalkByPieces(Walk):
             return None
         o = self.options
         border = Border(self.problem, self.curve, self.spot, o.tolerances)
-        inside = border.located(step, spot, LOCATED * o.border)
+        shorter = step > o.min_step
+        inside = border.located(step, spot, LOCATED * o.border, shorter)
         if inside is None or self._jumps(inside):
             return None
         out = self._between(inside)

@@ -13,6 +13,7 @@ from ...core.errors import InvalidInput
 from .course import Course
 from .flat import Deck
 from .history import History
+from .large import is_large
 from .scopes import Index
 from .shapes import SHAPES
 from .stages import Held
@@ -58,16 +59,12 @@ class About:
         own = labels[numbers >= 0]
         kinds = dict.fromkeys(block.kind for block in deck.blocks)
         other = tuple(f"{k}: {SHAPES[k].note}" for k in kinds if SHAPES[k].note)
-        large = any(
-            "NLGEOM" in step[0].card.options and step[0].card.label("NLGEOM") != "NO"
-            for step in deck.steps
-        )
         courses = [*history.supports.courses, *history.forces.courses]
         courses += [course for course, _, _ in history.faces.values()]
         courses += [course for course, _, _, _ in history.bodies.values()]
         return cls(
             own, len(np.unique(own)) == len(own), SHAPES[deck.blocks[0].kind].plane, other,
-            large, history.until, 
+            is_large(deck), history.until, 
             len(stages) == 1 and all(_is_ramp(c, history.until) for c in courses),
             partial(_at, tuple(stages), make), _cells(deck, numbers),
         )  # fmt: skip

@@ -50,6 +50,7 @@ from .general import found_pairs, motion_of, part_titles, read_general, self_con
 from .history import History, read_history
 from .joints import Joints, tied
 from .keywords import left_out, plain, sorted_out
+from .large import gives_way, of_size
 from .materials import read_interactions, read_sections
 from .meshing import Region
 from .options import PLACED, with_known_options
@@ -97,7 +98,9 @@ def read(path: Path, overrides: Sequence[str] = (), method: str | None = None) -
     if not deck.steps:
         raise cards[-1].error("the deck ends here without a *STEP, it loads nothing")
     try:
-        return _case(path, deck, settings, options, notes)
+        make = partial(_case, path, deck, settings, options)
+        small = options.small or (options.hard and gives_way(deck))
+        return of_size(make, deck, notes, small=small)
     except FileFormatError:
         raise
     except AmontonsError as reason:
@@ -117,12 +120,12 @@ def _settings(overrides: Sequence[str], method: str | None) -> tuple[Settings, O
             values["allow"] = tuple(word.strip() for word in words if word.strip())
         elif name == "increments" and value.strip().isdigit() and int(value) > 0:
             values["increments"] = int(value)
-        elif name == "hard" and value.strip().lower() in ("true", "false"):
-            values["hard"] = value.strip().lower() == "true"
+        elif name in ("hard", "small") and value.strip().lower() in ("true", "false"):
+            values[name] = value.strip().lower() == "true"
         else:
             raise InvalidInput(
-                f"--set {text}: expected deck.allow=[KEYWORD, ...], deck.hard=true or "
-                "deck.increments=NUMBER, of each step"
+                f"--set {text}: expected deck.allow=[KEYWORD, ...], deck.hard=true, "
+                "deck.small=true or deck.increments=NUMBER, of each step"
             )
     return settings, Options(**values)
 
@@ -152,10 +155,11 @@ def _with(placed: list[Placed], cards: list[Card | None]) -> list[Placed]:
 
 
 def _case(
-    path: Path, deck: Deck, settings: Settings, options: Options, notes: list[str]
-) -> Case:
+    path: Path, deck: Deck, settings: Settings, options: Options, notes: list[str],
+    finite: bool,
+) -> Case:  # fmt: skip
     shells = solid_shells(deck)
-    sections = read_sections(deck, deck.model)
+    sections = read_sections(deck, deck.model, notes)
     if len(shells):
         sections.append(section_of(shells, sections[0]))
     joints, turned = Joints.of(deck), Turned.of(deck)
@@ -174,10 +178,12 @@ def _case(
     _name_faces(region, history)
     mesh, at = region.mesh(title)
     sections = [s for s in sections if s.name in mesh.regions]  # others are given again
-    materials = {s.name: s.law(region.plane) for s in sections}
+    materials = {s.name: s.law(region.plane, finite=finite) for s in sections}
     near = Reach(more=motion_of(history))
-    titles = part_titles(deck, at, piece_labels(mesh))
-    if any(pair.itself for pair in pairs):
+    itself = any(pair.itself for pair in pairs)
+    found_by_us = itself or general is not None
+    titles = part_titles(deck, at, piece_labels(mesh)) if found_by_us else None
+    if itself:
         mesh, pairs, said = self_contact(Body(mesh, materials), pairs, near, titles)
         notes += said
     if general is not None:
@@ -222,14 +228,7 @@ def _title(deck: Deck) -> str:
 def _formulations(deck: Deck) -> list[str]:
     """What elements of the deck do otherwise than ours."""
     kinds = dict.fromkeys(block.kind for block in deck.blocks)
-    notes = [f"{kind}: {SHAPES[kind].note}" for kind in kinds if SHAPES[kind].note]
-    for step in deck.steps:
-        if "NLGEOM" in step[0].card.options and step[0].card.label("NLGEOM") != "NO":
-            notes.append(
-                "NLGEOM: strains are taken as small; a rotation that spoils this is warned of"
-            )
-            break
-    return notes
+    return [f"{kind}: {SHAPES[kind].note}" for kind in kinds if SHAPES[kind].note]
 
 
 # ------------------------------------------------------------------------------ history

@@ -20,11 +20,13 @@ SAME = 1e-9  # of numbers of a curve that are the same but for rounding
 class Options:
     """How a deck is read: cards that may be left out; hard: laws of overclosure too.
 
-    increments: of each step, in the place of what the deck says.
+    small: strains, whatever NLGEOM says.  increments: of each step, in the place of what the
+    deck says.
     """
 
     allow: tuple[str, ...] = ()
     hard: bool = False
+    small: bool = False
     increments: int | None = None
 
 

@@ -9,9 +9,11 @@ import numpy as np
 
 from ...core.errors import InvalidInput
 from ...mechanics.elements.elasticity import LinearElastic
+from ...mechanics.elements.energies import SaintVenantKirchhoff
 from ...mechanics.elements.orthotropic import X_AND_Y, OrthotropicElastic
 from ...mechanics.elements.plasticity import ElastoPlastic
 from .cards import Card, Row, number
+from .rubber import Rubber
 from .scopes import missing
 
 Flow = tuple[tuple[tuple[float, float], ...], Card]
@@ -19,6 +21,7 @@ PLANES = {"": "strain", "strain": "strain", "stress": "stress", "axisymmetric": 
 CONSTANTS = 9  # of an orthotropic material
 Three = tuple[float, float, float]
 Axes = Sequence[Sequence[float]]
+Material = LinearElastic | OrthotropicElastic | Rubber | SaintVenantKirchhoff
 
 
 @dataclass(frozen=True)
@@ -26,7 +29,8 @@ class Elastic:
     """Young's moduli and Poisson's ratios, three of each where they differ; then also shear.
 
     density: where one is given; expansion: strain per temperature, one or three; flow: rows
-    (yield stress, plastic strain) and their card, None of a material that does not yield.
+    (yield stress, plastic strain) and their card, None of a material that does not yield;
+    rubber: its law, of which young and poisson are those at rest.
     """
 
     young: float | Three
@@ -36,10 +40,16 @@ class Elastic:
     shear: Three | None = None
     expansion: float | Three = 0.0
     flow: Flow | None = None
+    rubber: Rubber | None = None
 
-    def law(self, plane: str, axes: Axes | None = None) -> LinearElastic | OrthotropicElastic:
-        """The material for a plane state, its axes turned; FileFormatError for what is none."""
+    def law(self, plane: str, axes: Axes | None = None, *, finite: bool = False) -> Material:
+        """The material for a plane state, its axes turned; FileFormatError for what is none.
+
+        finite: of finite strains.
+        """
         state = PLANES[plane]
+        if finite:
+            return self._finite(plane)
         if self.flow is not None:
             return self._yielding(state)
         try:
@@ -53,6 +63,22 @@ class Elastic:
             return OrthotropicElastic(
                 young, poisson, shear, axes or X_AND_Y, state, self.density, self.expansion
             )
+        except InvalidInput as reason:
+            raise self.card.error(str(reason)) from None
+
+    def _finite(self, plane: str) -> Rubber | SaintVenantKirchhoff:
+        if plane not in ("", "strain"):
+            raise self.card.error(f"finite strains are those of solids, not of plane {plane}")
+        for there, what in (
+            (self.flow is not None, "*PLASTIC"), (self.grows, "*EXPANSION"),
+            (self.shear is not None, "other constants than isotropic ones"),
+        ):  # fmt: skip
+            if there:
+                raise self.card.error(f"{what}: small strains alone have it")
+        if self.rubber is not None:
+            return self.rubber
+        try:
+            return SaintVenantKirchhoff(float(self.young), float(self.poisson))  # type: ignore[arg-type]
         except InvalidInput as reason:
             raise self.card.error(str(reason)) from None
 
@@ -109,6 +135,11 @@ def elastic(card: Card) -> Elastic:
         young, poisson, shear = (_of(values[k : k + 3]) for k in (0, 3, 6))
         return Elastic(young, poisson, None, card, shear)
     return _of_stiffness(values, card)
+
+
+def elastic_rubber(law: Rubber, card: Card) -> Elastic:
+    """The material of *HYPERELASTIC."""
+    return Elastic(law.young, law.poisson, None, card, rubber=law)
 
 
 def _of(values: Sequence[float]) -> Three:

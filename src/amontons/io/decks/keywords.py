@@ -13,7 +13,7 @@ from .cards import Card
 from .options import with_known_options
 
 READ = {
-    "HEADING", "MATERIAL", "ELASTIC", "PLASTIC", "DENSITY", "SOLIDSECTION",
+    "HEADING", "MATERIAL", "ELASTIC", "HYPERELASTIC", "PLASTIC", "DENSITY", "SOLIDSECTION",
     "SURFACEINTERACTION",
     "SURFACEBEHAVIOR", "FRICTION", "CONTACTPAIR", "BOUNDARY", "AMPLITUDE", "STEP", "STATIC",
     "CLOAD", "DLOAD", "DSLOAD", "EQUATION", "MPC", "TIE", "TRANSFORM", "COUPLING", "KINEMATIC",
@@ -46,7 +46,6 @@ PROCEDURES = {  # what a step may do instead of *STATIC
 }  # fmt: skip
 EMPTY = {"SYSTEM"}  # of no effect without an option
 MEANS = {  # what a card would have done
-    "HYPERELASTIC": "the material would be rubber",
     "GAP": "contact elements would act",
 }  # fmt: skip
 

@@ -7,21 +7,24 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ...core.errors import InvalidInput
-from ...mechanics.elements.elasticity import LinearElastic
-from ...mechanics.elements.orthotropic import OrthotropicElastic
 from .cards import Card, Row, number
 from .elastic import (
     Axes,
     Elastic,
+    Material,
     axes_of,
     elastic,
+    elastic_rubber,
     expansion,
     first_row,
     flow,
     read_orientations,
 )
 from .flat import Deck, Placed
+from .rubber import rubber
 from .scopes import Index, missing
+
+MATERIAL = ("ELASTIC", "HYPERELASTIC", "DENSITY", "EXPANSION", "PLASTIC")  # cards that are read
 
 
 @dataclass(frozen=True)
@@ -35,9 +38,9 @@ class Section:
     card: Card
     axes: Axes | None = None
 
-    def law(self, plane: str) -> LinearElastic | OrthotropicElastic:
-        """The material for a plane state, in the axes of the section."""
-        return self.material.law(plane, self.axes)
+    def law(self, plane: str, *, finite: bool) -> Material:
+        """The material for a plane state, in the axes of the section; of finite strains."""
+        return self.material.law(plane, self.axes, finite=finite)
 
 
 @dataclass
@@ -57,8 +60,8 @@ class Interaction:
     behaviour_card: Card | None = None
 
 
-def read_materials(cards: Sequence[Card]) -> dict[str, Elastic]:
-    """The materials by name."""
+def read_materials(cards: Sequence[Card], notes: list[str]) -> dict[str, Elastic]:
+    """The materials by name; notes: gets what is to be said of them."""
     found: dict[str, Elastic] = {}
     density: dict[str, float] = {}
     grows: dict[str, Any] = {}
@@ -69,7 +72,7 @@ def read_materials(cards: Sequence[Card]) -> dict[str, Elastic]:
             current = card
             if card.name("NAME") in found:
                 raise card.error(f"NAME: material {card.name('NAME')} is there already")
-        elif card.keyword in ("ELASTIC", "DENSITY", "EXPANSION", "PLASTIC"):
+        elif card.keyword in MATERIAL:
             if current is None:
                 raise card.error("stands before the first *MATERIAL")
             name = current.name("NAME")
@@ -79,6 +82,8 @@ def read_materials(cards: Sequence[Card]) -> dict[str, Elastic]:
                 grows[name] = expansion(card)
             elif card.keyword == "PLASTIC":
                 flows[name] = flow(card)
+            elif card.keyword == "HYPERELASTIC":
+                found[name] = elastic_rubber(rubber(card, notes), card)
             else:
                 found[name] = elastic(card)
     return {
@@ -88,9 +93,11 @@ def read_materials(cards: Sequence[Card]) -> dict[str, Elastic]:
     }
 
 
-def read_sections(deck: Deck, placed: Sequence[Placed]) -> list[Section]:
-    """Which elements are of which material."""
-    materials = read_materials([p.card for p in placed])
+def read_sections(
+    deck: Deck, placed: Sequence[Placed], notes: list[str]
+) -> list[Section]:
+    """Which elements are of which material; notes: gets what is to be said of those."""
+    materials = read_materials([p.card for p in placed], notes)
     turned, found = read_orientations([p.card for p in placed]), []
     for each in placed:
         card = each.card

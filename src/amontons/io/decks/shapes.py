@@ -81,6 +81,10 @@ def _planes() -> dict[str, Shape]:
                     Shape(cell, nodes, sides, plane, INCOMPATIBLE) if plane == "axisymmetric"
                     else Shape(cell, nodes, sides, plane, MODES, "incompatible")
                 )  # fmt: skip
+                if plane == "strain":
+                    found["CPE4IH"] = Shape(
+                        cell, nodes, sides, plane, "", "hybrid-incompatible"
+                    )
     return found
 
 
@@ -92,6 +96,7 @@ SHAPES = {
     "C3D15": Shape("wedge15", 15, WEDGE15, integration="reduced"),
     "C3D20": Shape("hex20", 20, HEX20),
     "C3D8H": Shape("hex", 8, HEX, integration="hybrid"),
+    "C3D8IH": Shape("hex", 8, HEX, integration="hybrid-incompatible"),
     "C3D8RH": Shape("hex", 8, HEX, note=REDUCED, integration="hybrid"),
     "C3D10H": Shape("tet10", 10, TET10, integration="hybrid"),
     "C3D20H": Shape("hex20", 20, HEX20, integration="hybrid"),

@@ -44,19 +44,21 @@ class _Picture(AxesImage):
 def draw_bodies(
     axes: Axes, scene: Scene, moved: Array, status: NDArray[np.int8] | None = None,
     *, room: float = 0.0, joints: Mapping[ContactStatus, str] = COLOURS,
-    length: str = "",
+    length: str = "", tints: Array | None = None,
 ) -> Image | None:  # fmt: skip
     """The bodies with their nodes where they have moved to, (nodes, dim).
 
     status (nc,): of the contacts, which colours slave surfaces and joints, these by their own
     colours; room: for what other pictures of a series need around the bodies at rest; length:
-    its unit.  In 3D the panel has no axes but a triad and a scale; the image is returned.
+    its unit; tints (nodes, 3): colours at the nodes, 0 to 1, instead of those of bodies and
+    slave surfaces.  In 3D the panel has no axes but a triad and a scale; the image is returned.
     """
     image = None
     if scene.camera.toward is None:
-        _draw_cells(axes, scene, moved)
+        _draw_cells(axes, scene, moved, tints)
     else:
-        image = _draw_surfaces(axes, scene, moved, status, room)
+        painted = status if tints is None else None
+        image = _draw_surfaces(axes, scene, moved, painted, room, tints)
         _draw_triad(axes, scene, image.window, length)
     if status is not None:
         _draw_joints(axes, scene, moved, status, joints, image)
@@ -77,36 +79,39 @@ def _box(scene: Scene, moved: Array, room: float) -> tuple[Array, Array]:
     return low - margin, high + margin
 
 
-def _draw_cells(axes: Axes, scene: Scene, moved: Array) -> None:
-    """Cells in the colour of their body."""
+def _draw_cells(axes: Axes, scene: Scene, moved: Array, tints: Array | None) -> None:
+    """Cells in the colour of their body, or in the mean one of their nodes."""
     many = sum(len(nodes) for nodes in scene.sides) > MANY_CELLS
     outline: Any = moved[scene.outline]
     for nodes in scene.sides:
         colour = STONE[int(scene.body_of[nodes[0, 0]]) % len(STONE)]
-        edges = {"edgecolors": colour if many else EDGE, "linewidths": 0.4}
+        faces: Any = colour if tints is None else tints[nodes].mean(axis=1)
+        edges = {"edgecolors": faces if many else EDGE, "linewidths": 0.4}
         cells: Any = moved[nodes]
-        axes.add_collection(PolyCollection(cells, facecolors=colour, **edges), autolim=False)
+        axes.add_collection(PolyCollection(cells, facecolors=faces, **edges), autolim=False)
     axes.add_collection(LineCollection(outline, colors=INK, linewidths=0.7), autolim=False)
 
 
 def _draw_surfaces(
-    axes: Axes, scene: Scene, moved: Array, status: NDArray[np.int8] | None, room: float
-) -> Image:
+    axes: Axes, scene: Scene, moved: Array, status: NDArray[np.int8] | None, room: float,
+    tints: Array | None,
+) -> Image:  # fmt: skip
     """The image of the surfaces, to one scale; it fills the panel."""
     place = axes.get_window_extent()
     shape = (max(int(round(place.height)), 2), max(int(round(place.width)), 2))
     low, high = _box(scene, moved, room)
     low[1] -= 1.5 * TRIAD * (high[1] - low[1])  # for the triad
     window = Window.around(low, high, shape)
-    tints = 255 * np.array([to_rgb(colour) for colour in STONE])
+    stones = np.array([to_rgb(colour) for colour in STONE])
+    if tints is None:
+        tints = stones[scene.body_of % len(STONE)]
     painted = None
     if status is not None:
         chosen = 255 * np.array([to_rgb(COLOURS[s]) for s in ContactStatus])
         painted = np.full((len(moved), 3), np.nan)
         has = scene.contact_of >= 0
         painted[has] = chosen[status[scene.contact_of[has]]]
-    image = render(scene.camera, moved, scene.sides, tints[scene.body_of % len(STONE)], painted,
-                   window)  # fmt: skip
+    image = render(scene.camera, moved, scene.sides, 255 * tints, painted, window)
     limits = (window.left, window.right, window.low, window.high)
     shown = _Picture(axes, extent=limits, origin="lower", interpolation="none")
     shown.set_data(image.colours)

@@ -39,7 +39,7 @@ def step_figure(
     length, so that all pictures of a film have one frame.
     """
     scene = model if isinstance(model, Scene) else Scene.of(model)
-    title = f"{_moment(frame, units)}, displacements × {magnify:g}"
+    title = f"{moment(frame, units)}, displacements × {magnify:g}"
     sheet = Sheet(7.6, 5.6, title=title, note=frame.stamp, rows=1)
     if scene.model.dimension == 2:
         axes = sheet.panel(0.85, 0.6, 6.5, 4.9)
@@ -47,7 +47,7 @@ def step_figure(
         axes = sheet.panel(0.1, 0.05, 7.4, 5.5)
     _draw_step(axes, scene, frame, magnify, room, units)
     labels = {s: f"{s.name.lower()}: {int((frame.status == s).sum())}" for s in ContactStatus}
-    _joint_legend(sheet, labels)
+    joint_legend(sheet, labels)
     return sheet.done()
 
 
@@ -68,15 +68,16 @@ def series_figure(
         counted = ", ".join(
             f"{n} {s.name.lower()}" for n, s in zip(shares, ContactStatus, strict=True)
         )
-        axes.set_title(f"{_moment(frame, units)}\n{counted}")
+        axes.set_title(f"{moment(frame, units)}\n{counted}")
         if k:
             axes.set_ylabel("")
         stamp_panel(axes, frame.stamp)
-    _joint_legend(sheet, {s: s.name.lower() for s in ContactStatus})
+    joint_legend(sheet, {s: s.name.lower() for s in ContactStatus})
     return sheet.done()
 
 
-def _moment(frame: Frame, units: Units) -> str:
+def moment(frame: Frame, units: Units) -> str:
+    """The time of a frame, in words."""
     return f"t = {frame.time:.4g} {units.time}".rstrip()
 
 
@@ -90,7 +91,8 @@ def _draw_step(
         axes.set(xlabel=with_unit("x", units.length), ylabel=with_unit("y", units.length))
 
 
-def _joint_legend(sheet: Sheet, labels: dict[ContactStatus, str]) -> None:
+def joint_legend(sheet: Sheet, labels: dict[ContactStatus, str]) -> None:
+    """Joints as they are drawn, with their labels."""
     handles = [
         Line2D([], [], color=JOINTS[s], linewidth=1.5 * WIDTHS[s], label=text)
         for s, text in labels.items()
@@ -117,23 +119,23 @@ def draw_film(
             paths.append(folder / f"{name}-{k:05d}.png")
             drawn = picture(figure)
             write_bytes(paths[-1], drawn)
-            images.append(_few_colours(drawn))
+            images.append(few_colours(drawn))
         if images:
             paths.append(folder / "film.gif")
-            write_bytes(paths[-1], _film(images))
+            write_bytes(paths[-1], film_of(images))
     return paths
 
 
-def _film(images: list[Image.Image]) -> bytes:
-    """The bytes of a GIF of them all."""
+def film_of(images: list[Image.Image], seconds: float = SECONDS) -> bytes:
+    """The bytes of a GIF of them all; seconds: of one."""
     film = BytesIO()
-    durations = [int(1e3 * SECONDS)] * (len(images) - 1) + [int(1e3 * LAST)]
+    durations = [round(1e3 * seconds)] * (len(images) - 1) + [int(1e3 * LAST)]
     images[0].save(film, format="gif", save_all=True, append_images=images[1:],
                    duration=durations, loop=0, optimize=True)  # fmt: skip
     return film.getvalue()
 
 
-def _few_colours(drawn: bytes) -> Image.Image:
+def few_colours(drawn: bytes, colours: int = 64) -> Image.Image:
     """A picture as a GIF wants it."""
     image = Image.open(BytesIO(drawn)).convert("RGB")
-    return image.quantize(colors=64, dither=Image.Dither.NONE)
+    return image.quantize(colors=colours, dither=Image.Dither.NONE)

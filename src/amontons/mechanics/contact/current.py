@@ -3,12 +3,16 @@
 Per contact, at position x with the normal n(x) and gap g(x) of its pair, lambda the force on
 the node in global axes, and s = x - x_before + drift the motion since the last step:
 
-    y = lambda - rho s,   z_N = lambda . n - rho g,   z_T = (I - n n^T) y                   (1)
-    law(lambda, x) = lambda - max(z_N, 0) n - P(z_T),   P: |.| <= mu max(z_N, 0) or a bound (2)
+    y = lambda - rho s,   z_N = lambda . n + c - rho (g + C lambda . n + o),
+    z_T = (I - n n^T) y                                                                     (1)
+    law(lambda, x) = lambda - (max(z_N, 0) - c) n - P(z_T),  P: |.| <= mu max(z_N, 0) or a  (2)
+                                                                bound
 
 which is zero exactly where g >= 0, lambda . n >= 0, one of them zero, and friction opposes the
 motion along the tangent plane at x: [AC], [LR] problem (P) with the other sign of lambda.
 Forces in global axes leave the choice of tangents free, so that (2) turns with the frame.
+c is a cohesion, C a compliance and o an offset of the law (`problem.law.changed`), zero else.
+Who meets nobody has no cohesion and no bound of his own.
 rho > 0 has the unit of force over length.  drift is (1 - gamma) V_T of [LR], else zero.
 
 Components that supports prescribe are left out: lambda and s count as zero there, the support
@@ -87,6 +91,22 @@ class ContactPoint:
         return self.meeting.normals
 
     @cached_property
+    def cohesion(self) -> Array:
+        """c, (nc,)."""
+        return np.where(self.meeting.met, self.contact.law.cohesion, 0.0)
+
+    @cached_property
+    def give(self) -> Array:
+        """C, (nc,), length per force."""
+        give = self.contact.law.give
+        return np.zeros(len(self.force)) if give is None else give[:, 0]
+
+    @cached_property
+    def _stiffness_left(self) -> Array:
+        """1 - rho C, (nc,): z_N by lambda . n."""
+        return 1.0 - self.contact.rho * self.give
+
+    @cached_property
     def y(self) -> Array:
         """lambda - rho s, (nc, d)."""
         return self.force - self.contact.rho[:, None] * self.motion
@@ -99,8 +119,11 @@ class ContactPoint:
     @cached_property
     def z_normal(self) -> Array:
         """z_N, (nc,): positive where closed; negative where nobody is met."""
-        along, apart = (self.n * self.force).sum(axis=1), self.contact.rho * self.meeting.gap
-        return np.where(self.meeting.met, along - apart, -np.abs(along) - np.abs(apart))
+        along = (self.n * self.force).sum(axis=1)
+        apart = self.meeting.gap + self.give * along + self.contact.law.offset
+        apart = self.contact.rho * apart
+        closed = along + self.cohesion - apart
+        return np.where(self.meeting.met, closed, -np.abs(along) - np.abs(apart))
 
     @cached_property
     def z_tangent(self) -> Array:
@@ -113,9 +136,9 @@ class ContactPoint:
         return self._bound(self.z_normal > 0)
 
     def _bound(self, closed: NDArray[np.bool_]) -> Array:
-        law, z = self.contact.law, np.where(closed, self.z_normal, 0.0)
+        law, z = self.contact.law.plain, np.where(closed, self.z_normal, 0.0)
         mu, bound = law.parameters.T
-        return np.where(law.given(z[:, None]), bound, mu * z)
+        return np.where(law.given(z[:, None]), bound, mu * z) * self.meeting.met
 
     @property
     def _without(self) -> NDArray[np.bool_]:
@@ -141,7 +164,7 @@ class ContactPoint:
         out = np.where(slide, np.where(self.along < 0, BACK, SLIP), STICK)
         closed = self.z_normal > 0
         out[self._without] = SLIP
-        alone = self.contact.law.kind == TRESCA
+        alone = (self.contact.law.kind == TRESCA) & self.meeting.met
         out[~closed & ~alone] = OPEN
         out[~closed & alone] += 4
         return out.astype(np.int8)
@@ -150,7 +173,7 @@ class ContactPoint:
         """(2), (nc, d), unit of force; or the selection functions of given pieces."""
         if pieces is not None:
             return self._selected(pieces)
-        normal = np.maximum(self.z_normal, 0.0)[:, None] * self.n
+        normal = (np.maximum(self.z_normal, 0.0) - self.cohesion)[:, None] * self.n
         length = np.linalg.norm(self.z_tangent, axis=1)
         scale = np.where(length > self.bound, self.bound / np.where(length > 0, length, 1), 1.0)
         return self.force - normal - scale[:, None] * self.z_tangent
@@ -158,7 +181,7 @@ class ContactPoint:
     def _selected(self, pieces: Pieces) -> Array:
         """(2) as if the given pieces were active."""
         closed, kind = (pieces > 0) & (pieces < 4), pieces % 4
-        normal = np.where(closed, self.z_normal, 0.0)[:, None] * self.n
+        normal = (np.where(closed, self.z_normal, 0.0) - self.cohesion)[:, None] * self.n
         bound = self._bound(closed)
         if self.n.shape[1] == 2:
             sign = np.select([kind == SLIP, kind == BACK], [1.0, -1.0], 0.0)
@@ -205,15 +228,16 @@ class ContactPoint:
         eye = np.eye(d)
         tangential = eye - n[:, :, None] * n[:, None, :]
         in_z, in_bound = self._friction(pieces)
-        law, z = self.contact.law, np.where(closed > 0, self.z_normal, 0.0)[:, None]
+        law, z = self.contact.law.plain, np.where(closed > 0, self.z_normal, 0.0)[:, None]
         slope = np.where(law.given(z), 0.0, law.parameters[:, MU])
         in_bound = in_bound * (slope * closed)[:, None]
         normal = closed[:, None] * n + in_bound  # of the force, per z_N
-        by_force = eye - normal[:, :, None] * n[:, None, :] - in_z @ tangential
+        pressed = self._stiffness_left[:, None, None] * normal[:, :, None]
+        by_force = eye - pressed * n[:, None, :] - in_z @ tangential
         # z_T by n at fixed y
         turned = -eye * self.y_normal[:, None, None] - n[:, :, None] * self.y[:, None, :]
-        by_normal = -normal[:, :, None] * self.force[:, None, :] - in_z @ turned
-        by_normal -= (closed * self.z_normal)[:, None, None] * eye
+        by_normal = -pressed * self.force[:, None, :] - in_z @ turned
+        by_normal -= (closed * self.z_normal - self.cohesion)[:, None, None] * eye
         if d == 2:
             by_normal -= self._turned_slip(pieces)
         by_gap = normal * self.contact.rho[:, None]

@@ -20,7 +20,16 @@ Nodes of which hardly anything faces the master, and those without a row, carry 
 their own: the others of their facets take their share, and B_ps > 0 at such a node s ([PW]).
 A node that does not meet is open, its gap the distance from the closest master node.
 
-Left out: facets of second order, and one surface against itself.
+Facets of second order have multipliers at their corners, psi dual to the functions of first
+order there; integrals are those over the facets through the corners ([PW]).  Bulges at the
+other nodes m, from the mean of corners c with parts w_mc, enter B as
+
+    B_pm = int psi_p N_m / D_p,    B_pc -> B_pc - w_mc B_pm,    of the master with -N_m.    (4)
+
+The force lambda_p then acts at p and at these; what a body needs of it at the corner is
+sum_j C_pj (f_int - f)_j, C_pp = 1 and C_pm = w_mp, as moving p without a bulge takes m along.
+
+Left out: one surface against itself.
 
 [PL] M. Puso, T. Laursen, CMAME 193 (2004) 601-629 and 4891-4913 (friction).
 [PSG] A. Popp, A. Seitz, M. Gee, W. Wall, "Improved robustness and consistency of 3D contact
@@ -54,12 +63,14 @@ class MortarPair:
     """Slave nodes (nc,) of the model, those of the slave facets that have a row, and a master.
 
     free (nc, d): components of the slaves without a support; normals lie in these.
+    names: of both surfaces, for messages.
     """
 
     slaves: Index
     slave: Skin
     master: Skin
     free: Mask
+    names: tuple[str, str] = ("slave", "master")
 
     def at(self, positions: Array) -> MortarMeeting:
         """Where they meet at the positions (nodes, d) of all nodes of the model."""
@@ -70,18 +81,23 @@ class MortarPair:
 class _Shared:
     """k pairs of facets, slave and master (k,), on `facets` (f,) of the slave; of (k,): which.
 
-    cross (k, a, b); mass, psi (f, a, a): A of `current_slopes`; kept (f, a): slots that carry
-    force.
+    own (f, a, a + e), cross (k, a, b + h): integrals with corners and middles of slave and
+    master; psi (f, a, a): A of `current_slopes`; kept (f, a): slots that carry force.
     """
 
     slave: Index
     master: Index
     facets: Index
     of: Index
-    mass: Array
+    own: Array
     cross: Array
     psi: Array
     kept: Mask
+
+    @property
+    def mass(self) -> Array:
+        """int phi phi, (f, a, a)."""
+        return self.own[:, :, : self.own.shape[1]]
 
     @property
     def weights(self) -> Array:
@@ -135,14 +151,14 @@ class MortarMeeting:
         """What the facets share."""
         slave, master, x = self.pair.slave, self.pair.master, self.x
         of, other = candidates(slave, master, x)
-        pairs = self.facet_pairs(of, other)
-        p, q = pairs.slave, pairs.master
-        mass, cross = pairs.integrals()
-        area = mass.sum(axis=(1, 2))
+        own, cross = self.facet_pairs(of, other).integrals()
+        a = own.shape[1]
+        p, q = slave.values(x)[of], master.values(x)[other]
+        area = own[:, :, :a].sum(axis=(1, 2))
         vectors = slave.areas(x)
         whole = np.linalg.norm(vectors, axis=1)
         between = np.einsum("kb,kbc->kc", cross.sum(axis=1), q)
-        between -= np.einsum("ka,kac->kc", mass.sum(axis=1), p)
+        between -= np.einsum("ka,kac->kc", own.sum(axis=1), p)
         gap = np.einsum("kc,kc->k", between, vectors[of])
         gap /= np.where(area > 0, area, 1.0) * whole[of]
         there = np.flatnonzero(area > 0)
@@ -151,17 +167,16 @@ class MortarMeeting:
         there = there[(reached > SLIVER * whole)[of[there]]]
         of, other, cross = of[there], other[there], cross[there]
         facets, numbers = np.unique(of, return_inverse=True)
-        total = np.zeros((len(facets), *mass.shape[1:]))
-        np.add.at(total, numbers, mass[there])
-        kept = self._carrying(facets, total, whole)
-        psi = dual_functions(total, kept, slave.real[facets])
+        total = np.zeros((len(facets), *own.shape[1:]))
+        np.add.at(total, numbers, own[there])
+        mass = total[:, :, :a]
+        kept = self._carrying(facets, mass, whole)
+        psi = dual_functions(mass, kept, slave.real[facets])
         return _Shared(of, other, facets, numbers, total, cross, psi, kept)
 
     def facet_pairs(self, of: Index, other: Index) -> FacetPairs:
         """Facets of the slave (k,) and of the master (k,), where they are."""
-        slave, master, x = self.pair.slave, self.pair.master, self.x
-        return FacetPairs(x[slave.nodes[of]], slave.corners[of],
-                          x[master.nodes[other]], master.corners[other])  # fmt: skip
+        return FacetPairs.of(self.pair.slave, of, self.pair.master, other, self.x)
 
     def _carrying(self, facets: Index, mass: Array, whole: Array) -> Mask:
         """Slots (f, a) of facets (f,) that carry force; whole: areas of all slave facets."""
@@ -208,15 +223,39 @@ class MortarMeeting:
         own = sparse.csr_array((np.ones(nc), (np.arange(nc), pair.slaves)), shape=shape)
         row = self.rows
         left = parts.psi @ parts.mass * ~parts.kept[:, None, :]
-        here = np.broadcast_to(pair.slave.nodes[parts.facets][:, None], left.shape)
-        beside = summed(left, np.broadcast_to(row[:, :, None], left.shape), here, shape)
         onto = parts.psi[parts.of] @ parts.cross
-        there = np.broadcast_to(pair.master.nodes[parts.master][:, None], onto.shape)
-        across = summed(
-            onto, np.broadcast_to(row[parts.of][:, :, None], onto.shape), there, shape
-        )
+        a, b = left.shape[1], pair.master.nodes.shape[1]
+        beside = _onto(left, row, pair.slave.nodes[parts.facets], shape)
+        across = _onto(onto[..., :b], row[parts.of], pair.master.nodes[parts.master], shape)
         scale = sparse.diags_array(self.by_weight)
-        return sparse.csr_array(own + scale @ (beside - across))
+        out = own + scale @ (beside - across)
+        if self.has_bulges:
+            raised = parts.psi @ parts.own[:, :, a:]
+            bent = _onto(raised, row, pair.slave.middles[parts.facets], shape)
+            middles = pair.master.middles[parts.master]
+            bent -= _onto(onto[..., b:], row[parts.of], middles, shape)
+            out += scale @ bent @ self.bulges
+        return sparse.csr_array(out)
+
+    @property
+    def has_bulges(self) -> bool:
+        """True with facets of second order."""
+        return any(skin.middles.shape[1] for skin in (self.pair.slave, self.pair.master))
+
+    @cached_property
+    def bulges(self) -> sparse.csr_array:
+        """Bulges of middles of both sides by positions, (nodes, nodes)."""
+        n = len(self.x)
+        return sparse.csr_array(self.pair.slave.bulges(n) + self.pair.master.bulges(n))
+
+    @cached_property
+    def passed(self) -> Array:
+        """How much of lambda_p all nodes of the slave side get, (nc,): more beside an edge.
+
+        There nodes without a force of their own leave their share to others.
+        """
+        onto_master = self.averages[:, self.pair.master.every].sum(axis=1)
+        return np.where(self.met, -np.asarray(onto_master).ravel(), 1.0)
 
     @property
     def met_averages(self) -> sparse.csr_array:
@@ -261,4 +300,12 @@ class MortarMeeting:
     def slopes(self) -> MortarSlopes:
         """Derivatives by the positions of all nodes."""
         return MortarSlopes(self)
+
+
+def _onto(
+    values: Array, rows: Index, nodes: Index, shape: tuple[int, int]
+) -> sparse.csr_array:
+    """Sum of blocks (k, a, b) in rows (k, a), < 0 for none, at nodes (k, b)."""
+    return summed(values, np.broadcast_to(rows[:, :, None], values.shape),
+                  np.broadcast_to(nodes[:, None], values.shape), shape)  # fmt: skip
 

@@ -59,6 +59,11 @@ class Meeting:
         return np.ones(len(self.slaves), dtype=bool)
 
     @property
+    def passed(self) -> Array:
+        """Parts of the forces that the slave's side gets, (nc,): all."""
+        return np.ones(len(self.slaves))
+
+    @property
     def averages(self) -> sparse.csr_array:
         """B, (nc, nodes)."""
         nc = len(self.slaves)
@@ -113,6 +118,11 @@ class Meetings:
     def met(self) -> Mask:
         """Contacts that meet their other side, (nc,); the others are open."""
         return np.concatenate([part.met for part in self.parts])
+
+    @cached_property
+    def passed(self) -> Array:
+        """All forces on the slave's side over lambda, (nc,)."""
+        return np.concatenate([part.passed for part in self.parts])
 
     @cached_property
     def averages(self) -> sparse.csr_array:

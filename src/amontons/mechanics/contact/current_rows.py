@@ -9,12 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..meshes.facets import corner_facets
 from ..meshes.mesh import Mesh
+from ..meshes.surfaces import nodal_weights
 from .current_mortar import MortarPair
 from .facing import Skin
 from .geometry import frames
 from .mortar import coupled_columns
-from .nodal import ContactRows, check_exterior, contact_nodes
+from .nodal import ContactRows, check_exterior
 from .overlap import check_different
 
 Array = NDArray[np.float64]
@@ -33,7 +35,10 @@ def current_contact(
     check_exterior(slave, surface)
     check_exterior(master, master_surface, "master")
     check_different(slave, surface, master, master_surface)
-    nodes, weights = contact_nodes(slave, surface)
+    corners = tuple(corner_facets(block) for block in slave.surface(surface))
+    weights = nodal_weights(slave.points, corners)
+    nodes = np.flatnonzero(weights > 0)
+    weights = weights[nodes]
     joined = slave is master
     points = slave.points if joined else np.concatenate([slave.points, master.points])
     over = Skin.of(slave.surface(surface), 0)

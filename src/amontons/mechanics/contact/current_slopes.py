@@ -1,9 +1,10 @@
 """Derivatives of the averages between two deforming bodies by the positions of all nodes.
 
-With mass and cross of `facet_integrals` on a slave facet, W_p = sum_t mass_pt of nodes that
-carry force and psi = A phi = W Q phi the dual functions, all follows from
+With own = [mass, integrals with middles] and cross of `facet_integrals` on a slave facet,
+W_p = sum_t mass_pt of nodes that carry force and psi = A phi = W Q phi the dual functions, all
+follows from
 
-    d(A h) = dW Q h - A dmass Q h + A dh       for h linear in mass and cross.              (1)
+    d(A h) = dW Q h - A dmass Q h + A dh       for h linear in own and cross.               (1)
 
 Notation is that of `current_mortar`.
 """
@@ -64,16 +65,17 @@ class MortarSlopes:
 
     @cached_property
     def _slopes(self) -> tuple[sparse.csr_array, sparse.csr_array]:
-        """Derivatives of mass (f a a, nodes d) and cross (k a b, nodes d)."""
+        """Derivatives of own (f a (a + e), nodes d) and cross (k a (b + h), nodes d)."""
         parts, pair = self.at.shared, self.at.pair
         slave, master = pair.slave.nodes[parts.slave], pair.master.nodes[parts.master]
-        mass, cross = self.at.facet_pairs(parts.slave, parts.master).slopes()
-        (k, a), b = slave.shape, master.shape[1]
+        own, cross = self.at.facet_pairs(parts.slave, parts.master).slopes()
+        k = len(slave)
         dofs = _dofs(np.concatenate([slave, master], axis=1), self.at.x.shape[1])
         out = []
-        for values, group, inner, count in (
-            (mass, parts.of, a * a, len(parts.facets)), (cross, np.arange(k), a * b, k),
+        for values, group, count in (
+            (own, parts.of, len(parts.facets)), (cross, np.arange(k), k),
         ):  # fmt: skip
+            inner = values.shape[1] * values.shape[2]
             values = values.reshape(k, inner, dofs.shape[1])
             rows = np.broadcast_to(
                 (group[:, None] * inner + np.arange(inner))[:, :, None], values.shape
@@ -86,23 +88,26 @@ class MortarSlopes:
     def distances(self) -> sparse.csr_array:
         """dG/dx, (nc d, nodes d), of nodes that meet; zero for the others."""
         parts, pair, d = self.at.shared, self.at.pair, self.at.x.shape[1]
-        at = self.at.x[pair.slave.nodes[parts.facets]]
-        there = self.at.x[pair.master.nodes[parts.master]]
-        h = parts.mass @ at
+        at = pair.slave.values(self.at.x)[parts.facets]
+        there = pair.master.values(self.at.x)[parts.master]
+        h = parts.own @ at
         np.subtract.at(h, parts.of, parts.cross @ there)
         kept, psi, row = parts.kept, parts.psi, self.at.rows
         y = np.where(kept[:, :, None], parts.inverse @ h, 0.0)
         scale = np.where(kept, self.at.by_weight[row], 0.0)
-        own = (y - np.where(kept[:, :, None], self.at.distances[row], 0.0)) * scale[:, :, None]
+        apart = y - np.where(kept[:, :, None], self.at.distances[row], 0.0)
+        apart = apart * scale[:, :, None]
         a = psi.shape[1]
-        # (f, p, c, r, t): by mass_rt
-        by_mass = np.einsum("fpr,ftc->fpcrt", psi * scale[:, :, None], at - y)
-        by_mass += np.einsum("fpc,pr,t->fpcrt", own, np.eye(a), np.ones(a))
+        # (f, p, c, r, t): by own_rt, where the first a of t are mass_rt
+        beside = at.copy()
+        beside[:, :a] -= y
+        by_own = np.einsum("fpr,ftc->fpcrt", psi * scale[:, :, None], beside)
+        by_own[..., :a] += np.einsum("fpc,pr,t->fpcrt", apart, np.eye(a), np.ones(a))
         by_cross = -np.einsum("kpr,kbc->kpcrb", (psi * scale[:, :, None])[parts.of], there)
-        mass, cross = self._slopes
-        nc, facets, numbers = len(pair.slaves), np.arange(len(own)), np.arange(len(there))
+        own, cross = self._slopes
+        nc, facets, numbers = len(pair.slaves), np.arange(len(y)), np.arange(len(there))
         whole = sparse.kron(self.at.met_averages, sparse.eye_array(d))
-        whole = whole + _placed(by_mass, row, facets, nc, mass.shape[0]) @ mass
+        whole = whole + _placed(by_own, row, facets, nc, own.shape[0]) @ own
         whole = whole + _placed(by_cross, row[parts.of], numbers, nc, cross.shape[0]) @ cross
         return sparse.csr_array(whole)
 
@@ -111,31 +116,48 @@ class MortarSlopes:
 
         force (nc, d): lambda, held.
         """
-        parts, pair, n = self.at.shared, self.at.pair, len(self.at.x)
-        kept, psi, row = parts.kept, parts.psi, self.at.rows
-        a, eye = psi.shape[1], np.eye(psi.shape[1])
+        parts, slave, master = self.at.shared, self.at.pair.slave, self.at.pair.master
         scaled = force * self.at.by_weight[:, None]
-        w = np.where(kept[:, :, None], scaled[row], 0.0)  # (f, p, c)
-        through = np.einsum("fpr,fpc->frc", psi, w)
-        # the other nodes of the slave: (f, s, c, r, t)
-        inner = np.where(kept[:, :, None], parts.inverse @ parts.mass, 0.0)
-        here = np.einsum("frc,frs,t->fscrt", w, inner, np.ones(a))
-        here += np.einsum("frc,fts->fscrt", through, eye - inner)
-        left = np.where(~kept & pair.slave.real[parts.facets],
-                        pair.slave.nodes[parts.facets], -1)  # fmt: skip
-        # master nodes: (k, b, c, r, t) by mass, (k, b, c, r, b') by cross
-        outer = np.where(kept[parts.of][:, :, None], parts.inverse[parts.of] @ parts.cross, 0.0)
-        there = -np.einsum("krc,krb,t->kbcrt", w[parts.of], outer, np.ones(a))
-        there += np.einsum("krc,ktb->kbcrt", through[parts.of], outer)
-        b = outer.shape[2]
-        direct = -np.einsum("krc,be->kbcre", through[parts.of], np.eye(b))
-        mass, cross = self._slopes
+        by_own, others, by_cross = self._by_integrals(scaled)
+        own, cross = self._slopes
         facets, numbers = np.arange(len(parts.facets)), np.arange(len(parts.of))
-        nodes = pair.master.nodes[parts.master]
-        out = _placed(here, left, facets, n, mass.shape[0]) @ mass
-        out = out + _placed(there, nodes, parts.of, n, mass.shape[0]) @ mass
-        out = out + _placed(direct, nodes, numbers, n, cross.shape[0]) @ cross
+        a, b, n = slave.nodes.shape[1], master.nodes.shape[1], len(self.at.x)
+
+        def onto(mine: Index, its: slice, theirs: Index, their: slice) -> sparse.csr_array:
+            """At nodes mine of the slave's facets, and theirs of the master's."""
+            out = _placed(by_own[:, its], mine, facets, n, own.shape[0])
+            out += _placed(others[:, their], theirs, parts.of, n, own.shape[0])
+            across = _placed(by_cross[:, their], theirs, numbers, n, cross.shape[0])
+            return sparse.csr_array(out @ own + across @ cross)
+
+        left = np.where(~parts.kept & slave.real[parts.facets], slave.nodes[parts.facets], -1)
+        out = onto(left, slice(a), master.nodes[parts.master], slice(b))
+        if self.at.has_bulges:
+            bent = onto(slave.middles[parts.facets], slice(a, None),
+                        master.middles[parts.master], slice(b, None))  # fmt: skip
+            out = out + sparse.kron(self.at.bulges.T, sparse.eye_array(force.shape[1])) @ bent
         return sparse.csr_array(out - self._by_weights(scaled))
+
+    def _by_integrals(self, scaled: Array) -> tuple[Array, Array, Array]:
+        """Derivatives of sum_p D_p B_pj lambda_p / D_p by own and cross; scaled: lambda / D.
+
+        At corners and middles of the slave by own, (f, s, c, r, t), of the master by own,
+        (k, b, c, r, t), and by cross, (k, b, c, r, b').
+        """
+        parts = self.at.shared
+        kept, psi = parts.kept, parts.psi
+        a, width, across = psi.shape[1], parts.own.shape[2], parts.cross.shape[2]
+        w = np.where(kept[:, :, None], scaled[self.at.rows], 0.0)  # (f, p, c)
+        through = np.einsum("fpr,fpc->frc", psi, w)
+        inner = np.where(kept[:, :, None], parts.inverse @ parts.own, 0.0)
+        here = np.einsum("frc,ts->fscrt", through, np.eye(width))
+        here[..., :a] += np.einsum("frc,frs,t->fscrt", w, inner, np.ones(a))
+        here[..., :a] -= np.einsum("frc,fts->fscrt", through, inner)
+        outer = np.where(kept[parts.of][:, :, None], parts.inverse[parts.of] @ parts.cross, 0.0)
+        there = np.einsum("krc,ktb->kbcrt", through[parts.of], outer)
+        there -= np.einsum("krc,krb,t->kbcrt", w[parts.of], outer, np.ones(a))
+        there = np.pad(there, [(0, 0)] * 4 + [(0, width - a)])
+        return here, there, -np.einsum("krc,be->kbcre", through[parts.of], np.eye(across))
 
     def _by_weights(self, scaled: Array) -> sparse.csr_array:
         """sum_p B_pj lambda_p dD_p / D_p, (nodes d, nodes d); scaled (nc, d): lambda / D."""
@@ -144,14 +166,14 @@ class MortarSlopes:
         a = row.shape[1]
         ones = np.broadcast_to(np.ones(a), (*row.shape, a))
         rows = np.broadcast_to(row[:, :, None], ones.shape)
-        columns = np.arange(row.size * a).reshape(ones.shape)
-        mass = self._slopes[0]
-        weights = summed(ones, rows, columns, (nc, mass.shape[0])) @ mass
-        off = self.at.met_averages.tocoo()
+        slots = np.arange(self.at.shared.own.size).reshape(self.at.shared.own.shape)
+        own = self._slopes[0]
+        weights = summed(ones, rows, slots[:, :, :a], (nc, own.shape[0])) @ own
+        kept = (np.asarray(self.at.met, dtype=float), (np.arange(nc), self.at.pair.slaves))
+        off = self.at.met_averages - sparse.coo_array(kept, shape=self.at.averages.shape)
+        off = off.tocoo()
         p, j = (np.asarray(k, dtype=np.int64) for k in off.coords)
-        away = j != self.at.pair.slaves[p]
-        p, j, value = p[away], j[away], off.data[away]
-        entries = value[:, None] * scaled[p]
+        entries = off.data[:, None] * scaled[p]
         rows = j[:, None] * d + np.arange(d)
         columns = np.broadcast_to(p[:, None], entries.shape)
         onto = summed(entries, rows, columns, (self.at.x.size, nc))

@@ -1,13 +1,15 @@
 """Integrals over what two facets share where they are now, with exact derivatives.
 
 The master facet is projected along the normal of the slave facet onto it ([PL]); with phi, N
-the shape functions of both and the integrals over the part they share, on the slave facet,
+functions of first order of both and the integrals over the part they share, on the slave facet,
 
     mass_rt = int phi_r phi_t,    cross_rb = int phi_r N_b.                                (1)
 
-They depend on the nodes of the two facets alone.  Derivatives are those of a complex step:
-the real parts decide where parts end, imaginary ones of 1e-100 carry the derivative through,
-exact to rounding as nothing is subtracted.
+Facets of second order are projected as those on their corners are; behind phi and N stand then
+the functions of their other nodes, which move the surface by the bulges of `facing`.
+The integrals depend on the corners of the two facets alone.  Derivatives are those of a complex
+step: the real parts decide where parts end, imaginary ones of 1e-100 carry the derivative
+through, exact to rounding as nothing is subtracted.
 
 [PL] M. Puso, T. Laursen, "A mortar segment-to-segment contact method for large deformation
 solid mechanics", Comput. Methods Appl. Mech. Engrg. 193 (2004) 601-629.
@@ -21,6 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .facing import Skin
 from .plane_integrals import plane_integrals, rule
 
 Array = NDArray[np.float64]
@@ -28,11 +31,16 @@ Index = NDArray[np.int64]
 Values = NDArray[Any]  # real, or complex in the search for derivatives
 STEP = 1e-100
 BESIDE = 0.5 / np.sqrt(3.0)
-GAUSS = ((0.5 - BESIDE, 0.5), (0.5 + BESIDE, 0.5))  # exact, as (1) is quadratic
+GAUSS = ((0.5 - BESIDE, 0.5), (0.5 + BESIDE, 0.5))  # exact, as (1) is cubic at most
 
 
-def line_integrals(slave: Values, master: Values) -> tuple[Values, Values]:
-    """(1) of lines with ends (..., 2, 2): mass and cross, each (..., 2, 2)."""
+def line_integrals(
+    slave: Values, master: Values, bent: bool = False, facing: bool = False
+) -> tuple[Values, Values]:
+    """(1) of lines with ends (..., 2, 2): mass and cross, each (..., 2, 2).
+
+    bent, facing: slave and master have a middle, and (..., 2, 3) with it.
+    """
     edge = slave[..., 1, :] - slave[..., 0, :]
     square = (edge * edge).sum(axis=-1)
     from_start = master - slave[..., :1, :]
@@ -44,40 +52,56 @@ def line_integrals(slave: Values, master: Values) -> tuple[Values, Values]:
     high = np.where(high.real < 1, np.where(high.real > 0, high, 0), 1)
     across = np.where(first.real == second.real, 1, second - first)
     length = np.sqrt(square) * (high - low)
-    mass = np.zeros(slave.shape, dtype=slave.dtype)
-    cross = np.zeros(slave.shape, dtype=slave.dtype)
+    mass = np.zeros((*slave.shape[:-1], 2 + bent), dtype=slave.dtype)
+    cross = np.zeros((*slave.shape[:-1], 2 + facing), dtype=slave.dtype)
     for place, weight in GAUSS:
         at = low + place * (high - low)
         opposite = (at - first) / across
-        phi = np.stack([1 - at, at], axis=-1)
-        shape = np.stack([1 - opposite, opposite], axis=-1)
+        own, shape = _on_line(at, bent), _on_line(opposite, facing)
         area = (weight * length)[..., None, None]
-        mass += area * phi[..., :, None] * phi[..., None, :]
-        cross += area * phi[..., :, None] * shape[..., None, :]
+        mass += area * own[..., :2, None] * own[..., None, :]
+        cross += area * own[..., :2, None] * shape[..., None, :]
     return mass, cross
+
+
+def _on_line(at: Values, bent: bool) -> Values:
+    """Functions of a line at places (...) between its ends, (..., 2) or (..., 3)."""
+    middle = [4 * at * (1 - at)] if bent else []
+    return np.stack([1 - at, at, *middle], axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
 class FacetPairs:
-    """k pairs of facets: nodes at slave (k, a, d), master (k, b, d), padded by the last.
+    """k pairs of facets: corners at slave (k, a, d), master (k, b, d), padded by the last.
 
-    corners, facing (k,): how many of them are real.
+    corners, facing (k,): how many of them are real; bent, opposite (k,): nodes beside them, in
+    tables of widths (e, h).
     """
 
     slave: Array
     corners: Index
     master: Array
     facing: Index
+    bent: Index
+    opposite: Index
+    widths: tuple[int, int]
+
+    @classmethod
+    def of(cls, slave: Skin, of: Index, master: Skin, other: Index, x: Array) -> FacetPairs:
+        """Facets (k,) of both at positions x (nodes, d)."""
+        return cls(x[slave.nodes[of]], slave.corners[of], x[master.nodes[other]],
+                   master.corners[other], slave.bent[of], master.bent[other],
+                   (slave.middles.shape[1], master.middles.shape[1]))  # fmt: skip
 
     def integrals(self) -> tuple[Array, Array]:
-        """mass (k, a, a) and cross (k, a, b)."""
+        """mass (k, a, a + e) and cross (k, a, b + h)."""
         if self.slave.shape[2] == 2:
-            return line_integrals(self.slave, self.master)
+            return self._on_lines(self.slave, self.master)
         mass, cross = self._in_space(1, 0.0)
         return mass[:, 0], cross[:, 0]
 
     def slopes(self) -> tuple[Array, Array]:
-        """Their derivatives by all nodes, (k, a, a, (a + b) d) and (k, a, b, (a + b) d)."""
+        """Their derivatives by all corners, (k, a, a + e, (a + b) d) and (k, a, b + h, ...)."""
         (k, a, d), b = self.slave.shape, self.master.shape[1]
         ways = (a + b) * d
         if d == 3:
@@ -86,13 +110,23 @@ class FacetPairs:
         both = np.concatenate([self.slave, self.master], axis=1).reshape(k, ways)
         moved = both[:, None, :] + 1j * STEP * np.eye(ways)
         moved = moved.reshape(k, ways, a + b, d)
-        found = line_integrals(moved[:, :, :a], moved[:, :, a:])
+        found = self._on_lines(moved[:, :, :a], moved[:, :, a:])
         mass, cross = (np.moveaxis(part.imag, 1, -1) / STEP for part in found)
         return mass, cross
 
     def _in_space(self, ways: int, step: float) -> tuple[Array, Array]:
         (k, a, _), b = self.slave.shape, self.master.shape[1]
-        mass, cross = np.zeros((k, ways, a, a)), np.zeros((k, ways, a, b))
-        plane_integrals(self.slave, self.corners, self.master, self.facing, rule(), step,
+        e, h = self.widths
+        mass, cross = np.zeros((k, ways, a, a + e)), np.zeros((k, ways, a, b + h))
+        numbers = np.stack([self.corners, self.facing, self.bent, self.opposite], axis=1)
+        plane_integrals(self.slave, self.master, numbers, rule(second=e + h > 0), step,
                         mass, cross)  # fmt: skip
+        return mass, cross
+
+    def _on_lines(self, slave: Values, master: Values) -> tuple[Values, Values]:
+        """`line_integrals`; of lines without a middle nothing at it."""
+        e, h = self.widths
+        mass, cross = line_integrals(slave, master, e > 0, h > 0)
+        for found, bent in ((mass, self.bent), (cross, self.opposite)):
+            found[bent == 0, ..., 2:] = 0.0
         return mass, cross

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
-from ..meshes.facets import Facets
+from ..meshes.cells import CELLS
+from ..meshes.facets import Facets, corner_facets
 from .segments import feet
 
 Array = NDArray[np.float64]
@@ -20,22 +23,53 @@ AWAY = -0.3  # cosine to the mean normal below which a facet closes a surface ar
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """Facets of first order in one table: nodes (f, a), padded by the last; corners (f,)."""
+    """Facets in one table: nodes (f, a) at corners, padded by the last; corners (f,).
+
+    Facets of second order have `bent` (f,) nodes beside them, middles (f, e), padded by the
+    first corner, with parts (f, e, a) of the corners that each lies between.  The surface is
+    that through the corners, and at every middle it is moved by the bulge: from the mean of
+    its corners to the node.
+    """
 
     nodes: Index
     corners: Index
+    middles: Index
+    parts: Array
+    bent: Index
 
     @classmethod
     def of(cls, facets: tuple[Facets, ...], offset: int) -> Skin:
         """The facets of a body whose nodes begin at `offset` in the model."""
-        parts = [block.nodes + offset for block in facets if len(block.nodes)]
-        width = max(part.shape[1] for part in parts)
+        blocks = [block for block in facets if len(block.nodes)]
+        firsts = [corner_facets(block).nodes + offset for block in blocks]
+        rests = [
+            block.nodes[:, first.shape[1] :] + offset
+            for block, first in zip(blocks, firsts, strict=True)
+        ]
+        width = max(part.shape[1] for part in firsts)
+        room = max(part.shape[1] for part in rests)
         padded = [
             np.concatenate([p, np.repeat(p[:, -1:], width - p.shape[1], axis=1)], axis=1)
-            for p in parts
+            for p in firsts
         ]
-        corners = [np.full(len(p), p.shape[1], dtype=np.int64) for p in parts]
-        return cls(np.concatenate(padded).astype(np.int64), np.concatenate(corners))
+        beside = [
+            np.concatenate([p, np.repeat(c[:, :1], room - p.shape[1], axis=1)], axis=1)
+            for p, c in zip(rests, firsts, strict=True)
+        ]
+        parts = []
+        for block in blocks:
+            part = np.zeros((room, width))
+            part[:, 0] = 1.0  # of the padding
+            for k, parents in enumerate(CELLS[block.kind].parents):
+                part[k] = 0.0
+                part[k, list(parents)] = 1 / len(parents)
+            parts.append(np.broadcast_to(part, (len(block.nodes), room, width)))
+        corners, bent = (
+            np.concatenate([np.full(len(p), p.shape[1], dtype=np.int64) for p in every])
+            for every in (firsts, rests)
+        )
+        nodes, middles = (np.concatenate(p).astype(np.int64) for p in (padded, beside))
+        return cls(nodes, corners, middles, np.concatenate(parts), bent)
 
     @property
     def real(self) -> Mask:
@@ -44,8 +78,37 @@ class Skin:
 
     @property
     def all(self) -> Index:
-        """Its nodes, ascending."""
+        """Its nodes at corners, ascending."""
         return np.unique(self.nodes)
+
+    @cached_property
+    def every(self) -> Index:
+        """All its nodes, ascending."""
+        return np.unique(np.concatenate([self.nodes.ravel(), self.middles.ravel()]))
+
+    @cached_property
+    def means(self) -> tuple[Index, Index, Array]:
+        """Middle, corner it lies between, and part of it, (k,) each, every pair once."""
+        real = np.arange(self.middles.shape[1]) < self.bent[:, None]
+        held = (self.parts > 0) & real[:, :, None]
+        f, m, c = np.nonzero(held)
+        pairs = np.stack([self.middles[f, m], self.nodes[f, c]])
+        pairs, first = np.unique(pairs, axis=1, return_index=True)
+        return pairs[0], pairs[1], self.parts[f, m, c][first]
+
+    def bulges(self, n: int) -> sparse.csr_array:
+        """Bulge of every middle of positions of n nodes, (n, n), without rows of others."""
+        middle, corner, part = self.means
+        own = np.unique(middle)
+        entries = np.concatenate([np.ones(len(own)), -part])
+        rows = np.concatenate([own, middle])
+        columns = np.concatenate([own, corner])
+        return sparse.coo_array((entries, (rows, columns)), shape=(n, n)).tocsr()
+
+    def values(self, x: Array) -> Array:
+        """Positions of corners and bulges of middles at positions x, (f, a + e, d)."""
+        corners = x[self.nodes]
+        return np.concatenate([corners, x[self.middles] - self.parts @ corners], axis=1)
 
     def areas(self, x: Array) -> Array:
         """Outward normals times area at positions x (nodes, d), (f, d)."""

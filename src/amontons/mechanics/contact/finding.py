@@ -182,7 +182,7 @@ def meetings_within(skin: Skin, part: int, reach: Reach, allowed: Allowed) -> li
     rows = skin.in_order(np.flatnonzero(skin.part == part))
     side = Surface.of(skin.mesh.points, skin.facets(rows), "outside",
                       axisymmetric=skin.mesh.axisymmetric)  # fmt: skip
-    found = segments(side, side, joined=True)
+    found = segments(side, side, joined=True, within=reach.of(side.radius))
     counts = _counts(side, side, found, reach) & ~_through(side, found, distances(side, found))
     counts &= allowed(rows[found.slave], rows[found.master])
     found = nearest(side, found.at(counts))

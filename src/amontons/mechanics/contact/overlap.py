@@ -40,7 +40,8 @@ def check_different(slave: Mesh, surface: str, master: Mesh, master_surface: str
     if both := len(one & other):
         raise InvalidInput(
             f"{both} facets are on both sides, a surface can not be its own master; name the "
-            "two sides as separate surfaces", ("master",),
+            "two sides as separate surfaces, or let find_contacts(..., itself=True) find them "
+            "where they lie opposite", ("master",),
             f"contact of {surface!r} with {master_surface!r}",
         )  # fmt: skip
 

@@ -19,11 +19,15 @@ ROOM = 10  # corners of what two quadrilaterals share, and two to spare
 NEWTON = 20  # steps to the reference point of a quadrilateral
 AGAIN = 2  # steps after the last, for the imaginary parts
 ENOUGH = 1e-14
+ON_LINE = 1e-10  # distance of a corner from the line of a side, over its length, that is none
 
 
-def rule() -> np.ndarray:
-    """Points and weights (9, 3) on the unit triangle, exact for products of shape functions."""
-    at, weight = triangle_rule(3)
+def rule(*, second: bool) -> np.ndarray:
+    """Points and weights (q, 3) on the unit triangle, exact for products of shape functions.
+
+    second: of first with second order.
+    """
+    at, weight = triangle_rule(4 if second else 3)
     return np.concatenate([at, weight[:, None]], axis=1)
 
 
@@ -67,8 +71,13 @@ def _flat(x, n, origin, axes, out):
 
 @njit(cache=True, error_model="numpy")
 def _cut(corners, count, start, end, out):
-    """What lies to the left of start -> end into out; how many corners."""
+    """What lies to the left of start -> end into out; how many corners.
+
+    Corners that are on the line up to rounding count as beyond it: slivers between two edges
+    that coincide have derivatives that are rounding alone.
+    """
     kept = 0
+    near = ON_LINE * ((end[0] - start[0]).real ** 2 + (end[1] - start[1]).real ** 2)
     for p in range(count):
         q = (p + 1) % count
         h = (end[0] - start[0]) * (corners[p, 1] - start[1]) - (end[1] - start[1]) * (
@@ -77,10 +86,14 @@ def _cut(corners, count, start, end, out):
         g = (end[0] - start[0]) * (corners[q, 1] - start[1]) - (end[1] - start[1]) * (
             corners[q, 0] - start[0]
         )
-        if h.real >= 0:
+        if h.real > near:
             out[kept, 0], out[kept, 1] = corners[p, 0], corners[p, 1]
             kept += 1
-        if h.real * g.real < 0:
+        if (h.real > near) != (g.real > near):
+            if h.real > near:
+                g -= max(g.real, 0.0)
+            else:
+                h -= max(h.real, 0.0)
             share = h / (h - g)
             for e in range(2):
                 out[kept, e] = corners[p, e] + share * (corners[q, e] - corners[p, e])
@@ -121,8 +134,27 @@ def _shapes(x, n, at0, at1, phi):
 
 
 @njit(cache=True, error_model="numpy")
-def _shared(slave, na, master, nb, rule, mass, cross):  # noqa: PLR0913
-    """int phi phi into mass (a, a) and int phi N into cross (a, b) of one pair."""
+def _bulging(phi, count, out):
+    """Functions of middles into out (count,), by those of the corners phi."""
+    if count == 3:  # of a triangle
+        for m in range(3):
+            out[m] = 4 * phi[m] * phi[(m + 1) % 3]
+        return
+    if count == 0:
+        return
+    s, t = phi[1] + phi[2], phi[2] + phi[3]
+    along, across = 4 * s * (1 - s), 4 * t * (1 - t)
+    out[0], out[1], out[2], out[3] = along * (1 - t), across * s, along * t, across * (1 - s)
+    if count == 5:  # with one inside
+        out[0], out[1] = out[0] * (1 - 2 * t), out[1] * (2 * s - 1)
+        out[2], out[3] = out[2] * (2 * t - 1), out[3] * (1 - 2 * s)
+        out[4] = along * across
+
+
+@njit(cache=True, error_model="numpy")
+def _shared(slave, master, numbers, rule, mass, cross):
+    """int phi phi into mass (a, a + e) and int phi N into cross (a, b + h) of one pair."""
+    na, nb = numbers[0], numbers[1]
     mass[:], cross[:] = 0j, 0j
     axes = np.empty((2, 3), np.complex128)
     _axes(slave, na, axes)
@@ -138,8 +170,9 @@ def _shared(slave, na, master, nb, rule, mass, cross):  # noqa: PLR0913
         one, other = other, one
         if count < 3:
             return
-    phi = np.empty(mass.shape[0], np.complex128)
-    opposite = np.empty(cross.shape[1], np.complex128)
+    a, b = slave.shape[0], master.shape[0]
+    phi = np.zeros(mass.shape[1], np.complex128)
+    opposite = np.zeros(cross.shape[1], np.complex128)
     for p in range(1, count - 1):
         a0, a1 = one[p, 0] - one[0, 0], one[p, 1] - one[0, 1]
         b0, b1 = one[p + 1, 0] - one[0, 0], one[p + 1, 1] - one[0, 1]
@@ -149,40 +182,44 @@ def _shared(slave, na, master, nb, rule, mass, cross):  # noqa: PLR0913
         for q in range(rule.shape[0]):
             at0 = one[0, 0] + rule[q, 0] * a0 + rule[q, 1] * b0
             at1 = one[0, 1] + rule[q, 0] * a1 + rule[q, 1] * b1
-            _shapes(x, na, at0, at1, phi)
-            _shapes(y, nb, at0, at1, opposite)
+            _shapes(x, na, at0, at1, phi[:a])
+            _shapes(y, nb, at0, at1, opposite[:b])
+            _bulging(phi[:a], numbers[2], phi[a:])
+            _bulging(opposite[:b], numbers[3], opposite[b:])
             for r in range(na):
                 weight = rule[q, 2] * double * phi[r]
-                for t in range(na):
+                for t in range(mass.shape[1]):
                     mass[r, t] += weight * phi[t]
-                for b in range(nb):
-                    cross[r, b] += weight * opposite[b]
+                for t in range(cross.shape[1]):
+                    cross[r, t] += weight * opposite[t]
 
 
 @njit(cache=True, error_model="numpy")
-def plane_integrals(slave, corners, master, facing, rule, step, mass, cross):  # noqa: PLR0913
-    """Integrals of k pairs of facets (k, a, 3), (k, b, 3), with corners, facing (k,) corners.
+def plane_integrals(slave, master, numbers, rule, step, mass, cross):  # noqa: PLR0913
+    """Integrals of k pairs of facets (k, a, 3), (k, b, 3).
 
-    step 0: mass (k, 1, a, a) and cross (k, 1, a, b) themselves; else their derivatives by the
-    (a + b) 3 coordinates in the second place, of a complex step.
+    numbers (k, 4): of corners of both, then of their nodes beside these.
+    step 0: mass (k, 1, a, a + e) and cross (k, 1, a, b + h) themselves; else their derivatives
+    by the (a + b) 3 coordinates in the second place, of a complex step.
     """
     k, a, b = slave.shape[0], slave.shape[1], master.shape[1]
     x, y = np.empty((a, 3), np.complex128), np.empty((b, 3), np.complex128)
-    m, c = np.empty((a, a), np.complex128), np.empty((a, b), np.complex128)
+    width, across = mass.shape[3], cross.shape[3]
+    m, c = np.empty((a, width), np.complex128), np.empty((a, across), np.complex128)
     for i in range(k):
         for way in range(mass.shape[1]):
             x[:], y[:] = slave[i], master[i]
             if step > 0:
                 node, e = way // 3, way % 3
-                if (node < a and node >= corners[i]) or node - a >= facing[i]:
+                if (node < a and node >= numbers[i, 0]) or node - a >= numbers[i, 1]:
                     continue  # of the padding
                 if node < a:
                     x[node, e] += 1j * step
                 else:
                     y[node - a, e] += 1j * step
-            _shared(x, corners[i], y, facing[i], rule, m, c)
+            _shared(x, y, numbers[i], rule, m, c)
             for r in range(a):
-                for t in range(a):
+                for t in range(width):
                     mass[i, way, r, t] = m[r, t].imag / step if step > 0 else m[r, t].real
-                for t in range(b):
+                for t in range(across):
                     cross[i, way, r, t] = c[r, t].imag / step if step > 0 else c[r, t].real

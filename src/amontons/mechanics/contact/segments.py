@@ -160,14 +160,18 @@ class Segments:
         return Segments(*(getattr(self, one.name)[chosen] for one in fields(self)))
 
 
-def segments(slave: Surface, master: Surface, *, joined: bool = False) -> Segments:
+def segments(
+    slave: Surface, master: Surface, *, joined: bool = False, within: Array | None = None
+) -> Segments:
     """All segments of two surfaces that face each other.
 
     joined: both are in one mesh, with common numbers; facets that share a node are a pair at
     the tip of a slot, but not around an edge, where the body is between them.
+    within (f,): distances in which to look around slave facets; by default around the closest
+    node of the master that faces a facet, which may lie behind it, through a thin body.
     """
     found = []
-    for chunk, facet in _candidates(slave, master):
+    for chunk, facet in _candidates(slave, master, within):
         if joined:
             same = slave.nodes[chunk][:, :, None] == master.nodes[facet][:, None, :]
             way = master.centre[facet] - slave.centre[chunk]
@@ -232,7 +236,9 @@ def _joined(parts: list[Segments], slave: Surface, master: Surface) -> Segments:
 
 
 # -------------------------------------------------------------------- search
-def _candidates(slave: Surface, master: Surface) -> Iterator[tuple[Index, Index]]:
+def _candidates(
+    slave: Surface, master: Surface, within: Array | None
+) -> Iterator[tuple[Index, Index]]:
     """Pairs of facets that may face each other, a chunk of slave facets at a time."""
     from scipy.spatial import cKDTree
 
@@ -244,8 +250,10 @@ def _candidates(slave: Surface, master: Surface) -> Iterator[tuple[Index, Index]
     trees = [(cKDTree(master.centre[c]), c, master.radius[c].max()) for c in classes]
     for start in range(0, len(slave.nodes), CHUNK):
         chunk = np.arange(start, min(start + CHUNK, len(slave.nodes)))
-        foot, beside = feet(slave.centre[chunk], slave.normal[chunk], tree, normals)
-        reach = 2 * slave.radius[chunk] + beside
+        foot, beside = slave.centre[chunk], np.zeros(0)
+        if within is None:
+            foot, beside = feet(foot, slave.normal[chunk], tree, normals)
+        reach = 2 * slave.radius[chunk] + (beside if within is None else within[chunk])
         for centres, members, size in trees:
             lists = centres.query_ball_point(foot, reach + size, return_sorted=True)
             counts = np.array([len(one) for one in lists])

@@ -29,6 +29,7 @@ from ..meshes.facets import Cells
 from ..meshes.linear_cells import Rule
 from ..meshes.mesh import Mesh
 from .hybrid import element_formulation, volume_modes, volume_modulus
+from .uniform import uniform_stiffness
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -41,10 +42,10 @@ def rule_of(mesh: Mesh, cells: Cells, *, finite: bool = False) -> Rule:
     finite: at finite strains; more at second order, as their laws are no polynomials.
     """
     cell = CELLS[cells.kind]
-    if finite:
-        return cell.stiffness if cell.order == 1 else cell.gauss
     if cells.integration == "reduced" and cell.reduced is not None:
         return cell.reduced
+    if finite:
+        return cell.stiffness if cell.order == 1 else cell.gauss
     if mesh.axisymmetric and cells.kind == "tri":
         return cell.gauss  # one point does not see how u / r changes
     return cell.stiffness
@@ -96,10 +97,14 @@ def _rows(G: Array) -> Array:
 
 def cell_stiffness(mesh: Mesh, cells: Cells, law: object) -> Iterator[tuple[Index, Array]]:
     """Nodes (k, a) and stiffness (k, a dim, a dim) of some cells at a time."""
-    hybrid = element_formulation(mesh, cells, law) == "hybrid"
+    formulation = element_formulation(mesh, cells, law)
+    hybrid = formulation == "hybrid"
     C = moduli_of(law, mesh, hybrid=hybrid)
     rule = rule_of(mesh, cells)
     for nodes in in_parts(cells):
+        if formulation == "hybrid-incompatible":
+            yield nodes, uniform_stiffness(mesh, Cells(cells.kind, nodes), law)
+            continue
         if cells.integration == "incompatible":
             yield nodes, _with_modes(mesh, cells.kind, nodes, rule, C)
             continue

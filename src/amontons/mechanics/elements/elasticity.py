@@ -26,9 +26,10 @@ from ..meshes.linear_cells import Rule
 from ..meshes.mesh import Mesh, unknown
 from .cell_loops import stiffness_inplace
 from .cell_matrices import add_blocks, cell_stiffness, rule_of
-from .hybrid import averaged, element_formulation, volume_modes, volume_modulus
+from .hybrid import averaged, element_formulation, is_hybrid, volume_modes, volume_modulus
 from .hybrid_loops import volume_terms_inplace
 from .pattern import node_pattern
+from .uniform import mean_gradient
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -173,7 +174,7 @@ def stiffness(
     for cells in mesh.cells:
         law = by_region[cells.region]
         formulation = element_formulation(mesh, cells, law)
-        if mesh.axisymmetric or formulation == "incompatible":
+        if mesh.axisymmetric or formulation.endswith("incompatible"):
             add_blocks(blocks, (pointers, columns), cell_stiffness(mesh, cells, law))
             continue
         rule, unit = rule_of(mesh, cells), (1.0,) * mesh.dim
@@ -241,7 +242,7 @@ def cell_stress(
     for block in mesh.cells:
         cell, law = CELLS[block.kind], by_region[block.region]
         gradient = gradient_at(mesh, block, displacement, cell.centre)
-        hybrid = element_formulation(mesh, block, law) == "hybrid"
+        hybrid = is_hybrid(mesh, block, law)
         stress = law.shape_stress(gradient) if hybrid else law.stress(gradient)
         if hybrid:
             p = volume_stress(mesh, block, law, displacement, cell.centre[None], warming)
@@ -273,7 +274,11 @@ def volume_stress(  # noqa: PLR0913  # as cell_stress, and where
     warming (n,): change of temperature, whose expansion is taken off.
     """
     rule, cell = rule_of(mesh, block, finite=law.finite), CELLS[block.kind]
-    slopes = np.stack([gradient_at(mesh, block, displacement, x) for x in rule[0]], axis=1)
+    if element_formulation(mesh, block, law) == "hybrid-incompatible":
+        mean = mean_gradient(mesh, block, displacement)
+        slopes = np.repeat(mean[:, None], len(rule[1]), axis=1)
+    else:
+        slopes = np.stack([gradient_at(mesh, block, displacement, x) for x in rule[0]], axis=1)
     if law.finite:
         ratio = np.linalg.det(np.eye(slopes.shape[-1]) + slopes)
     else:

@@ -6,8 +6,9 @@ per volume of the reference configuration.  U is the volume term of hybrid cells
 C_ = J^(-2/3) C, whose principal stretches l_i have the product 1,
 
     Mooney-Rivlin    w = c10 (tr C_ - 3) + c01 (tr cof C_ - 3)
+    reduced          w = sum_k c_k (tr C_ - 3)^k, k = 1 .. N; N = 3: Yeoh
     Ogden            w = sum_p 2 shear_p / exponent_p^2 (l_1^e_p + l_2^e_p + l_3^e_p - 3)
-    both             U = bulk / 2 (J - 1)^2
+    all three        U = bulk / 2 (J - 1)^2
     Saint Venant-Kirchhoff    W = lame_lambda / 2 (tr E)^2 + shear E : E,  2 E = C - I.
 
 Abaqus writes D1 = 2 / bulk.  Equal principal stretches need no care: quotients of differences
@@ -100,10 +101,17 @@ def pushed(F: Array, J: Array, S: Array) -> Array:
     return F @ S @ F.swapaxes(1, 2) / J[:, None, None]
 
 
+def check_density(density: float | None) -> None:
+    """Raise InvalidInput for a density that is no mass per volume."""
+    if density is not None and not number("density", density) > 0:
+        raise InvalidInput(f"density: expected a finite number > 0, got {density!r}")
+
+
 class _Isochoric(PointLaw):
     """w of C_ alone and U = bulk / 2 (J - 1)^2."""
 
     bulk: float
+    density: float | None
 
     @property
     def young(self) -> float:  # type: ignore[override]  # follows from what is given
@@ -131,6 +139,7 @@ class _Isochoric(PointLaw):
             raise InvalidInput(
                 f"expected constants with a shear modulus > 0 at rest, got {self.shear:g}"
             )
+        check_density(self.density)
         if not self.poisson > 0:
             raise InvalidInput(
                 f"bulk: expected more than two thirds of the shear modulus {self.shear:g}, "
@@ -144,12 +153,14 @@ class MooneyRivlin(_Isochoric):
     """W = c10 (tr C_ - 3) + c01 (tr cof C_ - 3) + bulk / 2 (J - 1)^2, C_ = J^(-2/3) C.
 
     c10, c01, bulk: unit of stress; the shear modulus at rest is 2 (c10 + c01).  c01 = 0 is the
-    neo-Hookean law of Abaqus, with bulk = 2 / D1.
+    neo-Hookean law of Abaqus, with bulk = 2 / D1.  density: mass per volume of the reference
+    configuration, read by dynamics only; also in the laws below.
     """
 
     c10: float
     c01: float
     bulk: float
+    density: float | None = None
 
     def __post_init__(self) -> None:
         number("c10", self.c10)
@@ -174,6 +185,47 @@ class MooneyRivlin(_Isochoric):
 
 @helpful
 @dataclass(frozen=True)
+class ReducedPolynomial(_Isochoric):
+    """W = sum_k coefficients[k] (tr C_ - 3)^(k + 1) + bulk / 2 (J - 1)^2, C_ = J^(-2/3) C.
+
+    coefficients, bulk: unit of stress; the shear modulus at rest is twice the first, > 0.
+    Three of them: the law of Yeoh.
+    """
+
+    coefficients: Sequence[float]
+    bulk: float
+    density: float | None = None
+
+    def __post_init__(self) -> None:
+        values = np.atleast_1d(real("coefficients", self.coefficients))
+        if values.ndim != 1 or not len(values) or not np.isfinite(values).all():
+            raise InvalidInput(
+                f"coefficients: expected finite numbers, got {values.tolist()}"
+            )
+        object.__setattr__(self, "coefficients", tuple(values.tolist()))
+        self._check()
+
+    @property
+    def shear(self) -> float:
+        """Shear modulus at F = I."""
+        return 2 * float(self.coefficients[0])
+
+    def respond(self, C: Array) -> Response:
+        """Energy, stress and moduli, see `PointLaw`."""
+        x, S, D = _empty(len(C))
+        J = np.sqrt(np.linalg.det(C))
+        mooney_rivlin_inplace(
+            np.ascontiguousarray(C), np.linalg.inv(C), J, 1.0, 0.0, x, S, D
+        )
+        powers = np.polynomial.Polynomial([0.0, *self.coefficients])
+        slope, bend = powers.deriv()(x), powers.deriv(2)(x)
+        D = slope[:, None, None, None, None] * D
+        D += np.einsum("n,nij,nkl->nijkl", bend, S, S)
+        return powers(x), slope[:, None, None] * S, D
+
+
+@helpful
+@dataclass(frozen=True)
 class Ogden(_Isochoric):
     """W = sum 2 shears / exponents^2 (sum l^exponents - 3) + bulk / 2 (J - 1)^2.
 
@@ -184,6 +236,7 @@ class Ogden(_Isochoric):
     shears: Sequence[float]
     exponents: Sequence[float]
     bulk: float
+    density: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("shears", "exponents"):
@@ -227,10 +280,11 @@ class SaintVenantKirchhoff(PointLaw):
 
     young: float
     poisson: float
+    density: float | None = None
     volume: ClassVar[None] = None  # type: ignore[assignment]  # no such term
 
     def __post_init__(self) -> None:
-        LinearElastic(self.young, self.poisson)  # its checks
+        LinearElastic(self.young, self.poisson, density=self.density)  # its checks
         if not self.poisson >= 0:
             raise InvalidInput(f"poisson: expected between 0 and 0.5, got {self.poisson!r}")
 

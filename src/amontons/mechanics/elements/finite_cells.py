@@ -7,7 +7,7 @@ the points of integration (`energies`), some thousands of them at a time.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,15 +26,14 @@ from .hybrid_loops import (
 )
 from .point_loops import deformations_inplace, forces_of_inplace, tangent_of_inplace
 
-if TYPE_CHECKING:
-    from .hyperelasticity import Hyperelastic
-
 Array = NDArray[np.float64]
 AT_ONCE = 16_000  # points of integration, for memory: the moduli have 81 numbers each
 
 
 class FiniteCells:
     """What all have: the geometry, and the pressures of hybrid cells."""
+
+    modulus: float  # that stresses of strains near 1 are measured by
 
     def __init__(self, mesh: Mesh, cells: Cells, law: Any) -> None:
         rule = rule_of(mesh, cells, finite=True)
@@ -195,8 +194,3 @@ class PointCells(FiniteCells):
         points, nodes, slopes, weights = geometry
         jac = np.einsum("kas,qad->kqsd", points[nodes], slopes)
         return np.linalg.det(jac) * weights
-
-
-def finite_cells(mesh: Mesh, cells: Cells, law: Hyperelastic) -> FamilyCells | PointCells:
-    """The cells of one block of a mesh."""
-    return (PointCells if isinstance(law, PointLaw) else FamilyCells)(mesh, cells, law)

@@ -37,22 +37,34 @@ from ..meshes.mesh import Mesh
 Array = NDArray[np.float64]
 LINEAR_PRESSURE = ("quad8", "quad9", "hex20", "hex27", "wedge15")
 NEARLY = 0.4  # poisson from which on full integration has at least twice their error
+BENDING = ("quad", "hex")  # that may have incompatible modes
 SIMPLEX = ("tri", "tet")  # of first order: their volume changes evenly anyhow
 
 
 def element_formulation(mesh: Mesh, cells: Cells, law: object) -> str:
-    """"full", "reduced", "incompatible" or "hybrid": how cells of a law are integrated.
+    """How cells of a law are integrated, see `Cells`.
 
     Cells that leave it open ("auto") are hybrid where the law is nearly incompressible, or
-    yields, and so flows at constant volume.
+    yields, and so flows at constant volume; "quad" and "hex" of laws that do not yield then
+    have incompatible modes, too, see `uniform`.
     """
     able = getattr(law, "volume", None) is not None and cells.kind not in SIMPLEX
     able = able and not is_thin(law, mesh)
+    bends = cells.kind in BENDING and not mesh.axisymmetric
+    bends = bends and not getattr(law, "keeps_volume", False)
+    both = "hybrid-incompatible" if bends else "hybrid"
     if cells.integration == "hybrid":
         return "hybrid" if able else "full"
+    if cells.integration == "hybrid-incompatible":
+        return both if able else "full"
     if cells.integration != "auto":
         return cells.integration
-    return "hybrid" if able and _keeps_volume(law) else "full"
+    return both if able and _keeps_volume(law) else "full"
+
+
+def is_hybrid(mesh: Mesh, cells: Cells, law: object) -> bool:
+    """Whether cells have pressures of their own."""
+    return element_formulation(mesh, cells, law).startswith("hybrid")
 
 
 def _keeps_volume(law: Any) -> bool:

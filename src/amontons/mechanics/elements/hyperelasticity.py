@@ -24,6 +24,7 @@ from ...core.errors import InvalidInput
 from ...core.words import helpful
 from ..meshes.cells import CELLS
 from ..meshes.check import determinant
+from ..meshes.facets import Cells
 from ..meshes.mesh import Mesh
 from .cell_matrices import rule_of
 from .elasticity import (
@@ -33,8 +34,11 @@ from .elasticity import (
     materials_by_region,
 )
 from .energies import PointLaw, deformation
-from .finite_cells import FiniteCells, finite_cells
+from .finite_cells import FamilyCells, FiniteCells, PointCells
+from .hybrid import element_formulation
 from .pattern import node_pattern
+from .point_loops import family_inplace
+from .uniform_cells import UniformCells
 
 Array = NDArray[np.float64]
 
@@ -65,6 +69,13 @@ class _Family(Isotropic):
         """`stress` without that of the volume term of hybrid cells."""
         return self._cauchy(gradient, self.shape_coefficients)
 
+    def respond(self, C: Array) -> tuple[Array, Array, Array]:
+        """W (n,), S = 2 dW/dC (n, 3, 3) and 2 dS/dC (n, 3, 3, 3, 3), without that term."""
+        W, S, D = np.empty(len(C)), np.empty((len(C), 3, 3)), np.empty((len(C), 3, 3, 3, 3))
+        family_inplace(np.ascontiguousarray(C), np.linalg.inv(C), np.sqrt(np.linalg.det(C)),
+                       np.array(self.shape_coefficients), W, S, D)  # fmt: skip
+        return W, S, D
+
     def _cauchy(
         self, gradient: Array, coefficients: tuple[float, float, float, float, float]
     ) -> Array:
@@ -82,14 +93,17 @@ class _Family(Isotropic):
 class NeoHookean(_Family):
     """Compressible neo-Hookean law: young, unit of stress, > 0; -1 < poisson < 0.5.
 
+    density: mass per volume of the reference configuration, read by dynamics only.
+
     W = shear / 2 (tr C - 3) - shear ln J + lame_lambda / 2 (ln J)^2, [BW] eq. (6.27).
     """
 
     young: float
     poisson: float
+    density: float | None = None
 
     def __post_init__(self) -> None:
-        LinearElastic(self.young, self.poisson)  # its checks
+        LinearElastic(self.young, self.poisson, density=self.density)  # its checks
 
     @property
     def coefficients(self) -> tuple[float, float, float, float, float]:
@@ -115,15 +129,16 @@ class CiarletGeymonat(_Family):
     W = a (tr C - 3) + b (tr cof C - 3) + c (J^2 - 1) - d ln J with b = shear / 2 - a,
     c = lame_lambda / 4 - shear / 2 + a, d = lame_lambda / 2 + shear ([C] section 4.10, [LR]).
     a, unit of stress: polyconvex for a, b, c > 0; the middle of what that allows by default,
-    shear / 4 where lame_lambda >= 2 shear.
+    shear / 4 where lame_lambda >= 2 shear.  density: as in `NeoHookean`.
     """
 
     young: float
     poisson: float
     a: float | None = None
+    density: float | None = None
 
     def __post_init__(self) -> None:
-        LinearElastic(self.young, self.poisson)  # its checks
+        LinearElastic(self.young, self.poisson, density=self.density)  # its checks
         if not self.poisson > 0:
             raise InvalidInput(
                 f"poisson: Ciarlet-Geymonat needs one above 0, got {self.poisson!r}; "
@@ -178,7 +193,8 @@ class CiarletGeymonat(_Family):
 
 Hyperelastic = NeoHookean | CiarletGeymonat | PointLaw
 NAMES = (
-    "NeoHookean, CiarletGeymonat, MooneyRivlin, Ogden, SaintVenantKirchhoff or UserEnergy"
+    "NeoHookean, CiarletGeymonat, MooneyRivlin, ReducedPolynomial, Ogden, "
+    "SaintVenantKirchhoff or UserEnergy"
 )
 
 
@@ -187,6 +203,13 @@ def is_hyperelastic(material: object) -> bool:
     if isinstance(material, Mapping):
         return any(isinstance(law, Hyperelastic) for law in material.values())
     return isinstance(material, Hyperelastic)
+
+
+def _finite_cells(mesh: Mesh, cells: Cells, law: Hyperelastic) -> FiniteCells:
+    """The cells of one block of a mesh."""
+    if element_formulation(mesh, cells, law) in ("incompatible", "hybrid-incompatible"):
+        return UniformCells(mesh, cells, law)
+    return (PointCells if isinstance(law, PointLaw) else FamilyCells)(mesh, cells, law)
 
 
 class HyperelasticBody:
@@ -207,7 +230,7 @@ class HyperelasticBody:
                     f"regions, got {law!r}"
                 )
         self.pointers, self.columns = node_pattern(mesh.cells, len(mesh.points))
-        self._blocks = [finite_cells(mesh, cells, laws[cells.region]) for cells in mesh.cells]
+        self._blocks = [_finite_cells(mesh, cells, laws[cells.region]) for cells in mesh.cells]
 
     @property
     def keeps_volume(self) -> bool:

@@ -20,7 +20,7 @@ from .elasticity import (
     volume_stress,
     with_hoop,
 )
-from .hybrid import element_formulation
+from .hybrid import is_hybrid
 from .hyperelasticity import cauchy_stress, is_hyperelastic
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def _at_nodes(
     for law, hybrid in _groups(mesh, laws):
         gradient, volume, pressure = np.zeros((n, dim, dim)), np.zeros(n), np.zeros(n)
         for cells in mesh.cells:
-            if laws[cells.region] is law and _is_hybrid(mesh, cells, law) == hybrid:
+            if laws[cells.region] is law and is_hybrid(mesh, cells, law) == hybrid:
                 cell = CELLS[cells.kind]
                 rule = (_places(cell), np.ones(cell.nodes))
                 points, nodes, slopes, _ = geometry_of(mesh, cells, rule)
@@ -94,13 +94,9 @@ def _groups(mesh: Mesh, laws: Mapping[str, Any]) -> list[tuple[Any, bool]]:
     found = {}
     for cells in mesh.cells:
         law = laws[cells.region]
-        hybrid = _is_hybrid(mesh, cells, law)
+        hybrid = is_hybrid(mesh, cells, law)
         found[id(law), hybrid] = (law, hybrid)
     return list(found.values())
-
-
-def _is_hybrid(mesh: Mesh, cells: Cells, law: Any) -> bool:
-    return element_formulation(mesh, cells, law) == "hybrid"
 
 
 def _corner_volumes(mesh: Mesh, cells: Cells, places: Array) -> Array:

@@ -125,6 +125,36 @@ def add_volume_inplace(inverse, J, slope, bend, S, D):
 
 
 @njit(cache=True, error_model="numpy")
+def family_inplace(C, inverse, J, law, W, S, D):
+    """W (n,), S and D of the family (2) of `cell_loops`, law (5,): a, b, c, d, e."""
+    a, b, c, d, e = law
+    for p in range(len(J)):
+        A, I, log = C[p], inverse[p], np.log(J[p])
+        one, square = A[0, 0] + A[1, 1] + A[2, 2], 0.0
+        for i in range(3):
+            for j in range(3):
+                square += A[i, j] * A[i, j]
+        W[p] = a * (one - 3.0) + b * (0.5 * (one * one - square) - 3.0)
+        W[p] += c * (J[p] * J[p] - 1.0) - d * log + 0.5 * e * log * log
+        pressure = 2.0 * c * J[p] * J[p] - d + e * log
+        slope = 4.0 * c * J[p] * J[p] + e
+        for i in range(3):
+            for j in range(3):
+                same = 1.0 if i == j else 0.0
+                S[p, i, j] = 2.0 * a * same + 2.0 * b * (one * same - A[i, j])
+                S[p, i, j] += pressure * I[i, j]
+                for k in range(3):
+                    for l in range(3):
+                        both = same if k == l else 0.0
+                        turned = 0.5 if i == k and j == l else 0.0
+                        turned += 0.5 if i == l and j == k else 0.0
+                        D[p, i, j, k, l] = 4.0 * b * (both - turned) + (
+                            slope * I[i, j] * I[k, l]
+                            - pressure * (I[i, k] * I[j, l] + I[i, l] * I[j, k])
+                        )
+
+
+@njit(cache=True, error_model="numpy")
 def mooney_rivlin_inplace(C, inverse, J, c10, c01, W, S, D):
     """W (n,), S and D of c10 (J^-2/3 tr C - 3) + c01 (J^-4/3 tr cof C - 3)."""
     eye = np.eye(3)

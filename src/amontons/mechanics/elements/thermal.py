@@ -18,7 +18,7 @@ from ..meshes.facets import Cells
 from ..meshes.mesh import Mesh
 from .cell_matrices import components, gradient_rows, in_parts, rule_of, volume_rows
 from .elasticity import held_stress, materials_by_region
-from .hybrid import element_formulation, volume_modes, volume_modulus
+from .hybrid import is_hybrid, volume_modes, volume_modulus
 
 Array = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ def thermal_load(mesh: Mesh, material: Any, change: Array, *, mean: bool = False
                 f"temperature: {cells.kind} cells with incompatible modes have no thermal "
                 "strains; take full integration"
             )
-        if element_formulation(mesh, cells, law) == "hybrid":
+        if is_hybrid(mesh, cells, law):
             bulk = 3 * law.expansion * volume_modulus(law)
             _add_volume_load(load, mesh, cells, bulk * change[cells.nodes])
             stress = stress - bulk * np.eye(3)

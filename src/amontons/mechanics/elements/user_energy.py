@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InvalidInput, InvertedCells, shown
-from .energies import PointLaw, Response
+from .energies import PointLaw, Response, check_density
 
 Array = NDArray[np.float64]
 SAMPLES = 12  # deformations at which what is given is compared with differences
@@ -29,7 +29,7 @@ class UserEnergy(PointLaw):
     well as NumPy's; plain functions of a module, if models are to be sent to other processes.
     volume: of J (n,), returns U, dU/dJ and d2U/dJ2, each (n,); cells are then hybrid where the
     law is nearly incompressible at rest.  A C is never turned, so no energy can depend on the
-    frame; it need not be isotropic.
+    frame; it need not be isotropic.  density: mass per volume, read by dynamics only.
 
     Raises InvalidInput where shapes, symmetries or derivatives are wrong, which is tried at
     some deformations with stretches of 0.7 to 1.4, or where the body is stressed at rest.  What
@@ -42,6 +42,7 @@ class UserEnergy(PointLaw):
     moduli_of: Callable[[Array], Any]
     volume_of: Callable[[Array], Any] | None = None
     name: str = "user's energy"
+    density: float | None = None
 
     def __post_init__(self) -> None:
         for field in ("energy", "stress_of", "moduli_of", "volume_of"):
@@ -50,6 +51,7 @@ class UserEnergy(PointLaw):
                 raise InvalidInput(f"{field}: expected a function, got {shown(given)}")
         if self.volume_of is None:
             object.__setattr__(self, "volume", None)
+        check_density(self.density)
         self._check()
         D = self.whole(np.eye(3)[None], np.ones(1))[2][0]
         bulk = float(np.einsum("iijj->", D)) / 9

@@ -91,7 +91,7 @@ def check_integration(block: Cells) -> None:
     if CELLS[block.kind].reduced is not None:
         known.append("reduced")
     if block.kind in ("quad", "hex"):
-        known.append("incompatible")
+        known += ["incompatible", "hybrid-incompatible"]
     if block.integration not in known:
         raise InvalidInput(
             f"{block.kind} cells: integration: expected {' or '.join(known)}, got "

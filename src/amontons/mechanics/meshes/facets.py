@@ -22,8 +22,10 @@ class Cells:
     integration: of the stiffness, "full", or "hybrid", the volume changing on the mean of each
     cell (`elements/hybrid`; the same for tri and tet, whose volume changes evenly); at small
     strains "reduced", with fewer points: 1 for tri around an axis, 2 per direction for quad8,
-    quad9, hex20 and hex27, 2 for wedge, 9 for wedge15; or "incompatible", bending modes inside
-    of each quad or hex on its own.  "auto": hybrid from a poisson of 0.4 on, else full.
+    quad9, hex20 and hex27, 2 for wedge, 9 for wedge15; of quad and hex also "incompatible",
+    bending modes inside of each cell on its own, or "hybrid-incompatible", with both
+    (`elements/uniform`; around an axis "hybrid").  "auto": from a poisson of 0.4 on
+    hybrid-incompatible where there is such a cell, else hybrid; below full.
     """
 
     kind: str

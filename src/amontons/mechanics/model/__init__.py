@@ -1,7 +1,7 @@
 """Models: bodies, supports, loads, contacts; assembled to a discrete problem and recovered."""
 
 from ..elements.elasticity import LinearElastic
-from ..elements.energies import MooneyRivlin, Ogden, SaintVenantKirchhoff
+from ..elements.energies import MooneyRivlin, Ogden, ReducedPolynomial, SaintVenantKirchhoff
 from ..elements.hyperelasticity import CiarletGeymonat, NeoHookean
 from ..elements.orthotropic import OrthotropicElastic
 from ..elements.plasticity import ElastoPlastic
@@ -17,6 +17,7 @@ from .processes import distributed
 __all__ = ["Axes", "Body", "BodyForce", "CiarletGeymonat", "Contact", "ContactFields",
            "Coupling", "ElastoPlastic", "Equation", "Fix", "FoundContacts", "FoundPair",
            "LinearElastic", "Model", "MooneyRivlin", "NeoHookean", "NodalForce", "Ogden",
-           "OrthotropicElastic", "Pressure", "Pretension", "Reference", "Rigid",
+           "OrthotropicElastic", "Pressure", "Pretension", "ReducedPolynomial",
+           "Reference", "Rigid",
            "SaintVenantKirchhoff", "Spring", "Temperature", "Traction", "UserEnergy",
            "distributed", "find_contacts"]  # fmt: skip

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 def formulations(model: Model) -> list[tuple[str, str, str, str]]:
     """(body, region, kind of cells, formulation) of all cells that deform by a law.
 
-    The formulation is "full", "reduced", "incompatible" or "hybrid", see `Cells`.
+    The formulation is "full", "reduced", "incompatible", "hybrid" or
+    "hybrid-incompatible", see `Cells`.
     """
     out = []
     for body in model.bodies:
@@ -39,6 +40,6 @@ def in_words(model: Model) -> list[str]:
         where = f" of region {region!r}" if region != "default" else ""
         where += f" of {body!r}" if several and body else ""
         mean = "linear in the cell" if powers_of(kind, dim) > 1 else "constant in the cell"
-        pressure = f" (pressure {mean}: no locking)" if taken == "hybrid" else ""
+        pressure = f" (pressure {mean}: no locking)" if taken.startswith("hybrid") else ""
         parts.append(f"{kind}{where} {taken}{pressure}")
     return [f"elements: {'; '.join(parts)}"] if parts else []

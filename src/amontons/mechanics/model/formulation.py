@@ -34,7 +34,7 @@ from .fields import ContactFields, recover_fields
 from .held import HeldNodes
 from .large_deformation import LargeDeformation, large_deformation
 from .large_fields import recover_large
-from .laws import NEEDS_FORCES, NEEDS_THE_START, OF_LINEAR_BODIES, check_law
+from .laws import NEEDS_FORCES, OF_LINEAR_BODIES, WHERE_NODES_ARE, check_law
 from .nitsche import nitsche_matrices, nitsche_problem
 from .nodal_forces import NodalForces, follows, nodal_forces
 from .parts import FINITE, SMALL, Body, BodyForce, Contact, Load, Pressure
@@ -215,7 +215,7 @@ class Moved(Formulation):
 
     problem = LargeDeformation
     finds_contact_where_nodes_are = True
-    lacks = NEEDS_THE_START | NEEDS_FORCES
+    lacks = WHERE_NODES_ARE
     doubts = CHECKS
     keeps = ""
 

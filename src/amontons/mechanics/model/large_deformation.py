@@ -39,9 +39,10 @@ from ...problem.protocol import Problem
 from ...solvers.newton.nonlinear import NonlinearProblem
 from ...solvers.newton.states import PlainStates
 from ..contact.current import STICK, ContactPoint, Pieces
+from ..contact.current_mortar import MortarMeeting
 from ..contact.current_pairs import Meetings
 from ..elements.linear_body import LinearBody
-from .moved_pairs import Linearisation, PairLinearisation, balanced
+from .moved_pairs import Linearisation, PairLinearisation, balanced, turned_forces
 from .nodal_forces import NodalForces, nodal_forces
 from .nonlinear_parts import NonlinearParts, nonlinear_parts
 from .pressure_states import PressureStates
@@ -78,10 +79,6 @@ class LargeDeformation(NonlinearProblem):
 
     # ---------------------------------------------------------------- sizes
     measure = Measure.RESIDUAL
-    no_inertia = (
-        "dynamics are those of small strains with contact in the reference configuration; use "
-        "QuasiStatic, or LinearElastic and kinematics='small'"
-    )
 
     @property
     def law(self) -> Law:  # type: ignore[override]  # read only
@@ -107,6 +104,15 @@ class LargeDeformation(NonlinearProblem):
     def dimension(self) -> int:  # type: ignore[override]  # read only
         """2 or 3."""
         return self.parts.dimension
+
+    def with_law(self, law: Law) -> LargeDeformation:
+        """The same problem under another law of its contacts."""
+        contact = replace(self.parts.contact, law=law)
+        return replace(self, parts=replace(self.parts, contact=contact))
+
+    def _law_at(self, meeting: Meetings) -> Law:
+        """The law without what holds contacts that meet nobody any more."""
+        return self.law if meeting.met.all() else self.law.lost(~meeting.met)
 
     # ---------------------------------------------------------------- states
     def displacement(self, v: Array) -> Array:
@@ -227,7 +233,8 @@ class LargeDeformation(NonlinearProblem):
         balance = float(np.linalg.norm(rest[self.parts.free]))
         if not self.contacts:
             return balance / load
-        law = judge.scaled_residual(r, u, self.law, self.rho)
+        meeting = self.parts.meet(self.displacement(v))
+        law = judge.scaled_residual(r, u, self._law_at(meeting), self.rho)
         return max(balance / load, law / length)
 
     def _sizes(self, v: Array, r: Array, u: Array, rest: Array) -> tuple[float, float]:
@@ -248,7 +255,8 @@ class LargeDeformation(NonlinearProblem):
         except InvertedCells:
             return Weakest(np.inf, None)
         own = np.linalg.norm(u, axis=1) + np.linalg.norm(r / self.rho[:, None], axis=1)
-        return judge.weakest_of(r, u, self.law, self.rho, own + self.parts.resolved[1])
+        law = self._law_at(self.parts.meet(self.displacement(v)))
+        return judge.weakest_of(r, u, law, self.rho, own + self.parts.resolved[1])
 
     # ---------------------------------------------------------------- load steps
     @property
@@ -307,6 +315,15 @@ class LargeDeformation(NonlinearProblem):
         w[:, 0] += (meeting.normals * across).sum(axis=1)
         return replace(tangent, f=tangent.f + force[self.parts.free], w=w)
 
+    def remark(self, v: Array) -> str:
+        """Which slaves face nothing of their masters at a state."""
+        met = self.parts.meet(self.displacement(v)).parts
+        alone = [m for m in met if isinstance(m, MortarMeeting) and not m.met.any()]
+        away = ["{!r} faces {!r} nowhere".format(*meeting.pair.names) for meeting in alone]
+        if not away:
+            return ""
+        return f"at the last state {', '.join(away)}: no contact force holds anything there"
+
     def closed_pieces(self, v: Array) -> list[Pieces]:
         """The active pieces with touching contacts stuck, then with all of them stuck."""
         point = self.contact_point(v)
@@ -338,25 +355,15 @@ class LargeDeformation(NonlinearProblem):
         r, u, axes, rest = self._local(v)
         meeting = parts.meet(moved)
         if meeting.only_obstacles:
-            blocks[parts.diagonal] -= _turned(axes, r, meeting.normal_slopes)
+            blocks[parts.diagonal] -= turned_forces(axes, r, meeting.normal_slopes)
         H = sparse.csc_array(meeting.columns(axes).tocsr()[parts.free])
         M = parts.on_free(blocks)
         load, length = self._sizes(v, r, u, rest)
         w = u - (H.T @ v).reshape(u.shape)
         return FrictionProblem.from_global(
-            M, H, M @ v - needed[parts.free], w, self.law, load_scale=load, u_scale=length,
-            name=self.name,
+            M, H, M @ v - needed[parts.free], w, self._law_at(meeting), load_scale=load,
+            u_scale=length, name=self.name,
         )  # fmt: skip
-
-
-def _turned(axes: Array, r: Array, bend: Array) -> Array:
-    """Derivative of the forces sum_k r_k axis_k by the position, (nc, d, d).
-
-    dn = bend dx, and tangents are carried along: dt = -n (t . dn).
-    """
-    n, t = axes[:, 0], axes[:, 1:]
-    along = np.einsum("pk,pkc,pcj->pj", r[:, 1:], t, bend)
-    return r[:, 0, None, None] * bend - n[:, :, None] * along[:, None, :]
 
 
 def large_deformation(model: Model) -> LargeDeformation:

@@ -38,7 +38,7 @@ def recover_large(
     sites = linear.sites
     meeting = parts.meet(moved)
     axes = frames(meeting.normals)
-    force = np.einsum("pkc,pk->pc", axes, r)
+    force = np.einsum("pkc,pk->pc", axes, r) * meeting.passed[:, None]
     traction = r / sites.weights[:, None]
     load = (model.load_factor * nodal_forces(model, model.loads)).at(moved)
     pushed = meeting.columns(axes) @ r.ravel()

@@ -45,10 +45,11 @@ NEEDS_FORCES = {  # numbers of laws that need both r and u, and why some formula
 OF_LINEAR_BODIES = {
     "mu": f"{VaryingFriction.name} needs bodies that do not yield",
 }
-NEEDS_THE_START = {  # the same of those that count from the undeformed state
+WHERE_NODES_ARE = {  # what contact in the current configuration does not take
     name: f"{what} small strains and contact in the reference configuration"
-    for name, what in (("cohesion", "cohesion needs"), ("tied", "ties need"),
-                       ("clearance", "a given clearance needs"))
+    for name, what in (("mu_across", "orthotropic friction needs"),
+                       ("stick_stiffness", "a spring along the surface needs"),
+                       ("tied", "ties need"), ("clearance", "a given clearance needs"))
 }  # fmt: skip
 SLANT = 1e-6  # part of a direction in the tangent plane that is one
 

@@ -1,7 +1,8 @@
 """Contact of two deforming bodies in the equations of large deformations.
 
-The force lambda_p on a slave node is all that its body needs there, f_int - f, as the dual
-functions leave no other slave's force on it.  The other nodes j of its pair carry
+The force lambda_p on a slave node is all that its body needs there, sum_j C_pj (f_int - f)_j
+with C of `contact.current_mortar` (of first order at p alone), as the dual functions leave no
+other slave's force on it.  The other nodes j of its pair carry
 
     f_int - f = sum_p B_pj lambda_p,                                                        (1)
 
@@ -29,11 +30,17 @@ Array = NDArray[np.float64]
 
 
 def balanced(parts: NonlinearParts, meeting: Meetings, rest: Array) -> Array:
-    """f_int - f (dofs,) without the forces that contacts give to nodes other than the slave."""
+    """f_int - f (dofs,) without the forces that contacts give to nodes other than the slave.
+
+    At slaves it is C times that.
+    """
     if meeting.only_obstacles:
         return rest
-    own = rest[parts.at] * parts.contact.free * meeting.met[:, None]
-    return rest - (meeting.others @ own).ravel()
+    gathered = (parts.gathers @ rest).reshape(parts.at.shape)
+    own = gathered * parts.contact.free * meeting.met[:, None]
+    out = rest - (meeting.others @ own).ravel()
+    out[parts.at] = (parts.gathers @ out).reshape(parts.at.shape)
+    return out
 
 
 def _others(parts: NonlinearParts, meeting: Meetings) -> sparse.csr_array:
@@ -126,15 +133,21 @@ class PairLinearisation:
     def _passing(self) -> sparse.csr_array:
         """Derivative of F by f_int - f on all nodes, (dofs, dofs), at fixed positions."""
         parts = self.parts
-        at, dofs = parts.at.ravel(), len(self.rest)
+        dofs = len(self.rest)
+        eye = sparse.eye_array(dofs, format="csr")
+        passed = eye - _others(parts, self.point.meeting) @ parts.gathers
+        return sparse.csr_array(self._by_needed @ passed)
+
+    @cached_property
+    def _by_needed(self) -> sparse.csr_array:
+        """Derivative of F by f_int - f without what contacts give to others, (dofs, dofs)."""
+        at, dofs = self.parts.at.ravel(), len(self.rest)
         own = sparse.csr_array((np.ones(len(at)), (np.arange(len(at)), at)),
                                shape=(len(at), dofs))  # fmt: skip
-        eye = sparse.eye_array(dofs, format="csr")
-        passed = eye - _others(parts, self.point.meeting) @ own
         kept = np.ones(dofs)
         kept[at] = 0.0
-        law = own.T @ (blocks_of(self.partials[0]) @ own)
-        return sparse.csr_array((sparse.diags_array(kept) + law) @ passed)
+        law = own.T @ (blocks_of(self.partials[0]) @ self.parts.gathers)
+        return sparse.csr_array(sparse.diags_array(kept) + law)
 
     def passed(self, change: Array) -> Array:
         """First-order change of F, (n,), with a change of f_int - f, (dofs,)."""
@@ -146,7 +159,8 @@ class PairLinearisation:
         parts, meeting = self.parts, self.point.meeting
         dofs, at = len(self.rest), parts.at.ravel()
         _, by_normal, by_gap, by_motion = self.partials
-        force = self.needed[parts.at] * parts.contact.free * meeting.met[:, None]
+        gathered = (parts.gathers @ self.needed).reshape(parts.at.shape)
+        force = gathered * parts.contact.free * meeting.met[:, None]
         rows, turned = [], sparse.csr_array((dofs, dofs))
         start = 0
         for part, old in zip(meeting.parts, self.earlier.parts, strict=True):
@@ -159,7 +173,7 @@ class PairLinearisation:
                 + blocks_of(by_gap[mine][:, :, None]) @ gap_slopes(part, dofs)
                 + blocks_of(by_motion[mine]) @ motion_slopes(part, old, dofs)
             )
-        out = self._passing @ parts.matrix(self.blocks).tocsr() - turned
+        out = self._passing @ parts.matrix(self.blocks).tocsr() - self._by_needed @ turned
         local = sparse.csr_array(sparse.vstack(rows))
         own = sparse.csr_array((np.ones(len(at)), (at, np.arange(len(at)))),
                                shape=(dofs, len(at)))  # fmt: skip
@@ -212,3 +226,13 @@ def _at_slaves(part: Meeting | MortarMeeting, values: Array, dofs: int) -> spars
     columns = part.slaves[:, None, None] * d + np.arange(d)
     entries = (values.ravel(), (rows.ravel(), np.broadcast_to(columns, values.shape).ravel()))
     return sparse.coo_array(entries, shape=(nc * m, dofs)).tocsr()
+
+
+def turned_forces(axes: Array, r: Array, bend: Array) -> Array:
+    """Derivative of the forces sum_k r_k axis_k by the position, (nc, d, d).
+
+    dn = bend dx, and tangents are carried along: dt = -n (t . dn).
+    """
+    n, t = axes[:, 0], axes[:, 1:]
+    along = np.einsum("pk,pkc,pcj->pj", r[:, 1:], t, bend)
+    return r[:, 0, None, None] * bend - n[:, :, None] * along[:, None, :]

@@ -16,18 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...core.errors import UnsupportedForm
 from ..contact.current import CurrentContact
 from ..contact.current_mortar import MortarPair
 from ..contact.current_pairs import Meetings, ObstaclePair, Pair
 from ..contact.facing import Skin
 from ..contact.geometry import Plane
-from ..contact.pairs import KINDS
-from ..elements.given import GivenMatrices
 from ..elements.hyperelasticity import HyperelasticBody, is_hyperelastic
 from ..elements.linear_body import LinearBody
-from ..elements.rigid import Rigid
-from .parts import FINITE
+from .finite_checks import check_nodes, check_supported
 from .supports import locate
 
 if TYPE_CHECKING:
@@ -85,6 +81,29 @@ class NonlinearParts:
     def has_pairs(self) -> bool:
         """True where two bodies that deform meet."""
         return any(isinstance(pair, MortarPair) for pair in self.contact.pairs)
+
+    @cached_property
+    def gathers(self) -> sparse.csr_array:
+        """C of `contact.current_mortar`: what contacts need of f_int - f, (nc d, dofs).
+
+        1 at their own nodes, and parts of middles beside these.
+        """
+        nc, d = self.at.shape
+        slaves = self.at[:, 0] // d
+        own = (np.ones(nc), (np.arange(nc), slaves))
+        out = sparse.csr_array(own, shape=(nc, len(self.X)))
+        start = 0
+        for pair in self.contact.pairs:
+            stop = start + len(pair.slaves)
+            if isinstance(pair, MortarPair):
+                row = np.full(len(self.X), -1)
+                row[pair.slaves] = np.arange(start, stop)
+                middle, corner, part = pair.slave.means
+                kept = row[corner] >= 0
+                entries = (part[kept], (row[corner[kept]], middle[kept]))
+                out = out + sparse.csr_array(entries, shape=out.shape)
+            start = stop
+        return sparse.csr_array(sparse.kron(out, sparse.eye_array(d), format="csr"))
 
     def meet(self, u: Array) -> Meetings:
         """Where the contact pairs meet at displacements u (nodes, d).
@@ -183,7 +202,7 @@ def nonlinear_parts(model: Model) -> NonlinearParts:
 
 
 def _nonlinear_parts(model: Model) -> NonlinearParts:
-    _check_supported(model)
+    check_supported(model)
     linear = model.discretisation  # of the tangent at rest: same dofs, contacts and checks
     bodies = tuple(
         (HyperelasticBody if is_hyperelastic(body.material) else LinearBody)(
@@ -195,9 +214,8 @@ def _nonlinear_parts(model: Model) -> NonlinearParts:
     d = X.shape[1]
     slaves = [p.rows.nodes + linear.offsets[p.body] // d for p in linear.placed]
     nodes = np.concatenate([np.zeros(0, dtype=np.int64), *slaves])
-    _check_single(nodes)
     pairs = _pairs(model, slaves, linear)
-    _check_apart(pairs, nodes)
+    check_nodes(pairs, nodes, free_dofs(linear).reshape(-1, d))
     at = nodes[:, None] * d + np.arange(d)
     is_free = free_dofs(linear)
     rows, columns = _pattern(bodies)
@@ -219,71 +237,6 @@ def _nonlinear_parts(model: Model) -> NonlinearParts:
                           columns, pointers, sparse.csc_array(taken))  # fmt: skip
 
 
-def _check_supported(model: Model) -> None:
-    asked = all(contact.kinematics == FINITE for contact in model.contacts)
-    for k, body in enumerate(model.bodies):
-        at, what = ("bodies", k, "material"), f"body {body.name!r}"
-        if isinstance(body.material, Rigid):
-            raise UnsupportedForm(
-                f"{what} is rigid, and contact of finite kinematics needs bodies that deform",
-                at, "",
-            )  # fmt: skip
-        if isinstance(body.material, GivenMatrices):
-            raise UnsupportedForm(
-                f"{what} has a given K, and contact of finite kinematics needs bodies with a "
-                "law; give its contacts kinematics='small'", at, "",
-            )  # fmt: skip
-        if not (asked or is_hyperelastic(body.material)):
-            raise UnsupportedForm(
-                "others have hyperelastic laws and this one is linear elastic; give all of "
-                "them NeoHookean or the like, or say that it keeps small strains by "
-                "kinematics='finite' of the contacts", at, what,
-            )  # fmt: skip
-    for k, contact in enumerate(model.contacts):
-        what = f"contact on {contact.slave!r}"
-        if contact.obstacle is None:
-            _check_pair(model, k)
-            continue
-        if contact.method != "nodal":
-            raise UnsupportedForm(
-                "finite kinematics has nodal contact with an obstacle only; use method='nodal'",
-                ("contacts", k, "method"), what,
-            )  # fmt: skip
-        for name in ("gap_slopes", "normal_slopes"):
-            if not hasattr(contact.obstacle, name):
-                raise UnsupportedForm(
-                    f"large deformations need its method {name}, as Plane, Sphere and "
-                    f"LevelSet have it; got {contact.obstacle!r}",
-                    ("contacts", k, "obstacle"), "obstacle",
-                )  # fmt: skip
-
-
-def _check_pair(model: Model, k: int) -> None:
-    """Raise UnsupportedForm for what a pair of finite kinematics does not have."""
-    contact = model.contacts[k]
-    what = f"contact on {contact.slave!r}"
-    if contact.method != "mortar":
-        raise UnsupportedForm(
-            "two bodies that deform meet by averages in finite kinematics; use "
-            "method='mortar', as by default", ("contacts", k, "method"), what,
-        )  # fmt: skip
-    if contact.tresca is not None:
-        raise UnsupportedForm(
-            "a given friction bound would hold sides that have slid off each other; expected "
-            "mu", ("contacts", k, "tresca"), what,
-        )  # fmt: skip
-    for side in (contact.slave, contact.master):
-        number, name = locate(model.bodies, str(side))
-        kinds = {block.kind for block in model.bodies[number].mesh.surface(name)}
-        if kinds - set(KINDS):
-            raise UnsupportedForm(
-                "two bodies that deform meet in finite kinematics on facets of first order; "
-                f"got {', '.join(sorted(kinds))} on {side!r}; give the bodies order=1, or "
-                "take LinearElastic and kinematics='small'",
-                ("contacts", k, "kinematics"), what,
-            )  # fmt: skip
-
-
 def _pairs(model: Model, slaves: list[Index], linear: Discretisation) -> list[Pair]:
     """The pairs of the contacts; slaves: nodes of their rows."""
     d = model.dimension
@@ -300,7 +253,8 @@ def _pairs(model: Model, slaves: list[Index], linear: Discretisation) -> list[Pa
             k, name = locate(model.bodies, side)
             facets = model.bodies[k].mesh.surface(name)
             skins.append(Skin.of(facets, int(linear.offsets[k]) // d))
-        out.append(MortarPair(nodes, *skins, is_free[nodes]))
+        names = (contact.slave, str(contact.master))
+        out.append(MortarPair(nodes, *skins, is_free[nodes], names))
     return out
 
 
@@ -309,24 +263,6 @@ def free_dofs(linear: Discretisation) -> NDArray[np.bool_]:
     out = np.zeros(linear.dofs, dtype=bool)
     out[linear.free] = True
     return out
-
-
-def _check_apart(pairs: Sequence[Pair], slaves: Index) -> None:
-    """Raise UnsupportedForm where a node of a master carries a contact of its own."""
-    masters = [pair.master.all for pair in pairs if isinstance(pair, MortarPair)]
-    if masters and np.isin(np.concatenate(masters), slaves).any():
-        raise UnsupportedForm(
-            "a node is in a slave and in a master surface, large deformations allow one; "
-            "leave it out of the slave (where), or make the surfaces smaller", ("contacts",),
-        )  # fmt: skip
-
-
-def _check_single(nodes: Index) -> None:
-    if len(np.unique(nodes)) < len(nodes):
-        raise UnsupportedForm(
-            "a node meets two obstacles, large deformations allow one; join both into one "
-            "LevelSet, or leave the node out of one of them (where)", ("contacts",),
-        )  # fmt: skip
 
 
 def _pattern(bodies: Sequence[HyperelasticBody | LinearBody]) -> tuple[Index, Index]:

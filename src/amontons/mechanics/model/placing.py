@@ -217,7 +217,7 @@ def _met(
     k, surface = locate(bodies, contact.slave)
     slave, size = bodies[k].mesh, int(offsets[-1])
     far = slides_far(bodies, contact)
-    mortar = is_mortar(slave, surface, contact) and not far
+    mortar = is_mortar(slave, surface, contact)
     points = slave.points[
         mortar_nodes(slave, surface) if mortar else contact_nodes(slave, surface)[0]
     ]

@@ -25,7 +25,7 @@ and what the mending of overlaps does.  That is an identity of the scheme, to ro
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -35,109 +35,33 @@ from ...core.arrays import finite, number
 from ...core.clock import NEVER, Deadline
 from ...core.errors import Interrupted, InvalidInput, NotConverged
 from ...problem.friction import FrictionProblem
-from ...problem.law import Coulomb, Law, Tied, joined
 from ...problem.solution import FrictionSolution
 from ...solvers.asked import Asked
 from ...solvers.contract import Iterate, Solver
 from ...solvers.driver import drive_as_asked
 from .bodies import GROUND, RigidBodies
+from .ends import ended, freely, middle_of
 from .meeting import Meetings, meetings
-from .rows import (
-    Rows,
-    delassus,
-    frames_of,
-    impulses,
-    rotations,
-    turned,
-    turned_freely,
-    velocities,
-)
+from .quick import Found, Posed, found_quickly, law_of, pose
+from .rows import Rows, delassus, impulses, rotations, rows_at, turned
+from .states import Motion, RigidEnergies, RigidState, RigidStep
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 WHOLE = 1e-9  # the end may miss a whole number of steps by this part of a step
 OVERLAP = 1e-5  # of the smallest body, below which overlaps are left
 TOUCHING = 1e-9  # of a body, gaps up to which it touches
+NOTHING = np.zeros((0, 3))
 
 
-class Motion(NamedTuple):
-    """Where all bodies are and how they move; all (n, 3) but orientation (n, 4).
+class _Met(NamedTuple):
+    """Contacts that were found, with their keys, and what they make with the joints."""
 
-    spin: angular velocity in own axes.
-    """
-
-    position: Array
-    orientation: Array
-    velocity: Array
-    spin: Array
-
-
-@dataclass(frozen=True, eq=False)
-class RigidState:
-    """All that the next step needs: an evolution goes on from it with the same numbers."""
-
-    index: int
-    time: float
-    motion: Motion
-    keys: Index  # (nc, 3) slave, master and feature of the last contacts
-    impulses: Array  # (nc, 3) theirs, in their frames
-
-
-@dataclass(frozen=True)
-class RigidEnergies:
-    """Kinetic and potential energy at the end of a step, works within it."""
-
-    kinetic: float
-    potential: float
-    gain: float  # of both together
-    contact: float  # work of contacts and joints
-    mending: float  # of overlaps
-
-    @property
-    def defect(self) -> float:
-        """What the balance misses, of rounding."""
-        return self.gain - self.contact - self.mending
-
-
-@dataclass(frozen=True, eq=False)
-class RigidStep:
-    """One step: the state after it, its contacts and energies.
-
-    meetings: contacts that were looked at, the first of `solution`; r (nc, 3): their impulses
-    in their frames, normal first; frames (nc, 3, 3) by rows; solution: None without contacts
-    and joints; joints (k, 3): impulses on the first bodies, in global axes.
-    """
-
-    system: RigidBodies
-    state: RigidState
-    meetings: Meetings
-    frames: Array
-    r: Array
-    joints: Array
-    energies: RigidEnergies
-    solution: FrictionSolution | None
-
-    @property
-    def time(self) -> float:
-        """Time at the end of the step."""
-        return self.state.time
-
-    @property
-    def position(self) -> Array:
-        """Centres of mass, (n, 3)."""
-        return self.state.motion.position
-
-    @property
-    def rotation(self) -> Array:
-        """Rotations from own to global axes, (n, 3, 3)."""
-        return rotations(self.state.motion.orientation)
-
-    @property
-    def status(self) -> NDArray[np.int8]:
-        """ContactStatus of the contacts, (nc,)."""
-        if self.solution is None:
-            return np.zeros(0, np.int8)
-        return self.solution.status[: len(self.r)]
+    found: Meetings
+    keys: Index  # (nc, 3) slave, master, feature
+    rows: Rows
+    apart: Array  # (k, 3) sides of joints
+    deepest: float  # largest overlap or distance of the sides of a joint
 
 
 def evolve_rigid(
@@ -210,9 +134,11 @@ class _Stepping:
     ) -> None:  # fmt: skip
         self.system, self.h, self.overlap, self.asked = system, step, overlap, asked
         self.solver, self.check = solver, check
-        self.masses = np.array([body.mass for body in system.bodies])
-        self.inertia = np.array([body.inertia for body in system.bodies])
-        self.inverse = np.linalg.inv(self.inertia)
+        masses = np.array([body.mass for body in system.bodies])
+        inertia = np.array([body.inertia for body in system.bodies])
+        self.inverse = np.linalg.inv(inertia)
+        self.gravity = np.array(system.gravity, dtype=float)
+        self.bodies = masses, inertia, self.inverse
         self.near = TOUCHING * system.packed.reach
         begin = at_start(system).motion
         R = rotations(begin.orientation)
@@ -230,120 +156,91 @@ class _Stepping:
     def advance(self, state: RigidState, time: float, deadline: Deadline) -> RigidStep:
         """One step from a state to a time."""
         h, before = self.h, state.motion
-        begin = before.position
-        spin = turned_freely(self.inertia, before.spin, h)
-        middle = self._middle(before)
-        found, rows, apart = self._rows(*middle, before)
-        moved = self._mended(rows, found, apart, middle[1])
+        begin, masses = before.position, self.bodies[0]
+        middle = middle_of(*before, h)
+        at = self._rows(*middle)
+        moved = self._mended(at, middle[1])
         if moved is not None:
             before = self._shifted(before, moved, rotations(before.orientation))
-            middle = self._middle(before)
-            found, rows, apart = self._rows(*middle, before)
-        R = middle[1]
-        free = before.velocity + h * np.asarray(self.system.gravity)
-        r, solution = np.zeros((len(rows.slave), 3)), None
-        velocity, after = free, spin
-        contact = 0.0
-        if len(r):
-            solution = self._solve(state, before, found, rows, (free, spin), R, deadline)
-            r = solution.r
-            push, turn = impulses(rows, r, len(free))
-            velocity = free + push / self.masses[:, None]
-            own = np.einsum("bij,bi->bj", R, turn)
-            after = spin + np.einsum("bij,bj->bi", self.inverse, own)
-            mean, turning = 0.5 * (before.velocity + velocity), 0.5 * (spin + after)
-            contact = float((push * mean).sum() + (own * turning).sum())
-        position = before.position + 0.5 * h * (before.velocity + velocity)
-        orientation = turned(before.orientation, 0.5 * h * (before.spin + after))
-        motion = Motion(position, orientation, velocity, after)
-        nc = len(found.slave)
-        keys = np.column_stack([found.slave, found.master, found.feature])
-        new = RigidState(state.index + 1, time, motion, keys, r[:nc])
-        mending = -self._weighs(before.position - begin)
-        energies = self._energies(state.motion, motion, contact, mending)
-        return RigidStep(self.system, new, found, rows.axes[:nc], r[:nc], r[nc:], energies,
-                         solution)  # fmt: skip
+            middle = middle_of(*before, h)
+            at = self._rows(*middle)
+        R, nc = middle[1], len(at.keys)
+        free = freely(before.velocity, before.spin, self.bodies[1], self.gravity, h)
+        solved, r = None, np.zeros((0, 3))
+        if len(at.rows.slave):
+            posed = Posed(*pose(
+                at.rows, nc, (masses, self.inverse, R), (before.velocity, before.spin), free,
+                self.system.restitution, at.keys, (state.keys, state.impulses),
+            ))  # fmt: skip
+            solved = self._quickly(posed, nc, deadline) or self._solve(
+                posed, nc, state.index + 1, deadline
+            )
+            r = solved.r if isinstance(solved, Found) else solved.r.copy()
+        motion, energies = ended(
+            at.rows, r, R, self.bodies, self.gravity, h, begin, tuple(before), free
+        )
+        new = RigidState(state.index + 1, time, Motion(*motion), at.keys, r[:nc])
+        return RigidStep(self.system, new, at.found, at.rows.axes[:nc], r[:nc], r[nc:],
+                         RigidEnergies(*energies), solved)  # fmt: skip
 
-    def _middle(self, motion: Motion) -> tuple[Array, Array]:
-        """Positions and rotations at the middle of the step, as the bodies move now."""
-        half = 0.5 * self.h
-        orientation = turned(motion.orientation, half * motion.spin)
-        return motion.position + half * motion.velocity, rotations(orientation)
-
-    def _rows(self, x: Array, R: Array, motion: Motion) -> tuple[Meetings, Rows, Array]:
-        """Contacts, all rows, and how far the sides of joints are apart, (k, 3)."""
+    def _rows(self, x: Array, R: Array) -> _Met:
+        """Contacts and joints of bodies at x, turned by R."""
         found = meetings(self.system.packed, x, R, self.near)
-        slave, master = found.slave, found.master
-        axes = frames_of(found.normals)
-        arms = found.points - x[slave]
-        others = found.points - x[master]  # of the ground: not read
+        keys, axes, arms, others, deepest = rows_at(*found, x)
         first, second = self.joined
         if not len(first):
-            return found, Rows(slave, master, axes, arms, others), np.zeros((0, 3))
+            rows = Rows(found.slave, found.master, axes, arms, others)
+            return _Met(found, keys, rows, NOTHING, deepest)
         own, other = (
             np.einsum("jik,jk->ji", R[b], a)
             for b, a in zip(self.joined, self.anchors, strict=True)
         )
         fixed = np.where((second == GROUND)[:, None], self.anchors[1], x[second] + other)
         rows = Rows(
-            np.concatenate([slave, first]), np.concatenate([master, second]),
+            np.concatenate([found.slave, first]), np.concatenate([found.master, second]),
             np.concatenate([axes, np.broadcast_to(np.eye(3), (len(first), 3, 3))]),
             np.concatenate([arms, own]), np.concatenate([others, other]),
         )  # fmt: skip
-        return found, rows, x[first] + own - fixed
+        apart = x[first] + own - fixed
+        return _Met(found, keys, rows, apart, max(deepest, float(np.abs(apart).max())))
 
     # ------------------------------------------------------------------ problems
-    def _law(self, found: Meetings, mu: float) -> Law:
-        """Friction at contacts, bonds at joints."""
-        contacts = Coulomb(np.full(len(found.slave), mu))
-        joints = len(self.joined[0])
-        if not joints:
-            return contacts
-        return joined([contacts, Tied(joints)]) if len(found.slave) else Tied(joints)
+    def _quickly(self, posed: Posed, contacts: int, deadline: Deadline) -> Found | None:
+        """What sweeps find where no solver is asked for, and no time is counted or over."""
+        if self.solver is not None or deadline.work is not None:
+            return None
+        if deadline is not NEVER and deadline.passed:
+            return None
+        return found_quickly(posed, contacts, self.system.mu, self.asked.tolerance)
 
     def _solve(
-        self, state: RigidState, before: Motion, found: Meetings, rows: Rows,
-        free: tuple[Array, Array], R: Array, deadline: Deadline,
-    ) -> FrictionSolution:  # fmt: skip
-        """The impulses of a step."""
-        nc, e = len(found.slave), self.system.restitution
-        q = velocities(rows, free[0], np.einsum("bij,bj->bi", R, free[1]))
-        if e > 0:
-            spin = np.einsum("bij,bj->bi", R, before.spin)
-            u0 = velocities(rows, before.velocity, spin)[:nc, 0]
-            q[:nc, 0] += e * np.minimum(u0, 0.0)
-        problem = self._problem(rows, q, self._law(found, self.system.mu), R)
-        start = np.zeros_like(q)
-        _match(found.slave, found.master, found.feature, state.keys, state.impulses, start)
+        self, posed: Posed, contacts: int, number: int, deadline: Deadline
+    ) -> FrictionSolution:
+        """The impulses of a step, its number for messages."""
+        law = law_of(contacts, len(posed.q) - contacts, self.system.mu)
         asked = self.asked if deadline is NEVER else replace(self.asked, time_limit=deadline)
-        solution = drive_as_asked(problem, asked, Iterate(start), self.solver)
+        problem = posed.problem(law)
+        solution = drive_as_asked(problem, asked, Iterate(posed.start), self.solver)
         if self.check and not solution.converged:
             record = solution.convergence
             kind = Interrupted if record.by_user else NotConverged
-            raise kind(f"step {state.index + 1}: {record}. {record.advice}", solution)
+            raise kind(f"step {number}: {record}. {record.advice}", solution)
         return solution
 
-    def _problem(self, rows: Rows, q: Array, law: Law, R: Array) -> FrictionProblem:
-        inverse = R @ self.inverse @ R.swapaxes(1, 2)
-        W = delassus(rows, self.masses, inverse)
-        return FrictionProblem._from_blocks(W, q, law)
-
-    def _mended(
-        self, rows: Rows, found: Meetings, apart: Array, R: Array
-    ) -> tuple[Array, Array] | None:
+    def _mended(self, at: _Met, R: Array) -> tuple[Array, Array] | None:
         """Displacements and rotations (n, 3) that take overlaps away; None of small ones."""
-        worst = max(-found.gaps.min(initial=0.0), np.abs(apart).max(initial=0.0))
-        if worst <= self.overlap:
+        if at.deepest <= self.overlap:
             return None
-        nc = len(found.slave)
+        rows, nc, masses = at.rows, len(at.keys), self.bodies[0]
         q = np.zeros((len(rows.slave), 3))
-        q[:nc, 0] = found.gaps + 0.5 * self.overlap
-        q[nc:] = apart
-        problem = self._problem(rows, q, self._law(found, 0.0), R)
-        solution = drive_as_asked(problem, self.asked, None, self.solver)
-        push, turn = impulses(rows, solution.r, len(self.masses))
+        q[:nc, 0] = at.found.gaps + 0.5 * self.overlap
+        q[nc:] = at.apart
         inverse = R @ self.inverse @ R.swapaxes(1, 2)
-        return push / self.masses[:, None], np.einsum("bij,bj->bi", inverse, turn)
+        law = law_of(nc, len(q) - nc, 0.0)
+        problem = FrictionProblem._from_blocks(delassus(rows, masses, inverse), q, law)
+        solution = drive_as_asked(problem, self.asked, None, self.solver)
+        push, turn = impulses(rows, solution.r, len(masses))
+        return push / masses[:, None], np.einsum("bij,bj->bi", inverse, turn)
 
     def _shifted(self, motion: Motion, by: tuple[Array, Array], R: Array) -> Motion:
         """The bodies moved and turned, with the velocities that they have in own axes."""
@@ -352,37 +249,3 @@ class _Stepping:
         return motion._replace(
             position=motion.position + moved, orientation=turned(motion.orientation, own)
         )
-
-    # ------------------------------------------------------------------ energies
-    def _energies(
-        self, before: Motion, after: Motion, contact: float, mending: float
-    ) -> RigidEnergies:
-        kinetic = self._kinetic(after)
-        change = after.position - before.position
-        gain = kinetic - self._kinetic(before) - self._weighs(change)
-        potential = -self._weighs(after.position)
-        return RigidEnergies(kinetic, potential, gain, contact, mending)
-
-    def _kinetic(self, motion: Motion) -> float:
-        moving = 0.5 * self.masses @ (motion.velocity**2).sum(axis=1)
-        turning = np.einsum("bi,bij,bj->", motion.spin, self.inertia, motion.spin)
-        return float(moving + 0.5 * turning)
-
-    def _weighs(self, moved: Array) -> float:
-        """Work of gravity on displacements (n, 3)."""
-        return float(self.masses @ (moved @ np.asarray(self.system.gravity)))
-
-
-def _match(
-    slave: Index, master: Index, feature: Index, keys: Index, last: Array, start: Array
-) -> None:
-    """Give contacts the impulses that the same corners had in the last step."""
-    if not len(last):
-        return
-    old = {tuple(key): k for k, key in enumerate(keys.tolist())}
-    for k, key in enumerate(
-        zip(slave.tolist(), master.tolist(), feature.tolist(), strict=True)
-    ):
-        found = old.get(key)
-        if found is not None:
-            start[k] = last[found]

@@ -35,17 +35,12 @@ class Rows(NamedTuple):
     master_arms: Array
 
 
-def frames_of(normals: Array) -> Array:
-    """Normal and two tangents, (n, 3, 3) by rows, right-handed."""
-    return _frames(normals)
-
-
 def delassus(rows: Rows, masses: Array, inverse: Array) -> BlockRows:
     """W in block rows; masses (n,), inverse (n, 3, 3) of the inertia in global axes."""
-    indptr, count = _coupled(rows.slave, rows.master, len(masses))
+    indptr, count = coupled(rows.slave, rows.master, len(masses))
     indices, data = np.empty(count, np.int32), np.empty((count, 3, 3))
     diagonal = np.empty(len(rows.slave), np.int32)
-    _blocks(*rows, masses, inverse, indptr, indices, data, diagonal)
+    fill_blocks(*rows, masses, inverse, indptr, indices, data, diagonal)
     for array in (indptr, indices, data, diagonal):
         array.flags.writeable = False
     return BlockRows(indptr, indices, data, diagonal)
@@ -53,16 +48,17 @@ def delassus(rows: Rows, masses: Array, inverse: Array) -> BlockRows:
 
 def velocities(rows: Rows, v: Array, omega: Array) -> Array:
     """u (n, 3) of bodies that move with v and omega, (b, 3), in global axes."""
-    return _velocities(*rows, v, omega)
+    return row_velocities(*rows, v, omega)
 
 
 def impulses(rows: Rows, r: Array, bodies: int) -> tuple[Array, Array]:
     """Impulse and angular impulse about its centre of mass of each body, (b, 3)."""
-    return _impulses(*rows, r, bodies)
+    return row_impulses(*rows, r, bodies)
 
 
 @njit(cache=True, error_model="numpy")
-def _frames(normals):
+def frames_of(normals):
+    """Normal and two tangents, (n, 3, 3) by rows, right-handed."""
     out = np.empty((len(normals), 3, 3))
     for i in range(len(normals)):
         n = normals[i]
@@ -76,6 +72,25 @@ def _frames(normals):
         first = first / np.sqrt((first * first).sum())
         out[i, 0], out[i, 1], out[i, 2] = n, first, np.cross(n, first)
     return out
+
+
+@njit(cache=True, error_model="numpy")
+def rows_at(slave, master, feature, points, normals, gaps, x):  # noqa: PLR0913
+    """(keys, axes, arms, arms of masters, deepest overlap >= 0) of contacts of bodies at x.
+
+    keys (n, 3): slave, master, feature.  The ground has arms that are not read.
+    """
+    n = len(slave)
+    keys, arms, others = np.empty((n, 3), np.int64), np.empty((n, 3)), np.zeros((n, 3))
+    deepest = 0.0
+    for c in range(n):
+        keys[c, 0], keys[c, 1], keys[c, 2] = slave[c], master[c], feature[c]
+        deepest = max(deepest, -gaps[c])
+        for k in range(3):
+            arms[c, k] = points[c, k] - x[slave[c], k]
+            if master[c] >= 0:
+                others[c, k] = points[c, k] - x[master[c], k]
+    return keys, frames_of(normals), arms, others, deepest
 
 
 @njit(cache=True, error_model="numpy")
@@ -99,7 +114,7 @@ def _of_bodies(slave, master, bodies):
 
 
 @njit(cache=True, error_model="numpy")
-def _coupled(slave, master, bodies):
+def coupled(slave, master, bodies):
     """indptr (n + 1,) of the contacts that share a body, and how many blocks there are."""
     first, members = _of_bodies(slave, master, bodies)
     n = len(slave)
@@ -119,7 +134,7 @@ def _coupled(slave, master, bodies):
 
 
 @njit(cache=True, error_model="numpy")
-def _blocks(  # noqa: PLR0913
+def fill_blocks(  # noqa: PLR0913
     slave, master, axes, arms, master_arms, masses, inverse, indptr, indices, data, diagonal
 ):
     """Fill the columns of each row in ascending order, and its blocks."""
@@ -175,7 +190,8 @@ def _blocks(  # noqa: PLR0913
 
 
 @njit(cache=True, error_model="numpy")
-def _velocities(slave, master, axes, arms, master_arms, v, omega):  # noqa: PLR0913
+def row_velocities(slave, master, axes, arms, master_arms, v, omega):  # noqa: PLR0913
+    """`velocities`, for kernels."""
     u = np.empty((len(slave), 3))
     for c in range(len(slave)):
         b = slave[c]
@@ -189,7 +205,8 @@ def _velocities(slave, master, axes, arms, master_arms, v, omega):  # noqa: PLR0
 
 
 @njit(cache=True, error_model="numpy")
-def _impulses(slave, master, axes, arms, master_arms, r, bodies):  # noqa: PLR0913
+def row_impulses(slave, master, axes, arms, master_arms, r, bodies):  # noqa: PLR0913
+    """`impulses`, for kernels."""
     push, turn = np.zeros((bodies, 3)), np.zeros((bodies, 3))
     for c in range(len(slave)):
         p = np.zeros(3)

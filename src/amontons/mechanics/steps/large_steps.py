@@ -11,11 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.clock import NEVER, Deadline
+from ...problem.law import VaryingFriction
+from ...problem.law.law import MU
 from ...problem.solution import FrictionSolution
 from ..contact import frames
+from ..contact.current_mortar import MortarMeeting
 from ..model import Model
 from ..model.diagnosis import with_diagnosis
-from ..model.large_deformation import large_step
+from ..model.large_deformation import LargeDeformation, large_step
 from ..model.nodal_forces import NodalForces
 from ..model.nonlinear_parts import nonlinear_parts
 from ..model.reactions import support_forces
@@ -23,10 +26,12 @@ from .energy import Energies, Forces, path_work, slow_energies
 from .moreau_jean import Solve
 from .passage import Crossing, taken
 from .rubbing import quasi_static_friction, rubbed
+from .springs import Springs
 from .state import State, TimeStep, undeformed
 from .system import Motion
 
 Array = NDArray[np.float64]
+AT_BOUND = 1e-6  # relative distance of a friction force from its bound that counts as none
 
 
 class LargeSlowModel:
@@ -59,16 +64,19 @@ class LargeSlowModel:
         problem = large_step(
             self.motion.body, load, prescribed, q0, self._known(state),
         )  # fmt: skip
+        if isinstance(problem.law, VaryingFriction):  # of the speed in this step
+            problem = problem.with_law(problem.law.lasting(abs(time - state.time) or 1.0))
         arrive = None
         if self.crossing is not None:
-            drift = (time - state.time) * at_contacts(self.motion.body, state.velocity)
+            drift = last_motion(problem, state, time - state.time)
             arrive = partial(self.crossing.along, problem, drift, limit)
         solution, passage = taken(
             lambda start: solve(problem, start, None), arrive, state.force, (state.time, time)
         )
         assert solution.v is not None
         q1 = problem.displacement(solution.v).ravel()
-        axes = frames(problem.contact_point(solution.v).n)
+        meeting = problem.contact_point(solution.v).meeting
+        axes = frames(meeting.normals)
         way = solution.u[:, 1:]
         work = quasi_static_friction(state.force[:, 1:], solution.r[:, 1:], way)
         energies = self._energies(state, q1, load, solution.r, float(work.sum()))
@@ -81,7 +89,7 @@ class LargeSlowModel:
         active = np.arange(len(way))
         return TimeStep(self.motion.body, new, solution, active, energies, solution.u[:, 0],
                         support_forces(self.motion.parts, rest), acting.load, axes,
-                        passage)  # fmt: skip
+                        passage, passed=meeting.passed)  # fmt: skip
 
     def explained(self, solution: FrictionSolution) -> FrictionSolution:
         """The same record; one that failed says which bodies give way."""
@@ -116,9 +124,33 @@ class LargeSlowModel:
         moved = q.reshape(parts.X.shape)
         meeting = parts.meet(moved)
         pushed = meeting.columns(frames(meeting.normals)) @ r.ravel()
-        return Forces(parts.forces(moved), load.at(moved), pushed, parts.energy(moved))
+        stored = Springs.of(self.motion.body.law, r.shape[1]).energy(r)
+        return Forces(parts.forces(moved), load.at(moved), pushed, parts.energy(moved), stored)
 
 
-def at_contacts(model: Model, displacement: Array) -> Array:
-    """Displacements of the contacts (nc, d) out of those of all dofs (dofs,)."""
-    return displacement[nonlinear_parts(model).at]
+def last_motion(problem: LargeDeformation, state: State, duration: float) -> Array:
+    """V (nc, d) of `passage`: how the contacts moved in the last step, scaled to a duration.
+
+    Those with an obstacle move with their node.  Between bodies that deform the law at the last
+    state says it: what sticks has not moved, what slips has moved against its force.
+    """
+    parts, moved = problem.parts, duration * state.velocity
+    out = moved[parts.at]
+    meeting = problem.earlier
+    pairs = np.concatenate(
+        [np.full(len(p.slaves), isinstance(p, MortarMeeting)) for p in meeting.parts]
+    )
+    if not pairs.any():
+        return out
+    n = meeting.normals
+    along = meeting.averages @ moved.reshape(parts.X.shape)
+    along -= n * (n * along).sum(axis=1)[:, None]
+    force = np.einsum("pk,pkc->pc", state.force[:, 1:], frames(n)[:, 1:])
+    size, bound = np.linalg.norm(force, axis=1), parts.contact.law.parameters[:, MU]
+    bound = bound * np.maximum(state.force[:, 0], 0.0)
+    against = -force / np.where(size > 0, size, 1.0)[:, None]
+    slipped = against * np.linalg.norm(along, axis=1)[:, None]
+    rubs = pairs & (bound > 0)
+    slips = size >= (1 - AT_BOUND) * bound
+    told = np.where(slips[:, None], slipped, 0.0)
+    return np.where(rubs[:, None], told, np.where(pairs[:, None], along, out))

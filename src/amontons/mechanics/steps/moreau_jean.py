@@ -24,6 +24,8 @@ The law is one of contacts, so of nodes: e is the restitution of a body only whe
 moves with its nodes, as one that is stiff against the step (a period below h).  A soft body
 leaves after its waves have run through it, with what they bring back, whatever e.
 
+Bodies of finite strains have steps of their own, see `large_inertia`.
+
 Contacts that give way have the law of the end of the step, see `springs`, and no restitution.
 
 M_hat does not change, and its W falls apart into the bodies: it is formed once, and every step
@@ -55,9 +57,12 @@ from ...problem.protocol import Problem
 from ...problem.solution import FrictionSolution
 from ...solvers.contract import Iterate
 from ..model import Model
+from ..model.large_deformation import LargeDeformation
 from ..model.reactions import support_forces
 from .bolts import lock_times
 from .energy import Energies
+from .impulses import Shifts
+from .large_inertia import LargeMovingModel
 from .rubbing import rubbed
 from .springs import Springs
 from .state import State, TimeStep
@@ -69,10 +74,7 @@ Mask = NDArray[np.bool_]
 Local = Callable[[FrictionProblem], FrictionProblem]
 Solve = Callable[[Problem, Iterate, Local | None], FrictionSolution]
 TOUCHING = 1e-9  # gaps below this part of the size of a contact's area count as closed
-TRIES = 3  # times that restitution is made smaller before the law on u_theta replaces it
-ENOUGH = 1.05  # times what a first-order estimate says that takes
 CREATED = 1.0  # energy contacts may create in a step, relative to the total, per tolerance
-ROUNDING = 1e-10  # of what a contact gives and takes: it creates no energy below
 W_LIMIT = 1e9  # bytes of W above which it is not formed
 
 
@@ -105,7 +107,7 @@ class MoreauJean:
                 f"{self.reach!r}", ("reach",),
             )
 
-    def prepare(self, model: Model, tolerance: float) -> MovingModel:
+    def prepare(self, model: Model, tolerance: float) -> MovingModel | LargeMovingModel:
         """The matrices of all steps; tolerance of their solves."""
         if model.kind.no_inertia:
             raise UnsupportedForm(f"model: {model.kind.no_inertia}")
@@ -114,6 +116,8 @@ class MoreauJean:
                 f"pretension {name!r}: bolts are locked in quasi-static steps only; tighten "
                 "them so, and begin the dynamics from that state with Fix on its length"
             )
+        if model.kind is LargeDeformation:
+            return LargeMovingModel(self, model, tolerance)
         return MovingModel(self, model, tolerance)
 
 
@@ -172,7 +176,7 @@ class MovingModel:
         start = Iterate(h * state.force[active])
         local = self._local_problem if self._condenses else None
         springs, pulled = self.springs.at(active), state.force[active]
-        shifts = _Shifts.of(
+        shifts = Shifts.of(
             u0[active], gap[active], method, springs, pulled, self.law.tied[active]
         )
         while True:
@@ -269,77 +273,6 @@ class MovingModel:
             loads=float(force @ dq), supports=float(held @ dq) / h,
             contact=work - jump, damping=float(dq @ (C @ dq)) / h, numerical=lost - jump,
         ), rest  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
-class _Shifts:
-    """What is added to u1 in the law of the active contacts, (k, d).
-
-    before (k, d): u0; opening (k,): gap over h, of open contacts; theta; restitution: that of
-    contacts with the law on u1; on_mean (k,): those with the law on u_theta; springs: contacts
-    that give way, gap (k,) and pulled (k, d), forces at first, over theta h; tied (k,);
-    tries: how often restitution was made smaller.
-    """
-
-    before: Array
-    opening: Array
-    theta: float
-    restitution: float
-    on_mean: Mask
-    springs: Springs
-    gap: Array
-    pulled: Array
-    tied: Mask
-    tries: int = 0
-
-    @classmethod
-    def of(
-        cls, before: Array, gap: Array, method: MoreauJean, springs: Springs, pulled: Array,
-        tied: Mask,
-    ) -> _Shifts:  # fmt: skip
-        """Those of a step that begins with u0 (k, d), gaps (k,) and forces (k, d)."""
-        none = np.zeros(len(before), dtype=bool)
-        opening = np.maximum(gap, 0) / method.step if method.reach else np.zeros(len(gap))
-        end = method.theta * method.step
-        return cls(before, opening, method.theta, method.restitution, none, springs, gap / end,
-                   pulled / end, tied)  # fmt: skip
-
-    @property
-    def values(self) -> Array:
-        """(k, d), unit of velocity."""
-        out = np.zeros_like(self.before)
-        out[:, 0] = self.restitution * self.before[:, 0]
-        mean = (1 - self.theta) / self.theta * self.before
-        out = np.where(self.on_mean[:, None], mean, out)
-        # gap at the end >= 0: u1 >= -(gap + (1 - theta) h u0) / (theta h)
-        is_open = self.opening > 0
-        out[is_open, 0] = (self.opening / self.theta + mean[:, 0])[is_open]
-        out[self.tied] = 0.0  # u1 = 0
-        return self.springs.shifted(out, mean, self.gap, self.pulled)
-
-    def changed(self, r: Array, after: Array, excess: float) -> _Shifts | None:
-        """Laws that create less than r and u1 = after, (k, d), did by `excess`; None: no other.
-
-        First those on u_theta for contacts that create energy by themselves, then a smaller
-        restitution, then the law on u_theta for all that do work on it.
-        """
-        own = (r * (self.before + after)).sum(axis=1)
-        size = (np.abs(r) * (np.abs(self.before) + np.abs(after))).sum(axis=1)
-        creating = own > ROUNDING * size  # with restitution 1 it is zero but for rounding
-        if (creating & ~self.on_mean).any():
-            return replace(self, on_mean=self.on_mean | creating)
-        impact = (self.before[:, 0] < 0) & ~self.on_mean & ~self.springs.presses
-        power = float(r[impact, 0] @ -self.before[impact, 0])
-        e = self.restitution
-        if e > 0 and power > 0 and self.tries < TRIES:
-            # impacts take (1 - e) power / 2, power ~ 1 + e: with e it changes by this slope
-            smaller = max(0.0, e - ENOUGH * excess * (1 + e) / (e * power))
-            return replace(self, restitution=smaller, tries=self.tries + 1)
-        mean = self.theta * after + (1 - self.theta) * self.before
-        working = (r * mean).sum(axis=1) > 0
-        if (working & ~self.on_mean).any():
-            return replace(self, on_mean=self.on_mean | working)
-        return None
 
 
 def _velocity(solution: FrictionSolution) -> Array:

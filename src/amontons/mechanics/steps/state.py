@@ -93,7 +93,8 @@ class TimeStep(Shown):
     after the step, unit of length.  frames (nc, d, d): those of the deformed state where it is
     large, else those of the model hold.  passage: the path of the step where it was followed.
     reaction, load (dofs,): nodal forces of supports, and of loads, at the end of the step, in
-    dynamics their means over it.
+    dynamics their means over it.  passed (nc,): forces on the slave's side over those at the
+    slaves, None where they are the same.
     """
 
     model: Model
@@ -106,6 +107,7 @@ class TimeStep(Shown):
     load: Array
     frames: Array | None = None
     passage: Passage | None = None
+    passed: Array | None = None
 
     @property
     def time(self) -> float:
@@ -199,7 +201,8 @@ class TimeStep(Shown):
     def _force(self) -> Array:
         """Contact forces on the slaves, (nc, d), global axes."""
         if self.frames is not None:
-            return np.einsum("pkc,pk->pc", self.frames, self.state.force)
+            force = np.einsum("pkc,pk->pc", self.frames, self.state.force)
+            return force if self.passed is None else force * self.passed[:, None]
         placed = self.model.discretisation.placed
         return forces([p.rows for p in placed], self.state.force)
 

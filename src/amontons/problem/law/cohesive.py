@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from ...core.errors import InvalidInput, shown
 from .changed import Changed
 from .compliant import Compliant
-from .law import INSIDE, Array, Law, per_contact, same_length
+from .law import INSIDE, Array, Law, Mask, per_contact, same_length
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +86,10 @@ class Cohesive(Changed):
     def with_mu(self, mu: Array) -> Cohesive:
         """The law with other coefficients mu, (nc,)."""
         return Cohesive(self.law.with_mu(mu), self.tension)
+
+    def lost(self, gone: Mask) -> Cohesive:
+        """The law without tension, and without Tresca's bounds, of contacts gone (nc,)."""
+        return Cohesive(self.law.lost(gone), np.where(gone, 0.0, self.tension))
 
     def with_bounds(self, bounds: Array) -> Cohesive:
         """The law with other bounds tau, (nc,)."""

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from ...core.arrays import read_only, real
 from ...core.errors import InvalidInput, shown
 from .changed import Changed
-from .law import INSIDE, Array, Law, per_contact, same_length
+from .law import INSIDE, Array, Law, Mask, per_contact, same_length
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +96,10 @@ class Compliant(Changed):
     def with_mu(self, mu: Array) -> Compliant:
         """The law with other coefficients mu, (nc,)."""
         return replace(self, law=self.law.with_mu(mu))
+
+    def lost(self, gone: Mask) -> Compliant:
+        """The law where contacts gone (nc,) have lost what holds them without pressure."""
+        return replace(self, law=self.law.lost(gone))
 
     def with_bounds(self, bounds: Array) -> Compliant:
         """The law with other bounds tau, (nc,)."""

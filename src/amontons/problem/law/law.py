@@ -195,6 +195,11 @@ class Law:
         bound = np.where(finite, bounds, self.parameters[:, BOUND])
         return self._of(self.kind, np.column_stack([self.parameters[:, MU], bound]))
 
+    def lost(self, gone: Mask) -> Law:
+        """The law where contacts gone (nc,) have lost what holds them without pressure."""
+        held = gone & (self.kind == TRESCA)
+        return self.with_bounds(np.where(held, 0.0, self.parameters[:, BOUND]))
+
     def with_mu(self, mu: Array) -> Law:
         """The law with other coefficients mu, (nc,), of the contacts that have one."""
         has = (self.kind == COULOMB) | (self.kind == CAPPED)

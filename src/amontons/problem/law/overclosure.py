@@ -315,6 +315,10 @@ class VaryingCompliance(Law):
         """The law with other coefficients mu, (nc,)."""
         return replace(self, law=self.inner.with_mu(mu))
 
+    def lost(self, gone: Mask) -> VaryingCompliance:
+        """The law where contacts gone (nc,) have lost what holds them without pressure."""
+        return replace(self, law=self.inner.lost(gone))
+
     def with_bounds(self, bounds: Array) -> VaryingCompliance:
         """The law with other bounds tau, (nc,)."""
         return replace(self, law=self.inner.with_bounds(bounds))

@@ -248,6 +248,10 @@ class VaryingFriction(Law):
         """The law in another unit of r."""
         return replace(self, area=self.area * force, law=self.inner.scaled(force))
 
+    def lost(self, gone: Mask) -> VaryingFriction:
+        """The law where contacts gone (nc,) have lost what holds them without pressure."""
+        return replace(self, law=self.inner.lost(gone))
+
     def with_bounds(self, bounds: Array) -> VaryingFriction:
         """The law with other bounds tau, (nc,)."""
         return replace(self, law=self.inner.with_bounds(bounds))

@@ -110,7 +110,7 @@ def _check_fits(problem: FrictionProblem) -> None:
 
 def _contact_solve(problem: FrictionProblem, r: Array, target: Target) -> Array:
     """Reaction of the contact problem with the compressed W."""
-    found, stages = r, Portfolio(problem, target, spatial(r)).stages()
+    found, stages = r, Portfolio(problem, target, spatial(r)).iterates()
     while problem.error(found) > target.tolerance and not target.deadline.passed:
         iterate = next(stages, None)
         if iterate is None:

@@ -1,10 +1,8 @@
 """Combinations: `Hybrid` runs one solver after another, `Auto` is what a plain `solve` runs.
 
     problem                         what Auto does
-    Delassus form, joints           `inexact`: accelerated sweeps, then inexact Newton with a
-                                    kept block LU; when that stalls, as below.  Joints:
-                                    groups of contacts with the same neighbours, not rigid
-    Delassus form                   `portfolio`: sweeps, smoothing Newton, proximal point
+    Delassus form                   `portfolio`: a race of sweeps, interior point, smoothing and
+                                    inexact Newton by measured progress (`race`)
     global form, W cheap            the same on W = H^T M^-1 H
     global form, mesh, W dear       `ContactMultigrid` from MESH unknowns on, bodies held or
                                     not; when it breaks down or stalls, as below
@@ -28,9 +26,6 @@ When is W cheap (`GlobalMatrices.condensing_is_cheap`; it then also judges)?
                                     (`condensation`) and its blocks fit into DENSE_LIMIT: walls
                                     of many equal blocks yes, one meshed body of 10 000 unknowns
                                     no; never where a body of LARGE_BODY unknowns has levels
-
-Whether to sweep or to take Newton steps is decided while solving, from the measured rate of the
-sweeps and operation counts of Newton (`Joints.newton_cost`, `State.step_cost`).
 
 [ABD] V. Acary, M. Brémond, F. Dubois, CSMA 2017 (see `sweeps.gauss_seidel`).
 """
@@ -69,7 +64,7 @@ from ..newton.semismooth import SemismoothNewton
 from ..newton.tangents import TangentNewton, TangentProblem
 from ..sweeps.gauss_seidel import GaussSeidel
 from .compressed import CompressedDelassus
-from .portfolio import FIRST, JOINTS, Portfolio
+from .portfolio import Portfolio
 from .tethers import Tethers
 
 MESH = 3_000  # unknowns of a mesh from which multigrid beats a factorisation
@@ -209,7 +204,7 @@ def _tried(
 
 
 def _stages(problem: FrictionProblem, start: Iterate, target: Target) -> Iterator[Iterate]:
-    return Portfolio(problem, target, spatial(start.r), JOINTS + FIRST).stages()
+    return Portfolio(problem, target, spatial(start.r)).iterates()
 
 
 def _is_mesh(problem: FrictionProblem) -> bool:

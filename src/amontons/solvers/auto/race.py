@@ -1,74 +1,194 @@
-"""Gauss-Seidel with several relaxations in a race: no single one is good for all problems.
+"""A race of methods by measured progress: what `Auto` runs on the Delassus form.
 
-Measured on packings of some 1000 to 2000 spheres: 1.6 reaches 1e-8 in 1500 sweeps on most of
-them, where 1.0 needs four times as many, but wanders for ever near 1e-3 on two, where 1.3 gets
-to 1e-5; on a rock pile with mu = 1 0.9 gets to 1e-4 in a fraction of the sweeps of the others.
-So all tracks run in turn, the cautious one later, but a track far behind the leader waits.
+Every track has a state of its own and goes on in chunks.  The next chunk goes to the track that
+promises the goal for the least further cost:
+
+    rest = ln(error / goal) (C - c) / ln(error(c) / error(C)),   c = (1 - WINDOW) C,
+
+C what the track has cost and error(c) its best error then: the rate of the last part of its own
+cost, a long one, which is patience.  Besides
+
+    unknown     a track is taken to need some part, or multiple, of all that was spent while it
+                has had a small share of it; a method of Newton's kind what it usually needs
+                until it has cost that
+    first       the track at the top of the table has a few chunks before all others
+    nothing     where no track promises anything, the one that has cost least
+
+    the end     where five times as much was spent as when the best error last halved, and a
+                thousand Newton steps' worth since
+
+So no track is ever given up, none takes more than its share while it does not progress, and
+only ratios of costs matter, which are operation counts.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from functools import partial
+from bisect import bisect_right
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...problem.friction import FrictionProblem
-from ...problem.judge.measures import natural_error
-from ..sweeps.kernels import Sweep, counted, sweep_data, sweeps_inplace, watch_for
+from ...core.errors import SingularOperator
+from ..contract import Breakdown, Iterate
+from .state import State
 
 Array = NDArray[np.float64]
-RELAXATIONS = (1.6, 1.3, 0.9)
-ALONE = 600  # sweeps that the first tracks do before the last one joins them
-FAR_BEHIND = 3.0  # times the leader's error, from which a track waits
+WINDOW = 0.7  # last part of a track's cost from which its rate is told
+FIRST_CHUNKS = 3  # of the first track before its rate counts
+GROWTH = 0.2  # cost of a chunk, of what its track has cost
+SHORTEST = 3e4  # nanoseconds of a chunk at least, or the calls cost more than the sweeps
+LOST, LOST_STEPS = 5.0, 1000.0  # all cost, in what it was at the last progress; steps since
+
+
+class Chunk(NamedTuple):
+    """What a track has after a chunk: r (nc, 3), its iterations, cost in ns and operations.
+
+    flops None where they are not counted; error of r, unit of u, where it is known.
+    """
+
+    r: Array
+    iterations: int
+    cost: float
+    flops: float | None = None
+    error: float = math.inf
+    linear_iterations: int = 0
+
+
+Chunks = Generator[Chunk, float, None]
+
+
+def always(state: State) -> bool:
+    """Whatever the problem."""
+    return True
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A row of the table of tracks: chunks(state) where when(state) holds.
+
+    share: of all cost up to which it is taken to be unknown, and then to need `optimism` times
+    all cost.  needs: nanoseconds that a method of Newton's kind is taken to need, whatever its
+    rate, until it has cost them; None for sweeps.
+    """
+
+    name: str
+    chunks: Callable[[State], Chunks]
+    share: float = 0.0
+    optimism: float = 1.0
+    needs: Callable[[State], float] | None = None
+    when: Callable[[State], bool] = always
 
 
 @dataclass(eq=False)
 class Track:
-    """Sweeps with one relaxation."""
+    """A method in a race: what it has cost, and how its best error, unit of u, has fallen."""
 
-    relaxation: float
-    data: Sweep
-    r: Array
-    error: float = math.inf  # unit of u
-    done: int = 0
+    entry: Entry
+    state: State
+    costs: list[float] = field(default_factory=lambda: [0.0])
+    errors: list[float] = field(default_factory=list)
+    chunks: Chunks | None = None
+
+    @property
+    def cost(self) -> float:
+        """Nanoseconds so far."""
+        return self.costs[-1]
+
+    def advance(self) -> Iterate | None:
+        """The state's best iterate after a chunk; None where the method has ended."""
+        if self.chunks is None:
+            self.chunks = self.entry.chunks(self.state)
+            next(self.chunks)
+            self.errors.append(self.state.first_error)
+        try:
+            chunk = self.chunks.send(max(GROWTH * self.cost, SHORTEST))
+        except (StopIteration, Breakdown, SingularOperator):
+            return None
+        state = self.state
+        found = state.offer(
+            chunk.r, chunk.iterations, self.entry.name, chunk.flops, chunk.error,
+            chunk.linear_iterations,
+        )  # fmt: skip
+        self.costs.append(self.cost + chunk.cost)
+        self.errors.append(min(state.latest, self.errors[-1]))
+        return found
+
+    def rest(self, total: float) -> float:
+        """Nanoseconds to the goal that it promises, of `total` spent on all tracks."""
+        entry = self.entry
+        if entry.needs is not None:
+            needed = entry.needs(self.state)
+            if self.cost < needed:
+                return needed - self.cost
+        promise = self._at_its_rate()
+        unknown = self.cost < entry.share * total
+        return min(promise, entry.optimism * total) if unknown else promise
+
+    def _at_its_rate(self) -> float:
+        if len(self.errors) <= FIRST_CHUNKS:
+            return math.inf
+        error, cost = self.errors[-1], self.cost
+        at = bisect_right(self.costs, (1.0 - WINDOW) * cost) - 1
+        if not error < self.errors[at]:
+            return math.inf
+        if error <= self.state.goal:
+            return 0.0
+        rate = math.log(self.errors[at] / error) / (cost - self.costs[at])
+        return math.log(error / self.state.goal) / rate
 
 
+@dataclass(eq=False)
 class Race:
-    """Tracks of one problem, all from the same reaction, (nc, 3)."""
+    """The tracks of one problem; the first of the table leads."""
 
-    def __init__(self, problem: FrictionProblem, r: Array) -> None:
-        self.kernel_data, self.judge_flops = problem.kernel_data, problem.judge_flops
-        first = sweep_data(problem)
-        self.tracks = [Track(w, first._replace(relaxation=w), r.copy()) for w in RELAXATIONS]
-        self.alone = ALONE
+    state: State
+    table: tuple[Entry, ...]
 
-    def enter(self, r: Array) -> None:
-        """Let all tracks go on from another reaction, the last one too."""
-        self.alone = 0
-        for track in self.tracks:
-            track.r, track.error, track.done = r.copy(), math.inf, 0
+    def __post_init__(self) -> None:
+        self.tracks = [Track(self.table[0], self.state)]
+        self.total = 0.0  # nanoseconds of all tracks
+        self.mark = (self.state.first_error, 0.0)  # error and total at the last progress
 
-    def run(self, sweeps: int, goal: float) -> tuple[Track, int, float]:
-        """Some sweeps of one track, at most until its error, unit of u, is `goal`.
+    def iterates(self) -> Iterator[Iterate]:
+        """The best reaction after every chunk, until nothing helps or is left."""
+        for _ in range(FIRST_CHUNKS):
+            if self.tracks:
+                yield from self._go_on(self.tracks[0])
+        self.enter()
+        while self.tracks and not self._is_lost():
+            yield from self._go_on(self._next())
 
-        Returns the track, the sweeps and their floating point operations.
-        """
-        track = self._next()
-        run = partial(sweeps_inplace, track.data, track.r, sweeps, watch_for(goal))
-        count, flops = counted(track.data, run)
-        track.done += count
-        track.error = natural_error(*self.kernel_data, track.r)
-        return track, count, flops + self.judge_flops
+    def enter(self) -> None:
+        """Let all others of the table in; what tells which of them run costs something too."""
+        state = self.state
+        self.tracks += [Track(e, state) for e in self.table[1:] if e.when(state)]
+
+    def _go_on(self, track: Track) -> Iterator[Iterate]:
+        """A chunk of a track, which leaves where it has ended."""
+        before, found = track.cost, track.advance()
+        if found is None:
+            self.tracks.remove(track)
+            return
+        self.total += track.cost - before
+        yield found
+
+    def _is_lost(self) -> bool:
+        """True where nothing has helped for long."""
+        error, total = self.mark
+        if self.state.error < 0.5 * error:
+            self.mark = self.state.error, self.total
+            return False
+        since = self.total - total
+        return self.total > LOST * total and since > LOST_STEPS * self.state.step_cost
 
     def _next(self) -> Track:
-        """The track whose turn it is."""
-        bold = self.tracks[:-1]
-        if min(track.done for track in bold) < self.alone:
-            return min(bold, key=lambda track: track.done)
-        fresh = [track for track in self.tracks if not track.done]
-        least = min(track.error for track in self.tracks)
-        near = [track for track in self.tracks if track.error <= FAR_BEHIND * least]
-        return fresh[0] if fresh else min(near, key=lambda track: track.done)
+        """The track that promises the goal for the least cost."""
+        rests = [track.rest(self.total) for track in self.tracks]
+        least = min(rests)
+        if least < math.inf:
+            return self.tracks[rests.index(least)]
+        return min(self.tracks, key=lambda track: track.cost)

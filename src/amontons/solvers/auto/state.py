@@ -6,13 +6,12 @@ Costs are operation counts, so that the same problem takes the same path on ever
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from functools import cached_property, partial
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...linear.blocks import spatial
 from ...problem.friction import FrictionProblem
 from ...problem.judge.measures import natural_error
 from ...problem.law import Coulomb
@@ -21,19 +20,18 @@ from ..newton.inexact import InexactNewton
 from ..newton.joints import Joints
 from ..newton.semismooth import Condensed, SemismoothNewton
 from ..newton.smoothing import Workspace
-from ..sweeps.kernels import SweepOrder, counted, sweep_data, sweeps_inplace, watch_for
-from .race import Race
+from ..sweeps.kernels import SweepOrder, sweep_data
 
 Array = NDArray[np.float64]
-FIRST_SWEEPS = 10  # plain sweeps before the race
 EXACT_WORK = 1e6  # products of blocks in an LU up to which an exact step costs no more
 # Nanoseconds measured on one core: only their ratios matter, and only roughly.
 SWEEP_BLOCK = 2.0
 SWEEP_CONTACT = 30.0
 HISTORY_CONTACT = 35.0
+MOMENTUM_CONTACT = 4.0
 PRODUCT = 5.4
 NEWTON_CONTACT = 500.0
-NEWTON_START, NEWTON_PER_DIGIT = 20, 8  # steps that smoothing Newton takes, typically
+DENSE_STEP = 0.05  # per cube of the unknowns
 
 
 @dataclass(eq=False)
@@ -45,15 +43,13 @@ class State:
     r: Array
     error: float = math.inf  # of r, unit of u
     latest: float = math.inf  # of the last reaction tried
-    spent: float = 0.0  # cost of the accelerated sweeps
-    budget: float = 0.0  # cost of Newton steps not yet matched by sweeps
     unsaid: float = 0.0  # operations that no iterate has told yet
-    joints: Joints | None = field(init=False)  # of deformable bodies, where not too small
 
     def __post_init__(self) -> None:
-        self.start, self.joints = self.r, Joints.of(self.problem.whole[0])
+        self.start = self.r
         if np.count_nonzero(self.r):
             self.error, self.unsaid = self.judge(self.r), self.problem.judge_flops
+        self.first_error = self.error if self.error < math.inf else self.problem.q_norm
         self.goal = self.target.tolerance * self.problem.q_norm
         self.data = sweep_data(self.problem, order=SweepOrder.APPROACH)
 
@@ -64,20 +60,17 @@ class State:
         return isinstance(self.problem.law, Coulomb)
 
     @cached_property
+    def joints(self) -> Joints | None:
+        """Joints between deformable bodies, where there are and they are not too small."""
+        return Joints.of(self.problem.whole[0])
+
+    @cached_property
     def newton_kind(self) -> type[SemismoothNewton]:
         """Newton with approximate steps; with exact ones where an LU in blocks is quick."""
         exact = Condensed.in_blocks(self.problem, EXACT_WORK)
         return SemismoothNewton if exact else InexactNewton
 
     # ---------------------------------------------------------------- tools
-    @cached_property
-    def race(self) -> Race:
-        """Over-relaxed sweeps from the first point: accelerated ones keep the slow modes."""
-        r = spatial(self.start)
-        run = partial(sweeps_inplace, self.data, r, FIRST_SWEEPS, watch_for(0.0))
-        self.unsaid += counted(self.data, run)[1]
-        return Race(self.problem, r)
-
     @cached_property
     def work(self) -> Workspace:
         """Symbolic factor, made when Newton is first thought of."""
@@ -89,9 +82,14 @@ class State:
         """Nanoseconds of a Newton step, by operations."""
         blocks, contacts = len(self.problem.blocks.indices), self.problem.contacts
         if not self.is_coulomb:
-            return 0.3 * float(3 * contacts) ** 3
+            return self.dense_step_cost
         products = PRODUCT * self.work.symbolic.products + NEWTON_CONTACT * contacts
         return products + 2 * SWEEP_BLOCK * blocks
+
+    @property
+    def dense_step_cost(self) -> float:
+        """Nanoseconds of a Newton step that factorises the whole of W as a full matrix."""
+        return DENSE_STEP * float(3 * self.problem.contacts) ** 3
 
     @property
     def sweep_cost(self) -> float:
@@ -104,20 +102,10 @@ class State:
         """Nanoseconds of an accelerated sweep."""
         return self.sweep_cost + HISTORY_CONTACT * self.problem.contacts
 
-    def newton_cost(self) -> float:
-        """Nanoseconds that Newton will take from here."""
-        digits = math.log10(max(self.error / self.goal, 1.0))
-        return self.step_cost * (NEWTON_START + NEWTON_PER_DIGIT * digits)
-
-    def sweeps_left(self, before: float, count: int) -> float:
-        """Sweeps to the goal at the rate of the last `count`, infinite without progress."""
-        if before == math.inf:  # no rate yet
-            return 0.0
-        if not math.isfinite(self.latest):
-            return math.inf
-        rate = math.log(max(before, 1e-300) / max(self.latest, 1e-300)) / count
-        left = math.log(max(self.latest / self.goal, 1.0))
-        return left / rate if rate > 0 else math.inf
+    @property
+    def momentum_cost(self) -> float:
+        """Nanoseconds of a sweep with momentum."""
+        return self.sweep_cost + MOMENTUM_CONTACT * self.problem.contacts
 
     def affordable(self, steps: int) -> int:
         """Newton steps of one compiled call that still fit before the driver's deadline."""
@@ -135,7 +123,7 @@ class State:
 
     def offer(
         self, x: Array, iterations: int, stage: str, flops: float | None = None,
-        error: float = math.inf,
+        error: float = math.inf, linear_iterations: int = 0,
     ) -> Iterate:  # fmt: skip
         """Keep x if it is better, and hand out the best.
 
@@ -152,7 +140,7 @@ class State:
             flops, self.unsaid = flops + self.unsaid, 0.0
         return Iterate(
             self.r[:, : self.problem.dimension].copy(), iterations=iterations, stage=stage,
-            flops=flops,
+            flops=flops, linear_iterations=linear_iterations,
         )  # fmt: skip
 
     def iterate(self, r: Array) -> Iterate:

@@ -23,7 +23,7 @@ from ...core.errors import InvalidInput, SingularOperator
 from ...linear.blocks import spatial
 from ...problem.friction import Form, FrictionProblem
 from ..contract import Breakdown, Iterate, Iterates, Patience, Target
-from .portfolio import FIRST, Portfolio
+from .portfolio import TRACKS, Portfolio
 
 Array = NDArray[np.float64]
 FIRST_SPRINGS = 1e-3  # share of the diagonal of M
@@ -32,7 +32,7 @@ SOFTEST = 1e-7  # below, W is rounding
 SLOW = 0.5  # least ratio of the errors of SOME steps that calls for softer springs
 SOME = 8
 STEPS = 60  # with springs
-INNER = 400  # iterates of a step that may pass without halving its error
+INNER = 100  # chunks of the race in a step that may pass without halving its error
 SHARP = 1e-4  # error of a step, in errors of the problem without springs
 LEAST = 1e-13  # rounding of such an error
 
@@ -85,7 +85,7 @@ def _solved(
     best, least, count = r, condensed.error(r), 0
     inner = replace(target, tolerance=goal, start_error=least)
     patience = Patience(INNER, mark=least)
-    for iterate in Portfolio(condensed, inner, spatial(r), FIRST).stages():
+    for iterate in Portfolio(condensed, inner, spatial(r), TRACKS[:-1]).iterates():
         error = condensed.error(iterate.r)
         count += iterate.iterations
         if error < least:

@@ -28,7 +28,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -47,6 +47,7 @@ from .block_lu import factorise_inplace, solve_inplace
 from .smoothing import PINNED, Workspace
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 BOUNDARY = 0.99  # part of the way to the boundary of the cones that a step goes
 STALLED = 5  # steps below SHORT in a row, after which the relaxation is left
 SHORT = 0.02
@@ -126,10 +127,11 @@ def _nesterov_todd(x, y, mu, shift, i, beta, w, lam, extra):
 def relax_inplace(  # noqa: PLR0913
     indptr, indices, data, q, kind, parameters, rho, order, upper_start, upper, lower_start,
     lower,
-    r, x, y, s, shift, goal, steps,
+    r, x, y, s, shift, goal, steps, short,
 ):  # fmt: skip
     """Predictor-corrector steps on (r, x, y) with s frozen; x and y inside the cones on entry.
 
+    short (1,): short steps in a row so far, with which a call goes on where the last one ended.
     shift: added to the diagonal, relative to |W_ii|; goal: error, unit of u, at which to stop.
     Returns steps done; r is the last iterate, and finite.
     """
@@ -142,7 +144,6 @@ def relax_inplace(  # noqa: PLR0913
     dx, dy, residual = np.zeros((nc, 3)), np.zeros((nc, 3)), np.zeros((nc, 3))
     lam, w, beta = np.empty((nc, 3)), np.empty((nc, 3)), np.empty(nc)
     p, fa, fb = np.empty(3), np.empty(3), np.empty(3)
-    short = 0
     for count in range(steps):
         velocity_inplace(indptr, indices, data, q, r, u)
         gap = away = 0.0
@@ -222,8 +223,8 @@ def relax_inplace(  # noqa: PLR0913
                             end = x[i, a] + length * dx[i, a]
                             left += end * (y[i, a] + length * dy[i, a])
                 sigma = min(max(left / total, 0.0), 1.0) ** 3
-        short = short + 1 if length < SHORT else 0
-        if short > STALLED:
+        short[0] = short[0] + 1 if length < SHORT else 0
+        if short[0] > STALLED:
             return count
         for i in range(nc):
             if rho[i] > 0.0:
@@ -284,18 +285,39 @@ class InteriorPoint:
         self, work: Workspace, slip: Array, goal: float, deadline: Deadline = NEVER
     ) -> tuple[int, Array]:
         """(steps, r) of the relaxation with frozen |u_T|, (nc,); goal: error, unit of u."""
-        indptr, indices, data, q, kind, parameters, rho = work.problem.kernel_data
-        mu = work.problem.mu
+        relaxation = Relaxation.of(work, slip, self.shift)
+        steps = relaxation.advance(goal, work.affordable(self.steps, deadline))
+        return max(steps, 1), relaxation.r
+
+
+@dataclass(eq=False)
+class Relaxation:
+    """The convex program of one frozen slip, and how far its solution has come; r (nc, 3)."""
+
+    work: Workspace
+    slip: Array
+    shift: float
+    x: Array
+    y: Array
+    r: Array
+    short: Index = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
+
+    @classmethod
+    def of(cls, work: Workspace, slip: Array, shift: float) -> Relaxation:
+        """At its start, for frozen |u_T|, (nc,)."""
+        q, mu, rho = work.problem.kernel_data[3], work.problem.mu, work.problem.kernel_data[6]
         size = work.problem.q_norm / math.sqrt(max(work.problem.contacts, 1))
         x, y = np.zeros_like(q), np.zeros_like(q)
         x[:, 0], y[:, 0] = size * rho, size
         r = x / np.where(mu > 0, mu, 1.0)[:, None]
-        steps = relax_inplace(
-            indptr, indices, data, q, kind, parameters, rho, *work.symbolic.arrays,
-            r, x, y, np.where(mu > 0, slip, 0.0), self.shift, goal,
-            work.affordable(self.steps, deadline),
+        return cls(work, np.where(mu > 0, slip, 0.0), shift, x, y, r)
+
+    def advance(self, goal: float, steps: int) -> int:
+        """Steps done of some, fewer at its end; goal: error, unit of u."""
+        return relax_inplace(
+            *self.work.problem.kernel_data, *self.work.symbolic.arrays, self.r, self.x, self.y,
+            self.slip, self.shift, goal, steps, self.short,
         )  # fmt: skip
-        return max(steps, 1), r
 
 
 def sliding_speed(problem: FrictionProblem, r: Array) -> Array:

@@ -52,7 +52,7 @@ ENOUGH = 1e-4  # least relative decrease of |F| over a full step
 NATURAL = 0.25  # least relative decrease of the next step over a full step, natural test
 LOOSE = 1e-5  # error, unit-free, at which a load step is good enough to go on
 REPEATED = 1e-12  # relative difference of |F| below which steps go round in circles
-JUMP = "; if the body jumps there, crossing=PathCrossing() of this solver follows it (2D)"
+JUMP = "; if the body jumps there, crossing=PathCrossing() of this solver follows it"
 STATUSES = 1e-8  # error of a tangent problem with contact
 CONTACT_STEPS = 300  # iterates in which it has to be reached
 EASY = 8  # Newton steps up to which the next load step may be longer
@@ -95,6 +95,10 @@ class NonlinearProblem(Problem):
     def towards(self, share: float, goal: float, v: Array) -> FrictionProblem:
         """The tangent problem with contact at a share, under the load of another."""
         ...
+
+    def remark(self, v: Array) -> str:
+        """What may be wrong at a state beyond which no equilibrium is found; "" for nothing."""
+        return ""
 
     def closed_pieces(self, v: Array) -> list[Any]:
         """Pieces with ever more contacts closed, for states at which nothing holds a body."""
@@ -159,6 +163,8 @@ class NonlinearNewton:
                     found = self._newton(problem, problem.states(v), target)
                     yield from shown.best(found, told)
                 hint = "" if self.crossing is not None else JUMP
+                if remark := problem.at_share(share).remark(v):
+                    hint = f"; {remark}"
                 raise Breakdown(
                     f"no equilibrium found beyond {share:.4g} of the load: {reason}{hint}"
                 )

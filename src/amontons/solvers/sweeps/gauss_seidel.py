@@ -16,7 +16,8 @@ hundred, as the next sweep changes the contact again.
 
 Optionally with Anderson acceleration: the sweep G is a fixed-point map, and the next iterate is
 the combination of the last ones whose residual G(r) - r is smallest.  A mixed iterate may leave
-the cone; the next sweep brings it back, so only sweeps are ever handed out.
+the cone; the next sweep brings it back, so only sweeps are ever handed out.  Or with Nesterov's
+momentum (`momentum`), which keeps one vector more.
 
 [ABD] V. Acary, M. Brémond, F. Dubois, "Méthodes de Newton non-lisses pour les problèmes de
 contact frottant dans les systèmes de multi-corps flexibles", CSMA 2017.
@@ -50,6 +51,7 @@ from .kernels import (
     watch_for,
 )
 from .local_contact import CLOSE, LocalSolver
+from .momentum import Momentum
 
 Array = NDArray[np.float64]
 CHANGE_FLOPS = 5  # of criterion (14) per component of r
@@ -67,7 +69,8 @@ class Batch(Enum):
 class GaussSeidel:
     """NSGS on the Delassus form; one iterate per `batch` sweeps.
 
-    anderson_depth > 0 accelerates: the window of past sweeps, 5 to 10 is usual.
+    anderson_depth > 0 accelerates: the window of past sweeps, 5 to 10 is usual; momentum=True
+    does by momentum, best without relaxation.
     batch=Batch.ADAPTIVE judges when the cheap criterion [ABD] eq. (14) says so.
     """
 
@@ -79,6 +82,7 @@ class GaussSeidel:
     order: SweepOrder = SweepOrder.STORED  # of the contacts in a sweep
     local_tolerance: float | None = None  # relative change of one contact; 1e-14
     local_steps: int | None = None  # on one contact; 20 of Newton, 100 projections
+    momentum: bool = False  # Nesterov's, restarted when a sweep changes more than the last
 
     def __post_init__(self) -> None:
         check_options(self)
@@ -87,12 +91,15 @@ class GaussSeidel:
         if not 0 < self.relaxation < 2:
             text = f"expected between 0 and 2, got {self.relaxation}"
             raise InvalidInput(text, ("relaxation",))
+        accelerated = "anderson_depth" if self.anderson_depth else "momentum"
         if not isinstance(self.batch, Batch):
             check_at_least(1, batch=self.batch)
-        elif self.anderson_depth:
+        elif self.anderson_depth or self.momentum:
             raise InvalidInput(
-                "ADAPTIVE compares plain sweeps, with anderson_depth give a number", ("batch",)
+                f"ADAPTIVE compares plain sweeps, with {accelerated} give a number", ("batch",)
             )
+        if self.anderson_depth and self.momentum:
+            raise InvalidInput("momentum: sweeps are accelerated by anderson_depth already")
 
     def _check_local(self) -> None:
         for name in ("local_tolerance", "local_steps"):
@@ -125,8 +132,9 @@ class GaussSeidel:
         if isinstance(self.batch, Batch):
             yield from _adaptive(problem, data, r, target)
             return
-        if self.anderson_depth:
-            memory = Acceleration(data, r, self.anderson_depth)
+        if self.anderson_depth or self.momentum:
+            depth = self.anderson_depth
+            memory = Acceleration(data, r, depth) if depth else Momentum(data, r)
             while True:
                 done, flops = memory.sweep(self.batch, never)
                 yield Iterate(memory.r[:, :d].copy(), iterations=done, flops=flops)

@@ -180,7 +180,7 @@ def sweep_inplace(s, backward, r):
 
 
 @njit(cache=True, error_model="numpy")
-def _content(s, r, change, watch):
+def content(s, r, change, watch):
     """True when the error is at most watch[0]; see `watch_for`."""
     if not change <= watch[1]:
         return False
@@ -201,7 +201,7 @@ def sweeps_inplace(s, r, sweeps, watch):
     watch: see `watch_for`.
     """
     for k in range(sweeps):
-        if _content(s, r, sweep_inplace(s, False, r), watch):
+        if content(s, r, sweep_inplace(s, False, r), watch):
             return k + 1
     return sweeps
 
@@ -287,7 +287,7 @@ def anderson_inplace(s, r, x, history, gram, count, sweeps, watch):  # noqa: PLR
     g, xf = r.reshape(m), x.reshape(m)
     for k in range(sweeps):
         r[:, :] = x
-        if _content(s, r, sweep_inplace(s, False, r), watch):
+        if content(s, r, sweep_inplace(s, False, r), watch):
             x[:, :] = r
             return k + 1
         size = old_size = 0.0

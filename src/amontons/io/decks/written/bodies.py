@@ -17,6 +17,7 @@ from ....mechanics.meshes.mesh import Mesh
 from ....mechanics.model import Body, Model
 from ..shapes import SHAPES
 from .lines import Names, listed, value, values
+from .rubber import FINITE, cards_of
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -42,7 +43,7 @@ class Meshes:
     def _body(self, k: int, body: Body) -> None:
         mesh, out = body.mesh, self.lines
         shown = body.name or f"body {k + 1}"
-        if not isinstance(body.material, LinearElastic | OrthotropicElastic | dict):
+        if not isinstance(body.material, LinearElastic | OrthotropicElastic | FINITE | dict):
             raise InvalidInput(
                 f"body {shown!r}: {type(body.material).__name__}: can not be said in a deck, "
                 "expected LinearElastic or OrthotropicElastic"
@@ -55,8 +56,8 @@ class Meshes:
         for block in mesh.cells:
             law = laws[block.region]
             integration = element_formulation(mesh, block, law)
-            if integration == "hybrid" and self._notes is not None:
-                integration = "full"
+            if integration.startswith("hybrid") and self._notes is not None:
+                integration = "incompatible" if "incompatible" in integration else "full"
                 self._notes.append(
                     f"body {shown!r}: CalculiX has no hybrid elements, those with full "
                     "integration lock near incompressibility, and where they flow"
@@ -71,7 +72,7 @@ class Meshes:
                     sides[_key(row[list(side)], block.kind)] = (self.elements, number)
         self._sides.append(sides)
         for region, law in laws.items():
-            if not isinstance(law, LinearElastic | OrthotropicElastic):
+            if not isinstance(law, LinearElastic | OrthotropicElastic | FINITE):
                 raise InvalidInput(
                     f"body {shown!r}: {type(law).__name__}: can not be said in a deck"
                 )
@@ -93,7 +94,7 @@ class Meshes:
         ranked = sorted(self._laws, key=lambda law: -law[0])
         return [line for _, cards in ranked for line in cards]
 
-    def _material(self, elset: str, law: LinearElastic | OrthotropicElastic) -> None:
+    def _material(self, elset: str, law: LinearElastic | OrthotropicElastic | FINITE) -> None:
         self._materials += 1
         name = f"MATERIAL_{self._materials}"
         out = [f"*MATERIAL, NAME={name}"]
@@ -105,6 +106,8 @@ class Meshes:
                 out += ["*PLASTIC", *(values(row) for row in law.rows_to(FAR))]
             if law.expansion:
                 out += ["*EXPANSION", value(law.expansion)]
+        elif isinstance(law, FINITE):
+            out += cards_of(law)
         else:
             constants = [*law.young, *law.poisson, *law.shear]
             out += ["*ELASTIC, TYPE=ENGINEERING CONSTANTS", values(constants[:8]) + ",",
@@ -112,7 +115,7 @@ class Meshes:
             if np.any(law.expansion):
                 out += ["*EXPANSION, TYPE=ORTHO", values(law.expansion)]  # type: ignore[arg-type]
             turned = f", ORIENTATION=AXES_{self._materials}"
-        if law.density is not None:
+        if not isinstance(law, FINITE) and law.density is not None:
             out += ["*DENSITY", value(law.density)]
         out = self.lines
         if isinstance(law, OrthotropicElastic):

@@ -1,4 +1,4 @@
-"""A model as a deck: one linear static step with all supports and loads at their full size.
+"""A model as a deck: one static step with all supports and loads at their full size.
 
 Supports are written node by node, loads as nodal forces equal to ours (constant pressures as
 *DSLOAD), constraints as *EQUATION, so that both programs take exactly what the model says.
@@ -29,10 +29,12 @@ from ....mechanics.model.values import is_number
 from .bodies import Meshes, plane_element
 from .contacts import Contacts
 from .lines import Names, value
+from .rubber import check_finite
 
 Array = NDArray[np.float64]
 CALCULIX, ABAQUS = DIALECTS = ("calculix", "abaqus")
 WIDTH = 3
+FIRST = 0.1  # the first increment of large deformations
 
 
 def write_deck(
@@ -44,7 +46,7 @@ def write_deck(
     dialect: "calculix" or "abaqus".  penalty: pressure over overclosure of hard contact, stress
     / length, > 0; by default hard, which CalculiX takes as 50 times the largest modulus.
     Raises InvalidInput for what no deck says, such as obstacles that are no planes, Tresca's
-    friction, values that depend on time, and large deformations.
+    friction, values that depend on time, and laws of finite strains that decks do not have.
     """
     if dialect not in DIALECTS:
         raise InvalidInput(f"dialect: expected one of {', '.join(DIALECTS)}, got {dialect!r}")
@@ -74,7 +76,7 @@ def write_deck(
 
 def _check(model: Model) -> None:
     if model.kind is LargeDeformation:
-        raise InvalidInput("large deformations: can not be said in a linear step of a deck")
+        check_finite(model)
     for part in ("supports", "loads"):
         for k, each in enumerate(getattr(model, part)):
             with within(part, k, "value"):
@@ -211,7 +213,10 @@ def _step(
     begin = ["*NSET, NSET=ALL_NODES, GENERATE", f"1, {count}, 1"]
     if warm:
         begin += ["*INITIAL CONDITIONS, TYPE=TEMPERATURE", "ALL_NODES, 0."]
-    out = [*begin, "*STEP", "*STATIC", "1., 1."]
+    finite = model.kind is LargeDeformation
+    first = FIRST if finite else 1.0  # of the whole load
+    head = "*STEP, NLGEOM, INC=1000" if finite else "*STEP"
+    out = [*begin, head, "*STATIC", f"{first:g}, 1."]
     held = np.flatnonzero(~np.isnan(prescribed))
     out += ["*BOUNDARY"] if len(held) else []
     for dof in held:

@@ -1,0 +1,401 @@
+"""Auto beside the best of its own methods in hindsight, on classes of cone problems.
+
+    python benchmarks/race.py [--seed 7] [--cap 3] [--traces FILE] [--again] [--tune]
+
+The problems are those of `classes.py`.  Every track of the table in `solvers/auto/portfolio.py`
+runs alone on each of them for at most `cap` CPU seconds, those of Newton's kind from 60
+accelerated sweeps, as in the race; the *oracle* is the fastest of them.  Auto is a whole solve,
+judge and bookkeeping included.  CPU seconds, one thread, blocks and diagonal prepared.
+
+--tune searches the constants of the race on the recorded traces, where tracks do not exchange
+reactions: of all classes, and of all but one, which is then scored with them.
+Writes results/race.md beside this file.
+"""
+
+import os
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import argparse
+import copy
+import gc
+import math
+import pickle
+import random
+import time
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+from classes import classes
+from machine import describe
+
+import amontons as am
+from amontons.solvers.auto import race as rules
+from amontons.solvers.auto.portfolio import TRACKS
+from amontons.solvers.auto.race import Track
+from amontons.solvers.auto.state import State
+from amontons.solvers.contract import Target
+from amontons.solvers.sweeps.kernels import Acceleration, watch_for
+
+HERE = Path(__file__).parent
+SHARED = Path(os.environ.get("AMONTONS_SHARED", HERE.parents[1] / "shared"))
+TOLERANCES = (1e-3, 1e-6, 1e-8)
+SWEPT = 60  # accelerated sweeps before a method of Newton's kind
+RUNS = 3  # of what takes less than BRIEF seconds; the best counts
+BRIEF = 0.1
+UNSOLVED = 100.0  # ratio of what is not solved though a track solves it
+ALONE = tuple(entry for entry in TRACKS if entry.name != "restarts")
+
+
+COLUMNS = ("| problems | solves | geometric mean | 90 % | worst |", "|---|---|---|---|---|")
+HEAD = """# Auto beside the best of its methods in hindsight
+
+Regenerate: `{command}`.
+
+{machine}
+
+CPU time of a whole solve by Auto over that of the fastest of its own tracks alone (the oracle),
+which no judge and no bookkeeping slows down; {unsolved:g}: not solved though a track is there.
+"""
+TRACKED = """
+Each track alone, over the oracle; and the race without it, simulated, over the race with all.
+
+| track | solves | geometric mean | 90 % | worst | best of all in | unsolved | without it |
+|---|---|---|---|---|---|---|---|"""
+
+CROSSED = """
+Simulated on the traces: with the constants of the race, with those that a search finds on all
+classes, and on each class with those found on the others.
+
+| problems | solves | geometric mean | 90 % | worst |
+|---|---|---|---|---|"""
+
+
+# ------------------------------------------------------------------------------ traces
+def trace(problem, entry, cap):
+    """What a track does alone: first error, CPU seconds before it, and after each chunk.
+
+    Rows of CPU seconds, cost in ns by operations and best error; None where it does not run.
+    """
+    state = State(problem, Target(1e-8), np.zeros((problem.contacts, 3)))
+    if not entry.when(state):
+        return None
+    before = 0.0
+    if entry.needs is not None:
+        began = time.process_time()
+        memory = Acceleration(state.data, state.start, 10)
+        memory.sweep(SWEPT, watch_for(0.0))
+        before = time.process_time() - began
+        state.offer(memory.r.copy(), SWEPT, "")
+        state.first_error = min(state.error, state.first_error)
+    track, rows, seconds = Track(entry, state), [], 0.0
+    gc.disable()
+    while seconds < cap and (not rows or rows[-1][2] > 0.9e-8):
+        began = time.process_time()
+        found = track.advance()
+        seconds += time.process_time() - began
+        if found is None:
+            break
+        rows.append((seconds, track.cost, track.errors[-1] / problem.q_norm))
+    gc.enable()
+    first = track.errors[0] / problem.q_norm if track.errors else 1.0
+    return first, np.array(rows).reshape(-1, 3), before
+
+
+def crossing(found, tolerance):
+    """CPU seconds until the error is below the tolerance, the sweeps before counted.
+
+    Infinite where these sweeps are there already: they are another method.
+    """
+    if found is None or found[0] <= tolerance:
+        return math.inf
+    below = np.flatnonzero(found[1][:, 2] <= tolerance)
+    return float(found[1][below[0], 0]) + found[2] if below.size else math.inf
+
+
+def solved(problem, tolerance, cap):
+    """CPU seconds of Auto, infinite where it does not converge; what ended it; error."""
+    best = (math.inf, "", math.inf)
+    for _ in range(RUNS):
+        fresh = problem.fresh()
+        _ = fresh.kernel_data, fresh.q_norm, fresh.blocks.eliminated
+        began = time.process_time()
+
+        def late(step, iterate, began=began):
+            return time.process_time() - began > cap
+
+        found = am.drive(fresh, tolerance=tolerance, callback=late)
+        seconds = time.process_time() - began
+        if not found.converged:
+            return math.inf, found.convergence.detail, found.convergence.error
+        best = min(best, (seconds, found.convergence.detail, found.convergence.error))
+        if seconds > BRIEF:
+            break
+    return best
+
+
+def record(folder, seed, cap, path):
+    """Traces of all tracks and times of Auto on all problems, kept in a file as they come."""
+    out = []
+    for kind, name, problem in classes(folder, seed):
+        if problem.contacts < 20:
+            continue
+        _ = problem.kernel_data, problem.q_norm, problem.blocks.eliminated
+        if not out:  # compile
+            for entry in ALONE:
+                trace(problem, entry, 0.1)
+            solved(problem, 1e-8, 1.0)
+        state = State(problem, Target(1e-8), np.zeros((problem.contacts, 3)))
+        row = {"kind": kind, "name": name, "contacts": problem.contacts, "traces": {},
+               "needs": {}}  # fmt: skip
+        fastest = math.inf
+        for entry in ALONE:
+            most = min(cap, max(0.2, 8 * fastest))
+            found = trace(problem, entry, most)
+            if found is not None and found[1].size and found[1][-1, 0] < BRIEF:
+                again = trace(problem, entry, most)
+                found = min(found, again, key=lambda t: t[1][-1, 0])
+            row["traces"][entry.name] = found
+            fastest = min(fastest, crossing(found, 1e-8))
+            if found is not None and entry.needs is not None:
+                row["needs"][entry.name] = entry.needs(state)
+        row["auto"] = {t: solved(problem, t, cap) for t in TOLERANCES}
+        out.append(row)
+        path.write_bytes(pickle.dumps(out))
+        print(kind, name, problem.contacts, *(
+            f"{row['auto'][t][0]:.2g}/{oracle(row, t)[0]:.2g}" for t in TOLERANCES
+        ), oracle(row, 1e-8)[1], "|", row["auto"][1e-8][1], flush=True)  # fmt: skip
+    return out
+
+
+def oracle(row, tolerance, names=None):
+    """CPU seconds of the fastest track, and its name."""
+    times = [(crossing(found, tolerance), name) for name, found in row["traces"].items()
+             if names is None or name in names]  # fmt: skip
+    return min(times, default=(math.inf, ""))
+
+
+# ------------------------------------------------------------------------------ simulation
+CONSTANTS = {
+    "window": rules.WINDOW, "first": rules.FIRST_CHUNKS,
+    "shares": {e.name: e.share for e in ALONE},
+    "optimisms": {e.name: e.optimism for e in ALONE},
+    "needs": {e.name: 1.0 for e in ALONE if e.needs is not None},
+}  # fmt: skip
+
+
+class Replay:
+    """A track that goes through its trace."""
+
+    def __init__(self, found):
+        self.first, self.rows, _ = found
+        self.at = 0
+
+    @property
+    def cost(self):
+        """Nanoseconds so far."""
+        return self.rows[self.at - 1, 1] if self.at else 0.0
+
+    @property
+    def seconds(self):
+        """CPU seconds so far."""
+        return self.rows[self.at - 1, 0] if self.at else 0.0
+
+    @property
+    def error(self):
+        """Best error so far."""
+        return self.rows[self.at - 1, 2] if self.at else self.first
+
+    def rate(self, goal, window, first):
+        """Cost to the goal at the rate of the last part."""
+        if self.at < first:
+            return math.inf
+        k = int(np.searchsorted(self.rows[: self.at, 1], (1 - window) * self.cost, "right")) - 1
+        cost, error = (self.rows[k, 1], self.rows[k, 2]) if k >= 0 else (0.0, self.first)
+        if not self.error < error:
+            return math.inf
+        rest = math.log(max(self.error / goal, 1.0))
+        return rest * (self.cost - cost) / math.log(error / self.error)
+
+
+def simulated(row, goal, c):
+    """CPU seconds of the race on the traces, infinite where no track gets there."""
+    tracks = {n: Replay(f) for n, f in row["traces"].items()
+              if f is not None and len(f[1]) and f[0] > goal}  # fmt: skip
+    total, lead = 0.0, next(iter(row["traces"]))
+
+    def rest(name):
+        track = tracks[name]
+        if name in row["needs"]:
+            needed = row["needs"][name] * c["needs"][name]
+            if track.cost < needed:
+                return needed - track.cost
+        promise = track.rate(goal, c["window"], c["first"])
+        unknown = track.cost < c["shares"][name] * total
+        return min(promise, c["optimisms"][name] * total) if unknown else promise
+
+    while tracks:
+        left = [n for n, t in tracks.items() if t.at < len(t.rows)]
+        if not left:
+            return math.inf
+        if lead in left and tracks[lead].at < c["first"]:
+            name = lead
+        else:
+            rests = {n: rest(n) for n in left}
+            name = min(left, key=rests.get)
+            if rests[name] == math.inf:
+                name = min(left, key=lambda n: tracks[n].cost)
+        track = tracks[name]
+        before = track.cost
+        track.at += 1
+        total += track.cost - before
+        if track.error <= goal:
+            return sum(t.seconds for t in tracks.values())
+    return math.inf
+
+
+def ratios(rows, c):
+    """Simulated race over the oracle, for all problems and tolerances that a track solves."""
+    out = []
+    for row in rows:
+        for tolerance in TOLERANCES:
+            best = oracle(row, tolerance)[0]
+            if best < math.inf:
+                out.append(min(simulated(row, tolerance, c) / best, UNSOLVED))
+    return np.array(out)
+
+
+def mean(values):
+    """Geometric mean."""
+    return float(np.exp(np.mean(np.log(values))))
+
+
+def score(rows, c):
+    """What the search lowers: the mean, and a little the worst."""
+    found = ratios(rows, c)
+    return mean(found) * (1 + 0.006 * found.max())
+
+
+def tuned(rows, rounds=1, seed=1):
+    """Constants found by a search along one of them after another."""
+    grid = {"window": (0.5, 0.6, 0.7, 0.8, 0.9), "first": (1, 2, 3, 4)}
+    inner = {"shares": (0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3),
+             "optimisms": (0.1, 0.3, 1.0, 3.0, 10.0),
+             "needs": (0.3, 0.5, 0.7, 1.0, 1.5, 2.0)}  # fmt: skip
+    c, best = copy.deepcopy(CONSTANTS), score(rows, CONSTANTS)
+    keys = [(k, None) for k in grid] + [(k, n) for k in inner for n in CONSTANTS[k]]
+    for _ in range(rounds):
+        random.Random(seed).shuffle(keys)
+        for key, name in keys:
+            for value in grid[key] if name is None else inner[key]:
+                other = copy.deepcopy(c)
+                if name is None:
+                    other[key] = value
+                else:
+                    other[key][name] = value
+                found = score(rows, other)
+                if found < best - 1e-4:
+                    best, c = found, other
+    return c
+
+
+# ------------------------------------------------------------------------------ the page
+def line(name, values, *more):
+    """A row: number, geometric mean, 90 % quantile, worst."""
+    return (f"| {name} | {len(values)} | {mean(values):.2f} | {np.quantile(values, 0.9):.1f} "
+            f"| {max(values):.1f} |" + "".join(f" {m} |" for m in more))  # fmt: skip
+
+
+def measured(rows):
+    """Ratios of Auto to the oracle by class and by tolerance."""
+    by = defaultdict(list)
+    for row in rows:
+        for t in TOLERANCES:
+            best = oracle(row, t)[0]
+            if best < math.inf:
+                ratio = min(row["auto"][t][0] / best, UNSOLVED)
+                for key in (row["kind"], f"all, to {t:g}", "all"):
+                    by[key].append(ratio)
+    return by
+
+
+def page(rows, machine, command, tuning):
+    """The whole page."""
+    by = measured(rows)
+    out = [HEAD.format(command=command, machine=machine, unsolved=UNSOLVED), *COLUMNS]
+    out += [line(key, values) for key, values in by.items()]
+    out += [TRACKED]
+    whole = ratios(rows, CONSTANTS)
+    for entry in ALONE:
+        values = []
+        for row in rows:
+            for t in TOLERANCES:
+                best = oracle(row, t)[0]
+                if best < math.inf:
+                    own = crossing(row["traces"].get(entry.name), t)
+                    values.append(min(own / best, UNSOLVED))
+        less = [{**row, "traces": {n: f for n, f in row["traces"].items() if n != entry.name}}
+                for row in rows]  # fmt: skip
+        without = [
+            min(simulated(cut, t, CONSTANTS) / oracle(row, t)[0], UNSOLVED)
+            for row, cut in zip(rows, less, strict=True) for t in TOLERANCES
+            if oracle(row, t)[0] < math.inf
+        ]  # fmt: skip
+        best, lost = sum(v < 1.02 for v in values), sum(v >= UNSOLVED for v in values)
+        worth = f"{mean(without) / mean(whole):.2f}"
+        out.append(line(entry.name, values, best, lost, worth))
+    out += tuning
+    out += ["\nCPU milliseconds, Auto / oracle (its track).\n",
+            "| problem | contacts | " + " | ".join(f"{t:g}" for t in TOLERANCES) + " |",
+            "|---|---|" + "---|" * len(TOLERANCES)]  # fmt: skip
+    for row in rows:
+        cells = []
+        for t in TOLERANCES:
+            seconds, _, error = row["auto"][t]
+            own = f"{1e3 * seconds:.3g}" if seconds < math.inf else f"(error {error:.1e})"
+            best, name = oracle(row, t)
+            theirs = f"{1e3 * best:.3g} ({name})" if best < math.inf else "-"
+            cells.append(f"{own} / {theirs}")
+        out.append(f"| {row['name']} | {row['contacts']} | " + " | ".join(cells) + " |")
+    return "\n".join(out) + "\n"
+
+
+def crossed(rows):
+    """Lines of the page: the race simulated with constants found without a class."""
+    out = [CROSSED, line("all, as they are", ratios(rows, CONSTANTS)),
+           line("all, searched", ratios(rows, tuned(rows)))]  # fmt: skip
+    left_out = []
+    for kind in dict.fromkeys(row["kind"] for row in rows):
+        c = tuned([row for row in rows if row["kind"] != kind])
+        found = ratios([row for row in rows if row["kind"] == kind], c)
+        out.append(line(f"{kind}, left out", found))
+        left_out += list(found)
+    return [*out, line("all, left out", left_out)]
+
+
+def main():
+    """Record, or take what was recorded; write the page."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--folder", type=Path, default=SHARED / "data/fclib")
+    parser.add_argument("--seed", type=int, default=7)
+    parser.add_argument("--cap", type=float, default=3.0)
+    parser.add_argument("--traces", type=Path, default=HERE / "results/race.pickle")
+    parser.add_argument("--kept", action="store_true", help="take the traces of the last run")
+    parser.add_argument("--tune", action="store_true")
+    chosen = parser.parse_args()
+    if chosen.kept:
+        rows = pickle.loads(chosen.traces.read_bytes())
+    else:
+        rows = record(chosen.folder, chosen.seed, chosen.cap, chosen.traces)
+    if chosen.tune:
+        print(tuned(rows, rounds=2))
+    command = f"python benchmarks/race.py --seed {chosen.seed} --cap {chosen.cap:g}"
+    machine = "; ".join(f"{k} {v}" for k, v in describe().items())
+    text = page(rows, machine, command, crossed(rows) if chosen.tune else [])
+    (HERE / "results/race.md").write_text(text)
+
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,395 @@
+"""A friction below which every load has one solution, with multipliers of every contact.
+
+Where the law of a contact is smooth, a change of its reaction and velocity obeys
+
+    free   dr = 0        stick  du = 0
+    slip   du_N = 0,  dr_T = -mu dr_N t - kappa P du_T,    t the direction of slip, |t| = 1,
+                                                           P across it, kappa >= 0,
+
+so dr_N du_N = 0, du_N dr_T = 0 and dr_T du_T <= mu |dr_N| |du_T|.  With tau, sigma, alpha > 0
+and a vector f of every contact
+
+    sum tau dr_N du_N + du_N f.dr_T + sigma dr_T.du_T
+        <= sum mu sigma/2 (alpha dr_N^2 + |du_T|^2 / alpha).
+
+With du = W dr the left side is dr A dr, A = sym(D W), D_i = [[tau, 0], [f, sigma I]] in rows
+N, T, the right side t dr B dr with mu = t shape.  Where A - t B is positive definite no piece
+of the law is singular, all have the orientation of those without friction.  Then the law and
+balance, a Lipschitz map of x = r - u, have a determinant of at least some c > 0 almost
+everywhere: such a map is open and discrete (Reshetnyak; in 2D it is piecewise linear), of
+degree one as t is led to zero, and so every load has exactly one solution.
+
+The multipliers are those of the largest t that a descent method finds: minimised is the
+largest L of B v = L A v, smoothed over the largest few.  Many contacts begin with the
+multipliers of every fourth (in 2D second) one alone, interpolated by how much W couples them,
+with alpha times a factor that is tried.  All that is floating point; the proof at the end
+covers rounding, for W as given.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular
+from scipy.optimize import minimize
+
+from ...core.clock import NEVER, Deadline
+from ...core.errors import TimeUp
+from ..multipliers.rounding import EPSILON, is_positive_definite, unit_scale
+from .energy_bound import energy_bound
+from .thinning import COARSEST, couplings, spread_out
+
+Array = NDArray[np.float64]
+Places = NDArray[np.int64]
+THINNED = {2: 2, 3: 4}  # contacts of which one begins
+NEAREST, POWER = 4, 4  # contacts between which others are interpolated, power of couplings
+SHIFTS = (-0.7, -0.35, 0.0, 0.2, 0.5, 0.7, 1.0)  # of log alpha, tried with all contacts
+SHARES = (1.0, 0.6, 0.3, 0.0)  # of the variation of the others, until A is definite
+INDEFINITE = 1e3  # the value where A is not
+DENSE = 400  # rows up to which all eigenvalues are computed
+KEPT = 40  # largest ones that count beyond
+DEPTH = 3  # products of the block Krylov space in which they are looked for
+SOFT = (40.0, 100.0)  # over how much of the largest L is smoothed, one search after the other
+STEPS = 60  # of a search where contacts are few
+MANY, FINE_STEPS = 1000, 18  # rows from which on, and steps where a coarser answer was at hand
+ROOMS = (1e-4, 1e-3, 5e-3, 2e-2, 0.1)  # by which less is proved than was found
+SHARPENED = 4  # times that the largest eigenvalue is looked for before the proof
+PROOF = 1.0  # operations of a proof per cube of the rows
+
+
+@dataclass(frozen=True, eq=False)
+class ContactMultipliers:
+    """At friction t shape every load has one solution, t = 0 without a proof.
+
+    tau, sigma, alpha (k,), f (k, d - 1): the multipliers that prove it; 1 and 0 for contacts
+    that can not react.  expected: t of them in floating point, before the proof.
+    """
+
+    t: float
+    tau: Array
+    sigma: Array
+    alpha: Array
+    f: Array
+    expected: float = 0.0
+
+    def unscaled(self, scale: Array) -> ContactMultipliers:
+        """In units in which reactions are divided by scale (k d,), one number per contact."""
+        return replace(self, alpha=self.alpha * scale[:: len(scale) // len(self.tau)] ** 2)
+
+
+def contact_multipliers(
+    W: Array, shape: Array, deadline: Deadline = NEVER, *, wanted: float = np.inf
+) -> ContactMultipliers:
+    """Multipliers for W (k d, k d) and friction in the proportions shape (k,).
+
+    wanted: a t that is enough.  Contacts with W_ii = 0 are left out.  Raises TimeUp where the
+    deadline is nearer than a first evaluation; later it ends the search.
+    """
+    k = len(shape)
+    d = len(W) // max(k, 1)
+    own = np.arange(k)
+    able = np.linalg.norm(W.reshape(k, d, k, d)[own, :, own], axis=(1, 2)) > 0
+    whole = ContactMultipliers(np.inf, np.ones(k), np.ones(k), np.ones(k), np.zeros((k, d - 1)))
+    if not able.any():
+        return whole
+    rows = np.flatnonzero(np.repeat(able, d))
+    form = _Form.of(W[np.ix_(rows, rows)], shape[able])
+    best = form.proved(_searched(form, deadline, wanted), deadline, wanted)
+    for name in ("tau", "sigma", "alpha", "f"):
+        getattr(whole, name)[able] = getattr(best, name)
+    return replace(whole, t=best.t, expected=best.expected)
+
+
+def holds(W: Array, shape: Array, t: float, by: ContactMultipliers) -> bool:
+    """True when A - t B of the module docstring is positive definite, rounding included.
+
+    W (k d, k d) and multipliers as given, all contacts reacting.
+    """
+    k = len(shape)
+    d = len(W) // k
+    if not (np.isfinite(t) and min(x.min() for x in (by.tau, by.sigma, by.alpha)) > 0):
+        return False
+    normal = d * np.arange(k)
+    tangent = (normal[:, None] + np.arange(1, d)).ravel()
+    D = np.empty(len(W))
+    D[normal], D[tangent] = by.tau, by.sigma.repeat(d - 1)
+    f = by.f.ravel()
+    M = D[:, None] * W
+    M[tangent] += f[:, None] * W[normal.repeat(d - 1)]
+    M = (M + M.T) / 2
+    rows = W[tangent]
+    at_normal = 0.5 * t * shape * by.sigma * by.alpha
+    weight = (0.5 * t * shape * by.sigma / by.alpha).repeat(d - 1)
+    M -= rows.T @ (weight[:, None] * rows)
+    M[normal, normal] -= at_normal
+    scale = unit_scale(M)
+    # sums of the rows of the terms' sizes, of which the rounding of an entry is a part
+    ones, size = scale, np.abs(W)
+    turned = D * ones
+    turned[normal] += (np.abs(f) * ones[tangent]).reshape(k, -1).sum(axis=1)
+    spread = size @ ones
+    from_normal = np.abs(f) * spread[normal.repeat(d - 1)]
+    spread = D * spread
+    spread[tangent] += from_normal
+    spread = (spread + size.T @ turned) / 2
+    spread += np.abs(rows).T @ (weight * (np.abs(rows) @ ones))
+    spread[normal] += at_normal * ones[normal]
+    M = (M + M.T) / 2 * scale[:, None] * scale
+    rounding = (len(W) + 12) * EPSILON * float((spread * scale).max())
+    return is_positive_definite(M, rounding / len(W))
+
+
+# ------------------------------------------------------------------------ searching
+def _searched(form: _Form, deadline: Deadline, wanted: float) -> Array:
+    """Multipliers x of the largest t found."""
+    if form.contacts <= COARSEST:
+        alpha = energy_bound(form.W, form.shape, deadline)[1]
+        x = np.zeros(form.unknowns)
+        x[2 * form.contacts : 3 * form.contacts] = np.log(alpha)
+        steps = STEPS
+    else:
+        coarse, weight = form.thinned()
+        x = form.interpolated(_searched(coarse, deadline, np.inf), weight)
+        steps = FINE_STEPS if len(form.W) > MANY else STEPS
+        x = form.shifted(x, deadline)
+    for soft in SOFT:
+        x = form.improved(x, soft, steps, deadline, wanted)
+    return x
+
+
+@dataclass(eq=False)
+class _Form:
+    """A and B of contacts that all react, |W_ii| near 1, and what is asked about them.
+
+    x: log tau, log sigma, log alpha (k,) each and f (k (d - 1),).
+    """
+
+    W: Array
+    shape: Array
+    root: Array  # (k d,) powers of two by which W as given was divided, twice
+    normal: Places
+    tangent: Places
+    owner: Places  # (k (d - 1),) contact of a tangent
+    subspace: Array | None = None  # of the largest eigenvalues at the last x
+
+    @classmethod
+    def of(cls, W: Array, shape: Array) -> _Form:
+        """Of W as given."""
+        k = len(shape)
+        d = len(W) // k
+        own = np.arange(k)
+        size = np.linalg.norm(W.reshape(k, d, k, d)[own, :, own], 2, axis=(1, 2))
+        root = np.exp2(np.round(np.log2(size) / 2)).repeat(d)
+        normal = d * own
+        tangent = (normal[:, None] + np.arange(1, d)).ravel()
+        return cls(W / root / root[:, None], shape, root, normal, tangent, own.repeat(d - 1))
+
+    @property
+    def contacts(self) -> int:
+        """k."""
+        return len(self.shape)
+
+    @property
+    def dimension(self) -> int:
+        """d."""
+        return len(self.W) // self.contacts
+
+    @property
+    def unknowns(self) -> int:
+        """Length of x."""
+        return self.contacts * (2 + self.dimension)
+
+    @property
+    def operations(self) -> float:
+        """Of one evaluation: all eigenvalues, or a factorisation and products with it."""
+        n = float(len(self.W))
+        return 8.0 * n**3 if n <= DENSE else n**3 / 3 + 5.0 * DEPTH * KEPT * n**2
+
+    # ------------------------------------------------------------- coarser and finer
+    def thinned(self) -> tuple[_Form, Array]:
+        """(the form of a part of the contacts, weights (k, part) of theirs at all)."""
+        near = couplings(self.W, self.contacts)
+        chosen = spread_out(near, int(self.contacts / THINNED[self.dimension]))
+        rows = (self.dimension * chosen[:, None] + np.arange(self.dimension)).ravel()
+        coarse = _Form.of(self.W[np.ix_(rows, rows)], self.shape[chosen])
+        weight = near[:, chosen] ** POWER
+        weight[weight < np.sort(weight, axis=1)[:, -NEAREST, None]] = 0.0
+        weight[chosen] = np.eye(len(chosen))
+        return coarse, weight / weight.sum(axis=1, keepdims=True)
+
+    def interpolated(self, x: Array, weight: Array) -> Array:
+        """Multipliers of all from those of a part of the contacts."""
+        n = weight.shape[1]
+        values = x[: 3 * n].reshape(3, n) @ weight.T
+        return np.concatenate([values.ravel(), (weight @ x[3 * n :].reshape(n, -1)).ravel()])
+
+    def shifted(self, x: Array, deadline: Deadline) -> Array:
+        """x with the shift of alpha that does best, tau, sigma and f less varied if need be."""
+        k = self.contacts
+        for share in SHARES:
+            y = x.copy()
+            for part in (slice(0, k), slice(k, 2 * k)):
+                y[part] = x[:k].mean() + share * (x[part] - x[:k].mean())
+            y[3 * k :] *= share
+            tried = []
+            for shift in SHIFTS:
+                deadline.pay(self.operations)
+                z = y.copy()
+                z[2 * k : 3 * k] += shift
+                tried.append((self.value(z, SOFT[-1], gradient=False)[0], shift))
+                if tried[-1][0] == INDEFINITE:
+                    break
+            else:
+                y[2 * k : 3 * k] += min(tried)[1]
+                return y
+        return x
+
+    # ------------------------------------------------------------- what is minimised
+    def parts(self, x: Array) -> tuple[Array, Array, Array, Array]:
+        """(tau, sigma, alpha, f)."""
+        k = self.contacts
+        tau, sigma, alpha = np.exp(x[: 3 * k]).reshape(3, k)
+        return tau, sigma, alpha, x[3 * k :]
+
+    def energy(self, x: Array) -> Array:
+        """A (k d, k d)."""
+        tau, sigma, _, f = self.parts(x)
+        A = np.empty_like(self.W)
+        A[self.normal] = tau[:, None] * self.W[self.normal]
+        A[self.tangent] = sigma[self.owner][:, None] * self.W[self.tangent]
+        A[self.tangent] += f[:, None] * self.W[self.normal[self.owner]]
+        return (A + A.T) / 2
+
+    def weights(self, x: Array) -> tuple[Array, Array]:
+        """Of dr_N^2 (k,) and of the tangents of du (k (d - 1),) in B."""
+        _, sigma, alpha, _ = self.parts(x)
+        half = 0.5 * self.shape * sigma
+        return half * alpha, (half / alpha)[self.owner]
+
+    def largest(self, x: Array) -> tuple[Array, Array] | None:
+        """(L, v) of the largest few of B v = L A v, ascending; None where A is indefinite."""
+        try:
+            root = cholesky(self.energy(x), lower=True, check_finite=False)
+        except LinAlgError:
+            return None
+        at_normal, at_tangent = self.weights(x)
+
+        def product(y: Array) -> Array:
+            v = solve_triangular(root, y, lower=True, trans=1, check_finite=False)
+            out = self.W[self.tangent].T @ (at_tangent[:, None] * (self.W[self.tangent] @ v))
+            out[self.normal] += at_normal[:, None] * v[self.normal]
+            return solve_triangular(root, out, lower=True, check_finite=False)
+
+        size = len(self.W)
+        if size <= DENSE:
+            C = product(np.eye(size))
+            few = (max(0, size - KEPT), size - 1)
+            w, y = eigh((C + C.T) / 2, check_finite=False, subset_by_index=few)
+        else:
+            w, y = self._in_subspace(product, size)
+        return w, solve_triangular(root, y, lower=True, trans=1, check_finite=False)
+
+    def _in_subspace(self, product, size: int) -> tuple[Array, Array]:  # type: ignore[no-untyped-def]
+        """Ritz values and vectors of a block Krylov space that begins with the last ones."""
+        begin, depth = self.subspace, DEPTH
+        if begin is None:
+            begin = np.random.default_rng(0).standard_normal((size, KEPT))
+            depth = 3 * DEPTH
+        Q = np.linalg.qr(begin)[0]
+        blocks, images = [Q], []
+        for k in range(depth):
+            images.append(product(blocks[-1]))
+            if k + 1 < depth:
+                basis = np.hstack(blocks)
+                new = images[-1] - basis @ (basis.T @ images[-1])
+                new -= basis @ (basis.T @ new)
+                blocks.append(np.linalg.qr(new)[0])
+        basis, image = np.hstack(blocks), np.hstack(images)
+        H = basis.T @ image
+        w, s = eigh((H + H.T) / 2)
+        y = basis @ s[:, -KEPT:]
+        self.subspace = y
+        return w[-KEPT:], y
+
+    def value(self, x: Array, soft: float, *, gradient: bool = True) -> tuple[float, Array]:
+        """(smoothed log of the largest L, its gradient); INDEFINITE where A is."""
+        found = self.largest(x)
+        if found is None:
+            return INDEFINITE, np.zeros_like(x)
+        w, v = found
+        L = w[-1]
+        p = np.exp(soft * (w / L - 1))
+        value = float(np.log(L) + np.log(p.sum()) / soft)
+        p /= p.sum()
+        if not gradient:
+            return value, np.zeros(0)
+        keep = p > 1e-8
+        return value, self._slope(x, w[keep], v[:, keep], p[keep] / L)
+
+    def _slope(self, x: Array, w: Array, v: Array, p: Array) -> Array:
+        """Gradient by eigenvectors v with v A v = 1, weighted by p (m,)."""
+        _, sigma, alpha, f = self.parts(x)
+        k, wp = self.contacts, w * p
+        u = self.W @ v
+        own = -(v * u) @ wp
+        at_normal = 0.5 * self.shape * ((v[self.normal] ** 2) @ p) * sigma * alpha
+        sliding = np.bincount(self.owner, (u[self.tangent] ** 2) @ p, k)
+        sliding *= 0.5 * self.shape * sigma / alpha
+        slope = np.empty_like(x)
+        slope[:k] = own[self.normal] * np.exp(x[:k])
+        slope[k : 2 * k] = np.bincount(self.owner, own[self.tangent], k) * sigma
+        slope[k : 2 * k] += at_normal + sliding
+        slope[2 * k : 3 * k] = at_normal - sliding
+        slope[3 * k :] = -(v[self.tangent] * u[self.normal[self.owner]]) @ wp
+        return slope
+
+    def improved(
+        self, x: Array, soft: float, steps: int, deadline: Deadline, wanted: float
+    ) -> Array:
+        """x after so many steps, or when t is wanted * 1.01, or in time."""
+        best = [np.inf, x]
+
+        def value(y: Array) -> tuple[float, Array]:
+            deadline.pay(self.operations)
+            found = self.value(y, soft)
+            if found[0] < best[0]:
+                best[:] = found[0], y.copy()
+                if found[0] < -np.log(wanted * (1 + 10 * ROOMS[0])):
+                    raise StopIteration
+            return found
+
+        try:
+            minimize(value, x, jac=True, method="L-BFGS-B",
+                     options={"maxiter": steps, "maxfun": 2 * steps})  # fmt: skip
+        except (StopIteration, TimeUp):
+            pass
+        return best[1]
+
+    # ---------------------------------------------------------------------- proving
+    def multipliers(self, x: Array, t: float) -> ContactMultipliers:
+        """In the units of W as given."""
+        tau, sigma, alpha, f = self.parts(x)
+        square = self.root[self.normal] ** 2
+        # forces times root and velocities over it are the scaled ones: only alpha has units
+        return ContactMultipliers(
+            0.0, tau, sigma, alpha * square, f.reshape(self.contacts, -1), t
+        )
+
+    def proved(self, x: Array, deadline: Deadline, wanted: float) -> ContactMultipliers:
+        """The multipliers with the largest t that could be proved."""
+        found = self.largest(x)
+        for _ in range(SHARPENED):  # each goes on from the subspace of the last
+            found = self.largest(x)
+        t = 0.0 if found is None else float(1 / found[0][-1])
+        by = self.multipliers(x, t)
+        given = self.W * self.root * self.root[:, None]
+        for room in ROOMS if t > 0 else ():
+            work = PROOF * len(self.W) ** 3
+            if not deadline.affords(work):
+                break
+            deadline.spend(work)
+            if holds(given, self.shape, t * (1 - room), by):
+                return replace(by, t=t * (1 - room))
+        return by

@@ -1,0 +1,288 @@
+"""Dynamics of large deformations: steps that keep momenta and energy, with impacts.
+
+With q_h, v_h the means of both ends of a step h, F(q0, q1) the inner forces of
+`elements.discrete_gradient`, whose work is the change of the stored energy, and impulses r,
+
+    q1 - q0 = h v_h,    M (v1 - v0) + h C v_h + h F(q0, q1) = h f(q_h) + H r.               (1)
+
+Times v_h this is the balance of energy, without any loss of the scheme; times a rigid motion of
+the nodes at q_h that of momentum and of moment of momentum: both change by loads, supports and
+contacts alone ([ST], [G]).  f is the load at the mean time, of loads that follow at q_h.
+
+Gaps are those at q0; normals, tangents and averages, in H, those of q0 + h v0 / 2.  A contact
+takes part where its gap and `prediction` h u_N are not positive together; its law is that of
+`moreau_jean`: between r and u1 + e u0, and where contacts would create energy on u_theta.
+
+(1) is solved by Newton's method with the symmetric matrix M + h/2 C + h^2/4 K(q1), a contact
+problem of impulses in every iteration, until its residual is rounding.
+
+[ST] J. C. Simo, N. Tarnow, "The discrete energy-momentum method. Conserving algorithms for
+nonlinear elastodynamics", ZAMP 43 (1992) 757-792.
+[G] see `discrete_gradient`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ...core.clock import NEVER, Deadline
+from ...core.errors import InvertedCells, NotConverged, UnsupportedForm
+from ...problem.friction import FrictionProblem
+from ...problem.solution import FrictionSolution
+from ...solvers.contract import Iterate
+from ..contact import frames
+from ..elements.discrete_gradient import DiscreteBody
+from ..elements.elasticity import materials_by_region
+from ..elements.hyperelasticity import is_hyperelastic
+from ..model import Model
+from ..model.nonlinear_parts import nonlinear_parts
+from ..model.reactions import support_forces
+from .energy import Energies
+from .impulses import Shifts
+from .rubbing import rubbed
+from .springs import Springs
+from .state import State, TimeStep
+from .system import Inertia, Motion
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+ITERATIONS = 40  # of Newton's method
+ROUNDING = 1e-13  # residual, of the sizes of what it sums up, at which it ends
+GOOD = 1e-8  # residual that is still taken where it falls no more
+TOUCHING = 1e-9  # gaps below this part of the size of a contact's area count as closed
+
+
+@dataclass
+class _Trial:
+    """An iterate: velocities and impulses, and what (1) misses there, (dofs,)."""
+
+    velocity: Array
+    impulse: Array
+    missing: Array
+    error: float
+
+
+class LargeMovingModel:
+    """A model in large deformations with inertia; `advance` makes one step."""
+
+    def __init__(self, method: Any, model: Model, tolerance: float) -> None:
+        for name, wanted in (("theta", 0.5), ("reach", 0.0), ("stiffness_damping", 0.0)):
+            if getattr(method, name) != wanted:
+                raise UnsupportedForm(
+                    f"{name}: expected {wanted:g} in dynamics of large deformations, got "
+                    f"{getattr(method, name):g}"
+                )
+        for body in model.bodies:
+            if not is_hyperelastic(body.material):
+                raise UnsupportedForm(
+                    f"body {body.name!r}: dynamics of large deformations need a hyperelastic "
+                    "law, or LinearElastic bodies and kinematics='small' of all contacts"
+                )
+        self.method, self.motion, self.tolerance = method, Motion(model), tolerance
+        body = self.motion.body
+        self.parts, self._all = nonlinear_parts(body), self.motion.parts
+        inertia = Inertia(body, method.mass_damping, 0.0, method.lumped)
+        self.M, self.C = inertia.M, inertia.C
+        self._bodies = [
+            DiscreteBody(b.mesh, materials_by_region(b.mesh, b.material))  # type: ignore[arg-type]
+            for b in body.bodies
+        ]
+        weights = self._all.sites.weights
+        self._closed = TOUCHING * weights ** (1 / (model.dimension - 1))
+        self.fixed = np.setdiff1d(np.arange(self._all.dofs), self.parts.free)
+
+    def begin(self, state: State) -> State:
+        """The state before the first step: as it is."""
+        return state
+
+    def explained(self, solution: FrictionSolution) -> FrictionSolution:
+        """The same record: inertia balances any load."""
+        return solution
+
+    def advance(
+        self, state: State, time: float, solve: Any, limit: Deadline = NEVER
+    ) -> TimeStep:
+        """One step from a state to a time; solve(problem, start, None) solves contacts."""
+        step = _Step(self, state, time)
+        solve_one = step.solver(solve)
+        while True:
+            trial, solution = step.solved(solve_one, limit)
+            energies, held = step.energies(trial)
+            size = energies.total + abs(energies.loads) + abs(energies.supports)
+            excess = energies.contact - self.tolerance * size
+            after = step.local(trial.velocity)[step.active]
+            shifts = excess > 0 and step.shifts.changed(solution.r, after, excess)
+            if not shifts:
+                return step.done(trial, solution, energies, held)
+            step.shifts = shifts
+
+    def between(self, before: Array, after: Array) -> Array:
+        """Inner forces (dofs,) of a way between displacements (dofs,)."""
+        shape, ends = self.parts.X.shape, self.parts.ends
+        both = (np.split(q.reshape(shape), ends) for q in (before, after))
+        parts = zip(self._bodies, *both, strict=True)
+        return np.concatenate([body.between(a, b).ravel() for body, a, b in parts])
+
+
+class _Step:
+    """What does not change within one step."""
+
+    def __init__(self, model: LargeMovingModel, state: State, time: float) -> None:
+        self.model, self.state, self.time = model, state, time
+        parts, method, motion = model.parts, model.method, model.motion
+        h, shape = method.step, parts.X.shape
+        q0, v0 = state.displacement, state.velocity
+        start = parts.meet(q0.reshape(shape))
+        meeting = parts.meet((q0 + h / 2 * v0).reshape(shape))
+        self.H = sparse.csc_array(meeting.columns(frames(meeting.normals)))
+        u0 = self.local(v0)
+        closing = start.gap + method.prediction * h * u0[:, 0] <= model._closed
+        self.active = np.flatnonzero(closing & meeting.met)
+        self.law = motion.body.law.at(self.active)
+        self.load = 0.5 * (motion.load(state.time) + motion.load(time))
+        self.held = (motion.prescribed(time) - motion.prescribed(state.time)) / h
+        springs = Springs.of(motion.body.law, u0.shape[1]).at(self.active)
+        none = np.zeros(len(self.active), dtype=bool)
+        self.shifts = Shifts.of(u0[self.active], start.gap[self.active], method, springs,
+                                np.zeros_like(u0[self.active]), none)  # fmt: skip
+        d = u0.shape[1]
+        columns = (self.active[:, None] * d + np.arange(d)).ravel()
+        self._columns = sparse.csc_array(self.H[:, columns])  # type: ignore[index]
+        self._before = u0
+
+    def local(self, v: Array) -> Array:
+        """Local values of motions (dofs,), (nc, d)."""
+        return (self.H.T @ v).reshape(-1, self.model.parts.dimension)
+
+    def _moved(self, v1: Array) -> Array:
+        return self.state.displacement + self.model.method.step / 2 * (self.state.velocity + v1)
+
+    def _trial(self, v1: Array, impulse: Array) -> _Trial:
+        """(1) at velocities v1 (dofs,) and impulses (k d,) of the active contacts."""
+        m, h = self.model, self.model.method.step
+        q0, v0 = self.state.displacement, self.state.velocity
+        q1 = self._moved(v1)
+        inertia, inner = m.M @ (v1 - v0), h * m.between(q0, q1)
+        damped = h / 2 * (m.C @ (v0 + v1))
+        load = h * self.load.at(((q0 + q1) / 2).reshape(m.parts.X.shape))
+        pushed = self._columns @ impulse
+        missing = inertia + damped + inner - load - pushed
+        free = m.parts.free
+        terms = (m.M @ v0, m.M @ v1, inner, damped, load, pushed)
+        size = sum(float(np.linalg.norm(term[free])) for term in terms)
+        error = float(np.linalg.norm(missing[free])) / (size or 1.0)
+        return _Trial(v1, impulse, missing, error)
+
+    def solver(self, solve: Any) -> Any:
+        """solve of a linearised step: (trial, matrix) -> (velocities, solution)."""
+        m, free = self.model, self.model.parts.free
+        kept: dict[int, FrictionProblem] = {}
+
+        def solved(trial: _Trial, matrix: Any) -> tuple[Array, FrictionSolution]:
+            rest = trial.missing + self._columns @ trial.impulse
+            known = matrix @ (trial.velocity - self._full(self.held)) - rest
+            w = (self._columns.T @ self._full(self.held)).reshape(-1, m.parts.dimension)
+            w = w + self.shifts.values
+            if id(matrix) not in kept:
+                kept.clear()
+                kept[id(matrix)] = FrictionProblem.from_global(
+                    sparse.csr_array(matrix.tocsr()[free][:, free]),
+                    sparse.csc_array(self._columns.tocsr()[free]), known[free], w, self.law,
+                    name=m.motion.body.name,
+                )  # fmt: skip
+            problem = replace(kept[id(matrix)], f=known[free], w=w)
+            start = Iterate(trial.impulse.reshape(-1, m.parts.dimension))
+            solution = solve(problem, start, None)
+            assert solution.v is not None
+            v1 = self._full(self.held)
+            v1[free] = solution.v
+            return v1, solution
+
+        return solved
+
+    def _full(self, held: Array) -> Array:
+        """Velocities (dofs,) of the supports, zero on free dofs."""
+        out = np.zeros_like(held)
+        out[self.model.fixed] = held[self.model.fixed]
+        return out
+
+    def _matrix(self, v1: Array) -> sparse.csr_array:
+        m, h = self.model, self.model.method.step
+        q1 = self._moved(v1).reshape(m.parts.X.shape)
+        blocks = m.parts.tangent(q1)[1]
+        n = len(m.parts.X) * m.parts.dimension
+        K = sparse.bsr_array((blocks, m.parts.columns, m.parts.pointers), shape=(n, n))
+        return sparse.csr_array(m.M + h / 2 * m.C + h**2 / 4 * K.tocsr())
+
+    def solved(self, solve: Any, limit: Deadline) -> tuple[_Trial, FrictionSolution]:
+        """The state at which (1) holds; raises NotConverged where it is not found."""
+        first = self._full(self.held)
+        first[self.model.parts.free] = self.state.velocity[self.model.parts.free]
+        impulse = self.model.method.step * self.state.force[self.active].ravel()
+        why = "cells would be inverted within it"
+        try:
+            trial, best, matrix = self._trial(first, impulse), np.inf, None
+            solution: FrictionSolution | None = None
+            for k in range(ITERATIONS):
+                if k < 3 or k % 5 == 0:
+                    matrix = self._matrix(trial.velocity)
+                v1, solution = solve(trial, matrix)
+                trial = self._trial(v1, solution.r.ravel())
+                stalled = trial.error > 0.5 * best
+                ends = trial.error <= ROUNDING or (stalled and trial.error <= GOOD)
+                if ends or limit.passed:
+                    break
+                best = min(best, trial.error)
+            if solution is not None and trial.error <= GOOD:
+                return trial, solution
+            why = f"its balance of momentum is left with {trial.error:.1e}"
+        except InvertedCells:
+            solution = None
+        raise NotConverged(
+            f"step {self.state.index + 1}: no state at its end is found: {why}. Take a smaller "
+            f"step than {self.model.method.step:g}", solution,
+        )  # fmt: skip
+
+    def energies(self, trial: _Trial) -> tuple[Energies, Array]:
+        """The balance of the step, and the impulses (dofs,) left to supports."""
+        m, h = self.model, self.model.method.step
+        v0, q0, v1 = self.state.velocity, self.state.displacement, trial.velocity
+        q1, shape = self._moved(trial.velocity), m.parts.X.shape
+        dq = q1 - q0
+        held = np.zeros_like(dq)
+        held[m.fixed] = trial.missing[m.fixed]
+        kinetic, elastic = 0.5 * v1 @ (m.M @ v1), m.parts.energy(q1.reshape(shape))
+        gain = kinetic + elastic - 0.5 * v0 @ (m.M @ v0) - m.parts.energy(q0.reshape(shape))
+        load = self.load.at(((q0 + q1) / 2).reshape(shape))
+        return Energies(
+            kinetic=float(kinetic), elastic=float(elastic), gain=float(gain),
+            loads=float(load @ dq), supports=float(held @ dq) / h,
+            contact=float((self._columns @ trial.impulse) @ dq) / h,
+            damping=float(dq @ (m.C @ dq)) / h,
+        ), held  # fmt: skip
+
+    def done(
+        self, trial: _Trial, solution: FrictionSolution, energies: Energies, held: Array
+    ) -> TimeStep:
+        """The step with its state."""
+        m, h, state = self.model, self.model.method.step, self.state
+        q1, d = self._moved(trial.velocity), m.parts.dimension
+        impulse = np.zeros_like(self._before)
+        impulse[self.active] = trial.impulse.reshape(-1, d)
+        mean = 0.5 * (self._before + self.local(trial.velocity))[:, 1:]
+        work = np.minimum((impulse[:, 1:] * mean).sum(axis=1), 0.0)
+        sliding = np.zeros(len(mean), dtype=bool)
+        sliding[self.active] = solution.sliding
+        new = State(state.index + 1, self.time, q1, trial.velocity, impulse / h,
+                    state.slip + h * mean,
+                    **rubbed(state, h * mean, sliding, work))  # fmt: skip
+        meeting = m.parts.meet(q1.reshape(m.parts.X.shape))
+        load = self.load.at(((state.displacement + q1) / 2).reshape(m.parts.X.shape))
+        return TimeStep(m.motion.body, new, solution, self.active, energies, meeting.gap,
+                        support_forces(m._all, held / h), load,
+                        frames(meeting.normals))  # fmt: skip

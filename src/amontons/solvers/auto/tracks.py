@@ -1,0 +1,182 @@
+"""The methods of the race: generators that are sent what a chunk may cost and yield it.
+
+A chunk of sweeps costs about what was asked for; a Newton step is never halved.  All begin at
+the start of the solve unless they say otherwise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import SingularOperator
+from ...linear.blocks import spatial
+from ..contract import Breakdown, Iterate, Patience
+from ..newton.interior_point import InteriorPoint, Relaxation, sliding_speed
+from ..newton.line_search import FullStep
+from ..newton.semismooth import SemismoothNewton
+from ..newton.smoothing import SmoothingNewton
+from ..sweeps.kernels import Acceleration, counted, sweep_data, sweeps_inplace, watch_for
+from ..sweeps.momentum import Momentum
+from .race import Chunk, Chunks
+from .state import State
+
+Array = NDArray[np.float64]
+DEPTH = 10  # past sweeps that Anderson acceleration combines
+LEAST = 20  # sweeps of a chunk: a judgement costs as much as one
+BETWEEN = 200  # accelerated sweeps after each relaxation
+RELAXED = 60  # steps of one relaxation at most
+# First smoothing, times the error of the best reaction per contact, or 0, from zero; shrinking.
+SMOOTHED = ((100.0, 0.3), (0.0, 0.3), (1000.0, 0.3), (0.0, 0.5))
+PATIENCE = 30  # steps of smoothing Newton without halving its error
+FLOP = 0.15  # nanoseconds of an operation of a step between deformable bodies
+STALLED = 8  # steps of Newton's method without halving its error
+
+
+# ---------------------------------------------------------------- sweeps
+def momentum(state: State) -> Chunks:
+    """Sweeps with Nesterov's momentum."""
+    memory, watch = Momentum(sweep_data(state.problem), state.start), watch_for(state.goal)
+    return _swept(memory, state.momentum_cost, watch)
+
+
+def anderson(state: State) -> Chunks:
+    """Accelerated sweeps, contacts in the order of their approach."""
+    memory, watch = Acceleration(state.data, state.start, DEPTH), watch_for(state.goal)
+    return _swept(memory, state.accelerated_cost, watch)
+
+
+def _swept(memory: Momentum | Acceleration, cost: float, watch: Array) -> Chunks:
+    """Chunks of sweeps that cost so many nanoseconds each."""
+    wanted = yield Chunk(memory.r, 0, 0.0)
+    while True:
+        count, flops = memory.sweep(max(LEAST, int(wanted / cost)), watch)
+        wanted = yield Chunk(memory.r.copy(), count, cost * count, flops, watch[2])
+
+
+def relaxed(relaxation: float, state: State) -> Chunks:
+    """Sweeps with a relaxation, 1: none."""
+    watch, r = watch_for(state.goal), state.start.copy()
+    data, cost = sweep_data(state.problem, relaxation=relaxation), state.sweep_cost
+    wanted = yield Chunk(r, 0, 0.0)
+    while True:
+        sweeps = max(LEAST, int(wanted / cost))
+        count, flops = counted(data, partial(sweeps_inplace, data, r, sweeps, watch))
+        wanted = yield Chunk(r.copy(), count, cost * count, flops, watch[2])
+
+
+# ---------------------------------------------------------------- Newton's kind
+def interior_point(state: State) -> Chunks:
+    """Steps on the relaxation without sliding, sweeps, those with the sliding found, and on."""
+    solver, problem = InteriorPoint(), state.problem
+    slip = np.zeros(problem.contacts)
+    if state.start.any():
+        slip = sliding_speed(problem, state.start[:, : problem.dimension])
+    wanted = yield Chunk(state.start, 0, 0.0)
+    while True:
+        relaxation, done = Relaxation.of(state.work, slip, solver.shift), 0
+        while done < RELAXED:
+            steps = int(np.clip(wanted / state.step_cost, 1, RELAXED - done))
+            count = relaxation.advance(state.goal, state.affordable(steps))
+            done += count
+            cost = max(count, 1) * state.step_cost
+            wanted = yield Chunk(relaxation.r.copy(), max(count, 1), cost)
+            if count < steps:
+                break
+        slip = sliding_speed(problem, relaxation.r[:, : problem.dimension])
+        memory = Acceleration(state.data, relaxation.r, DEPTH)
+        watch, cost, left = watch_for(state.goal), state.accelerated_cost, BETWEEN
+        while left > 0:
+            count, flops = memory.sweep(int(np.clip(wanted / cost, 20, left)), watch)
+            left -= count
+            wanted = yield Chunk(memory.r.copy(), count, cost * count, flops, watch[2])
+
+
+def smoothing_newton(state: State) -> Chunks:
+    """Smoothing Newton from the best reaction, from zero when it stalls, and so on.
+
+    From a swept point it takes half the steps that it takes from zero, where the smoothing is
+    far above the error there.
+    """
+    root, x = math.sqrt(max(state.problem.contacts, 1)), state.start
+    wanted = yield Chunk(x, 0, 0.0)
+    while True:
+        for smoothing, shrink in SMOOTHED:
+            afar = 0.1 * state.problem.q_norm / root
+            if smoothing:
+                x, sigma = state.r.copy(), min(smoothing * state.error / root, afar)
+            else:
+                x, sigma = np.zeros_like(state.start), afar
+            solver, patience = SmoothingNewton(shrink=shrink), Patience(PATIENCE)
+            while not patience.waited > patience.most:
+                steps = state.affordable(max(1, int(wanted / state.step_cost)))
+                count, residual, sigma, found = state.work.newton(
+                    x, sigma, solver, goal=0.5 * state.goal, steps=steps
+                )
+                cost = max(abs(count), 1) * state.step_cost
+                wanted = yield Chunk(found, max(abs(count), 1), cost)
+                if count < 0 or patience.over(residual):
+                    break
+
+
+def inexact_newton(state: State) -> Chunks:
+    """Steps between deformable bodies: full ones from the best reaction, then from the start.
+
+    With a line search after that.
+    """
+    full, search = state.newton_kind(line_search=FullStep()), state.newton_kind()
+    _ = yield Chunk(state.start, 0, 0.0)
+    for solver, swept in ((full, True), (full, False), (search, True), (search, False)):
+        for chunk in _stepped(state, solver, state.r if swept else state.start):
+            _ = yield chunk
+
+
+def semismooth_newton(state: State) -> Chunks:
+    """Semismooth Newton from the best reaction, again whenever it stalls."""
+    _ = yield Chunk(state.start, 0, 0.0)
+    while True:
+        none = True
+        for chunk in _stepped(state, SemismoothNewton(), state.r):
+            none = False
+            _ = yield chunk
+        if none:
+            return
+
+
+def _stepped(state: State, solver: SemismoothNewton, r: Array) -> Iterator[Chunk]:
+    """Steps of Newton's method from r until it stalls or breaks down."""
+    patience = Patience(STALLED)
+    try:
+        for found in solver.iterates(state.problem, state.iterate(r), state.target):
+            cost = state.dense_step_cost if found.flops is None else FLOP * found.flops
+            yield Chunk(spatial(found.r), 1, cost, found.flops, math.inf,
+                        found.linear_iterations)  # fmt: skip
+            if patience.over(state.latest):
+                return
+    except (Breakdown, SingularOperator):
+        return
+
+
+# ---------------------------------------------------------------- the last resort
+Staged = Callable[[State], Iterator[Iterate]]
+
+
+def staged(stages: Staged, state: State) -> Chunks:
+    """Stages that start from the best reaction, and offer what they find themselves."""
+    _ = yield Chunk(state.start, 0, 0.0)
+    for found in stages(state):
+        cost = state.step_cost * found.iterations
+        if found.flops is not None:
+            cost = min(cost, FLOP * found.flops)
+        yield Chunk(spatial(found.r), found.iterations, cost, found.flops, state.error,
+                    found.linear_iterations)  # fmt: skip
+
+
+__all__ = [
+    "anderson", "inexact_newton", "interior_point", "momentum", "relaxed", "semismooth_newton",
+    "smoothing_newton", "staged",
+]  # fmt: skip

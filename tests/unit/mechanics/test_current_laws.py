@@ -1,0 +1,117 @@
+"""Laws of two bodies that slide far: forces of a dragged block that are known beforehand."""
+
+import numpy as np
+import pytest
+from tangent_checker import checked_tangents
+
+import amontons as am
+from amontons.mechanics.model.large_deformation import large_deformation, large_step
+
+SOFT, STIFF = am.NeoHookean(1.0, 0.3), am.NeoHookean(20.0, 0.3)
+PRESS, DRAG = 0.06, 0.5
+
+
+def top(x, t):
+    """Press until 1, then drag."""
+    return DRAG * max(t - 1.0, 0.0), -PRESS * min(t, 1.0)
+
+
+def model(*, order=1, **law):
+    """A stiff block of width 1 on a softer slab."""
+    lower = am.Body(am.box((3, 1), (15, 4), origin=(-0.7, -1)), SOFT, name="lower", order=order)
+    upper = am.Body(am.box((1, 1), (4, 3)), STIFF, name="upper", order=order)
+    return am.Model([lower, upper], [am.Fix("lower.bottom", 0), am.Fix("upper.top", top)],
+                    [am.Contact("upper.bottom", master="lower.top", **law)])  # fmt: skip
+
+
+def dragged(*, until=2.0, **law):
+    """(normal, shear) forces at contacts after the drag, and the step."""
+    *_, step = am.evolve(model(**law), am.QuasiStatic(0.25), until=until)
+    return step.state.force[:, 0], np.abs(step.state.force[:, 1:]).sum(axis=1), step
+
+
+def test_a_given_bound_is_the_shear_of_the_whole_area():
+    """Force per area of the undeformed surface, whatever the pressure."""
+    _, shear, _ = dragged(tresca=0.004)
+    assert shear.sum() == pytest.approx(0.004, rel=1e-8)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_cap_holds_where_the_pressure_is_high(order):
+    normal, shear, step = dragged(mu=0.5, cap=0.006, order=order)
+    weights = np.repeat(0.25, 5) * [0.5, 1, 1, 1, 0.5]
+    np.testing.assert_allclose(shear, np.minimum(0.5 * normal, 0.006 * weights), rtol=1e-6)
+    assert (shear < 0.4 * normal).any()
+    assert step.solution.converged
+
+
+def test_cohesion_adds_to_the_pressure():
+    """Mohr and Coulomb: mu times (pressure + cohesion), over the whole area."""
+    normal, shear, _ = dragged(mu=0.3, cohesion=0.01)
+    assert shear.sum() == pytest.approx(0.3 * (normal.sum() + 0.01), rel=1e-8)
+
+
+def test_cohesion_bears_its_tension_and_no_more():
+    """A block that is lifted: it hangs on until the tension is reached, then with just that."""
+    for lift, torn in ((0.001, False), (0.2, True)):
+        bodies = model(mu=0.3, cohesion=0.02)
+        supports = [am.Fix("lower.bottom", 0), am.Fix("upper.top", (0, lift))]
+        lifted = am.Model(bodies.bodies, supports, bodies.contacts)
+        solution = am.solve(lifted)
+        assert solution.converged
+        assert (solution.resultant.ravel()[1] == pytest.approx(-0.02, rel=1e-8)) == torn
+
+
+def test_friction_over_pressure():
+    """mu = a / p: the shear is a, whatever the pressure."""
+    curve = am.FrictionCurve(lambda p, s: 0.004 / np.maximum(p, 0.005))
+    normal, shear, _ = dragged(mu=curve)
+    high = normal > 0.005 * 0.25
+    assert high.all()
+    assert shear.sum() == pytest.approx(0.004, rel=1e-6)
+
+
+def test_friction_over_the_speed_of_the_slip():
+    """The block slides by 0.5 in unit time, where all of it slides."""
+    curve = am.FrictionCurve([0.4, 0.1], speed=[0.0, 1.0])
+    normal, shear, _ = dragged(mu=curve)
+    assert shear.sum() == pytest.approx((0.4 - 0.3 * DRAG) * normal.sum(), rel=0.02)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_sides_that_give_way_overlap_by_pressure_over_stiffness(order):
+    normal, _, step = dragged(mu=0.1, stiffness=0.5, order=order, until=1.0)
+    weights = np.repeat(0.25, 5) * [0.5, 1, 1, 1, 0.5]
+    np.testing.assert_allclose(-step.gap, normal / (0.5 * weights), rtol=1e-6)
+    assert abs(step.energies.defect) < 1e-6 * step.energies.turnover
+
+
+LAWS = [{"tresca": 0.01}, {"mu": 0.4, "cap": 0.02}, {"mu": 0.3, "cohesion": 0.01},
+        {"mu": 0.3, "stiffness": 2.0},
+        {"tresca": 0.01, "cohesion": 0.02, "stiffness": 1.0}]  # fmt: skip
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_tangents_are_exact(law):
+    rng, bodies = np.random.default_rng(3), model(**law)
+    dofs = large_deformation(bodies).parts.X.size
+    before = 0.01 * rng.standard_normal(dofs)
+    problem = large_step(bodies, np.zeros(dofs), np.zeros(dofs), before)
+    draws = (rng.standard_normal((2, problem.unknowns)) * [[0.01], [1.0]] for _ in range(20))
+    assert checked_tangents(problem, draws) > 8
+
+
+def test_what_has_slid_off_carries_no_force():
+    """Half of the block beyond the slab's end: the bound of what is left alone."""
+    short = am.Body(am.box((1.5, 1), (8, 4), origin=(-0.5, -1)), SOFT, name="lower")
+
+    def far(x, t):
+        return 0.5 * max(t - 1.0, 0.0), -PRESS * min(t, 1.0)
+
+    upper, contact = model(tresca=0.004).bodies[1], model(tresca=0.004).contacts[0]
+    supports = [am.Fix("lower.bottom", 0), am.Fix("upper.top", far)]
+    slid = am.Model([short, upper], supports, [contact])
+    *_, step = am.evolve(slid, am.QuasiStatic(0.1), until=2.0)
+    assert step.solution.converged
+    shear = -step.state.force[:, 1]
+    np.testing.assert_allclose(shear, [0.0005, 0.001, 0.001, 0, 0], atol=1e-9)

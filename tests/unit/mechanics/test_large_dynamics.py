@@ -1,0 +1,185 @@
+"""Dynamics of large deformations: momenta and energy are kept, impacts create none."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import amontons as am
+from amontons.mechanics.elements.discrete_gradient import DiscreteBody
+from amontons.mechanics.elements.hyperelasticity import HyperelasticBody
+from amontons.mechanics.elements.mass import mass
+
+SOFT = am.NeoHookean(100.0, 0.3, density=1.0)
+CELLS = [  # kind of cells, integration, law
+    ("quad", "full", SOFT), ("quad", "hybrid", am.NeoHookean(1.0, 0.45)),
+    ("quad", "hybrid-incompatible", am.MooneyRivlin(0.3, 0.1, 10.0)),
+    ("quad", "incompatible", am.SaintVenantKirchhoff(1.0, 0.3)),
+    ("tri", "full", am.CiarletGeymonat(1.0, 0.3)), ("hex", "hybrid", am.NeoHookean(1.0, 0.45)),
+    ("hex", "hybrid-incompatible", am.Ogden((0.5, 0.1), (1.5, -2.0), 8.0)),
+    ("hex", "incompatible", SOFT), ("tet", "full", am.ReducedPolynomial((0.4, 0.1), 2.0)),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize(("kind", "integration", "law"), CELLS)
+def test_forces_between_two_states_keep_energy_and_momenta(kind, integration, law, order):
+    if order == 2 and "incompatible" in integration:
+        pytest.skip("of first order alone")
+    dim = 2 if kind in ("quad", "tri") else 3
+    mesh = am.Body(am.box((1.0,) * dim, 2, kind), law, order=order,
+                   integration=integration).mesh  # fmt: skip
+    rng, x = np.random.default_rng(3), mesh.points
+    before = 0.02 * rng.standard_normal(x.shape)
+    after = before + 0.02 * rng.standard_normal(x.shape)
+    after += x @ rng.uniform(-0.2, 0.2, (dim, dim))
+    elastic = HyperelasticBody(mesh, law)
+    between = DiscreteBody(mesh, dict.fromkeys(mesh.regions, law)).between
+    force, size = between(before, after), law.young + law.lame_lambda()
+    gain = elastic.energy(after) - elastic.energy(before)
+    assert (force * (after - before)).sum() == pytest.approx(gain, abs=1e-13 * size)
+    assert abs(force.sum(axis=0)).max() < 1e-13 * size
+    moment = np.einsum("ai,aj->ij", x + (before + after) / 2, force)
+    assert abs(moment - moment.T).max() < 1e-13 * size
+    np.testing.assert_allclose(between(before, before), elastic.forces(before),
+                               atol=1e-13 * size)  # fmt: skip
+
+
+def momenta(body, state):
+    """Momentum and moment of momentum about the origin."""
+    X = body.mesh.points
+    x = X + state.displacement.reshape(X.shape)
+    p = (mass(body.mesh, body.material) @ state.velocity).reshape(X.shape)
+    moment = np.einsum("ai,aj->ij", x, p)
+    return np.concatenate([p.sum(axis=0), (moment - moment.T).ravel()])
+
+
+@pytest.mark.parametrize(("size", "law", "steps"), [
+    ((1.0, 0.6), SOFT, 1000),
+    ((1.0, 0.6), am.MooneyRivlin(15.0, 2.0, 400.0, density=1.0), 60),
+    ((1.0, 0.6, 0.3), SOFT, 60),
+])  # fmt: skip
+def test_a_free_block_that_spins_keeps_all(size, law, steps):
+    """Two turns and more in steps of a third of a period of its first vibration."""
+    body = am.Body(am.box(size, 2), law)
+
+    def velocity(x):
+        turn = [-3 * x[1] + 0.5, 3 * x[0]]
+        return (*turn, 0.5 * x[1]) if len(size) == 3 else tuple(turn)
+
+    model = am.Model([body], [], [])
+    start = am.at_rest(model, velocity=velocity)
+    wanted, energy = momenta(body, start), None
+    for step in am.evolve(model, am.MoreauJean(0.02), until=0.02 * steps, start=start):
+        energy = step.energies.total if energy is None else energy
+        assert step.energies.total == pytest.approx(energy, rel=1e-10)
+        np.testing.assert_allclose(momenta(body, step.state), wanted,
+                                   atol=1e-10 * abs(wanted).max())  # fmt: skip
+    assert step.state.index == steps
+    assert step.energies.elastic > 5e-5 * energy  # it is stretched
+
+
+def test_steps_are_of_second_order():
+    body = am.Body(am.box((1.0, 0.5), (2, 1)), SOFT)
+    model = am.Model([body], [am.Fix("left", (0, 0))], [], [am.BodyForce((0.0, -20.0))])
+    ends = {}
+    for h in (0.02, 0.01, 0.005, 0.00125):
+        *_, step = am.evolve(model, am.MoreauJean(h), until=0.2)
+        ends[h] = step.state.displacement
+    off = [abs(ends[h] - ends[0.00125]).max() for h in (0.02, 0.01, 0.005)]
+    assert 3.3 < off[0] / off[1] < 4.8
+    assert abs(ends[0.005]).max() > 0.05
+
+
+def dropped(restitution, mu, law, until=0.6, h=0.005):
+    mesh = am.box((1.0, 0.6), (3, 2))
+    mesh = replace(mesh, points=mesh.points + [0.0, 0.2])
+    body = am.Body(mesh, law)
+    model = am.Model([body], [], [am.Contact("bottom", am.Plane((0, 1)), mu=mu)],
+                     [am.BodyForce((0.0, -9.81))])  # fmt: skip
+    start = am.at_rest(model, velocity=(1.0, -2.0))
+    return body, list(am.evolve(model, am.MoreauJean(h, restitution=restitution), until=until,
+                                start=start))  # fmt: skip
+
+
+@pytest.mark.parametrize(("restitution", "mu"), [(0.0, 0.3), (0.5, 0.5), (1.0, 0.0)])
+def test_energy_of_a_bouncing_block_never_grows(restitution, mu):
+    body, steps = dropped(restitution, mu, SOFT)
+    M, X = mass(body.mesh, SOFT), body.mesh.points
+    total = []
+    for step in steps:
+        u = step.state.displacement
+        height = (M @ (X.ravel() + u)).reshape(X.shape)[:, 1].sum()
+        total.append(step.energies.total + 9.81 * height)
+        assert abs(step.energies.defect) < 1e-10 * total[0]
+        assert step.energies.contact <= 1e-8 * total[0]
+    assert np.diff(total).max() <= 1e-8 * total[0]  # the tolerance of contact solves
+    assert sum(len(step.active) > 0 for step in steps) > 10
+    if restitution == 1.0:
+        assert total[-1] == pytest.approx(total[0], rel=1e-6)
+    else:
+        assert total[-1] < 0.9 * total[0]
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
+def test_stiff_blocks_leave_with_their_restitution(restitution):
+    """As a rigid one, whose period is below the step: a column of one cell."""
+    law = am.NeoHookean(1e7, 0.0, density=1.0)
+    body = am.Body(am.box((1.0, 1.0), 1), law)
+    mesh = replace(body.mesh, points=body.mesh.points + [0.0, 0.0995])
+    model = am.Model([am.Body(mesh, law)], [], [am.Contact("bottom", am.Plane((0, 1)), mu=0.0)])
+    start = am.at_rest(model, velocity=(0.0, -1.0))
+    *_, step = am.evolve(model, am.MoreauJean(0.01, restitution=restitution), until=0.2,
+                         start=start)  # fmt: skip
+    mean = (mass(mesh, law) @ step.state.velocity).reshape(-1, 2).sum(axis=0)[1]
+    # the stress that is left gives back 1e-5 of the energy of the impact
+    assert -1e-9 <= mean <= np.hypot(restitution, np.sqrt(1e-5))
+
+
+def test_small_motions_are_those_of_small_strains():
+    """A thousandth of the load: both schemes are the same up to squares."""
+    found = []
+    for law in (SOFT, am.LinearElastic(100.0, 0.3, density=1.0)):
+        body = am.Body(am.box((1.0, 0.5), (3, 2)), law)
+        floor = am.Contact("bottom", am.Plane((0, 1), (0, -1)), mu=0.2)
+        model = am.Model([body], [am.Fix("left", (0, 0))], [floor], [am.BodyForce((0, -0.02))])
+        *_, step = am.evolve(model, am.MoreauJean(0.01, mass_damping=0.5), until=0.3)
+        found.append(step.state.displacement)
+    np.testing.assert_allclose(found[0], found[1], atol=2e-3 * abs(found[1]).max())
+    assert abs(found[1]).max() > 1e-5
+
+
+def test_moving_supports_and_friction_do_their_work():
+    """A block is drawn over a floor by its top, which is lifted in the end."""
+    law = am.NeoHookean(100.0, 0.45, density=1.0)
+    body = am.Body(am.box((1.0, 0.5), (3, 2)), law)
+    top = am.Fix("top", lambda x, t: (0.5 * t, -0.02 * min(1.0, 10 * t)))
+    model = am.Model([body], [top], [am.Contact("bottom", am.Plane((0, 1)), mu=0.3)])
+    work = 0.0
+    for step in am.evolve(model, am.MoreauJean(0.01), until=0.4):
+        size = step.energies.turnover + step.energies.total
+        assert abs(step.energies.defect) < 1e-7 * size
+        work += step.energies.contact
+    assert work < -1e-3
+    assert step.resultant()[1] > 0
+
+
+@pytest.mark.parametrize(("method", "law", "message"), [
+    (am.MoreauJean(0.1, theta=1.0), SOFT, "theta: expected 0.5"),
+    (am.MoreauJean(0.1, stiffness_damping=1.0), SOFT, "stiffness_damping: expected 0"),
+    (am.MoreauJean(0.1, reach=0.1), SOFT, "reach: expected 0"),
+    (am.MoreauJean(0.1), am.NeoHookean(1.0, 0.3), "need its density"),
+])  # fmt: skip
+def test_what_these_dynamics_do_not_have(method, law, message):
+    model = am.Model([am.Body(am.box((1, 1), 1), law)], [],
+                     [am.Contact("bottom", am.Plane((0, 1)), mu=0.2)])  # fmt: skip
+    with pytest.raises(am.AmontonsError, match=message):
+        am.evolve(model, method, until=1.0)
+
+
+def test_a_step_that_is_too_long_says_so():
+    body = am.Body(am.box((1.0, 1.0), 2), am.NeoHookean(1.0, 0.3, density=1.0))
+    model = am.Model([body], [], [])
+    start = am.at_rest(model, velocity=lambda x: (0.0, -10 * x[1]))
+    with pytest.raises(am.NotConverged, match="step 1: no state at its end is found"):
+        list(am.evolve(model, am.MoreauJean(1.0), until=1.0, start=start))
