@@ -33,7 +33,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular
-from scipy.optimize import minimize
 
 from ...core.clock import NEVER, Deadline
 from ...core.errors import TimeUp
@@ -217,6 +216,7 @@ class _Form:
         weight = near[:, chosen] ** POWER
         weight[weight < np.sort(weight, axis=1)[:, -NEAREST, None]] = 0.0
         weight[chosen] = np.eye(len(chosen))
+        weight[~weight.any(axis=1)] = 1.0  # coupled with none of the part
         return coarse, weight / weight.sum(axis=1, keepdims=True)
 
     def interpolated(self, x: Array, weight: Array) -> Array:
@@ -350,13 +350,16 @@ class _Form:
     ) -> Array:
         """x after so many steps, or when t is wanted * 1.01, or in time."""
         best = [np.inf, x]
+        from scipy.optimize import minimize  # a start of the program does not wait for it
+
+        enough = np.log(wanted * (1 + 10 * ROOMS[0])) if wanted > 0 else -np.inf
 
         def value(y: Array) -> tuple[float, Array]:
             deadline.pay(self.operations)
             found = self.value(y, soft)
             if found[0] < best[0]:
                 best[:] = found[0], y.copy()
-                if found[0] < -np.log(wanted * (1 + 10 * ROOMS[0])):
+                if -found[0] > enough:
                     raise StopIteration
             return found
 
