@@ -1,42 +1,18 @@
 """A body that meets itself, small strains that slide far, and the laws of sliding pairs."""
 
-from dataclasses import replace
 
 import numpy as np
 import pytest
+from folded_meshes import ARM, hairpin
 from tangent_checker import checked_tangents
 
 import amontons as am
-from amontons.mechanics.meshes import Facets
 from amontons.mechanics.model.large_deformation import large_deformation, large_step
 
 NEO, LINEAR = am.NeoHookean(1.0, 0.3), am.LinearElastic(1.0, 0.3)
-ARM, GAP, THICK = 2.0, 0.3, 0.2
 
 
 # ------------------------------------------------------------------------ folded beam
-def hairpin():
-    """A strip bent to a U, arms along x: surfaces "low" and "high" inside, "press" outside."""
-    radius = (GAP + THICK) / 2
-    half = np.pi * radius
-    mesh = am.box((2 * ARM + half, THICK), (48, 4))
-    s, h = mesh.points.T
-    angle = np.clip((s - ARM) / radius, 0, np.pi) - np.pi / 2
-    past = np.maximum(s - ARM - half, 0)
-    centre = np.stack([np.minimum(s, ARM) - past + radius * np.cos(angle),
-                       radius * np.sin(angle)], axis=1)  # fmt: skip
-    inward = -np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    mesh = replace(mesh, points=centre + (h - THICK / 2)[:, None] * inward)
-    (inside,), (outside,) = mesh.surface("top"), mesh.surface("bottom")
-    first, second = (mesh.points[f.nodes].mean(axis=1) for f in (inside, outside))
-    tip = (second[:, 1] > 0) & (second[:, 0] < 0.4)
-    return mesh.with_surfaces({
-        "low": (Facets("line", inside.nodes[first[:, 1] < 0]),),
-        "high": (Facets("line", inside.nodes[first[:, 1] > 0]),),
-        "press": (Facets("line", outside.nodes[tip]),),
-    })  # fmt: skip
-
-
 def test_sides_of_a_folded_beam_are_found():
     """Across a gap that is wider than the beam is thick; then as with sides given by hand."""
 

@@ -12,12 +12,12 @@ from scipy import sparse
 from ..meshes.facets import corner_facets
 from ..meshes.mesh import Mesh
 from ..meshes.surfaces import nodal_weights
-from .current_mortar import MortarPair
+from .current_mortar import MortarPair, folded
 from .facing import Skin
 from .geometry import frames
 from .mortar import coupled_columns
 from .nodal import ContactRows, check_exterior
-from .overlap import check_different
+from .overlap import check_different, is_itself
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -34,7 +34,9 @@ def current_contact(
     """
     check_exterior(slave, surface)
     check_exterior(master, master_surface, "master")
-    check_different(slave, surface, master, master_surface)
+    itself = is_itself(slave, surface, master, master_surface)
+    if not itself:
+        check_different(slave, surface, master, master_surface)
     corners = tuple(corner_facets(block) for block in slave.surface(surface))
     weights = nodal_weights(slave.points, corners)
     nodes = np.flatnonzero(weights > 0)
@@ -47,7 +49,10 @@ def current_contact(
     whole = MortarPair(nodes, over, under, np.ones_like(free)).at(points).normals
     found = np.linalg.norm(whole * free, axis=1) > FREE
     chosen = nodes[found]
-    meeting = MortarPair(chosen, over, under, free[found]).at(points)
+    if itself:
+        meeting = folded(chosen, over, free[found], points).at(points)
+    else:
+        meeting = MortarPair(chosen, over, under, free[found]).at(points)
     axes = frames(meeting.normals)
     columns = coupled_columns(
         meeting.references, axes, np.zeros(axes.shape[:2], dtype=bool)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -70,6 +70,10 @@ class Skin:
         )
         nodes, middles = (np.concatenate(p).astype(np.int64) for p in (padded, beside))
         return cls(nodes, corners, middles, np.concatenate(parts), bent)
+
+    def part(self, chosen: Index) -> Skin:
+        """Some of the facets, (k,)."""
+        return Skin(*(getattr(self, one.name)[chosen] for one in fields(self)))
 
     @property
     def real(self) -> Mask:
@@ -154,7 +158,7 @@ def candidates(slave: Skin, master: Skin, x: Array) -> tuple[Index, Index]:
     """
     from scipy.spatial import cKDTree
 
-    (centre, normal, radius), (there, facing, size) = (_shapes(s, x) for s in (slave, master))
+    (centre, normal, radius), (there, facing, size) = (shapes(s, x) for s in (slave, master))
     nodes = master.all
     normals = np.zeros(x.shape)
     for slot in range(master.nodes.shape[1]):
@@ -183,7 +187,7 @@ def candidates(slave: Skin, master: Skin, x: Array) -> tuple[Index, Index]:
     return first[kept], second[kept]
 
 
-def _shapes(side: Skin, x: Array) -> tuple[Array, Array, Array]:
+def shapes(side: Skin, x: Array) -> tuple[Array, Array, Array]:
     """Centres, unit normals (f, d) and radii (f,) of facets."""
     p, real = x[side.nodes], side.real[:, :, None]
     centre = (p * real).sum(axis=1) / side.corners[:, None]

@@ -84,15 +84,39 @@ def check_nodes(pairs: Sequence[Pair], slaves: Index, is_free: Mask) -> None:
     _check_middles(pairs, is_free)
 
 
+def chains(pairs: Sequence[Pair]) -> list[set[int]]:
+    """For every pair the others of which some of its slaves are in the master."""
+    return [
+        {
+            k for k, other in enumerate(pairs)
+            if other is not pair and isinstance(other, MortarPair)
+            and np.isin(pair.slaves, _whole(other)).any()
+        }
+        for pair in pairs
+    ]  # fmt: skip
+
+
+def _whole(pair: MortarPair) -> Index:
+    """Nodes that a pair may press as those of its master."""
+    return (pair.master if pair.fold is None else pair.fold.skin).every
+
+
 def _check_apart(pairs: Sequence[Pair], slaves: Index) -> None:
-    """Raise UnsupportedForm where a node of a master carries a contact of its own."""
-    mortars = [pair for pair in pairs if isinstance(pair, MortarPair)]
-    taken = [pair.master.every for pair in mortars]
-    taken += [pair.slave.means[0] for pair in mortars]
-    if taken and np.isin(np.concatenate(taken), slaves).any():
+    """Raise UnsupportedForm for nodes that carry forces of pairs in a ring, or of a middle."""
+    middles = [pair.slave.means[0] for pair in pairs if isinstance(pair, MortarPair)]
+    if middles and np.isin(np.concatenate(middles), slaves).any():
         raise UnsupportedForm(
-            "a node is in a slave and in a master surface, large deformations allow one; "
-            "leave it out of the slave (where), or make the surfaces smaller", ("contacts",),
+            "a node between the corners of a slave surface carries a contact of its own; leave "
+            "it out of that (where), or make the surfaces smaller", ("contacts",),
+        )  # fmt: skip
+    links = chains(pairs)
+    for _ in pairs:  # what follows no other is no part of a ring
+        links = [{k for k in link if links[k]} for link in links]
+    if any(links):
+        raise UnsupportedForm(
+            "nodes are slave in one contact and master in another, and the other way round in "
+            "a ring; leave them out of one of the slaves (where), or make the surfaces smaller",
+            ("contacts",),
         )  # fmt: skip
 
 

@@ -388,6 +388,9 @@ def large_step(
     """
     parts = nonlinear_parts(model)
     _ = model.rests_on_contact  # raises where nothing holds a body
-    before = np.zeros(parts.X.size) if before is None else before
+    if before is None:
+        before = np.zeros(parts.X.size)
+    elif parts.folds:
+        parts = nonlinear_parts(model.divided(before))
     return LargeDeformation(parts, NodalForces.of(load), prescribed, before,
                             np.zeros(parts.at.shape), known, model.name)  # fmt: skip

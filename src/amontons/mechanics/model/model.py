@@ -63,6 +63,7 @@ class Model(Told):
     springs: Sequence[Spring] = ()
     pair_names: tuple[str, ...] = field(default=(), init=False, repr=False)
     beside: Beside = field(default=None, init=False, repr=False)  # type: ignore[assignment]
+    divided_at: Array | None = field(default=None, init=False, repr=False)
     _shared: Prepared = field(default_factory=Prepared, init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -265,6 +266,16 @@ class Model(Told):
         """A copy that shares the assembled matrices, which must not depend on the changes."""
         other = replace(self, **changes)  # type: ignore[arg-type]
         object.__setattr__(other, "_shared", self._shared)
+        object.__setattr__(other, "divided_at", self.divided_at)
+        return other
+
+    def divided(self, displacement: Array) -> Model:
+        """The same whose surfaces that meet themselves have the sides of another state.
+
+        displacement (dofs,): at the beginning of a step; else the undeformed state is meant.
+        """
+        other = self._variant()
+        object.__setattr__(other, "divided_at", displacement)
         return other
 
     def recover(self, solution: FrictionSolution) -> ContactFields:

@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..contact.current import CurrentContact
-from ..contact.current_mortar import MortarPair
+from ..contact.current_mortar import MortarPair, folded
 from ..contact.current_pairs import Meetings, ObstaclePair, Pair
 from ..contact.facing import Skin
 from ..contact.geometry import Plane
+from ..contact.overlap import is_itself
 from ..elements.hyperelasticity import HyperelasticBody, is_hyperelastic
 from ..elements.linear_body import LinearBody
-from .finite_checks import check_nodes, check_supported
+from .finite_checks import chains, check_nodes, check_supported
 from .supports import locate
 
 if TYPE_CHECKING:
@@ -81,6 +82,34 @@ class NonlinearParts:
     def has_pairs(self) -> bool:
         """True where two bodies that deform meet."""
         return any(isinstance(pair, MortarPair) for pair in self.contact.pairs)
+
+    @cached_property
+    def chained(self) -> int:
+        """How many pairs follow the first in a chain of slaves that are masters of others."""
+        return len(self.contact.pairs) - 1 if any(chains(self.contact.pairs)) else 0
+
+    @property
+    def folds(self) -> bool:
+        """True where a surface meets itself."""
+        return any(isinstance(p, MortarPair) and p.fold is not None for p in self.contact.pairs)
+
+    def divided(self, u: Array) -> NonlinearParts:
+        """The same with sides of folds as they are at displacements u (nodes, d)."""
+        for known, parts in tuple(self._divisions):
+            if np.array_equal(known, u):
+                return parts
+        pairs = tuple(
+            pair.divided(self.X + u) if isinstance(pair, MortarPair) else pair
+            for pair in self.contact.pairs
+        )
+        parts = replace(self, contact=replace(self.contact, pairs=pairs))
+        self._divisions.append((u.copy(), parts))
+        return parts
+
+    @cached_property
+    def _divisions(self) -> deque[tuple[Array, NonlinearParts]]:
+        """States, and these parts with the sides of folds there."""
+        return deque(maxlen=KEPT)
 
     @cached_property
     def gathers(self) -> sparse.csr_array:
@@ -198,6 +227,8 @@ def nonlinear_parts(model: Model) -> NonlinearParts:
     Raises UnsupportedForm for what finite strains do not have.
     """
     parts = model._shared.once(_nonlinear_parts, (), model)
+    if model.divided_at is not None and parts.folds:
+        parts = parts.divided(model.divided_at.reshape(parts.X.shape))
     return replace(parts, contact=replace(parts.contact, law=model.law))
 
 
@@ -248,12 +279,17 @@ def _pairs(model: Model, slaves: list[Index], linear: Discretisation) -> list[Pa
         if contact.obstacle is not None:
             out.append(ObstaclePair(contact.obstacle, nodes))  # type: ignore[arg-type]
             continue
-        skins = []
+        skins, owners = [], []
         for side in (contact.slave, str(contact.master)):
             k, name = locate(model.bodies, side)
             facets = model.bodies[k].mesh.surface(name)
             skins.append(Skin.of(facets, int(linear.offsets[k]) // d))
+            owners += [model.bodies[k].mesh, name]
         names = (contact.slave, str(contact.master))
+        if is_itself(*owners):
+            x = np.concatenate([body.mesh.points for body in model.bodies])
+            out.append(folded(nodes, skins[0], is_free[nodes], x, names))
+            continue
         out.append(MortarPair(nodes, *skins, is_free[nodes], names))
     return out
 
@@ -293,7 +329,8 @@ def _resistance(pairs: Sequence[Pair], K: sparse.csr_array, at: Index) -> Array:
         mine = slice(start, start + len(pair.slaves))
         start = mine.stop
         if isinstance(pair, MortarPair):
-            other = np.median(_stiffness_at(K, pair.master.all[:, None] * d + np.arange(d)))
+            nodes = (pair.master if pair.fold is None else pair.fold.skin).all
+            other = np.median(_stiffness_at(K, nodes[:, None] * d + np.arange(d)))
             own[mine] = own[mine] * other / (own[mine] + other)
     return own
 
