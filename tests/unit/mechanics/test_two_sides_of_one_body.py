@@ -65,11 +65,13 @@ def test_a_folded_beam_meets_itself_and_slides():
     assert np.mean(counts) <= 6
 
 
-def test_a_surface_is_not_its_own_master():
-    body = am.Body(hairpin(), NEO, name="beam")
-    model = am.Model([body], [am.Fix("left", 0)], [am.Contact("top", master="top", mu=0.1)])
+@pytest.mark.parametrize(("law", "sides"), [(NEO, ("top", "low")), (LINEAR, ("top", "top"))])
+def test_a_surface_is_its_own_master_as_a_whole_or_not_at_all(law, sides):
+    """And with small strains not at all, where pairs do not change."""
+    body = am.Body(hairpin(), law, name="beam")
+    pair = am.Contact(sides[0], master=sides[1], mu=0.1)
     with pytest.raises(am.InvalidInput, match="name the two sides as separate surfaces"):
-        am.solve(model)
+        am.solve(am.Model([body], [am.Fix("left", 0)], [pair]))
 
 
 # --------------------------------------------------------------------- small strains

@@ -5,6 +5,9 @@ Every slave node that can carry a force has one, also where it does not face the
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
@@ -25,26 +28,30 @@ FREE = 1e-9  # free part of a normal up to which supports hold it
 
 
 def current_contact(
-    slave: Mesh, surface: str, master: Mesh, master_surface: str, held: Mask
-) -> tuple[ContactRows, sparse.csc_array, Mask]:
-    """Rows, their part on the master, and found, as `mortar_contact` has them.
+    slave: Mesh, surface: str, masters: Sequence[tuple[Mesh, str]], held: Mask
+) -> tuple[ContactRows, list[sparse.csc_array], Mask]:
+    """Rows, their part on each of the masters, and found, as `mortar_contact` has them.
 
     held (n, dim): components of the slave that supports prescribe; nodes that can not move
     along their normal have no row.
     """
     check_exterior(slave, surface)
-    check_exterior(master, master_surface, "master")
-    itself = is_itself(slave, surface, master, master_surface)
-    if not itself:
-        check_different(slave, surface, master, master_surface)
+    itself = len(masters) == 1 and is_itself(slave, surface, *masters[0])
+    for mesh, name in masters:
+        check_exterior(mesh, name, "master")
+        if not itself:
+            check_different(slave, surface, mesh, name)
     corners = tuple(corner_facets(block) for block in slave.surface(surface))
     weights = nodal_weights(slave.points, corners)
     nodes = np.flatnonzero(weights > 0)
     weights = weights[nodes]
-    joined = slave is master
-    points = slave.points if joined else np.concatenate([slave.points, master.points])
+    meshes = list(dict.fromkeys([slave, *(mesh for mesh, _ in masters)]))
+    starts = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
+    points = np.concatenate([mesh.points for mesh in meshes])
     over = Skin.of(slave.surface(surface), 0)
-    under = Skin.of(master.surface(master_surface), 0 if joined else len(slave.points))
+    under = Skin.joined([
+        Skin.of(mesh.surface(name), int(starts[meshes.index(mesh)])) for mesh, name in masters
+    ])  # fmt: skip
     free = ~held[nodes]
     whole = MortarPair(nodes, over, under, np.ones_like(free)).at(points).normals
     found = np.linalg.norm(whole * free, axis=1) > FREE
@@ -57,12 +64,14 @@ def current_contact(
     columns = coupled_columns(
         meeting.references, axes, np.zeros(axes.shape[:2], dtype=bool)
     ).tocsr()
-    size = slave.points.size
+    parts = [sparse.csc_array(columns[slice(*ends)]) for ends in pairwise(starts * slave.dim)]
     rows = ContactRows(
-        chosen, slave.points[chosen], weights[found], meeting.gap, axes,
-        sparse.csc_array(columns[:size]),
-    )  # fmt: skip
-    on_master = sparse.csc_array((master.points.size, axes.shape[0] * axes.shape[1]))
-    if not joined:
-        on_master = sparse.csc_array(columns[size:])
-    return rows, on_master, found
+        chosen, slave.points[chosen], weights[found], meeting.gap, axes, parts[0]
+    )
+    on_masters, told = [], {0}
+    for mesh, _ in masters:
+        k = meshes.index(mesh)
+        nothing = sparse.csc_array((mesh.points.size, columns.shape[1]))
+        on_masters.append(nothing if k in told else parts[k])
+        told.add(k)
+    return rows, on_masters, found

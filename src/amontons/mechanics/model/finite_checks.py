@@ -142,6 +142,7 @@ def _check_single(nodes: Index) -> None:
     if len(np.unique(nodes)) < len(nodes):
         raise UnsupportedForm(
             "a node is the slave of two contacts, large deformations allow one; leave it out "
-            "of one of them (where), join obstacles into one LevelSet, two masters into one "
-            "surface of one body, or let the masters be the slaves", ("contacts",),
+            "of one of them (where), join obstacles into one LevelSet, give both masters to "
+            "one contact with one law (more_masters), or let the masters be the slaves",
+            ("contacts",),
         )  # fmt: skip

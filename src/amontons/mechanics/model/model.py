@@ -79,6 +79,7 @@ class Model(Told):
         if len({body.axisymmetric for body in self.bodies}) > 1:
             raise InvalidInput("expected all axisymmetric or none of them, got both",
                                ("bodies",))  # fmt: skip
+        object.__setattr__(self, "contacts", self.formulation.joined(self.contacts))
         self.formulation.check(self)
         object.__setattr__(self, "pair_names", pair_names(self.contacts))
         if not (is_number(self.load_factor) and np.isfinite(self.load_factor)):
@@ -96,6 +97,11 @@ class Model(Told):
                 for name in (name for name in fields if hasattr(item, name)):
                     with within(part, k, name):
                         self._check_surface(item, name)
+        for k, contact in enumerate(self.contacts):
+            for name in contact.more_masters:
+                with within("contacts", k, "more_masters"):
+                    j, surface = locate(self.bodies, name)
+                    self.bodies[j].mesh.surface(surface)
 
     def _check_surface(self, part: object, field: str) -> None:
         """Raise InvalidInput for a surface that no body has, or more than one."""

@@ -279,18 +279,19 @@ def _pairs(model: Model, slaves: list[Index], linear: Discretisation) -> list[Pa
         if contact.obstacle is not None:
             out.append(ObstaclePair(contact.obstacle, nodes))  # type: ignore[arg-type]
             continue
-        skins, owners = [], []
-        for side in (contact.slave, str(contact.master)):
+        skins, meshes = [], []
+        for side in (contact.slave, *contact.masters):
             k, name = locate(model.bodies, side)
             facets = model.bodies[k].mesh.surface(name)
             skins.append(Skin.of(facets, int(linear.offsets[k]) // d))
-            owners += [model.bodies[k].mesh, name]
-        names = (contact.slave, str(contact.master))
-        if is_itself(*owners):
+            meshes.append((model.bodies[k].mesh, name))
+        names = (contact.slave, ", ".join(contact.masters))
+        if len(meshes) == 2 and is_itself(*meshes[0], *meshes[1]):
             x = np.concatenate([body.mesh.points for body in model.bodies])
             out.append(folded(nodes, skins[0], is_free[nodes], x, names))
             continue
-        out.append(MortarPair(nodes, *skins, is_free[nodes], names))
+        master = Skin.joined(skins[1:])
+        out.append(MortarPair(nodes, skins[0], master, is_free[nodes], names))
     return out
 
 
