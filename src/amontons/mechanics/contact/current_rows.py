@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ...core.errors import InvalidInput
 from ..meshes.facets import corner_facets
 from ..meshes.mesh import Mesh
 from ..meshes.surfaces import nodal_weights
@@ -20,7 +21,7 @@ from .facing import Skin
 from .geometry import frames
 from .mortar import coupled_columns
 from .nodal import ContactRows, check_exterior
-from .overlap import check_different, is_itself
+from .overlap import check_different, is_itself, not_facing
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -28,12 +29,13 @@ FREE = 1e-9  # free part of a normal up to which supports hold it
 
 
 def current_contact(
-    slave: Mesh, surface: str, masters: Sequence[tuple[Mesh, str]], held: Mask
-) -> tuple[ContactRows, list[sparse.csc_array], Mask]:
+    slave: Mesh, surface: str, masters: Sequence[tuple[Mesh, str]], held: Mask, *,
+    tied: bool = False,
+) -> tuple[ContactRows, list[sparse.csc_array], Mask]:  # fmt: skip
     """Rows, their part on each of the masters, and found, as `mortar_contact` has them.
 
     held (n, dim): components of the slave that supports prescribe; nodes that can not move
-    along their normal have no row.
+    along their normal have no row.  tied: nodes that face nothing have none, either.
     """
     check_exterior(slave, surface)
     itself = len(masters) == 1 and is_itself(slave, surface, *masters[0])
@@ -55,6 +57,15 @@ def current_contact(
     free = ~held[nodes]
     whole = MortarPair(nodes, over, under, np.ones_like(free)).at(points).normals
     found = np.linalg.norm(whole * free, axis=1) > FREE
+    if tied and itself:
+        raise InvalidInput(
+            "a tie is between two surfaces; name its sides as separate surfaces", ("master",),
+            f"contact of {surface!r} with itself",
+        )
+    if tied:
+        found[found] = MortarPair(nodes[found], over, under, free[found]).at(points).met
+        if not found.any():
+            raise not_facing(slave, surface, *masters[0])
     chosen = nodes[found]
     if itself:
         meeting = folded(chosen, over, free[found], points).at(points)

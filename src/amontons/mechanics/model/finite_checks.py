@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import UnsupportedForm
+from ..contact.carried import TiedPair
 from ..contact.current_mortar import MortarPair
-from ..contact.current_pairs import Pair
+from ..contact.current_pairs import Pair, between_bodies
 from ..elements.given import GivenMatrices
 from ..elements.hyperelasticity import is_hyperelastic
 from ..elements.rigid import Rigid
@@ -49,6 +50,11 @@ def check_supported(model: Model) -> None:
         if contact.obstacle is None:
             _check_pair(model, k)
             continue
+        if contact.tied:
+            raise UnsupportedForm(
+                "a tie to an obstacle is a support here; use Fix in the place of the contact",
+                ("contacts", k, "tied"), what,
+            )  # fmt: skip
         if contact.method != "nodal":
             raise UnsupportedForm(
                 "finite kinematics has nodal contact with an obstacle only; use method='nodal'",
@@ -89,21 +95,24 @@ def chains(pairs: Sequence[Pair]) -> list[set[int]]:
     return [
         {
             k for k, other in enumerate(pairs)
-            if other is not pair and isinstance(other, MortarPair)
-            and np.isin(pair.slaves, _whole(other)).any()
+            if other is not pair and np.isin(pair.slaves, _whole(other)).any()
         }
         for pair in pairs
     ]  # fmt: skip
 
 
-def _whole(pair: MortarPair) -> Index:
+def _whole(pair: Pair) -> Index:
     """Nodes that a pair may press as those of its master."""
+    if isinstance(pair, TiedPair):
+        return pair.pressed
+    if not isinstance(pair, MortarPair):
+        return np.zeros(0, dtype=np.int64)
     return (pair.master if pair.fold is None else pair.fold.skin).every
 
 
 def _check_apart(pairs: Sequence[Pair], slaves: Index) -> None:
     """Raise UnsupportedForm for nodes that carry forces of pairs in a ring, or of a middle."""
-    middles = [pair.slave.means[0] for pair in pairs if isinstance(pair, MortarPair)]
+    middles = [m.slave.means[0] for m in map(between_bodies, pairs) if m is not None]
     if middles and np.isin(np.concatenate(middles), slaves).any():
         raise UnsupportedForm(
             "a node between the corners of a slave surface carries a contact of its own; leave "
@@ -125,8 +134,8 @@ def _check_middles(pairs: Sequence[Pair], is_free: Mask) -> None:
 
     is_free (nodes, d).
     """
-    for pair in pairs:
-        if not isinstance(pair, MortarPair):
+    for pair in map(between_bodies, pairs):
+        if pair is None:
             continue
         middle, corner, _ = pair.slave.means
         has_row = np.isin(corner, pair.slaves)

@@ -28,9 +28,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..contact.carried import TiedMeeting
 from ..contact.current import ContactPoint
 from ..contact.current_mortar import MortarMeeting
-from ..contact.current_pairs import Meeting, Meetings
+from ..contact.current_pairs import AnyMeeting, Meeting, Meetings
 from ..contact.current_slopes import blocks_of
 from .nodal_forces import NodalForces
 from .nonlinear_parts import NonlinearParts
@@ -223,25 +224,27 @@ class PairLinearisation:
         return change[self.parts.free]
 
 
-def normal_slopes(part: Meeting | MortarMeeting, dofs: int) -> sparse.csr_array:
+def normal_slopes(part: AnyMeeting, dofs: int) -> sparse.csr_array:
     """Derivatives of the normals by the positions of all nodes, (nc d, dofs)."""
-    if isinstance(part, MortarMeeting):
+    if not isinstance(part, Meeting):
         return part.slopes.normals
     return _at_slaves(part, part.side.normal_slopes(part.x), dofs)
 
 
-def gap_slopes(part: Meeting | MortarMeeting, dofs: int) -> sparse.csr_array:
+def gap_slopes(part: AnyMeeting, dofs: int) -> sparse.csr_array:
     """The same of the gaps, (nc, dofs)."""
-    if isinstance(part, MortarMeeting):
+    if not isinstance(part, Meeting):
         return part.slopes.gap
     return _at_slaves(part, part.side.gap_slopes(part.x)[:, None], dofs)
 
 
 def motion_slopes(
-    part: Meeting | MortarMeeting, old: Meeting | MortarMeeting, dofs: int
+    part: AnyMeeting, old: AnyMeeting, dofs: int
 ) -> sparse.csr_array:
     """The same of the motion since `old`, (nc d, dofs)."""
     if isinstance(part, MortarMeeting) and isinstance(old, MortarMeeting):
+        return part.slopes.motion(old)
+    if isinstance(part, TiedMeeting):
         return part.slopes.motion(old)
     d = part.x.shape[1]
     return _at_slaves(part, np.broadcast_to(np.eye(d), (len(part.slaves), d, d)), dofs)

@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..contact.carried import TiedPair
 from ..contact.current import CurrentContact
 from ..contact.current_mortar import MortarPair, folded
-from ..contact.current_pairs import Meetings, ObstaclePair, Pair
+from ..contact.current_pairs import Meetings, ObstaclePair, Pair, between_bodies
 from ..contact.facing import Skin
 from ..contact.geometry import Plane
 from ..contact.overlap import is_itself
@@ -124,10 +125,11 @@ class NonlinearParts:
         start = 0
         for pair in self.contact.pairs:
             stop = start + len(pair.slaves)
-            if isinstance(pair, MortarPair):
+            mortar = between_bodies(pair)
+            if mortar is not None:
                 row = np.full(len(self.X), -1)
                 row[pair.slaves] = np.arange(start, stop)
-                middle, corner, part = pair.slave.means
+                middle, corner, part = mortar.slave.means
                 kept = row[corner] >= 0
                 entries = (part[kept], (row[corner[kept]], middle[kept]))
                 out = out + sparse.csr_array(entries, shape=out.shape)
@@ -291,7 +293,14 @@ def _pairs(model: Model, slaves: list[Index], linear: Discretisation) -> list[Pa
             out.append(folded(nodes, skins[0], is_free[nodes], x, names))
             continue
         master = Skin.joined(skins[1:])
-        out.append(MortarPair(nodes, skins[0], master, is_free[nodes], names))
+        pair = MortarPair(nodes, skins[0], master, is_free[nodes], names)
+        if not contact.tied:
+            out.append(pair)
+            continue
+        x = np.concatenate([body.mesh.points for body in model.bodies])
+        blocks = sparse.bsr_array(linear.stored_stiffness, blocksize=(d, d))
+        beside = (np.ones(len(blocks.indices)), blocks.indices, blocks.indptr)
+        out.append(TiedPair.of(pair, x, sparse.csr_array(beside, shape=(len(x), len(x)))))
     return out
 
 
@@ -329,8 +338,9 @@ def _resistance(pairs: Sequence[Pair], K: sparse.csr_array, at: Index) -> Array:
     for pair in pairs:
         mine = slice(start, start + len(pair.slaves))
         start = mine.stop
-        if isinstance(pair, MortarPair):
-            nodes = (pair.master if pair.fold is None else pair.fold.skin).all
+        mortar = between_bodies(pair)
+        if mortar is not None:
+            nodes = (mortar.master if mortar.fold is None else mortar.fold.skin).all
             other = np.median(_stiffness_at(K, nodes[:, None] * d + np.arange(d)))
             own[mine] = own[mine] * other / (own[mine] + other)
     return own

@@ -234,7 +234,7 @@ def _met(
     master = bodies[j].mesh
     if far:
         sides = [(bodies[i].mesh, name) for i, name in located(bodies, contact)]
-        rows, every, met = current_contact(slave, surface, sides, held[k])
+        rows, every, met = current_contact(slave, surface, sides, held[k], tied=contact.tied)
         H = _shifted(rows.H, int(offsets[k]), size)
         for (i, _), part in zip(located(bodies, contact), every, strict=True):
             H = H + _shifted(part, int(offsets[i]), size)

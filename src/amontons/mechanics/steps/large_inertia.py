@@ -83,6 +83,13 @@ class LargeMovingModel:
                     f"body {body.name!r}: dynamics of large deformations need a hyperelastic "
                     "law, or LinearElastic bodies and kinematics='small' of all contacts"
                 )
+        for k, contact in enumerate(model.contacts):
+            if contact.tied:
+                raise UnsupportedForm(
+                    "dynamics of large deformations have no ties; read both bodies as one mesh "
+                    "where they match, or use QuasiStatic", ("contacts", k, "tied"),
+                    f"contact on {contact.slave!r}",
+                )  # fmt: skip
         self.method, self.motion, self.tolerance = method, Motion(model), tolerance
         body = self.motion.body
         self.parts, self._all = nonlinear_parts(body), self.motion.parts

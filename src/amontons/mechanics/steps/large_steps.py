@@ -77,12 +77,14 @@ class LargeSlowModel:
         q1 = problem.displacement(solution.v).ravel()
         meeting = problem.contact_point(solution.v).meeting
         axes = frames(meeting.normals)
-        way = solution.u[:, 1:]
+        tied = body.law.tied[:, None]  # what bonds give way is no slip
+        way = np.where(tied, 0.0, solution.u[:, 1:])
         work = quasi_static_friction(state.force[:, 1:], solution.r[:, 1:], way)
         energies = self._energies(body, state, q1, load, solution.r, float(work.sum()))
         passed = time - state.time
         velocity = (q1 - q0) / passed if passed else np.zeros_like(q1)
-        new = State(state.index + 1, time, q1, velocity, solution.r, state.slip + way,
+        new = State(state.index + 1, time, q1, velocity, solution.r,
+                    np.where(tied, solution.u[:, 1:], state.slip + way),
                     **rubbed(state, way, solution.sliding, work))  # fmt: skip
         acting = self._forces(body, q1, load, solution.r)
         rest = acting.inner - acting.load - acting.pushed
@@ -142,7 +144,7 @@ def last_motion(problem: LargeDeformation, state: State, duration: float) -> Arr
     pairs = np.concatenate(
         [np.full(len(p.slaves), isinstance(p, MortarMeeting)) for p in meeting.parts]
     )
-    if not pairs.any():
+    if not pairs.any() and not problem.law.tied.any():
         return out
     n = meeting.normals
     along = meeting.averages @ moved.reshape(parts.X.shape)
@@ -155,4 +157,5 @@ def last_motion(problem: LargeDeformation, state: State, duration: float) -> Arr
     rubs = pairs & (bound > 0)
     slips = size >= (1 - AT_BOUND) * bound
     told = np.where(slips[:, None], slipped, 0.0)
-    return np.where(rubs[:, None], told, np.where(pairs[:, None], along, out))
+    told = np.where(rubs[:, None], told, np.where(pairs[:, None], along, out))
+    return np.where(problem.law.tied[:, None], 0.0, told)
