@@ -8,8 +8,9 @@ near p with sum_j c_pj X_j the distance vector that the sides have there,
 is the tie: linear, kept by every affine motion x = A X + b, so that bodies turn as one.  The
 distance goes with the deformation of the slave's body beside it, whose nodes take part in what
 it bears.  The forces -T_pj lambda_p are without sum, and without moment, as
-sum_j x_j x T_pj lambda_p = (T x)_p x lambda_p ([P]: there the mesh is moved until c = 0).  c is that of least squares, on p and nodes off the slave's
-surface, so that the force on p is still that of p alone; rows are scaled to T_pp = 1.
+sum_j x_j x T_pj lambda_p = (T x)_p x lambda_p ([P]: there the mesh is moved until c = 0).
+c is that of least squares, on p and nodes off the slave's surface, so that the force on p is
+still that of p alone; rows are scaled to T_pp = 1.
 
 An elastic bond has T x = -C lambda in the place of T x = 0, normal and tangential.
 

@@ -10,12 +10,13 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ...core.errors import InvertedCells
 from ..contact.carried import TiedPair
 from ..contact.current import CurrentContact
 from ..contact.current_mortar import MortarPair, folded
@@ -27,6 +28,7 @@ from ..elements.hyperelasticity import HyperelasticBody, is_hyperelastic
 from ..elements.linear_body import LinearBody
 from .finite_checks import chains, check_nodes, check_supported
 from .supports import locate
+from .worst_cells import flattest, most_strained
 
 if TYPE_CHECKING:
     from .assembly import Discretisation
@@ -50,6 +52,7 @@ class NonlinearParts:
     """
 
     bodies: tuple[HyperelasticBody | LinearBody, ...]
+    names: tuple[str, ...]
     X: Array
     ends: Index
     free: Index
@@ -179,18 +182,29 @@ class NonlinearParts:
             yield body, part, pressures[first:last]
             first = last
 
+    def _of_each(self, name: str, u: Array, pressures: Array | None) -> list[Any]:
+        """What a method of all bodies returns; raises InvertedCells naming body and cell."""
+        out = []
+        for k, (body, *given) in enumerate(self._given(u, pressures)):
+            try:
+                out.append(getattr(body, name)(*given))
+            except InvertedCells as reason:
+                least, cell = flattest(body.mesh, given[0])
+                cell = cell if not least > 0 else most_strained(body.mesh, given[0])
+                where = f"{cell} of body {self.names[k]!r}"
+                raise InvertedCells(f"{reason}, the worst {where}") from reason
+        return out
+
     def forces(self, u: Array, pressures: Array | None = None) -> Array:
         """Nodal forces of the bodies (dofs,) at displacements u (nodes, d).
 
         pressures (c,): of hybrid cells, else those of the displacements.
         """
-        return np.concatenate(
-            [body.forces(*given).ravel() for body, *given in self._given(u, pressures)]
-        )
+        return np.concatenate([f.ravel() for f in self._of_each("forces", u, pressures)])
 
     def tangent(self, u: Array, pressures: Array | None = None) -> tuple[Array, Array]:
         """(forces (dofs,), node blocks (m, d, d) of their derivative) at displacements u."""
-        both = [body.tangent(*given) for body, *given in self._given(u, pressures)]
+        both = self._of_each("tangent", u, pressures)
         return np.concatenate([f.ravel() for f, _ in both]), np.concatenate(
             [b for _, b in both]
         )
@@ -265,7 +279,8 @@ def _nonlinear_parts(model: Model) -> NonlinearParts:
         _resistance(pairs, linear.stored_stiffness, at),
         is_free[at],
     )  # fmt: skip
-    return NonlinearParts(bodies, X, linear.offsets[1:-1] // d, linear.free, contact, at,
+    names = tuple(body.name for body in model.bodies)
+    return NonlinearParts(bodies, names, X, linear.offsets[1:-1] // d, linear.free, contact, at,
                           contact_of[rows], np.flatnonzero(rows == columns)[nodes],
                           columns, pointers, sparse.csc_array(taken))  # fmt: skip
 
