@@ -261,7 +261,7 @@ def _nonlinear_parts(model: Model) -> NonlinearParts:
     d = X.shape[1]
     slaves = [p.rows.nodes + linear.offsets[p.body] // d for p in linear.placed]
     nodes = np.concatenate([np.zeros(0, dtype=np.int64), *slaves])
-    pairs = _pairs(model, slaves, linear)
+    pairs = _cleared(model, _pairs(model, slaves, linear), linear, X)
     check_nodes(pairs, nodes, free_dofs(linear).reshape(-1, d))
     at = nodes[:, None] * d + np.arange(d)
     is_free = free_dofs(linear)
@@ -316,6 +316,22 @@ def _pairs(model: Model, slaves: list[Index], linear: Discretisation) -> list[Pa
         blocks = sparse.bsr_array(linear.stored_stiffness, blocksize=(d, d))
         beside = (np.ones(len(blocks.indices)), blocks.indices, blocks.indptr)
         out.append(TiedPair.of(pair, x, sparse.csr_array(beside, shape=(len(x), len(x)))))
+    return out
+
+
+def _cleared(
+    model: Model, pairs: list[Pair], linear: Discretisation, X: Array
+) -> list[Pair]:
+    """The pairs with the gaps at X that contacts are said to have, where nodes meet there."""
+    out = []
+    for contact, pair, placed in zip(
+        model.contacts or [None], pairs, linear.placed or [None], strict=True
+    ):
+        if contact is not None and placed is not None and contact.clearance is not None:
+            found = pair.at(X)
+            offset = np.where(found.met, placed.rows.gap - found.gap, 0.0)
+            pair = replace(pair, offset=offset)  # type: ignore[type-var]  # noqa: PLW2901
+        out.append(pair)
     return out
 
 
