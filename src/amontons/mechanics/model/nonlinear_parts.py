@@ -21,6 +21,7 @@ from ..contact.current_mortar import MortarPair
 from ..contact.current_pairs import Meetings, ObstaclePair, Pair
 from ..contact.facing import Skin
 from ..contact.geometry import Plane
+from ..elements.corotational import CorotationalBody
 from ..elements.hyperelasticity import HyperelasticBody, is_hyperelastic
 from ..elements.linear_body import LinearBody
 from .finite_checks import check_nodes, check_supported
@@ -28,6 +29,7 @@ from .supports import locate
 
 if TYPE_CHECKING:
     from .assembly import Discretisation
+    from .body import Body
     from .model import Model
 
 Array = NDArray[np.float64]
@@ -205,9 +207,7 @@ def _nonlinear_parts(model: Model) -> NonlinearParts:
     check_supported(model)
     linear = model.discretisation  # of the tangent at rest: same dofs, contacts and checks
     bodies = tuple(
-        (HyperelasticBody if is_hyperelastic(body.material) else LinearBody)(
-            body.mesh, body.material  # type: ignore[arg-type]
-        )
+        _kind_of(body)(body.mesh, body.material)  # type: ignore[arg-type]
         for body in model.bodies
     )
     X = np.concatenate([body.mesh.points for body in model.bodies])
@@ -235,6 +235,12 @@ def _nonlinear_parts(model: Model) -> NonlinearParts:
     return NonlinearParts(bodies, X, linear.offsets[1:-1] // d, linear.free, contact, at,
                           contact_of[rows], np.flatnonzero(rows == columns)[nodes],
                           columns, pointers, sparse.csc_array(taken))  # fmt: skip
+
+
+def _kind_of(body: Body) -> type[HyperelasticBody | LinearBody]:
+    if body.corotational:
+        return CorotationalBody
+    return HyperelasticBody if is_hyperelastic(body.material) else LinearBody
 
 
 def _pairs(model: Model, slaves: list[Index], linear: Discretisation) -> list[Pair]:
