@@ -26,7 +26,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Callable, Generator, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -42,6 +42,9 @@ FIRST_CHUNKS = 3  # of the first track before its rate counts
 GROWTH = 0.2  # cost of a chunk, of what its track has cost
 SHORTEST = 3e4  # nanoseconds of a chunk at least, or the calls cost more than the sweeps
 LOST, LOST_STEPS = 5.0, 1000.0  # all cost, in what it was at the last progress; steps since
+# Cost between two iterates that are handed out, of all cost, and its bounds in nanoseconds: the
+# driver's judgement costs more than a chunk of a small problem, but it looks at the clock.
+PAUSE, LEAST_PAUSE, MOST_PAUSE = 0.1, 1e6, 5e7
 
 
 class Chunk(NamedTuple):
@@ -141,6 +144,16 @@ class Track:
         return math.log(error / self.state.goal) / rate
 
 
+def _counted_with(before: Iterate, found: Iterate) -> Iterate:
+    """The iterate, what was done for one before it counted in."""
+    counted = before.flops is not None and found.flops is not None
+    return replace(
+        found, iterations=before.iterations + found.iterations,
+        linear_iterations=before.linear_iterations + found.linear_iterations,
+        flops=before.flops + found.flops if counted else None,
+    )  # fmt: skip
+
+
 @dataclass(eq=False)
 class Race:
     """The tracks of one problem; the first of the table leads."""
@@ -151,16 +164,20 @@ class Race:
     def __post_init__(self) -> None:
         self.tracks = [Track(self.table[0], self.state)]
         self.total = 0.0  # nanoseconds of all tracks
+        self.shown = 0.0  # total when an iterate was handed out last
+        self.held: Iterate | None = None  # counts of those since then
         self.mark = (self.state.first_error, 0.0)  # error and total at the last progress
 
     def iterates(self) -> Iterator[Iterate]:
-        """The best reaction after every chunk, until nothing helps or is left."""
+        """The best reaction now and then, until nothing helps or is left."""
         for _ in range(FIRST_CHUNKS):
             if self.tracks:
                 yield from self._go_on(self.tracks[0])
         self.enter()
         while self.tracks and not self._is_lost():
             yield from self._go_on(self._next())
+        if self.held is not None:
+            yield self.held
 
     def enter(self) -> None:
         """Let all others of the table in; what tells which of them run costs something too."""
@@ -174,7 +191,15 @@ class Race:
             self.tracks.remove(track)
             return
         self.total += track.cost - before
-        yield found
+        self.held = found if self.held is None else _counted_with(self.held, found)
+        if self._is_due():
+            found, self.held, self.shown = self.held, None, self.total
+            yield found
+
+    def _is_due(self) -> bool:
+        """True where the driver should see the best reaction: it may do, or it has waited."""
+        pause = min(max(PAUSE * self.total, LEAST_PAUSE), MOST_PAUSE)
+        return self.state.error <= self.state.goal or self.total - self.shown >= pause
 
     def _is_lost(self) -> bool:
         """True where nothing has helped for long."""

@@ -34,6 +34,11 @@ NEWTON_CONTACT = 500.0
 DENSE_STEP = 0.05  # per cube of the unknowns
 
 
+def nanoseconds_of_sweep(blocks: int, contacts: int, more: float = 0.0) -> float:
+    """Cost of a sweep with so many stored blocks of W; more: per contact, for acceleration."""
+    return SWEEP_BLOCK * blocks + (SWEEP_CONTACT + more) * contacts
+
+
 @dataclass(eq=False)
 class State:
     """One run on the Delassus form; r is the best reaction so far, (nc, 3)."""
@@ -94,18 +99,22 @@ class State:
     @property
     def sweep_cost(self) -> float:
         """Nanoseconds of a sweep."""
-        blocks, contacts = len(self.problem.blocks.indices), self.problem.contacts
-        return SWEEP_BLOCK * blocks + SWEEP_CONTACT * contacts
+        return self._cost()
 
     @property
     def accelerated_cost(self) -> float:
         """Nanoseconds of an accelerated sweep."""
-        return self.sweep_cost + HISTORY_CONTACT * self.problem.contacts
+        return self._cost(HISTORY_CONTACT)
 
     @property
     def momentum_cost(self) -> float:
         """Nanoseconds of a sweep with momentum."""
-        return self.sweep_cost + MOMENTUM_CONTACT * self.problem.contacts
+        return self._cost(MOMENTUM_CONTACT)
+
+    def _cost(self, more: float = 0.0) -> float:
+        return nanoseconds_of_sweep(
+            len(self.problem.blocks.indices), self.problem.contacts, more
+        )
 
     def affordable(self, steps: int) -> int:
         """Newton steps of one compiled call that still fit before the driver's deadline."""
