@@ -51,9 +51,10 @@ class State:
     unsaid: float = 0.0  # operations that no iterate has told yet
 
     def __post_init__(self) -> None:
-        self.start = self.r
+        self.start = self.swept = self.r  # swept: the best reaction of sweeps
         if np.count_nonzero(self.r):
             self.error, self.unsaid = self.judge(self.r), self.problem.judge_flops
+        self.swept_error = self.error
         self.first_error = self.error if self.error < math.inf else self.problem.q_norm
         self.goal = self.target.tolerance * self.problem.q_norm
         self.data = sweep_data(self.problem, order=SweepOrder.APPROACH)

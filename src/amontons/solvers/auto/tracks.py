@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from functools import partial
+from itertools import chain, cycle
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +31,10 @@ DEPTH = 10  # past sweeps that Anderson acceleration combines
 LEAST = 20  # sweeps of a chunk: a judgement costs as much as one
 BETWEEN = 200  # accelerated sweeps after each relaxation
 RELAXED = 60  # steps of one relaxation at most
-# First smoothing, times the error of the best reaction per contact, or 0, from zero; shrinking.
-SMOOTHED = ((100.0, 0.3), (0.0, 0.3), (1000.0, 0.3), (0.0, 0.5))
+# First smoothing, times the error per contact of the reaction that it starts from, or 0, from
+# zero, and how it shrinks; then, again and again, from the best of sweeps (True) or of all.
+SMOOTHED = ((100.0, 0.3, True), (0.0, 0.3, True), (1000.0, 0.3, True), (0.0, 0.5, True))
+AGAIN = ((100.0, 0.3, True), (100.0, 0.3, False), (1000.0, 0.3, True), (1000.0, 0.5, False))
 PATIENCE = 30  # steps of smoothing Newton without halving its error
 FLOP = 0.15  # nanoseconds of an operation of a step between deformable bodies
 STALLED = 8  # steps of Newton's method without halving its error
@@ -97,30 +100,30 @@ def interior_point(state: State) -> Chunks:
 
 
 def smoothing_newton(state: State) -> Chunks:
-    """Smoothing Newton from the best reaction, from zero when it stalls, and so on.
+    """Smoothing Newton from the best swept reaction, from zero when it stalls, and so on.
 
+    A relaxation of the interior point may be nearer, but not to the sliding of a solution.
     From a swept point it takes half the steps that it takes from zero, where the smoothing is
     far above the error there.
     """
     root, x = math.sqrt(max(state.problem.contacts, 1)), state.start
     wanted = yield Chunk(x, 0, 0.0)
-    while True:
-        for smoothing, shrink in SMOOTHED:
-            afar = 0.1 * state.problem.q_norm / root
-            if smoothing:
-                x, sigma = state.r.copy(), min(smoothing * state.error / root, afar)
-            else:
-                x, sigma = np.zeros_like(state.start), afar
-            solver, patience = SmoothingNewton(shrink=shrink), Patience(PATIENCE)
-            while not patience.waited > patience.most:
-                steps = state.affordable(max(1, int(wanted / state.step_cost)))
-                count, residual, sigma, found = state.work.newton(
-                    x, sigma, solver, goal=0.5 * state.goal, steps=steps
-                )
-                cost = max(abs(count), 1) * state.step_cost
-                wanted = yield Chunk(found, max(abs(count), 1), cost)
-                if count < 0 or patience.over(residual):
-                    break
+    afar = 0.1 * state.problem.q_norm / root
+    for smoothing, shrink, swept in chain(SMOOTHED, cycle(AGAIN)):
+        r, error = (state.swept, state.swept_error) if swept else (state.r, state.error)
+        x, sigma = r.copy(), min(smoothing * error / root, afar)
+        if not smoothing:
+            x, sigma = np.zeros_like(r), afar
+        solver, patience = SmoothingNewton(shrink=shrink), Patience(PATIENCE)
+        while not patience.waited > patience.most:
+            steps = state.affordable(max(1, int(wanted / state.step_cost)))
+            count, residual, sigma, found = state.work.newton(
+                x, sigma, solver, goal=0.5 * state.goal, steps=steps
+            )
+            cost = max(abs(count), 1) * state.step_cost
+            wanted = yield Chunk(found, max(abs(count), 1), cost)
+            if count < 0 or patience.over(residual):
+                break
 
 
 def inexact_newton(state: State) -> Chunks:
