@@ -67,7 +67,14 @@ class Chunk(NamedTuple):
     linear_iterations: int = 0
 
 
-Chunks = Generator[Chunk, float, None]
+class Turn(NamedTuple):
+    """What a track is sent: what a chunk may cost, in ns, and its best error, unit of u."""
+
+    cost: float
+    error: float
+
+
+Chunks = Generator[Chunk, Turn, None]
 
 
 def always(state: State) -> bool:
@@ -118,7 +125,8 @@ class Track:
             next(self.chunks)
             self.errors.append(self.state.first_error)
         try:
-            chunk = self.chunks.send(max(GROWTH * self.cost, SHORTEST))
+            turn = Turn(max(GROWTH * self.cost, SHORTEST), self.errors[-1])
+            chunk = self.chunks.send(turn)
         except (StopIteration, Breakdown, SingularOperator):
             return None
         state = self.state
