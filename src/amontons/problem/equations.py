@@ -259,6 +259,11 @@ class Equations(Matrices):
         """
         return self._shared.once(make, (self.M, self.H, self.W), self)
 
+    def kept_of_pattern(self, make: Callable[[Self], T]) -> T:
+        """The same of where the blocks of W are, for all variants that have them there."""
+        sources = (self.blocks.indptr, self.blocks.indices)
+        return self._shared.once(make, sources, self)
+
     def accepted(
         self, r: Array, v: Array | None, error: float, tolerance: float
     ) -> Accepted:

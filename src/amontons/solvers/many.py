@@ -24,7 +24,7 @@ from ..problem.solution import FrictionSolution
 from . import Auto
 from .asked import Asked
 from .at_once import begin_of, local_form, told
-from .auto.first_stage import Together
+from .auto.first_stage import SWEEPS, Together
 from .contract import Iterate
 from .driver import drive_as_asked
 
@@ -92,8 +92,9 @@ def _in_ranges(pool: ThreadPoolExecutor, together: Together, end: float) -> Arra
         return time.perf_counter() - began
 
     took = sum(pool.map(solve, cuts[:-1].tolist(), cuts[1:].tolist()))
-    flops = np.array([together.flops(p) for p in range(len(together.problems))])
-    return took * flops / max(flops.sum(), 1.0)
+    work = together.told[:, SWEEPS] * np.diff(together.sizes[:, 1])
+    work = np.where(np.isfinite(work), work, 0.0)
+    return took * work / max(work.sum(), 1.0)
 
 
 def _driven(

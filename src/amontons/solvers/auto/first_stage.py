@@ -1,10 +1,10 @@
-"""The first stage of `Auto` on many small problems: order, sweeps and judge in one compiled call.
+"""The first stage of `Auto` on many small problems, compiled: sweeps and judge in one call.
 
 Most problems of a simulator end in the first chunks of the first track, accelerated sweeps
 (`portfolio`), whose arithmetic takes some microseconds and whose way through the driver fifty.
-Here all problems stand one behind the other in shared arrays, and one call without Python's lock
-goes through a range of them: the same sweeps, the same judge and the same reactions, bit by bit,
-as `drive` has where it ends in these chunks; where it does not, `drive` is asked.
+Here all problems stand one behind the other in shared arrays, and one call without Python's
+lock goes through a range of them: the same sweeps, judge and reactions, bit by bit, as those of
+`drive` where that ends in these chunks; where it does not, it is asked.
 """
 
 from __future__ import annotations
@@ -52,19 +52,19 @@ def sweeps_of_first_chunks(blocks: int, contacts: int) -> int:
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def solve_range(  # noqa: PLR0913
-    first, last, sizes, limits, tolerances, norms, data, floor, r, u, kept, status, sliding, told
+    first, last, sizes, limits, goals, data, floor, r, u, kept, status, sliding, told
 ):
     """Solve problems first to last - 1, from r; those that are not solved have error inf.
 
     sizes (problems + 1, 2): contacts and blocks of all before a problem; limits (problems,):
-    sweeps at most; norms: of q.  data: arrays of all problems one behind the other, a row of
+    sweeps at most; goals: errors.  data: arrays of all problems one behind the other, a row of
     indptr more for each.  Fills r, u, kept (contacts, 3), status, sliding (contacts,) and told
     (problems, 8), see the columns; errors unit of u.
     """
     indptr, indices, blocks, q, kind, parameters, rho, diagonal, eliminated = data
     for p in range(first, last):
         a, b, c, d = sizes[p, 0], sizes[p + 1, 0], sizes[p, 1], sizes[p + 1, 1]
-        goal, work = tolerances[p] * norms[p], np.zeros(1)
+        goal, work = goals[p], np.zeros(1)
         s = Sweep(
             indptr[a + p : b + p + 1], indices[c:d], blocks[c:d], q[a:b], kind[a:b],
             parameters[a:b], rho[a:b], diagonal[a:b], eliminated[a:b], by_approach(q[a:b]),
@@ -116,31 +116,30 @@ class Together:
 
     def __post_init__(self) -> None:
         problems = self.problems
-        counts = [(p.contacts, len(p.blocks.indices)) for p in problems]
-        self.sizes = np.zeros((len(problems) + 1, 2), np.int64)
-        np.cumsum(np.array(counts, np.int64).reshape(-1, 2), axis=0, out=self.sizes[1:])
-        self.limits = np.array([sweeps_of_first_chunks(b, c) for c, b in counts], np.int64)
+        ends, limits = [(0, 0)], []
+        for p in problems:
+            contacts, blocks = p.contacts, len(p.blocks.indices)
+            ends.append((ends[-1][0] + contacts, ends[-1][1] + blocks))
+            limits.append(sweeps_of_first_chunks(blocks, contacts))
+        self.sizes, self.limits = np.array(ends, np.int64), np.array(limits, np.int64)
         self.norms = np.array([p.q_norm for p in problems])
-        kernels = [p.kernel_data for p in problems]
-        more = [[p.blocks.diagonal for p in problems], [p.blocks.eliminated for p in problems]]
-        self.data = tuple(_joined(x) for x in [*zip(*kernels, strict=True), *more])
+        kernels = [(*p.kernel_data, p.blocks.diagonal, p.blocks.eliminated) for p in problems]
+        self.data = tuple(_joined(x) for x in zip(*kernels, strict=True))
         self.floor = _joined([p.floor for p in problems])
         total = len(self.r)
         self.u, self.kept = np.empty((2, total, 3))
         self.status, self.sliding = np.empty((2, total), np.int8)
-        self.told = np.zeros((len(problems), 8))
-        self.told[:, ERROR] = math.inf
+        self.told = np.full((len(problems), 8), math.inf)
 
     def solve(self, first: int, last: int) -> None:
         """Solve some of the problems."""
-        tolerances = np.full(len(self.problems), self.tolerance)
         solve_range(
-            first, last, self.sizes, self.limits, tolerances, self.norms, self.data, self.floor,
-            self.r, self.u, self.kept, self.status, self.sliding, self.told,
+            first, last, self.sizes, self.limits, self.tolerance * self.norms, self.data,
+            self.floor, self.r, self.u, self.kept, self.status, self.sliding, self.told,
         )  # fmt: skip
 
     def flops(self, p: int) -> float:
-        """Floating point operations of the sweeps on a problem."""
-        nc, blocks = self.sizes[p + 1] - self.sizes[p]
-        each = flops_of_sweep(blocks, nc) + flops_of_acceleration(3 * nc, DEPTH)
-        return float(self.told[p, SWEEPS] * each + self.told[p, WORK])
+        """Floating point operations of the sweeps on a problem, once they are done."""
+        contacts, blocks = self.problems[p].contacts, len(self.problems[p].blocks.indices)
+        each = flops_of_sweep(blocks, contacts) + flops_of_acceleration(3 * contacts, DEPTH)
+        return float(self.told[p, SWEEPS]) * each + float(self.told[p, WORK])

@@ -172,11 +172,12 @@ class Track:
 
 def _counted_with(before: Iterate, found: Iterate) -> Iterate:
     """The iterate, what was done for one before it counted in."""
-    counted = before.flops is not None and found.flops is not None
+    flops = None
+    if before.flops is not None and found.flops is not None:
+        flops = before.flops + found.flops
     return replace(
-        found, iterations=before.iterations + found.iterations,
+        found, iterations=before.iterations + found.iterations, flops=flops,
         linear_iterations=before.linear_iterations + found.linear_iterations,
-        flops=before.flops + found.flops if counted else None,
     )  # fmt: skip
 
 
