@@ -32,6 +32,7 @@ _HOME = {
     "solvers.newton.nonlinear": ("NonlinearNewton",),
     "analysis.paths.path_crossing": ("PathCrossing",),
     "solvers.driver": ("drive",),
+    "solvers.many": ("solve_many",),
     "io.decks.written": ("write_deck",),
     "io.fclib": ("read_fclib", "write_fclib"),
     "mechanics.multibody": ("Ball", "Joint", "Polyhedron", "RigidBodies", "RigidBody",

@@ -109,6 +109,7 @@ from .solvers import (
     SmoothingNewton as SmoothingNewton, SweepOrder as SweepOrder, Uzawa as Uzawa,
 )
 from .solvers.driver import drive as drive
+from .solvers.many import solve_many as solve_many
 from .solvers.newton.nonlinear import NonlinearNewton as NonlinearNewton
 
 __version__: str
