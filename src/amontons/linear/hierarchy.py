@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from .chunks import better_numbers
 from .level_matrix import LevelMatrix
 from .node_blocks import DEAD, NodeBlocks
 from .patched import PatchedBlocks, Rows
 from .transfer import Transfer
+from .vectors import advance, dot, norm, turn
 from .work import Work
 
 Array = NDArray[np.float64]
@@ -38,10 +41,15 @@ class Nodes:
         node = np.cumsum(starts) - 1
         return cls(3 * node + component, int(node[-1]) + 1 if len(node) else 0)
 
-    @property
+    @cached_property
     def plain(self) -> bool:
-        """True when every node has its three components."""
-        return 3 * self.count == len(self.place)
+        """True when every node has its three components, in the order of the unknowns."""
+        n = len(self.place)
+        return 3 * self.count == n and bool((self.place == np.arange(n)).all())
+
+    def renumbered(self, number: Index) -> Nodes:
+        """The same with nodes of other numbers, (count,)."""
+        return Nodes(3 * number[self.place // 3] + self.place % 3, self.count)
 
     @property
     def idle(self) -> Index:
@@ -77,10 +85,13 @@ def components(modes: Array | None, n: int, d: int) -> Index | None:
 
 
 def transfers(
-    levels: Sequence[sparse.csr_array], component: Index
-) -> tuple[list[Transfer], list[Nodes]]:
-    """Given prolongations of unknowns as transfers between nodes, finest first."""
-    nodes, out = [Nodes.of(component)], []
+    levels: Sequence[sparse.csr_array], component: Index, finest: Nodes | None = None
+) -> list[Transfer]:
+    """Given prolongations of unknowns as transfers between nodes, finest first.
+
+    finest: the nodes of the unknowns, where their numbers are others.
+    """
+    nodes, out = [finest or Nodes.of(component)], []
     for level in levels:
         coo = sparse.coo_array(level)
         if not coo.shape[1]:
@@ -96,7 +107,7 @@ def transfers(
         out.append(Transfer.of(tiles, fine.idle, coarse.idle))
         nodes.append(coarse)
         component = coarse_component
-    return out, nodes
+    return out
 
 
 @dataclass(eq=False)
@@ -144,10 +155,14 @@ class Hierarchy:
         component: Index,
         prolongations: Sequence[sparse.csr_array],
         modes: Array | None,
+        nodes: Nodes | None = None,
     ) -> Hierarchy:
-        """Galerkin levels below A; modes (n, k): near-nullspace for the algebraic ones."""
-        given, nodes = transfers(prolongations, component)
-        return cls.on(A, nodes[0], given, modes)
+        """Galerkin levels below A; modes (n, k): near-nullspace for the algebraic ones.
+
+        nodes: those of A, where they are not in the order of the unknowns.
+        """
+        nodes = nodes or Nodes.of(component)
+        return cls.on(A, nodes, transfers(prolongations, component, nodes), modes)
 
     @classmethod
     def on(
@@ -158,20 +173,18 @@ class Hierarchy:
         modes: Array | None,
     ) -> Hierarchy:
         """The same for transfers between nodes."""
-        levels = [Level(A)]
+        levels, number = [Level(A)], None
         for P in given:
             if A.nodes <= 8:
                 break
-            levels[-1].P = P
-            A = A.coarse(P)
-            levels.append(Level(A))
+            number = append_level(levels, P, number)
+            A = levels[-1].A
         geometric = len(levels)
         if A.nodes > COARSEST:
-            A = A.stored()
+            number, A = None, A.stored()
             for P in algebraic(A, _coarse_modes(levels, nodes, modes)):
-                levels[-1].P = P
-                A = P.galerkin(A)
-                levels.append(Level(A))
+                number = append_level(levels, P, number, A)
+                A = None
         return cls(levels, geometric, nodes)
 
     def invert_coarsest(self) -> None:
@@ -203,20 +216,18 @@ class Hierarchy:
         """
         r = b.copy()
         x, p, z, Ap = (np.zeros_like(r) for _ in range(4))
-        A, old, goal = self.levels[k].A, 1.0, tolerance * np.linalg.norm(b)
+        size = norm(b)
+        A, old, goal = self.levels[k].A, 1.0, tolerance * size
         for count in range(most):
-            if np.linalg.norm(r) <= goal:
+            if size <= goal:
                 return x, count
             self.cycle(k, r, z)
-            new = np.vdot(r, z)
-            p *= new / old
-            p += z
+            new = dot(r, z)
+            turn(p, new / old, z)
             old = new
             A.times(p, Ap)
-            step = new / np.vdot(p, Ap)
-            x += step * p
-            r -= step * Ap
-        return x, most if np.linalg.norm(r) <= goal else most + 1
+            size = advance(x, r, new / dot(p, Ap), p, Ap)
+        return x, most if size <= goal else most + 1
 
     def estimate(self, b: Array, size: int) -> Array:
         """x of A x = b, (nodes, 3), from the first level of at most `size` nodes alone."""
@@ -246,6 +257,24 @@ class Hierarchy:
         self.cycle(k + 1, below.b, below.x)
         level.P.add(below.x, x)
         A.smooth(b, x, level.free, True)
+
+
+def append_level(
+    levels: list[Level], P: Transfer, number: Index | None, fine: LevelMatrix | None = None
+) -> Index | None:
+    """Add the level below P, with numbers of its nodes that let threads sweep it.
+
+    number: what has become of those of the fine nodes, which P has as they were; returns the
+    same of the coarse ones.  fine: the matrix to make the coarse one of, where it is another.
+    """
+    P = P.renumbered(number, None)
+    A = (fine or levels[-1].A).coarse(P)
+    number = better_numbers(A.indptr, A.indices) if isinstance(A, NodeBlocks) else None
+    if number is not None:
+        P, A = P.renumbered(None, number), A.renumbered(number)
+    levels[-1].P = P
+    levels.append(Level(A))
+    return number
 
 
 def inverse_at_rest(A: Array, diagonal: Array, size: Array) -> Array:
