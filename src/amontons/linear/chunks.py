@@ -57,18 +57,20 @@ def chunks_of_sorted(indptr: Integers, indices: Integers) -> list[Range]:
     return chunks_of(indptr, indices[indptr[:-1]], indices[indptr[1:] - 1])
 
 
-def better_numbers(indptr: Integers, indices: Integers) -> Index | None:
+def better_numbers(indptr: Integers, indices: Integers, width: int = 1) -> Index | None:
     """New numbers of nodes, (n,), with which they come in chunks.
 
-    None where they do already, where the matrix is small, and where none are found.
+    None where they do already, where the matrix is small, and where none are found.  width:
+    nodes that stay together.
     """
     if indptr[-1] < LEAST_ENTRIES or len(chunks_of_sorted(indptr, indices)) > 1:
         return None
     from scipy.sparse import csgraph
 
     n = len(indptr) - 1
-    graph = sparse.csr_array((np.ones(len(indices), np.int8), indices, indptr), shape=(n, n))
+    graph = units_of(indptr, indices, width)
     order = csgraph.reverse_cuthill_mckee(sparse.csr_matrix(graph), symmetric_mode=True)
+    order = (width * order.astype(np.int64)[:, None] + np.arange(width)).ravel()
     number = np.empty(n, dtype=np.int64)
     number[order] = np.arange(n)
     columns = number[indices]
@@ -76,3 +78,17 @@ def better_numbers(indptr: Integers, indices: Integers) -> Index | None:
     last = np.maximum.reduceat(columns, indptr[:-1])[order]
     pointers = np.concatenate([[0], np.cumsum(np.diff(indptr)[order])])
     return number if len(chunks_of(pointers, first, last)) > 1 else None
+
+
+def units_of(
+    indptr: NDArray[np.integer], indices: NDArray[np.integer], width: int
+) -> sparse.csr_array:
+    """The graph of units of `width` block rows each, (n / width, n / width), sorted."""
+    n = len(indptr) - 1
+    graph = sparse.csr_array((np.ones(len(indices), np.int8), indices, indptr), shape=(n, n))
+    if width > 1:
+        unit = np.arange(n) // width
+        join = sparse.csr_array((np.ones(n, np.int8), (np.arange(n), unit)))
+        graph = sparse.csr_array(join.T @ graph @ join)
+        graph.sort_indices()
+    return sparse.csr_array((np.ones(graph.nnz), graph.indices, graph.indptr), graph.shape)

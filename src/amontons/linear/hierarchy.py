@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from .aggregation import Aggregates
 from .chunks import better_numbers
 from .level_matrix import LevelMatrix
 from .node_blocks import DEAD, NodeBlocks
@@ -23,6 +24,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Kind = Callable[[LevelMatrix], LevelMatrix]
 COARSEST = 120  # nodes of the level that is solved directly, at most
+COARSEST_UNITS = 60  # aggregates of such a level
 SMALL = 1e-10  # singular values of the coarsest matrix below this part of the largest rest
 
 
@@ -181,10 +183,16 @@ class Hierarchy:
             A = levels[-1].A
         geometric = len(levels)
         if A.nodes > COARSEST:
-            number, A = None, A.stored()
-            for P in algebraic(A, _coarse_modes(levels, nodes, modes)):
-                number = append_level(levels, P, number, A)
-                A = None
+            fine = A.stored()
+            aggregates = Aggregates(_coarse_modes(levels, nodes, modes))
+            while fine.nodes > COARSEST_UNITS * aggregates.width:
+                found = aggregates.coarsen(fine)
+                if found is None:
+                    break
+                P, aggregates = found
+                number = append_level(levels, P, None, fine, aggregates.width)
+                aggregates = aggregates.renumbered(number)
+                fine = levels[-1].A.stored()
         return cls(levels, geometric, nodes)
 
     def invert_coarsest(self) -> None:
@@ -260,16 +268,21 @@ class Hierarchy:
 
 
 def append_level(
-    levels: list[Level], P: Transfer, number: Index | None, fine: LevelMatrix | None = None
+    levels: list[Level],
+    P: Transfer,
+    number: Index | None,
+    fine: LevelMatrix | None = None,
+    width: int = 1,
 ) -> Index | None:
     """Add the level below P, with numbers of its nodes that let threads sweep it.
 
     number: what has become of those of the fine nodes, which P has as they were; returns the
-    same of the coarse ones.  fine: the matrix to make the coarse one of, where it is another.
+    same of the coarse ones.  fine: the matrix to make the coarse one of, where it is another;
+    width: coarse nodes that stay together.
     """
     P = P.renumbered(number, None)
     A = (fine or levels[-1].A).coarse(P)
-    number = better_numbers(A.indptr, A.indices) if isinstance(A, NodeBlocks) else None
+    number = better_numbers(A.indptr, A.indices, width) if isinstance(A, NodeBlocks) else None
     if number is not None:
         P, A = P.renumbered(None, number), A.renumbered(number)
     levels[-1].P = P
@@ -317,23 +330,3 @@ def _coarse_modes(levels: list[Level], nodes: Nodes, modes: Array | None) -> Arr
 
 def _pseudo_inverse(A: Array) -> Array:
     return np.linalg.pinv(A, rcond=SMALL).astype(float, copy=False)
-
-
-def algebraic(A: NodeBlocks, modes: Array) -> list[Transfer]:
-    """Smoothed aggregation (pyamg) below A; modes (3 nodes, k), k made a multiple of 3."""
-    import pyamg
-
-    n = 3 * A.nodes
-    tiles = sparse.bsr_matrix((A.data, A.indices, A.indptr), shape=(n, n))
-    modes = np.column_stack([modes, np.zeros((n, -modes.shape[1] % 3))])
-    hierarchy = pyamg.smoothed_aggregation_solver(
-        tiles, B=modes, improve_candidates=None, max_coarse=COARSEST // 2,
-        presmoother=None, postsmoother=None,
-    )  # fmt: skip
-    none = np.empty(0, dtype=np.int64)
-    out, idle = [], np.flatnonzero(tiles.diagonal() == 0)
-    for level in hierarchy.levels[:-1]:
-        blocks = sparse.bsr_array(level.P.tobsr((3, 3)))
-        out.append(Transfer.of(blocks, idle, none))
-        idle = none
-    return out

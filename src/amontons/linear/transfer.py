@@ -12,7 +12,7 @@ from scipy import sparse
 
 from ..core.compiled import njit
 from ..core.threads import over_rows
-from .node_blocks import NodeBlocks, with_diagonal
+from .node_blocks import NodeBlocks, row_product, with_diagonal
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -129,9 +129,12 @@ class Transfer:
         )
 
     @cached_property
-    def _columns(self) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
-        """Entries by columns: pointers (coarse + 1,), rows and places among them (k,)."""
-        return _by_columns(self.indptr, self.indices, self.coarse)
+    def _columns(self) -> tuple[NDArray[np.int32], NDArray[np.int32], Array]:
+        """P^T by rows: pointers (coarse + 1,), fine nodes and values (k,)."""
+        start, row, place = _by_columns(self.indptr, self.indices, self.coarse)
+        if not len(self.blocks):
+            return start, row, self.weights[place]
+        return start, row, np.ascontiguousarray(self.blocks[place].swapaxes(1, 2))
 
     def add(self, coarse: Array, fine: Array) -> None:
         """fine += P coarse, (nodes, 3)."""
@@ -147,11 +150,10 @@ class Transfer:
         """coarse = P^T fine; padding of both is left out."""
         if self.idle.size:
             fine.reshape(-1)[self.idle] = 0.0
-        values, kernel = self.weights, _restrict
-        if len(self.blocks):
-            values, kernel = self.blocks, _restrict_blocks
+        start, row, values = self._columns
+        kernel = _restrict_blocks if len(self.blocks) else _restrict
         work = 6.0 * self.fine + 2.0 * values.size
-        over_rows(kernel, self.coarse, work, *self._columns, values, fine, coarse)
+        over_rows(kernel, self.coarse, work, start, row, values, fine, coarse)
         if self.coarse_idle.size:
             coarse.reshape(-1)[self.coarse_idle] = 0.0
 
@@ -319,11 +321,11 @@ def _add(begin, end, indptr, indices, weights, coarse, fine):  # noqa: PLR0913
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _restrict(begin, end, start, row, place, weights, fine, coarse):  # noqa: PLR0913
+def _restrict(begin, end, start, row, weights, fine, coarse):  # noqa: PLR0913
     for j in range(begin, end):
         s0, s1, s2 = 0.0, 0.0, 0.0
         for k in range(uint64(start[j]), uint64(start[j + 1])):
-            i, w = uint64(row[k]), weights[uint64(place[k])]
+            i, w = uint64(row[k]), weights[k]
             s0 += w * fine[i, 0]
             s1 += w * fine[i, 1]
             s2 += w * fine[i, 2]
@@ -333,21 +335,17 @@ def _restrict(begin, end, start, row, place, weights, fine, coarse):  # noqa: PL
 @njit(cache=True, error_model="numpy", nogil=True)
 def _add_blocks(begin, end, indptr, indices, blocks, coarse, fine):  # noqa: PLR0913
     for i in range(begin, end):
-        for k in range(indptr[i], indptr[i + 1]):
-            j = indices[k]
-            for a in range(3):
-                for b in range(3):
-                    fine[i, a] += blocks[k, a, b] * coarse[j, b]
+        s0, s1, s2 = row_product(
+            indices, blocks, coarse, uint64(indptr[i]), uint64(indptr[i + 1])
+        )
+        fine[i, 0] += s0
+        fine[i, 1] += s1
+        fine[i, 2] += s2
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _restrict_blocks(begin, end, start, row, place, blocks, fine, coarse):  # noqa: PLR0913
+def _restrict_blocks(begin, end, start, row, blocks, fine, coarse):  # noqa: PLR0913
     for j in range(begin, end):
-        s0, s1, s2 = 0.0, 0.0, 0.0
-        for k in range(uint64(start[j]), uint64(start[j + 1])):
-            i, P = uint64(row[k]), blocks[uint64(place[k])]
-            x0, x1, x2 = fine[i, 0], fine[i, 1], fine[i, 2]
-            s0 += P[0, 0] * x0 + P[1, 0] * x1 + P[2, 0] * x2
-            s1 += P[0, 1] * x0 + P[1, 1] * x1 + P[2, 1] * x2
-            s2 += P[0, 2] * x0 + P[1, 2] * x1 + P[2, 2] * x2
-        coarse[j, 0], coarse[j, 1], coarse[j, 2] = s0, s1, s2
+        coarse[j, 0], coarse[j, 1], coarse[j, 2] = row_product(
+            row, blocks, fine, uint64(start[j]), uint64(start[j + 1])
+        )
