@@ -29,18 +29,22 @@ LEAST_ENTRIES = 50_000  # blocks of a matrix that is not cut: a sweep takes less
 LEAST_ROWS = 128  # of a chunk
 
 
-def chunks_of(indptr: Integers, first: Integers, last: Integers) -> list[Range]:
+def chunks_of(
+    indptr: Integers, first: Integers, last: Integers, multiple: int = 1
+) -> list[Range]:
     """Chunks of rows whose least and greatest columns are first and last, (n,); one if need be.
 
-    How many depends on the matrix alone.
+    How many depends on the matrix alone.  multiple: all but the last have so many rows, or a
+    multiple of that.
     """
     rows = len(indptr) - 1
     if indptr[-1] < LEAST_ENTRIES:
         return [(0, rows)]
     for count in COUNTS:
-        if rows < LEAST_ROWS * count:
+        length = -(-rows // (count * multiple)) * multiple
+        ends = np.minimum(length * np.arange(count + 1), rows)
+        if rows < LEAST_ROWS * count or ends[-2] == rows:
             continue
-        ends = rows * np.arange(count + 1) // count
         low = np.minimum.reduceat(first, ends[:-1])
         high = np.maximum.reduceat(last, ends[:-1])
         k = np.arange(count)
@@ -65,6 +69,14 @@ def better_numbers(indptr: Integers, indices: Integers, width: int = 1) -> Index
     """
     if indptr[-1] < LEAST_ENTRIES or len(chunks_of_sorted(indptr, indices)) > 1:
         return None
+    number, chunks = near_numbers(indptr, indices, width)
+    return number if len(chunks) > 1 else None
+
+
+def near_numbers(
+    indptr: Integers, indices: Integers, width: int = 1, multiple: int = 1
+) -> tuple[Index, list[Range]]:
+    """The reverse Cuthill-McKee numbers of nodes, (n,), and the chunks that they give."""
     from scipy.sparse import csgraph
 
     n = len(indptr) - 1
@@ -77,7 +89,7 @@ def better_numbers(indptr: Integers, indices: Integers, width: int = 1) -> Index
     first = np.minimum.reduceat(columns, indptr[:-1])[order]
     last = np.maximum.reduceat(columns, indptr[:-1])[order]
     pointers = np.concatenate([[0], np.cumsum(np.diff(indptr)[order])])
-    return number if len(chunks_of(pointers, first, last)) > 1 else None
+    return number, chunks_of(pointers, first, last, multiple)
 
 
 def units_of(
