@@ -15,7 +15,6 @@ from .chunks import better_numbers
 from .grid_matrix import GridMatrix
 from .hierarchy import Hierarchy, Nodes, components
 from .levels import Levels
-from .node_blocks import NodeBlocks
 
 Array = NDArray[np.float64]
 
@@ -76,7 +75,7 @@ def prepared(
     if component is None:
         return None
     nodes = Nodes.of(component)
-    A = NodeBlocks.from_sparse(matrix, None if nodes.plain else nodes.place, nodes.count)
+    A = nodes.blocks(matrix)
     number = better_numbers(A.indptr, A.indices)
     if number is not None:
         nodes, A = nodes.renumbered(number), A.renumbered(number)

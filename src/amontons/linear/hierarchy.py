@@ -30,10 +30,14 @@ SMALL = 1e-10  # singular values of the coarsest matrix below this part of the l
 
 @dataclass(frozen=True, eq=False)
 class Nodes:
-    """Which node and component an unknown is: place (n,), three to a node; count of nodes."""
+    """Which node and component an unknown is: place (n,), three to a node; count of nodes.
+
+    plainly: the same with nodes in the order of the unknowns, where their numbers are others.
+    """
 
     place: Index
     count: int
+    plainly: Nodes | None = None
 
     @classmethod
     def of(cls, component: Index) -> Nodes:
@@ -51,7 +55,18 @@ class Nodes:
 
     def renumbered(self, number: Index) -> Nodes:
         """The same with nodes of other numbers, (count,)."""
-        return Nodes(3 * number[self.place // 3] + self.place % 3, self.count)
+        place = 3 * number[self.place // 3] + self.place % 3
+        return Nodes(place, self.count, self.plainly or self)
+
+    def blocks(self, matrix: sparse.sparray) -> NodeBlocks:
+        """The matrix (n, n) of the unknowns in blocks, with ones at padding."""
+        plain = self.plainly or self
+        A = NodeBlocks.from_sparse(matrix, None if plain.plain else plain.place, plain.count)
+        if self.plainly is None:
+            return A
+        number = np.empty(self.count, dtype=np.int64)
+        number[plain.place // 3] = self.place // 3
+        return A.renumbered(number)
 
     @property
     def idle(self) -> Index:

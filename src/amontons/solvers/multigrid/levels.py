@@ -11,7 +11,6 @@ from scipy import sparse
 from ...linear.blocks import spatial
 from ...linear.chunks import better_numbers
 from ...linear.hierarchy import Hierarchy, Level, Nodes, append_level
-from ...linear.node_blocks import NodeBlocks
 from ...linear.transfer import Transfer
 from ...problem.friction import FrictionProblem
 from ...problem.law.law import BOUND
@@ -137,8 +136,7 @@ def _in_basis(hierarchy: Hierarchy, basis: OneSided) -> Hierarchy:
     the master side at its place, so that it has one node of its own on every level.
     """
     nodes = hierarchy.nodes
-    place = None if nodes.plain else nodes.place
-    A = NodeBlocks.from_sparse(basis.M, place, nodes.count)
+    A = nodes.blocks(basis.M)
     number = better_numbers(A.indptr, A.indices)
     if number is not None:
         nodes, A = nodes.renumbered(number), A.renumbered(number)
