@@ -14,6 +14,7 @@ _HOME = {
     "core.errors": ("AmontonsError", "FileFormatError", "Interrupted", "InvalidInput",
                     "InvertedCells", "MissingDependency", "NotConverged", "NotWritten",
                     "SingularOperator", "TimeUp", "UnsupportedForm", "UnsupportedLaw"),
+    "core.threads": ("threads",),
     "problem.law": ("CappedCoulomb", "Cohesive", "Compliant", "Coulomb", "Mixed", "Orthotropic",
                     "ExponentialOverclosure", "FrictionCurve", "OverclosureCurve", "Tied",
                     "Tresca", "VaryingCompliance", "VaryingFriction"),

@@ -31,6 +31,7 @@ from .core.errors import (
     NotWritten as NotWritten, SingularOperator as SingularOperator, TimeUp as TimeUp,
     UnsupportedForm as UnsupportedForm, UnsupportedLaw as UnsupportedLaw,
 )
+from .core.threads import threads as threads
 from .core.warned import (
     DoubtWarning as DoubtWarning, ResultWarning as ResultWarning, warn_of as warn_of,
 )
