@@ -14,6 +14,17 @@ from .analysis import (
     performance_profile as performance_profile,
 )
 from .analysis.audit.verdict import Audit as Audit
+from .analysis.gradients.gradient import (
+    Derivative as Derivative, Gradient as Gradient, OneSided as OneSided,
+)
+from .analysis.gradients.model_gradient import (
+    ModelDerivative as ModelDerivative, ModelGradient as ModelGradient,
+)
+from .analysis.gradients.steps import (
+    EvolutionGradient as EvolutionGradient, evolution_gradient as evolution_gradient,
+)
+from .analysis.gradients.with_jax import jax_function as jax_function
+from .analysis.gradients.with_torch import torch_function as torch_function
 from .analysis.paths.path_crossing import PathCrossing as PathCrossing
 from .app.api import solve as solve
 from .app.audit import audit as audit

@@ -18,6 +18,7 @@ the coarse levels that contact multigrid makes at these statuses, and a smoother
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -42,10 +43,8 @@ MOST = 200  # cycles before it gives up
 JACOBI = 0.7  # of block Jacobi at the contact nodes, which are neighbours
 
 
-class CycleSystem:
+class CycleSystem(System):
     """(1) and (2) of `systems` without a factor; falls back to one where nodes do not fit."""
-
-    distance: float | None = None  # not known: nothing is factorised
 
     def __init__(self, at: Linearised) -> None:
         self.at, self.iterations = at, 0
@@ -63,6 +62,11 @@ class CycleSystem:
         self.V, self.W, self.L = self._tangent()
         self.back = self.contacts.to_reaction  # H_c^-1
         self.cycles: dict[bool, _Cycle] = {}
+
+    @cached_property
+    def distance(self) -> float | None:
+        """None: nothing is factorised; cycles that do not converge say that it is small."""
+        return None if self.fallback is None else self.fallback.distance
 
     def _set_states(self, contacts: ContactNodes) -> None:
         solution, law = self.at.solution, self.at.problem.law
@@ -122,10 +126,10 @@ class CycleSystem:
     @property
     def _reacts(self) -> Array:
         """0 where a reaction does not change, else 1, (nc, d)."""
-        A, B = self.at.A, self.at.B
-        still = (np.einsum("kii->ki", A) != 0) & ~B.any(axis=2) & (self.at.slope == 0).all(
-            axis=1
-        )[:, None]
+        held = self.at.B.any(axis=2)
+        still = (np.einsum("kii->ki", self.at.A) != 0) & ~held
+        slides: Any = self.at.slope.any(axis=1)
+        still &= ~slides[:, None]
         return np.where(still, 0.0, 1.0)
 
     def _held(self, given: Array) -> Array:
@@ -136,7 +140,8 @@ class CycleSystem:
         out = np.zeros((self.levels.nodes.count, 3))
         d = self.at.problem.dimension
         moved = given.copy()
-        moved[:, :d] *= self.at.B.any(axis=2) | self.at.slope.any(axis=1)[:, None]
+        slides: Any = self.at.slope.any(axis=1)
+        moved[:, :d] *= self.at.B.any(axis=2) | slides[:, None]
         out[self.contacts.node] = -np.einsum("cia,ci->ca", self.back, moved)
         return out
 

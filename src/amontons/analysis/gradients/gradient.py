@@ -119,7 +119,8 @@ class Gradient(Told):
             for name, value in (("load", self.load), ("w", self.w), ("mu", self.mu),
                                 ("bound", self.bound))
         )  # fmt: skip
-        text = f"gradient of {self.solution.problem.contacts} contacts, largest entries: {sizes}"
+        count = self.solution.problem.contacts
+        text = f"gradient of {count} contacts, largest entries: {sizes}"
         return "\n".join([text, *map(str, self.warnings)])
 
 
@@ -135,7 +136,7 @@ class Differentiable:
 
     @cached_property
     def system(self) -> System:
-        """The linear system at the statuses; raises SingularOperator where it has no inverse."""
+        """The system at the statuses; raises SingularOperator where it has no inverse."""
         return system_of(self.at)
 
     @property

@@ -74,9 +74,10 @@ class Linearised:
                 "differentiate; expected a FrictionProblem, of small strains and contact of "
                 "method 'nodal' or 'mortar'"
             )
-        if problem.law.varies:
+        law = problem.law if solution.follows is None else solution.follows
+        if law.varies:
             raise UnsupportedLaw(
-                f"gradient: {problem.law.name} has coefficients that follow the state, and "
+                f"gradient: {law.name} has coefficients that follow the state, and "
                 "their slopes are not known; expected Coulomb's, Tresca's, capped or tied "
                 "contacts, also with cohesion, orthotropic or compliant"
             )

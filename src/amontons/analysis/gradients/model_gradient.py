@@ -3,7 +3,7 @@
 With U = (prescribed, v) all displacements, L the adjoint of the load on all dofs (zero where
 supports hold) and z that of u, a change of the model's arrays changes J by
 
-    L . (dF - dK U + dH r) + z . (dgap n + dH^T U) + P . dprescribed + mu~ . dmu + bound~ . dbound,
+    L . (dF - dK U + dH r) + z . (dgap n + dH^T U) + P . dprescribed + mu~ . dmu + b~ . dbound,
     P = J_U - K L + H z   at the dofs that supports prescribe.
 
 Material, node positions and anything else of which a model is made act through K, H, F and the
@@ -31,6 +31,7 @@ from ...mechanics.model import Model
 from ...mechanics.model.assembly import Discretisation
 from ...mechanics.model.fields import by_body
 from ...problem.friction import FrictionProblem
+from ...problem.law import Law
 from ...problem.law.law import BOUND, MU
 from ...problem.solution import FrictionSolution
 from .gradient import Differentiable, Gradient, differentiable
@@ -147,7 +148,7 @@ class ModelGradient(Told):
         All of make(p) have the same unknowns and contacts.  step: of differences, by default
         1e-3 of `at`.  Raises InvalidInput where it makes models of other sizes.
         """
-        h = _step(at, step)
+        h = step_of(at, step)
         return sum(share * self._paired(make(at + k * h)) for k, share in STENCIL) / h
 
     def _paired(self, other: Model) -> float:
@@ -156,7 +157,7 @@ class ModelGradient(Told):
         v, r = solution.v, solution.r.ravel()
         assert v is not None and p.H is not None and p.f is not None and p.w is not None
         out = g.load @ (p.f + p.H @ r - p.M @ v) + g.w.ravel() @ (p.H.T @ v + p.w.ravel())
-        mu, bound = _numbers(p)
+        mu, bound = numbers_of(p.law)
         prescribed = other.load_factor * other.discretisation.prescribed
         return float(out + g.mu @ mu + g.bound @ bound + self._directly @ prescribed)
 
@@ -204,7 +205,7 @@ def model_vjp(
 ) -> ModelGradient:  # fmt: skip
     """See `ModelSolution.vjp`."""
     parts, kept = _checked(model), differentiable(solution)
-    of_U = _of_bodies("displacement", displacement, model)
+    of_U = of_bodies("displacement", displacement, model)
     g = kept.vjp(r, u, parts.gathered(of_U))
     L = g.load
     if parts.eliminated is not None:
@@ -220,8 +221,8 @@ def model_jvp(
 ) -> ModelDerivative:  # fmt: skip
     """See `ModelSolution.jvp`."""
     parts, kept = _checked(model), differentiable(solution)
-    F = _of_bodies("load", load, model)
-    moved = _of_bodies("prescribed", prescribed, model)
+    F = of_bodies("load", load, model)
+    moved = of_bodies("prescribed", prescribed, model)
     if np.any(moved[~parts.is_fixed]):
         raise InvalidInput("prescribed: expected 0 at dofs that no support holds")
     if parts.eliminated is not None and moved.any():
@@ -261,23 +262,23 @@ def _change(
     make: Make, at: float, model: Model, solution: FrictionSolution
 ) -> tuple[Array, Array, Array, Array, Array]:
     """What a parameter changes: f with -M v + H r, w with H^T v, mu, bound, prescribed."""
-    h, v, r = _step(at, None), solution.v, solution.r.ravel()
+    h, v, r = step_of(at, None), solution.v, solution.r.ravel()
     assert v is not None
     total: list[Any] = [0.0] * 5
     for k, share in STENCIL:
         other = make(at + k * h)
         p = _assembled(other, model)
         assert p.H is not None and p.f is not None and p.w is not None
-        mu, bound = _numbers(p)
+        mu, bound = numbers_of(p.law)
         now = (p.f + p.H @ r - p.M @ v, p.w + (p.H.T @ v).reshape(p.w.shape), mu, bound,
                other.load_factor * other.discretisation.prescribed)  # fmt: skip
         total = [a + share / h * b for a, b in zip(total, now, strict=True)]
     return tuple(total)  # type: ignore[return-value]
 
 
-def _numbers(problem: FrictionProblem) -> tuple[Array, Array]:
+def numbers_of(law: Law) -> tuple[Array, Array]:
     """Coefficients and finite bounds of the plain law, (nc,) each."""
-    parameters = problem.law.plain.parameters
+    parameters = law.plain.parameters
     bound = parameters[:, BOUND]
     return parameters[:, MU], np.where(np.isfinite(bound), bound, 0.0)
 
@@ -295,7 +296,8 @@ def _assembled(other: Model, model: Model) -> FrictionProblem:
     return found
 
 
-def _step(at: float, step: float | None) -> float:
+def step_of(at: float, step: float | None) -> float:
+    """The step of differences of a parameter; raises InvalidInput for none > 0."""
     if step is None:
         return RELATIVE * (abs(at) or 1.0)
     if not (np.isfinite(step) and step > 0):
@@ -313,7 +315,7 @@ def _checked(model: Model) -> Discretisation:
     return model.discretisation
 
 
-def _of_bodies(name: str, given: Any, model: Model) -> Array:
+def of_bodies(name: str, given: Any, model: Model) -> Array:
     """Values at all nodes, (dofs,), of (nodes, dim) per body, of one array, or of (dofs,)."""
     parts, bodies = model.discretisation, model.bodies
     out = np.zeros(parts.dofs)
@@ -374,7 +376,7 @@ class _Varied:
 def _moving(model: Model, points: Any) -> Make:
     """Models whose nodes have moved along directions (nodes, dim) per body."""
     parts = model.discretisation
-    whole = by_body(model.bodies, parts, _of_bodies("points", points, model))
+    whole = by_body(model.bodies, parts, of_bodies("points", points, model))
 
     def make(p: float) -> Model:
         bodies = [

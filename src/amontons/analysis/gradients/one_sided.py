@@ -35,8 +35,9 @@ def sides_of(
     law = problem.law
     if not isinstance(law, Coulomb | Tresca):
         return (), False, (
-            f"one-sided derivatives are found for Coulomb's and Tresca's law, not for {law.name}"
-        )  # fmt: skip
+            "one-sided derivatives are found for Coulomb's and Tresca's law, not for "
+            f"{law.name}"
+        )
     rate = mu if isinstance(law, Coulomb) else bound
     falls = rate < 0
     if (falls & (law.coefficient == 0)).any():

@@ -15,9 +15,10 @@ z = u~ - B^T y.  A cotangent of any size costs one solve of (2), a direction one
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,24 +54,24 @@ class Adjoint(NamedTuple):
     x: Array | None
 
 
-class System(Protocol):
+class System(ABC):
     """Solves (1) and (2)."""
 
-    @property
+    @cached_property
+    @abstractmethod
     def distance(self) -> float | None:
         """To the nearest singular system, in scaled variables of norm near 1; None: unknown.
 
         Of a dense system an estimate of |J| |J^-1|, else a bound from above by some solves.
         """
-        ...
 
+    @abstractmethod
     def change(self, F: Array | None, c: Array, h: Array) -> Change:
         """(1); F (n,), None in the Delassus form."""
-        ...
 
+    @abstractmethod
     def adjoint(self, v: Array | None, r: Array, u: Array) -> Adjoint:
         """(2)."""
-        ...
 
 
 def system_of(at: Linearised) -> System:
@@ -87,7 +88,7 @@ def system_of(at: Linearised) -> System:
     return GlobalSystem(at)
 
 
-class DelassusSystem:
+class DelassusSystem(System):
     """(1) without v: (A + B W) dr = c - B h, du = W dr + h."""
 
     def __init__(self, at: Linearised) -> None:
@@ -134,7 +135,7 @@ class DelassusSystem:
         return Adjoint(y, u - np.einsum("kji,kj->ki", self.at.B, y), None)
 
 
-class GlobalSystem:
+class GlobalSystem(System):
     """(1) as one sparse matrix: M may be singular, where contact alone holds a body."""
 
     def __init__(self, at: Linearised) -> None:
