@@ -28,6 +28,9 @@ from .analysis.gradients.with_torch import torch_function as torch_function
 from .analysis.paths.path_crossing import PathCrossing as PathCrossing
 from .app.api import solve as solve
 from .app.audit import audit as audit
+from .analysis.limits.collapse import Collapse as Collapse
+from .analysis.limits.jamming import Jamming as Jamming
+from .app.limits import collapse_load as collapse_load, jamming_friction as jamming_friction
 from .app.model_solution import ModelSolution as ModelSolution
 from .app.questions import (
     all_solutions as all_solutions, basins as basins, critical_friction as critical_friction,

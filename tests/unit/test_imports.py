@@ -22,7 +22,8 @@ ALONE = {  # package: the folders or files that import it
     "h5py": "core/hdf5 io",  # checks; the exchange format, results, states
 }  # fmt: skip
 INSIDE = {  # the same inside of a room
-    "analysis": ("multipliers", "solutions", "certificates", "paths", "gradients"),
+    "analysis": ("multipliers", "solutions", "certificates", "paths", "gradients",
+                 "limits"),
     "mechanics": ("meshes", "elements", "contact", "model", "steps"),
     "problem": ("law", "judge"),
 }

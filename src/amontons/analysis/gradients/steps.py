@@ -115,9 +115,9 @@ def evolution_gradient(
     "force": (nc, d)}, each left out where it is zero; None for nothing.  along: {name: (make,
     at)}, families of models make(p) with make(at) the model, by differences of assembled
     arrays; the state at the start is the same for all p.  Others as of `evolve`.  Raises
-    NotConverged where a step does, UnsupportedForm for large deformations, bodies that yield, Nitsche's method, locked
-    bolts and schedules of several models, UnsupportedLaw for laws that follow the state, and
-    for springs of contacts in dynamics.
+    NotConverged where a step does, UnsupportedForm for large deformations, bodies that yield,
+    Nitsche's method, locked bolts and schedules of several models, UnsupportedLaw for laws that
+    follow the state, and for springs of contacts in dynamics.
     """
     if model.kind is not FrictionProblem or isinstance(method, Schedule):
         raise UnsupportedForm(
