@@ -13,7 +13,6 @@ from ..contact.carried import TiedPair
 from ..contact.current_mortar import MortarPair
 from ..contact.current_pairs import Pair, between_bodies
 from ..elements.given import GivenMatrices
-from ..elements.hyperelasticity import is_hyperelastic
 from ..elements.rigid import Rigid
 from .parts import FINITE
 
@@ -39,11 +38,11 @@ def check_supported(model: Model) -> None:
                 f"{what} has a given K, and contact of finite kinematics needs bodies with a "
                 "law; give its contacts kinematics='small'", at, "",
             )  # fmt: skip
-        if not (asked or is_hyperelastic(body.material)):
+        if not (asked or body.turns):
             raise UnsupportedForm(
-                "others have hyperelastic laws and this one is linear elastic; give all of "
-                "them NeoHookean or the like, or say that it keeps small strains by "
-                "kinematics='finite' of the contacts", at, what,
+                "others have hyperelastic laws or turn, and this one is linear elastic; give "
+                "it corotational=True, NeoHookean or the like, or say that it keeps small "
+                "strains by kinematics='finite' of the contacts", at, what,
             )  # fmt: skip
     for k, contact in enumerate(model.contacts):
         what = f"contact on {contact.slave!r}"

@@ -26,7 +26,6 @@ from ...problem.friction import FrictionProblem
 from ...problem.nitsche import NitscheProblem
 from ...problem.protocol import Problem
 from ...problem.solution import FrictionSolution
-from ..elements.hyperelasticity import is_hyperelastic
 from ..elements.plasticity import is_plastic
 from .assembly import Discretisation
 from .doubts import CHECKS, OF_THE_START, Check
@@ -255,8 +254,8 @@ class Moved(Formulation):
             at = ("contacts", k, "kinematics")
             if contact.kinematics == SMALL and by_law:
                 raise InvalidInput(
-                    "hyperelastic laws have contact in the current configuration, "
-                    "kinematics='finite', as by default; got 'small'",
+                    "hyperelastic laws and corotational bodies have contact in the current "
+                    "configuration, kinematics='finite', as by default; got 'small'",
                     at, f"contact on {contact.slave!r}",
                 )  # fmt: skip
             if contact.kinematics != FINITE and not by_law:
@@ -330,8 +329,8 @@ def formulation_of(bodies: Sequence[Body], contacts: Sequence[Contact]) -> Formu
 
 
 def has_finite_strains(bodies: Sequence[Body]) -> bool:
-    """True where a body has a hyperelastic law."""
-    return any(is_hyperelastic(body.material) for body in bodies)
+    """True where a body has a hyperelastic law, or a frame that turns with it."""
+    return any(body.turns for body in bodies)
 
 
 def _first(problem: FrictionProblem) -> FrictionProblem:

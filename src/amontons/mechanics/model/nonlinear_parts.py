@@ -24,6 +24,7 @@ from ..contact.current_pairs import Meetings, ObstaclePair, Pair, between_bodies
 from ..contact.facing import Skin
 from ..contact.geometry import Plane
 from ..contact.overlap import is_itself
+from ..elements.corotational import CorotationalBody
 from ..elements.hyperelasticity import HyperelasticBody, is_hyperelastic
 from ..elements.linear_body import LinearBody
 from .finite_checks import chains, check_nodes, check_supported
@@ -32,6 +33,7 @@ from .worst_cells import flattest, most_strained
 
 if TYPE_CHECKING:
     from .assembly import Discretisation
+    from .body import Body
     from .model import Model
 
 Array = NDArray[np.float64]
@@ -252,9 +254,7 @@ def _nonlinear_parts(model: Model) -> NonlinearParts:
     check_supported(model)
     linear = model.discretisation  # of the tangent at rest: same dofs, contacts and checks
     bodies = tuple(
-        (HyperelasticBody if is_hyperelastic(body.material) else LinearBody)(
-            body.mesh, body.material  # type: ignore[arg-type]
-        )
+        _kind_of(body)(body.mesh, body.material)  # type: ignore[arg-type]
         for body in model.bodies
     )
     X = np.concatenate([body.mesh.points for body in model.bodies])
@@ -283,6 +283,12 @@ def _nonlinear_parts(model: Model) -> NonlinearParts:
     return NonlinearParts(bodies, names, X, linear.offsets[1:-1] // d, linear.free, contact, at,
                           contact_of[rows], np.flatnonzero(rows == columns)[nodes],
                           columns, pointers, sparse.csc_array(taken))  # fmt: skip
+
+
+def _kind_of(body: Body) -> type[HyperelasticBody | LinearBody]:
+    if body.corotational:
+        return CorotationalBody
+    return HyperelasticBody if is_hyperelastic(body.material) else LinearBody
 
 
 def _pairs(model: Model, slaves: list[Index], linear: Discretisation) -> list[Pair]:

@@ -31,7 +31,6 @@ from ..contact import (
 from ..contact.segments import Surface
 from ..elements.elasticity import LinearElastic, materials_by_region
 from ..elements.given import GivenMatrices
-from ..elements.hyperelasticity import is_hyperelastic
 from ..elements.rigid import Rigid
 from ..meshes.mesh import Mesh
 from ..meshes.surfaces import facet_normals
@@ -257,7 +256,7 @@ def located(bodies: Sequence[Body], contact: Contact) -> list[tuple[int, str]]:
 
 def slides_far(bodies: Sequence[Body], contact: Contact) -> bool:
     """Whether a pair of two bodies meets where they are now."""
-    finite = contact.kinematics == FINITE or any(is_hyperelastic(b.material) for b in bodies)
+    finite = contact.kinematics == FINITE or any(b.turns for b in bodies)
     return finite and contact.master is not None and contact.method == "mortar"
 
 
