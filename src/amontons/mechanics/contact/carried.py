@@ -82,7 +82,8 @@ class TiedPair:
     @cached_property
     def pressed(self) -> Index:
         """Nodes that may get forces beside the slaves."""
-        return np.setdiff1d(np.unique(self.rows.indices), self.slaves)
+        every = np.unique(self.rows.indices).astype(np.int64)
+        return every[~np.isin(every, self.slaves)]
 
     def at(self, positions: Array) -> TiedMeeting:
         """The ties at the positions (nodes, d) of all nodes."""
@@ -93,11 +94,11 @@ def _told_by(
     node: int, apart: Array, X: Array, beside: sparse.csr_array, on_slave: Mask
 ) -> tuple[Index, Array]:
     """Nodes off the surface and their parts c with sum c_j (X_j - X_node) = apart."""
-    ring = np.array([node])
+    ring = np.array([node], dtype=np.int64)
     for _ in range(RINGS):
         ring = np.unique(np.concatenate([ring, *(
             beside.indices[beside.indptr[k] : beside.indptr[k + 1]] for k in ring
-        )]))  # fmt: skip
+        )])).astype(np.int64)  # fmt: skip
         nodes = ring[~on_slave[ring]]
         arms = (X[nodes] - X[node]).T
         if arms.shape[1] < len(apart):

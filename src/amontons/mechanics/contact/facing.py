@@ -83,9 +83,10 @@ class Skin:
             part[:, :, 0] = 1.0  # of the padding
             part[:, : s.middles.shape[1], : s.nodes.shape[1]] = s.parts
             parts.append(part)
-        return cls(*(np.concatenate(every) for every in (
-            nodes, [s.corners for s in skins], middles, parts, [s.bent for s in skins]
-        )))  # fmt: skip
+        corners, bent = (np.concatenate([getattr(s, name) for s in skins])
+                         for name in ("corners", "bent"))  # fmt: skip
+        return cls(np.concatenate(nodes), corners, np.concatenate(middles),
+                   np.concatenate(parts), bent)  # fmt: skip
 
     def part(self, chosen: Index) -> Skin:
         """Some of the facets, (k,)."""

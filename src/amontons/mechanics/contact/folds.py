@@ -196,7 +196,7 @@ def _opposite(
         aside = aside / (radius[one] + radius[other])
         kept = aside < BESIDE
         kept &= ~(skin.nodes[one][:, :, None] == skin.nodes[other][:, None]).any(axis=(1, 2))
-        yield _Opposite(*(part[kept] for part in (one, other, ahead, back, aside)))
+        yield _Opposite(one[kept], other[kept], ahead[kept], back[kept], aside[kept])
 
 
 def _coloured(tree: sparse.csr_array, differs: sparse.csr_array) -> Index:

@@ -79,7 +79,7 @@ class Model(Told):
         if len({body.axisymmetric for body in self.bodies}) > 1:
             raise InvalidInput("expected all axisymmetric or none of them, got both",
                                ("bodies",))  # fmt: skip
-        object.__setattr__(self, "contacts", self.formulation.joined(self.contacts))
+        object.__setattr__(self, "contacts", self.formulation.joined(tuple(self.contacts)))
         self.formulation.check(self)
         object.__setattr__(self, "pair_names", pair_names(self.contacts))
         if not (is_number(self.load_factor) and np.isfinite(self.load_factor)):
