@@ -5,6 +5,9 @@ import pytest
 from tangent_checker import checked_tangents
 
 import amontons as am
+from amontons.core.errors import FileFormatError
+from amontons.io.case.contacts import read_contact
+from amontons.io.case.tables import Table
 from amontons.mechanics.model.large_deformation import large_deformation, large_step
 
 NEO = am.NeoHookean(1.0, 0.3)
@@ -166,3 +169,14 @@ def test_a_ring_is_refused():
              am.Contact("b.top", master="a.top", mu=0)]
     with pytest.raises(am.UnsupportedForm, match="ring"):
         am.solve(am.Model(parts, [am.Fix("a.left", 0), am.Fix("b.right", 0)], pairs))
+
+
+def test_case_files_take_a_list():
+    """master = [...] of a contact table; anything else in the list is told."""
+    blocks = table([]).bodies
+    given = {"slave": "top.bottom", "friction": {"coulomb": 0.1},
+             "master": ["left.top", "right.top"]}  # fmt: skip
+    contact = read_contact(Table("case.toml", "contact.1", given), blocks)
+    assert contact.masters == ("left.top", "right.top")
+    with pytest.raises(FileFormatError, match="list of texts"):
+        read_contact(Table("case.toml", "c", given | {"master": ["left.top", 3]}), blocks)
