@@ -7,6 +7,7 @@ was found), then a second solution.  What none of them settles is undecided, wit
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import cast
 
@@ -21,7 +22,10 @@ from ...problem.friction import FrictionProblem
 from ...problem.law import Coulomb, Law, Tresca
 from ...problem.law.law import MU
 from ...problem.solution import FrictionSolution
+from ...solvers.contract import Iterate
 from ...solvers.driver import drive
+from ..hyperstatic.held_tangents import relaxed
+from ..hyperstatic.indeterminacy import indeterminacy, is_singular
 from ..scaled import COPIES, UNRESOLVED, Scaled
 from ..solutions.discs.search import enumerate_discs
 from ..solutions.enumerate import PieceSolution, Solutions, enumerate_solutions
@@ -31,15 +35,18 @@ from .energy_bound import energy_bound
 from .one_load.answer import LoadCertificate, LoadOutcome
 from .one_load.certificate import certify_load
 from .status_pieces import friction_shape
-from .verdict import Uniqueness, Verdict
+from .verdict import Uniqueness, Verdict, with_indeterminacy
 
 Array = NDArray[np.float64]
 ENUMERATED = 25  # contacts up to which all solutions are looked for before a certificate
 REGIONS = 10  # contacts in 3D up to which all solutions are looked for after it
+SMALL = 60  # rows of a singular W up to which all solutions are looked for first
 INSTANT = 8  # contacts up to which the quick verdict examines all patterns: milliseconds
 QUICK = 400  # rows of W up to which the quick verdict is given: some ten milliseconds
 SECONDS = 60.0  # whose work a verdict without a time limit may take
 QUICK_SECONDS = 1.0  # the same of a quick one
+SOLVING = 0.7  # part of the time for a solution where W is singular
+RELAXED = 0.7  # part of the time for the motion where supports hold tangents
 ABOVE = 1e-9  # relative, at which a friction is proved to be safe
 BOUNDS = 0.5  # part of the time for the bounds on the critical friction
 PENETRATES = 1e-6  # gap of a contact that can not react, relative to the load
@@ -58,6 +65,11 @@ def assess(
     """
     deadline = deadline_of(time_limit, SECONDS)
     began = now()
+    if isinstance(problem.law, Coulomb):
+        found = _if_held(problem, solution, deadline)
+        found = found or _if_singular(problem, solution, deadline, held)
+        if found is not None:
+            return _finished(found, began)
     try:
         local = problem.condensed(deadline)
         coulomb = isinstance(problem.law, Coulomb)
@@ -76,6 +88,66 @@ def assess(
     if verdict.verdict is Verdict.UNDECIDED:
         verdict = _this_load(given, solution, verdict, deadline)
     return _finished(verdict, began)
+
+
+def _if_held(
+    problem: FrictionProblem, solution: FrictionSolution | None, deadline: Deadline
+) -> Uniqueness | None:
+    """The verdict where supports hold tangents of contacts, by the relaxed problem."""
+    try:
+        found = relaxed(problem, deadline)
+    except (TimeUp, InvalidInput, SingularOperator):
+        return None
+    if found is None or _blocked(problem):
+        return None
+    other, held = found
+    if solution is None or not solution.converged:
+        say("a solution for this load")
+        solution = drive(problem, time_limit=deadline.share(BOUNDS))
+    if not solution.converged:
+        return None
+    known = None
+    with suppress(InvalidInput):
+        r = np.where(held, 0.0, solution.r)
+        known = drive(other, start=Iterate(r), tolerance=1e-10, time_limit=deadline.share(0.1))
+    verdict = assess(other, known, time_limit=deadline.share(RELAXED))
+    proved = verdict.verdict is not Verdict.UNDECIDED
+    apart = indeterminacy(
+        problem, solution, deadline, proved=verdict.verdict.value if proved else "",
+        why=verdict.reason,
+    )  # fmt: skip
+    count = int(held.any(axis=1).sum())
+    told = f"Supports hold tangents of {count} contacts."
+    return with_indeterminacy(replace(verdict, solution=solution, reason=told), apart)
+
+
+def _if_singular(
+    problem: FrictionProblem, solution: FrictionSolution | None, deadline: Deadline, held: str
+) -> Uniqueness | None:
+    """The verdict where W is singular or missing; None where it is not, or all is small.
+
+    Then the lists of `_this_load` say more, and where they do not it is asked for again.
+    """
+    try:
+        if problem.contacts * problem.dimension <= SMALL or not is_singular(problem, deadline):
+            return None
+        loose = problem.loose_modes.shape[1] > 0
+        if not loose and _blocked(problem):
+            return None
+    except (TimeUp, InvalidInput, SingularOperator):
+        return None
+    if solution is None or not solution.converged:
+        say("a solution for this load")
+        solution = drive(problem, time_limit=deadline.share(SOLVING))
+    cause = "W is singular"
+    if loose:
+        cause = f"Contact alone holds {held}, so there is no W"
+    nothing = _without_verdict(problem, f"{cause}.", now())
+    if not solution.converged:
+        why = f"No solution was found: {solution.convergence}."
+        return replace(nothing, reason=f"{cause}. {why}")
+    return with_indeterminacy(replace(nothing, solution=solution),
+                              indeterminacy(problem, solution, deadline))  # fmt: skip
 
 
 def quick_verdict(problem: FrictionProblem) -> Uniqueness | None:
@@ -120,9 +192,8 @@ def _is_small(local: FrictionProblem) -> bool:
 # --------------------------------------------------------------------- no solution
 def _blocked(local: FrictionProblem) -> bool:
     """True where a contact penetrates that can not react; rounding of a gap does not count."""
-    assert local.q is not None
-    reacts = local.rho > 0
-    return bool((local.q[~reacts, 0] < -PENETRATES * local.q_norm).any())
+    q, reacts = local.free_velocity, local.rho > 0
+    return bool((q[~reacts, 0] < -PENETRATES * np.linalg.norm(q)).any())
 
 
 def _not_known(law: Law) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 from ...core.faces import Told
 from ...core.words import shortened
 from ...problem.solution import FrictionSolution
+from ..hyperstatic.indeterminacy import Indeterminacy
 from ..solutions.enumerate import PieceSolution
 from .critical_friction import CriticalFriction, Witness
 from .one_load.answer import LoadCertificate
@@ -50,6 +51,7 @@ class Uniqueness(Told):
     resolution: of UNIQUE_THIS_LOAD, any other solution would differ by less; of NOT_UNIQUE, to
     which both are known; relative to the largest reaction or, if that is larger, to what the
     load can make.  0 for every load, None where nothing is known.
+    indeterminacy: where W is singular or missing, what is known of motion and reactions apart.
     """
 
     verdict: Verdict
@@ -65,6 +67,7 @@ class Uniqueness(Told):
     critical: CriticalFriction | None = None
     seconds: float = 0.0
     resolution: float | None = None
+    indeterminacy: Indeterminacy | None = None
 
     def __str__(self) -> str:
         upper = "unknown" if np.isinf(self.upper) else f"{self.upper:.4g}"
@@ -84,7 +87,7 @@ class Uniqueness(Told):
             self.reason,
             f"friction {self.friction:g}",
         ]
-        if self.criterion == "given friction":
+        if self.criterion == "given friction" or self.indeterminacy is not None:
             return "\n".join(lines[:2])
         if math.isinf(self.lower):
             lines.append("every load has one solution at any friction")
@@ -133,7 +136,24 @@ class Uniqueness(Told):
                 "friction": self.friction, "lower": self.lower, "upper": self.upper,
                 "criterion": self.criterion, "witness": witness, "other": other,
                 "comparison": comparison, "resolution": self.resolution,
-                "seconds": self.seconds}  # fmt: skip
+                "seconds": self.seconds,
+                **({} if self.indeterminacy is None else self.indeterminacy.record),
+                }  # fmt: skip
+
+
+def with_indeterminacy(verdict: Uniqueness, found: Indeterminacy) -> Uniqueness:
+    """The verdict with what is known of motion and reactions apart, in its reason too."""
+    if found.motion == "not_unique" or found.has_other_reactions:
+        known = Verdict.NOT_UNIQUE
+    elif found.motion_is_unique and found.reactions_are_unique:
+        known = Verdict.UNIQUE_THIS_LOAD
+    else:
+        known = Verdict.UNDECIDED
+    resolution = verdict.resolution
+    if known is Verdict.UNIQUE_THIS_LOAD:
+        resolution = resolution if found.bound is None else found.bound.distance
+    return replace(verdict, verdict=known, reason=f"{verdict.reason} {found}",
+                   resolution=resolution, indeterminacy=found)  # fmt: skip
 
 
 def _comparison(bounds: CriticalFriction | None) -> list[str]:
