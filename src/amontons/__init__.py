@@ -33,6 +33,7 @@ _HOME = {
     "analysis.paths.path_crossing": ("PathCrossing",),
     "solvers.driver": ("drive",),
     "io.decks.written": ("write_deck",),
+    "io.certificates": ("check_certificate", "write_certificate"),
     "io.fclib": ("read_fclib", "write_fclib"),
     "mechanics.multibody": ("Ball", "Joint", "Polyhedron", "RigidBodies", "RigidBody",
                             "RigidState", "RigidStep", "cuboid", "evolve_rigid"),

@@ -9,8 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from ...core.clock import now
 from ...core.faces import Told
 from ...core.words import shortened
+from ...problem.friction import FrictionProblem
+from ...problem.law.law import MU
 from ...problem.solution import FrictionSolution
 from ..hyperstatic.indeterminacy import Indeterminacy
 from ..solutions.enumerate import PieceSolution
@@ -40,6 +43,21 @@ _MEANING = {
 }
 
 
+class Cause(Enum):
+    """Why a quick verdict is not settled: its name in JSON files, in words, what decides."""
+
+    LARGE = ("large", "The problem is large",
+             "amontons uniqueness bounds the friction and examines this load")  # fmt: skip
+    NO_W = ("no_w", "Contact alone holds a body, so there is no W",
+            "amontons uniqueness tells motion and reactions apart")  # fmt: skip
+    NOT_FORMED = ("w_not_formed", "W was not needed, and takes longer to form",
+                  "amontons uniqueness forms it")  # fmt: skip
+    SINGULAR = ("singular", "W is singular or hardly definite",
+                "amontons uniqueness tells motion and reactions apart")  # fmt: skip
+    FRICTION = ("friction", "Friction is above the cheapest bound",
+                "amontons uniqueness looks for a better one and examines this load")  # fmt: skip
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Uniqueness(Told):
     """The verdict, and all that supports it.
@@ -52,6 +70,7 @@ class Uniqueness(Told):
     which both are known; relative to the largest reaction or, if that is larger, to what the
     load can make.  0 for every load, None where nothing is known.
     indeterminacy: where W is singular or missing, what is known of motion and reactions apart.
+    cause: of a quick verdict that is not settled, what stood in its way.
     """
 
     verdict: Verdict
@@ -68,6 +87,7 @@ class Uniqueness(Told):
     seconds: float = 0.0
     resolution: float | None = None
     indeterminacy: Indeterminacy | None = None
+    cause: Cause | None = None
 
     def __str__(self) -> str:
         upper = "unknown" if np.isinf(self.upper) else f"{self.upper:.4g}"
@@ -113,7 +133,8 @@ class Uniqueness(Told):
         """One line with the cheap part of it."""
         if self.verdict is Verdict.UNIQUE_EVERY_LOAD:
             return f"uniqueness: one solution for every load. {self.reason}"
-        return f"uniqueness: not settled. {self.reason} Ask with --uniqueness"
+        decides = "" if self.cause is None else f" {self.cause.value[2]}."
+        return f"uniqueness: not settled. {self.reason}{decides} Ask with --uniqueness"
 
     @property
     def record(self) -> dict[str, Any]:
@@ -137,8 +158,17 @@ class Uniqueness(Told):
                 "criterion": self.criterion, "witness": witness, "other": other,
                 "comparison": comparison, "resolution": self.resolution,
                 "seconds": self.seconds,
+                "cause": None if self.cause is None else self.cause.value[0],
+                "decided_by": None if self.cause is None else self.cause.value[2],
                 **({} if self.indeterminacy is None else self.indeterminacy.record),
                 }  # fmt: skip
+
+
+def without_verdict(problem: FrictionProblem, reason: str, began: float) -> Uniqueness:
+    """UNDECIDED, with the reason; began: when the question was asked."""
+    friction = problem.law.parameters[:, MU].max(initial=0.0)
+    return Uniqueness(Verdict.UNDECIDED, float(friction), 0.0, np.inf, "none", reason,
+                      seconds=now() - began)  # fmt: skip
 
 
 def with_indeterminacy(verdict: Uniqueness, found: Indeterminacy) -> Uniqueness:
