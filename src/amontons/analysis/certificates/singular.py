@@ -17,6 +17,7 @@ from ...solvers.contract import Iterate
 from ...solvers.driver import drive
 from ..hyperstatic.held_tangents import relaxed
 from ..hyperstatic.indeterminacy import indeterminacy, is_singular
+from ..scaled import Scaled
 from .verdict import Uniqueness, Verdict, with_indeterminacy, without_verdict
 
 SMALL = 60  # rows of a singular W up to which all solutions are looked for first
@@ -47,14 +48,27 @@ def if_held(
         r = np.where(held, 0.0, solution.r)
         known = drive(other, start=Iterate(r), tolerance=1e-10, time_limit=deadline.share(0.1))
     verdict = assess(other, known, time_limit=deadline.share(RELAXED))
-    proved = verdict.verdict is not Verdict.UNDECIDED
-    apart = indeterminacy(
-        problem, solution, deadline, proved=verdict.verdict.value if proved else "",
-        why=verdict.reason,
-    )  # fmt: skip
+    apart = indeterminacy(problem, solution, deadline, why=verdict.reason,
+                          proved=_of_motion(other, known, verdict))  # fmt: skip
     count = int(held.any(axis=1).sum())
     told = f"Supports hold tangents of {count} contacts."
     return with_indeterminacy(replace(verdict, solution=solution, reason=told), apart)
+
+
+def _of_motion(
+    other: FrictionProblem, known: FrictionSolution | None, verdict: Uniqueness
+) -> str:
+    """What a verdict on the relaxed problem says of motions, "" for nothing."""
+    if verdict.indeterminacy is not None:  # it is singular besides
+        found = verdict.indeterminacy
+        return found.motion if found.motion_is_unique else ""
+    if verdict.verdict is not Verdict.NOT_UNIQUE:
+        return "" if verdict.verdict is Verdict.UNDECIDED else verdict.verdict.value
+    first = known if verdict.solution is None else verdict.solution
+    if verdict.other is None or first is None:
+        return ""
+    differs = not Scaled.of(other).rests(verdict.other.r - first.r)
+    return verdict.verdict.value if differs else ""
 
 
 def if_singular(

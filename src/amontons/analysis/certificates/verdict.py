@@ -55,7 +55,7 @@ class Cause(Enum):
     SINGULAR = ("singular", "W is singular or hardly definite",
                 "amontons uniqueness tells motion and reactions apart")  # fmt: skip
     FRICTION = ("friction", "Friction is above the cheapest bound",
-                "amontons uniqueness looks for a better one and examines this load")  # fmt: skip
+                "amontons uniqueness looks for a better one, then at this load")  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -69,7 +69,8 @@ class Uniqueness(Told):
     resolution: of UNIQUE_THIS_LOAD, any other solution would differ by less; of NOT_UNIQUE, to
     which both are known; relative to the largest reaction or, if that is larger, to what the
     load can make.  0 for every load, None where nothing is known.
-    indeterminacy: where W is singular or missing, what is known of motion and reactions apart.
+    indeterminacy: where W is singular or missing, what is known of motion and reactions apart;
+    lower and upper are then about motions.
     cause: of a quick verdict that is not settled, what stood in its way.
     """
 

@@ -87,7 +87,9 @@ class Indeterminacy(Told):
         if self.proved:
             return f"{_PROVED[self.proved]} {self.why}".strip()
         if self.motion == "unique_this_load":
-            return "The motion is unique: without friction it is the same."
+            assert self.bound is not None
+            return (f"The motion is unique, to {self.bound.distance:.0e} of the free one: without "
+                    "friction it is the same.")  # fmt: skip
         if self.other is not None:
             a, b = self.other.errors
             return (f"There is another motion, {self.other.distance:.1%} away; the errors of "
