@@ -76,8 +76,8 @@ def main() -> None:
         print(rows[-1], flush=True)
     page = f"""# Where W is singular or missing
 
-`python benchmarks/hyperstatic.py`, {describe()}; CPU seconds, the first with compilation, at most a
-minute of the clock for each verdict.
+`python benchmarks/hyperstatic.py`, {describe()}; CPU seconds, the first with compilation, at
+most a minute of the clock for each verdict.
 
 Bound: how far any other motion can be, relative to the free motion, in the norm of energy.
 Other: another motion, of so many solutions from other starts. Reactions: of how many contacts

@@ -88,8 +88,8 @@ class Indeterminacy(Told):
             return f"{_PROVED[self.proved]} {self.why}".strip()
         if self.motion == "unique_this_load":
             assert self.bound is not None
-            return (f"The motion is unique, to {self.bound.distance:.0e} of the free one: without "
-                    "friction it is the same.")  # fmt: skip
+            return (f"The motion is unique, to {self.bound.distance:.0e} of the free one: "
+                    "without friction it is the same.")  # fmt: skip
         if self.other is not None:
             a, b = self.other.errors
             return (f"There is another motion, {self.other.distance:.1%} away; the errors of "

@@ -8,7 +8,7 @@ from ... import __version__
 from . import flags
 from .folders import results_folder
 from .group import Commands
-from .more_commands import audit, check, convert, examples
+from .more_commands import audit, check, convert, examples, jam
 
 EPILOG = """\b
 Examples:
@@ -395,3 +395,4 @@ main.add_command(audit)
 main.add_command(check)
 main.add_command(convert)
 main.add_command(examples)
+main.add_command(jam)
