@@ -40,6 +40,7 @@ _HOME = {
     "solvers.driver": ("drive",),
     "solvers.many": ("solve_many",),
     "io.decks.written": ("write_deck",),
+    "io.certificates": ("check_certificate", "write_certificate"),
     "io.fclib": ("read_fclib", "write_fclib"),
     "mechanics.multibody": ("Ball", "Joint", "Polyhedron", "RigidBodies", "RigidBody",
                             "RigidState", "RigidStep", "cuboid", "evolve_rigid"),

@@ -49,6 +49,9 @@ from .core.threads import threads as threads
 from .core.warned import (
     DoubtWarning as DoubtWarning, ResultWarning as ResultWarning, warn_of as warn_of,
 )
+from .io.certificates import (
+    check_certificate as check_certificate, write_certificate as write_certificate,
+)
 from .io.checkpoint import (
     export_fclib as export_fclib, load_start as load_start, load_state as load_state,
     save_state as save_state,

@@ -84,6 +84,24 @@ def convert(**options: object) -> None:
 @click.command(
     epilog="""\b
 Examples:
+  amontons uniqueness example:hild --mu 1 --certificate c.h5
+  amontons check c.h5
+
+\b
+Exit codes: 0 it proves what it says, 2 it does not.
+"""
+)
+@click.argument("certificate")
+def check(certificate: str) -> int:
+    """Check a certificate of uniqueness, with code that shares nothing with the rest."""
+    from .uniqueness import check as run
+
+    return run(certificate)
+
+
+@click.command(
+    epilog="""\b
+Examples:
   amontons jam example:brake                  from which friction on the arm can stay locked
   amontons jam case.toml --json - | jq .upper
 
