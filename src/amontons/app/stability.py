@@ -61,20 +61,13 @@ def modes(
         found, toward, speed = _sliding(model, velocity)
     else:
         found = target.solution if isinstance(target, ModelSolution) else solve(model).solution
-    from ..mechanics.model.fields import by_body
     from ..mechanics.steps.system import Inertia
 
     own = Inertia(model, mass_damping, stiffness_damping, lumped)
     M = own.M[parts.free][:, parts.free]
     C = _rayleigh(M, parts.M, mass_damping, stiffness_damping, damping)
     state = SlidingState.of(Linearised.of(found), M, C, toward=toward, speed=speed)
-
-    def spread(v: Any) -> Any:
-        whole = np.zeros(parts.dofs, dtype=complex)
-        whole[parts.free] = v
-        return by_body(model.bodies, parts, whole)
-
-    return modes_of(state, count, near, spread)
+    return modes_of(state, count, near, model)
 
 
 def _rayleigh(M: Any, K: Any, by_mass: float, by_stiffness: float, more: Any) -> Any:

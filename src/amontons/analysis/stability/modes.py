@@ -19,10 +19,12 @@ from numpy.typing import NDArray
 from scipy import linalg, sparse
 
 from ...core.errors import InvalidInput
-from ...core.faces import Told
+from ...core.faces import Shown
+from ...mechanics.model.fields import by_body
 from .sliding import SlidingState, factor
 
 if TYPE_CHECKING:
+    from ...mechanics.model import Model
     from .coalescence import Flutter
 
 Array = NDArray[np.float64]
@@ -33,7 +35,7 @@ SAME = 1e-6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Modes(Told):
+class Modes(Shown):
     """Modes by |s|: s (k,), complex, of a pair the one with Im s >= 0; shapes (n, k).
 
     shapes are those of the unknowns v, of length 1; state: what they are modes of.
@@ -42,7 +44,7 @@ class Modes(Told):
     s: Complex
     shapes: Complex
     state: SlidingState = field(repr=False)
-    spread: Any = field(default=None, repr=False)  # unknowns to bodies, of a model
+    model: Model | None = field(default=None, repr=False)
 
     @property
     def frequency(self) -> Array:
@@ -53,7 +55,7 @@ class Modes(Told):
     def damping(self) -> Array:
         """-Re s / |s|, (k,): negative for modes that grow."""
         size = np.abs(self.s)
-        return -self.s.real / np.where(size > 0, size, 1.0)
+        return 0.0 - self.s.real / np.where(size > 0, size, 1.0)
 
     @property
     def growing(self) -> NDArray[np.int64]:
@@ -68,19 +70,28 @@ class Modes(Told):
 
     def displacement(self, k: int) -> tuple[Complex, ...]:
         """Shape of mode k on the bodies of a model, (nodes, dim) each, complex."""
-        if self.spread is None:
+        if self.model is None:
             raise InvalidInput("modes: a discrete problem has no bodies; see shapes")
-        return self.spread(self.shapes[:, k])
+        parts = self.model.discretisation
+        parts_of = [
+            by_body(self.model.bodies, parts, parts.spread(x, np.zeros(parts.dofs)))
+            for x in (self.shapes[:, k].real, self.shapes[:, k].imag)
+        ]
+        return tuple(a + 1j * b for a, b in zip(*parts_of, strict=True))
 
-    def flutter(self, most: int = 5) -> tuple[Flutter, ...]:
-        """Frictions at which two modes meet and begin to grow, ascending; see `coalescence`."""
+    def flutter(self, most: int = 3) -> tuple[Flutter, ...]:
+        """Frictions at which two modes meet and begin to grow, ascending; see `coalescence`.
+
+        Statuses are those of this state, whatever the friction; where contacts would open or
+        stick before, ask again at that friction.  Damping is left out.
+        """
         from .coalescence import flutter_points
 
         return flutter_points(self.state, len(self.s), most)
 
     @cached_property
     def divergence(self) -> Array:
-        """Frictions > 0 at which the state loses its static stability, ascending, (k,)."""
+        """Frictions > 0 at which the state loses static stability, ascending, (k,)."""
         from .coalescence import divergence_points
 
         return divergence_points(self.state)
@@ -112,7 +123,7 @@ class Modes(Told):
 
 
 def modes_of(
-    state: SlidingState, count: int = 10, near: float = 0.0, spread: Any = None
+    state: SlidingState, count: int = 10, near: float = 0.0, model: Model | None = None
 ) -> Modes:
     """`count` modes nearest to a frequency, per unit of time; 0: the slowest."""
     if not count >= 1:
@@ -126,9 +137,10 @@ def modes_of(
     keep = s.imag >= -SAME * np.maximum(np.abs(s), 1e-300)
     s, shapes = s[keep], shapes[:, keep]
     order = np.argsort(np.abs(s - 2j * np.pi * near), kind="stable")[:count]
-    order = order[np.argsort(np.abs(s[order]), kind="stable")]
+    size = np.abs(s[order])
+    order = order[np.lexsort((s[order].real, np.round(size / size.max(initial=1e-300), 9)))]
     s, shapes = s[order], shapes[:, order]
-    return Modes(s, shapes / np.linalg.norm(shapes, axis=0), state, spread)
+    return Modes(s, shapes / np.linalg.norm(shapes, axis=0), state, model)
 
 
 def projected(state: SlidingState, p: float = 1.0) -> tuple[Array, Array, Array, Array]:

@@ -8,7 +8,7 @@ from ... import __version__
 from . import flags
 from .folders import results_folder
 from .group import Commands
-from .more_commands import audit, convert, examples, jam
+from .more_commands import audit, convert, examples, jam, modes
 
 EPILOG = """\b
 Examples:
@@ -391,3 +391,4 @@ main.add_command(audit)
 main.add_command(convert)
 main.add_command(examples)
 main.add_command(jam)
+main.add_command(modes)
