@@ -32,6 +32,7 @@ Complex = NDArray[np.complex128]
 DENSE = 400  # unknowns up to which all modes are found at once
 GROWING = 1e-7  # Re s, relative to |s|, above which a mode grows: rounding splits double ones
 SAME = 1e-6
+HELD = 1e-6  # part of B v, relative, that rounding may leave
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -161,19 +162,23 @@ def projected(state: SlidingState, p: float = 1.0) -> tuple[Array, Array, Array,
 
 def _all(state: SlidingState) -> tuple[Complex, Complex]:
     K, C, M, V = projected(state)
+    unit = _unit(state)
+    C, M = unit * C, unit**2 * M
     if not C.any():
         values, shapes = linalg.eig(K, M)  # of -s^2
         finite = np.isfinite(values)
         root = 1j * np.sqrt(values[finite].astype(complex))
         root = np.where(np.abs(root.imag) <= 1e-14 * np.abs(root), root.real + 0j, root)
-        both = np.concatenate([root, -root])
+        both = unit * np.concatenate([root, -root])
         return both, np.tile(V @ shapes[:, finite], (1, 2))
+    K, M = K / state.scale, M / state.scale
+    C = C / state.scale
     n = len(K)
     A = np.block([[np.zeros((n, n)), np.eye(n)], [-K, -C]])
     B = linalg.block_diag(np.eye(n), M)
     values, shapes = linalg.eig(A, B)
     finite = np.isfinite(values)
-    return values[finite], V @ shapes[:n, finite]
+    return unit * values[finite], V @ shapes[:n, finite]
 
 
 def _some(state: SlidingState, count: int, near: float) -> tuple[Complex, Complex]:
@@ -181,27 +186,42 @@ def _some(state: SlidingState, count: int, near: float) -> tuple[Complex, Comple
 
     n, whole = state.K.shape[0], state.size
     K, M = state.stiffness(), state.wide(state.M)
+    unit = _unit(state)
+    M = unit**2 * M
     start = np.cos(np.arange(1.0, whole + 1.0))
-    shift = 2j * np.pi * near
+    shift = 2j * np.pi * near / unit
     wanted = min(2 * count + 4, n - 2)
     if state.C is None:
         sigma = float((-(shift**2)).real)
         solve = factor(sparse.csc_array(K - sigma * M) if sigma else K).solve
         inverse = LinearOperator((whole, whole), lambda x: solve(M @ x), dtype=float)  # type: ignore[call-arg]
-        values, shapes = eigs(inverse, k=wanted, v0=solve(M @ start), tol=0)
+        values, x = eigs(inverse, k=wanted, v0=solve(M @ start), tol=0)
         root = 1j * np.sqrt((sigma + 1 / values).astype(complex))
-        both = np.concatenate([root, -root])
-        return both, np.tile(shapes[:n], (1, 2))
-    C = state.wide(state.C)
+        held = _held(state, K, x)
+        return unit * np.concatenate([root, -root])[np.tile(held, 2)], np.tile(x[:n, held], 2)
+    C = unit * state.wide(state.C)
     Q = factor(sparse.csc_array(K + shift * C + shift**2 * M).astype(complex))
 
-    def apply(x: Any) -> Any:
-        a, b = x[:whole], x[whole:]
+    def apply(y: Any) -> Any:
+        a, b = y[:whole], y[whole:]
         first = Q.solve(-(M @ b + C @ a + shift * (M @ a)).astype(complex))
         return np.concatenate([first, a + shift * first])
 
     size = 2 * whole
     inverse = LinearOperator((size, size), apply, dtype=complex)  # type: ignore[call-arg]
-    begin = apply(np.tile(start, 2).astype(complex))
-    values, shapes = eigs(inverse, k=wanted, v0=begin, tol=0)
-    return shift + 1 / values, shapes[:n]
+    begin = apply(apply(np.tile(start, 2).astype(complex)))
+    values, y = eigs(inverse, k=wanted, v0=begin, tol=0)
+    held = _held(state, K, y[:whole])
+    return unit * (shift + 1 / values[held]), y[:n, held]
+
+
+def _unit(state: SlidingState) -> float:
+    """A typical |s|, by which all are divided."""
+    return float(np.sqrt(state.scale / np.abs(state.M.diagonal()).mean()))
+
+
+def _held(state: SlidingState, K: sparse.csc_array, x: Complex) -> NDArray[np.bool_]:
+    """Which vectors (n + k, m) obey B v + D r = 0: those of infinite s do not."""
+    n = state.K.shape[0]
+    rest = np.linalg.norm(K[n:] @ x, axis=0)
+    return np.asarray(rest <= HELD * state.scale * np.linalg.norm(x[:n], axis=0))
