@@ -17,6 +17,7 @@ import amontons as am
 
 
 def block(mu):
+    """Ten by five cells, its top held and pushed down."""
     body = am.Body(am.box((1, 0.5), cells=(10, 5)), am.LinearElastic(200, 0.3, density=1.0))
     return am.Model(
         [body], [am.Fix("top", (0, -0.01))], [am.Contact("bottom", am.Plane((0, 1)), mu=mu)]
@@ -36,11 +37,11 @@ import matplotlib.pyplot as plt
 
 from dataclasses import replace
 
+from amontons.analysis.stability.modes import modes_of
+
 figure, (above, below) = plt.subplots(2, sharex=True, figsize=(6.5, 5))
 for p in np.linspace(0.02, 1.2, 40):
     state = replace(modes.state, F_1=p * modes.state.F_1, mu=p * modes.state.mu)
-    from amontons.analysis.stability.modes import modes_of
-
     found = modes_of(state, 10)
     above.plot(np.full(len(found.s), state.mu), found.frequency, ".", color="0.4", markersize=2)
     below.plot(np.full(len(found.s), state.mu), found.s.real, ".", color="0.4", markersize=2)

@@ -58,8 +58,14 @@ model = am.Model(
 # The disc turns, so the pads slide against it.  Slip that changes its direction is damped by
 # friction, the more the slower the disc: at 10 rad/s nothing is heard, at 100 rad/s a pair of
 # bending modes of the disc grows.
+
+def turning(speed):
+    """Velocity of the pads against a disc that turns."""
+    return lambda x: (speed * x[1], -speed * x[0], 0.0)
+
+
 for speed in (10, 100):
-    modes = am.modes(model, 8, near=6474, velocity=lambda x: (speed * x[1], -speed * x[0], 0.0))
+    modes = am.modes(model, 8, near=6474, velocity=turning(speed))
     print(f"at {speed} rad/s: {modes}")
 
 # %%

@@ -7,8 +7,8 @@ import pytest
 from block_assemblies import arch, column, four_hinges, sideways
 
 import amontons as am
-from amontons.mechanics.ready.gallery import GALLERY
 from amontons.app.cli.sources import open_source
+from amontons.mechanics.ready.gallery import GALLERY
 
 
 def wedge(degrees, material):
@@ -27,7 +27,10 @@ def wedge(degrees, material):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("material", [am.Rigid(1.0), am.LinearElastic(100, 0.3)], ids=["r", "e"])
+MATERIALS = {"rigid": am.Rigid(1.0), "elastic": am.LinearElastic(100, 0.3)}
+
+
+@pytest.mark.parametrize("material", MATERIALS.values(), ids=MATERIALS)
 @pytest.mark.parametrize("degrees", [5, 20, 40])
 def test_a_wedge_jams_at_the_tangent_of_its_half_angle(degrees, material):
     found = am.jamming_friction(wedge(degrees, material))

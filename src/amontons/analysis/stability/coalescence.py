@@ -167,7 +167,8 @@ def _newton(state: SlidingState, l: float, p: float) -> tuple[float, float] | No
         b, c = made.b, made.c
         return made
 
-    return _iterate(solver, lambda x: -(M @ x), lambda x: slope @ x, lambda x: slope.T @ x, l, p)
+    products = lambda x: -(M @ x), lambda x: slope @ x, lambda x: slope.T @ x
+    return _iterate(solver, *products, l, p)
 
 
 class _Sparse:

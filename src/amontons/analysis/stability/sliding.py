@@ -116,9 +116,9 @@ class SlidingState:
         """The derivative of `stiffness` by p."""
         k = self.B.shape[0]
         zero, low = sparse.csc_array(self.K.shape), sparse.csc_array((k, self.K.shape[0]))
-        return sparse.csc_array(
-            sparse.block_array([[zero, -self.scale * self.F_1], [low, sparse.csc_array((k, k))]])
-        )
+        none = sparse.csc_array((k, k))
+        slope = -self.scale * self.F_1
+        return sparse.csc_array(sparse.block_array([[zero, slope], [low, none]]))
 
     def wide(self, matrix: Any) -> sparse.csc_array:
         """A matrix (n, n) with rows and columns of zeros for r."""

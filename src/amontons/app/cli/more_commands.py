@@ -137,7 +137,7 @@ Exit codes: 0 no mode grows, 1 one grows, 2 bad input.
 @click.option("--picture", metavar="FILE", help="Draw the modes: .png, .svg or .pdf.")
 @flags.of_decks
 def modes(**options: object) -> int:
-    """Find the complex modes of small motions about a sliding state: does it flutter?
+    """Find the complex modes of small motions about a sliding state, and which of them grow.
 
     SOURCE is a case file (.toml), a deck (.inp) or example:NAME with densities; it is solved.
     """

@@ -1,4 +1,4 @@
-"""Modes side by side: bodies at the moment of the largest displacement, growing ones in words."""
+"""Modes side by side: bodies at the moment of their largest displacement."""
 
 from __future__ import annotations
 
