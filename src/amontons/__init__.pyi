@@ -48,6 +48,7 @@ from .core.errors import (
     NotWritten as NotWritten, SingularOperator as SingularOperator, TimeUp as TimeUp,
     UnsupportedForm as UnsupportedForm, UnsupportedLaw as UnsupportedLaw,
 )
+from .core.threads import threads as threads
 from .core.warned import (
     DoubtWarning as DoubtWarning, ResultWarning as ResultWarning, warn_of as warn_of,
 )
@@ -126,6 +127,7 @@ from .solvers import (
     SmoothingNewton as SmoothingNewton, SweepOrder as SweepOrder, Uzawa as Uzawa,
 )
 from .solvers.driver import drive as drive
+from .solvers.many import solve_many as solve_many
 from .solvers.newton.nonlinear import NonlinearNewton as NonlinearNewton
 
 __version__: str
