@@ -86,8 +86,9 @@ def divergence_points(state: SlidingState) -> Array:
         start = np.cos(np.arange(1.0, n + 1.0))
         values = eigs(inverse, k=min(6, n - 2), v0=solve(slope @ start), tol=0,
                       return_eigenvectors=False)  # fmt: skip
+    values = np.asarray(values)
     size = np.abs(values).max(initial=0.0)
-    real = values[(np.abs(values.imag) <= 1e-9 * np.abs(values)) & (values.real > 0)].real
+    real: Any = values[(np.abs(values.imag) <= 1e-9 * np.abs(values)) & (values.real > 0)].real
     real = real[real > max(1 / LARGEST, 1e-12 * size)]
     return np.sort(state.mu / real)
 
@@ -152,7 +153,8 @@ class _Dense:
         self.whole = whole
 
     def solve(self, b: Array, *, transposed: bool) -> Array:
-        return np.linalg.solve(self.whole.T if transposed else self.whole, b)
+        found: Any = np.linalg.solve(self.whole.T if transposed else self.whole, b)
+        return found
 
 
 def _newton(state: SlidingState, l: float, p: float) -> tuple[float, float] | None:
@@ -195,6 +197,7 @@ def _iterate(
     solver: Any, by_l: Any, by_p: Any, by_p_transposed: Any, l: float, p: float
 ) -> tuple[float, float] | None:
     """Newton's method for g = 0, dg/dl = 0; by_l, by_p: products with derivatives of Q."""
+    size = np.inf
     for _ in range(STEPS):
         try:
             system = solver(l, p)

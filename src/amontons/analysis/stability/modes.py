@@ -165,18 +165,20 @@ def _all(state: SlidingState) -> tuple[Complex, Complex]:
     unit = _unit(state)
     C, M = unit * C, unit**2 * M
     if not C.any():
-        values, shapes = linalg.eig(K, M)  # of -s^2
+        pairs: Any = linalg.eig(K, M)  # of -s^2
+        values, shapes = pairs
         finite = np.isfinite(values)
         root = 1j * np.sqrt(values[finite].astype(complex))
         root = np.where(np.abs(root.imag) <= 1e-14 * np.abs(root), root.real + 0j, root)
-        both = unit * np.concatenate([root, -root])
+        both: Any = unit * np.concatenate([root, -root])
         return both, np.tile(V @ shapes[:, finite], (1, 2))
     K, M = K / state.scale, M / state.scale
     C = C / state.scale
     n = len(K)
     A = np.block([[np.zeros((n, n)), np.eye(n)], [-K, -C]])
     B = linalg.block_diag(np.eye(n), M)
-    values, shapes = linalg.eig(A, B)
+    pairs = linalg.eig(A, B)
+    values, shapes = pairs
     finite = np.isfinite(values)
     return unit * values[finite], V @ shapes[:n, finite]
 
@@ -195,12 +197,15 @@ def _some(state: SlidingState, count: int, near: float) -> tuple[Complex, Comple
         sigma = float((-(shift**2)).real)
         solve = factor(sparse.csc_array(K - sigma * M) if sigma else K).solve
         inverse = LinearOperator((whole, whole), lambda x: solve(M @ x), dtype=float)  # type: ignore[call-arg]
-        values, x = eigs(inverse, k=wanted, v0=solve(M @ start), tol=0)
+        found: Any = eigs(inverse, k=wanted, v0=solve(M @ start), tol=0)
+        values, x = found
         root = 1j * np.sqrt((sigma + 1 / values).astype(complex))
         held = _held(state, K, x)
-        return unit * np.concatenate([root, -root])[np.tile(held, 2)], np.tile(x[:n, held], 2)
+        both: Any = unit * np.concatenate([root, -root])
+        return both[np.tile(held, 2)], np.tile(x[:n, held], 2).astype(complex)
     C = unit * state.wide(state.C)
-    Q = factor(sparse.csc_array(K + shift * C + shift**2 * M).astype(complex))
+    shifted: Any = sparse.csc_array(K + shift * C + shift**2 * M).astype(complex)
+    Q = factor(shifted)
 
     def apply(y: Any) -> Any:
         a, b = y[:whole], y[whole:]
@@ -210,7 +215,8 @@ def _some(state: SlidingState, count: int, near: float) -> tuple[Complex, Comple
     size = 2 * whole
     inverse = LinearOperator((size, size), apply, dtype=complex)  # type: ignore[call-arg]
     begin = apply(apply(np.tile(start, 2).astype(complex)))
-    values, y = eigs(inverse, k=wanted, v0=begin, tol=0)
+    found = eigs(inverse, k=wanted, v0=begin, tol=0)
+    values, y = found
     held = _held(state, K, y[:whole])
     return unit * (shift + 1 / values[held]), y[:n, held]
 
