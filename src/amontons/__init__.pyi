@@ -28,6 +28,9 @@ from .analysis.gradients.with_torch import torch_function as torch_function
 from .analysis.paths.path_crossing import PathCrossing as PathCrossing
 from .app.api import solve as solve
 from .app.audit import audit as audit
+from .analysis.stability.coalescence import Flutter as Flutter
+from .analysis.stability.modes import Modes as Modes
+from .app.stability import modes as modes
 from .analysis.limits.collapse import Collapse as Collapse
 from .analysis.limits.jamming import Jamming as Jamming
 from .app.limits import collapse_load as collapse_load, jamming_friction as jamming_friction
