@@ -21,8 +21,9 @@ from ..newton.interior_point import InteriorPoint, Relaxation, sliding_speed
 from ..newton.line_search import FullStep
 from ..newton.semismooth import SemismoothNewton
 from ..newton.smoothing import SmoothingNewton
-from ..sweeps.kernels import Acceleration, counted, sweep_data, sweeps_inplace, watch_for
+from ..sweeps.kernels import Acceleration, counted, sweep_data, watch_for
 from ..sweeps.momentum import Momentum
+from ..sweeps.shared import sweeps as shared_sweeps
 from .race import Chunk, Chunks
 from .state import State
 
@@ -78,7 +79,7 @@ def relaxed(relaxation: float, state: State) -> Chunks:
     turn = yield Chunk(r, 0, 0.0)
     while True:
         sweeps = max(LEAST, int(turn.cost / cost))
-        count, flops = counted(data, partial(sweeps_inplace, data, r, sweeps, watch))
+        count, flops = counted(data, partial(shared_sweeps, data, r, sweeps, watch))
         turn = yield Chunk(r.copy(), count, cost * count, flops, watch[2])
 
 
