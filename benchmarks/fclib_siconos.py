@@ -29,6 +29,8 @@ import select
 import subprocess
 import tempfile
 import time
+from collections import Counter
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -110,9 +112,12 @@ def _worker(problem, python, path, solver, asked, cap):
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
     )
-    runs = []
+    runs, spent = [], 0.0
     for k in range(len(asked)):
-        ready, _, _ = select.select([process.stdout], [], [], cap + (10 if k == 0 else 0))
+        ready = False
+        while not ready and _cpu(process.pid) - spent < 2 * cap + (5 if k == 0 else 0):
+            ready = bool(select.select([process.stdout], [], [], 0.1)[0])
+        spent = _cpu(process.pid)
         line = process.stdout.readline() if ready else ""
         if not line:
             break
@@ -125,6 +130,15 @@ def _worker(problem, python, path, solver, asked, cap):
     process.kill()
     process.wait()
     return runs
+
+
+def _cpu(pid):
+    """CPU seconds of a process that runs, Linux; else of the clock."""
+    path = Path(f"/proc/{pid}/stat")
+    if not path.exists():
+        return time.monotonic()
+    after = path.read_text().rpartition(")")[2].split()
+    return (int(after[11]) + int(after[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def compare(problem, python, cap, limit):
@@ -262,9 +276,10 @@ def main():
     shared = Path(os.environ.get("AMONTONS_SHARED", "../shared"))
     parser.add_argument("folder", nargs="?", type=Path, default=shared / "data/fclib")
     parser.add_argument("--siconos", default="/usr/bin/python3", help="Python that has Siconos")
-    parser.add_argument("--cap", type=float, default=3.0, help="seconds for one run of Siconos")
+    parser.add_argument("--cap", type=float, default=3.0, help="CPU seconds for one run of Siconos")
     parser.add_argument("--limit", type=float, default=30.0, help="seconds for one run of ours")
     parser.add_argument("--only", default="", help="part of a name; keep the stored rest")
+    parser.add_argument("--most", type=int, default=1000, help="problems of a class")
     parser.add_argument("--seed", type=int, default=2026, help="of what is made here")
     options = parser.parse_args()
     (HERE / "results").mkdir(exist_ok=True)
@@ -284,18 +299,21 @@ def main():
     print(json.dumps(summaries, indent=1))
     record = {"machine": machine, "summary": summaries, "files": results}
     chosen = f" --cap {options.cap:g} --seed {options.seed}"
+    chosen += f" --most {options.most}" if options.most < 1000 else ""
     stored.write_text(json.dumps(record, indent=1))
     (HERE / "results/fclib_siconos.md").write_text(table(results, summaries, machine, chosen))
 
 
 def _problems(options):
     """(group, name, problem in Delassus form) of all that is compared."""
-    for name, problem in fclib(options.folder, least=1):
-        if problem.contacts < COMPARED and options.only in name:
-            yield GROUPS["FCLib"], name, problem
-    for kind, name, problem in classes(options.folder, options.seed):
-        if problem.contacts >= COMPARED and options.only in name:
-            yield GROUPS[kind], name, problem
+    small = (("small", name, problem) for name, problem in fclib(options.folder, least=1)
+             if problem.contacts < COMPARED)  # fmt: skip
+    counts = Counter()
+    for kind, name, problem in chain(small, classes(options.folder, options.seed)):
+        few = problem.contacts < COMPARED
+        if options.only in name and few == (kind == "small") and counts[kind] < options.most:
+            counts[kind] += 1
+            yield GROUPS.get(kind, GROUPS["FCLib"]), name, problem
 
 
 if __name__ == "__main__":
