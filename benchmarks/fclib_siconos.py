@@ -276,7 +276,7 @@ def main():
     shared = Path(os.environ.get("AMONTONS_SHARED", "../shared"))
     parser.add_argument("folder", nargs="?", type=Path, default=shared / "data/fclib")
     parser.add_argument("--siconos", default="/usr/bin/python3", help="Python that has Siconos")
-    parser.add_argument("--cap", type=float, default=3.0, help="CPU seconds of a run of Siconos")
+    parser.add_argument("--cap", type=float, default=3.0, help="CPU seconds of one of its runs")
     parser.add_argument("--limit", type=float, default=30.0, help="seconds for one run of ours")
     parser.add_argument("--only", default="", help="part of a name; keep the stored rest")
     parser.add_argument("--most", type=int, default=1000, help="problems of a class")
