@@ -39,6 +39,7 @@ _HOME = {
     "analysis.gradients.with_torch": ("torch_function",),
     "solvers.driver": ("drive",),
     "solvers.many": ("solve_many",),
+    "analysis.solutions.second_start": ("Other", "maybe_others"),
     "io.decks.written": ("write_deck",),
     "io.certificates": ("check_certificate", "write_certificate"),
     "io.fclib": ("read_fclib", "write_fclib"),
