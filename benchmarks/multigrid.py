@@ -301,8 +301,9 @@ def _two_bodies_table(rows):
 
 
 def _unstructured_table(rows):
-    lines = ["| unknowns | contacts | open / slip / stick | to | linear: set-up, iterations, s | "
-             "contact: set-up, cycles, s | ratio | with set-up |", "|" + "---|" * 8]  # fmt: skip
+    lines = ["| unknowns | contacts | open / slip / stick | to | linear: set-up, iterations, "
+             "s | contact: set-up, cycles, s | ratio | with set-up |",
+             "|" + "---|" * 8]  # fmt: skip
     for row in rows:
         counts = " / ".join(str(row["counts"][k]) for k in ("open", "slip", "stick"))
         for tolerance in TOLERANCES:

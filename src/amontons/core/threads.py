@@ -67,8 +67,8 @@ if hasattr(os, "register_at_fork"):  # not on Windows, which can not fork
 def threads(count: int | None = None) -> int:
     """How many threads a solve may use from now on in this process; `count` sets it.
 
-    Without being told it is AMONTONS_THREADS, else OMP_NUM_THREADS, else the physical cores that
-    this process may use, 16 at most.  Results do not depend on it, to the last bit.
+    Without being told it is AMONTONS_THREADS, else OMP_NUM_THREADS, else the physical cores
+    that this process may use, 16 at most.  Results do not depend on it, to the last bit.
     Raises InvalidInput for a count below 1.
     """
     if count is not None:

@@ -115,7 +115,7 @@ class NodeBlocks:
 
     @cached_property
     def chunks(self) -> list[Range]:
-        """Ranges of rows that are swept at the same time, every second of them; see `chunks`."""
+        """Ranges of rows, every second of which is swept at once; see `chunks`."""
         return chunks_of_sorted(self.indptr, self.indices)
 
     @property
