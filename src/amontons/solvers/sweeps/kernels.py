@@ -105,7 +105,7 @@ def sweep_data(
     _, _, _, q, kind, parameters, rho = problem.kernel_data
     visits, ends = np.arange(len(q)), np.empty(0)
     if order is SweepOrder.APPROACH:
-        visits, ends = in_chunks(problem, _by_approach(q))
+        visits, ends = in_chunks(problem, by_approach(q))
     work = np.concatenate([[0.0], ends])
     return Sweep(
         b.indptr, b.indices, b.data, q, kind, parameters, rho, b.diagonal, b.eliminated,
@@ -119,9 +119,13 @@ def sweep_flops(s: Sweep, sweeps: int, local: float) -> float:
     A block of W takes nine products and nine sums; then there are the solution of each contact
     and what tells its change.
     """
-    nc = len(s.order)
-    own = CONTACT_FLOPS + (EXACT_FLOPS if s.local == EXACT else 0.0)
-    return sweeps * (BLOCK_FLOPS * (len(s.indices) - nc) + own * nc) + local
+    return sweeps * flops_of_sweep(len(s.indices), len(s.order), s.local) + local
+
+
+def flops_of_sweep(blocks: int, contacts: int, local: int = EXACT) -> float:
+    """Of a sweep, so many stored blocks of W; beyond what iterations on contacts count."""
+    own = CONTACT_FLOPS + (EXACT_FLOPS if local == EXACT else 0.0)
+    return BLOCK_FLOPS * (blocks - contacts) + own * contacts
 
 
 def counted(s: Sweep, run: Callable[[], T]) -> tuple[T, float]:
@@ -133,7 +137,7 @@ def counted(s: Sweep, run: Callable[[], T]) -> tuple[T, float]:
 
 
 @njit(cache=True, error_model="numpy")
-def _by_approach(q):
+def by_approach(q):
     """Contacts by octaves of -q_N, the largest first, spread by the golden ratio in each."""
     nc = len(q)
     fastest = 0.0
@@ -356,6 +360,11 @@ def watch_for(goal: float) -> Array:
     return np.array([goal, FIRST_JUDGED * goal, math.inf])
 
 
+def flops_of_acceleration(size: int, depth: int) -> float:
+    """Of Anderson's memory per sweep, for so many components of r."""
+    return size * (8.0 + 4.0 * depth) + depth**3 / 3
+
+
 @dataclass(eq=False)
 class Acceleration:
     """Anderson's memory between two calls: see `anderson_inplace`."""
@@ -374,7 +383,7 @@ class Acceleration:
     @property
     def flops(self) -> float:
         """Floating point operations of a sweep beyond the sweep itself."""
-        return self.r.size * (8.0 + 4.0 * self.depth) + self.depth**3 / 3
+        return flops_of_acceleration(self.r.size, self.depth)
 
     def sweep(self, sweeps: int, watch: Array) -> tuple[int, float]:
         """Go on for `sweeps` sweeps or until the judge is content; sweeps done, operations."""
