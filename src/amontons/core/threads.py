@@ -168,6 +168,25 @@ def over_chunks(
     _in_threads(kernel, groups, arguments)
 
 
+def over_stages(
+    kernel: Kernel,
+    chunks: Sequence[Range],
+    work: float,
+    *arguments: Any,
+    backward: bool = False,
+    tell: bool = False,
+) -> None:
+    """kernel(first, last, *arguments) on all even chunks, then on all odd ones.
+
+    backward: the other way round; tell: the kernel is told by a last argument which they are.
+    """
+    for odd in (True, False) if backward else (False, True):
+        some = chunks[odd::2]
+        if some:
+            share = 0.5 * work if len(chunks) > 1 else work
+            over_chunks(kernel, some, share, *arguments, *((odd,) if tell else ()))
+
+
 def shared(kernel: Kernel, ranges: Sequence[Range], arguments: tuple[Any, ...]) -> None:
     """kernel(first, last, *arguments) for some ranges, each in a thread of its own."""
     if len(ranges) == 1:

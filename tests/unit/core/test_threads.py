@@ -18,6 +18,8 @@ from amontons.linear import chunks
 from amontons.linear.chunks import near_numbers
 from amontons.linear.grid import GridBlocks
 from amontons.linear.vectors import advance, dot, norm
+from amontons.mechanics.elements import slabs
+from amontons.mechanics.elements.elasticity import stiffness as stiffness_of
 from amontons.mechanics.model import assembly
 from amontons.solvers.driver import drive
 from amontons.solvers.sweeps.kernels import Acceleration, SweepOrder, sweep_data, watch_for
@@ -233,6 +235,23 @@ def cube(cells):
         supports=[am.Fix("top", lambda x: (0, 0.2, 0.06 - 0.15 * x[0]))],
         contacts=[am.Contact("bottom", am.Plane(normal=(0, 0, 1)), mu=1.0)],
     )
+
+
+@pytest.mark.parametrize("kind", ["hex", "tet"])
+def test_stiffness(kind, monkeypatch):
+    """Cells in slabs, in threads, against all of them in turn."""
+    mesh = am.box((2, 1, 1), cells=(12, 5, 5), kind=kind)
+    law = am.LinearElastic(young=200, poisson=0.3)
+    turn = stiffness_of(mesh, law).toarray()
+    monkeypatch.setattr(slabs, "LEAST", 100)
+    cells = mesh.cells[0].nodes
+    sorted_cells, ranges = slabs.in_slabs(mesh.points, cells)
+    assert len(ranges) >= 4
+    assert sorted(map(tuple, sorted_cells)) == sorted(map(tuple, cells))
+    (found,) = same(lambda: (stiffness_of(mesh, law).toarray(),))
+    np.testing.assert_allclose(found, turn, rtol=0, atol=1e-14 * np.abs(turn).max())
+    rng = np.random.default_rng(0)  # points anywhere: no slabs, and the same stiffness pattern
+    assert len(slabs.in_slabs(rng.permutation(mesh.points), cells)[1]) == 1
 
 
 @pytest.mark.parametrize("kind", ["stored", "operator", "aggregates"])
