@@ -99,7 +99,7 @@ def main():
         "Regenerate: `python benchmarks/"
         f"{' '.join([Path(sys.argv[0]).name, *sys.argv[1:]])}`.  "
         f"{machine}.", "", text, "",
-        "| problem | threads | wall s | times as fast | CPU s | of the caller | less by | load |",
+        "| problem | threads | wall s | as fast | CPU s | of the caller | less by | load |",
         "|---|---|---|---|---|---|---|---|", *rows,
     ]  # fmt: skip
     (HERE / "results/threads.md").write_text("\n".join(page) + "\n")
