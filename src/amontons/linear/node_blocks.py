@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numba import uint64
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..core.compiled import njit
-from ..core.threads import Kernel, Range, over_chunks, over_rows
+from ..core.threads import Range, over_rows, over_stages
 from .chunks import chunks_of_sorted
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ class NodeBlocks:
 
     @cached_property
     def chunks(self) -> list[Range]:
-        """Ranges of rows that are swept at the same time, every second of them; see `chunks`."""
+        """Ranges of rows, every second of which is swept at once; see `chunks`."""
         return chunks_of_sorted(self.indptr, self.indices)
 
     @property
@@ -159,25 +159,6 @@ class NodeBlocks:
         arguments = self.indptr, self.indices, self.data, order, number, indptr, indices, data
         over_rows(_renumber, self.nodes, 2.0 * self.work, *arguments)
         return NodeBlocks(indptr, indices, data, self.inverse[order])
-
-
-def over_stages(
-    kernel: Kernel,
-    chunks: list[Range],
-    work: float,
-    *arguments: Any,
-    backward: bool = False,
-    tell: bool = False,
-) -> None:
-    """kernel(first, last, *arguments) on all even chunks, then on all odd ones.
-
-    backward: the other way round; tell: the kernel is told by a last argument which they are.
-    """
-    for odd in (True, False) if backward else (False, True):
-        some = chunks[odd::2]
-        if some:
-            share = 0.5 * work if len(chunks) > 1 else work
-            over_chunks(kernel, some, share, *arguments, *((odd,) if tell else ()))
 
 
 def with_diagonal(tiles: sparse.bsr_array) -> sparse.bsr_array:
