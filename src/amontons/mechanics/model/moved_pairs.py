@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ...linear.condensed import Structure
 from ..contact.current import ContactPoint
 from ..contact.current_mortar import MortarMeeting
 from ..contact.current_pairs import Meeting, Meetings
@@ -49,6 +50,33 @@ def _others(parts: NonlinearParts, meeting: Meetings) -> sparse.csr_array:
     counts = parts.contact.free * meeting.met[:, None]
     spread = sparse.kron(meeting.others, sparse.eye_array(d), format="csr")
     return sparse.csr_array(spread @ sparse.diags_array(counts.ravel().astype(float)))
+
+
+def structure_of(
+    parts: NonlinearParts, u: Array, by_force: Array, returned: sparse.csr_array
+) -> Structure:
+    """What a tangent at displacements u (nodes, d) consists of, see `linear.condensed`."""
+    place = parts.place
+    modes = rigid_modes(parts.X + u, parts.joined)[parts.free]
+    return Structure(parts.dimension, place, parts.joined, modes, parts.unknown[parts.at],
+                     by_force, sparse.csr_array(returned))  # fmt: skip
+
+
+def rigid_modes(x: Array, part: NDArray[np.int64]) -> Array:
+    """Translations and rotations (dofs, 3 or 6) of places x (nodes, d), about each part's mean.
+
+    part (nodes,): numbers from 0.
+    """
+    n, d = x.shape
+    counts = np.bincount(part)
+    means = np.stack([np.bincount(part, x[:, c]) / counts for c in range(d)], axis=1)
+    y = (x - means[part]) / np.ptp(x, axis=0).max()
+    planes = [(0, 1)] if d == 2 else [(0, 1), (1, 2), (2, 0)]
+    out = np.zeros((n, d, d + len(planes)))
+    out[:, range(d), range(d)] = 1.0
+    for k, (i, j) in enumerate(planes, d):
+        out[:, i, k], out[:, j, k] = -y[:, j], y[:, i]
+    return out.reshape(n * d, -1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +126,12 @@ class Linearisation:
         change[parts.at] = at
         return change[parts.free]
 
+    @property
+    def structure(self) -> Structure:
+        """What the matrix consists of."""
+        nothing = sparse.csr_array((len(self.parts.free), self.parts.at.size))
+        return structure_of(self.parts, self.u, self.by_force, nothing)
+
     def passed(self, change: Array) -> Array:
         """First-order change of F, (n,), with a change of f_int - f, (dofs,)."""
         parts, out = self.parts, change.copy()
@@ -128,6 +162,12 @@ class PairLinearisation:
         out = self.rest.copy()
         out[self.parts.at] = self.point.residual()
         return out[self.parts.free]
+
+    @property
+    def structure(self) -> Structure:
+        """What the matrix consists of."""
+        returned = _others(self.parts, self.point.meeting)[self.parts.free]
+        return structure_of(self.parts, self.u, self.partials[0], returned)
 
     @cached_property
     def _passing(self) -> sparse.csr_array:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.sparse import csgraph
 
 from ..contact.current import CurrentContact
 from ..contact.current_mortar import MortarPair
@@ -81,6 +82,26 @@ class NonlinearParts:
     def has_pairs(self) -> bool:
         """True where two bodies that deform meet."""
         return any(isinstance(pair, MortarPair) for pair in self.contact.pairs)
+
+    @cached_property
+    def unknown(self) -> Index:
+        """Number of every dof among the free ones, (dofs,), -1 for others."""
+        out = np.full(self.X.size, -1)
+        out[self.free] = np.arange(len(self.free))
+        return out
+
+    @cached_property
+    def place(self) -> Index:
+        """3 node + component of the free dofs, (n,)."""
+        d = self.dimension
+        return 3 * (self.free // d) + self.free % d
+
+    @cached_property
+    def joined(self) -> Index:
+        """Number of the piece that a node belongs to, (nodes,), cells joining their nodes."""
+        entries = (np.ones(len(self.columns)), self.columns, self.pointers)
+        graph = sparse.csr_array(entries, shape=(len(self.X),) * 2)
+        return csgraph.connected_components(graph, directed=False)[1].astype(np.int64)
 
     @cached_property
     def gathers(self) -> sparse.csr_array:
