@@ -177,7 +177,7 @@ def _shared(slave, master, numbers, rule, mass, cross):
         a0, a1 = one[p, 0] - one[0, 0], one[p, 1] - one[0, 1]
         b0, b1 = one[p + 1, 0] - one[0, 0], one[p + 1, 1] - one[0, 1]
         double = a0 * b1 - a1 * b0
-        if double.real <= 0:
+        if double == 0:
             continue
         for q in range(rule.shape[0]):
             at0 = one[0, 0] + rule[q, 0] * a0 + rule[q, 1] * b0

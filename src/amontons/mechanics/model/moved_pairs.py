@@ -170,32 +170,42 @@ class PairLinearisation:
         return structure_of(self.parts, self.u, self.partials[0], returned)
 
     @cached_property
-    def _passing(self) -> sparse.csr_array:
-        """Derivative of F by f_int - f on all nodes, (dofs, dofs), at fixed positions."""
-        parts = self.parts
-        dofs = len(self.rest)
-        eye = sparse.eye_array(dofs, format="csr")
-        passed = eye - _others(parts, self.point.meeting) @ parts.gathers
-        return sparse.csr_array(self._by_needed @ passed)
+    def _kept(self) -> Array:
+        """1 for rows of F that are f_int - f, 0 for those of contacts, (dofs,)."""
+        out = np.ones(len(self.rest))
+        out[self.parts.at] = 0.0
+        return out
 
     @cached_property
+    def _passing(self) -> sparse.csr_array:
+        """Derivative of F by f_int - f on all nodes without `_kept`, (dofs, dofs).
+
+        At fixed positions: few rows, those of contacts and of what their forces act on.
+        """
+        gathers = self.parts.gathers
+        given = _others(self.parts, self.point.meeting) @ gathers
+        return sparse.csr_array(self._law - self._by_needed @ given)
+
+    @cached_property
+    def _law(self) -> sparse.csr_array:
+        """Derivative of the rows of contacts by the forces on their side, (dofs, dofs)."""
+        at, dofs = self.parts.at.ravel(), len(self.rest)
+        own = sparse.csr_array((np.ones(len(at)), (at, np.arange(len(at)))),
+                               shape=(dofs, len(at)))  # fmt: skip
+        return sparse.csr_array(own @ (blocks_of(self.partials[0]) @ self.parts.gathers))
+
+    @property
     def _by_needed(self) -> sparse.csr_array:
         """Derivative of F by f_int - f without what contacts give to others, (dofs, dofs)."""
-        at, dofs = self.parts.at.ravel(), len(self.rest)
-        own = sparse.csr_array((np.ones(len(at)), (np.arange(len(at)), at)),
-                               shape=(len(at), dofs))  # fmt: skip
-        kept = np.ones(dofs)
-        kept[at] = 0.0
-        law = own.T @ (blocks_of(self.partials[0]) @ self.parts.gathers)
-        return sparse.csr_array(sparse.diags_array(kept) + law)
+        return sparse.csr_array(sparse.diags_array(self._kept) + self._law)
 
     def passed(self, change: Array) -> Array:
         """First-order change of F, (n,), with a change of f_int - f, (dofs,)."""
-        return (self._passing @ change)[self.parts.free]
+        return (self._kept * change + self._passing @ change)[self.parts.free]
 
     @cached_property
-    def whole(self) -> sparse.csr_array:
-        """dF/dx, (dofs, dofs), as if no node were held."""
+    def _near(self) -> sparse.csr_array:
+        """dF/dx without the rows of `blocks` that are `_kept`, (dofs, dofs)."""
         parts, meeting = self.parts, self.point.meeting
         dofs, at = len(self.rest), parts.at.ravel()
         _, by_normal, by_gap, by_motion = self.partials
@@ -213,26 +223,30 @@ class PairLinearisation:
                 + blocks_of(by_gap[mine][:, :, None]) @ gap_slopes(part, dofs)
                 + blocks_of(by_motion[mine]) @ motion_slopes(part, old, dofs)
             )
-        out = self._passing @ parts.matrix(self.blocks).tocsr() - self._by_needed @ turned
+        stiffness = parts.matrix(self.blocks).tocsr()
         local = sparse.csr_array(sparse.vstack(rows))
         own = sparse.csr_array((np.ones(len(at)), (at, np.arange(len(at)))),
                                shape=(dofs, len(at)))  # fmt: skip
-        return sparse.csr_array(out + own @ local)
+        out = self._passing @ stiffness - self._by_needed @ turned + own @ local
+        return sparse.csr_array(out)
 
     @cached_property
     def matrix(self) -> sparse.csc_array:
         """dF/dv, (n, n)."""
         free = self.parts.free
-        return sparse.csc_array(self.whole[free].tocsc()[:, free])
+        stiffness = self.parts.on_free(self.blocks)
+        stiffness.data *= self._kept[free][stiffness.indices]
+        return sparse.csc_array(stiffness + self._near[free].tocsc()[:, free])
 
     def shifted(
         self, load: NodalForces | Array, prescribed: Array, drift: Array | None = None
     ) -> Array:
         """First-order change of F, (n,), with changes of load, prescribed (dofs,) and drift."""
-        change = self.whole @ prescribed - self._passing @ NodalForces.of(load).at(self.u)
+        change = self._kept * (self.parts.matrix(self.blocks) @ prescribed)
+        change += self._near @ prescribed
         if drift is not None:
             change[self.parts.at] += np.einsum("pij,pj->pi", self.partials[3], drift)
-        return change[self.parts.free]
+        return change[self.parts.free] - self.passed(NodalForces.of(load).at(self.u))
 
 
 def normal_slopes(part: Meeting | MortarMeeting, dofs: int) -> sparse.csr_array:

@@ -174,9 +174,24 @@ class NonlinearParts:
 
         pressures (c,): of hybrid cells, else those of the displacements.
         """
-        return np.concatenate(
+        for known, forces in tuple(self._known) if pressures is None else ():
+            if np.array_equal(known, u):
+                return forces
+        forces = np.concatenate(
             [body.forces(*given).ravel() for body, *given in self._given(u, pressures)]
         )
+        if pressures is None:
+            self._keep(u, forces)
+        return forces
+
+    @cached_property
+    def _known(self) -> deque[tuple[Array, Array]]:
+        """States and the forces there: one is asked for its residual and its error."""
+        return deque(maxlen=KEPT)
+
+    def _keep(self, u: Array, forces: Array) -> None:
+        forces.flags.writeable = False
+        self._known.append((u.copy(), forces))
 
     def tangent(self, u: Array, pressures: Array | None = None) -> tuple[Array, Array]:
         """(forces (dofs,), node blocks (m, d, d) of their derivative) at displacements u."""
