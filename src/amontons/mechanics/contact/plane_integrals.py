@@ -2,7 +2,8 @@
 
 Both are projected along the slave's normal onto the plane through it, the master's outline is
 cut by the sides of the slave's, and the part they share is filled with triangles from its first
-corner.  Numbers are complex: real parts decide, imaginary ones carry derivatives along.
+corner.  Where corners coincide some of these have an area of rounding, of either sign, and yet
+derivatives that only all together are right: none is left out.  Numbers are complex: real parts decide, imaginary ones carry derivatives along.
 
 Arguments of all loops: corners (n, 2) in the plane with their number; facets (a, 3) padded,
 with their numbers of corners; rule (q, 3): points and weights on the unit triangle.
@@ -20,6 +21,7 @@ NEWTON = 20  # steps to the reference point of a quadrilateral
 AGAIN = 2  # steps after the last, for the imaginary parts
 ENOUGH = 1e-14
 ON_LINE = 1e-10  # distance of a corner from the line of a side, over its length, that is none
+FLAT = 1e-10  # area of a triangle, over that of the square on a side, which may be rounding
 
 
 def rule(*, second: bool) -> np.ndarray:
@@ -171,13 +173,14 @@ def _shared(slave, master, numbers, rule, mass, cross):
         if count < 3:
             return
     a, b = slave.shape[0], master.shape[0]
+    flat = FLAT * ((x[1, 0] - x[0, 0]).real ** 2 + (x[1, 1] - x[0, 1]).real ** 2)
     phi = np.zeros(mass.shape[1], np.complex128)
     opposite = np.zeros(cross.shape[1], np.complex128)
     for p in range(1, count - 1):
         a0, a1 = one[p, 0] - one[0, 0], one[p, 1] - one[0, 1]
         b0, b1 = one[p + 1, 0] - one[0, 0], one[p + 1, 1] - one[0, 1]
         double = a0 * b1 - a1 * b0
-        if double == 0:
+        if double.real < -flat:
             continue
         for q in range(rule.shape[0]):
             at0 = one[0, 0] + rule[q, 0] * a0 + rule[q, 1] * b0
