@@ -53,7 +53,7 @@ def aggregated(A: NodeBlocks, nodes: Nodes, modes: Array, part: Index) -> Hierar
     return Hierarchy(levels, 1, nodes)
 
 
-def _gathered(A: NodeBlocks, together: int, part: Index) -> tuple[sparse.csr_matrix, Index]:
+def _gathered(A: NodeBlocks, together: int, part: Index) -> tuple[sparse.csr_array, Index]:
     """Aggregates (groups of nodes, aggregates) within parts, and the parts of these."""
     from pyamg.aggregation import standard_aggregation
 
@@ -62,19 +62,20 @@ def _gathered(A: NodeBlocks, together: int, part: Index) -> tuple[sparse.csr_mat
     column = A.indices // together
     same = part[row] == part[column]
     entries = (np.ones(np.count_nonzero(same)), (row[same], column[same]))
-    groups, _ = standard_aggregation(sparse.csr_matrix(entries, shape=(n, n)))
-    found = np.zeros(groups.shape[1], dtype=np.int64)
-    found[groups.indices] = part[np.repeat(np.arange(n), np.diff(groups.indptr))]
-    return groups, found
+    found, _ = standard_aggregation(sparse.csr_matrix(entries, shape=(n, n)))
+    groups = sparse.csr_array(found)
+    own = np.zeros(groups.shape[1], dtype=np.int64)
+    own[groups.indices] = part[np.repeat(np.arange(n), np.diff(groups.indptr))]
+    return groups, own
 
 
 def _prolongation(
-    A: NodeBlocks, groups: sparse.csr_matrix, modes: Array
+    A: NodeBlocks, groups: sparse.csr_array, modes: Array
 ) -> tuple[sparse.bsr_array, Array]:
     """(I - w D^-1 A) T in blocks, T the modes on every aggregate, and the coarse modes."""
     from pyamg.aggregation import fit_candidates
 
-    T, coarse = fit_candidates(groups, modes)
+    T, coarse = fit_candidates(sparse.csr_matrix(groups), modes)
     n = 3 * A.nodes
     tiles = sparse.bsr_array((A.data, A.indices, A.indptr), shape=(n, n))
     diagonal = tiles.diagonal()

@@ -10,10 +10,10 @@ second kind give to the other side taken back from there,
     [A_rr A_rc] [x_r]   [b_r]        S = A_rr - A_rc A_cc^-1 A_cr,                          (1)
     [A_cr A_cc] [x_c] = [b_c],       S x_r = b_r - A_rc A_cc^-1 b_c.
 
-A_cc couples neighbours on the surface alone and is factorised; S is, but for friction and turning
-normals, the stiffness of bodies whose constrained nodes follow the other side: condensation as
-of dual mortar methods [WGW].  It is solved by GMRES with right preconditioner, one V-cycle of
-`aggregates` on S formed with the diagonal of A_cc.
+A_cc couples neighbours on the surface alone and is factorised; S is, but for friction and
+turning normals, the stiffness of bodies whose constrained nodes follow the other side:
+condensation as of dual mortar methods [WGW].  It is solved by GMRES with right preconditioner,
+one V-cycle of `aggregates` on S formed with the diagonal of A_cc.
 
 [WGW] T. Wiesner, M. Gee, A. Popp, W. Wall, "Algebraic multigrid methods for dual mortar finite
 element formulations in contact mechanics", Int. J. Numer. Meth. Engng. 114 (2018).
@@ -52,9 +52,9 @@ class Structure:
 
     dimension d; place (n,): 3 node + component, ascending; part (nodes,): number of the part
     that a node belongs to; modes (n, k): rigid motions of all parts where they are now.
-    at (nc, d): unknowns of the contacts' nodes, -1 where supports hold them; by_force (nc, d, d):
-    derivative of their rows by the forces on them; returned (n, nc d): forces that other
-    unknowns get per force on the contacts, which are in the rows of these already.
+    at (nc, d): unknowns of the contacts' nodes, -1 where supports hold them; by_force
+    (nc, d, d): derivative of their rows by the forces on them; returned (n, nc d): forces that
+    other unknowns get per force on the contacts, which are in the rows of these already.
     """
 
     dimension: int
@@ -146,7 +146,7 @@ class Condensed:
         size = abs(self._own).sum(axis=1)
         firm = np.abs(diagonal) > DOMINANT * size
         inverse = np.where(firm, 1 / np.where(firm, diagonal, 1.0), 0.0)
-        eye = sparse.eye_array(self.A.shape[0], format="csr")
+        eye = sparse.csr_array(sparse.eye_array(self.A.shape[0]))
         onto = eye[:, self.rest] - eye[:, self.held] @ (
             sparse.diags_array(inverse) @ self._across
         )

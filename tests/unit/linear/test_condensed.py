@@ -1,4 +1,4 @@
-"""Newton steps of bodies in contact by multigrid: beside direct factors, and where it gives up."""
+"""Newton steps of bodies in contact by multigrid: beside direct factors, and its limits."""
 
 from dataclasses import replace
 
@@ -37,7 +37,8 @@ def pressed(dim=3, law=NEO, *, pair=True, sides=(), order=1, fine=1):
         contacts = [am.Contact("upper.bottom", am.Plane(tuple(normal)), mu=0.3)]
     else:
         origin = (*[0.0] * (dim - 1), -0.5)
-        below = am.box((1.4,) * (dim - 1) + (0.5,), (3 * fine,) * (dim - 1) + (2,), origin=origin)
+        size, cells = (*[1.4] * (dim - 1), 0.5), (*[3 * fine] * (dim - 1), 2)
+        below = am.box(size, cells, origin=origin)
         bodies.append(am.Body(below, law, name="lower", order=order))
         held.append(am.Fix("lower.bottom", 0))
         contacts = [am.Contact("upper.bottom", master="lower.top", mu=0.3)]

@@ -3,7 +3,8 @@
 Both are projected along the slave's normal onto the plane through it, the master's outline is
 cut by the sides of the slave's, and the part they share is filled with triangles from its first
 corner.  Where corners coincide some of these have an area of rounding, of either sign, and yet
-derivatives that only all together are right: none is left out.  Numbers are complex: real parts decide, imaginary ones carry derivatives along.
+derivatives that only all together are right: none is left out.  Numbers are complex: real parts
+decide, imaginary ones carry derivatives along.
 
 Arguments of all loops: corners (n, 2) in the plane with their number; facets (a, 3) padded,
 with their numbers of corners; rule (q, 3): points and weights on the unit triangle.

@@ -1,10 +1,10 @@
-"""Which linear solver takes a Newton step: a direct factor, or multigrid where that is cheaper.
+"""Which linear solver takes a Newton step: a direct factor, or multigrid where it is cheaper.
 
-A factor of a body in three dimensions costs n^2 operations, multigrid n.  From LARGE unknowns on
-the steps of one solve begin with `linear.condensed`, whose levels stay while the constraints of
-contact stay the same and GMRES does not need many more steps than with new ones.  Where it fails
-the direct solver takes over until the end of the solve; that also says whether a matrix is
-singular.  What is kept never outlives a solve, so that a solve does not depend on earlier ones.
+A factor of a body in three dimensions costs n^2 operations, multigrid n.  From LARGE unknowns
+on the steps of one solve begin with `linear.condensed`, whose levels stay while the constraints
+of contact stay the same and GMRES does not need many more steps than with new ones.  Where it
+fails the direct solver takes over until the end of the solve; that also says whether a matrix
+is singular.  What is kept never outlives a solve, which so does not depend on earlier ones.
 
 Steps are as exact as Newton's method can use [EW], choice 2: a small part of the square of the
 last ratio of residuals, so that its last steps stay quadratic.

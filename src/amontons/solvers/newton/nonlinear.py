@@ -152,7 +152,8 @@ class NonlinearNewton:
         shown, linear = _Shown(), LinearSteps(self.linear)
         if start.v is not None:
             try:
-                yield from shown.best(self._newton(problem, problem.states(start.v), target, linear))
+                states = problem.states(start.v)
+                yield from shown.best(self._newton(problem, states, target, linear))
             except (_Failed, InvertedCells):
                 pass  # the start was no help
         share, step, reason = 0.0, 1.0, ""
