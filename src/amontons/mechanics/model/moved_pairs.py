@@ -8,24 +8,35 @@ other slave's force on it.  The other nodes j of its pair carry
 
 B of `contact.current_mortar`.  With both eliminated that way the displacements are all
 unknowns; `PairLinearisation` has the derivative of (1) and of the law in them.
+
+Where slaves of one pair are of another one's master, their lambda is what is left beside (1):
+with O the part of (1) that contacts of nodes that meet give to others, in global axes,
+
+    lambda = C (f_int - f - O lambda),    lambda = (I + C O)^-1 C (f_int - f).              (2)
+
+No two pairs are slave and master of each other, along none of their chains, so that C O is
+nilpotent: (I + C O)^-1 = I - C O + (C O)^2 - ..., with as many terms as the chain has pairs.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
 from ...linear.condensed import Structure
+from ..contact.carried import TiedMeeting
 from ..contact.current import ContactPoint
 from ..contact.current_mortar import MortarMeeting
-from ..contact.current_pairs import Meeting, Meetings
+from ..contact.current_pairs import AnyMeeting, Meeting, Meetings
 from ..contact.current_slopes import blocks_of
 from .nodal_forces import NodalForces
 from .nonlinear_parts import NonlinearParts
+from .tangent_structure import structure_of
 
 Array = NDArray[np.float64]
 
@@ -37,10 +48,26 @@ def balanced(parts: NonlinearParts, meeting: Meetings, rest: Array) -> Array:
     """
     if meeting.only_obstacles:
         return rest
-    gathered = (parts.gathers @ rest).reshape(parts.at.shape)
-    own = gathered * parts.contact.free * meeting.met[:, None]
+    own = _own(parts, meeting, rest)
     out = rest - (meeting.others @ own).ravel()
     out[parts.at] = (parts.gathers @ out).reshape(parts.at.shape)
+    return out
+
+
+def _own(parts: NonlinearParts, meeting: Meetings, needed: Array) -> Array:
+    """lambda (nc, d) of nodes that meet, of f_int - f (dofs,)."""
+    gathered = parts.gathers @ needed
+    if parts.chained:
+        gathered = _unchained(parts, _others(parts, meeting), gathered)
+    return gathered.reshape(parts.at.shape) * parts.contact.free * meeting.met[:, None]
+
+
+def _unchained(parts: NonlinearParts, others: sparse.csr_array, gathered: Any) -> Any:
+    """(I + C O)^-1 of (2) times an array or matrix (nc d, ...)."""
+    out = term = gathered
+    for _ in range(parts.chained):
+        term = -(parts.gathers @ (others @ term))
+        out = out + term
     return out
 
 
@@ -50,33 +77,6 @@ def _others(parts: NonlinearParts, meeting: Meetings) -> sparse.csr_array:
     counts = parts.contact.free * meeting.met[:, None]
     spread = sparse.kron(meeting.others, sparse.eye_array(d), format="csr")
     return sparse.csr_array(spread @ sparse.diags_array(counts.ravel().astype(float)))
-
-
-def structure_of(
-    parts: NonlinearParts, u: Array, by_force: Array, returned: sparse.csr_array
-) -> Structure:
-    """What a tangent at displacements u (nodes, d) consists of, see `linear.condensed`."""
-    place = parts.place
-    modes = rigid_modes(parts.X + u, parts.joined)[parts.free]
-    return Structure(parts.dimension, place, parts.joined, modes, parts.unknown[parts.at],
-                     by_force, sparse.csr_array(returned))  # fmt: skip
-
-
-def rigid_modes(x: Array, part: NDArray[np.int64]) -> Array:
-    """Translations and rotations (dofs, 3 or 6) of places x (nodes, d), about each part's mean.
-
-    part (nodes,): numbers from 0.
-    """
-    n, d = x.shape
-    counts = np.bincount(part)
-    means = np.stack([np.bincount(part, x[:, c]) / counts for c in range(d)], axis=1)
-    y = (x - means[part]) / np.ptp(x, axis=0).max()
-    planes = [(0, 1)] if d == 2 else [(0, 1), (1, 2), (2, 0)]
-    out = np.zeros((n, d, d + len(planes)))
-    out[:, range(d), range(d)] = 1.0
-    for k, (i, j) in enumerate(planes, d):
-        out[:, i, k], out[:, j, k] = -y[:, j], y[:, i]
-    return out.reshape(n * d, -1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,9 +182,10 @@ class PairLinearisation:
 
         At fixed positions: few rows, those of contacts and of what their forces act on.
         """
-        gathers = self.parts.gathers
-        given = _others(self.parts, self.point.meeting) @ gathers
-        return sparse.csr_array(self._law - self._by_needed @ given)
+        others, gathers = _others(self.parts, self.point.meeting), self.parts.gathers
+        if self.parts.chained:
+            gathers = _unchained(self.parts, others, gathers)
+        return sparse.csr_array(self._law - self._by_needed @ (others @ gathers))
 
     @cached_property
     def _law(self) -> sparse.csr_array:
@@ -209,8 +210,7 @@ class PairLinearisation:
         parts, meeting = self.parts, self.point.meeting
         dofs, at = len(self.rest), parts.at.ravel()
         _, by_normal, by_gap, by_motion = self.partials
-        gathered = (parts.gathers @ self.needed).reshape(parts.at.shape)
-        force = gathered * parts.contact.free * meeting.met[:, None]
+        force = _own(parts, meeting, self.needed)
         rows, turned = [], sparse.csr_array((dofs, dofs))
         start = 0
         for part, old in zip(meeting.parts, self.earlier.parts, strict=True):
@@ -224,10 +224,13 @@ class PairLinearisation:
                 + blocks_of(by_motion[mine]) @ motion_slopes(part, old, dofs)
             )
         stiffness = parts.matrix(self.blocks).tocsr()
+        given = self._by_needed
+        if parts.chained:
+            given = sparse.csr_array(sparse.diags_array(self._kept) + self._passing)
         local = sparse.csr_array(sparse.vstack(rows))
         own = sparse.csr_array((np.ones(len(at)), (at, np.arange(len(at)))),
                                shape=(dofs, len(at)))  # fmt: skip
-        out = self._passing @ stiffness - self._by_needed @ turned + own @ local
+        out = self._passing @ stiffness - given @ turned + own @ local
         return sparse.csr_array(out)
 
     @cached_property
@@ -249,25 +252,27 @@ class PairLinearisation:
         return change[self.parts.free] - self.passed(NodalForces.of(load).at(self.u))
 
 
-def normal_slopes(part: Meeting | MortarMeeting, dofs: int) -> sparse.csr_array:
+def normal_slopes(part: AnyMeeting, dofs: int) -> sparse.csr_array:
     """Derivatives of the normals by the positions of all nodes, (nc d, dofs)."""
-    if isinstance(part, MortarMeeting):
+    if not isinstance(part, Meeting):
         return part.slopes.normals
     return _at_slaves(part, part.side.normal_slopes(part.x), dofs)
 
 
-def gap_slopes(part: Meeting | MortarMeeting, dofs: int) -> sparse.csr_array:
+def gap_slopes(part: AnyMeeting, dofs: int) -> sparse.csr_array:
     """The same of the gaps, (nc, dofs)."""
-    if isinstance(part, MortarMeeting):
+    if not isinstance(part, Meeting):
         return part.slopes.gap
     return _at_slaves(part, part.side.gap_slopes(part.x)[:, None], dofs)
 
 
 def motion_slopes(
-    part: Meeting | MortarMeeting, old: Meeting | MortarMeeting, dofs: int
+    part: AnyMeeting, old: AnyMeeting, dofs: int
 ) -> sparse.csr_array:
     """The same of the motion since `old`, (nc d, dofs)."""
     if isinstance(part, MortarMeeting) and isinstance(old, MortarMeeting):
+        return part.slopes.motion(old)
+    if isinstance(part, TiedMeeting):
         return part.slopes.motion(old)
     d = part.x.shape[1]
     return _at_slaves(part, np.broadcast_to(np.eye(d), (len(part.slaves), d, d)), dofs)
