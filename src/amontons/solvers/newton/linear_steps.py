@@ -57,7 +57,7 @@ class LinearSteps:
     def solved(self, here: Linear, F: Array, tolerance: float) -> tuple[Array, Factor]:
         """(-A^-1 F, the factor) of a linearisation; raises SingularOperator."""
         if self._iterative and len(F) >= min(LARGE.values()):
-            structure = here.structure
+            structure = getattr(here, "structure", None)
             if structure is not None and len(F) >= LARGE[structure.dimension]:
                 try:
                     return self._by_multigrid(here.matrix, structure, F, tolerance)
