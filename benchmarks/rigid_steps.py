@@ -5,7 +5,8 @@
 Each case runs for a second first, in which kernels are compiled, then afresh until its end or
 for a minute.  Beside it the same steps with a solver that is asked for, `solver=am.Auto()`,
 as all steps were solved before sweeps were tried first.  Ball and wall begin with the hardest
-steps: an intact wall of 2200 contacts, four to a joint, more reactions than balances.  Writes results/rigid_steps.md.
+steps: an intact wall of 2200 contacts, four to a joint, more reactions than balances.  Writes
+results/rigid_steps.md.
 """
 
 import time
@@ -123,8 +124,8 @@ def row(make):
     slower = 1e3 * general / len(theirs)
     print(make.__name__, f"{each:.3f} ms, solvers {slower:.3f} ms over {len(same)}", flush=True)
     return (f"| {make.__doc__.rstrip('.')} | {len(steps)} | {contacts:.1f} | {each:.3f} | "
-            f"{1e3 * each / max(contacts, 1):.0f} | {1e3 * worst:.1f} | {100 * quick:.0f} % | {slower:.2f} "
-            f"({len(theirs)}) | {told} | {last} |")  # fmt: skip
+            f"{1e3 * each / max(contacts, 1):.0f} | {1e3 * worst:.1f} | {100 * quick:.0f} % | "
+            f"{slower:.2f} ({len(theirs)}) | {told} | {last} |")  # fmt: skip
 
 
 def main():
@@ -133,11 +134,11 @@ def main():
     text = "\n".join([
         "# Steps of rigid bodies", "",
         "`python benchmarks/rigid_steps.py`: time of the processor, at most a minute for each",
-        "case; the longest step of all. Swept: steps that compiled sweeps solved alone. Solvers: the same with",
-        "`solver=am.Auto()`, over as many steps as fit in ten seconds; later steps of a motion",
-        "may cost more.", "",
-        "| case | steps | contacts | ms a step | us a contact | longest, ms | swept | solvers, ms (steps) | "
-        "outcomes | contacts at the end |",
+        "case; the longest step of all. Swept: steps that compiled sweeps solved alone.",
+        "Solvers: the same with `solver=am.Auto()`, over as many steps as fit in ten seconds;",
+        "later steps of a motion may cost more.", "",
+        "| case | steps | contacts | ms a step | us a contact | longest, ms | swept | "
+        "solvers, ms (steps) | outcomes | contacts at the end |",
         "|---|---|---|---|---|---|---|---|---|---|", *rows, "",
     ])  # fmt: skip
     (Path(__file__).parent / "results" / "rigid_steps.md").write_text(text, encoding="utf-8")
