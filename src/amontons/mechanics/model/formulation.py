@@ -31,6 +31,7 @@ from .assembly import Discretisation
 from .doubts import CHECKS, OF_THE_START, Check
 from .fields import ContactFields, recover_fields
 from .held import HeldNodes
+from .joint_masters import with_masters
 from .large_deformation import LargeDeformation, large_deformation
 from .large_fields import recover_large
 from .laws import NEEDS_FORCES, OF_LINEAR_BODIES, WHERE_NODES_ARE, check_law
@@ -58,10 +59,20 @@ class Formulation(ABC):
     doubts: ClassVar[tuple[Check, ...]] = CHECKS + OF_THE_START
     keeps: ClassVar[str] = ", and keep loads and gaps where they were"  # turned bodies do
 
+    def joined(self, contacts: tuple[Contact, ...]) -> tuple[Contact, ...]:
+        """The contacts that a model has: as they are given."""
+        return contacts
+
     def check(self, model: Model) -> None:
         """Raise InvalidInput or UnsupportedLaw for contacts and loads that do not fit."""
         for k, contact in enumerate(model.contacts):
             check_law(k, contact, model.dimension, self.lacks)
+            if contact.more_masters:
+                raise UnsupportedForm(
+                    "several masters in one contact need kinematics='finite'; here a contact "
+                    "for each of them does the same", ("contacts", k, "more_masters"),
+                    f"contact on {contact.slave!r}",
+                )  # fmt: skip
         for k, load in enumerate(model.loads):
             if follows(load) and not isinstance(load, Pressure):
                 is_body = isinstance(load, BodyForce)
@@ -217,6 +228,10 @@ class Moved(Formulation):
     lacks = WHERE_NODES_ARE
     doubts = CHECKS
     keeps = ""
+
+    def joined(self, contacts: tuple[Contact, ...]) -> tuple[Contact, ...]:
+        """Contacts of one slave with several masters and one law are one: nodes carry one."""
+        return with_masters(contacts)
 
     def check(self, model: Model) -> None:
         """Loads may follow; raises InvalidInput where kinematics do not fit laws, or differ."""

@@ -8,20 +8,30 @@ other slave's force on it.  The other nodes j of its pair carry
 
 B of `contact.current_mortar`.  With both eliminated that way the displacements are all
 unknowns; `PairLinearisation` has the derivative of (1) and of the law in them.
+
+Where slaves of one pair are of another one's master, their lambda is what is left beside (1):
+with O the part of (1) that contacts of nodes that meet give to others, in global axes,
+
+    lambda = C (f_int - f - O lambda),    lambda = (I + C O)^-1 C (f_int - f).              (2)
+
+No two pairs are slave and master of each other, along none of their chains, so that C O is
+nilpotent: (I + C O)^-1 = I - C O + (C O)^2 - ..., with as many terms as the chain has pairs.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..contact.carried import TiedMeeting
 from ..contact.current import ContactPoint
 from ..contact.current_mortar import MortarMeeting
-from ..contact.current_pairs import Meeting, Meetings
+from ..contact.current_pairs import AnyMeeting, Meeting, Meetings
 from ..contact.current_slopes import blocks_of
 from .nodal_forces import NodalForces
 from .nonlinear_parts import NonlinearParts
@@ -36,10 +46,26 @@ def balanced(parts: NonlinearParts, meeting: Meetings, rest: Array) -> Array:
     """
     if meeting.only_obstacles:
         return rest
-    gathered = (parts.gathers @ rest).reshape(parts.at.shape)
-    own = gathered * parts.contact.free * meeting.met[:, None]
+    own = _own(parts, meeting, rest)
     out = rest - (meeting.others @ own).ravel()
     out[parts.at] = (parts.gathers @ out).reshape(parts.at.shape)
+    return out
+
+
+def _own(parts: NonlinearParts, meeting: Meetings, needed: Array) -> Array:
+    """lambda (nc, d) of nodes that meet, of f_int - f (dofs,)."""
+    gathered = parts.gathers @ needed
+    if parts.chained:
+        gathered = _unchained(parts, _others(parts, meeting), gathered)
+    return gathered.reshape(parts.at.shape) * parts.contact.free * meeting.met[:, None]
+
+
+def _unchained(parts: NonlinearParts, others: sparse.csr_array, gathered: Any) -> Any:
+    """(I + C O)^-1 of (2) times an array or matrix (nc d, ...)."""
+    out = term = gathered
+    for _ in range(parts.chained):
+        term = -(parts.gathers @ (others @ term))
+        out = out + term
     return out
 
 
@@ -135,7 +161,10 @@ class PairLinearisation:
         parts = self.parts
         dofs = len(self.rest)
         eye = sparse.eye_array(dofs, format="csr")
-        passed = eye - _others(parts, self.point.meeting) @ parts.gathers
+        others, gathers = _others(parts, self.point.meeting), parts.gathers
+        if parts.chained:
+            gathers = _unchained(parts, others, gathers)
+        passed = eye - others @ gathers
         return sparse.csr_array(self._by_needed @ passed)
 
     @cached_property
@@ -159,8 +188,7 @@ class PairLinearisation:
         parts, meeting = self.parts, self.point.meeting
         dofs, at = len(self.rest), parts.at.ravel()
         _, by_normal, by_gap, by_motion = self.partials
-        gathered = (parts.gathers @ self.needed).reshape(parts.at.shape)
-        force = gathered * parts.contact.free * meeting.met[:, None]
+        force = _own(parts, meeting, self.needed)
         rows, turned = [], sparse.csr_array((dofs, dofs))
         start = 0
         for part, old in zip(meeting.parts, self.earlier.parts, strict=True):
@@ -173,7 +201,8 @@ class PairLinearisation:
                 + blocks_of(by_gap[mine][:, :, None]) @ gap_slopes(part, dofs)
                 + blocks_of(by_motion[mine]) @ motion_slopes(part, old, dofs)
             )
-        out = self._passing @ parts.matrix(self.blocks).tocsr() - self._by_needed @ turned
+        given = self._passing if parts.chained else self._by_needed
+        out = self._passing @ parts.matrix(self.blocks).tocsr() - given @ turned
         local = sparse.csr_array(sparse.vstack(rows))
         own = sparse.csr_array((np.ones(len(at)), (at, np.arange(len(at)))),
                                shape=(dofs, len(at)))  # fmt: skip
@@ -195,25 +224,27 @@ class PairLinearisation:
         return change[self.parts.free]
 
 
-def normal_slopes(part: Meeting | MortarMeeting, dofs: int) -> sparse.csr_array:
+def normal_slopes(part: AnyMeeting, dofs: int) -> sparse.csr_array:
     """Derivatives of the normals by the positions of all nodes, (nc d, dofs)."""
-    if isinstance(part, MortarMeeting):
+    if not isinstance(part, Meeting):
         return part.slopes.normals
     return _at_slaves(part, part.side.normal_slopes(part.x), dofs)
 
 
-def gap_slopes(part: Meeting | MortarMeeting, dofs: int) -> sparse.csr_array:
+def gap_slopes(part: AnyMeeting, dofs: int) -> sparse.csr_array:
     """The same of the gaps, (nc, dofs)."""
-    if isinstance(part, MortarMeeting):
+    if not isinstance(part, Meeting):
         return part.slopes.gap
     return _at_slaves(part, part.side.gap_slopes(part.x)[:, None], dofs)
 
 
 def motion_slopes(
-    part: Meeting | MortarMeeting, old: Meeting | MortarMeeting, dofs: int
+    part: AnyMeeting, old: AnyMeeting, dofs: int
 ) -> sparse.csr_array:
     """The same of the motion since `old`, (nc d, dofs)."""
     if isinstance(part, MortarMeeting) and isinstance(old, MortarMeeting):
+        return part.slopes.motion(old)
+    if isinstance(part, TiedMeeting):
         return part.slopes.motion(old)
     d = part.x.shape[1]
     return _at_slaves(part, np.broadcast_to(np.eye(d), (len(part.slaves), d, d)), dofs)

@@ -143,6 +143,10 @@ class _Step:
         parts, method, motion = model.parts, model.method, model.motion
         h, shape = method.step, parts.X.shape
         q0, v0 = state.displacement, state.velocity
+        parts = parts.divided(q0.reshape(shape)) if parts.folds else parts
+        self.parts = parts
+        parts = parts.divided(q0.reshape(shape)) if parts.folds else parts
+        self.parts = parts
         start = parts.meet(q0.reshape(shape))
         meeting = parts.meet((q0 + h / 2 * v0).reshape(shape))
         self.H = sparse.csc_array(meeting.columns(frames(meeting.normals)))
@@ -303,7 +307,7 @@ class _Step:
         new = State(state.index + 1, self.time, q1, trial.velocity, impulse / h,
                     state.slip + h * mean,
                     **rubbed(state, h * mean, sliding, work))  # fmt: skip
-        meeting = m.parts.meet(q1.reshape(m.parts.X.shape))
+        meeting = self.parts.meet(q1.reshape(m.parts.X.shape))
         load = self.load.at(((state.displacement + q1) / 2).reshape(m.parts.X.shape))
         return TimeStep(m.motion.body, new, solution, self.active, energies, meeting.gap,
                         support_forces(m._all, held / h), load,

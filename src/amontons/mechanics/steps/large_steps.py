@@ -61,9 +61,9 @@ class LargeSlowModel:
         """
         load, prescribed = self.motion.applied(time)
         q0 = state.displacement
-        problem = large_step(
-            self.motion.body, load, prescribed, q0, self._known(state),
-        )  # fmt: skip
+        body = self.motion.body
+        body = body.divided(q0) if nonlinear_parts(body).folds else body
+        problem = large_step(body, load, prescribed, q0, self._known(state))
         if isinstance(problem.law, VaryingFriction):  # of the speed in this step
             problem = problem.with_law(problem.law.lasting(abs(time - state.time) or 1.0))
         arrive = None
@@ -77,17 +77,19 @@ class LargeSlowModel:
         q1 = problem.displacement(solution.v).ravel()
         meeting = problem.contact_point(solution.v).meeting
         axes = frames(meeting.normals)
-        way = solution.u[:, 1:]
+        tied = body.law.tied[:, None]  # what bonds give way is no slip
+        way = np.where(tied, 0.0, solution.u[:, 1:])
         work = quasi_static_friction(state.force[:, 1:], solution.r[:, 1:], way)
-        energies = self._energies(state, q1, load, solution.r, float(work.sum()))
+        energies = self._energies(body, state, q1, load, solution.r, float(work.sum()))
         passed = time - state.time
         velocity = (q1 - q0) / passed if passed else np.zeros_like(q1)
-        new = State(state.index + 1, time, q1, velocity, solution.r, state.slip + way,
+        new = State(state.index + 1, time, q1, velocity, solution.r,
+                    np.where(tied, solution.u[:, 1:], state.slip + way),
                     **rubbed(state, way, solution.sliding, work))  # fmt: skip
-        acting = self._forces(q1, load, solution.r)
+        acting = self._forces(body, q1, load, solution.r)
         rest = acting.inner - acting.load - acting.pushed
         active = np.arange(len(way))
-        return TimeStep(self.motion.body, new, solution, active, energies, solution.u[:, 0],
+        return TimeStep(body, new, solution, active, energies, solution.u[:, 0],
                         support_forces(self.motion.parts, rest), acting.load, axes,
                         passage, passed=meeting.passed)  # fmt: skip
 
@@ -96,11 +98,13 @@ class LargeSlowModel:
         return with_diagnosis(solution, self.motion.body)
 
     def _energies(
-        self, state: State, q1: Array, load: NodalForces, r: Array, friction: float
-    ) -> Energies:
+        self, body: Model, state: State, q1: Array, load: NodalForces, r: Array,
+        friction: float,
+    ) -> Energies:  # fmt: skip
         """The balance of `slow_energies`; r (nc, d): reactions after the step."""
         q0, load_0 = state.displacement, self.motion.load_of(state)
-        before, after = self._forces(q0, load_0, state.force), self._forces(q1, load, r)
+        before = self._forces(body, q0, load_0, state.force)
+        after = self._forces(body, q1, load, r)
         path = path_work(before, after, q1 - q0)
         bend = self._bend(q0, q1, load_0, load)
         return slow_energies(before, after, q1 - q0, self.motion.parts.fixed, friction, path,
@@ -118,9 +122,9 @@ class LargeSlowModel:
         middle = (0.5 * (before + after)).at(((q0 + q1) / 2).reshape(shape))
         return float((middle - ends) @ (q1 - q0)) * 2 / 3
 
-    def _forces(self, q: Array, load: NodalForces, r: Array) -> Forces:
+    def _forces(self, body: Model, q: Array, load: NodalForces, r: Array) -> Forces:
         """All forces at displacements q (dofs,); r (nc, d): in the frames there."""
-        parts = nonlinear_parts(self.motion.body)
+        parts = nonlinear_parts(body)
         moved = q.reshape(parts.X.shape)
         meeting = parts.meet(moved)
         pushed = meeting.columns(frames(meeting.normals)) @ r.ravel()
@@ -140,7 +144,7 @@ def last_motion(problem: LargeDeformation, state: State, duration: float) -> Arr
     pairs = np.concatenate(
         [np.full(len(p.slaves), isinstance(p, MortarMeeting)) for p in meeting.parts]
     )
-    if not pairs.any():
+    if not pairs.any() and not problem.law.tied.any():
         return out
     n = meeting.normals
     along = meeting.averages @ moved.reshape(parts.X.shape)
@@ -153,4 +157,5 @@ def last_motion(problem: LargeDeformation, state: State, duration: float) -> Arr
     rubs = pairs & (bound > 0)
     slips = size >= (1 - AT_BOUND) * bound
     told = np.where(slips[:, None], slipped, 0.0)
-    return np.where(rubs[:, None], told, np.where(pairs[:, None], along, out))
+    told = np.where(rubs[:, None], told, np.where(pairs[:, None], along, out))
+    return np.where(problem.law.tied[:, None], 0.0, told)

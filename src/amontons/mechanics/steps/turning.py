@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 
 def check_turning(method: Any, model: Model) -> None:
-    """Raise UnsupportedForm for options and bodies that large deformations do not have."""
+    """Raise UnsupportedForm for options, bodies and contacts that large deformations do not have."""
     for name, wanted in (("theta", 0.5), ("reach", 0.0), ("stiffness_damping", 0.0)):
         framed = name == "stiffness_damping" and all(b.corotational for b in model.bodies)
         if getattr(method, name) != wanted and not framed:
@@ -46,6 +46,13 @@ def check_turning(method: Any, model: Model) -> None:
                 "or a hyperelastic law, or LinearElastic bodies and kinematics='small' of all "
                 "contacts"
             )
+    for k, contact in enumerate(model.contacts):
+        if contact.tied:
+            raise UnsupportedForm(
+                "dynamics of large deformations have no ties; read both bodies as one mesh "
+                "where they match, or use QuasiStatic", ("contacts", k, "tied"),
+                f"contact on {contact.slave!r}",
+            )  # fmt: skip
 
 
 @dataclass(frozen=True)
