@@ -8,7 +8,7 @@ import pytest
 
 import amontons as am
 from amontons.linear.blocks import BlockRows, inverse_norms
-from amontons.mechanics.multibody import quick
+from amontons.mechanics.multibody import sweeping
 from amontons.mechanics.multibody.quick import Found, eliminated_of
 
 FLOOR = am.Plane((0, 0, 1))
@@ -70,7 +70,7 @@ def test_quick_steps_follow_those_of_the_solvers(make, step, until):
 
 def test_sweeps_with_momentum_follow_the_solvers_too(monkeypatch):
     """As many contacts have them, which plain sweeps are too dear for."""
-    monkeypatch.setattr(quick, "WORK", 0)
+    monkeypatch.setattr(sweeping, "WORK", 0)
     for system, step in ((pile(), 2e-3), (pendulum(), 2e-3)):
         ours, theirs = both(system, step, 0.3)
         swept = [s._solved for s in ours if isinstance(s._solved, Found)]
@@ -130,8 +130,8 @@ def test_what_sweeps_do_not_solve_goes_to_the_solvers_with_the_same_start(monkey
     """And what these do not solve is reported: a tolerance that rounding does not allow."""
     system = pile()
     late = list(am.evolve_rigid(system, step=2e-3, until=0.4))[-1].state
-    monkeypatch.setattr(quick, "WORK", 0)
-    monkeypatch.setattr(quick, "MOMENTUM", 0)
+    monkeypatch.setattr(sweeping, "WORK", 0)
+    monkeypatch.setattr(sweeping, "MOMENTUM", 0)
     step = next(am.evolve_rigid(system, step=2e-3, until=0.402, start=late))
     assert not isinstance(step._solved, Found) and step.solution.converged
     with pytest.raises(am.NotConverged, match="step"):

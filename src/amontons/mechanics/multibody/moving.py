@@ -28,7 +28,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,9 +43,10 @@ from ...solvers.driver import drive_as_asked
 from .bodies import GROUND, RigidBodies
 from .ends import ended, freely, middle_of
 from .meeting import Meetings, meetings
-from .quick import Found, Posed, found_quickly, law_of, pose
+from .quick import Found, Posed, law_of, pose
 from .rows import Rows, delassus, impulses, rotations, rows_at, turned
 from .states import Motion, RigidEnergies, RigidState, RigidStep
+from .sweeping import found_quickly
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -217,8 +218,9 @@ class _Stepping:
         apart = np.where(found.master >= 0, self.near[found.master], 0.0)
         kept = gaps <= self.near[found.slave] + apart
         rows = np.concatenate([kept, np.ones(len(at.rows.slave) - nc, dtype=bool)])
-        found = Meetings(*(a[kept] for a in found._replace(gaps=gaps)))
-        return _Met(found, at.keys[kept], Rows(*(a[rows] for a in at.rows)), at.apart, 0.0)
+        left: list[Any] = [a[kept] for a in found._replace(gaps=gaps)]
+        those: list[Any] = [a[rows] for a in at.rows]
+        return _Met(Meetings(*left), at.keys[kept], Rows(*those), at.apart, 0.0)
 
     # ------------------------------------------------------------------ problems
     def _solve(
