@@ -66,7 +66,7 @@ def law_of(contacts: int, joints: int, mu: float) -> Law:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What `solve_quickly` has found; the solution as the solvers tell it when asked for.
+    """What sweeps have found; the solution as the solvers tell it when asked for.
 
     r, u (n, 3); status, sliding (n,); errors unit-free: in the sum, of the weakest contact.
     """
