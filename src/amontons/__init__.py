@@ -51,7 +51,7 @@ _HOME = {
                         "evolve"),
     "io.checkpoint": ("export_fclib", "load_start", "load_state", "save_state"),
     "io.readers": ("read_case",),
-    "io.rigid_bodies": ("write_rigid",),
+    "io.rigid_bodies": ("export_rigid", "write_rigid"),
     "io.series": ("export_xdmf",),
     "io.plots.film": ("film",),
     "app.model_solution": ("ModelSolution",),

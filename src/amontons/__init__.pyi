@@ -65,6 +65,7 @@ from .io.fclib import read_fclib as read_fclib, write_fclib as write_fclib
 from .io.matrices import StoredMatrices as StoredMatrices, read_matrices as read_matrices
 from .io.meshes import read_mesh as read_mesh
 from .io.readers import read_case as read_case
+from .io.rigid_bodies import export_rigid as export_rigid
 from .io.rigid_bodies import write_rigid as write_rigid
 from .io.plots.film import film as film
 from .io.series import export_xdmf as export_xdmf

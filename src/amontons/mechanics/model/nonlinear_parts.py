@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...core.errors import InvertedCells
+from ...core.errors import InvertedCells, UnsupportedForm
 from ..contact.carried import TiedPair
 from ..contact.current import CurrentContact
 from ..contact.current_mortar import MortarPair, folded
@@ -79,6 +79,14 @@ class NonlinearParts:
         around = self.points - self.X.mean(axis=0)
         return (RESOLVED * float(np.linalg.norm(forces)),
                 RESOLVED * float(np.linalg.norm(around)))  # fmt: skip
+
+    def check_tangent(self) -> None:
+        """Raise UnsupportedForm where the tangent is not the derivative of the forces."""
+        if any(isinstance(body, CorotationalBody) for body in self.bodies):
+            raise UnsupportedForm(
+                "corotational bodies have no path: their tangent leaves out what stresses do "
+                "in a rotation, on which stability hangs; give them SaintVenantKirchhoff"
+            )
 
     @property
     def dimension(self) -> int:
