@@ -2,7 +2,9 @@
 
 Both are projected along the slave's normal onto the plane through it, the master's outline is
 cut by the sides of the slave's, and the part they share is filled with triangles from its first
-corner.  Numbers are complex: real parts decide, imaginary ones carry derivatives along.
+corner.  Where corners coincide some of these have an area of rounding, of either sign, and yet
+derivatives that only all together are right: none is left out.  Numbers are complex: real parts
+decide, imaginary ones carry derivatives along.
 
 Functions of quadrilaterals that are no parallelograms are no polynomials in the plane, as
 their reference point (s, t) is the root of an equation.  With x = c + a s + b t + h st the
@@ -39,6 +41,7 @@ NEWTON = 20  # steps to the reference point of a quadrilateral
 AGAIN = 2  # steps after the last, for the imaginary parts
 ENOUGH = 1e-14
 ON_LINE = 1e-10  # distance of a corner from the line of a side, over its length, that is none
+FLAT = 1e-10  # area of a triangle, over that of the square on a side, which may be rounding
 
 
 @cache
@@ -231,13 +234,14 @@ def _shared(slave, master, numbers, rules, counts, mass, cross):  # noqa: PLR091
     lost = LOST_SECOND if numbers[2] + numbers[3] > 0 else LOST
     level = _level(x, na, y, nb, lost, len(counts))
     rule = rules[level]
+    flat = FLAT * ((x[1, 0] - x[0, 0]).real ** 2 + (x[1, 1] - x[0, 1]).real ** 2)
     phi = np.zeros(mass.shape[1], np.complex128)
     opposite = np.zeros(cross.shape[1], np.complex128)
     for p in range(1, count - 1):
         a0, a1 = one[p, 0] - one[0, 0], one[p, 1] - one[0, 1]
         b0, b1 = one[p + 1, 0] - one[0, 0], one[p + 1, 1] - one[0, 1]
         double = a0 * b1 - a1 * b0
-        if double.real <= 0:
+        if double.real < -flat:
             continue
         for q in range(counts[level]):
             at0 = one[0, 0] + rule[q, 0] * a0 + rule[q, 1] * b0
