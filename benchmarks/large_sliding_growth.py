@@ -34,8 +34,9 @@ PARTS = {  # modules by the beginnings of their paths in the package; the rest i
 }
 PASSES = 40  # by which time in other libraries is handed to who called them
 
-DENSE = """  All cells are
-refined alike but in the last rows, which have as many contacts as 100 000 unknowns will hold."""
+DENSE = """
+All cells are refined alike but in the last rows, which have as many contacts as 100 000
+unknowns will hold."""
 HEAD = """# Ironing in 3D, ever finer
 
 Regenerate: `python benchmarks/large_sliding_growth.py`.
