@@ -26,8 +26,12 @@ from .analysis.gradients.steps import (
 from .analysis.gradients.with_jax import jax_function as jax_function
 from .analysis.gradients.with_torch import torch_function as torch_function
 from .analysis.paths.path_crossing import PathCrossing as PathCrossing
+from .analysis.solutions.second_start import Other as Other, maybe_others as maybe_others
 from .app.api import solve as solve
 from .app.audit import audit as audit
+from .analysis.stability.coalescence import Flutter as Flutter
+from .analysis.stability.modes import Modes as Modes
+from .app.stability import modes as modes
 from .analysis.limits.collapse import Collapse as Collapse
 from .analysis.limits.jamming import Jamming as Jamming
 from .app.limits import collapse_load as collapse_load, jamming_friction as jamming_friction
@@ -48,6 +52,9 @@ from .core.errors import (
 from .core.threads import threads as threads
 from .core.warned import (
     DoubtWarning as DoubtWarning, ResultWarning as ResultWarning, warn_of as warn_of,
+)
+from .io.certificates import (
+    check_certificate as check_certificate, write_certificate as write_certificate,
 )
 from .io.checkpoint import (
     export_fclib as export_fclib, load_start as load_start, load_state as load_state,
