@@ -77,8 +77,8 @@ def main() -> None:
     where = describe()
     page = f"""# Where W is singular or missing
 
-`python benchmarks/hyperstatic.py`, {where['cpu']}, Python {where['python']}; CPU seconds, the first with compilation, at
-most the work of a minute (operations counted) for each verdict.
+`python benchmarks/hyperstatic.py`, {where['cpu']}, Python {where['python']}; CPU seconds, the
+first with compilation, at most the work of a minute (operations counted) for each verdict.
 
 Bound: how far any other motion can be, relative to the free motion, in the norm of energy.
 Other: another motion, of so many solutions from other starts. Reactions: of how many contacts
