@@ -64,10 +64,11 @@ def main() -> None:
             files.append(path)
         refused, harmless, wrong = forge(files, asked.forgeries, Path(folder) / "forged.h5")
     rows = "\n".join(f"| {name} | {number} |" for name, number in sorted(count.items()))
+    where = describe()
     page = f"""# Certificates as files
 
 `python benchmarks/certificate_files.py --certificates {asked.certificates} --forgeries
-{asked.forgeries}`, {describe()}.
+{asked.forgeries}`, {where['cpu']}, Python {where['python']}.
 
 {len(files)} certificates of random problems were accepted by the separate checker
 (`amontons.io.certificate_checker`), none refused; one takes {np.median(seconds) * 1e3:.1f} ms

@@ -88,7 +88,7 @@ def if_singular(
         return None
     if solution is None or not solution.converged:
         say("a solution for this load")
-        solution = drive(problem, time_limit=deadline.share(SOLVING))
+        solution = drive(problem, start=solution, time_limit=deadline.share(SOLVING))
     cause = "W is singular"
     if loose:
         cause = f"Contact alone holds {held}, so there is no W"
