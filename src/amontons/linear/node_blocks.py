@@ -56,18 +56,12 @@ class NodeBlocks:
     def from_sparse(cls, matrix: sparse.sparray, place: Index | None, nodes: int) -> NodeBlocks:
         """The blocks of a scalar matrix (n, n) whose unknown i sits at place[i] of 3 nodes.
 
-        place None: unknown i at i.  Padding gets ones on the diagonal.
+        place ascending; None: unknown i at i.  Padding gets ones on the diagonal.
         """
-        if place is None:
-            tiles = sparse.csr_array(matrix).tobsr((3, 3))
-        else:
-            coo = matrix.tocoo()
-            idle = np.setdiff1d(np.arange(3 * nodes), place)
-            rows = np.concatenate([place[coo.coords[0]], idle])
-            columns = np.concatenate([place[coo.coords[1]], idle])
-            values = np.concatenate([coo.data, np.ones(len(idle))])
-            shape = (3 * nodes, 3 * nodes)
-            tiles = sparse.coo_array((values, (rows, columns)), shape=shape).tobsr((3, 3))
+        rows = sparse.csr_array(matrix)
+        if place is not None:
+            rows = _spread(rows, place, 3 * nodes)
+        tiles = rows.tobsr((3, 3))
         tiles = with_diagonal(tiles)
         return cls.of(tiles.indptr, tiles.indices, np.asarray(tiles.data, dtype=float))
 
@@ -159,6 +153,22 @@ class NodeBlocks:
         arguments = self.indptr, self.indices, self.data, order, number, indptr, indices, data
         over_rows(_renumber, self.nodes, 2.0 * self.work, *arguments)
         return NodeBlocks(indptr, indices, data, self.inverse[order])
+
+
+def _spread(rows: sparse.csr_array, place: Index, size: int) -> sparse.csr_array:
+    """A matrix with its unknowns at ascending places, and ones on the diagonal elsewhere."""
+    counts = np.ones(size, dtype=np.int64)
+    counts[place] = np.diff(rows.indptr)
+    pointers = np.concatenate([[0], np.cumsum(counts)])
+    idle = np.ones(size, dtype=bool)
+    idle[place] = False
+    own = pointers[:-1][idle]
+    taken = np.ones(pointers[-1], dtype=bool)
+    taken[own] = False
+    columns, values = np.empty(pointers[-1], dtype=np.int64), np.empty(pointers[-1])
+    columns[taken], values[taken] = place[rows.indices], rows.data
+    columns[own], values[own] = np.flatnonzero(idle), 1.0
+    return sparse.csr_array((values, columns, pointers), shape=(size, size))
 
 
 def with_diagonal(tiles: sparse.bsr_array) -> sparse.bsr_array:
