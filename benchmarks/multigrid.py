@@ -1,7 +1,7 @@
 """Contact multigrid on the problems of hueeber2008, against one linear elasticity solve.
 
     python benchmarks/multigrid.py [--levels 3,4,5,6,7] [--repeats 3] [--only mortar,shell]
-    python benchmarks/multigrid.py --only unstructured [--sizes 0.033,0.0145]
+    python benchmarks/multigrid.py --only unstructured [--sizes 0.036,0.024,0.0158]
 
 Linear solve: the same bodies with their contact faces clamped, conjugate gradients with one
 V(1,1) cycle of `GeometricMultigrid`, zero start, to the same relative residual.  Contact: the
@@ -350,7 +350,7 @@ def main():
     parser.add_argument("--levels", default="1,2,3,4,5,6,7")
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--friction-level", type=int, default=5)
-    parser.add_argument("--sizes", default="0.033,0.0145", help="edges of tetrahedra")
+    parser.add_argument("--sizes", default="0.036,0.024", help="edges of tetrahedra")
     parser.add_argument("--only", help="parts to measure again, with commas")
     given = parser.parse_args()
     levels = [int(x) for x in given.levels.split(",")]

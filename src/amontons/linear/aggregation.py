@@ -31,6 +31,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 STEPS = 12  # of Lanczos's method for rho: within some per cent
 OMEGA = 4 / 3
+LARGEST = 600  # block rows that are inverted whole at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,15 +42,21 @@ class Aggregates:
     width: int = 1
 
     def coarsen(self, A: NodeBlocks) -> tuple[Transfer, Aggregates] | None:
-        """Prolongation to aggregates of units of A, and the same of them; None without any."""
+        """Prolongation to aggregates of units of A, and the same of them; None without any.
+
+        Units without neighbours are left out, also where there are no others: many of these,
+        on the coarsest level, would be inverted together.
+        """
         from pyamg.aggregation import fit_candidates, standard_aggregation
 
         graph = units_of(A.indptr, A.indices, self.width)
         joined, _ = standard_aggregation(graph)
-        if not joined.nnz or joined.shape[1] >= graph.shape[0]:
+        if joined.shape[1] >= graph.shape[0] or not (joined.nnz or A.nodes > LARGEST):
             return None
         columns = -self.modes.shape[1] % 3
         modes = np.column_stack([self.modes, np.zeros((len(self.modes), columns))])
+        if not joined.nnz:
+            return _nothing(A.nodes, modes.shape[1])
         pieces, coarse = fit_candidates(joined, modes)
         T = sparse.bsr_array(sparse.bsr_array(pieces).tobsr((3, 3)))
         P = _smoothed(A, T)
@@ -63,6 +70,15 @@ class Aggregates:
             return self
         modes = self.modes.reshape(len(number), 3, -1)[np.argsort(number)]
         return Aggregates(modes.reshape(self.modes.shape), self.width)
+
+
+def _nothing(nodes: int, count: int) -> tuple[Transfer, Aggregates]:
+    """A next level of one unit that gets nothing and gives nothing."""
+    width, none = count // 3, np.empty(0, dtype=np.int64)
+    pointers = np.minimum(np.arange(nodes + 1), width)
+    zero = (np.zeros((width, 3, 3)), np.arange(width), pointers)
+    tiles = sparse.bsr_array(zero, shape=(3 * nodes, 3 * width))
+    return Transfer.of(tiles, none, none), Aggregates(np.zeros((3 * width, count)), width)
 
 
 def _smoothed(A: NodeBlocks, T: sparse.bsr_array) -> sparse.bsr_array:

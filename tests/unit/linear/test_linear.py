@@ -241,3 +241,21 @@ def test_superlu_is_not_asked_for_what_no_permutation_can_factorise(capfd):
     with pytest.raises(SingularOperator, match="at most 80 of 100 pivots"):
         Direct(Backend.SUPERLU).factor(matrix)
     assert capfd.readouterr().out == ""
+
+
+def test_multigrid_on_many_loose_parts():
+    """Each is one aggregate, and these have no neighbours: nothing whole to invert below."""
+    rng, parts = np.random.default_rng(0), 700
+    blocks = rng.standard_normal((parts, 12, 12))
+    blocks = blocks @ blocks.swapaxes(1, 2) + 12 * np.eye(12)
+    M = sparse.csc_array(sparse.block_diag(list(blocks), format="csc"))
+    x, y, z = rng.random((4 * parts, 3)).T
+    modes = np.zeros((4 * parts, 3, 6))
+    modes[:, range(3), range(3)] = 1
+    modes[:, 0, 3], modes[:, 1, 3] = -y, x
+    modes[:, 1, 4], modes[:, 2, 4] = -z, y
+    modes[:, 2, 5], modes[:, 0, 5] = -x, z
+    factor = GeometricMultigrid().factor(M, modes.reshape(-1, 6))
+    assert factor.hierarchy.levels[-1].A.nodes < 10
+    b = rng.standard_normal(M.shape[0])
+    assert np.abs(M @ factor.solve(b) - b).max() < 1e-9
