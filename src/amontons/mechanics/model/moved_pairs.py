@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ...linear.condensed import Structure
 from ..contact.carried import TiedMeeting
 from ..contact.current import ContactPoint
 from ..contact.current_mortar import MortarMeeting
@@ -35,6 +36,7 @@ from ..contact.current_pairs import AnyMeeting, Meeting, Meetings
 from ..contact.current_slopes import blocks_of
 from .nodal_forces import NodalForces
 from .nonlinear_parts import NonlinearParts
+from .tangent_structure import structure_of
 
 Array = NDArray[np.float64]
 
@@ -124,6 +126,12 @@ class Linearisation:
         change[parts.at] = at
         return change[parts.free]
 
+    @property
+    def structure(self) -> Structure:
+        """What the matrix consists of."""
+        nothing = sparse.csr_array((len(self.parts.free), self.parts.at.size))
+        return structure_of(self.parts, self.u, self.by_force, nothing)
+
     def passed(self, change: Array) -> Array:
         """First-order change of F, (n,), with a change of f_int - f, (dofs,)."""
         parts, out = self.parts, change.copy()
@@ -155,36 +163,50 @@ class PairLinearisation:
         out[self.parts.at] = self.point.residual()
         return out[self.parts.free]
 
-    @cached_property
-    def _passing(self) -> sparse.csr_array:
-        """Derivative of F by f_int - f on all nodes, (dofs, dofs), at fixed positions."""
-        parts = self.parts
-        dofs = len(self.rest)
-        eye = sparse.eye_array(dofs, format="csr")
-        others, gathers = _others(parts, self.point.meeting), parts.gathers
-        if parts.chained:
-            gathers = _unchained(parts, others, gathers)
-        passed = eye - others @ gathers
-        return sparse.csr_array(self._by_needed @ passed)
+    @property
+    def structure(self) -> Structure:
+        """What the matrix consists of."""
+        returned = _others(self.parts, self.point.meeting)[self.parts.free]
+        return structure_of(self.parts, self.u, self.partials[0], returned)
 
     @cached_property
+    def _kept(self) -> Array:
+        """1 for rows of F that are f_int - f, 0 for those of contacts, (dofs,)."""
+        out = np.ones(len(self.rest))
+        out[self.parts.at] = 0.0
+        return out
+
+    @cached_property
+    def _passing(self) -> sparse.csr_array:
+        """Derivative of F by f_int - f on all nodes without `_kept`, (dofs, dofs).
+
+        At fixed positions: few rows, those of contacts and of what their forces act on.
+        """
+        others, gathers = _others(self.parts, self.point.meeting), self.parts.gathers
+        if self.parts.chained:
+            gathers = _unchained(self.parts, others, gathers)
+        return sparse.csr_array(self._law - self._by_needed @ (others @ gathers))
+
+    @cached_property
+    def _law(self) -> sparse.csr_array:
+        """Derivative of the rows of contacts by the forces on their side, (dofs, dofs)."""
+        at, dofs = self.parts.at.ravel(), len(self.rest)
+        own = sparse.csr_array((np.ones(len(at)), (at, np.arange(len(at)))),
+                               shape=(dofs, len(at)))  # fmt: skip
+        return sparse.csr_array(own @ (blocks_of(self.partials[0]) @ self.parts.gathers))
+
+    @property
     def _by_needed(self) -> sparse.csr_array:
         """Derivative of F by f_int - f without what contacts give to others, (dofs, dofs)."""
-        at, dofs = self.parts.at.ravel(), len(self.rest)
-        own = sparse.csr_array((np.ones(len(at)), (np.arange(len(at)), at)),
-                               shape=(len(at), dofs))  # fmt: skip
-        kept = np.ones(dofs)
-        kept[at] = 0.0
-        law = own.T @ (blocks_of(self.partials[0]) @ self.parts.gathers)
-        return sparse.csr_array(sparse.diags_array(kept) + law)
+        return sparse.csr_array(sparse.diags_array(self._kept) + self._law)
 
     def passed(self, change: Array) -> Array:
         """First-order change of F, (n,), with a change of f_int - f, (dofs,)."""
-        return (self._passing @ change)[self.parts.free]
+        return (self._kept * change + self._passing @ change)[self.parts.free]
 
     @cached_property
-    def whole(self) -> sparse.csr_array:
-        """dF/dx, (dofs, dofs), as if no node were held."""
+    def _near(self) -> sparse.csr_array:
+        """dF/dx without the rows of `blocks` that are `_kept`, (dofs, dofs)."""
         parts, meeting = self.parts, self.point.meeting
         dofs, at = len(self.rest), parts.at.ravel()
         _, by_normal, by_gap, by_motion = self.partials
@@ -201,27 +223,33 @@ class PairLinearisation:
                 + blocks_of(by_gap[mine][:, :, None]) @ gap_slopes(part, dofs)
                 + blocks_of(by_motion[mine]) @ motion_slopes(part, old, dofs)
             )
-        given = self._passing if parts.chained else self._by_needed
-        out = self._passing @ parts.matrix(self.blocks).tocsr() - given @ turned
+        stiffness = parts.matrix(self.blocks).tocsr()
+        given = self._by_needed
+        if parts.chained:
+            given = sparse.csr_array(sparse.diags_array(self._kept) + self._passing)
         local = sparse.csr_array(sparse.vstack(rows))
         own = sparse.csr_array((np.ones(len(at)), (at, np.arange(len(at)))),
                                shape=(dofs, len(at)))  # fmt: skip
-        return sparse.csr_array(out + own @ local)
+        out = self._passing @ stiffness - given @ turned + own @ local
+        return sparse.csr_array(out)
 
     @cached_property
     def matrix(self) -> sparse.csc_array:
         """dF/dv, (n, n)."""
         free = self.parts.free
-        return sparse.csc_array(self.whole[free].tocsc()[:, free])
+        stiffness = self.parts.on_free(self.blocks)
+        stiffness.data *= self._kept[free][stiffness.indices]
+        return sparse.csc_array(stiffness + self._near[free].tocsc()[:, free])
 
     def shifted(
         self, load: NodalForces | Array, prescribed: Array, drift: Array | None = None
     ) -> Array:
         """First-order change of F, (n,), with changes of load, prescribed (dofs,) and drift."""
-        change = self.whole @ prescribed - self._passing @ NodalForces.of(load).at(self.u)
+        change = self._kept * (self.parts.matrix(self.blocks) @ prescribed)
+        change += self._near @ prescribed
         if drift is not None:
             change[self.parts.at] += np.einsum("pij,pj->pi", self.partials[3], drift)
-        return change[self.parts.free]
+        return change[self.parts.free] - self.passed(NodalForces.of(load).at(self.u))
 
 
 def normal_slopes(part: AnyMeeting, dofs: int) -> sparse.csr_array:
