@@ -37,7 +37,7 @@ def test_the_same_for_the_same_seed():
 
 
 def test_bad_input_is_named():
-    problem = hild(0.3)
+    problem = am.SpherePacking(12, seed=3).problem().condensed()
     failed = am.drive(problem, am.GaussSeidel(), max_iterations=1, tolerance=1e-15)
     assert not failed.converged
     with pytest.raises(am.InvalidInput, match="solution: expected a converged solution"):

@@ -1,10 +1,11 @@
 """A second start: the cheap hint that another solution is near.
 
-A method that comes from elsewhere may end in another solution, if there is one.  An iterate that
-is only nearly a solution may be far from the one that it will come to, many times its error; so
-what is compared are solutions: where the motions of two differ, both are solved again to a
-hundredth of the tolerance, and count as two where the difference stays.  No proof, neither of
-several (`all_solutions`, `existence` prove), nor of one where nothing is found (`uniqueness`).
+A method that comes from elsewhere may end in another solution, if there is one.  An iterate
+that is only nearly a solution may be far from the one that it will come to, many times its
+error; so what is compared are solutions: where the motions of two differ, both are solved
+again to a hundredth of the tolerance, and count as two where the difference stays.  No proof,
+neither of several (`all_solutions`, `existence` prove), nor of one where nothing is found
+(`uniqueness`).
 """
 
 from __future__ import annotations
