@@ -46,9 +46,14 @@ def balanced(parts: NonlinearParts, meeting: Meetings, rest: Array) -> Array:
 def _others(parts: NonlinearParts, meeting: Meetings) -> sparse.csr_array:
     """Forces on other nodes per force on the slaves, (dofs, nc d)."""
     d = parts.at.shape[1]
-    counts = parts.contact.free * meeting.met[:, None]
-    spread = sparse.kron(meeting.others, sparse.eye_array(d), format="csr")
-    return sparse.csr_array(spread @ sparse.diags_array(counts.ravel().astype(float)))
+    counts = (parts.contact.free * meeting.met[:, None]).astype(float)
+    by_slave = meeting.others.tocsc()
+    p = np.repeat(np.arange(len(counts)), np.diff(by_slave.indptr))
+    values = by_slave.data[:, None] * counts[p]
+    rows = by_slave.indices[:, None] * d + np.arange(d)
+    columns = p[:, None] * d + np.arange(d)
+    entries = (values.ravel(), (rows.ravel(), columns.ravel()))
+    return sparse.csr_array(entries, shape=(parts.X.size, parts.at.size))
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,97 +134,87 @@ class PairLinearisation:
         out[self.parts.at] = self.point.residual()
         return out[self.parts.free]
 
-    @cached_property
-    def _passing(self) -> sparse.csr_array:
-        """Derivative of F by f_int - f on all nodes, (dofs, dofs), at fixed positions."""
-        parts = self.parts
-        dofs = len(self.rest)
-        eye = sparse.eye_array(dofs, format="csr")
-        passed = eye - _others(parts, self.point.meeting) @ parts.gathers
-        return sparse.csr_array(self._by_needed @ passed)
-
-    @cached_property
-    def _by_needed(self) -> sparse.csr_array:
-        """Derivative of F by f_int - f without what contacts give to others, (dofs, dofs)."""
-        at, dofs = self.parts.at.ravel(), len(self.rest)
-        own = sparse.csr_array((np.ones(len(at)), (np.arange(len(at)), at)),
-                               shape=(len(at), dofs))  # fmt: skip
-        kept = np.ones(dofs)
-        kept[at] = 0.0
-        law = own.T @ (blocks_of(self.partials[0]) @ self.parts.gathers)
-        return sparse.csr_array(sparse.diags_array(kept) + law)
-
     def passed(self, change: Array) -> Array:
         """First-order change of F, (n,), with a change of f_int - f, (dofs,)."""
-        return (self._passing @ change)[self.parts.free]
+        return self._passed(change)[self.parts.free]
+
+    def _passed(self, change: Array) -> Array:
+        """The same of all dofs."""
+        out = balanced(self.parts, self.point.meeting, change)
+        at = self.parts.at
+        out[at] = np.einsum("pij,pj->pi", self.partials[0], out[at])
+        return out
 
     @cached_property
-    def whole(self) -> sparse.csr_array:
-        """dF/dx, (dofs, dofs), as if no node were held."""
+    def _by_x(self) -> tuple[sparse.csr_array, sparse.csr_array]:
+        """Derivatives by the place of all nodes, (., dofs), as if no node were held.
+
+        Of f_int - f without what contacts give to other nodes, and of the law, (nc d, dofs).
+        """
         parts, meeting = self.parts, self.point.meeting
-        dofs, at = len(self.rest), parts.at.ravel()
-        _, by_normal, by_gap, by_motion = self.partials
+        by_force, by_normal, by_gap, by_motion = self.partials
         gathered = (parts.gathers @ self.needed).reshape(parts.at.shape)
         force = gathered * parts.contact.free * meeting.met[:, None]
-        rows, turned = [], sparse.csr_array((dofs, dofs))
+        rest, law = sparse.csr_array(parts.matrix(self.blocks).tocsr()), []
+        rest = rest - _others(parts, meeting) @ (parts.gathers @ rest)
         start = 0
         for part, old in zip(meeting.parts, self.earlier.parts, strict=True):
             mine = slice(start, start + len(part.slaves))
             start = mine.stop
+            slopes = by_normal[mine], by_gap[mine], by_motion[mine]
             if isinstance(part, MortarMeeting) and isinstance(old, MortarMeeting):
-                turned = turned + part.slopes.spread(force[mine])
-            rows.append(
-                blocks_of(by_normal[mine]) @ normal_slopes(part, dofs)
-                + blocks_of(by_gap[mine][:, :, None]) @ gap_slopes(part, dofs)
-                + blocks_of(by_motion[mine]) @ motion_slopes(part, old, dofs)
-            )
-        out = self._passing @ parts.matrix(self.blocks).tocsr() - self._by_needed @ turned
-        local = sparse.csr_array(sparse.vstack(rows))
-        own = sparse.csr_array((np.ones(len(at)), (at, np.arange(len(at)))),
-                               shape=(dofs, len(at)))  # fmt: skip
-        return sparse.csr_array(out + own @ local)
+                rest = rest - part.slopes.spread(force[mine])
+                law.append(_law_of_pair(part, old, *slopes))
+            else:
+                law.append(_law_at_obstacle(part, *slopes))
+        own = blocks_of(by_force) @ (parts.gathers @ rest)
+        return sparse.csr_array(rest), sparse.csr_array(own + sparse.vstack(law))
 
     @cached_property
     def matrix(self) -> sparse.csc_array:
         """dF/dv, (n, n)."""
+        rest, law = self._by_x
+        rows = np.arange(rest.shape[0])
+        rows[self.parts.at.ravel()] = rest.shape[0] + np.arange(law.shape[0])
         free = self.parts.free
-        return sparse.csc_array(self.whole[free].tocsc()[:, free])
+        chosen = sparse.vstack([rest, law], format="csr")[rows[free]]
+        return sparse.csc_array(chosen.tocsc()[:, free])
 
     def shifted(
         self, load: NodalForces | Array, prescribed: Array, drift: Array | None = None
     ) -> Array:
         """First-order change of F, (n,), with changes of load, prescribed (dofs,) and drift."""
-        change = self.whole @ prescribed - self._passing @ NodalForces.of(load).at(self.u)
+        rest, law = self._by_x
+        at = self.parts.at
+        change = rest @ prescribed
+        change[at] = (law @ prescribed).reshape(at.shape)
+        change -= self._passed(NodalForces.of(load).at(self.u))
         if drift is not None:
-            change[self.parts.at] += np.einsum("pij,pj->pi", self.partials[3], drift)
+            change[at] += np.einsum("pij,pj->pi", self.partials[3], drift)
         return change[self.parts.free]
 
 
-def normal_slopes(part: Meeting | MortarMeeting, dofs: int) -> sparse.csr_array:
-    """Derivatives of the normals by the positions of all nodes, (nc d, dofs)."""
-    if isinstance(part, MortarMeeting):
-        return part.slopes.normals
-    return _at_slaves(part, part.side.normal_slopes(part.x), dofs)
-
-
-def gap_slopes(part: Meeting | MortarMeeting, dofs: int) -> sparse.csr_array:
-    """The same of the gaps, (nc, dofs)."""
-    if isinstance(part, MortarMeeting):
-        return part.slopes.gap
-    return _at_slaves(part, part.side.gap_slopes(part.x)[:, None], dofs)
-
-
-def motion_slopes(
-    part: Meeting | MortarMeeting, old: Meeting | MortarMeeting, dofs: int
+def _law_of_pair(
+    part: MortarMeeting, old: MortarMeeting, by_normal: Array, by_gap: Array, by_motion: Array
 ) -> sparse.csr_array:
-    """The same of the motion since `old`, (nc d, dofs)."""
-    if isinstance(part, MortarMeeting) and isinstance(old, MortarMeeting):
-        return part.slopes.motion(old)
-    d = part.x.shape[1]
-    return _at_slaves(part, np.broadcast_to(np.eye(d), (len(part.slaves), d, d)), dofs)
+    """Derivative of the law by the place of all nodes through n, g = n . G and s."""
+    apart = part.distances * part.met[:, None]
+    by_normal = by_normal + by_gap[:, :, None] * apart[:, None, :]
+    by_distance = by_gap[:, :, None] * part.normals[:, None, :]
+    return part.slopes.combined(by_normal, by_distance, by_motion, old)
 
 
-def _at_slaves(part: Meeting | MortarMeeting, values: Array, dofs: int) -> sparse.csr_array:
+def _law_at_obstacle(
+    part: Meeting | MortarMeeting, by_normal: Array, by_gap: Array, by_motion: Array
+) -> sparse.csr_array:
+    """The same where the other side is an obstacle."""
+    assert isinstance(part, Meeting)
+    by_x = by_normal @ part.side.normal_slopes(part.x) + by_motion
+    by_x = by_x + by_gap[:, :, None] * part.side.gap_slopes(part.x)[:, None, :]
+    return _at_slaves(part, by_x, part.nodes * part.x.shape[1])
+
+
+def _at_slaves(part: Meeting, values: Array, dofs: int) -> sparse.csr_array:
     """Rows (nc, m, d) by the place of the slave alone, (nc m, dofs)."""
     nc, m, d = values.shape
     rows = np.broadcast_to(np.arange(nc * m).reshape(nc, m, 1), values.shape)

@@ -198,6 +198,8 @@ def nonlinear_parts(model: Model) -> NonlinearParts:
     Raises UnsupportedForm for what finite strains do not have.
     """
     parts = model._shared.once(_nonlinear_parts, (), model)
+    if parts.contact.law is model.law:
+        return parts  # with the meetings that it keeps
     return replace(parts, contact=replace(parts.contact, law=model.law))
 
 
