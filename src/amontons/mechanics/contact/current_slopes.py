@@ -153,7 +153,7 @@ class MortarSlopes:
         by_cross = -scaled[parts.of][:, :, None, :, None] * by_cross
         own, cross, dofs = self._integrals
         values = _through(by_own[parts.of], own) + _through(by_cross, cross)
-        return SlotSlopes(values.reshape(len(dofs), a, d, -1), row[parts.of], dofs)
+        return SlotSlopes(values.reshape(-1, a, d, dofs.shape[1]), row[parts.of], dofs)
 
     def spread(self, force: Array) -> sparse.csr_array:
         """Derivative of sum_p B_pj lambda_p at all nodes j by x, (nodes d, nodes d).
@@ -189,7 +189,7 @@ class MortarSlopes:
         by_mass += (inverse.swapaxes(1, 2)[:, :, None] * w.swapaxes(1, 2)[:, None])[..., None]
         across = inverse.swapaxes(1, 2)[:, :, None, None, :]
         by_mass -= z.swapaxes(1, 2)[:, None, :, :, None] * across
-        values = _through(by_mass[parts.of], mass).reshape(len(dofs), a * d, -1)
+        values = _through(by_mass[parts.of], mass)
         rows = (parts.of[:, None] * a * d + np.arange(a * d))[:, :, None]
         held = assembled([(values, rows, dofs[:, None])], (f * a * d, n))
         # D_p in lambda / D_p
@@ -234,7 +234,7 @@ class MortarSlopes:
 def _through(factors: Array, slopes: Array) -> Array:
     """sum_rt factors (k, p, c, r, t) slopes (k, r, t, w), (k, p c, w)."""
     k, p, c, r, t = factors.shape
-    return factors.reshape(k, p * c, r * t) @ slopes.reshape(k, r * t, -1)
+    return factors.reshape(k, p * c, r * t) @ slopes.reshape(k, r * t, slopes.shape[3])
 
 
 def averaged(averages: sparse.csr_array, factors: Array) -> Entries:

@@ -177,7 +177,7 @@ class PairLinearisation:
         rows = np.arange(rest.shape[0])
         rows[self.parts.at.ravel()] = rest.shape[0] + np.arange(law.shape[0])
         free = self.parts.free
-        chosen = sparse.vstack([rest, law], format="csr")[rows[free]]
+        chosen = sparse.csr_array(sparse.vstack([rest, law], format="csr"))[rows[free]]
         return sparse.csc_array(chosen.tocsc()[:, free])
 
     def shifted(
