@@ -21,17 +21,22 @@ def columns(case):
 
 
 def late(row):
-    """Forces over the second half of the path, (k, 4), without the last one."""
+    """Forces at the load steps of the second half of the path, (k, 4), without the last one.
+
+    Between them where a program has taken steps of its own.
+    """
     forces = np.array(row["forces"])
     last = round(forces[-1, 0] / row["reached"])
-    return forces[(forces[:, 0] > 0.55 * last) & (forces[:, 0] < last - 0.5)]
+    steps = np.arange(int(0.55 * last) + 1, last)
+    inside = [np.interp(steps, forces[:, 0], column) for column in forces.T[1:]]
+    return np.column_stack([steps, *inside])
 
 
-def means(row):
-    """Means of the measured forces; None of a path that ended."""
+def curves(row):
+    """The measured forces over `late`, (k, m); None of a path that ended."""
     if row is None or row["reached"] < 0.999:
         return None
-    return [abs(late(row)[:, c].mean()) for c, _ in columns(row["case"])]
+    return late(row)[:, [c for c, _ in columns(row["case"])]]
 
 
 def cells(row):
@@ -39,12 +44,11 @@ def cells(row):
     whole = "yes" if row["reached"] > 0.999 else f"to {row['reached']:.0%}"
     whole += ", out of time" if row["why"] == "out of time" else ""
     told = ["", "", ""]
-    found = means(row)
-    if found:
-        there = late(row)[:, columns(row["case"])[0][0]]
-        names = [name for _, name in columns(row["case"])]
-        told = [f"{name} {value:.4f}" for name, value in zip(names, found, strict=True)]
-        told = [*told, ""][:2] + [f"{there.std() / found[0]:.1%}"]
+    found = curves(row)
+    if found is not None:
+        names, means = [name for _, name in columns(row["case"])], np.abs(found.mean(axis=0))
+        told = [f"{name} {value:.4g}" for name, value in zip(names, means, strict=True)]
+        told = [*told, ""][:2] + [f"{found[:, 0].std() / means[0]:.1%}"]
     newton = f"{row['newton'] / max(row['steps'], 1):.1f}"
     return [row["case"], row["program"], row["unknowns"], whole, row["steps"], newton,
             row.get("most") or "", f"{row['seconds']:.1f}",
@@ -53,20 +57,22 @@ def cells(row):
 
 def limit_of(coarse, fine):
     """Extrapolated from mesh widths h and h / 2 at an error of second order."""
-    return None if coarse is None or fine is None else [
-        b + (b - a) / 3 for a, b in zip(coarse, fine, strict=True)]  # fmt: skip
+    return None if coarse is None or fine is None else fine + (fine - coarse) / 3
 
 
 def apart(mine, theirs):
-    """Differences in percent of theirs."""
+    """Differences in percent of theirs, root mean squares of the curves, whatever the sign."""
     if mine is None or theirs is None:
         return ""
-    return ", ".join(f"{100 * (a / b - 1):+.1f}" for a, b in zip(mine, theirs, strict=True))
+    theirs = theirs * np.where((mine * theirs).sum(axis=0) < 0, -1.0, 1.0)
+    size = np.sqrt((theirs**2).mean(axis=0))
+    found = 100 * np.sqrt(((mine - theirs) ** 2).mean(axis=0)) / size
+    return ", ".join(f"{value:.1f}" for value in found)
 
 
 def compared(rows, name):
     """Lines of the second table about a case."""
-    found = {r["program"]: means(r) for r in rows if r["case"] == name}
+    found = {r["program"]: curves(r) for r in rows if r["case"] == name}
     seconds = {r["program"]: r["seconds"] for r in rows if r["case"] == name}
     out = []
     for peer, law in (("GetFEM", ""), ("CalculiX", ", law of CalculiX")):
@@ -96,10 +102,11 @@ def written(rows, cases, programs):
              "; ".join(f"{k} {v}" for k, v in describe().items()), "",
              *table(HEAD, map(cells, rows)), "",
              "## Beside the peers' own limits", "",
-             "Forces of amontons (beside CalculiX with its law) against those of a peer, in "
-             "percent: on the same mesh with its stiffness times 1, 10 and 100, with half the "
-             "mesh width, and both extrapolated to zero width. Empty: a path that ended or "
-             "was not asked for. Last column: its CPU time over that of amontons.", "",
+             "Curves of amontons (beside CalculiX with its law) against those of a peer, root "
+             "mean square differences in percent of each force: on the same mesh with its "
+             "stiffness times 1, 10 and 100, with half the mesh width, and both extrapolated "
+             "to zero width. Empty: a path that ended or was not run. Last column: its CPU "
+             "time over that of amontons.", "",
              *table(["case", "peer", "x 1", "x 10", "x 100", "half the width", "limit",
                      "time over ours"], both), ""]  # fmt: skip
     notes = RESULTS / "large_sliding_notes.txt"

@@ -14,9 +14,23 @@ from .analysis import (
     performance_profile as performance_profile,
 )
 from .analysis.audit.verdict import Audit as Audit
+from .analysis.gradients.gradient import (
+    Derivative as Derivative, Gradient as Gradient, OneSided as OneSided,
+)
+from .analysis.gradients.model_gradient import (
+    ModelDerivative as ModelDerivative, ModelGradient as ModelGradient,
+)
+from .analysis.gradients.steps import (
+    EvolutionGradient as EvolutionGradient, evolution_gradient as evolution_gradient,
+)
+from .analysis.gradients.with_jax import jax_function as jax_function
+from .analysis.gradients.with_torch import torch_function as torch_function
 from .analysis.paths.path_crossing import PathCrossing as PathCrossing
 from .app.api import solve as solve
 from .app.audit import audit as audit
+from .analysis.limits.collapse import Collapse as Collapse
+from .analysis.limits.jamming import Jamming as Jamming
+from .app.limits import collapse_load as collapse_load, jamming_friction as jamming_friction
 from .app.model_solution import ModelSolution as ModelSolution
 from .app.questions import (
     all_solutions as all_solutions, basins as basins, critical_friction as critical_friction,
@@ -31,6 +45,7 @@ from .core.errors import (
     NotWritten as NotWritten, SingularOperator as SingularOperator, TimeUp as TimeUp,
     UnsupportedForm as UnsupportedForm, UnsupportedLaw as UnsupportedLaw,
 )
+from .core.threads import threads as threads
 from .core.warned import (
     DoubtWarning as DoubtWarning, ResultWarning as ResultWarning, warn_of as warn_of,
 )
@@ -109,6 +124,7 @@ from .solvers import (
     SmoothingNewton as SmoothingNewton, SweepOrder as SweepOrder, Uzawa as Uzawa,
 )
 from .solvers.driver import drive as drive
+from .solvers.many import solve_many as solve_many
 from .solvers.newton.nonlinear import NonlinearNewton as NonlinearNewton
 
 __version__: str

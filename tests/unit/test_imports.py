@@ -18,10 +18,12 @@ ALONE = {  # package: the folders or files that import it
     "pypardiso": "linear", "mumps": "linear", "petsc4py": "linear", "mpi4py": "linear",
     "pymetis": "mechanics/meshes",
     "meshio": "mechanics/meshes io/vtk",  # reads meshes, writes pictures
+    "jax": "analysis/gradients/with_jax", "torch": "analysis/gradients/with_torch",
     "h5py": "core/hdf5 io",  # checks; the exchange format, results, states
 }  # fmt: skip
 INSIDE = {  # the same inside of a room
-    "analysis": ("multipliers", "solutions", "certificates", "paths"),
+    "analysis": ("multipliers", "solutions", "certificates", "paths", "gradients",
+                 "limits"),
     "mechanics": ("meshes", "elements", "contact", "model", "steps"),
     "problem": ("law", "judge"),
 }

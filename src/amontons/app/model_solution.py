@@ -14,6 +14,7 @@ from ..io import results as output
 from ..problem.solution import FrictionSolution
 
 if TYPE_CHECKING:
+    from ..analysis.gradients.model_gradient import ModelDerivative, ModelGradient
     from ..mechanics.model import ContactFields, Model
     from ..mechanics.model.pairs import PairResult
     from ..mechanics.model.reactions import SupportResult
@@ -105,6 +106,32 @@ class ModelSolution(Shown):
             assemble_seconds=self.assemble_seconds,
             warnings=self.warnings,
         )
+
+    def vjp(self, displacement: Any = None, r: Any = None, u: Any = None) -> ModelGradient:
+        """The gradient of a number J, given by its slopes, with respect to the model.
+
+        displacement: slopes in the displacements, (nodes, dim) per body; r, u (nc, d).  The
+        result has loads, prescribed displacements, gaps, friction, young, poisson, node
+        positions, and `along(make, at)` for any parameter of a family of models: one linear
+        solve for all.  Raises InvalidInput for a solution that has not converged and for other
+        shapes, UnsupportedForm for large deformations, bodies that yield and Nitsche's method,
+        UnsupportedLaw and SingularOperator as `FrictionSolution.vjp`.
+        """
+        from ..analysis.gradients.model_gradient import model_vjp
+
+        return model_vjp(self.model, self.solution, displacement, r, u)
+
+    def jvp(self, **changes: Any) -> ModelDerivative:
+        """The derivative of this solution along changes of the model.
+
+        changes: load, prescribed, points, (nodes, dim) per body; gap, mu, bound (nc,); young,
+        poisson, a rate by body or body.region; along, (make, at) of a family of models.  One
+        linear solve; where contacts are on the border of their status, all one-sided ones.
+        Raises as `vjp`.
+        """
+        from ..analysis.gradients.model_gradient import model_jvp
+
+        return model_jvp(self.model, self.solution, **changes)
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the solution; the suffix decides: .vtu, .h5 (or .hdf5), .json, .csv."""

@@ -7,6 +7,7 @@ code sees them, which takes their indices on trust.
 
 from __future__ import annotations
 
+from copy import copy
 from numbers import Number
 from typing import Any, TypeVar
 
@@ -14,12 +15,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
+from .canonical import size_of_canonical
 from .errors import InvalidInput, number_hint, shown
 
 Array = NDArray[np.float64]
 AnyArray = TypeVar("AnyArray", bound=NDArray[Any])
 Matrix = sparse.csr_array | sparse.csc_array | Array
 LARGEST = 1e100  # entry in any unit: squares must stay finite, and 1 / LARGEST positive
+INDEX_TYPES = (np.dtype(np.int32), np.dtype(np.int64))
 WHOLE = 2.0**53  # up to which floats hold every whole number
 WORDS = {"b": "truth values", "U": "texts", "S": "bytes", "M": "dates", "m": "lengths of time"}
 
@@ -32,6 +35,8 @@ def expect_shape(name: str, found: tuple[int, ...] | None, expected: tuple[int, 
 
 def real(name: str, values: object) -> Array:
     """A float copy; rejects all that are not real numbers, and ragged lists."""
+    if type(values) is np.ndarray and values.dtype == np.float64:
+        return np.array(values, order="C")
     if sparse.issparse(values):
         raise InvalidInput(f"{name}: expected a dense array, got a sparse one")
     try:
@@ -145,6 +150,8 @@ def sparse_rows(name: str, matrix: Matrix) -> sparse.csr_array:
 
 
 def _canonical(name: str, matrix: Any, kind: Any) -> Any:
+    if type(matrix) is kind and (found := _copied(matrix)) is not None:
+        return found
     if sparse.issparse(matrix):
         matrix = compressed(name, matrix)
     else:
@@ -163,6 +170,23 @@ def _canonical(name: str, matrix: Any, kind: Any) -> Any:
         )
     _squarable(name, size)
     return locked(out)
+
+
+def _copied(matrix: Any) -> Any:
+    """A read-only copy of what is canonical already; None of what has to be looked at."""
+    arrays = matrix.indptr, matrix.indices, matrix.data
+    if any(type(array) is not np.ndarray or array.ndim != 1 for array in arrays):
+        return None
+    kinds = [array.dtype for array in arrays]
+    if kinds[0] not in INDEX_TYPES or kinds[1] != kinds[0] or kinds[2] != np.float64:
+        return None
+    lines, width = matrix.shape if matrix.format == "csr" else matrix.shape[::-1]
+    size = size_of_canonical(*arrays, lines, width)
+    if not (1 / LARGEST <= size <= LARGEST):
+        return None
+    out = copy(matrix)
+    out.indptr, out.indices, out.data = (read_only(array.copy()) for array in arrays)
+    return out
 
 
 def compressed(name: str, matrix: Any) -> Any:
@@ -273,9 +297,11 @@ def locked(matrix):
 
 def squarable(name: str, array: Array, largest: float = LARGEST) -> Array:
     """The same array, locked, of finite numbers whose squares are numbers, or as `largest`."""
-    size = float(np.abs(_finite(name, array)).max(initial=0.0))
+    size = float(np.abs(array).max(initial=0.0))
+    if not np.isfinite(size):
+        _finite(name, array)
     _squarable(name, size, largest)
-    return array
+    return read_only(array)
 
 
 def _finite(name: str, array: Array) -> Array:

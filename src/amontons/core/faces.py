@@ -1,4 +1,4 @@
-"""The faces of a result: methods of classes in all rooms, answered by the room `io`.
+"""The faces of a result: methods of classes in all rooms, answered by rooms above them.
 
 Results stand in lower rooms than pictures and files.  So that `branch.plot("b.png")` needs no
 import upwards, a class says here that it can be shown, and what it looks like is found by name
@@ -15,6 +15,8 @@ HOMES = {  # the module whose function of that name answers
     "plot": "amontons.io.plots.faces", "report": "amontons.io.report.faces",
     "html": "amontons.io.notebook.html", "view": "amontons.io.notebook.view",
     "to_dataframe": "amontons.io.notebook.tables", "to_xarray": "amontons.io.notebook.tables",
+    "vjp": "amontons.analysis.gradients.gradient",
+    "jvp": "amontons.analysis.gradients.gradient",
 }  # fmt: skip
 
 
@@ -74,6 +76,31 @@ class Shown(Told):
         Raises MissingDependency without xarray, and InvalidInput for other results.
         """
         return _face("to_xarray")(self)
+
+
+class Differentiated(Shown):
+    """A solution that can be differentiated."""
+
+    __slots__ = ()
+
+    def vjp(self, r: Any = None, u: Any = None, v: Any = None) -> Any:
+        """The gradient of a number J, given by its slopes in r, u (nc, d) and v (n,).
+
+        A `Gradient` with respect to loads, gaps, friction and matrices, by one linear solve
+        with the transposed system at the statuses of this solution.  Raises InvalidInput for
+        one that has not converged and for other shapes, UnsupportedLaw where coefficients
+        follow the state, SingularOperator at a fold.
+        """
+        return _face("vjp")(self, r, u, v)
+
+    def jvp(self, **changes: Any) -> Any:
+        """The derivative of this solution along changes of the data, a `Derivative`.
+
+        changes: load, of f (n,) or q (nc, d); w (nc, d), mu, bound (nc,); M, H or W, matrices
+        of their shapes.  One linear solve; where contacts are on the border of their status,
+        all one-sided derivatives.  Raises as `vjp`.
+        """
+        return _face("jvp")(self, **changes)
 
 
 def _face(name: str) -> Any:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..linear.blocks import spatial
 from ..mechanics.elements import von_mises
+from ..mechanics.elements.corotational import corotated_stress
 from ..mechanics.elements.given import GivenMatrices
 from ..mechanics.elements.nodal_stress import stress_of
 from ..mechanics.elements.rigid import Rigid
@@ -124,6 +125,8 @@ def body_stress(
     """
     if isinstance(body.material, Rigid | GivenMatrices):
         return np.zeros((body.mesh.cell_count, 3, 3)), np.zeros((len(moved), 3, 3))
+    if body.corotational:
+        return corotated_stress(body.mesh, body.material, moved)
     found = stress_of(body.mesh, body.material, moved, warm)
     return found if flown is None else relieved(body.mesh, body.material, found, flown)
 

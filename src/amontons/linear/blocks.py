@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..core.compiled import njit
+from ..core.threads import over_rows
 from .block_kernels import blocks_of_dense, blocks_of_rows, contact_data
 
 Array = NDArray[np.float64]
@@ -103,10 +104,17 @@ def block_part(blocks: BlockRows, contacts: NDArray[np.int64]) -> BlockRows:
     return embedded(indptr, columns, blocks.data[kept], diagonal)
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
-def velocity_inplace(indptr, indices, data, q, r, u):  # noqa: PLR0913
+def velocity_inplace(  # noqa: PLR0913
+    indptr: NDArray[np.int32], indices: NDArray[np.int32], data: Array, q: Array, r: Array,
+    u: Array,
+) -> None:  # fmt: skip
     """u = W r + q by rows of blocks; q, r, u (nc, 3)."""
-    for i in range(len(q)):
+    over_rows(_velocity, len(q), 10.0 * len(indices), indptr, indices, data, q, r, u)
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"}, nogil=True)
+def _velocity(begin, end, indptr, indices, data, q, r, u):  # noqa: PLR0913
+    for i in range(begin, end):
         u0, u1, u2 = q[i, 0], q[i, 1], q[i, 2]
         for k in range(uint64(indptr[i]), uint64(indptr[i + 1])):
             j = uint64(indices[k])  # unsigned: no test for negative indices in the loop

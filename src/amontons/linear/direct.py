@@ -39,6 +39,7 @@ from scipy import sparse
 
 from ..core.errors import InvalidInput, MissingDependency, SingularOperator
 from ..core.options import check_options
+from ..core.threads import asked
 from .base import by_columns, stored
 
 Array = NDArray[np.float64]
@@ -97,7 +98,7 @@ class Direct:
     """Sparse LDL^T or LU; `backend=None` takes the best installed one and falls back."""
 
     backend: Backend | None = None
-    threads: int = 0  # 0: the backend's own choice (rslab only)
+    threads: int = 0  # rslab's; 0: what `amontons.threads` was told, else its own choice
 
     def __post_init__(self) -> None:
         check_options(self)
@@ -135,7 +136,7 @@ class Direct:
         reasons = []
         for backend in chosen:
             try:
-                made, flops = _FACTORISE[backend](matrix, self.threads)
+                made, flops = _FACTORISE[backend](matrix, self.threads or asked())
                 solve = _Made(matrix, backend, self.threads, made)
                 return DirectFactor(checked(matrix, solve), backend, flops=flops)
             except FAILURES as error:

@@ -11,10 +11,10 @@ from scipy import sparse
 from ..core.errors import InvalidInput, SingularOperator
 from ..core.options import check_options
 from .base import by_columns, check_stopping
+from .chunks import better_numbers
 from .grid_matrix import GridMatrix
 from .hierarchy import Hierarchy, Nodes, components
 from .levels import Levels
-from .node_blocks import NodeBlocks
 
 Array = NDArray[np.float64]
 
@@ -75,8 +75,11 @@ def prepared(
     if component is None:
         return None
     nodes = Nodes.of(component)
-    A = NodeBlocks.from_sparse(matrix, None if nodes.plain else nodes.place, nodes.count)
-    return Hierarchy.of(A, component, levels, modes)
+    A = nodes.blocks(matrix)
+    number = better_numbers(A.indptr, A.indices)
+    if number is not None:
+        nodes, A = nodes.renumbered(number), A.renumbered(number)
+    return Hierarchy.of(A, component, levels, modes, nodes)
 
 
 @dataclass

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.compiled import njit
+from ..core.threads import over_rows
 from .node_blocks import NodeBlocks, block_inverse
 from .work import Work
 
@@ -63,6 +64,11 @@ class GridBlocks:
         """Number of nodes."""
         return int(np.prod(self.shape))
 
+    @property
+    def _lines(self) -> int:
+        """Number of lines of nodes along x, the rows that threads share."""
+        return self.shape[0] * self.shape[1]
+
     # ------------------------------------------------------------------ products
     def times(self, x: Array, out: Array) -> None:
         """out = A x, both (nodes, 3), zero at idle components."""
@@ -73,8 +79,14 @@ class GridBlocks:
         self._pass(x, b, x, out, 0.0, 0.0, 1, self._free)
 
     def _pass(self, x, b, d, out, keep, step, mode, held) -> None:  # noqa: PLR0913
-        _grid_pass(self.shape, *self._terms, self.stencils, self.inverses, self.used, held,
-                   x, b, d, out, keep, step, mode)  # fmt: skip
+        over_rows(_grid_pass, self._lines, 30.0 * self.nodes, self.shape, *self._terms,
+                  self.stencils, self.inverses, self.used, held, x, b, d, out, keep, step,
+                  mode)  # fmt: skip
+
+    def _scale(self, b: Array, out: Array, same: Array, factor: float) -> None:
+        """out = same = factor D^-1 b at the unknowns."""
+        over_rows(_scaled, self._lines, 10.0 * self.nodes, self.shape, self.inverses, self.used,
+                  b, out, same, factor)  # fmt: skip
 
     # ------------------------------------------------------------------ smoothing
     def smooth(self, b: Array, x: Array, held: NDArray[np.bool_], backward: bool) -> None:
@@ -88,8 +100,7 @@ class GridBlocks:
         """The same from x = 0, and r = b - A x."""
         d, other = self._work.x, self._work.b
         first, keep, second = self._chebyshev
-        _scaled(self.shape, self.inverses, self.used, b, d, first)
-        other[:] = d
+        self._scale(b, d, other, first)
         self._pass(other, b, d, x, keep, second, 2, self._free)
         self.residual(x, b, r)
 
@@ -119,7 +130,7 @@ class GridBlocks:
         Ax, size = np.empty_like(x), 1.0
         for _ in range(POWER_STEPS):
             self.times(x, Ax)
-            _scaled(self.shape, self.inverses, self.used, Ax, x, 1.0)
+            self._scale(Ax, x, x, 1.0)
             size = float(np.linalg.norm(x))
             x /= size
         return size
@@ -210,22 +221,23 @@ def _terms(stencils: Array) -> tuple[Array, Index, Index]:
     return tuple(array.reshape(shape) for array in out)  # type: ignore[return-value]
 
 
-@njit(cache=True, error_model="numpy")
-def _scaled(shape, inverses, used, b, out, factor):
-    """out = factor D^-1 b at the unknowns."""
+@njit(cache=True, error_model="numpy", nogil=True)
+def _scaled(begin, end, shape, inverses, used, b, out, same, factor):  # noqa: PLR0913
+    """out = same = factor D^-1 b at the unknowns of the lines begin to end."""
     nz, ny, nx = shape
-    node = 0
-    for z in range(nz):
+    node = begin * nx
+    for line in range(begin, end):
+        z, y = line // ny, line % ny
         cz = 0 if z == 0 else (2 if z == nz - 1 else 1)
-        for y in range(ny):
-            cy = 0 if y == 0 else (2 if y == ny - 1 else 1)
-            for x in range(nx):
-                cx = 0 if x == 0 else (2 if x == nx - 1 else 1)
-                D = inverses[(cz * 3 + cy) * 3 + cx]
-                for a in range(3):
-                    s = D[a, 0] * b[node, 0] + D[a, 1] * b[node, 1] + D[a, 2] * b[node, 2]
-                    out[node, a] = factor * s * used[node, a]
-                node += 1
+        cy = 0 if y == 0 else (2 if y == ny - 1 else 1)
+        for x in range(nx):
+            cx = 0 if x == 0 else (2 if x == nx - 1 else 1)
+            D = inverses[(cz * 3 + cy) * 3 + cx]
+            b0, b1, b2 = b[node, 0], b[node, 1], b[node, 2]
+            for a in range(3):
+                s = factor * (D[a, 0] * b0 + D[a, 1] * b1 + D[a, 2] * b2) * used[node, a]
+                out[node, a], same[node, a] = s, s
+            node += 1
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
@@ -268,53 +280,56 @@ def _end(stencil, buffer, i, a):
     return s
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
-def _grid_pass(shape, values, lines, shifts, stencils, inverses, used, held, x, b, d, out,
+@njit(cache=True, error_model="numpy", fastmath={"contract"}, nogil=True)
+def _grid_pass(begin, end, shape, values, lines, shifts, stencils, inverses, used, held, x, b, d, out,
                keep, step, mode):  # noqa: PLR0913 # fmt: skip
-    """mode 0: out = A x; 1: out = b - A x; 2: d = keep d + step D^-1 (b - A x), out = x + d."""
+    """On the lines begin to end of nodes along x:
+
+    mode 0: out = A x; 1: out = b - A x; 2: d = keep d + step D^-1 (b - A x), out = x + d.
+    """
     nz, ny, nx = shape
     buffer = np.zeros((27, nx + 2))
     acc = np.zeros((3, nx))
-    for z in range(nz):
+    for line in range(begin, end):
+        z, y = line // ny, line % ny
         cz = 0 if z == 0 else (2 if z == nz - 1 else 1)
-        for y in range(ny):
-            cy = 0 if y == 0 else (2 if y == ny - 1 else 1)
-            for dz in range(3):
-                for dy in range(3):
-                    l = 3 * dz + dy
-                    inside = 0 <= z + dz - 1 < nz and 0 <= y + dy - 1 < ny
-                    if not inside:
-                        buffer[3 * l : 3 * l + 3] = 0.0
-                    elif dy < 2 and y > 0:  # was the next line of the one before
-                        buffer[3 * l : 3 * l + 3] = buffer[3 * l + 3 : 3 * l + 6]
-                    else:
-                        _load(x, ((z + dz - 1) * ny + y + dy - 1) * nx, nx, buffer, l)
-            kind = 3 * cz + cy
-            _line(values[kind], lines[kind], shifts[kind], buffer, acc, nx)
-            for a in range(3):
-                acc[a, 0] = _end(stencils[cz, cy, 0], buffer, 0, a)
-                acc[a, nx - 1] = _end(stencils[cz, cy, 2], buffer, nx - 1, a)
-            node = (z * ny + y) * nx
-            for i in range(nx):
-                p = node + i
-                if mode == 0:
-                    for a in range(3):
-                        out[p, a] = acc[a, i] * used[p, a]
-                elif mode == 1:
-                    for a in range(3):
-                        out[p, a] = (b[p, a] - acc[a, i]) * used[p, a]
-                elif held[p]:
-                    for a in range(3):
-                        d[p, a] = 0.0
-                        out[p, a] = x[p, a]
+        cy = 0 if y == 0 else (2 if y == ny - 1 else 1)
+        for dz in range(3):
+            for dy in range(3):
+                l = 3 * dz + dy
+                inside = 0 <= z + dz - 1 < nz and 0 <= y + dy - 1 < ny
+                if not inside:
+                    buffer[3 * l : 3 * l + 3] = 0.0
+                elif dy < 2 and y > 0 and line > begin:  # was the next line of the one before
+                    buffer[3 * l : 3 * l + 3] = buffer[3 * l + 3 : 3 * l + 6]
                 else:
-                    cx = 0 if i == 0 else (2 if i == nx - 1 else 1)
-                    D = inverses[3 * kind + cx]
-                    r0 = (b[p, 0] - acc[0, i]) * used[p, 0]
-                    r1 = (b[p, 1] - acc[1, i]) * used[p, 1]
-                    r2 = (b[p, 2] - acc[2, i]) * used[p, 2]
-                    for a in range(3):
-                        s = D[a, 0] * r0 + D[a, 1] * r1 + D[a, 2] * r2
-                        s = (keep * d[p, a] + step * s) * used[p, a]
-                        d[p, a] = s
-                        out[p, a] = x[p, a] + s
+                    _load(x, ((z + dz - 1) * ny + y + dy - 1) * nx, nx, buffer, l)
+        kind = 3 * cz + cy
+        _line(values[kind], lines[kind], shifts[kind], buffer, acc, nx)
+        for a in range(3):
+            acc[a, 0] = _end(stencils[cz, cy, 0], buffer, 0, a)
+            acc[a, nx - 1] = _end(stencils[cz, cy, 2], buffer, nx - 1, a)
+        node = (z * ny + y) * nx
+        for i in range(nx):
+            p = node + i
+            if mode == 0:
+                for a in range(3):
+                    out[p, a] = acc[a, i] * used[p, a]
+            elif mode == 1:
+                for a in range(3):
+                    out[p, a] = (b[p, a] - acc[a, i]) * used[p, a]
+            elif held[p]:
+                for a in range(3):
+                    d[p, a] = 0.0
+                    out[p, a] = x[p, a]
+            else:
+                cx = 0 if i == 0 else (2 if i == nx - 1 else 1)
+                D = inverses[3 * kind + cx]
+                r0 = (b[p, 0] - acc[0, i]) * used[p, 0]
+                r1 = (b[p, 1] - acc[1, i]) * used[p, 1]
+                r2 = (b[p, 2] - acc[2, i]) * used[p, 2]
+                for a in range(3):
+                    s = D[a, 0] * r0 + D[a, 1] * r1 + D[a, 2] * r2
+                    s = (keep * d[p, a] + step * s) * used[p, a]
+                    d[p, a] = s
+                    out[p, a] = x[p, a] + s

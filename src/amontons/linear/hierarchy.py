@@ -5,30 +5,39 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from .aggregation import Aggregates
+from .chunks import better_numbers
 from .level_matrix import LevelMatrix
 from .node_blocks import DEAD, NodeBlocks
 from .patched import PatchedBlocks, Rows
 from .transfer import Transfer
+from .vectors import advance, dot, norm, turn
 from .work import Work
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Kind = Callable[[LevelMatrix], LevelMatrix]
 COARSEST = 120  # nodes of the level that is solved directly, at most
+COARSEST_UNITS = 60  # aggregates of such a level
 SMALL = 1e-10  # singular values of the coarsest matrix below this part of the largest rest
 
 
 @dataclass(frozen=True, eq=False)
 class Nodes:
-    """Which node and component an unknown is: place (n,), three to a node; count of nodes."""
+    """Which node and component an unknown is: place (n,), three to a node; count of nodes.
+
+    plainly: the same with nodes in the order of the unknowns, where their numbers are others.
+    """
 
     place: Index
     count: int
+    plainly: Nodes | None = None
 
     @classmethod
     def of(cls, component: Index) -> Nodes:
@@ -38,10 +47,26 @@ class Nodes:
         node = np.cumsum(starts) - 1
         return cls(3 * node + component, int(node[-1]) + 1 if len(node) else 0)
 
-    @property
+    @cached_property
     def plain(self) -> bool:
-        """True when every node has its three components."""
-        return 3 * self.count == len(self.place)
+        """True when every node has its three components, in the order of the unknowns."""
+        n = len(self.place)
+        return 3 * self.count == n and bool((self.place == np.arange(n)).all())
+
+    def renumbered(self, number: Index) -> Nodes:
+        """The same with nodes of other numbers, (count,)."""
+        place = 3 * number[self.place // 3] + self.place % 3
+        return Nodes(place, self.count, self.plainly or self)
+
+    def blocks(self, matrix: sparse.sparray) -> NodeBlocks:
+        """The matrix (n, n) of the unknowns in blocks, with ones at padding."""
+        plain = self.plainly or self
+        A = NodeBlocks.from_sparse(matrix, None if plain.plain else plain.place, plain.count)
+        if self.plainly is None:
+            return A
+        number = np.empty(self.count, dtype=np.int64)
+        number[plain.place // 3] = self.place // 3
+        return A.renumbered(number)
 
     @property
     def idle(self) -> Index:
@@ -77,10 +102,13 @@ def components(modes: Array | None, n: int, d: int) -> Index | None:
 
 
 def transfers(
-    levels: Sequence[sparse.csr_array], component: Index
-) -> tuple[list[Transfer], list[Nodes]]:
-    """Given prolongations of unknowns as transfers between nodes, finest first."""
-    nodes, out = [Nodes.of(component)], []
+    levels: Sequence[sparse.csr_array], component: Index, finest: Nodes | None = None
+) -> list[Transfer]:
+    """Given prolongations of unknowns as transfers between nodes, finest first.
+
+    finest: the nodes of the unknowns, where their numbers are others.
+    """
+    nodes, out = [finest or Nodes.of(component)], []
     for level in levels:
         coo = sparse.coo_array(level)
         if not coo.shape[1]:
@@ -96,7 +124,7 @@ def transfers(
         out.append(Transfer.of(tiles, fine.idle, coarse.idle))
         nodes.append(coarse)
         component = coarse_component
-    return out, nodes
+    return out
 
 
 @dataclass(eq=False)
@@ -144,10 +172,14 @@ class Hierarchy:
         component: Index,
         prolongations: Sequence[sparse.csr_array],
         modes: Array | None,
+        nodes: Nodes | None = None,
     ) -> Hierarchy:
-        """Galerkin levels below A; modes (n, k): near-nullspace for the algebraic ones."""
-        given, nodes = transfers(prolongations, component)
-        return cls.on(A, nodes[0], given, modes)
+        """Galerkin levels below A; modes (n, k): near-nullspace for the algebraic ones.
+
+        nodes: those of A, where they are not in the order of the unknowns.
+        """
+        nodes = nodes or Nodes.of(component)
+        return cls.on(A, nodes, transfers(prolongations, component, nodes), modes)
 
     @classmethod
     def on(
@@ -158,20 +190,24 @@ class Hierarchy:
         modes: Array | None,
     ) -> Hierarchy:
         """The same for transfers between nodes."""
-        levels = [Level(A)]
+        levels, number = [Level(A)], None
         for P in given:
             if A.nodes <= 8:
                 break
-            levels[-1].P = P
-            A = A.coarse(P)
-            levels.append(Level(A))
+            number = append_level(levels, P, number)
+            A = levels[-1].A
         geometric = len(levels)
         if A.nodes > COARSEST:
-            A = A.stored()
-            for P in algebraic(A, _coarse_modes(levels, nodes, modes)):
-                levels[-1].P = P
-                A = P.galerkin(A)
-                levels.append(Level(A))
+            fine = A.stored()
+            aggregates = Aggregates(_coarse_modes(levels, nodes, modes))
+            while fine.nodes > COARSEST_UNITS * aggregates.width:
+                found = aggregates.coarsen(fine)
+                if found is None:
+                    break
+                P, aggregates = found
+                number = append_level(levels, P, None, fine, aggregates.width)
+                aggregates = aggregates.renumbered(number)
+                fine = levels[-1].A.stored()
         return cls(levels, geometric, nodes)
 
     def invert_coarsest(self) -> None:
@@ -203,20 +239,18 @@ class Hierarchy:
         """
         r = b.copy()
         x, p, z, Ap = (np.zeros_like(r) for _ in range(4))
-        A, old, goal = self.levels[k].A, 1.0, tolerance * np.linalg.norm(b)
+        size = norm(b)
+        A, old, goal = self.levels[k].A, 1.0, tolerance * size
         for count in range(most):
-            if np.linalg.norm(r) <= goal:
+            if size <= goal:
                 return x, count
             self.cycle(k, r, z)
-            new = np.vdot(r, z)
-            p *= new / old
-            p += z
+            new = dot(r, z)
+            turn(p, new / old, z)
             old = new
             A.times(p, Ap)
-            step = new / np.vdot(p, Ap)
-            x += step * p
-            r -= step * Ap
-        return x, most if np.linalg.norm(r) <= goal else most + 1
+            size = advance(x, r, new / dot(p, Ap), p, Ap)
+        return x, most if size <= goal else most + 1
 
     def estimate(self, b: Array, size: int) -> Array:
         """x of A x = b, (nodes, 3), from the first level of at most `size` nodes alone."""
@@ -246,6 +280,29 @@ class Hierarchy:
         self.cycle(k + 1, below.b, below.x)
         level.P.add(below.x, x)
         A.smooth(b, x, level.free, True)
+
+
+def append_level(
+    levels: list[Level],
+    P: Transfer,
+    number: Index | None,
+    fine: LevelMatrix | None = None,
+    width: int = 1,
+) -> Index | None:
+    """Add the level below P, with numbers of its nodes that let threads sweep it.
+
+    number: what has become of those of the fine nodes, which P has as they were; returns the
+    same of the coarse ones.  fine: the matrix to make the coarse one of, where it is another;
+    width: coarse nodes that stay together.
+    """
+    P = P.renumbered(number, None)
+    A = (fine or levels[-1].A).coarse(P)
+    number = better_numbers(A.indptr, A.indices, width) if isinstance(A, NodeBlocks) else None
+    if number is not None:
+        P, A = P.renumbered(None, number), A.renumbered(number)
+    levels[-1].P = P
+    levels.append(Level(A))
+    return number
 
 
 def inverse_at_rest(A: Array, diagonal: Array, size: Array) -> Array:
@@ -288,23 +345,3 @@ def _coarse_modes(levels: list[Level], nodes: Nodes, modes: Array | None) -> Arr
 
 def _pseudo_inverse(A: Array) -> Array:
     return np.linalg.pinv(A, rcond=SMALL).astype(float, copy=False)
-
-
-def algebraic(A: NodeBlocks, modes: Array) -> list[Transfer]:
-    """Smoothed aggregation (pyamg) below A; modes (3 nodes, k), k made a multiple of 3."""
-    import pyamg
-
-    n = 3 * A.nodes
-    tiles = sparse.bsr_matrix((A.data, A.indices, A.indptr), shape=(n, n))
-    modes = np.column_stack([modes, np.zeros((n, -modes.shape[1] % 3))])
-    hierarchy = pyamg.smoothed_aggregation_solver(
-        tiles, B=modes, improve_candidates=None, max_coarse=COARSEST // 2,
-        presmoother=None, postsmoother=None,
-    )  # fmt: skip
-    none = np.empty(0, dtype=np.int64)
-    out, idle = [], np.flatnonzero(tiles.diagonal() == 0)
-    for level in hierarchy.levels[:-1]:
-        blocks = sparse.bsr_array(level.P.tobsr((3, 3)))
-        out.append(Transfer.of(blocks, idle, none))
-        idle = none
-    return out

@@ -8,7 +8,8 @@ diagonal.  So every compiled loop is written for blocks of 3x3 only.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numba import uint64
@@ -16,6 +17,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..core.compiled import njit
+from ..core.threads import Kernel, Range, over_chunks, over_rows
+from .chunks import chunks_of_sorted
 
 if TYPE_CHECKING:
     from .transfer import Transfer
@@ -110,18 +113,32 @@ class NodeBlocks:
         """Itself."""
         return self
 
+    @cached_property
+    def chunks(self) -> list[Range]:
+        """Ranges of rows that are swept at the same time, every second of them; see `chunks`."""
+        return chunks_of_sorted(self.indptr, self.indices)
+
+    @property
+    def work(self) -> float:
+        """Numbers that a product touches."""
+        return 10.0 * len(self.indices)
+
     def residual(self, x: Array, b: Array, out: Array) -> None:
         """out = b - A x."""
-        residual(self.indptr, self.indices, self.data, x, b, out)
+        arguments = self.indptr, self.indices, self.data, x, b, out
+        over_rows(residual, self.nodes, self.work, *arguments)
 
     def smooth(self, b: Array, x: Array, held: NDArray[np.bool_], backward: bool) -> None:
         """A block Gauss-Seidel sweep on A x = b over the nodes that are not held."""
-        sweep(self.indptr, self.indices, self.data, self.inverse, b, x, held, backward)
+        arguments = (self.indptr, self.indices, self.data, self.inverse, b, x, held, backward)
+        over_stages(sweep, self.chunks, self.work, *arguments, backward=backward)
 
     def first_smooth(self, b: Array, x: Array, r: Array) -> None:
         """A forward sweep from x = 0, and r = b - A x."""
-        first_sweep(self.indptr, self.indices, self.data, self.inverse, b, x)
-        _upper_residual(self.indptr, self.indices, self.data, x, r)
+        A = self.indptr, self.indices, self.data
+        work = 0.5 * self.work
+        over_stages(first_sweep, self.chunks, work, *A, self.inverse, b, x, tell=True)
+        over_stages(_rest, self.chunks, work, *A, x, r, tell=True)
 
     def dense(self) -> Array:
         """The whole matrix, (3 n, 3 n)."""
@@ -130,7 +147,37 @@ class NodeBlocks:
 
     def times(self, x: Array, out: Array) -> None:
         """out = A x, both (nodes, 3)."""
-        product(self.indptr, self.indices, self.data, x, out)
+        arguments = self.indptr, self.indices, self.data, x, out
+        over_rows(product, self.nodes, self.work, *arguments)
+
+    def renumbered(self, number: Index) -> NodeBlocks:
+        """The same with nodes of other numbers, (nodes,)."""
+        order = np.argsort(number)
+        counts = np.diff(self.indptr)[order]
+        indptr = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+        indices, data = np.empty_like(self.indices), np.empty_like(self.data)
+        arguments = self.indptr, self.indices, self.data, order, number, indptr, indices, data
+        over_rows(_renumber, self.nodes, 2.0 * self.work, *arguments)
+        return NodeBlocks(indptr, indices, data, self.inverse[order])
+
+
+def over_stages(
+    kernel: Kernel,
+    chunks: list[Range],
+    work: float,
+    *arguments: Any,
+    backward: bool = False,
+    tell: bool = False,
+) -> None:
+    """kernel(first, last, *arguments) on all even chunks, then on all odd ones.
+
+    backward: the other way round; tell: the kernel is told by a last argument which they are.
+    """
+    for odd in (True, False) if backward else (False, True):
+        some = chunks[odd::2]
+        if some:
+            share = 0.5 * work if len(chunks) > 1 else work
+            over_chunks(kernel, some, share, *arguments, *((odd,) if tell else ()))
 
 
 def with_diagonal(tiles: sparse.bsr_array) -> sparse.bsr_array:
@@ -195,29 +242,45 @@ def row_product(indices, data, x, first, last):
     return s0, s1, s2
 
 
-@njit(cache=True, error_model="numpy")
-def product(indptr, indices, data, x, out):
+@njit(cache=True, error_model="numpy", nogil=True)
+def _renumber(begin, end, indptr, indices, data, order, number, new_ptr, new_indices, new_data):  # noqa: PLR0913
+    """Rows begin to end of the renumbered matrix, columns in ascending order."""
+    for i in range(begin, end):
+        first, to = indptr[order[i]], new_ptr[i]
+        count = new_ptr[i + 1] - to
+        columns = np.empty(count, np.int64)
+        for k in range(count):
+            columns[k] = number[indices[first + k]]
+        places = np.argsort(columns)
+        for k in range(count):
+            new_indices[to + k] = columns[places[k]]
+            for a in range(3):
+                for b in range(3):
+                    new_data[to + k, a, b] = data[first + places[k], a, b]
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def product(begin, end, indptr, indices, data, x, out):  # noqa: PLR0913
     """out = A x."""
-    for i in range(len(indptr) - 1):
+    for i in range(begin, end):
         out[i, 0], out[i, 1], out[i, 2] = row_product(
             indices, data, x, uint64(indptr[i]), uint64(indptr[i + 1])
         )
 
 
-@njit(cache=True, error_model="numpy")
-def residual(indptr, indices, data, x, b, out):
+@njit(cache=True, error_model="numpy", nogil=True)
+def residual(begin, end, indptr, indices, data, x, b, out):  # noqa: PLR0913
     """out = b - A x."""
-    for i in range(len(indptr) - 1):
+    for i in range(begin, end):
         s0, s1, s2 = row_product(indices, data, x, uint64(indptr[i]), uint64(indptr[i + 1]))
         out[i, 0], out[i, 1], out[i, 2] = b[i, 0] - s0, b[i, 1] - s1, b[i, 2] - s2
 
 
-@njit(cache=True, error_model="numpy")
-def sweep(indptr, indices, data, inverse, b, x, held, backward):  # noqa: PLR0913
-    """One block Gauss-Seidel sweep on A x = b over all nodes that are not held."""
-    n = len(indptr) - 1
-    for step in range(n):
-        i = uint64(n - 1 - step if backward else step)
+@njit(cache=True, error_model="numpy", nogil=True)
+def sweep(begin, end, indptr, indices, data, inverse, b, x, held, backward):  # noqa: PLR0913
+    """A block Gauss-Seidel sweep on A x = b over the nodes of a chunk that are not held."""
+    for step in range(end - begin):
+        i = uint64(end - 1 - step if backward else begin + step)
         if held[i]:
             continue
         s0, s1, s2 = row_product(indices, data, x, uint64(indptr[i]), uint64(indptr[i + 1]))
@@ -227,27 +290,61 @@ def sweep(indptr, indices, data, inverse, b, x, held, backward):  # noqa: PLR091
         x[i, 2] += inverse[i, 2, 0] * r0 + inverse[i, 2, 1] * r1 + inverse[i, 2, 2] * r2
 
 
-@njit(cache=True, error_model="numpy")
-def first_sweep(indptr, indices, data, inverse, b, x):  # noqa: PLR0913
-    """A forward sweep from x = 0, which reads only the lower triangle."""
-    for i in range(len(indptr) - 1):
-        last = uint64(indptr[i])
-        while last < uint64(indptr[i + 1]) and indices[last] < i:
-            last += uint64(1)
-        s0, s1, s2 = row_product(indices, data, x, uint64(indptr[i]), last)
+@njit(cache=True, error_model="numpy", inline="always")
+def visited_product(indices, data, x, first, last, i, begin, end, odd):  # noqa: PLR0913
+    """Row i, entries first to last, times x at the nodes that a forward sweep visits before i.
+
+    Those are earlier ones of the chunk begin to end, and in an odd one all of other chunks.
+    """
+    stop = first
+    while stop < last and indices[stop] < i:
+        stop += uint64(1)
+    if not odd:
+        while first < stop and indices[first] < begin:
+            first += uint64(1)
+        return row_product(indices, data, x, first, stop)
+    s0, s1, s2 = row_product(indices, data, x, first, stop)
+    after = last
+    while after > stop and indices[after - uint64(1)] >= end:
+        after -= uint64(1)
+    t0, t1, t2 = row_product(indices, data, x, after, last)
+    return s0 + t0, s1 + t1, s2 + t2
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def later_product(indices, data, x, first, last, i, begin, end, odd):  # noqa: PLR0913
+    """The same at the nodes that it visits after i."""
+    start = last
+    while start > first and indices[start - uint64(1)] > i:
+        start -= uint64(1)
+    if odd:
+        while last > start and indices[last - uint64(1)] >= end:
+            last -= uint64(1)
+        return row_product(indices, data, x, start, last)
+    s0, s1, s2 = row_product(indices, data, x, start, last)
+    before = first
+    while before < start and indices[before] < begin:
+        before += uint64(1)
+    t0, t1, t2 = row_product(indices, data, x, first, before)
+    return s0 + t0, s1 + t1, s2 + t2
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def first_sweep(begin, end, indptr, indices, data, inverse, b, x, odd):  # noqa: PLR0913
+    """A forward sweep from x = 0, which reads only what was visited before."""
+    for i in range(begin, end):
+        first, last = uint64(indptr[i]), uint64(indptr[i + 1])
+        s0, s1, s2 = visited_product(indices, data, x, first, last, i, begin, end, odd)
         r0, r1, r2 = b[i, 0] - s0, b[i, 1] - s1, b[i, 2] - s2
         x[i, 0] = inverse[i, 0, 0] * r0 + inverse[i, 0, 1] * r1 + inverse[i, 0, 2] * r2
         x[i, 1] = inverse[i, 1, 0] * r0 + inverse[i, 1, 1] * r1 + inverse[i, 1, 2] * r2
         x[i, 2] = inverse[i, 2, 0] * r0 + inverse[i, 2, 1] * r1 + inverse[i, 2, 2] * r2
 
 
-@njit(cache=True, error_model="numpy")
-def _upper_residual(indptr, indices, data, x, out):
-    """b - A x after `first_sweep`: minus the upper triangle times x."""
-    for i in range(len(indptr) - 1):
-        last = uint64(indptr[i + 1])
-        first = last
-        while first > uint64(indptr[i]) and indices[first - uint64(1)] > i:
-            first -= uint64(1)
-        s0, s1, s2 = row_product(indices, data, x, first, last)
+@njit(cache=True, error_model="numpy", nogil=True)
+def _rest(begin, end, indptr, indices, data, x, out, odd):  # noqa: PLR0913
+    """b - A x after `first_sweep`: minus what was visited later, times x."""
+    for i in range(begin, end):
+        first, last = uint64(indptr[i]), uint64(indptr[i + 1])
+        s0, s1, s2 = later_product(indices, data, x, first, last, i, begin, end, odd)
         out[i, 0], out[i, 1], out[i, 2] = -s0, -s1, -s2

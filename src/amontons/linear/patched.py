@@ -13,7 +13,13 @@ from numba import uint64
 from numpy.typing import NDArray
 
 from ..core.compiled import njit
-from .node_blocks import NodeBlocks, row_product
+from .node_blocks import (
+    NodeBlocks,
+    later_product,
+    over_stages,
+    row_product,
+    visited_product,
+)
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -67,11 +73,15 @@ class PatchedBlocks:
 
     def smooth(self, b: Array, x: Array, held: NDArray[np.bool_], backward: bool) -> None:
         """A block Gauss-Seidel sweep on A x = b over the nodes that are not held."""
-        _sweep(*self._arrays, b, x, held, backward)
+        over_stages(_sweep, self.base.chunks, self.base.work, *self._arrays, b, x, held,
+                    backward, backward=backward)  # fmt: skip
 
     def first_smooth(self, b: Array, x: Array, r: Array) -> None:
         """A forward sweep from x = 0, and r = b - A x."""
-        _first_sweep(*self._arrays, b, x, r)
+        chunks, work = self.base.chunks, 0.5 * self.base.work
+        x[:] = 0.0
+        over_stages(_first_sweep, chunks, work, *self._arrays, b, x, tell=True)
+        over_stages(_rest, chunks, work, *self._arrays, x, r, tell=True)
 
     def stored(self) -> NodeBlocks:
         """The whole matrix, copied."""
@@ -89,12 +99,11 @@ def _relax(D, b, s, x, i):
     x[i, 2] += D[2, 0] * r0 + D[2, 1] * r1 + D[2, 2] * r2
 
 
-@njit(cache=True, error_model="numpy")
-def _sweep(number, indptr, indices, data, inverse, own_ptr, own_indices, own_data, own_inverse,
-           b, x, held, backward):  # noqa: PLR0913 # fmt: skip
-    n = len(indptr) - 1
-    for step in range(n):
-        i = uint64(n - 1 - step if backward else step)
+@njit(cache=True, error_model="numpy", nogil=True)
+def _sweep(begin, end, number, indptr, indices, data, inverse, own_ptr, own_indices, own_data,
+           own_inverse, b, x, held, backward):  # noqa: PLR0913 # fmt: skip
+    for step in range(end - begin):
+        i = uint64(end - 1 - step if backward else begin + step)
         if held[i]:
             continue
         k = number[i]
@@ -107,36 +116,32 @@ def _sweep(number, indptr, indices, data, inverse, own_ptr, own_indices, own_dat
             _relax(own_inverse[k], b, s, x, i)
 
 
-@njit(cache=True, error_model="numpy")
-def _first_sweep(number, indptr, indices, data, inverse, own_ptr, own_indices, own_data,
-                 own_inverse, b, x, r):  # noqa: PLR0913 # fmt: skip
-    """A sweep from 0 reads the lower triangle; what is left is minus the upper one times x."""
-    n = len(indptr) - 1
-    x[:] = 0.0
-    for i in range(n):
+@njit(cache=True, error_model="numpy", nogil=True)
+def _first_sweep(begin, end, number, indptr, indices, data, inverse, own_ptr, own_indices,
+                 own_data, own_inverse, b, x, odd):  # noqa: PLR0913 # fmt: skip
+    """From x = 0, which reads only what was visited before."""
+    for i in range(begin, end):
         k = number[i]
         if k < 0:
-            last = uint64(indptr[i])
-            while last < uint64(indptr[i + 1]) and indices[last] < i:
-                last += uint64(1)
-            s = row_product(indices, data, x, uint64(indptr[i]), last)
+            first, last = uint64(indptr[i]), uint64(indptr[i + 1])
+            s = visited_product(indices, data, x, first, last, i, begin, end, odd)
             _relax(inverse[i], b, s, x, i)
         else:
-            last = uint64(own_ptr[k])
-            while last < uint64(own_ptr[k + 1]) and own_indices[last] < i:
-                last += uint64(1)
-            s = row_product(own_indices, own_data, x, uint64(own_ptr[k]), last)
+            first, last = uint64(own_ptr[k]), uint64(own_ptr[k + 1])
+            s = visited_product(own_indices, own_data, x, first, last, i, begin, end, odd)
             _relax(own_inverse[k], b, s, x, i)
-    for i in range(n):
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _rest(begin, end, number, indptr, indices, data, inverse, own_ptr, own_indices, own_data,
+          own_inverse, x, r, odd):  # noqa: PLR0913 # fmt: skip
+    """What is left then: minus what was visited later, times x."""
+    for i in range(begin, end):
         k = number[i]
         if k < 0:
-            first = last = uint64(indptr[i + 1])
-            while first > uint64(indptr[i]) and indices[first - uint64(1)] > i:
-                first -= uint64(1)
-            s = row_product(indices, data, x, first, last)
+            first, last = uint64(indptr[i]), uint64(indptr[i + 1])
+            s = later_product(indices, data, x, first, last, i, begin, end, odd)
         else:
-            first = last = uint64(own_ptr[k + 1])
-            while first > uint64(own_ptr[k]) and own_indices[first - uint64(1)] > i:
-                first -= uint64(1)
-            s = row_product(own_indices, own_data, x, first, last)
+            first, last = uint64(own_ptr[k]), uint64(own_ptr[k + 1])
+            s = later_product(own_indices, own_data, x, first, last, i, begin, end, odd)
         r[i, 0], r[i, 1], r[i, 2] = -s[0], -s[1], -s[2]

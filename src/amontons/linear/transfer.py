@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numba import uint64
@@ -10,7 +11,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..core.compiled import njit
-from .node_blocks import NodeBlocks, with_diagonal
+from ..core.threads import over_rows
+from .node_blocks import NodeBlocks, row_product, with_diagonal
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -106,12 +108,41 @@ class Transfer:
         out.eliminate_zeros()
         return out
 
+    def renumbered(self, fine: Index | None, coarse: Index | None) -> Transfer:
+        """The same between nodes of other numbers: new numbers of both, None: the old ones."""
+        if fine is None and coarse is None:
+            return self
+        fine = np.arange(self.fine) if fine is None else fine
+        coarse = np.arange(self.coarse) if coarse is None else coarse
+        order, counts = np.argsort(fine), np.diff(self.indptr)
+        row = np.repeat(fine, counts)
+        column = coarse[self.indices]
+        entry = np.lexsort((column, row))
+        return Transfer(
+            np.concatenate([[0], np.cumsum(counts[order])]).astype(np.int32),
+            column[entry].astype(np.int32),
+            self.weights[entry] if len(self.weights) else self.weights,
+            self.blocks[entry] if len(self.blocks) else self.blocks,
+            np.sort(3 * fine[self.idle // 3] + self.idle % 3),
+            np.sort(3 * coarse[self.coarse_idle // 3] + self.coarse_idle % 3),
+            self.coarse,
+        )
+
+    @cached_property
+    def _columns(self) -> tuple[NDArray[np.int32], NDArray[np.int32], Array]:
+        """P^T by rows: pointers (coarse + 1,), fine nodes and values (k,)."""
+        start, row, place = _by_columns(self.indptr, self.indices, self.coarse)
+        if not len(self.blocks):
+            return start, row, self.weights[place]
+        return start, row, np.ascontiguousarray(self.blocks[place].swapaxes(1, 2))
+
     def add(self, coarse: Array, fine: Array) -> None:
         """fine += P coarse, (nodes, 3)."""
+        values, kernel = self.weights, _add
         if len(self.blocks):
-            _add_blocks(self.indptr, self.indices, self.blocks, coarse, fine)
-        else:
-            _add(self.indptr, self.indices, self.weights, coarse, fine)
+            values, kernel = self.blocks, _add_blocks
+        work = 6.0 * self.fine + 2.0 * values.size
+        over_rows(kernel, self.fine, work, self.indptr, self.indices, values, coarse, fine)
         if self.idle.size:
             fine.reshape(-1)[self.idle] = 0.0
 
@@ -119,11 +150,10 @@ class Transfer:
         """coarse = P^T fine; padding of both is left out."""
         if self.idle.size:
             fine.reshape(-1)[self.idle] = 0.0
-        coarse[:] = 0.0
-        if len(self.blocks):
-            _restrict_blocks(self.indptr, self.indices, self.blocks, fine, coarse)
-        else:
-            _restrict(self.indptr, self.indices, self.weights, fine, coarse)
+        start, row, values = self._columns
+        kernel = _restrict_blocks if len(self.blocks) else _restrict
+        work = 6.0 * self.fine + 2.0 * values.size
+        over_rows(kernel, self.coarse, work, start, row, values, fine, coarse)
         if self.coarse_idle.size:
             coarse.reshape(-1)[self.coarse_idle] = 0.0
 
@@ -258,9 +288,27 @@ def _sort_rows(ptr, idx, data):
         data[first:last] = data[first:last][order]
 
 
-@njit(cache=True, error_model="numpy")
-def _add(indptr, indices, weights, coarse, fine):
+@njit(cache=True)
+def _by_columns(indptr, indices, columns):
+    """Pointers, rows and places of the entries of compressed rows, column after column."""
+    start = np.zeros(columns + 1, np.int32)
+    for k in range(len(indices)):
+        start[indices[k] + 1] += 1
+    for j in range(columns):
+        start[j + 1] += start[j]
+    to = start[:-1].copy()
+    row, place = np.empty(len(indices), np.int32), np.empty(len(indices), np.int32)
     for i in range(len(indptr) - 1):
+        for k in range(indptr[i], indptr[i + 1]):
+            at = to[indices[k]]
+            to[indices[k]] += 1
+            row[at], place[at] = i, k
+    return start, row, place
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _add(begin, end, indptr, indices, weights, coarse, fine):  # noqa: PLR0913
+    for i in range(begin, end):
         s0, s1, s2 = 0.0, 0.0, 0.0
         for k in range(uint64(indptr[i]), uint64(indptr[i + 1])):
             j, w = uint64(indices[k]), weights[k]
@@ -272,32 +320,32 @@ def _add(indptr, indices, weights, coarse, fine):
         fine[i, 2] += s2
 
 
-@njit(cache=True, error_model="numpy")
-def _restrict(indptr, indices, weights, fine, coarse):
-    for i in range(len(indptr) - 1):
-        x0, x1, x2 = fine[i, 0], fine[i, 1], fine[i, 2]
-        for k in range(uint64(indptr[i]), uint64(indptr[i + 1])):
-            j, w = uint64(indices[k]), weights[k]
-            coarse[j, 0] += w * x0
-            coarse[j, 1] += w * x1
-            coarse[j, 2] += w * x2
+@njit(cache=True, error_model="numpy", nogil=True)
+def _restrict(begin, end, start, row, weights, fine, coarse):  # noqa: PLR0913
+    for j in range(begin, end):
+        s0, s1, s2 = 0.0, 0.0, 0.0
+        for k in range(uint64(start[j]), uint64(start[j + 1])):
+            i, w = uint64(row[k]), weights[k]
+            s0 += w * fine[i, 0]
+            s1 += w * fine[i, 1]
+            s2 += w * fine[i, 2]
+        coarse[j, 0], coarse[j, 1], coarse[j, 2] = s0, s1, s2
 
 
-@njit(cache=True, error_model="numpy")
-def _add_blocks(indptr, indices, blocks, coarse, fine):
-    for i in range(len(indptr) - 1):
-        for k in range(indptr[i], indptr[i + 1]):
-            j = indices[k]
-            for a in range(3):
-                for b in range(3):
-                    fine[i, a] += blocks[k, a, b] * coarse[j, b]
+@njit(cache=True, error_model="numpy", nogil=True)
+def _add_blocks(begin, end, indptr, indices, blocks, coarse, fine):  # noqa: PLR0913
+    for i in range(begin, end):
+        s0, s1, s2 = row_product(
+            indices, blocks, coarse, uint64(indptr[i]), uint64(indptr[i + 1])
+        )
+        fine[i, 0] += s0
+        fine[i, 1] += s1
+        fine[i, 2] += s2
 
 
-@njit(cache=True, error_model="numpy")
-def _restrict_blocks(indptr, indices, blocks, fine, coarse):
-    for i in range(len(indptr) - 1):
-        for k in range(indptr[i], indptr[i + 1]):
-            j = indices[k]
-            for a in range(3):
-                for b in range(3):
-                    coarse[j, b] += blocks[k, a, b] * fine[i, a]
+@njit(cache=True, error_model="numpy", nogil=True)
+def _restrict_blocks(begin, end, start, row, blocks, fine, coarse):  # noqa: PLR0913
+    for j in range(begin, end):
+        coarse[j, 0], coarse[j, 1], coarse[j, 2] = row_product(
+            row, blocks, fine, uint64(start[j]), uint64(start[j + 1])
+        )

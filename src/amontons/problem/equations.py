@@ -259,6 +259,11 @@ class Equations(Matrices):
         """
         return self._shared.once(make, (self.M, self.H, self.W), self)
 
+    def kept_of_pattern(self, make: Callable[[Self], T]) -> T:
+        """The same of where the blocks of W are, for all variants that have them there."""
+        sources = (self.blocks.indptr, self.blocks.indices)
+        return self._shared.once(make, sources, self)
+
     def accepted(
         self, r: Array, v: Array | None, error: float, tolerance: float
     ) -> Accepted:
@@ -284,10 +289,11 @@ class Equations(Matrices):
     @of_plain
     def assessed(self, r: Array) -> Assessed:
         """All that is asked of reactions that may have converged (Delassus form only)."""
-        return assessed(self.kernel_data, kernel_rows(r), self._floor, self.q_norm)
+        return assessed(self.kernel_data, kernel_rows(r), self.floor, self.q_norm)
 
     @cached_property
-    def _floor(self) -> Array:
+    def floor(self) -> Array:
+        """What is added to the scale of each contact in its error, (nc,), unit of u."""
         return self.blur if self.blur is not None else np.zeros(self.contacts)
 
     @of_plain

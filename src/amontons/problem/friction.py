@@ -165,12 +165,7 @@ class FrictionProblem(Told, Equations):
         _check_name(name)
         q = contact_rows("q", q, len(law))
         check_dimension(law, q.shape[1])
-        if sparse.issparse(W):
-            W = sparse_rows("W", W)
-            expect_shape("W", W.shape, (q.size, q.size))
-        else:
-            W = numbers("W", cast(Array, W), (q.size, q.size))
-        problem = cls(law, W=W, q=q, name=name)
+        problem = cls(law, W=_checked(W, q.size), q=q, name=name)
         _ = problem.kernel_data, problem.blocks.eliminated  # once, not in the first solve
         return problem
 
@@ -206,6 +201,37 @@ class FrictionProblem(Told, Equations):
         q = contact_rows("q", load, self.contacts)
         expect_shape("q", q.shape, (self.contacts, self.dimension))
         return replace(self, q=q, blur=None)
+
+    def update(
+        self, *, W: Matrix | None = None, q: ArrayLike | None = None,
+        mu: ArrayLike | None = None,
+    ) -> FrictionProblem:  # fmt: skip
+        """The problem of the next step: another W, q or mu, what is not given as it is.
+
+        Delassus form; shapes as of `from_delassus`, the number of contacts stays.  Where the
+        blocks of W stand where they stood, what was made of their places is kept: the order of
+        Newton's elimination and its fill.  A W of another pattern is analysed anew.
+        Raises InvalidInput, which names the argument; UnsupportedForm in the global form.
+        """
+        self._need(Form.DELASSUS)
+        problem = self
+        if W is not None:
+            problem = problem._with_W(W)
+        if q is not None:
+            problem = problem.with_load(q)
+        return problem if mu is None else problem.with_mu(mu)
+
+    def _with_W(self, W: Matrix) -> FrictionProblem:
+        """The problem with another W, whose blocks share the places of those before."""
+        assert self.q is not None
+        given = _checked(W, self.q.size)
+        old, new = self.blocks, block_rows(given, self.dimension)
+        alike = np.array_equal(old.indptr, new.indptr)
+        if alike and np.array_equal(old.indices, new.indices):
+            new = BlockRows(old.indptr, old.indices, new.data, old.diagonal)
+        problem = replace(self, W=given, blur=None)
+        problem._shared.put(block_rows, (given,), new)
+        return problem
 
     def with_hierarchy(self, hierarchy: Hierarchy) -> FrictionProblem:
         """The same problem with multigrid levels of one's own for M (global form)."""
@@ -331,6 +357,15 @@ class FrictionProblem(Told, Equations):
     def fresh(self) -> FrictionProblem:
         """The same problem with nothing prepared: no factor, no W."""
         return replace(self, _shared=Prepared())
+
+
+def _checked(W: Matrix, size: int) -> Any:
+    """A read-only copy of W, (size, size)."""
+    if not sparse.issparse(W):
+        return numbers("W", cast(Array, W), (size, size))
+    W = sparse_rows("W", W)
+    expect_shape("W", W.shape, (size, size))
+    return W
 
 
 def _alone(problem: FrictionProblem) -> tuple[FrictionProblem, NDArray[np.int64]]:

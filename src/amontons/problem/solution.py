@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.errors import SingularOperator
-from ..core.faces import Shown
+from ..core.faces import Differentiated, Shown
 from ..core.warned import ResultWarning
 from .judge import measures as judge
 from .judge.measures import Measure
@@ -159,12 +159,14 @@ class Convergence(Shown):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FrictionSolution(Shown):
+class FrictionSolution(Differentiated):
     """Reactions and velocities of a discrete problem, and what they mean.
 
     r, u: (nc, d) in the local frames; v: (n,) or None in the Delassus form; warnings: reasons
     to doubt a result that has converged; settled: the statuses that a converged r keeps to,
     told in the form in which it was solved, so that another form does not tell others.
+    follows: the law of which that of the problem has the coefficients at this state, None where
+    they are given.
     """
 
     problem: Problem
@@ -174,6 +176,7 @@ class FrictionSolution(Shown):
     convergence: Convergence
     warnings: tuple[ResultWarning, ...] = ()
     settled: Settled | None = None
+    follows: Law | None = None
 
     @cached_property
     def _classified(self) -> tuple[NDArray[np.int8], NDArray[np.bool_], Array]:

@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.compiled import njit
+from ..core.threads import BLOCK, over_blocks
+from ..linear.vectors import blocks_of
 
 Array = NDArray[np.float64]
 RANK = 1e-13  # is added to the diagonal of the scaled Gram matrix
@@ -32,28 +34,30 @@ class Anderson:
             return
         slot = max(self.count, 0) % self.depth
         used = min(self.count + 1, self.depth) if self.count >= 0 else 0
-        dots = np.zeros(self.depth)
-        row = np.zeros(self.depth)
-        _record(x, image, self.last_step, self.last_image, self.steps, self.images, slot, used,
-                row, dots)  # fmt: skip
+        sums = np.empty((blocks_of(len(x)), used, 2))
+        over_blocks(
+            _record, len(x), (3.0 + 3 * used) * len(x), x, image, self.last_step,
+            self.last_image, self.steps, self.images, slot, used, sums,
+        )  # fmt: skip
+        row, dots = np.add.reduce(sums, axis=0).T
         self.count += 1
         if not used:
             return
-        self.gram[slot, :used] = self.gram[:used, slot] = row[:used]
+        self.gram[slot, :used] = self.gram[:used, slot] = row
         scale = 1 / np.sqrt(np.maximum(np.diag(self.gram)[:used], np.finfo(float).tiny))
         gram = self.gram[:used, :used] * np.outer(scale, scale)
         if not (np.isfinite(gram).all() and np.isfinite(dots).all()):
             return
-        weights = scale * np.linalg.solve(gram + RANK * np.eye(used), scale * dots[:used])
-        _combine(image, self.images, weights)
+        weights = scale * np.linalg.solve(gram + RANK * np.eye(used), scale * dots)
+        work = (1.0 + used) * len(image)
+        over_blocks(_combine, len(image), work, image, self.images, weights)
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
-def _record(x, image, last_step, last_image, steps, images, slot, used, row, dots):  # noqa: PLR0913
-    """Store the newest differences; row: their products with all steps, dots: with g(x) - x."""
-    CHUNK = 4096
-    for first in range(0, len(x), CHUNK):
-        last = min(first + CHUNK, len(x))
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
+def _record(begin, end, x, image, last_step, last_image, steps, images, slot, used, sums):  # noqa: PLR0913
+    """Store the newest differences; their products with all steps, and those of g(x) - x."""
+    for first in range(begin, end, BLOCK):
+        last = min(first + BLOCK, end)
         for i in range(first, last):
             step = image[i] - x[i]
             if used:
@@ -66,15 +70,13 @@ def _record(x, image, last_step, last_image, steps, images, slot, used, row, dot
             for i in range(first, last):
                 a += steps[k, i] * steps[slot, i]
                 b += steps[k, i] * last_step[i]
-            row[k] += a
-            dots[k] += b
+            sums[first // BLOCK, k, 0], sums[first // BLOCK, k, 1] = a, b
 
 
-@njit(cache=True, error_model="numpy")
-def _combine(image, images, weights):
-    CHUNK = 4096
-    for first in range(0, len(image), CHUNK):
-        last = min(first + CHUNK, len(image))
+@njit(cache=True, error_model="numpy", nogil=True)
+def _combine(begin, end, image, images, weights):
+    for first in range(begin, end, BLOCK):
+        last = min(first + BLOCK, end)
         for k in range(len(weights)):
             w = weights[k]
             for i in range(first, last):

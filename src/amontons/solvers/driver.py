@@ -15,6 +15,7 @@ from ..problem.protocol import Problem
 from ..problem.solution import FrictionSolution, Outcome
 from . import Auto
 from .asked import PATIENCE, Asked, Callback
+from .at_once import at_once
 from .changed_law import changed_law
 from .contract import Iterate, Solver, check_solver, fitted
 from .first_iterate import as_it_is, first_iterate, own_motion
@@ -91,6 +92,9 @@ def drive_as_asked(
     """The solve that `drive` makes; `taken` makes of an iterate what is judged of it."""
     solver = solver if solver is not None else Auto()
     if isinstance(solver, Auto):
+        found = at_once(problem, asked, start) if taken is own_motion else None
+        if found is not None:
+            return found
         solver = solver.choice(problem)
     check_solver(solver)
     if problem.law.varies or problem.plain is not problem:

@@ -231,7 +231,7 @@ def _whole(
     )  # fmt: skip
     own: Any = found.problem
     frozen = replace(own, law=problem.law.frozen(found.r, found.u))
-    return replace(found, problem=frozen, convergence=record)
+    return replace(found, problem=frozen, convergence=record, follows=problem.law)
 
 
 def _after(before: Step | None, step: Step) -> Step:

@@ -146,8 +146,6 @@ def test_patch(swap, mu):
 def test_what_two_bodies_do_not_have_is_said():
     with pytest.raises(am.UnsupportedForm, match="method='mortar'"):
         am.solve(two_blocks((0, -0.1), mu=0.1, method="nodal"))
-    with pytest.raises(am.UnsupportedLaw, match="ties"):
-        am.solve(two_blocks((0, -0.1), mu=None, tied=True))
 
 
 def test_meetings_outlast_a_step():

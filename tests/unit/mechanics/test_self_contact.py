@@ -2,34 +2,11 @@
 
 import numpy as np
 import pytest
+from folded_meshes import fork
 
 import amontons as am
 
 SOFT = am.LinearElastic(1000.0, 0.3)
-
-
-def fork(gap, cells=(12, 4)):
-    """Two beams 3 x 1 joined at the left, a slot between them, symmetric about y = 0.
-
-    One mesh: the columns of the left third go through, the others leave the slot open.
-    """
-    parts = []
-    for sign in (1, -1):
-        mesh = am.box((3, 1), cells)
-        y = gap / 2 + mesh.points[:, 1]
-        parts.append((np.stack([mesh.points[:, 0], sign * y], axis=1), mesh.cells[0].nodes))
-    bridge = am.box((1, gap), (cells[0] // 3, 2))
-    parts.append((np.stack([bridge.points[:, 0], bridge.points[:, 1] - gap / 2], axis=1),
-                  bridge.cells[0].nodes))  # fmt: skip
-    points = np.concatenate([p for p, _ in parts])
-    starts = np.cumsum([0, *(len(p) for p, _ in parts)])
-    nodes = np.concatenate([c + s for (_, c), s in zip(parts, starts, strict=False)])
-    _, first, same = np.unique(points.round(9), axis=0, return_index=True, return_inverse=True)
-    kept = points[first]
-    return am.Mesh(kept, (am.Cells("quad", same.ravel()[nodes]),),
-                   node_sets={"left": np.flatnonzero(kept[:, 0] < 1e-9),
-                              "up": np.flatnonzero(kept[:, 1] > gap / 2 + 1 - 1e-9),
-                              "down": np.flatnonzero(kept[:, 1] < -gap / 2 - 1 + 1e-9)})
 
 
 def closed(mesh, contacts, bodies):

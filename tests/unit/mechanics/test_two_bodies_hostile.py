@@ -116,13 +116,13 @@ def test_a_path_that_ends_keeps_its_last_state():
 
 
 def test_two_masters():
-    """One slave of both is told how else; both as slaves of one master are solved."""
+    """One slave of both, and both as slaves of one master."""
     parts = [*bodies(), am.Body(am.box((1, 1), 5, origin=(1.5, -1)), NEO, name="end")]
     supports = [am.Fix("upper.top", (1.2, -0.05)), am.Fix("end.bottom", 0)]
     sides = (("upper.bottom", "lower.top"), ("upper.bottom", "end.top"))
-    with pytest.raises(am.UnsupportedForm, match="let the masters be the slaves"):
-        am.solve(model(parts, *supports, contacts=[
-            am.Contact(one, master=other, mu=0.1) for one, other in sides]))  # fmt: skip
+    straight = am.solve(model(parts, *supports, contacts=[
+        am.Contact(one, master=other, mu=0.1) for one, other in sides]))  # fmt: skip
+    assert straight.converged
     turned = [am.Contact(other, master=one, mu=0.1) for one, other in sides]
     way = (lambda x, t: 1.2 * max(t - 1, 0), lambda x, t: -0.05 * min(t, 1))
     top = am.Fix("upper.top", way)
@@ -132,3 +132,86 @@ def test_two_masters():
     normal = last.state.force[:, 0]
     assert normal[:first].sum() > 0.005
     assert normal[first:].sum() > 0.005
+
+
+# ------------------------------------------------------------- words, and the last good state
+BEYOND = 2.0  # square of the stretch beyond which the energy below is not a number
+
+
+def brittle():
+    """C:C / 4 and the like of Saint Venant and Kirchhoff, not a number beyond a stretch."""
+    one = np.eye(3)
+    symmetric = (np.einsum("ik,jl->ijkl", one, one) + np.einsum("il,jk->ijkl", one, one)) / 2
+    stiff = np.einsum("ij,kl->ijkl", one, one) + symmetric
+
+    def torn(C, values):
+        far = np.linalg.eigvalsh(C)[:, -1] > BEYOND
+        values = np.array(values)
+        values[far] = np.nan
+        return values
+
+    def stress(C):
+        return torn(C, np.einsum("ijkl,nkl->nij", stiff, (C - one) / 2))
+
+    def energy(C):
+        return np.einsum("nij,nij->n", stress(C), C - one) / 4
+
+    def moduli(C):
+        return torn(C, np.broadcast_to(stiff, (len(C), 3, 3, 3, 3)))
+
+    return am.UserEnergy(energy, stress, moduli, name="glass")
+
+
+def ending(what):
+    """A model whose path ends at some time, and which words tell where."""
+    lower, upper = bodies()
+    if what == "pressed flat":
+        down = am.Fix("upper.top", (0, lambda x, t: -2.2 * t))
+        return model([lower, upper], down), "cell .* of body 'lower' is pressed to det F"
+    if what == "not a number":
+        torn = am.Body(upper.mesh, brittle(), name="upper")
+        held = [am.Fix("upper.left", (0, -0.02)),
+                am.Fix("upper.right", (lambda x, t: t, -0.02))]  # fmt: skip
+        return model([lower, torn], *held), "glass: .* not a finite number .* of body 'upper'"
+    load = am.Traction("upper.top", lambda x, t: (0, -0.02 * min(4 * t, 1)))
+    held = am.Fix("upper.top", (lambda x, t: 2.4 * max(t - 0.25, 0), None))
+    return model([lower, upper], held, loads=[load]), "no equilibrium .* faces 'lower.top'"
+
+
+@pytest.mark.parametrize("what", ["pressed flat", "not a number", "off the edge"])
+def test_an_end_is_told_and_leaves_no_trace(what):
+    """In words that name the place; from the last state on all goes as if nobody had tried."""
+    hostile, words = ending(what)
+    kept, quick = [], am.NonlinearNewton(smallest_share=0.2, patience=6)
+
+    def go():
+        for step in am.evolve(hostile, am.QuasiStatic(0.125), until=1.5, solver=quick):
+            kept.append(step)  # noqa: PERF402  # it ends on the way
+
+    with pytest.raises(am.NotConverged, match=words) as told:
+        go()
+    assert kept
+    assert np.isfinite(told.value.solution.v).all()
+    last = kept[-2].state
+    found = [next(am.evolve(each, am.QuasiStatic(0.125), until=9.0, start=last)).state
+             for each in (hostile, ending(what)[0])]  # fmt: skip
+    for state in found:
+        np.testing.assert_array_equal(state.displacement, kept[-1].state.displacement)
+        np.testing.assert_array_equal(state.force, kept[-1].state.force)
+
+
+def test_load_steps_shorten_and_lengthen_themselves():
+    """Pressed by half at once: some load steps, the last ones longer than the first."""
+    solution = am.solve(model(bodies(), am.Fix("upper.top", (0.3, -0.5))))
+    assert solution.converged
+    halved = am.solve(model(bodies(), am.Fix("upper.top", (0.15, -0.25))))
+    assert solution.convergence.iterations < 6 * halved.convergence.iterations
+
+
+def test_a_cell_that_is_inverted_from_the_start():
+    lower, upper = bodies()
+    points = upper.mesh.points.copy()
+    points[np.linalg.norm(points - (0.25, 1 / 3), axis=1).argmin()] += (0.6, 0)
+    with pytest.raises(am.InvalidInput, match=r"cell|inside out"):
+        am.solve(model([lower, am.Body(replace(upper.mesh, points=points), NEO, name="upper")],
+                       am.Fix("upper.top", (0, -0.05))))  # fmt: skip

@@ -8,7 +8,7 @@ from ... import __version__
 from . import flags
 from .folders import results_folder
 from .group import Commands
-from .more_commands import audit, convert, examples
+from .more_commands import audit, convert, examples, jam
 
 EPILOG = """\b
 Examples:
@@ -390,3 +390,4 @@ def run(**options: object) -> int:
 main.add_command(audit)
 main.add_command(convert)
 main.add_command(examples)
+main.add_command(jam)

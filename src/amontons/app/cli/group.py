@@ -18,8 +18,26 @@ from .streams import open_missing, printed
 UNFINISHED, BAD_INPUT, INTERRUPTED = 1, 2, 130  # the last as shells tell of signals
 
 
+def _use_threads(_context: click.Context, _option: click.Parameter, count: int | None) -> None:
+    if count is not None:
+        from ...core.threads import threads
+
+        threads(count)
+
+
 class Commands(click.Group):
     """A group whose commands return their exit code and may raise AmontonsError."""
+
+    def add_command(self, cmd: click.Command, name: str | None = None) -> None:
+        """Every command can be told how many threads it may use."""
+        cmd.params.append(
+            click.Option(
+                ["--threads"], type=click.IntRange(1, 256), metavar="N", expose_value=False,
+                callback=_use_threads, help="Threads for large problems; results do not depend "
+                "on it. [AMONTONS_THREADS, OMP_NUM_THREADS, or the cores, 16 at most]",
+            )  # fmt: skip
+        )
+        super().add_command(cmd, name)
 
     def main(self, args: Sequence[str] | None = None, *more: Any, **options: Any) -> Any:
         """Run and exit; that something could not be printed is said on stderr."""

@@ -81,6 +81,35 @@ def convert(**options: object) -> None:
     run(**options)  # type: ignore[arg-type]
 
 
+@click.command(
+    epilog="""\b
+Examples:
+  amontons jam example:brake                  from which friction on the arm can stay locked
+  amontons jam case.toml --json - | jq .upper
+
+\b
+Exit codes: 0 settled for every pattern of open contacts, 1 with all contacts closed only,
+2 bad input.
+"""
+)
+@click.argument("source")
+@click.option("--time-limit", type=float, metavar="SECONDS",
+              help="For patterns of open contacts. [30]")  # fmt: skip
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
+              help="Replace a value of the case.")  # fmt: skip
+@click.option("--json", "json_copy", metavar="FILE", help="The same as JSON; - prints it.")
+@flags.of_decks
+def jam(**options: object) -> int:
+    """Find the smallest friction at which a state can be locked in without load.
+
+    SOURCE is a case file (.toml), a deck (.inp), an FCLib file (.hdf5), or example:NAME.  Its
+    loads are not read; its friction is the shape over the contacts.  Both bounds are proved.
+    """
+    from .jam import run
+
+    return run(**options)  # type: ignore[arg-type]
+
+
 @click.command()
 def examples() -> None:
     """List the built-in examples: `amontons solve example:NAME`, in time `amontons run`."""

@@ -30,10 +30,14 @@ def read_contact(table: Table, bodies: Sequence[Body]) -> Contact:
     if isinstance(table.data.get("slave"), list):
         raise table.error("slave", "expected one surface; write a table [[contact]] for each")
     slave = table.text("slave")
-    for key in ("slave", "master"):
+    masters = table.texts("master") if isinstance(table.data.get("master"), list) else ()
+    for key in ("slave", *(() if masters else ("master",))):
         if key in table.data:
             with table.blamed(key):
                 locate(bodies, table.text(key))
+    for name in masters:
+        with table.blamed("master"):
+            locate(bodies, name)
     if ("obstacle" in table.data) == ("master" in table.data):
         raise table.error("", "expected either obstacle = { plane = { normal = [0, 1] } } or "
                           'master = "SURFACE"')  # fmt: skip
@@ -48,7 +52,8 @@ def read_contact(table: Table, bodies: Sequence[Body]) -> Contact:
             found[key] = table.text(key)
     with table.blamed():
         if "master" in table.data:
-            master = table.text("master")
+            master, *more = masters or (table.text("master"),)
+            found["more_masters"] = more
             return Contact(slave, master=master, **numbers, method=method, **found)
         words = "a table, such as { plane = { normal = [0, 1] } }"
         given = table.as_table("obstacle", table.data["obstacle"], words)

@@ -66,6 +66,14 @@ class Table:
             raise self.error(key, f"expected a text, got {shown(value)}")
         return value
 
+    def texts(self, key: str) -> tuple[str, ...]:
+        """Several texts, at least one, none of them empty."""
+        value = self.need(key, "a list of texts")
+        texts = isinstance(value, list) and all(isinstance(v, str) and v.strip() for v in value)
+        if not texts or not value:
+            raise self.error(key, f"expected a list of texts, got {shown(value)}")
+        return tuple(value)
+
     def choice(self, key: str, known: Sequence[str], default: str | None = None) -> str:
         """One of several words."""
         value = self.text(key, default)

@@ -105,7 +105,7 @@ def _(result: Model) -> str:
     rows += [("load", f"{type(load).__name__} {getattr(load, 'on', '')}")
              for load in result.loads[:MOST]]  # fmt: skip
     for contact in result.contacts[:MOST]:
-        against = contact.master or type(contact.obstacle).__name__
+        against = ", ".join(contact.masters) or type(contact.obstacle).__name__
         rows.append((f"contact {contact.slave}", f"with {against}"))
     return listing(result.name or "model", rows)
 

@@ -130,10 +130,13 @@ class Skin:
         nothing = np.zeros((0, self.model.dimension), dtype=np.int64)
         title = f"{surface} of {self.model.bodies[k].name}"
         if contact.master is not None:
-            other, name = locate(self.model.bodies, contact.master)
-            body = self.model.bodies[other]
-            master = vertex[other][_pieces(body.mesh.surface(name))]
-            return Zone(title, f"{name} of {body.name}", pieces, master, outward,
+            masters, titles = [], []
+            for side in contact.masters:
+                other, name = locate(self.model.bodies, side)
+                body = self.model.bodies[other]
+                masters.append(vertex[other][_pieces(body.mesh.surface(name))])
+                titles.append(f"{name} of {body.name}")
+            return Zone(title, ", ".join(titles), pieces, np.concatenate(masters), outward,
                         np.zeros((0, 3)), nothing)  # fmt: skip
         points, rigid = self._rigid(contact, pieces)
         return Zone(title, "rigid obstacle", pieces, nothing, outward, points,

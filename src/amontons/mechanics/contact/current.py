@@ -106,6 +106,28 @@ class ContactPoint:
         """1 - rho C, (nc,): z_N by lambda . n."""
         return 1.0 - self.contact.rho * self.give
 
+    @property
+    def tied(self) -> NDArray[np.bool_]:
+        """Contacts that neither part nor slip, (nc,): their law is rho (s + C lambda)."""
+        return self.contact.law.tied
+
+    @cached_property
+    def _gives(self) -> Array:
+        """C of ties in global axes, (nc, d, d)."""
+        (nc, d), give = self.n.shape, self.contact.law.give
+        if give is None:
+            return np.zeros((nc, d, d))
+        across = np.eye(d) - self.n[:, :, None] * self.n[:, None, :]
+        along = self.n[:, :, None] * self.n[:, None, :]
+        return give[:, 0, None, None] * along + give[:, 1, None, None] * across
+
+    def _with_ties(self, out: Array) -> Array:
+        """The law (nc, d) of the others, with that of ties."""
+        if not self.tied.any():
+            return out
+        given = self.motion + np.einsum("pij,pj->pi", self._gives, self.force)
+        return np.where(self.tied[:, None], self.contact.rho[:, None] * given, out)
+
     @cached_property
     def y(self) -> Array:
         """lambda - rho s, (nc, d)."""
@@ -138,6 +160,7 @@ class ContactPoint:
     def _bound(self, closed: NDArray[np.bool_]) -> Array:
         law, z = self.contact.law.plain, np.where(closed, self.z_normal, 0.0)
         mu, bound = law.parameters.T
+        bound = np.where(self.tied, 0.0, bound)  # infinite, of no use here
         return np.where(law.given(z[:, None]), bound, mu * z) * self.meeting.met
 
     @property
@@ -167,6 +190,7 @@ class ContactPoint:
         alone = (self.contact.law.kind == TRESCA) & self.meeting.met
         out[~closed & ~alone] = OPEN
         out[~closed & alone] += 4
+        out[self.tied] = STICK
         return out.astype(np.int8)
 
     def residual(self, pieces: Pieces | None = None) -> Array:
@@ -176,7 +200,7 @@ class ContactPoint:
         normal = (np.maximum(self.z_normal, 0.0) - self.cohesion)[:, None] * self.n
         length = np.linalg.norm(self.z_tangent, axis=1)
         scale = np.where(length > self.bound, self.bound / np.where(length > 0, length, 1), 1.0)
-        return self.force - normal - scale[:, None] * self.z_tangent
+        return self._with_ties(self.force - normal - scale[:, None] * self.z_tangent)
 
     def _selected(self, pieces: Pieces) -> Array:
         """(2) as if the given pieces were active."""
@@ -189,7 +213,8 @@ class ContactPoint:
         else:
             length = np.where(self.along > 0, self.along, 1.0)
             slip = (np.where(_slides(kind), bound, 0.0) / length)[:, None] * self.z_tangent
-        return self.force - normal - slip - (kind == STICK)[:, None] * self.z_tangent
+        stuck = (kind == STICK)[:, None] * self.z_tangent
+        return self._with_ties(self.force - normal - slip - stuck)
 
     def margins(self, pieces: Pieces) -> Array:
         """Distances to the borders of given pieces, (nc, 3): all positive inside of them.
@@ -207,7 +232,9 @@ class ContactPoint:
         other = without & ((kind == STICK) | (kind == BACK))  # pieces they do not have
         ahead[without], behind[without] = np.inf, np.inf
         ahead[other] = -np.inf
-        return np.stack([z, ahead, behind], axis=1)
+        out = np.stack([z, ahead, behind], axis=1)
+        out[self.tied] = np.inf
+        return out
 
     def derivatives(self, pieces: Pieces | None = None) -> tuple[Array, Array, Array]:
         """Derivatives of (2) by lambda, x and s, each (nc, d, d), on some (the active) pieces.
@@ -241,8 +268,26 @@ class ContactPoint:
         if d == 2:
             by_normal -= self._turned_slip(pieces)
         by_gap = normal * self.contact.rho[:, None]
+        by_motion = rho * (in_z @ tangential)
+        if self.tied.any():
+            self._tie_inplace(by_force, by_normal, by_gap, by_motion)
         free = self.contact.free[:, None, :]
-        return by_force * free, by_normal, by_gap, rho * (in_z @ tangential) * free
+        return by_force * free, by_normal, by_gap, by_motion * free
+
+    def _tie_inplace(
+        self, by_force: Array, by_normal: Array, by_gap: Array, by_motion: Array
+    ) -> None:
+        """Put those of ties in their places."""
+        tied, give, d = self.tied, self.contact.law.give, self.n.shape[1]
+        rho, n, force = self.contact.rho[tied], self.n[tied], self.force[tied]
+        by_force[tied] = rho[:, None, None] * self._gives[tied]
+        by_motion[tied] = rho[:, None, None] * np.eye(d)
+        by_gap[tied] = by_normal[tied] = 0.0
+        if give is None:
+            return
+        more = rho * (give[tied, 0] - give[tied, 1])
+        turned = (n * force).sum(axis=1)[:, None, None] * np.eye(d)
+        by_normal[tied] = more[:, None, None] * (turned + n[:, :, None] * force[:, None, :])
 
     def _friction(self, pieces: Pieces) -> tuple[Array, Array]:
         """Derivatives of P by z_T, (nc, d, d), and by the bound, (nc, d)."""

@@ -29,7 +29,8 @@ other nodes m, from the mean of corners c with parts w_mc, enter B as
 The force lambda_p then acts at p and at these; what a body needs of it at the corner is
 sum_j C_pj (f_int - f)_j, C_pp = 1 and C_pm = w_mp, as moving p without a bulge takes m along.
 
-Left out: one surface against itself.
+One surface against itself falls into two sides, see `folds`; nodes that are of no slave facet
+alone are open like those that do not meet.
 
 [PL] M. Puso, T. Laursen, CMAME 193 (2004) 601-629 and 4891-4913 (friction).
 [PSG] A. Popp, A. Seitz, M. Gee, W. Wall, "Improved robustness and consistency of 3D contact
@@ -39,7 +40,7 @@ algorithms based on a dual mortar approach", CMAME 264 (2013).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -50,6 +51,7 @@ from .current_slopes import MortarSlopes, summed
 from .dual import dual_functions, nodes_with_multiplier
 from .facet_integrals import FacetPairs
 from .facing import Skin, candidates, nearest
+from .folds import Fold
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -63,7 +65,8 @@ class MortarPair:
     """Slave nodes (nc,) of the model, those of the slave facets that have a row, and a master.
 
     free (nc, d): components of the slaves without a support; normals lie in these.
-    names: of both surfaces, for messages.
+    names: of both surfaces, for messages.  fold: of one surface against itself, whose sides
+    slave and master are then, and all nodes of which have a row.
     """
 
     slaves: Index
@@ -71,10 +74,35 @@ class MortarPair:
     master: Skin
     free: Mask
     names: tuple[str, str] = ("slave", "master")
+    fold: Fold | None = None
+
+    @property
+    def around(self) -> tuple[Skin, Mask]:
+        """The facets whose areas make the normals, and of which of their nodes, (f, a)."""
+        if self.fold is None:
+            return self.slave, self.slave.real
+        return self.fold.skin, self.fold.heeded
+
+    def divided(self, positions: Array) -> MortarPair:
+        """The same with the sides of a fold at the positions (nodes, d)."""
+        if self.fold is None:
+            return self
+        fold = self.fold.at(positions)
+        if (fold.side == self.fold.side).all():
+            return self
+        return replace(self, slave=fold.skins[0], master=fold.skins[1], fold=fold)
 
     def at(self, positions: Array) -> MortarMeeting:
         """Where they meet at the positions (nodes, d) of all nodes of the model."""
         return MortarMeeting(self, positions)
+
+
+def folded(
+    slaves: Index, skin: Skin, free: Mask, x: Array, names: tuple[str, str] = ("slave", "slave")
+) -> MortarPair:
+    """One surface against itself, slaves (nc,) its nodes, undeformed at x (nodes, d)."""
+    fold = Fold.of(skin, x)
+    return MortarPair(slaves, *fold.skins, free, names, fold)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,11 +154,11 @@ class MortarMeeting:
     @cached_property
     def sums(self) -> Array:
         """Area vectors around the slaves, into the slave, in free directions, (nc, d)."""
-        skin = self.pair.slave
+        skin, heeded = self.pair.around
         share = -skin.areas(self.x) / skin.corners[:, None]
         out = np.zeros(self.x.shape)
         for slot in range(skin.nodes.shape[1]):
-            np.add.at(out, skin.nodes[:, slot], share * skin.real[:, slot, None])
+            np.add.at(out, skin.nodes[:, slot], share * heeded[:, slot, None])
         return out[self.pair.slaves] * self.pair.free
 
     @cached_property
@@ -141,16 +169,19 @@ class MortarMeeting:
     # ---------------------------------------------------------------- averages
     @cached_property
     def row(self) -> Index:
-        """Row of every node, (nodes,), -1 for none."""
-        out = np.full(len(self.x), -1, dtype=np.int64)
-        out[self.pair.slaves] = np.arange(len(self.pair.slaves))
+        """Row of every node that may carry a force, (nodes,), -1 for none."""
+        out, pair = np.full(len(self.x), -1, dtype=np.int64), self.pair
+        out[pair.slaves] = np.arange(len(pair.slaves))
+        if pair.fold is not None:
+            out[pair.slaves[~pair.fold.carries(pair.slaves)]] = -1
         return out
 
     @cached_property
     def shared(self) -> _Shared:
         """What the facets share."""
         slave, master, x = self.pair.slave, self.pair.master, self.x
-        of, other = candidates(slave, master, x)
+        fold = self.pair.fold
+        of, other = candidates(slave, master, x) if fold is None else fold.candidates(x)
         own, cross = self.facet_pairs(of, other).integrals()
         a = own.shape[1]
         p, q = slave.values(x)[of], master.values(x)[other]
@@ -195,7 +226,8 @@ class MortarMeeting:
         """D, (nc,), zero where nobody meets."""
         parts = self.shared
         nodes = self.pair.slave.nodes[parts.facets]
-        found = np.bincount(nodes.ravel(), parts.weights.ravel(), minlength=len(self.x))
+        weights = np.where(self.rows >= 0, parts.weights, 0.0)
+        found = np.bincount(nodes.ravel(), weights.ravel(), minlength=len(self.x))
         return np.asarray(found[self.pair.slaves], dtype=np.float64)
 
     @property
@@ -267,6 +299,8 @@ class MortarMeeting:
         """The master node closest to each slave, (nc,)."""
         from scipy.spatial import cKDTree
 
+        if self.pair.fold is not None:
+            return self.pair.fold.closest(self.pair.slaves, self.x)
         nodes = self.pair.master.all
         nearby = cKDTree(self.x[nodes]).query(self.x[self.pair.slaves])[1]
         return nodes[np.asarray(nearby, dtype=np.int64)]

@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from .current_mortar import MortarMeeting
+from .carried import TiedMeeting, TiedPair
+from .current_mortar import MortarMeeting, MortarPair
 from .geometry import Obstacle
 
 Array = NDArray[np.float64]
@@ -36,7 +37,7 @@ class Pair(Protocol):
         """Nodes with a row."""
         ...
 
-    def at(self, positions: Array) -> Meeting | MortarMeeting:
+    def at(self, positions: Array) -> AnyMeeting:
         """Where they meet at the positions (nodes, d) of all nodes of the model."""
         ...
 
@@ -81,6 +82,16 @@ class Meeting:
         return self.side.normals(self.x)
 
 
+AnyMeeting = Meeting | MortarMeeting | TiedMeeting
+
+
+def between_bodies(pair: Pair) -> MortarPair | None:
+    """The mortar pair that a pair of two bodies is or comes from; None with an obstacle."""
+    if isinstance(pair, TiedPair):
+        return pair.pair
+    return pair if isinstance(pair, MortarPair) else None
+
+
 @dataclass(frozen=True, eq=False)
 class ObstaclePair:
     """Slave nodes (nc,) of the model in front of an obstacle."""
@@ -97,7 +108,7 @@ class ObstaclePair:
 class Meetings:
     """All pairs of a model at some positions, one after another: nc contacts."""
 
-    parts: Sequence[Meeting | MortarMeeting]
+    parts: Sequence[AnyMeeting]
     _last: list[Any] = field(default_factory=list, init=False, repr=False)  # of `motion`
 
     @property
@@ -166,10 +177,12 @@ class Meetings:
             return self._last[1].copy()
         out = []
         for part, old in zip(self.parts, earlier.parts, strict=True):
-            if isinstance(part, Meeting) or isinstance(old, Meeting):
-                out.append(u[part.slaves] - before[part.slaves])
-            else:
+            if isinstance(part, MortarMeeting) and isinstance(old, MortarMeeting):
                 out.append(part.motion(old))
+            elif isinstance(part, TiedMeeting):
+                out.append(part.motion(old))
+            else:
+                out.append(u[part.slaves] - before[part.slaves])
         self._last[:] = earlier, np.concatenate(out)
         return self._last[1].copy()
 

@@ -108,13 +108,15 @@ class MortarSlopes:
     @cached_property
     def _normals(self) -> SlotSlopes:
         """Of n, a part per facet."""
-        skin, n = self.at.pair.slave, self.at.normals
-        (f, a), d = skin.nodes.shape, n.shape[1]
+        (skin, heeded), n = self.at.pair.around, self.at.normals
+        (f, a), (nc, d) = skin.nodes.shape, n.shape
         length = np.linalg.norm(self.at.sums, axis=1)
         project = (np.eye(d) - n[:, :, None] * n[:, None, :]) / length[:, None, None]
         project = project * self.at.pair.free[:, None, :]
         share = -skin.area_slopes(self.at.x).reshape(f, 1, d, a * d)
-        row = np.where(skin.real, self.at.row[skin.nodes], -1)
+        own = np.full(len(self.at.x), -1)
+        own[self.at.slaves] = np.arange(nc)
+        row = np.where(heeded, own[skin.nodes], -1)
         values = np.where((row >= 0)[:, :, None, None], project[row], 0.0)
         values = values @ (share / skin.corners[:, None, None, None])  # (f, a, d, a d)
         return SlotSlopes(values, row, _dofs(skin.nodes, d))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -49,12 +50,10 @@ class Skin:
         width = max(part.shape[1] for part in firsts)
         room = max(part.shape[1] for part in rests)
         padded = [
-            np.concatenate([p, np.repeat(p[:, -1:], width - p.shape[1], axis=1)], axis=1)
-            for p in firsts
+            _wider(p, width, p[:, -1:]) for p in firsts
         ]
         beside = [
-            np.concatenate([p, np.repeat(c[:, :1], room - p.shape[1], axis=1)], axis=1)
-            for p, c in zip(rests, firsts, strict=True)
+            _wider(p, room, c[:, :1]) for p, c in zip(rests, firsts, strict=True)
         ]
         parts = []
         for block in blocks:
@@ -70,6 +69,27 @@ class Skin:
         )
         nodes, middles = (np.concatenate(p).astype(np.int64) for p in (padded, beside))
         return cls(nodes, corners, middles, np.concatenate(parts), bent)
+
+    @classmethod
+    def joined(cls, skins: Sequence[Skin]) -> Skin:
+        """The facets of several surfaces, one after another, as one."""
+        width, room = (max(getattr(s, name).shape[1] for s in skins)
+                       for name in ("nodes", "middles"))  # fmt: skip
+        nodes = [_wider(s.nodes, width, s.nodes[:, -1:]) for s in skins]
+        middles = [_wider(s.middles, room, s.nodes[:, :1]) for s in skins]
+        parts = []
+        for s in skins:
+            part = np.zeros((len(s.nodes), room, width))
+            part[:, :, 0] = 1.0  # of the padding
+            part[:, : s.middles.shape[1], : s.nodes.shape[1]] = s.parts
+            parts.append(part)
+        return cls(*(np.concatenate(every) for every in (
+            nodes, [s.corners for s in skins], middles, parts, [s.bent for s in skins]
+        )))  # fmt: skip
+
+    def part(self, chosen: Index) -> Skin:
+        """Some of the facets, (k,)."""
+        return Skin(*(getattr(self, one.name)[chosen] for one in fields(self)))
 
     @property
     def real(self) -> Mask:
@@ -137,6 +157,11 @@ class Skin:
         return out
 
 
+def _wider(table: Index, width: int, last: Index) -> Index:
+    """A table (f, a) with `last` (f, 1) again and again, up to a width."""
+    return np.concatenate([table, np.repeat(last, width - table.shape[1], axis=1)], axis=1)
+
+
 def _crossing(v: Array) -> Array:
     """Matrices (k, 3, 3) of v x ., v (k, 3)."""
     out = np.zeros((len(v), 3, 3))
@@ -154,7 +179,7 @@ def candidates(slave: Skin, master: Skin, x: Array) -> tuple[Index, Index]:
     """
     from scipy.spatial import cKDTree
 
-    (centre, normal, radius), (there, facing, size) = (_shapes(s, x) for s in (slave, master))
+    (centre, normal, radius), (there, facing, size) = (shapes(s, x) for s in (slave, master))
     nodes = master.all
     normals = np.zeros(x.shape)
     for slot in range(master.nodes.shape[1]):
@@ -183,7 +208,7 @@ def candidates(slave: Skin, master: Skin, x: Array) -> tuple[Index, Index]:
     return first[kept], second[kept]
 
 
-def _shapes(side: Skin, x: Array) -> tuple[Array, Array, Array]:
+def shapes(side: Skin, x: Array) -> tuple[Array, Array, Array]:
     """Centres, unit normals (f, d) and radii (f,) of facets."""
     p, real = x[side.nodes], side.real[:, :, None]
     centre = (p * real).sum(axis=1) / side.corners[:, None]

@@ -29,19 +29,28 @@ def inside(mesh: Mesh, points: Array) -> NDArray[np.bool_]:
     return out
 
 
+def is_itself(slave: Mesh, surface: str, master: Mesh, master_surface: str) -> bool:
+    """Whether two surfaces are one."""
+    if slave is not master:
+        return False
+    one, other = (_facets(slave, name) for name in (surface, master_surface))
+    return one == other
+
+
+def _facets(mesh: Mesh, name: str) -> set[tuple[int, ...]]:
+    return {tuple(sorted(f)) for block in mesh.surface(name) for f in block.nodes.tolist()}
+
+
 def check_different(slave: Mesh, surface: str, master: Mesh, master_surface: str) -> None:
     """Raise InvalidInput when two surfaces share facets."""
     if slave is not master:
         return
-    one, other = (
-        {tuple(sorted(f)) for block in slave.surface(name) for f in block.nodes.tolist()}
-        for name in (surface, master_surface)
-    )
+    one, other = (_facets(slave, name) for name in (surface, master_surface))
     if both := len(one & other):
         raise InvalidInput(
-            f"{both} facets are on both sides, a surface can not be its own master; name the "
-            "two sides as separate surfaces, or let find_contacts(..., itself=True) find them "
-            "where they lie opposite", ("master",),
+            f"{both} facets are on both sides; name the two sides as separate surfaces, or let "
+            "find_contacts(..., itself=True) find them where they lie opposite; a surface that "
+            "is its own master is so as a whole, and with kinematics='finite'", ("master",),
             f"contact of {surface!r} with {master_surface!r}",
         )  # fmt: skip
 

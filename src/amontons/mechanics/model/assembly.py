@@ -373,7 +373,7 @@ def _check_once(
         else:
             master = locate(bodies, contact.master)
             pair, again = (slave, master), f"with {contact.master!r}"
-            if (master, slave) in seen and contact.where is None:
+            if slave != master and (master, slave) in seen and contact.where is None:
                 raise InvalidInput(
                     f"the contact {again} is there already, with slave and master exchanged; "
                     "expected every pair once", at, what,

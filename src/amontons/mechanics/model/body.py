@@ -10,7 +10,7 @@ from ...core.errors import InvalidInput, shown
 from ...core.words import helpful
 from ..elements.elasticity import LinearElastic, materials_by_region
 from ..elements.given import GivenMatrices
-from ..elements.hyperelasticity import NAMES, Hyperelastic
+from ..elements.hyperelasticity import NAMES, Hyperelastic, is_hyperelastic
 from ..elements.orthotropic import OrthotropicElastic
 from ..elements.rigid import Rigid
 from ..meshes.mesh import Mesh
@@ -35,6 +35,9 @@ class Body:
     revolution, x the distance from the axis and y along it.  Nothing twists.  Forces are those
     of the whole body, as loads and in results; tractions and pressures are per area.  A rigid
     one moves along the axis alone, and follows a reference.
+    corotational: LinearElastic or OrthotropicElastic in a frame that turns with the body, so
+    that it may turn by any angle as a whole, at small strains; see `elements.corotational`.
+    Contacts are found in the current state, as of finite strains.
     integration: of all cells, see `Cells`; by default what they say themselves, which is
     "auto" where nobody says: hybrid, without locking, from a poisson of 0.4 on, else full.
     """
@@ -45,6 +48,7 @@ class Body:
     order: int = 1
     axisymmetric: bool = False
     integration: str | None = None
+    corotational: bool = False
 
     def __post_init__(self) -> None:
         if not isinstance(self.mesh, Mesh):
@@ -67,6 +71,7 @@ class Body:
             self.material.check(self.mesh)
         laws = materials_by_region(self.mesh, self.material)
         self._turn(laws.values())
+        self._check_frame(laws.values())
         if isinstance(self.material, Mapping):
             for region, law in laws.items():
                 if not isinstance(law, Material):
@@ -98,6 +103,26 @@ class Body:
         K that resists rigid motions without held.
         """
         return cls(mesh, GivenMatrices.of(mesh, K, load, mass, rows, held), name)
+
+    @property
+    def turns(self) -> bool:
+        """True where it may turn by any angle: of finite strains, or corotational."""
+        return self.corotational or is_hyperelastic(self.material)
+
+    def _check_frame(self, laws: Iterable[object]) -> None:
+        """Raise InvalidInput for a frame that turns of what has no linear stiffness."""
+        if not isinstance(self.corotational, bool):
+            raise InvalidInput(
+                f"expected True or False, got {shown(self.corotational)}", ("corotational",)
+            )
+        for law in laws if self.corotational else ():
+            if type(law) not in (LinearElastic, OrthotropicElastic) or self.axisymmetric:
+                raise InvalidInput(
+                    "expected LinearElastic or OrthotropicElastic, in the plane or in space: "
+                    "others yield, turn by themselves, or have an axis; got "
+                    f"{'an axisymmetric mesh' if self.axisymmetric else shown(law)}",
+                    ("corotational",),
+                )
 
     def _turn(self, laws: Iterable[object]) -> None:
         """Make the mesh axisymmetric where that is asked for; laws: its materials."""

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import UnsupportedForm
+from ..contact.carried import TiedPair
 from ..contact.current_mortar import MortarPair
-from ..contact.current_pairs import Pair
+from ..contact.current_pairs import Pair, between_bodies
 from ..elements.given import GivenMatrices
-from ..elements.hyperelasticity import is_hyperelastic
 from ..elements.rigid import Rigid
 from .parts import FINITE
 
@@ -38,17 +38,22 @@ def check_supported(model: Model) -> None:
                 f"{what} has a given K, and contact of finite kinematics needs bodies with a "
                 "law; give its contacts kinematics='small'", at, "",
             )  # fmt: skip
-        if not (asked or is_hyperelastic(body.material)):
+        if not (asked or body.turns):
             raise UnsupportedForm(
-                "others have hyperelastic laws and this one is linear elastic; give all of "
-                "them NeoHookean or the like, or say that it keeps small strains by "
-                "kinematics='finite' of the contacts", at, what,
+                "others have hyperelastic laws or turn, and this one is linear elastic; give "
+                "it corotational=True, NeoHookean or the like, or say that it keeps small "
+                "strains by kinematics='finite' of the contacts", at, what,
             )  # fmt: skip
     for k, contact in enumerate(model.contacts):
         what = f"contact on {contact.slave!r}"
         if contact.obstacle is None:
             _check_pair(model, k)
             continue
+        if contact.tied:
+            raise UnsupportedForm(
+                "a tie to an obstacle is a support here; use Fix in the place of the contact",
+                ("contacts", k, "tied"), what,
+            )  # fmt: skip
         if contact.method != "nodal":
             raise UnsupportedForm(
                 "finite kinematics has nodal contact with an obstacle only; use method='nodal'",
@@ -84,15 +89,42 @@ def check_nodes(pairs: Sequence[Pair], slaves: Index, is_free: Mask) -> None:
     _check_middles(pairs, is_free)
 
 
+def chains(pairs: Sequence[Pair]) -> list[set[int]]:
+    """For every pair the others of which some of its slaves are in the master."""
+    return [
+        {
+            k for k, other in enumerate(pairs)
+            if other is not pair and np.isin(pair.slaves, _whole(other)).any()
+        }
+        for pair in pairs
+    ]  # fmt: skip
+
+
+def _whole(pair: Pair) -> Index:
+    """Nodes that a pair may press as those of its master."""
+    if isinstance(pair, TiedPair):
+        return pair.pressed
+    if not isinstance(pair, MortarPair):
+        return np.zeros(0, dtype=np.int64)
+    return (pair.master if pair.fold is None else pair.fold.skin).every
+
+
 def _check_apart(pairs: Sequence[Pair], slaves: Index) -> None:
-    """Raise UnsupportedForm where a node of a master carries a contact of its own."""
-    mortars = [pair for pair in pairs if isinstance(pair, MortarPair)]
-    taken = [pair.master.every for pair in mortars]
-    taken += [pair.slave.means[0] for pair in mortars]
-    if taken and np.isin(np.concatenate(taken), slaves).any():
+    """Raise UnsupportedForm for nodes that carry forces of pairs in a ring, or of a middle."""
+    middles = [m.slave.means[0] for m in map(between_bodies, pairs) if m is not None]
+    if middles and np.isin(np.concatenate(middles), slaves).any():
         raise UnsupportedForm(
-            "a node is in a slave and in a master surface, large deformations allow one; "
-            "leave it out of the slave (where), or make the surfaces smaller", ("contacts",),
+            "a node between the corners of a slave surface carries a contact of its own; leave "
+            "it out of that (where), or make the surfaces smaller", ("contacts",),
+        )  # fmt: skip
+    links = chains(pairs)
+    for _ in pairs:  # what follows no other is no part of a ring
+        links = [{k for k in link if links[k]} for link in links]
+    if any(links):
+        raise UnsupportedForm(
+            "nodes are slave in one contact and master in another, and the other way round in "
+            "a ring; leave them out of one of the slaves (where), or make the surfaces smaller",
+            ("contacts",),
         )  # fmt: skip
 
 
@@ -101,8 +133,8 @@ def _check_middles(pairs: Sequence[Pair], is_free: Mask) -> None:
 
     is_free (nodes, d).
     """
-    for pair in pairs:
-        if not isinstance(pair, MortarPair):
+    for pair in map(between_bodies, pairs):
+        if pair is None:
             continue
         middle, corner, _ = pair.slave.means
         has_row = np.isin(corner, pair.slaves)
@@ -118,6 +150,7 @@ def _check_single(nodes: Index) -> None:
     if len(np.unique(nodes)) < len(nodes):
         raise UnsupportedForm(
             "a node is the slave of two contacts, large deformations allow one; leave it out "
-            "of one of them (where), join obstacles into one LevelSet, two masters into one "
-            "surface of one body, or let the masters be the slaves", ("contacts",),
+            "of one of them (where), join obstacles into one LevelSet, give both masters to "
+            "one contact with one law (more_masters), or let the masters be the slaves",
+            ("contacts",),
         )  # fmt: skip

@@ -26,12 +26,12 @@ from ...problem.friction import FrictionProblem
 from ...problem.nitsche import NitscheProblem
 from ...problem.protocol import Problem
 from ...problem.solution import FrictionSolution
-from ..elements.hyperelasticity import is_hyperelastic
 from ..elements.plasticity import is_plastic
 from .assembly import Discretisation
 from .doubts import CHECKS, OF_THE_START, Check
 from .fields import ContactFields, recover_fields
 from .held import HeldNodes
+from .joint_masters import with_masters
 from .large_deformation import LargeDeformation, large_deformation
 from .large_fields import recover_large
 from .laws import NEEDS_FORCES, OF_LINEAR_BODIES, WHERE_NODES_ARE, check_law
@@ -59,10 +59,20 @@ class Formulation(ABC):
     doubts: ClassVar[tuple[Check, ...]] = CHECKS + OF_THE_START
     keeps: ClassVar[str] = ", and keep loads and gaps where they were"  # turned bodies do
 
+    def joined(self, contacts: tuple[Contact, ...]) -> tuple[Contact, ...]:
+        """The contacts that a model has: as they are given."""
+        return contacts
+
     def check(self, model: Model) -> None:
         """Raise InvalidInput or UnsupportedLaw for contacts and loads that do not fit."""
         for k, contact in enumerate(model.contacts):
             check_law(k, contact, model.dimension, self.lacks)
+            if contact.more_masters:
+                raise UnsupportedForm(
+                    "several masters in one contact need kinematics='finite'; here a contact "
+                    "for each of them does the same", ("contacts", k, "more_masters"),
+                    f"contact on {contact.slave!r}",
+                )  # fmt: skip
         for k, load in enumerate(model.loads):
             if follows(load) and not isinstance(load, Pressure):
                 is_body = isinstance(load, BodyForce)
@@ -219,6 +229,10 @@ class Moved(Formulation):
     doubts = CHECKS
     keeps = ""
 
+    def joined(self, contacts: tuple[Contact, ...]) -> tuple[Contact, ...]:
+        """Contacts of one slave with several masters and one law are one: nodes carry one."""
+        return with_masters(contacts)
+
     def check(self, model: Model) -> None:
         """Loads may follow; raises InvalidInput where kinematics do not fit laws, or differ."""
         by_law = has_finite_strains(model.bodies)
@@ -240,8 +254,8 @@ class Moved(Formulation):
             at = ("contacts", k, "kinematics")
             if contact.kinematics == SMALL and by_law:
                 raise InvalidInput(
-                    "hyperelastic laws have contact in the current configuration, "
-                    "kinematics='finite', as by default; got 'small'",
+                    "hyperelastic laws and corotational bodies have contact in the current "
+                    "configuration, kinematics='finite', as by default; got 'small'",
                     at, f"contact on {contact.slave!r}",
                 )  # fmt: skip
             if contact.kinematics != FINITE and not by_law:
@@ -315,8 +329,8 @@ def formulation_of(bodies: Sequence[Body], contacts: Sequence[Contact]) -> Formu
 
 
 def has_finite_strains(bodies: Sequence[Body]) -> bool:
-    """True where a body has a hyperelastic law."""
-    return any(is_hyperelastic(body.material) for body in bodies)
+    """True where a body has a hyperelastic law, or a frame that turns with it."""
+    return any(body.turns for body in bodies)
 
 
 def _first(problem: FrictionProblem) -> FrictionProblem:

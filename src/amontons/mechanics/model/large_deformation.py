@@ -39,12 +39,12 @@ from ...problem.protocol import Problem
 from ...solvers.newton.nonlinear import NonlinearProblem
 from ...solvers.newton.states import PlainStates
 from ..contact.current import STICK, ContactPoint, Pieces
-from ..contact.current_mortar import MortarMeeting
 from ..contact.current_pairs import Meetings
 from ..elements.linear_body import LinearBody
 from .moved_pairs import Linearisation, PairLinearisation, balanced, turned_forces
 from .nodal_forces import NodalForces, nodal_forces
 from .nonlinear_parts import NonlinearParts, nonlinear_parts
+from .places_of_failure import places_of_failure
 from .pressure_states import PressureStates
 
 if TYPE_CHECKING:
@@ -323,13 +323,8 @@ class LargeDeformation(NonlinearProblem):
         return replace(tangent, f=tangent.f + force[self.parts.free], w=w)
 
     def remark(self, v: Array) -> str:
-        """Which slaves face nothing of their masters at a state."""
-        met = self.parts.meet(self.displacement(v)).parts
-        alone = [m for m in met if isinstance(m, MortarMeeting) and not m.met.any()]
-        away = ["{!r} faces {!r} nowhere".format(*meeting.pair.names) for meeting in alone]
-        if not away:
-            return ""
-        return f"at the last state {', '.join(away)}: no contact force holds anything there"
+        """Which slaves face nothing of their masters, have left them, and what is flat."""
+        return places_of_failure(self.parts, self.displacement(v), self.earlier)
 
     def closed_pieces(self, v: Array) -> list[Pieces]:
         """The active pieces with touching contacts stuck, then with all of them stuck."""
@@ -395,6 +390,9 @@ def large_step(
     """
     parts = nonlinear_parts(model)
     _ = model.rests_on_contact  # raises where nothing holds a body
-    before = np.zeros(parts.X.size) if before is None else before
+    if before is None:
+        before = np.zeros(parts.X.size)
+    elif parts.folds:
+        parts = nonlinear_parts(model.divided(before))
     return LargeDeformation(parts, NodalForces.of(load), prescribed, before,
                             np.zeros(parts.at.shape), known, model.name)  # fmt: skip

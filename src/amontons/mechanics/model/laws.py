@@ -49,7 +49,7 @@ WHERE_NODES_ARE = {  # what contact in the current configuration does not take
     name: f"{what} small strains and contact in the reference configuration"
     for name, what in (("mu_across", "orthotropic friction needs"),
                        ("stick_stiffness", "a spring along the surface needs"),
-                       ("tied", "ties need"), ("clearance", "a given clearance needs"))
+                       ("clearance", "a given clearance needs"))
 }  # fmt: skip
 SLANT = 1e-6  # part of a direction in the tangent plane that is one
 
@@ -71,6 +71,8 @@ def check_law(k: int, contact: Contact, dimension: int, lacks: Mapping[str, str]
              if name != "mu" or isinstance(value, FrictionCurve)}  # fmt: skip
     asked |= {"tied"} if contact.tied else set()
     asked |= {"clearance"} if contact.clearance is not None else set()
+    if contact.tied and "tied" not in lacks:  # bonds have springs where ties are
+        asked.discard("stick_stiffness")
     for name, why in lacks.items():
         if name in asked:
             raise UnsupportedLaw(why, ("contacts", k, name), where)

@@ -63,6 +63,7 @@ class Model(Told):
     springs: Sequence[Spring] = ()
     pair_names: tuple[str, ...] = field(default=(), init=False, repr=False)
     beside: Beside = field(default=None, init=False, repr=False)  # type: ignore[assignment]
+    divided_at: Array | None = field(default=None, init=False, repr=False)
     _shared: Prepared = field(default_factory=Prepared, init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -78,6 +79,7 @@ class Model(Told):
         if len({body.axisymmetric for body in self.bodies}) > 1:
             raise InvalidInput("expected all axisymmetric or none of them, got both",
                                ("bodies",))  # fmt: skip
+        object.__setattr__(self, "contacts", self.formulation.joined(self.contacts))
         self.formulation.check(self)
         object.__setattr__(self, "pair_names", pair_names(self.contacts))
         if not (is_number(self.load_factor) and np.isfinite(self.load_factor)):
@@ -95,6 +97,11 @@ class Model(Told):
                 for name in (name for name in fields if hasattr(item, name)):
                     with within(part, k, name):
                         self._check_surface(item, name)
+        for k, contact in enumerate(self.contacts):
+            for name in contact.more_masters:
+                with within("contacts", k, "more_masters"):
+                    j, surface = locate(self.bodies, name)
+                    self.bodies[j].mesh.surface(surface)
 
     def _check_surface(self, part: object, field: str) -> None:
         """Raise InvalidInput for a surface that no body has, or more than one."""
@@ -265,6 +272,16 @@ class Model(Told):
         """A copy that shares the assembled matrices, which must not depend on the changes."""
         other = replace(self, **changes)  # type: ignore[arg-type]
         object.__setattr__(other, "_shared", self._shared)
+        object.__setattr__(other, "divided_at", self.divided_at)
+        return other
+
+    def divided(self, displacement: Array) -> Model:
+        """The same whose surfaces that meet themselves have the sides of another state.
+
+        displacement (dofs,): at the beginning of a step; else the undeformed state is meant.
+        """
+        other = self._variant()
+        object.__setattr__(other, "divided_at", displacement)
         return other
 
     def recover(self, solution: FrictionSolution) -> ContactFields:

@@ -8,20 +8,30 @@ other slave's force on it.  The other nodes j of its pair carry
 
 B of `contact.current_mortar`.  With both eliminated that way the displacements are all
 unknowns; `PairLinearisation` has the derivative of (1) and of the law in them.
+
+Where slaves of one pair are of another one's master, their lambda is what is left beside (1):
+with O the part of (1) that contacts of nodes that meet give to others, in global axes,
+
+    lambda = C (f_int - f - O lambda),    lambda = (I + C O)^-1 C (f_int - f).              (2)
+
+No two pairs are slave and master of each other, along none of their chains, so that C O is
+nilpotent: (I + C O)^-1 = I - C O + (C O)^2 - ..., with as many terms as the chain has pairs.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..contact.carried import TiedMeeting
 from ..contact.current import ContactPoint
 from ..contact.current_mortar import MortarMeeting
-from ..contact.current_pairs import Meeting, Meetings
+from ..contact.current_pairs import AnyMeeting, Meeting, Meetings
 from ..contact.current_slopes import blocks_of
 from .nodal_forces import NodalForces
 from .nonlinear_parts import NonlinearParts
@@ -36,10 +46,26 @@ def balanced(parts: NonlinearParts, meeting: Meetings, rest: Array) -> Array:
     """
     if meeting.only_obstacles:
         return rest
-    gathered = (parts.gathers @ rest).reshape(parts.at.shape)
-    own = gathered * parts.contact.free * meeting.met[:, None]
+    own = _own(parts, meeting, rest)
     out = rest - (meeting.others @ own).ravel()
     out[parts.at] = (parts.gathers @ out).reshape(parts.at.shape)
+    return out
+
+
+def _own(parts: NonlinearParts, meeting: Meetings, needed: Array) -> Array:
+    """lambda (nc, d) of nodes that meet, of f_int - f (dofs,)."""
+    gathered = parts.gathers @ needed
+    if parts.chained:
+        gathered = _unchained(parts, _others(parts, meeting), gathered)
+    return gathered.reshape(parts.at.shape) * parts.contact.free * meeting.met[:, None]
+
+
+def _unchained(parts: NonlinearParts, others: sparse.csr_array, gathered: Any) -> Any:
+    """(I + C O)^-1 of (2) times an array or matrix (nc d, ...)."""
+    out = term = gathered
+    for _ in range(parts.chained):
+        term = -(parts.gathers @ (others @ term))
+        out = out + term
     return out
 
 
@@ -153,22 +179,42 @@ class PairLinearisation:
         """
         parts, meeting = self.parts, self.point.meeting
         by_force, by_normal, by_gap, by_motion = self.partials
-        gathered = (parts.gathers @ self.needed).reshape(parts.at.shape)
-        force = gathered * parts.contact.free * meeting.met[:, None]
-        rest, law = sparse.csr_array(parts.matrix(self.blocks).tocsr()), []
-        rest = rest - _others(parts, meeting) @ (parts.gathers @ rest)
+        force = _own(parts, meeting, self.needed)
+        stiffness, law = sparse.csr_array(parts.matrix(self.blocks).tocsr()), []
+        turned: sparse.csr_array | None = None
         start = 0
         for part, old in zip(meeting.parts, self.earlier.parts, strict=True):
             mine = slice(start, start + len(part.slaves))
             start = mine.stop
             slopes = by_normal[mine], by_gap[mine], by_motion[mine]
             if isinstance(part, MortarMeeting) and isinstance(old, MortarMeeting):
-                rest = rest - part.slopes.spread(force[mine])
+                spread = part.slopes.spread(force[mine])
+                turned = spread if turned is None else sparse.csr_array(turned + spread)
                 law.append(_law_of_pair(part, old, *slopes))
+            elif isinstance(part, TiedMeeting):
+                law.append(_law_of_tie(part, old, *slopes))
             else:
                 law.append(_law_at_obstacle(part, *slopes))
+        rest = self._without_others(stiffness, turned)
         own = blocks_of(by_force) @ (parts.gathers @ rest)
-        return sparse.csr_array(rest), sparse.csr_array(own + sparse.vstack(law))
+        return rest, sparse.csr_array(own + sparse.vstack(law))
+
+    def _without_others(
+        self, stiffness: sparse.csr_array, turned: sparse.csr_array | None
+    ) -> sparse.csr_array:
+        """Derivative of f_int - f without what contacts give to other nodes, (dofs, dofs).
+
+        turned: of these at held forces, which pass through chains of contacts themselves.
+        """
+        parts, gathers = self.parts, self.parts.gathers
+        others = _others(parts, self.point.meeting)
+        if parts.chained:
+            gathers = _unchained(parts, others, gathers)
+            stiffness = stiffness if turned is None else stiffness - turned
+        rest = stiffness - others @ (gathers @ stiffness)
+        if turned is not None and not parts.chained:
+            rest = rest - turned
+        return sparse.csr_array(rest)
 
     @cached_property
     def matrix(self) -> sparse.csc_array:
@@ -204,8 +250,17 @@ def _law_of_pair(
     return part.slopes.combined(by_normal, by_distance, by_motion, old)
 
 
+def _law_of_tie(
+    part: TiedMeeting, old: AnyMeeting, by_normal: Array, by_gap: Array, by_motion: Array
+) -> sparse.csr_array:
+    """The same where the averages stay."""
+    slopes = part.slopes
+    out = blocks_of(by_normal) @ slopes.normals + blocks_of(by_motion) @ slopes.motion(old)
+    return sparse.csr_array(out + blocks_of(by_gap[:, :, None]) @ slopes.gap)
+
+
 def _law_at_obstacle(
-    part: Meeting | MortarMeeting, by_normal: Array, by_gap: Array, by_motion: Array
+    part: AnyMeeting, by_normal: Array, by_gap: Array, by_motion: Array
 ) -> sparse.csr_array:
     """The same where the other side is an obstacle."""
     assert isinstance(part, Meeting)

@@ -10,24 +10,30 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ...core.errors import InvertedCells
+from ..contact.carried import TiedPair
 from ..contact.current import CurrentContact
-from ..contact.current_mortar import MortarPair
-from ..contact.current_pairs import Meetings, ObstaclePair, Pair
+from ..contact.current_mortar import MortarPair, folded
+from ..contact.current_pairs import Meetings, ObstaclePair, Pair, between_bodies
 from ..contact.facing import Skin
 from ..contact.geometry import Plane
+from ..contact.overlap import is_itself
+from ..elements.corotational import CorotationalBody
 from ..elements.hyperelasticity import HyperelasticBody, is_hyperelastic
 from ..elements.linear_body import LinearBody
-from .finite_checks import check_nodes, check_supported
+from .finite_checks import chains, check_nodes, check_supported
 from .supports import locate
+from .worst_cells import flattest, most_strained
 
 if TYPE_CHECKING:
     from .assembly import Discretisation
+    from .body import Body
     from .model import Model
 
 Array = NDArray[np.float64]
@@ -48,6 +54,7 @@ class NonlinearParts:
     """
 
     bodies: tuple[HyperelasticBody | LinearBody, ...]
+    names: tuple[str, ...]
     X: Array
     ends: Index
     free: Index
@@ -83,6 +90,34 @@ class NonlinearParts:
         return any(isinstance(pair, MortarPair) for pair in self.contact.pairs)
 
     @cached_property
+    def chained(self) -> int:
+        """How many pairs follow the first in a chain of slaves that are masters of others."""
+        return len(self.contact.pairs) - 1 if any(chains(self.contact.pairs)) else 0
+
+    @property
+    def folds(self) -> bool:
+        """True where a surface meets itself."""
+        return any(isinstance(p, MortarPair) and p.fold is not None for p in self.contact.pairs)
+
+    def divided(self, u: Array) -> NonlinearParts:
+        """The same with sides of folds as they are at displacements u (nodes, d)."""
+        for known, parts in tuple(self._divisions):
+            if np.array_equal(known, u):
+                return parts
+        pairs = tuple(
+            pair.divided(self.X + u) if isinstance(pair, MortarPair) else pair
+            for pair in self.contact.pairs
+        )
+        parts = replace(self, contact=replace(self.contact, pairs=pairs))
+        self._divisions.append((u.copy(), parts))
+        return parts
+
+    @cached_property
+    def _divisions(self) -> deque[tuple[Array, NonlinearParts]]:
+        """States, and these parts with the sides of folds there."""
+        return deque(maxlen=KEPT)
+
+    @cached_property
     def gathers(self) -> sparse.csr_array:
         """C of `contact.current_mortar`: what contacts need of f_int - f, (nc d, dofs).
 
@@ -95,10 +130,11 @@ class NonlinearParts:
         start = 0
         for pair in self.contact.pairs:
             stop = start + len(pair.slaves)
-            if isinstance(pair, MortarPair):
+            mortar = between_bodies(pair)
+            if mortar is not None:
                 row = np.full(len(self.X), -1)
                 row[pair.slaves] = np.arange(start, stop)
-                middle, corner, part = pair.slave.means
+                middle, corner, part = mortar.slave.means
                 kept = row[corner] >= 0
                 entries = (part[kept], (row[corner[kept]], middle[kept]))
                 out = out + sparse.csr_array(entries, shape=out.shape)
@@ -148,18 +184,29 @@ class NonlinearParts:
             yield body, part, pressures[first:last]
             first = last
 
+    def _of_each(self, name: str, u: Array, pressures: Array | None) -> list[Any]:
+        """What a method of all bodies returns; raises InvertedCells naming body and cell."""
+        out = []
+        for k, (body, *given) in enumerate(self._given(u, pressures)):
+            try:
+                out.append(getattr(body, name)(*given))
+            except InvertedCells as reason:
+                least, cell = flattest(body.mesh, given[0])
+                cell = cell if not least > 0 else most_strained(body.mesh, given[0])
+                where = f"{cell} of body {self.names[k]!r}"
+                raise InvertedCells(f"{reason}, the worst {where}") from reason
+        return out
+
     def forces(self, u: Array, pressures: Array | None = None) -> Array:
         """Nodal forces of the bodies (dofs,) at displacements u (nodes, d).
 
         pressures (c,): of hybrid cells, else those of the displacements.
         """
-        return np.concatenate(
-            [body.forces(*given).ravel() for body, *given in self._given(u, pressures)]
-        )
+        return np.concatenate([f.ravel() for f in self._of_each("forces", u, pressures)])
 
     def tangent(self, u: Array, pressures: Array | None = None) -> tuple[Array, Array]:
         """(forces (dofs,), node blocks (m, d, d) of their derivative) at displacements u."""
-        both = [body.tangent(*given) for body, *given in self._given(u, pressures)]
+        both = self._of_each("tangent", u, pressures)
         return np.concatenate([f.ravel() for f, _ in both]), np.concatenate(
             [b for _, b in both]
         )
@@ -198,6 +245,8 @@ def nonlinear_parts(model: Model) -> NonlinearParts:
     Raises UnsupportedForm for what finite strains do not have.
     """
     parts = model._shared.once(_nonlinear_parts, (), model)
+    if model.divided_at is not None and parts.folds:
+        parts = parts.divided(model.divided_at.reshape(parts.X.shape))
     if parts.contact.law is model.law:
         return parts  # with the meetings that it keeps
     return replace(parts, contact=replace(parts.contact, law=model.law))
@@ -207,9 +256,7 @@ def _nonlinear_parts(model: Model) -> NonlinearParts:
     check_supported(model)
     linear = model.discretisation  # of the tangent at rest: same dofs, contacts and checks
     bodies = tuple(
-        (HyperelasticBody if is_hyperelastic(body.material) else LinearBody)(
-            body.mesh, body.material  # type: ignore[arg-type]
-        )
+        _kind_of(body)(body.mesh, body.material)  # type: ignore[arg-type]
         for body in model.bodies
     )
     X = np.concatenate([body.mesh.points for body in model.bodies])
@@ -234,9 +281,16 @@ def _nonlinear_parts(model: Model) -> NonlinearParts:
         _resistance(pairs, linear.stored_stiffness, at),
         is_free[at],
     )  # fmt: skip
-    return NonlinearParts(bodies, X, linear.offsets[1:-1] // d, linear.free, contact, at,
+    names = tuple(body.name for body in model.bodies)
+    return NonlinearParts(bodies, names, X, linear.offsets[1:-1] // d, linear.free, contact, at,
                           contact_of[rows], np.flatnonzero(rows == columns)[nodes],
                           columns, pointers, sparse.csc_array(taken))  # fmt: skip
+
+
+def _kind_of(body: Body) -> type[HyperelasticBody | LinearBody]:
+    if body.corotational:
+        return CorotationalBody
+    return HyperelasticBody if is_hyperelastic(body.material) else LinearBody
 
 
 def _pairs(model: Model, slaves: list[Index], linear: Discretisation) -> list[Pair]:
@@ -250,13 +304,26 @@ def _pairs(model: Model, slaves: list[Index], linear: Discretisation) -> list[Pa
         if contact.obstacle is not None:
             out.append(ObstaclePair(contact.obstacle, nodes))  # type: ignore[arg-type]
             continue
-        skins = []
-        for side in (contact.slave, str(contact.master)):
+        skins, meshes = [], []
+        for side in (contact.slave, *contact.masters):
             k, name = locate(model.bodies, side)
             facets = model.bodies[k].mesh.surface(name)
             skins.append(Skin.of(facets, int(linear.offsets[k]) // d))
-        names = (contact.slave, str(contact.master))
-        out.append(MortarPair(nodes, *skins, is_free[nodes], names))
+            meshes.append((model.bodies[k].mesh, name))
+        names = (contact.slave, ", ".join(contact.masters))
+        if len(meshes) == 2 and is_itself(*meshes[0], *meshes[1]):
+            x = np.concatenate([body.mesh.points for body in model.bodies])
+            out.append(folded(nodes, skins[0], is_free[nodes], x, names))
+            continue
+        master = Skin.joined(skins[1:])
+        pair = MortarPair(nodes, skins[0], master, is_free[nodes], names)
+        if not contact.tied:
+            out.append(pair)
+            continue
+        x = np.concatenate([body.mesh.points for body in model.bodies])
+        blocks = sparse.bsr_array(linear.stored_stiffness, blocksize=(d, d))
+        beside = (np.ones(len(blocks.indices)), blocks.indices, blocks.indptr)
+        out.append(TiedPair.of(pair, x, sparse.csr_array(beside, shape=(len(x), len(x)))))
     return out
 
 
@@ -294,8 +361,10 @@ def _resistance(pairs: Sequence[Pair], K: sparse.csr_array, at: Index) -> Array:
     for pair in pairs:
         mine = slice(start, start + len(pair.slaves))
         start = mine.stop
-        if isinstance(pair, MortarPair):
-            other = np.median(_stiffness_at(K, pair.master.all[:, None] * d + np.arange(d)))
+        mortar = between_bodies(pair)
+        if mortar is not None:
+            nodes = (mortar.master if mortar.fold is None else mortar.fold.skin).all
+            other = np.median(_stiffness_at(K, nodes[:, None] * d + np.arange(d)))
             own[mine] = own[mine] * other / (own[mine] + other)
     return own
 

@@ -93,7 +93,7 @@ def _result(  # noqa: PLR0913
     net = np.linalg.norm(fields.slid[numbers], axis=1)
     obstacle = contact.obstacle
     return PairResult(
-        name, contact.slave, contact.master,
+        name, contact.slave, ", ".join(contact.masters) or None,
         None if obstacle is None else type(obstacle).__name__.lower(), wrench, area,
         float(fields.pressure[numbers].max(initial=0.0)),
         Slip(float(net.max(initial=0.0)), float(fields.path[numbers].max(initial=0.0))),

@@ -142,6 +142,8 @@ class Contact:
 
     master: another surface, of any body; slave nodes without a facet of it in front of them are
     left out.
+    more_masters: other surfaces of the same side: a master made of several bodies.  With
+    kinematics "finite", where several such contacts of one slave and law are one, too.
     method: "nodal", every slave node against the closest point of the other side, or "mortar",
     averages with dual basis functions, exact also for a uniform pressure between meshes that do
     not match, or "nitsche", the law at Gauss points with stresses in the place of reactions;
@@ -199,6 +201,7 @@ class Contact:
     name: str = ""
     clearance: float | Callable[[Array], Array] | None = None
     follows: str | None = None
+    more_masters: Sequence[str] = ()
 
     def __post_init__(self, configuration: str | None, law: Law | None) -> None:
         if not isinstance(self.name, str) or not self.name.isprintable():
@@ -216,6 +219,7 @@ class Contact:
             )
         if self.follows is not None:
             self._check_follows()
+        self._check_masters()
         if not isinstance(self.method, Nitsche | str | None):
             raise InvalidInput(f"method: expected a text, got {shown(self.method)}")
         if self.method is None:
@@ -250,6 +254,26 @@ class Contact:
                 f"{self.obstacle!r}; "
                 'another surface is master="NAME"'
             )
+
+    def _check_masters(self) -> None:
+        given = self.more_masters
+        several = isinstance(given, list | tuple) and all(isinstance(n, str) for n in given)
+        if not several or (given and self.master is None):
+            raise InvalidInput(
+                f"contact on {self.slave!r}: more_masters: expected a list of surfaces beside "
+                f"master, got {shown(given)}"
+            )
+        object.__setattr__(self, "more_masters", tuple(given))
+        if len(set(self.masters)) < len(self.masters):
+            raise InvalidInput(
+                f"contact on {self.slave!r}: more_masters: expected every master once, got "
+                f"{', '.join(self.masters)}"
+            )
+
+    @property
+    def masters(self) -> tuple[str, ...]:
+        """All surfaces of the other side, none with an obstacle."""
+        return () if self.master is None else (self.master, *self.more_masters)
 
     def _check_follows(self) -> None:
         where = f"contact on {self.slave!r}: follows"

@@ -31,7 +31,6 @@ from ..contact import (
 from ..contact.segments import Surface
 from ..elements.elasticity import LinearElastic, materials_by_region
 from ..elements.given import GivenMatrices
-from ..elements.hyperelasticity import is_hyperelastic
 from ..elements.rigid import Rigid
 from ..meshes.mesh import Mesh
 from ..meshes.surfaces import facet_normals
@@ -172,7 +171,7 @@ def _held_nodes(
         H = _with_tool(bodies, contact, rows, offsets)
     else:
         assert contact.master is not None
-        j, other = locate(bodies, contact.master)
+        j, other = locate(bodies, contact.master)  # of several the first
         try:
             rows, on_master, _ = pair_contact(slave, surface, bodies[j].mesh, other)
         except InvalidInput:
@@ -201,8 +200,8 @@ def _with_tool(
 
 
 def _sides(bodies: Sequence[Body], contact: Contact) -> tuple[Mesh, str, Mesh, str] | None:
-    """Mesh and surface of slave and master."""
-    if contact.master is None:
+    """Mesh and surface of slave and master; None with several."""
+    if contact.master is None or contact.more_masters:
         return None
     (k, surface), (j, other) = (locate(bodies, n) for n in (contact.slave, contact.master))
     return bodies[k].mesh, surface, bodies[j].mesh, other
@@ -233,8 +232,13 @@ def _met(
     j, other = locate(bodies, contact.master)
     master = bodies[j].mesh
     if far:
-        rows, on_master, met = current_contact(slave, surface, master, other, held[k])
-    elif mortar:
+        sides = [(bodies[i].mesh, name) for i, name in located(bodies, contact)]
+        rows, every, met = current_contact(slave, surface, sides, held[k], tied=contact.tied)
+        H = _shifted(rows.H, int(offsets[k]), size)
+        for (i, _), part in zip(located(bodies, contact), every, strict=True):
+            H = H + _shifted(part, int(offsets[i]), size)
+        return rows, sparse.csc_array(H), met, points, None
+    if mortar:
         rows, on_master, met = mortar_contact(
             slave, surface, master, other, held=held[k], lasting=lasting[k],
             master_lasting=lasting[j], tied=contact.tied,
@@ -245,9 +249,14 @@ def _met(
     return rows, sparse.csc_array(H), met, points, None
 
 
+def located(bodies: Sequence[Body], contact: Contact) -> list[tuple[int, str]]:
+    """Body and surface of every master."""
+    return [locate(bodies, name) for name in contact.masters]
+
+
 def slides_far(bodies: Sequence[Body], contact: Contact) -> bool:
     """Whether a pair of two bodies meets where they are now."""
-    finite = contact.kinematics == FINITE or any(is_hyperelastic(b.material) for b in bodies)
+    finite = contact.kinematics == FINITE or any(b.turns for b in bodies)
     return finite and contact.master is not None and contact.method == "mortar"
 
 

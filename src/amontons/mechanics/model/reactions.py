@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..elements.hyperelasticity import is_hyperelastic
 from .names import support_names
 from .references import beside_wrench
 from .supports import prescribed_values
@@ -56,12 +55,12 @@ def support_forces(parts: Discretisation, rest: Array) -> Array:
 
 
 def arms(model: Model, displacement: Sequence[Array]) -> Array:
-    """Where the forces at all nodes act, (nodes, d): deformed at finite strains alone.
+    """Where the forces at all nodes act, (nodes, d): deformed where bodies may turn.
 
     Small strains balance forces on the undeformed body, and so do their moments.
     """
     points = np.concatenate([body.mesh.points for body in model.bodies])
-    if any(is_hyperelastic(body.material) for body in model.bodies):
+    if any(body.turns for body in model.bodies):
         return points + np.concatenate(list(displacement))
     return points
 

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.warned import ResultWarning
-from ..elements.hyperelasticity import is_hyperelastic
 from .fields import ContactFields
 from .rigid import Piece
 
@@ -79,12 +78,12 @@ def _finite_strains(model: Model) -> list[int]:
     starts = np.cumsum([body.mesh.points.size for body in model.bodies])
     pieces = model.discretisation.parts
     of = [int(np.searchsorted(starts, piece.dofs[0], side="right")) for piece in pieces]
-    return [k for k, body in enumerate(of) if is_hyperelastic(model.bodies[body].material)]
+    return [k for k, body in enumerate(of) if model.bodies[body].turns]
 
 
 def large_rotation(model: Model, fields: ContactFields) -> list[ResultWarning]:
     """A warning where a body of small strains turns by more than LIMIT."""
-    if all(is_hyperelastic(body.material) for body in model.bodies):
+    if all(body.turns for body in model.bodies):
         return []
     displacement = np.concatenate(fields.displacement)
     if not np.isfinite(displacement).all():
@@ -104,6 +103,6 @@ def large_rotation(model: Model, fields: ContactFields) -> list[ResultWarning]:
         "large-rotation",
         f"body {fit.names[worst]!r} turns by {turned[worst]:.1f} degrees{others}: small "
         f"strains stretch what turns, here by {stretch:.2g} %{model.formulation.keeps}; "
-        "give the bodies a hyperelastic law such as NeoHookean (solve, quasi-static "
-        f"steps), or trust the motion only up to some {LIMIT:g} degrees",
+        "give the bodies corotational=True or a hyperelastic law such as NeoHookean, or "
+        f"trust the motion only up to some {LIMIT:g} degrees",
     )]  # fmt: skip

@@ -180,13 +180,15 @@ class Packed(NamedTuple):
     corners: Index  # vertices around each face
     first_edge: Index  # (n + 1,)
     edges: Index  # (e, 2)
+    first_line: Index  # (n + 1,)
+    lines: Index  # (l + 1,) edges of each direction
     planes: Array  # (p, 4) normal and offset
     apart: NDArray[np.bool_]  # (n, n) pairs that do not meet; (0, 0) where there are none
 
 
 def _packed(system: RigidBodies) -> Packed:
-    vertices, normals, offsets, corners, edges = [], [], [], [], []
-    counts = {"vertex": [0], "face": [0], "edge": [0]}
+    vertices, normals, offsets, corners, edges, lines = [], [], [], [], [], []
+    counts = {"vertex": [0], "face": [0], "edge": [0], "line": [0]}
     around, total = [0], 0
     for body in system.bodies:
         shape = body.shape
@@ -198,11 +200,12 @@ def _packed(system: RigidBodies) -> Packed:
             for loop in facets.loops:
                 corners.append(loop + total)
                 around.append(around[-1] + len(loop))
+            lines.append(facets.lines + counts["edge"][-1])
             edges.append(facets.edges + total)
             total += len(vertices[-1])
-            sizes = len(vertices[-1]), len(normals[-1]), len(edges[-1])
+            sizes = len(vertices[-1]), len(normals[-1]), len(edges[-1]), len(lines[-1])
         else:
-            sizes = 0, 0, 0
+            sizes = 0, 0, 0, 0
         for key, size in zip(counts, sizes, strict=True):
             counts[key].append(counts[key][-1] + size)
     n = len(system.bodies)
@@ -216,8 +219,9 @@ def _packed(system: RigidBodies) -> Packed:
         np.array(counts["vertex"]), _rows(vertices, 3), np.array(counts["face"]),
         _rows(normals, 3), np.concatenate([np.zeros(0), *offsets]), np.array(around),
         np.concatenate([np.zeros(0, np.int64), *corners]), np.array(counts["edge"]),
-        _rows(edges, 2).astype(np.int64), np.reshape(np.array(planes, dtype=float), (-1, 4)),
-        apart,
+        _rows(edges, 2).astype(np.int64), np.array(counts["line"]),
+        np.concatenate([*lines, counts["edge"][-1:]]).astype(np.int64),
+        np.reshape(np.array(planes, dtype=float), (-1, 4)), apart,
     )  # fmt: skip
 
 

@@ -19,13 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
+from .apart import boxes_apart, dot, edges_apart, face_apart
 from .bodies import GROUND, Packed
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 FACES_FIRST = 1e-3  # of the size: edges must be apart by so much more than faces to decide
 MOST = 64  # corners of a face that is cut
-PARALLEL = 1e-6  # sine below which two edges have no common normal
 PLACES = 1 << 20  # features of one pair that are told from each other
 
 
@@ -48,7 +48,7 @@ def meetings(packed: Packed, x: Array, R: Array, near: Array) -> Meetings:
 
     near (n,): how far each body is looked for, unit of length.
     """
-    vertices, normals, offsets = _placed(
+    vertices, normals, offsets, boxes = _placed(
         packed.first_vertex, packed.vertices, packed.first_face, packed.normals,
         packed.offsets, x, R,
     )  # fmt: skip
@@ -58,7 +58,8 @@ def meetings(packed: Packed, x: Array, R: Array, near: Array) -> Meetings:
         count = _meet(
             packed.radius, packed.reach, packed.first_vertex, vertices, packed.first_face,
             normals, offsets, packed.first_corner, packed.corners, packed.first_edge,
-            packed.edges, packed.planes, packed.apart, x, near, numbers, places,
+            packed.edges, packed.first_line, packed.lines, packed.planes, packed.apart, x, near,
+            boxes, numbers, places,
         )  # fmt: skip
         if count <= room:
             slave, master, feature = numbers[:, :count]
@@ -69,14 +70,18 @@ def meetings(packed: Packed, x: Array, R: Array, near: Array) -> Meetings:
 
 @njit(cache=True, error_model="numpy")
 def _placed(first_vertex, vertices, first_face, normals, offsets, x, R):  # noqa: PLR0913
-    """Vertices, face normals and offsets in global axes."""
+    """Vertices, face normals and offsets in global axes, boxes (n, 2, 3) around vertices."""
     v, n, o = np.empty_like(vertices), np.empty_like(normals), np.empty_like(offsets)
+    boxes = np.empty((len(x), 2, 3))
     for b in range(len(x)):
+        boxes[b, 0], boxes[b, 1] = np.inf, -np.inf
         for k in range(first_vertex[b], first_vertex[b + 1]):
             for i in range(3):
                 v[k, i] = x[b, i]
                 for j in range(3):
                     v[k, i] += R[b, i, j] * vertices[k, j]
+                boxes[b, 0, i] = min(boxes[b, 0, i], v[k, i])
+                boxes[b, 1, i] = max(boxes[b, 1, i], v[k, i])
         for k in range(first_face[b], first_face[b + 1]):
             o[k] = offsets[k]
             for i in range(3):
@@ -84,12 +89,7 @@ def _placed(first_vertex, vertices, first_face, normals, offsets, x, R):  # noqa
                 for j in range(3):
                     n[k, i] += R[b, i, j] * normals[k, j]
                 o[k] += n[k, i] * x[b, i]
-    return v, n, o
-
-
-@njit(cache=True, error_model="numpy")
-def _dot(a, b):
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return v, n, o, boxes
 
 
 @njit(cache=True, error_model="numpy")
@@ -105,14 +105,14 @@ def _add(count, slave, master, feature, px, py, pz, nx, ny, nz, gap, numbers, pl
 @njit(cache=True, error_model="numpy")
 def _meet(  # noqa: PLR0913
     radius, reach, first_vertex, v, first_face, n, o, first_corner, corners, first_edge, edges,
-    planes, apart, x, near, numbers, places,
+    first_line, lines, planes, apart, x, near, boxes, numbers, places,
 ):  # fmt: skip
     """Fill numbers (slave, master, feature) and places (point, normal, gap); the count."""
     count = 0
     for p in range(len(planes)):
         normal, offset = planes[p, :3], planes[p, 3]
         for b in range(len(x)):
-            above = _dot(normal, x[b]) - offset
+            above = dot(normal, x[b]) - offset
             if above > reach[b] + near[b]:
                 continue
             if radius[b] > 0:
@@ -121,7 +121,7 @@ def _meet(  # noqa: PLR0913
                              x[b, 1] - s * normal[1], x[b, 2] - s * normal[2], normal[0],
                              normal[1], normal[2], s - radius[b], numbers, places)  # fmt: skip
             for k in range(first_vertex[b], first_vertex[b + 1]):
-                gap = _dot(normal, v[k]) - offset
+                gap = dot(normal, v[k]) - offset
                 if gap <= near[b]:
                     count = _add(count, b, GROUND, p * PLACES + k - first_vertex[b],
                                  v[k, 0], v[k, 1], v[k, 2], normal[0], normal[1], normal[2],
@@ -155,10 +155,10 @@ def _meet(  # noqa: PLR0913
                 ball, other = (first, second) if radius[first] > 0 else (second, first)
                 count = _ball_on(count, ball, other, x, radius, first_face, n, o,
                                  first_corner, corners, v, margin, numbers, places)  # fmt: skip
-            else:
+            elif not boxes_apart(boxes[i], boxes[j], margin):
                 count = _polyhedra(count, first, second, first_vertex, v, first_face, n, o,
-                                   first_corner, corners, first_edge, edges, x, reach, margin,
-                                   numbers, places)  # fmt: skip
+                                   first_corner, corners, first_edge, edges, first_line, lines,
+                                   x, reach, margin, numbers, places)  # fmt: skip
     return count
 
 
@@ -166,7 +166,7 @@ def _meet(  # noqa: PLR0913
 def _balls(count, i, j, x, radius, margin, numbers, places):  # noqa: PLR0913
     """Two balls: the second is the slave."""
     d = x[j] - x[i]
-    length = np.sqrt(_dot(d, d))
+    length = np.sqrt(dot(d, d))
     gap = length - radius[i] - radius[j]
     if gap > margin:
         return count
@@ -185,7 +185,7 @@ def _ball_on(  # noqa: PLR0913
     centre = x[ball]
     inside, deepest, face = True, -np.inf, -1
     for f in range(first_face[other], first_face[other + 1]):
-        above = _dot(n[f], centre) - o[f]
+        above = dot(n[f], centre) - o[f]
         inside = inside and above <= 0
         if above > deepest:
             deepest, face = above, f
@@ -196,7 +196,7 @@ def _ball_on(  # noqa: PLR0913
     if not inside:
         distance = np.inf
         for f in range(first_face[other], first_face[other + 1]):
-            above = _dot(n[f], centre) - o[f]
+            above = dot(n[f], centre) - o[f]
             if above <= 0:
                 continue
             foot = centre - above * n[f]
@@ -206,12 +206,12 @@ def _ball_on(  # noqa: PLR0913
                 p = v[corners[c]]
                 q = v[corners[c + 1 if c + 1 < end else begin]]
                 side = np.cross(q - p, n[f])
-                if _dot(side, foot - p) > 0:
+                if dot(side, foot - p) > 0:
                     within = False
                     edge = q - p
-                    t = min(max(_dot(edge, centre - p) / _dot(edge, edge), 0.0), 1.0)
+                    t = min(max(dot(edge, centre - p) / dot(edge, edge), 0.0), 1.0)
                     nearest = p + t * edge
-                    length = np.sqrt(_dot(centre - nearest, centre - nearest))
+                    length = np.sqrt(dot(centre - nearest, centre - nearest))
                     if length < distance:
                         distance, at = length, nearest
                         feature = PLACES // 2 + min(corners[c], corners[begin])
@@ -227,77 +227,26 @@ def _ball_on(  # noqa: PLR0913
 
 
 @njit(cache=True, error_model="numpy")
-def _face_apart(first_face, n, o, i, first_vertex, v, j):  # noqa: PLR0913
-    """(distance, face) of the face of i from which j is farthest."""
-    best, face = -np.inf, -1
-    for f in range(first_face[i], first_face[i + 1]):
-        lowest = np.inf
-        for k in range(first_vertex[j], first_vertex[j + 1]):
-            lowest = min(lowest, _dot(n[f], v[k]))
-        if lowest - o[f] > best:
-            best, face = lowest - o[f], f
-    return best, face
-
-
-@njit(cache=True, error_model="numpy")
-def _edges_apart(i, j, first_vertex, v, first_edge, edges, x):  # noqa: PLR0913
-    """(distance, edge of i, edge of j, normal from i to j) of the two farthest apart."""
-    best, one, two, normal = -np.inf, -1, -1, np.zeros(3)
-    between = x[j] - x[i]
-    for a in range(first_edge[i], first_edge[i + 1]):
-        p = v[edges[a, 1]] - v[edges[a, 0]]
-        for b in range(first_edge[j], first_edge[j + 1]):
-            q = v[edges[b, 1]] - v[edges[b, 0]]
-            m = np.cross(p, q)
-            length = np.sqrt(_dot(m, m))
-            if length < PARALLEL * np.sqrt(_dot(p, p) * _dot(q, q)):
-                continue
-            m = m / length
-            if _dot(m, between) < 0:
-                m = -m
-            distance = _dot(m, v[edges[b, 0]]) - _dot(m, v[edges[a, 0]])
-            if distance <= best:
-                continue
-            # the two must be the outermost of their bodies along m
-            size = 1e-9 * np.sqrt(_dot(between, between))
-            top, bottom = _dot(m, v[edges[a, 0]]), _dot(m, v[edges[b, 0]])
-            outermost = True
-            for k in range(first_vertex[i], first_vertex[i + 1]):
-                if _dot(m, v[k]) > top + size:
-                    outermost = False
-                    break
-            if not outermost:
-                continue
-            for k in range(first_vertex[j], first_vertex[j + 1]):
-                if _dot(m, v[k]) < bottom - size:
-                    outermost = False
-                    break
-            if outermost:
-                best, one, two, normal = distance, a, b, m
-    return best, one, two, normal
-
-
-@njit(cache=True, error_model="numpy")
 def _polyhedra(  # noqa: PLR0913
     count, i, j, first_vertex, v, first_face, n, o, first_corner, corners, first_edge, edges,
-    x, reach, margin, numbers, places,
+    first_line, lines, x, reach, margin, numbers, places,
 ):  # fmt: skip
     """Two polyhedra: the corners of a face on another, or two edges."""
-    apart_i, face_i = _face_apart(first_face, n, o, i, first_vertex, v, j)
+    apart_i, face_i = face_apart(first_face, n, o, i, first_vertex, v, j)
     if apart_i > margin:
         return count
-    apart_j, face_j = _face_apart(first_face, n, o, j, first_vertex, v, i)
+    apart_j, face_j = face_apart(first_face, n, o, j, first_vertex, v, i)
     if apart_j > margin:
         return count
     size = FACES_FIRST * min(reach[i], reach[j])
-    apart_e, one, two, m = _edges_apart(i, j, first_vertex, v, first_edge, edges, x)
+    apart_e, one, two, m = edges_apart(i, j, first_vertex, v, edges, first_line, lines, x)
     if apart_e > margin:
         return count
     if one >= 0 and apart_e > max(apart_i, apart_j) + size:
         p, q = v[edges[one, 0]], v[edges[two, 0]]
         a, b = v[edges[one, 1]] - p, v[edges[two, 1]] - q
-        aa, ab, bb = _dot(a, a), _dot(a, b), _dot(b, b)
-        s = (_dot(a, q - p) * bb - _dot(b, q - p) * ab) / (aa * bb - ab * ab)
+        aa, ab, bb = dot(a, a), dot(a, b), dot(b, b)
+        s = (dot(a, q - p) * bb - dot(b, q - p) * ab) / (aa * bb - ab * ab)
         at = p + min(max(s, 0.0), 1.0) * a + 0.5 * apart_e * m
         feature = PLACES // 2 + (one - first_edge[i]) * 1024 + two - first_edge[j]
         return _add(count, j, i, feature, at[0], at[1], at[2], m[0], m[1], m[2], apart_e,
@@ -318,7 +267,7 @@ def _on_face(  # noqa: PLR0913
     normal, offset = n[face], o[face]
     against, lowest = -1, np.inf
     for f in range(first_face[j], first_face[j + 1]):
-        cosine = _dot(n[f], normal)
+        cosine = dot(n[f], normal)
         if cosine < lowest:
             against, lowest = f, cosine
     polygon, cut = np.empty((MOST, 3)), np.empty((MOST, 3))
@@ -334,11 +283,11 @@ def _on_face(  # noqa: PLR0913
         p = v[corners[c]]
         q = v[corners[c + 1 if c + 1 < end else begin]]
         out = np.cross(q - p, normal)
-        out = out / np.sqrt(_dot(out, out))
+        out = out / np.sqrt(dot(out, out))
         number, side = 0, PLACES // 4 + 256 * (c - begin)
         for k in range(size):
             a, b = polygon[k], polygon[k + 1 if k + 1 < size else 0]
-            da, db = _dot(out, a - p), _dot(out, b - p)
+            da, db = dot(out, a - p), dot(out, b - p)
             if da <= 0 and number < MOST:
                 cut[number], kept[number] = a, marks[k]
                 number += 1
@@ -356,7 +305,7 @@ def _on_face(  # noqa: PLR0913
     low, high = (i, j) if i < j else (j, i)
     turn = PLACES if i == high else 0
     for k in range(size):
-        gap = _dot(normal, polygon[k]) - offset
+        gap = dot(normal, polygon[k]) - offset
         if gap <= margin:
             at = polygon[k] - 0.5 * gap * normal
             count = _add(count, j, i, turn + marks[k], at[0], at[1], at[2], normal[0],
@@ -364,7 +313,7 @@ def _on_face(  # noqa: PLR0913
     if size == 0:  # beside the face: the corner that is nearest to its plane
         best, gap = -1, np.inf
         for k in range(first_vertex[j], first_vertex[j + 1]):
-            height = _dot(normal, v[k]) - offset
+            height = dot(normal, v[k]) - offset
             if height < gap:
                 best, gap = k, height
         at = v[best] - 0.5 * gap * normal

@@ -11,9 +11,9 @@ with W_f after a step without contact (`rows.turned_freely`).  Contacts whose ga
 midpoint is not positive take part, with the law between r and u1 + e min(u0_N, 0).  What an
 impact leaves of overlap, h |u_N| / 2 at most, and joints lose by turning, is mended where it is
 more than `overlap`: by the smallest displacements, in the metric of the masses, that take it
-away.  (A law that lets open contacts close without overlap, u1_N >= -gap / h, turns a rocking
-block round a step too early at each impact; at the same step its times are wrong by six times
-as much.)
+away.  What was mended takes part, though rotations open it by their squares.  (A law that lets
+open contacts close without overlap, u1_N >= -gap / h, turns a rocking block round a step too
+early at each impact; at the same step its times are wrong by six times as much.)
 
 Energies: kinetic + potential gain what contacts do, r . (u0 + u1) / 2 (of W_f for rotations),
 and what the mending of overlaps does.  That is an identity of the scheme, to rounding.
@@ -34,7 +34,6 @@ from numpy.typing import NDArray
 from ...core.arrays import finite, number
 from ...core.clock import NEVER, Deadline
 from ...core.errors import Interrupted, InvalidInput, NotConverged
-from ...problem.friction import FrictionProblem
 from ...problem.solution import FrictionSolution
 from ...solvers.asked import Asked
 from ...solvers.contract import Iterate, Solver
@@ -50,6 +49,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 WHOLE = 1e-9  # the end may miss a whole number of steps by this part of a step
 OVERLAP = 1e-5  # of the smallest body, below which overlaps are left
+FAR = 1e-3  # of the smallest body, moved by mending, from which contacts are found again
 TOUCHING = 1e-9  # of a body, gaps up to which it touches
 NOTHING = np.zeros((0, 3))
 
@@ -159,11 +159,18 @@ class _Stepping:
         begin, masses = before.position, self.bodies[0]
         middle = middle_of(*before, h)
         at = self._rows(*middle)
-        moved = self._mended(at, middle[1])
-        if moved is not None:
+        mended = self._mended(at, middle[1])
+        if mended is not None:
+            moved, gaps = mended
             before = self._shifted(before, moved, rotations(before.orientation))
             middle = middle_of(*before, h)
-            at = self._rows(*middle)
+            reach = self.system.packed.reach
+            angle = np.linalg.norm(moved[1], axis=1)
+            far = np.linalg.norm(moved[0], axis=1) + angle * reach > FAR * self.system.size
+            if far.any():  # rotations lift what was mended by their squares
+                at = self._rows(*middle, angle**2 * reach)
+            else:
+                at = self._closed(at, gaps)
         R, nc = middle[1], len(at.keys)
         free = freely(before.velocity, before.spin, self.bodies[1], self.gravity, h)
         solved, r = None, np.zeros((0, 3))
@@ -172,9 +179,7 @@ class _Stepping:
                 at.rows, nc, (masses, self.inverse, R), (before.velocity, before.spin), free,
                 self.system.restitution, at.keys, (state.keys, state.impulses),
             ))  # fmt: skip
-            solved = self._quickly(posed, nc, deadline) or self._solve(
-                posed, nc, state.index + 1, deadline
-            )
+            solved = self._solve(posed, nc, f"step {state.index + 1}", deadline)
             r = solved.r if isinstance(solved, Found) else solved.r.copy()
         motion, energies = ended(
             at.rows, r, R, self.bodies, self.gravity, h, begin, tuple(before), free
@@ -183,9 +188,9 @@ class _Stepping:
         return RigidStep(self.system, new, at.found, at.rows.axes[:nc], r[:nc], r[nc:],
                          RigidEnergies(*energies), solved)  # fmt: skip
 
-    def _rows(self, x: Array, R: Array) -> _Met:
-        """Contacts and joints of bodies at x, turned by R."""
-        found = meetings(self.system.packed, x, R, self.near)
+    def _rows(self, x: Array, R: Array, apart: Array | float = 0.0) -> _Met:
+        """Contacts and joints of bodies at x, turned by R; apart (n,): gaps that count."""
+        found = meetings(self.system.packed, x, R, self.near + apart)
         keys, axes, arms, others, deepest = rows_at(*found, x)
         first, second = self.joined
         if not len(first):
@@ -201,34 +206,48 @@ class _Stepping:
             np.concatenate([axes, np.broadcast_to(np.eye(3), (len(first), 3, 3))]),
             np.concatenate([arms, own]), np.concatenate([others, other]),
         )  # fmt: skip
-        apart = x[first] + own - fixed
-        return _Met(found, keys, rows, apart, max(deepest, float(np.abs(apart).max())))
+        sides = x[first] + own - fixed
+        return _Met(found, keys, rows, sides, max(deepest, float(np.abs(sides).max())))
+
+    def _closed(self, at: _Met, gaps: Array) -> _Met:
+        """What is left of contacts that were mended, with their gaps (nc,) after that."""
+        found, nc = at.found, len(at.keys)
+        apart = np.where(found.master >= 0, self.near[found.master], 0.0)
+        kept = gaps <= self.near[found.slave] + apart
+        rows = np.concatenate([kept, np.ones(len(at.rows.slave) - nc, dtype=bool)])
+        found = Meetings(*(a[kept] for a in found._replace(gaps=gaps)))
+        return _Met(found, at.keys[kept], Rows(*(a[rows] for a in at.rows)), at.apart, 0.0)
 
     # ------------------------------------------------------------------ problems
-    def _quickly(self, posed: Posed, contacts: int, deadline: Deadline) -> Found | None:
-        """What sweeps find where no solver is asked for, and no time is counted or over."""
-        if self.solver is not None or deadline.work is not None:
-            return None
-        if deadline is not NEVER and deadline.passed:
-            return None
-        return found_quickly(posed, contacts, self.system.mu, self.asked.tolerance)
-
     def _solve(
-        self, posed: Posed, contacts: int, number: int, deadline: Deadline
-    ) -> FrictionSolution:
-        """The impulses of a step, its number for messages."""
-        law = law_of(contacts, len(posed.q) - contacts, self.system.mu)
-        asked = self.asked if deadline is NEVER else replace(self.asked, time_limit=deadline)
+        self, posed: Posed, contacts: int, what: str, deadline: Deadline
+    ) -> Found | FrictionSolution:
+        """The impulses of a step, `what` for messages.
+
+        By sweeps alone where no solver is asked for, and no time is counted or over.
+        """
+        mu, asked = self.system.mu, self.asked
+        timed = deadline is not NEVER and (deadline.work is not None or deadline.passed)
+        if self.solver is None and not timed:
+            found, start = found_quickly(posed, contacts, mu, asked.tolerance)
+            if found is not None:
+                return found
+            posed = posed._replace(start=start)
+        law = law_of(contacts, len(posed.q) - contacts, mu)
+        asked = asked if deadline is NEVER else replace(asked, time_limit=deadline)
         problem = posed.problem(law)
         solution = drive_as_asked(problem, asked, Iterate(posed.start), self.solver)
         if self.check and not solution.converged:
             record = solution.convergence
             kind = Interrupted if record.by_user else NotConverged
-            raise kind(f"step {number}: {record}. {record.advice}", solution)
+            raise kind(f"{what}: {record}. {record.advice}", solution)
         return solution
 
-    def _mended(self, at: _Met, R: Array) -> tuple[Array, Array] | None:
-        """Displacements and rotations (n, 3) that take overlaps away; None of small ones."""
+    def _mended(self, at: _Met, R: Array) -> tuple[tuple[Array, Array], Array] | None:
+        """Displacements and rotations (n, 3) that take overlaps away, and the gaps then.
+
+        None where overlaps are small.
+        """
         if at.deepest <= self.overlap:
             return None
         rows, nc, masses = at.rows, len(at.keys), self.bodies[0]
@@ -236,11 +255,18 @@ class _Stepping:
         q[:nc, 0] = at.found.gaps + 0.5 * self.overlap
         q[nc:] = at.apart
         inverse = R @ self.inverse @ R.swapaxes(1, 2)
-        law = law_of(nc, len(q) - nc, 0.0)
-        problem = FrictionProblem._from_blocks(delassus(rows, masses, inverse), q, law)
-        solution = drive_as_asked(problem, self.asked, None, self.solver)
-        push, turn = impulses(rows, solution.r, len(masses))
-        return push / masses[:, None], np.einsum("bij,bj->bi", inverse, turn)
+        W = delassus(rows, masses, inverse)
+        posed = Posed(W.indptr, W.indices, W.data, W.diagonal, q, np.zeros_like(q))
+        found = None
+        if self.solver is None:
+            found, start = found_quickly(posed, nc, 0.0, self.asked.tolerance)
+            posed = posed._replace(start=start)
+        if found is None:
+            problem = posed.problem(law_of(nc, len(q) - nc, 0.0))
+            found = drive_as_asked(problem, self.asked, Iterate(posed.start), self.solver)
+        push, turn = impulses(rows, found.r, len(masses))
+        moved = push / masses[:, None], np.einsum("bij,bj->bi", inverse, turn)
+        return moved, found.u[:nc, 0] - 0.5 * self.overlap
 
     def _shifted(self, motion: Motion, by: tuple[Array, Array], R: Array) -> Motion:
         """The bodies moved and turned, with the velocities that they have in own axes."""

@@ -1,9 +1,11 @@
-"""The contact problem of a small step solved in compiled sweeps, without a problem object.
+"""The contact problem of a step solved in compiled sweeps, without a problem object.
 
-`pose` forms W and q of a step and starts from the last impulses; `solve_quickly` sweeps
-(Gauss-Seidel, each contact exactly) until the judge is content, as the solvers do by default,
-and lets open contacts carry nothing.  What it can not solve within WORK goes to the solvers,
-with the same W, q and start: nothing is formed twice.
+`pose` forms W and q of a step and starts from the last impulses, or from none where those are
+worse, as after an impact; `found_quickly` sweeps (Gauss-Seidel, each contact exactly) until the
+judge is content, as the solvers do by default, and lets open contacts carry nothing.  What a
+few sweeps do not solve is swept with momentum (`solvers.sweeps.momentum`), which many contacts
+of bricks need; what that can not solve either goes to the solvers, from where it has come, with
+the same W and q: nothing is formed twice.
 """
 
 from __future__ import annotations
@@ -31,12 +33,16 @@ from ...problem.solution import Convergence, FrictionSolution, Outcome, Step
 from ...solvers.judging import BLUR
 from ...solvers.sweeps.kernels import EXACT, FIRST_JUDGED, Sweep, sweeps_inplace
 from ...solvers.sweeps.local_contact import CLOSE
+from ...solvers.sweeps.momentum import momentum_inplace
 from .rows import coupled, fill_blocks, row_velocities
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-WORK = 100_000  # blocks of W that are multiplied before the solvers are asked
-FEWEST = 20  # sweeps that are worth to begin with
+WORK = 100_000  # blocks of W that plain sweeps multiply at most
+FEWEST = 20  # of them, that are worth to begin with
+MOMENTUM = 2000  # sweeps with momentum before the solvers are asked
+MORE = 200_000_000  # what these cost at most, in blocks, for many contacts
+CONTACT = 15  # blocks that take as long as the solution of a contact
 SETTLING = 4  # rounds in which open contacts lose what they carry
 
 
@@ -102,19 +108,22 @@ class Found:
         )
 
 
-def found_quickly(posed: Posed, contacts: int, mu: float, tolerance: float) -> Found | None:
-    """What sweeps find of a small problem; None where they do not meet the tolerance."""
-    sweeps = WORK // max(len(posed.indices), 1)
-    if sweeps < FEWEST:
-        return None
+def found_quickly(
+    posed: Posed, contacts: int, mu: float, tolerance: float
+) -> tuple[Found | None, Array]:
+    """What sweeps find, None where they do not meet the tolerance; and how far they came."""
+    blocks = max(len(posed.indices), 1)
+    sweeps = WORK // blocks
+    more = min(MOMENTUM, MORE // (blocks + CONTACT * len(posed.q)))
     began = now()
     r, (u, status, sliding), done, error, worst, contact = _solved(
-        *posed, contacts, mu, tolerance, BLUR * tolerance, sweeps
-    )
+        *posed, contacts, mu, tolerance, BLUR * tolerance,
+        sweeps if sweeps >= FEWEST else 0, more if more >= FEWEST else 0,
+    )  # fmt: skip
     if done < 0:
-        return None
+        return None, r
     return Found(posed, contacts, mu, tolerance, r, u, status, sliding, done, error,
-                 (worst, contact), now() - began)  # fmt: skip
+                 (worst, contact), now() - began), r  # fmt: skip
 
 
 @njit(cache=True, error_model="numpy")
@@ -244,7 +253,7 @@ def _largest_eigenvalue(A):
 
 @njit(cache=True, error_model="numpy")
 def _solved(  # noqa: PLR0913
-    indptr, indices, data, diagonal, q, start, contacts, mu, tolerance, blur, sweeps
+    indptr, indices, data, diagonal, q, start, contacts, mu, tolerance, blur, sweeps, more
 ):
     """(r, (u, status, sliding), sweeps done or -1, error, contactwise error, its contact)."""
     n = len(q)
@@ -261,13 +270,22 @@ def _solved(  # noqa: PLR0913
     if not size > 0.0 or not math.isfinite(size):
         return r, told, -1, math.inf, math.inf, -1
     goal, done = tolerance * size, 0
-    if not natural_error(indptr, indices, data, q, kind, parameters, rho, r) <= goal:
+    problem = indptr, indices, data, q, kind, parameters, rho
+    error = natural_error(*problem, r)
+    at_rest = natural_error(*problem, np.zeros((n, 3)))
+    if at_rest < error:
+        r[:, :], error = 0.0, at_rest
+    if not error <= goal:
         watch = np.array([goal, FIRST_JUDGED * goal, math.inf])
         s = Sweep(
             indptr, indices, data, q, kind, parameters, rho, diagonal, eliminated,
             np.arange(n), EXACT, 1.0, CLOSE, 0, np.zeros(1),
         )  # fmt: skip
         done = sweeps_inplace(s, r, sweeps, watch)
+        if not watch[2] <= goal and more > 0:
+            old, pace = r.copy(), np.array([1.0, math.inf])
+            watch[1] = FIRST_JUDGED * goal
+            done += momentum_inplace(s, r, old, pace, more, watch)
         if not watch[2] <= goal:
             return r, told, -1, math.inf, math.inf, -1
     floor = np.zeros(n)

@@ -140,11 +140,13 @@ def fill_blocks(  # noqa: PLR0913
     """Fill the columns of each row in ascending order, and its blocks."""
     n = len(slave)
     first, members = _of_bodies(slave, master, len(masses))
-    turning = np.empty((2, n, 3, 3))  # arm x axis of slave and of master
+    turning = np.zeros((2, n, 3, 3))  # arm x axis of slave and of master
+    spun = np.zeros((2, n, 3, 3))  # the angular velocities that it makes
     for c in range(n):
-        for k in range(3):
-            turning[0, c, k] = np.cross(arms[c], axes[c, k])
-            turning[1, c, k] = np.cross(master_arms[c], axes[c, k])
+        _turned_axes(arms[c], axes[c], inverse[slave[c]], turning[0, c], spun[0, c])
+        if master[c] >= 0:
+            b = master[c]
+            _turned_axes(master_arms[c], axes[c], inverse[b], turning[1, c], spun[1, c])
     seen = np.full(n, -1, np.int64)
     for i in range(n):
         at = indptr[i]
@@ -158,7 +160,7 @@ def fill_blocks(  # noqa: PLR0913
                     seen[j] = i
                     indices[at] = j
                     at += 1
-        indices[indptr[i] : at] = np.sort(indices[indptr[i] : at])
+        _sort_inplace(indices, indptr[i], at)
         for place in range(indptr[i], at):
             j = indices[place]
             block = data[place]
@@ -174,19 +176,39 @@ def fill_blocks(  # noqa: PLR0913
                     if other != b:
                         continue
                     sign = 1.0 if p == s else -1.0
-                    own, its = turning[p, i], turning[s, j]
+                    own, its, mobility = turning[p, i], spun[s, j], sign / masses[b]
                     for k in range(3):
                         for e in range(3):
-                            moved = 0.0
+                            moved = turned = 0.0
                             for d in range(3):
                                 moved += axes[i, k, d] * axes[j, e, d]
-                            moved = moved / masses[b]
-                            for d in range(3):
-                                spun = 0.0
-                                for f in range(3):
-                                    spun += inverse[b, d, f] * its[e, f]
-                                moved += own[k, d] * spun
-                            block[k, e] += sign * moved
+                                turned += own[k, d] * its[e, d]
+                            block[k, e] += mobility * moved + sign * turned
+
+
+@njit(cache=True, error_model="numpy")
+def _turned_axes(arm, axes, inverse, turning, spun):
+    """arm x axis, and that times the inverse inertia, of three axes by rows."""
+    for k in range(3):
+        a = axes[k]
+        turning[k, 0] = arm[1] * a[2] - arm[2] * a[1]
+        turning[k, 1] = arm[2] * a[0] - arm[0] * a[2]
+        turning[k, 2] = arm[0] * a[1] - arm[1] * a[0]
+        for d in range(3):
+            spun[k, d] = 0.0
+            for f in range(3):
+                spun[k, d] += inverse[d, f] * turning[k, f]
+
+
+@njit(cache=True, error_model="numpy")
+def _sort_inplace(numbers, begin, end):
+    """A short part that is nearly in order."""
+    for a in range(begin + 1, end):
+        number, b = numbers[a], a
+        while b > begin and numbers[b - 1] > number:
+            numbers[b] = numbers[b - 1]
+            b -= 1
+        numbers[b] = number
 
 
 @njit(cache=True, error_model="numpy")

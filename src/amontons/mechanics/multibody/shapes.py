@@ -31,7 +31,8 @@ class Facets(NamedTuple):
     normals: Array  # (k, 3)
     offsets: Array  # (k,)
     loops: tuple[Index, ...]  # vertices of each, anticlockwise as seen from outside
-    edges: Index  # (e, 2), each once
+    edges: Index  # (e, 2), each once, parallel ones one after another
+    lines: Index  # (k,) where the edges of each direction begin
 
 
 @dataclass(frozen=True)
@@ -111,7 +112,7 @@ class Polyhedron:
         pairs = [np.column_stack([loop, np.roll(loop, -1)]) for loop in loops]
         edges = np.unique(np.sort(np.concatenate(pairs), axis=1), axis=0)
         return Facets(np.array([f[0] for f in faces]), np.array([f[1] for f in faces]), loops,
-                      edges)  # fmt: skip
+                      *_by_direction(points, edges))  # fmt: skip
 
     @cached_property
     def _moments(self) -> tuple[float, Array, Array]:
@@ -156,6 +157,19 @@ def cuboid(sides: ArrayLike) -> Polyhedron:
         raise InvalidInput(f"expected three lengths > 0, got {shown(sides)}", ("sides",))
     corners = np.array(np.meshgrid(*[(-0.5, 0.5)] * 3, indexing="ij")).reshape(3, -1).T
     return Polyhedron(corners * lengths)
+
+
+def _by_direction(points: Array, edges: Index) -> tuple[Index, Index]:
+    """Edges (e, 2) with parallel ones one after another, and where each direction begins."""
+    along = points[edges[:, 1]] - points[edges[:, 0]]
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    left, order, lines = np.arange(len(edges)), [], []
+    while len(left):
+        sine = np.linalg.norm(np.cross(along[left], along[left[0]]), axis=1)
+        lines.append(sum(map(len, order)))
+        order.append(left[sine <= COPLANAR])
+        left = left[sine > COPLANAR]
+    return edges[np.concatenate(order)], np.array(lines)
 
 
 def _around(points: Array, normal: Array, corners: Index) -> Index:

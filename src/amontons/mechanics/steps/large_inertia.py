@@ -31,14 +31,14 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...core.clock import NEVER, Deadline
-from ...core.errors import InvertedCells, NotConverged, UnsupportedForm
+from ...core.errors import InvertedCells, NotConverged
 from ...problem.friction import FrictionProblem
 from ...problem.solution import FrictionSolution
 from ...solvers.contract import Iterate
 from ..contact import frames
+from ..elements.corotational import CorotationalBody
 from ..elements.discrete_gradient import DiscreteBody
 from ..elements.elasticity import materials_by_region
-from ..elements.hyperelasticity import is_hyperelastic
 from ..model import Model
 from ..model.nonlinear_parts import nonlinear_parts
 from ..model.reactions import support_forces
@@ -48,6 +48,7 @@ from .rubbing import rubbed
 from .springs import Springs
 from .state import State, TimeStep
 from .system import Inertia, Motion
+from .turning import InFrames, Turning, check_turning
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -71,27 +72,19 @@ class LargeMovingModel:
     """A model in large deformations with inertia; `advance` makes one step."""
 
     def __init__(self, method: Any, model: Model, tolerance: float) -> None:
-        for name, wanted in (("theta", 0.5), ("reach", 0.0), ("stiffness_damping", 0.0)):
-            if getattr(method, name) != wanted:
-                raise UnsupportedForm(
-                    f"{name}: expected {wanted:g} in dynamics of large deformations, got "
-                    f"{getattr(method, name):g}"
-                )
-        for body in model.bodies:
-            if not is_hyperelastic(body.material):
-                raise UnsupportedForm(
-                    f"body {body.name!r}: dynamics of large deformations need a hyperelastic "
-                    "law, or LinearElastic bodies and kinematics='small' of all contacts"
-                )
+        check_turning(method, model)
         self.method, self.motion, self.tolerance = method, Motion(model), tolerance
         body = self.motion.body
         self.parts, self._all = nonlinear_parts(body), self.motion.parts
         inertia = Inertia(body, method.mass_damping, 0.0, method.lumped)
-        self.M, self.C = inertia.M, inertia.C
-        self._bodies = [
-            DiscreteBody(b.mesh, materials_by_region(b.mesh, b.material))  # type: ignore[arg-type]
-            for b in body.bodies
-        ]
+        self.M, self.C = inertia.M, inertia.C  # without viscosity, which bodies have
+        viscous = method.stiffness_damping / method.step
+        self._bodies: list[Any] = [
+            Turning(own, viscous) if isinstance(own, CorotationalBody)
+            else DiscreteBody(b.mesh, materials_by_region(b.mesh, b.material))  # type: ignore[arg-type]
+            for b, own in zip(body.bodies, self.parts.bodies, strict=True)
+        ]  # fmt: skip
+        self.frames = InFrames.of(self.parts, inertia, method)
         weights = self._all.sites.weights
         self._closed = TOUCHING * weights ** (1 / (model.dimension - 1))
         self.fixed = np.setdiff1d(np.arange(self._all.dofs), self.parts.free)
@@ -129,6 +122,14 @@ class LargeMovingModel:
         return np.concatenate([body.between(a, b).ravel() for body, a, b in parts])
 
 
+    def lost(self, before: Array, after: Array) -> float:
+        """Energy that viscosity takes on a way between displacements (dofs,)."""
+        shape, ends = self.parts.X.shape, self.parts.ends
+        both = (np.split(q.reshape(shape), ends) for q in (before, after))
+        parts = zip(self._bodies, *both, strict=True)
+        return sum(body.lost(a, b) for body, a, b in parts if isinstance(body, Turning))
+
+
 class _Step:
     """What does not change within one step."""
 
@@ -137,6 +138,10 @@ class _Step:
         parts, method, motion = model.parts, model.method, model.motion
         h, shape = method.step, parts.X.shape
         q0, v0 = state.displacement, state.velocity
+        parts = parts.divided(q0.reshape(shape)) if parts.folds else parts
+        self.parts = parts
+        parts = parts.divided(q0.reshape(shape)) if parts.folds else parts
+        self.parts = parts
         start = parts.meet(q0.reshape(shape))
         meeting = parts.meet((q0 + h / 2 * v0).reshape(shape))
         self.H = sparse.csc_array(meeting.columns(frames(meeting.normals)))
@@ -183,6 +188,18 @@ class _Step:
         m, free = self.model, self.model.parts.free
         kept: dict[int, FrictionProblem] = {}
 
+        def in_frames(trial: _Trial, T: Any) -> tuple[Array, FrictionSolution]:
+            assert m.frames is not None
+            rest = trial.missing + self._columns @ trial.impulse
+            known = m.frames.product(T, trial.velocity) - rest
+            problem = m.frames.problem(
+                T, self._columns, known, self.shifts.values, self.law, m.motion.body.name
+            )
+            start = Iterate(trial.impulse.reshape(-1, m.parts.dimension))
+            solution = solve(problem, start, None)
+            assert solution.v is not None
+            return T @ solution.v, solution
+
         def solved(trial: _Trial, matrix: Any) -> tuple[Array, FrictionSolution]:
             rest = trial.missing + self._columns @ trial.impulse
             known = matrix @ (trial.velocity - self._full(self.held)) - rest
@@ -203,7 +220,7 @@ class _Step:
             v1[free] = solution.v
             return v1, solution
 
-        return solved
+        return solved if m.frames is None else in_frames
 
     def _full(self, held: Array) -> Array:
         """Velocities (dofs,) of the supports, zero on free dofs."""
@@ -211,13 +228,17 @@ class _Step:
         out[self.model.fixed] = held[self.model.fixed]
         return out
 
-    def _matrix(self, v1: Array) -> sparse.csr_array:
+    def _matrix(self, v1: Array) -> Any:
+        """The matrix of Newton's step; frames halfway where these tell it."""
         m, h = self.model, self.model.method.step
+        if m.frames is not None:
+            return m.frames.at(0.5 * (self.state.displacement + self._moved(v1)))
         q1 = self._moved(v1).reshape(m.parts.X.shape)
         blocks = m.parts.tangent(q1)[1]
         n = len(m.parts.X) * m.parts.dimension
         K = sparse.bsr_array((blocks, m.parts.columns, m.parts.pointers), shape=(n, n))
-        return sparse.csr_array(m.M + h / 2 * m.C + h**2 / 4 * K.tocsr())
+        factor = h**2 / 4 + h / 2 * m.method.stiffness_damping
+        return sparse.csr_array(m.M + h / 2 * m.C + factor * K.tocsr())
 
     def solved(self, solve: Any, limit: Deadline) -> tuple[_Trial, FrictionSolution]:
         """The state at which (1) holds; raises NotConverged where it is not found."""
@@ -263,7 +284,7 @@ class _Step:
             kinetic=float(kinetic), elastic=float(elastic), gain=float(gain),
             loads=float(load @ dq), supports=float(held @ dq) / h,
             contact=float((self._columns @ trial.impulse) @ dq) / h,
-            damping=float(dq @ (m.C @ dq)) / h,
+            damping=float(dq @ (m.C @ dq)) / h + m.lost(q0, q1),
         ), held  # fmt: skip
 
     def done(
@@ -281,7 +302,7 @@ class _Step:
         new = State(state.index + 1, self.time, q1, trial.velocity, impulse / h,
                     state.slip + h * mean,
                     **rubbed(state, h * mean, sliding, work))  # fmt: skip
-        meeting = m.parts.meet(q1.reshape(m.parts.X.shape))
+        meeting = self.parts.meet(q1.reshape(m.parts.X.shape))
         load = self.load.at(((state.displacement + q1) / 2).reshape(m.parts.X.shape))
         return TimeStep(m.motion.body, new, solution, self.active, energies, meeting.gap,
                         support_forces(m._all, held / h), load,

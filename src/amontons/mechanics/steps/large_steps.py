@@ -40,7 +40,7 @@ class LargeSlowModel:
 
     def __init__(self, model: Model, crossing: Crossing | None = None) -> None:
         self.motion, self.crossing = Motion(model), crossing
-        self._acted: tuple[State, Forces] | None = None  # at the end of the last step
+        self._acted: tuple[State, Model, Forces] | None = None  # at the end of the last step
 
     def begin(self, state: State) -> State:
         """The state before the first step: undeformed, also where supports hold the body."""
@@ -63,9 +63,9 @@ class LargeSlowModel:
         """
         load, prescribed = self.motion.applied(time)
         q0 = state.displacement
-        problem = large_step(
-            self.motion.body, load, prescribed, q0, self._known(state),
-        )  # fmt: skip
+        body = self.motion.body
+        body = body.divided(q0) if nonlinear_parts(body).folds else body
+        problem = large_step(body, load, prescribed, q0, self._known(state))
         if isinstance(problem.law, VaryingFriction):  # of the speed in this step
             problem = problem.with_law(problem.law.lasting(abs(time - state.time) or 1.0))
         arrive = None
@@ -79,18 +79,20 @@ class LargeSlowModel:
         q1 = problem.displacement(solution.v).ravel()
         meeting = problem.contact_point(solution.v).meeting
         axes = frames(meeting.normals)
-        way = solution.u[:, 1:]
+        tied = body.law.tied[:, None]  # what bonds give way is no slip
+        way = np.where(tied, 0.0, solution.u[:, 1:])
         work = quasi_static_friction(state.force[:, 1:], solution.r[:, 1:], way)
-        acting = self._forces(q1, load, solution.r)
-        energies = self._energies(state, q1, load, acting, float(work.sum()))
+        acting = self._forces(body, q1, load, solution.r)
+        energies = self._energies(body, state, q1, load, acting, float(work.sum()))
         passed = time - state.time
         velocity = (q1 - q0) / passed if passed else np.zeros_like(q1)
-        new = State(state.index + 1, time, q1, velocity, solution.r, state.slip + way,
+        new = State(state.index + 1, time, q1, velocity, solution.r,
+                    np.where(tied, solution.u[:, 1:], state.slip + way),
                     **rubbed(state, way, solution.sliding, work))  # fmt: skip
-        self._acted = new, acting
+        self._acted = new, body, acting
         rest = acting.inner - acting.load - acting.pushed
         active = np.arange(len(way))
-        return TimeStep(self.motion.body, new, solution, active, energies, solution.u[:, 0],
+        return TimeStep(body, new, solution, active, energies, solution.u[:, 0],
                         support_forces(self.motion.parts, rest), acting.load, axes,
                         passage, passed=meeting.passed)  # fmt: skip
 
@@ -99,15 +101,17 @@ class LargeSlowModel:
         return with_diagnosis(solution, self.motion.body)
 
     def _energies(
-        self, state: State, q1: Array, load: NodalForces, after: Forces, friction: float
-    ) -> Energies:
+        self, body: Model, state: State, q1: Array, load: NodalForces, after: Forces,
+        friction: float,
+    ) -> Energies:  # fmt: skip
         """The balance of `slow_energies`; after: the forces at the displacements q1."""
         q0, load_0 = state.displacement, self.motion.load_of(state)
-        if self._acted is not None and self._acted[0] is state:
-            shape = nonlinear_parts(self.motion.body).X.shape
-            before = replace(self._acted[1], load=load_0.at(q0.reshape(shape)))
+        kept = self._acted
+        if kept is not None and kept[0] is state and kept[1] is body:
+            shape = nonlinear_parts(body).X.shape
+            before = replace(kept[2], load=load_0.at(q0.reshape(shape)))
         else:
-            before = self._forces(q0, load_0, state.force)
+            before = self._forces(body, q0, load_0, state.force)
         path = path_work(before, after, q1 - q0)
         bend = self._bend(q0, q1, load_0, load)
         return slow_energies(before, after, q1 - q0, self.motion.parts.fixed, friction, path,
@@ -125,9 +129,9 @@ class LargeSlowModel:
         middle = (0.5 * (before + after)).at(((q0 + q1) / 2).reshape(shape))
         return float((middle - ends) @ (q1 - q0)) * 2 / 3
 
-    def _forces(self, q: Array, load: NodalForces, r: Array) -> Forces:
+    def _forces(self, body: Model, q: Array, load: NodalForces, r: Array) -> Forces:
         """All forces at displacements q (dofs,); r (nc, d): in the frames there."""
-        parts = nonlinear_parts(self.motion.body)
+        parts = nonlinear_parts(body)
         moved = q.reshape(parts.X.shape)
         meeting = parts.meet(moved)
         pushed = meeting.pushed(frames(meeting.normals), r)
@@ -147,7 +151,7 @@ def last_motion(problem: LargeDeformation, state: State, duration: float) -> Arr
     pairs = np.concatenate(
         [np.full(len(p.slaves), isinstance(p, MortarMeeting)) for p in meeting.parts]
     )
-    if not pairs.any():
+    if not pairs.any() and not problem.law.tied.any():
         return out
     n = meeting.normals
     along = meeting.averages @ moved.reshape(parts.X.shape)
@@ -160,4 +164,5 @@ def last_motion(problem: LargeDeformation, state: State, duration: float) -> Arr
     rubs = pairs & (bound > 0)
     slips = size >= (1 - AT_BOUND) * bound
     told = np.where(slips[:, None], slipped, 0.0)
-    return np.where(rubs[:, None], told, np.where(pairs[:, None], along, out))
+    told = np.where(rubs[:, None], told, np.where(pairs[:, None], along, out))
+    return np.where(problem.law.tied[:, None], 0.0, told)

@@ -19,7 +19,6 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.arrays import real
 from .cones import cone_regions, natural_map, with_de_saxce
 from .law import MU, Array, Kind, Kinds, Law, Mask, columns_of, kinds_of, per_contact
 
@@ -81,4 +80,4 @@ class Coulomb(Law):
 
 def as_law(mu: ArrayLike | Law) -> Law:
     """A law as it is; numbers are coefficients of Coulomb's."""
-    return mu if isinstance(mu, Law) else Coulomb(real("mu", mu))
+    return mu if isinstance(mu, Law) else Coulomb(mu)  # type: ignore[arg-type]  # it converts

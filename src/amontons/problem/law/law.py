@@ -240,6 +240,8 @@ def per_contact(name: str, value: ArrayLike) -> Array:
     array = np.atleast_1d(real(name, value))
     if array.ndim != 1:
         raise InvalidInput(f"{name}: expected shape (nc,), got {array.shape}")
+    if array.size == 0 or (array.min() >= 0 and array.max() <= LARGEST):  # not where it is nan
+        return read_only(array)
     bad = np.flatnonzero(~np.isfinite(array) | (array < 0))
     if bad.size:
         raise InvalidInput(

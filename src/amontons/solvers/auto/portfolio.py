@@ -116,10 +116,10 @@ TRACKS = (
     Entry("Gauss-Seidel, relaxation 1.6", partial(relaxed, 1.6), 0.02, 3.0),
     Entry("Gauss-Seidel, relaxation 0.9", partial(relaxed, 0.9), 0.02, 3.0),
     Entry("interior point", interior_point, 0.05, 1.0, _steps(20), _has_cone),
-    Entry("smoothing Newton", smoothing_newton, 0.05, 1.0, _steps(30), _has_cone),
+    Entry("smoothing Newton", smoothing_newton, 0.15, 1.0, _steps(30), _has_cone),
     Entry("inexact Newton", inexact_newton, 0.3, 0.3, _at_joints, _has_joints),
     Entry("semismooth Newton", semismooth_newton, 0.1, 1.0, _dense_steps, _has_steps),
-    Entry("restarts", partial(staged, restarts), 0.05, 3.0, _steps(1000), _can_end),
+    Entry("restarts", partial(staged, restarts), 0.2, 1.0, _steps(1000), _can_end, True),
 )
 # fmt: on
 

@@ -6,16 +6,18 @@ promises the goal for the least further cost:
     rest = ln(error / goal) (C - c) / ln(error(c) / error(C)),   c = (1 - WINDOW) C,
 
 C what the track has cost and error(c) its best error then: the rate of the last part of its own
-cost, a long one, which is patience.  Besides
+cost, a long one, which is patience.  A track that has promised to be there at a cost F, and has
+not, is believed less: its rest counts C / (GRACE F) times.  Besides
 
     unknown     a track is taken to need some part, or multiple, of all that was spent while it
                 has had a small share of it; a method of Newton's kind what it usually needs
                 until it has cost that
-    first       the track at the top of the table has a few chunks before all others
+    first       the track at the top of the table has a few chunks before all others, and more
+                while it promises the goal for less than to let them in costs
     nothing     where no track promises anything, the one that has cost least
 
     the end     where five times as much was spent as when the best error last halved, and a
-                thousand Newton steps' worth since
+                thousand Newton steps' worth, some seconds at least, since
 
 So no track is ever given up, none takes more than its share while it does not progress, and
 only ratios of costs matter, which are operation counts.
@@ -26,7 +28,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Callable, Generator, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -39,9 +41,16 @@ from .state import State
 Array = NDArray[np.float64]
 WINDOW = 0.7  # last part of a track's cost from which its rate is told
 FIRST_CHUNKS = 3  # of the first track before its rate counts
+GRACE = 1.5  # times the cost at which a track has promised the goal: its promise is broken
 GROWTH = 0.2  # cost of a chunk, of what its track has cost
 SHORTEST = 3e4  # nanoseconds of a chunk at least, or the calls cost more than the sweeps
-LOST, LOST_STEPS = 5.0, 1000.0  # all cost, in what it was at the last progress; steps since
+# Nanoseconds that letting the other tracks in costs: joints, symbolic factors; per block of W.
+ENTRY, ENTRY_BLOCK = 3e5, 150.0
+# All cost, in what it was at the last progress; Newton steps and nanoseconds since.
+LOST, LOST_STEPS, LOST_LEAST = 5.0, 1000.0, 2e9
+# Cost between two iterates that are handed out, of all cost, and its bounds in nanoseconds: the
+# driver's judgement costs more than a chunk of a small problem, but it looks at the clock.
+PAUSE, LEAST_PAUSE, MOST_PAUSE = 0.1, 1e6, 5e7
 
 
 class Chunk(NamedTuple):
@@ -58,7 +67,14 @@ class Chunk(NamedTuple):
     linear_iterations: int = 0
 
 
-Chunks = Generator[Chunk, float, None]
+class Turn(NamedTuple):
+    """What a track is sent: what a chunk may cost, in ns, and its best error, unit of u."""
+
+    cost: float
+    error: float
+
+
+Chunks = Generator[Chunk, Turn, None]
 
 
 def always(state: State) -> bool:
@@ -72,7 +88,8 @@ class Entry:
 
     share: of all cost up to which it is taken to be unknown, and then to need `optimism` times
     all cost.  needs: nanoseconds that a method of Newton's kind is taken to need, whatever its
-    rate, until it has cost them; None for sweeps.
+    rate, until it has cost them; None for sweeps.  last: it runs where no other promises the
+    goal for that, and has its share and no more.
     """
 
     name: str
@@ -81,6 +98,7 @@ class Entry:
     optimism: float = 1.0
     needs: Callable[[State], float] | None = None
     when: Callable[[State], bool] = always
+    last: bool = False
 
 
 @dataclass(eq=False)
@@ -92,6 +110,8 @@ class Track:
     costs: list[float] = field(default_factory=lambda: [0.0])
     errors: list[float] = field(default_factory=list)
     chunks: Chunks | None = None
+    promise: float = math.inf  # nanoseconds to the goal at its rate
+    foreseen: float = math.inf  # the least cost at which it has promised the goal
 
     @property
     def cost(self) -> float:
@@ -105,7 +125,8 @@ class Track:
             next(self.chunks)
             self.errors.append(self.state.first_error)
         try:
-            chunk = self.chunks.send(max(GROWTH * self.cost, SHORTEST))
+            turn = Turn(max(GROWTH * self.cost, SHORTEST), self.errors[-1])
+            chunk = self.chunks.send(turn)
         except (StopIteration, Breakdown, SingularOperator):
             return None
         state = self.state
@@ -113,8 +134,12 @@ class Track:
             chunk.r, chunk.iterations, self.entry.name, chunk.flops, chunk.error,
             chunk.linear_iterations,
         )  # fmt: skip
+        if self.entry.needs is None and state.latest < state.swept_error:
+            state.swept, state.swept_error = chunk.r, state.latest
         self.costs.append(self.cost + chunk.cost)
         self.errors.append(min(state.latest, self.errors[-1]))
+        self.promise = self._at_its_rate()
+        self.foreseen = min(self.foreseen, self.cost + self.promise)
         return found
 
     def rest(self, total: float) -> float:
@@ -122,9 +147,13 @@ class Track:
         entry = self.entry
         if entry.needs is not None:
             needed = entry.needs(self.state)
+            if entry.last:
+                return needed if self.cost < entry.share * total else math.inf
             if self.cost < needed:
                 return needed - self.cost
-        promise = self._at_its_rate()
+        promise = self.promise
+        if self.cost > GRACE * self.foreseen:
+            promise *= self.cost / (GRACE * self.foreseen)
         unknown = self.cost < entry.share * total
         return min(promise, entry.optimism * total) if unknown else promise
 
@@ -141,6 +170,17 @@ class Track:
         return math.log(error / self.state.goal) / rate
 
 
+def _counted_with(before: Iterate, found: Iterate) -> Iterate:
+    """The iterate, what was done for one before it counted in."""
+    flops = None
+    if before.flops is not None and found.flops is not None:
+        flops = before.flops + found.flops
+    return replace(
+        found, iterations=before.iterations + found.iterations, flops=flops,
+        linear_iterations=before.linear_iterations + found.linear_iterations,
+    )  # fmt: skip
+
+
 @dataclass(eq=False)
 class Race:
     """The tracks of one problem; the first of the table leads."""
@@ -151,16 +191,25 @@ class Race:
     def __post_init__(self) -> None:
         self.tracks = [Track(self.table[0], self.state)]
         self.total = 0.0  # nanoseconds of all tracks
+        self.shown = 0.0  # total when an iterate was handed out last
+        self.held: Iterate | None = None  # counts of those since then
         self.mark = (self.state.first_error, 0.0)  # error and total at the last progress
 
     def iterates(self) -> Iterator[Iterate]:
-        """The best reaction after every chunk, until nothing helps or is left."""
-        for _ in range(FIRST_CHUNKS):
-            if self.tracks:
-                yield from self._go_on(self.tracks[0])
+        """The best reaction now and then, until nothing helps or is left."""
+        while self.tracks and self._is_first():
+            yield from self._go_on(self.tracks[0])
         self.enter()
         while self.tracks and not self._is_lost():
             yield from self._go_on(self._next())
+        if self.held is not None:
+            yield self.held
+
+    def _is_first(self) -> bool:
+        """True while the first track has its chunks, or promises the goal before others run."""
+        first = self.tracks[0]
+        entry = ENTRY + ENTRY_BLOCK * len(self.state.problem.blocks.indices)
+        return len(first.errors) <= FIRST_CHUNKS or first.rest(self.total) < entry
 
     def enter(self) -> None:
         """Let all others of the table in; what tells which of them run costs something too."""
@@ -174,7 +223,15 @@ class Race:
             self.tracks.remove(track)
             return
         self.total += track.cost - before
-        yield found
+        self.held = found if self.held is None else _counted_with(self.held, found)
+        if self._is_due():
+            found, self.held, self.shown = self.held, None, self.total
+            yield found
+
+    def _is_due(self) -> bool:
+        """True where the driver should see the best reaction: it may do, or it has waited."""
+        pause = min(max(PAUSE * self.total, LEAST_PAUSE), MOST_PAUSE)
+        return self.state.error <= self.state.goal or self.total - self.shown >= pause
 
     def _is_lost(self) -> bool:
         """True where nothing has helped for long."""
@@ -183,7 +240,8 @@ class Race:
             self.mark = self.state.error, self.total
             return False
         since = self.total - total
-        return self.total > LOST * total and since > LOST_STEPS * self.state.step_cost
+        long = max(LOST_STEPS * self.state.step_cost, LOST_LEAST)
+        return self.total > LOST * total and since > long
 
     def _next(self) -> Track:
         """The track that promises the goal for the least cost."""

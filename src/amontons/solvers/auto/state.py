@@ -34,6 +34,11 @@ NEWTON_CONTACT = 500.0
 DENSE_STEP = 0.05  # per cube of the unknowns
 
 
+def nanoseconds_of_sweep(blocks: int, contacts: int, more: float = 0.0) -> float:
+    """Cost of a sweep with so many stored blocks of W; more: per contact, for acceleration."""
+    return SWEEP_BLOCK * blocks + (SWEEP_CONTACT + more) * contacts
+
+
 @dataclass(eq=False)
 class State:
     """One run on the Delassus form; r is the best reaction so far, (nc, 3)."""
@@ -46,9 +51,10 @@ class State:
     unsaid: float = 0.0  # operations that no iterate has told yet
 
     def __post_init__(self) -> None:
-        self.start = self.r
+        self.start = self.swept = self.r  # swept: the best reaction of sweeps
         if np.count_nonzero(self.r):
             self.error, self.unsaid = self.judge(self.r), self.problem.judge_flops
+        self.swept_error = self.error
         self.first_error = self.error if self.error < math.inf else self.problem.q_norm
         self.goal = self.target.tolerance * self.problem.q_norm
         self.data = sweep_data(self.problem, order=SweepOrder.APPROACH)
@@ -94,18 +100,22 @@ class State:
     @property
     def sweep_cost(self) -> float:
         """Nanoseconds of a sweep."""
-        blocks, contacts = len(self.problem.blocks.indices), self.problem.contacts
-        return SWEEP_BLOCK * blocks + SWEEP_CONTACT * contacts
+        return self._cost()
 
     @property
     def accelerated_cost(self) -> float:
         """Nanoseconds of an accelerated sweep."""
-        return self.sweep_cost + HISTORY_CONTACT * self.problem.contacts
+        return self._cost(HISTORY_CONTACT)
 
     @property
     def momentum_cost(self) -> float:
         """Nanoseconds of a sweep with momentum."""
-        return self.sweep_cost + MOMENTUM_CONTACT * self.problem.contacts
+        return self._cost(MOMENTUM_CONTACT)
+
+    def _cost(self, more: float = 0.0) -> float:
+        return nanoseconds_of_sweep(
+            len(self.problem.blocks.indices), self.problem.contacts, more
+        )
 
     def affordable(self, steps: int) -> int:
         """Newton steps of one compiled call that still fit before the driver's deadline."""

@@ -1,4 +1,4 @@
-"""The methods of the race: generators that are sent what a chunk may cost and yield it.
+"""The methods of the race: generators that are sent a `Turn` and yield a chunk.
 
 A chunk of sweeps costs about what was asked for; a Newton step is never halved.  All begin at
 the start of the solve unless they say otherwise.
@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from functools import partial
+from itertools import chain, cycle
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,18 +21,22 @@ from ..newton.interior_point import InteriorPoint, Relaxation, sliding_speed
 from ..newton.line_search import FullStep
 from ..newton.semismooth import SemismoothNewton
 from ..newton.smoothing import SmoothingNewton
-from ..sweeps.kernels import Acceleration, counted, sweep_data, sweeps_inplace, watch_for
+from ..sweeps.kernels import Acceleration, counted, sweep_data, watch_for
 from ..sweeps.momentum import Momentum
+from ..sweeps.shared import sweeps as shared_sweeps
 from .race import Chunk, Chunks
 from .state import State
 
 Array = NDArray[np.float64]
 DEPTH = 10  # past sweeps that Anderson acceleration combines
+TAKEN = 0.1  # error of the best reaction, of its own, at which a track goes on from that
 LEAST = 20  # sweeps of a chunk: a judgement costs as much as one
-BETWEEN = 200  # accelerated sweeps after each relaxation
+BETWEEN = 200  # accelerated sweeps after each relaxation, and on while they halve the error
 RELAXED = 60  # steps of one relaxation at most
-# First smoothing, times the error of the best reaction per contact, or 0, from zero; shrinking.
-SMOOTHED = ((100.0, 0.3), (0.0, 0.3), (1000.0, 0.3), (0.0, 0.5))
+# First smoothing, times the error per contact of the reaction that it starts from, or 0, from
+# zero, and how it shrinks; then, again and again, from the best of sweeps (True) or of all.
+SMOOTHED = ((100.0, 0.3, True), (0.0, 0.3, True), (1000.0, 0.3, True), (0.0, 0.5, True))
+AGAIN = ((100.0, 0.3, True), (100.0, 0.3, False), (1000.0, 0.3, True), (1000.0, 0.5, False))
 PATIENCE = 30  # steps of smoothing Newton without halving its error
 FLOP = 0.15  # nanoseconds of an operation of a step between deformable bodies
 STALLED = 8  # steps of Newton's method without halving its error
@@ -45,28 +50,37 @@ def momentum(state: State) -> Chunks:
 
 
 def anderson(state: State) -> Chunks:
-    """Accelerated sweeps, contacts in the order of their approach."""
+    """Accelerated sweeps, contacts in the order of their approach.
+
+    They go on from the best reaction of the others where that is far better than theirs.
+    """
     memory, watch = Acceleration(state.data, state.start, DEPTH), watch_for(state.goal)
-    return _swept(memory, state.accelerated_cost, watch)
+    cost = state.accelerated_cost
+    turn = yield Chunk(memory.r, 0, 0.0)
+    while True:
+        if state.error < TAKEN * turn.error:
+            memory, watch = Acceleration(state.data, state.r, DEPTH), watch_for(state.goal)
+        count, flops = memory.sweep(max(LEAST, int(turn.cost / cost)), watch)
+        turn = yield Chunk(memory.r.copy(), count, cost * count, flops, watch[2])
 
 
 def _swept(memory: Momentum | Acceleration, cost: float, watch: Array) -> Chunks:
     """Chunks of sweeps that cost so many nanoseconds each."""
-    wanted = yield Chunk(memory.r, 0, 0.0)
+    turn = yield Chunk(memory.r, 0, 0.0)
     while True:
-        count, flops = memory.sweep(max(LEAST, int(wanted / cost)), watch)
-        wanted = yield Chunk(memory.r.copy(), count, cost * count, flops, watch[2])
+        count, flops = memory.sweep(max(LEAST, int(turn.cost / cost)), watch)
+        turn = yield Chunk(memory.r.copy(), count, cost * count, flops, watch[2])
 
 
 def relaxed(relaxation: float, state: State) -> Chunks:
     """Sweeps with a relaxation, 1: none."""
     watch, r = watch_for(state.goal), state.start.copy()
     data, cost = sweep_data(state.problem, relaxation=relaxation), state.sweep_cost
-    wanted = yield Chunk(r, 0, 0.0)
+    turn = yield Chunk(r, 0, 0.0)
     while True:
-        sweeps = max(LEAST, int(wanted / cost))
-        count, flops = counted(data, partial(sweeps_inplace, data, r, sweeps, watch))
-        wanted = yield Chunk(r.copy(), count, cost * count, flops, watch[2])
+        sweeps = max(LEAST, int(turn.cost / cost))
+        count, flops = counted(data, partial(shared_sweeps, data, r, sweeps, watch))
+        turn = yield Chunk(r.copy(), count, cost * count, flops, watch[2])
 
 
 # ---------------------------------------------------------------- Newton's kind
@@ -76,51 +90,54 @@ def interior_point(state: State) -> Chunks:
     slip = np.zeros(problem.contacts)
     if state.start.any():
         slip = sliding_speed(problem, state.start[:, : problem.dimension])
-    wanted = yield Chunk(state.start, 0, 0.0)
+    turn = yield Chunk(state.start, 0, 0.0)
     while True:
         relaxation, done = Relaxation.of(state.work, slip, solver.shift), 0
         while done < RELAXED:
-            steps = int(np.clip(wanted / state.step_cost, 1, RELAXED - done))
+            steps = int(np.clip(turn.cost / state.step_cost, 1, RELAXED - done))
             count = relaxation.advance(state.goal, state.affordable(steps))
             done += count
             cost = max(count, 1) * state.step_cost
-            wanted = yield Chunk(relaxation.r.copy(), max(count, 1), cost)
+            turn = yield Chunk(relaxation.r.copy(), max(count, 1), cost)
             if count < steps:
                 break
         slip = sliding_speed(problem, relaxation.r[:, : problem.dimension])
         memory = Acceleration(state.data, relaxation.r, DEPTH)
         watch, cost, left = watch_for(state.goal), state.accelerated_cost, BETWEEN
+        mark = turn.error
         while left > 0:
-            count, flops = memory.sweep(int(np.clip(wanted / cost, 20, left)), watch)
+            count, flops = memory.sweep(int(np.clip(turn.cost / cost, LEAST, left)), watch)
             left -= count
-            wanted = yield Chunk(memory.r.copy(), count, cost * count, flops, watch[2])
+            turn = yield Chunk(memory.r.copy(), count, cost * count, flops, watch[2])
+            if left <= 0 and turn.error < 0.5 * mark:
+                left, mark = BETWEEN, turn.error
 
 
 def smoothing_newton(state: State) -> Chunks:
-    """Smoothing Newton from the best reaction, from zero when it stalls, and so on.
+    """Smoothing Newton from the best swept reaction, from zero when it stalls, and so on.
 
+    A relaxation of the interior point may be nearer, but not to the sliding of a solution.
     From a swept point it takes half the steps that it takes from zero, where the smoothing is
     far above the error there.
     """
     root, x = math.sqrt(max(state.problem.contacts, 1)), state.start
-    wanted = yield Chunk(x, 0, 0.0)
-    while True:
-        for smoothing, shrink in SMOOTHED:
-            afar = 0.1 * state.problem.q_norm / root
-            if smoothing:
-                x, sigma = state.r.copy(), min(smoothing * state.error / root, afar)
-            else:
-                x, sigma = np.zeros_like(state.start), afar
-            solver, patience = SmoothingNewton(shrink=shrink), Patience(PATIENCE)
-            while not patience.waited > patience.most:
-                steps = state.affordable(max(1, int(wanted / state.step_cost)))
-                count, residual, sigma, found = state.work.newton(
-                    x, sigma, solver, goal=0.5 * state.goal, steps=steps
-                )
-                cost = max(abs(count), 1) * state.step_cost
-                wanted = yield Chunk(found, max(abs(count), 1), cost)
-                if count < 0 or patience.over(residual):
-                    break
+    turn = yield Chunk(x, 0, 0.0)
+    afar = 0.1 * state.problem.q_norm / root
+    for smoothing, shrink, swept in chain(SMOOTHED, cycle(AGAIN)):
+        r, error = (state.swept, state.swept_error) if swept else (state.r, state.error)
+        x, sigma = r.copy(), min(smoothing * error / root, afar)
+        if not smoothing:
+            x, sigma = np.zeros_like(r), afar
+        solver, patience = SmoothingNewton(shrink=shrink), Patience(PATIENCE)
+        while not patience.waited > patience.most:
+            steps = state.affordable(max(1, int(turn.cost / state.step_cost)))
+            count, residual, sigma, found = state.work.newton(
+                x, sigma, solver, goal=0.5 * state.goal, steps=steps
+            )
+            cost = max(abs(count), 1) * state.step_cost
+            turn = yield Chunk(found, max(abs(count), 1), cost)
+            if count < 0 or patience.over(residual):
+                break
 
 
 def inexact_newton(state: State) -> Chunks:

@@ -54,10 +54,10 @@ from .levels import ContactLevels
 from .nodes import ContactNodes
 
 Array = NDArray[np.float64]
-MANY = 0.01  # share of contacts that change their state above which Anderson forgets
+MANY = 0.1  # share of contacts that change their state above which Anderson forgets
 GROWTH = 1e3  # of the error over the best one that counts as divergence
 GRID_DEPTH = 3  # past cycles to mix at most where M is not stored
-SLOW = 0.5  # fall of the error in a cycle above which, while states change, steps are limited
+SLOW = 0.8  # fall of the error in a cycle above which, while states change, steps are limited
 CLOSE = 0.9  # share of the error that should do at which an iterate is handed out
 
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...linear.blocks import spatial
-from ...linear.hierarchy import Hierarchy, Level, Nodes
-from ...linear.node_blocks import NodeBlocks
+from ...linear.chunks import better_numbers
+from ...linear.hierarchy import Hierarchy, Level, Nodes, append_level
 from ...linear.transfer import Transfer
 from ...problem.friction import FrictionProblem
 from ...problem.law.law import BOUND
@@ -136,21 +136,23 @@ def _in_basis(hierarchy: Hierarchy, basis: OneSided) -> Hierarchy:
     the master side at its place, so that it has one node of its own on every level.
     """
     nodes = hierarchy.nodes
-    place = None if nodes.plain else nodes.place
-    A = NodeBlocks.from_sparse(basis.M, place, nodes.count)
+    A = nodes.blocks(basis.M)
+    number = better_numbers(A.indptr, A.indices)
+    if number is not None:
+        nodes, A = nodes.renumbered(number), A.renumbered(number)
     levels = [Level(A)]
     size = 3 * nodes.count
     C = basis.coupling.tocoo()
     entries = (C.data, (nodes.place[C.coords[0]], nodes.place[C.coords[1]]))
     coupling = sparse.coo_array(entries, shape=(size, size)).tocsr()
-    for k, old in enumerate(hierarchy.levels[1:]):
+    coarse: Index | None = None
+    for k in range(len(hierarchy.levels) - 1):
         P = hierarchy.levels[k].P
         assert P is not None
+        P = P.renumbered(number if k == 0 else None, None)
         if coupling.nnz:
             P, coupling = _between_bases(P, coupling, geometric=k + 1 < hierarchy.geometric)
-        levels[-1].P = P
-        A = A.coarse(P)
-        levels.append(Level(A, old.P))
+        coarse = append_level(levels, P, coarse)
     out = Hierarchy(levels, hierarchy.geometric, nodes)
     return out if hierarchy.kind is None else out.made_of(hierarchy.kind)
 

@@ -37,8 +37,8 @@ class Symbolic:
 
     @classmethod
     def of(cls, problem: FrictionProblem) -> Symbolic:
-        """Order and fill of W, analysed once for all variants of a problem."""
-        return problem.kept(_analyse)
+        """Order and fill of W, analysed once for all variants with its pattern."""
+        return problem.kept_of_pattern(_analyse)
 
     @property
     def arrays(self) -> tuple[Any, ...]:

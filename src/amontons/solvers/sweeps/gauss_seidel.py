@@ -46,12 +46,12 @@ from .kernels import (
     SweepOrder,
     counted,
     sweep_data,
-    sweeps_inplace,
     sweeps_until_inplace,
     watch_for,
 )
 from .local_contact import CLOSE, LocalSolver
 from .momentum import Momentum
+from .shared import sweeps as shared_sweeps
 
 Array = NDArray[np.float64]
 CHANGE_FLOPS = 5  # of criterion (14) per component of r
@@ -139,7 +139,7 @@ class GaussSeidel:
                 done, flops = memory.sweep(self.batch, never)
                 yield Iterate(memory.r[:, :d].copy(), iterations=done, flops=flops)
         while True:
-            run = partial(sweeps_inplace, data, r, self.batch, never)
+            run = partial(shared_sweeps, data, r, self.batch, never)
             done, flops = counted(data, run)
             yield Iterate(r[:, :d].copy(), iterations=done, flops=flops)
 

@@ -23,9 +23,24 @@ from numpy.typing import NDArray
 
 from ...core.compiled import njit
 from .kernels import Sweep, content, sweep_flops, sweep_inplace
+from .shared import SharedSweep
 
 Array = NDArray[np.float64]
 MOMENTUM_FLOPS = 3  # per component of r
+
+
+@njit(cache=True, error_model="numpy")
+def push_inplace(r, old, t):
+    """r becomes the next point to sweep from, old what r was; returns the next t."""
+    after = 0.5 * (1.0 + math.sqrt(1.0 + 4.0 * t * t))
+    b = (t - 1.0) / after
+    for i in range(len(r)):
+        x0 = r[i, 0] + b * (r[i, 0] - old[i, 0])
+        for a in range(3):
+            now = r[i, a]
+            r[i, a] = now + b * (now - old[i, a]) if x0 > 0.0 else 0.0
+            old[i, a] = now
+    return after
 
 
 @njit(cache=True, error_model="numpy")
@@ -36,18 +51,24 @@ def momentum_inplace(s, r, old, pace, sweeps, watch):
     where a call goes on.  watch: see `watch_for`.
     """
     for k in range(sweeps):
-        t = pace[0]
-        after = 0.5 * (1.0 + math.sqrt(1.0 + 4.0 * t * t))
-        b = (t - 1.0) / after
-        for i in range(len(r)):
-            x0 = r[i, 0] + b * (r[i, 0] - old[i, 0])
-            for a in range(3):
-                now = r[i, a]
-                r[i, a] = now + b * (now - old[i, a]) if x0 > 0.0 else 0.0
-                old[i, a] = now
+        after = push_inplace(r, old, pace[0])
         change = sweep_inplace(s, False, r)
         pace[0] = 1.0 if change > pace[1] else after
         pace[1] = change
+        if content(s, r, change, watch):
+            return k + 1
+    return sweeps
+
+
+def _momentum(s: Sweep, r: Array, old: Array, pace: Array, sweeps: int, watch: Array) -> int:  # noqa: PLR0913
+    """The same, a large problem in several threads."""
+    sweep = SharedSweep.of(s)
+    if sweep is None:
+        return momentum_inplace(s, r, old, pace, sweeps, watch)
+    for k in range(sweeps):
+        after = push_inplace(r, old, pace[0])
+        change = sweep(r)
+        pace[:] = 1.0 if change > pace[1] else after, change
         if content(s, r, change, watch):
             return k + 1
     return sweeps
@@ -68,6 +89,6 @@ class Momentum:
     def sweep(self, sweeps: int, watch: Array) -> tuple[int, float]:
         """Go on for `sweeps` sweeps or until the judge is content; sweeps done, operations."""
         s, before = self.data, float(self.data.work[0])
-        done = momentum_inplace(s, self.r, self.old, self.pace, sweeps, watch)
+        done = _momentum(s, self.r, self.old, self.pace, sweeps, watch)
         own = MOMENTUM_FLOPS * self.r.size * done
         return done, sweep_flops(s, done, float(s.work[0]) - before) + own

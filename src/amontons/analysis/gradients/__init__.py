@@ -1,0 +1,1 @@
+"""Derivatives of verified solutions with respect to what a problem is made of."""

@@ -1,0 +1,85 @@
+"""All one-sided derivatives of a solution with contacts on the border of their statuses.
+
+The solutions over a parameter p that carries the data along the asked direction leave along
+the tangents of `paths.first_order`; those with p' > 0 are the derivatives for a small step that
+way, one each.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import AmontonsError
+from ...problem.law import Coulomb, Tresca
+from ...problem.solution import FrictionSolution
+from ..paths.first_order import first_order
+from ..paths.friction_path import FrictionPath
+from .gradient import OneSided
+from .linearised import Linearised
+
+Array = NDArray[np.float64]
+FORWARD = 1e-9  # rate of the parameter, of a tangent of length 1, that leads on
+
+
+def sides_of(
+    at: Linearised, F: Array | None, h: Array, mu: Array, bound: Array
+) -> tuple[tuple[OneSided, ...], bool, str]:
+    """(one-sided derivatives, whether these are all, what is to be said) along a direction.
+
+    F (n,) or None, h (nc, d): changes of f and of w or q; mu, bound (nc,).
+    """
+    problem, solution = at.problem, at.solution
+    law = problem.law
+    if not isinstance(law, Coulomb | Tresca):
+        return (), False, (
+            "one-sided derivatives are found for Coulomb's and Tresca's law, not for "
+            f"{law.name}"
+        )
+    rate = mu if isinstance(law, Coulomb) else bound
+    falls = rate < 0
+    if (falls & (law.coefficient == 0)).any():
+        return (), False, "friction falls below zero along this direction"
+    part = min(1.0, float((law.coefficient[falls] / -rate[falls]).min(initial=2.0)) / 2)
+    changes: dict = {"law": type(law)(law.coefficient + part * rate)}
+    if F is not None:
+        changes |= {"f": problem.f + part * F, "w": problem.w + part * h}
+    else:
+        changes |= {"q": problem.q + part * h}
+    try:
+        path = FrictionPath(problem, replace(problem, **changes, guess=None))
+        found = first_order(path, path.state(solution.r), 0.0, tolerance=_reach(path, at))
+    except AmontonsError as reason:
+        return (), False, f"one-sided derivatives were not found: {reason}"
+    sides = tuple(
+        _side(solution, path.reaction_rates(t.direction / (part * t.rate)), F, h, str(t.piece))
+        for t in found.tangents if t.rate > FORWARD
+    )  # fmt: skip
+    reason = found.reason if not found.complete else ""
+    if found.complete and not sides:
+        reason = "no solution leaves that way: it ends here, at a fold or by a jump"
+    return sides, found.complete, reason
+
+
+def _reach(path: FrictionPath, at: Linearised) -> float:
+    """Distance to a border, in unknowns of the path, within which a contact is weak."""
+    worst = 1e-9
+    d = at.problem.dimension
+    scaled = at.solution.margin / path.to_r[::d]
+    for i in at.weak:
+        worst = max(worst, 2.0 * float(scaled[i]))
+    return min(worst, 1e-6)
+
+
+def _side(
+    solution: FrictionSolution, r: Array, F: Array | None, h: Array, piece: str
+) -> OneSided:
+    """The change of u and v with that of r."""
+    problem = solution.problem
+    if F is None:
+        u = (problem.W @ r.ravel()).reshape(r.shape) + h  # type: ignore[attr-defined]
+        return OneSided(r, u, None, piece)
+    v = problem.solve_M(problem.H @ r.ravel() + F)  # type: ignore[attr-defined]
+    return OneSided(r, (problem.H.T @ v).reshape(r.shape) + h, v, piece)  # type: ignore[attr-defined]

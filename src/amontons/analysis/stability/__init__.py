@@ -1,0 +1,1 @@
+"""Stability of sliding states: complex modes, flutter and divergence over the friction."""

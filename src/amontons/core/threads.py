@@ -1,0 +1,218 @@
+"""Kernels on all cores: parts of their rows in the threads of one pool, the same bits always.
+
+A kernel that is to be shared takes (first, last, ...), writes nothing outside of its rows that
+another part reads or writes, and computes a row alike whatever `first` and `last` are; it is
+compiled with nogil=True.  Then neither the number of threads nor who was quicker can be seen in
+the result.  Sums over all rows are those of blocks of fixed length (`BLOCK`), added in order.
+
+The caller works on the first part itself and waits for the others.  A part never asks for
+threads, so that any number of solves at the same time, each in a thread of its user, can not
+wait for each other.  What takes less than some tenths of a millisecond is not shared at all.
+
+Numba's own threads are not used: of its layers the one that comes with every wheel ends the
+process when two threads use it at the same time.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Sequence
+from functools import cache
+from pathlib import Path
+from threading import Lock
+from typing import TYPE_CHECKING, Any
+
+from .errors import InvalidInput
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future, ThreadPoolExecutor
+
+Kernel = Callable[..., None]
+Range = tuple[int, int]
+BLOCK = 8192  # rows of a partial sum
+GRAIN = 150_000  # numbers that a part touches at least: to wake a thread takes some 40 µs
+MOST = 256  # threads of the pool
+DEFAULT_MOST = 16  # threads without being told: then memory is the limit, not the cores
+VARIABLE = "AMONTONS_THREADS"
+_started: set[Kernel] = set()  # kernels that have run in this process: these are compiled
+
+
+class _Pool:
+    """The pool of this process, made when it is needed first, and what was asked for."""
+
+    asked: int | None = None
+    executor: ThreadPoolExecutor | None = None
+    lock = Lock()
+
+    @classmethod
+    def get(cls) -> ThreadPoolExecutor:
+        """It starts threads when parts wait for one, and keeps them."""
+        from concurrent.futures import ThreadPoolExecutor
+
+        with cls.lock:
+            if cls.executor is None:
+                cls.executor = ThreadPoolExecutor(MOST, thread_name_prefix="amontons")
+            return cls.executor
+
+    @classmethod
+    def after_fork(cls) -> None:
+        """Threads have not survived; a forked process starts its own."""
+        cls.executor, cls.lock = None, Lock()
+
+
+if hasattr(os, "register_at_fork"):  # not on Windows, which can not fork
+    os.register_at_fork(after_in_child=_Pool.after_fork)
+
+
+def threads(count: int | None = None) -> int:
+    """How many threads a solve may use from now on in this process; `count` sets it.
+
+    Without being told it is AMONTONS_THREADS, else OMP_NUM_THREADS, else the physical cores that
+    this process may use, 16 at most.  Results do not depend on it, to the last bit.
+    Raises InvalidInput for a count below 1.
+    """
+    if count is not None:
+        if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST:
+            text = f"expected a whole number from 1 to {MOST}, got {count!r}"
+            raise InvalidInput(text, ("threads",))
+        _Pool.asked = count
+    return _Pool.asked or _default()
+
+
+def asked() -> int:
+    """The number of threads that the user has set by `threads` or AMONTONS_THREADS, else 0."""
+    return _Pool.asked or _from_environment(VARIABLE) or 0
+
+
+@cache
+def _default() -> int:
+    return (
+        _from_environment(VARIABLE)
+        or _from_environment("OMP_NUM_THREADS")
+        or min(_cores(), DEFAULT_MOST)
+    )
+
+
+def _from_environment(name: str) -> int | None:
+    """A count from 1; what OpenMP takes too, "4,2", is the first of them.  None without one.
+
+    Raises InvalidInput where our own variable is no such count.
+    """
+    text = os.environ.get(name, "").strip()
+    first = text.split(",")[0].strip()
+    if first.isdecimal() and 1 <= int(first) <= MOST:
+        return int(first)
+    if text and name == VARIABLE:
+        raise InvalidInput(f"{name}: expected a whole number from 1 to {MOST}, got {text!r}")
+    return None
+
+
+def _cores() -> int:
+    """Physical cores that this process may use, by its affinity and its group's quota."""
+    try:
+        logical = os.sched_getaffinity(0)  # type: ignore[attr-defined]
+    except (AttributeError, OSError):  # macOS, Windows
+        return os.cpu_count() or 1
+    siblings = set()
+    for k in logical:
+        path = Path(f"/sys/devices/system/cpu/cpu{k}/topology/thread_siblings_list")
+        try:
+            siblings.add(path.read_text().strip())
+        except OSError:
+            siblings.add(str(k))
+    return max(1, min(len(siblings), _quota()))
+
+
+def _quota() -> int:
+    """Processors that a container may keep busy on the average, at least 1."""
+    try:
+        quota, period = Path("/sys/fs/cgroup/cpu.max").read_text().split()
+        return MOST if quota == "max" else max(1, round(int(quota) / int(period)))
+    except (OSError, ValueError):
+        return MOST
+
+
+def split(rows: int, work: float) -> list[Range]:
+    """Ranges of rows for as many threads as `work`, numbers that are touched, is worth."""
+    count = int(min(work // GRAIN, rows))
+    count = min(threads(), count) if count > 1 else 1
+    if count <= 1:
+        return [(0, rows)]
+    ends = [rows * k // count for k in range(count + 1)]
+    return list(zip(ends[:-1], ends[1:], strict=True))
+
+
+def over_rows(kernel: Kernel, rows: int, work: float, *arguments: Any) -> None:
+    """kernel(first, last, *arguments) for all of range(rows), in parts."""
+    shared(kernel, split(rows, work), arguments)
+
+
+def over_blocks(kernel: Kernel, rows: int, work: float, *arguments: Any) -> None:
+    """The same with parts that begin at multiples of BLOCK, for partial sums."""
+    blocks = -(-rows // BLOCK)
+    ranges = [
+        (first * BLOCK, min(last * BLOCK, rows)) for first, last in split(blocks, work)
+    ]
+    shared(kernel, ranges, arguments)
+
+
+def over_chunks(
+    kernel: Kernel, chunks: Sequence[Range], work: float, *arguments: Any
+) -> None:
+    """kernel(first, last, *arguments) for every one of some ranges of rows, in any order."""
+    groups = [chunks[first:last] for first, last in split(len(chunks), work)]
+    if len(groups) == 1 or not chunks:
+        for first, last in chunks:
+            kernel(first, last, *arguments)
+        return
+    _in_threads(kernel, groups, arguments)
+
+
+def shared(kernel: Kernel, ranges: Sequence[Range], arguments: tuple[Any, ...]) -> None:
+    """kernel(first, last, *arguments) for some ranges, each in a thread of its own."""
+    if len(ranges) == 1:
+        kernel(*ranges[0], *arguments)
+    else:
+        _in_threads(kernel, [[part] for part in ranges], arguments)
+
+
+def _in_threads(
+    kernel: Kernel, groups: Sequence[Sequence[Range]], arguments: tuple[Any, ...]
+) -> None:
+    """One thread a group.  Errors of any part are raised when all have ended."""
+    groups = list(groups)
+    if kernel not in _started:  # compiled by this thread, whose clock knows of it
+        _each(kernel, groups.pop(0), arguments)
+        _started.add(kernel)
+        if len(groups) == 1:
+            _each(kernel, groups[0], arguments)
+            return
+    pool = _Pool.get()
+    futures = [pool.submit(_each, kernel, group, arguments) for group in groups[1:]]
+    try:
+        _each(kernel, groups[0], arguments)
+    finally:
+        errors = _ended(futures)
+    for error in errors:
+        raise error
+
+
+def _each(kernel: Kernel, group: Iterable[Range], arguments: tuple[Any, ...]) -> None:
+    for first, last in group:
+        kernel(first, last, *arguments)
+
+
+def _ended(futures: Sequence[Future[None]]) -> list[BaseException]:
+    """Errors of parts, after all have ended: Ctrl-C waits for them, they work on our arrays."""
+    interrupted: KeyboardInterrupt | None = None
+    errors = []
+    for future in futures:
+        while True:
+            try:
+                error = future.exception()
+                break
+            except KeyboardInterrupt as pressed:
+                interrupted = pressed
+        if error is not None:
+            errors.append(error)
+    return [interrupted, *errors] if interrupted else errors

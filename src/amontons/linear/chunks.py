@@ -1,0 +1,106 @@
+"""Chunks of consecutive nodes that threads can sweep at the same time, and numbers that allow it.
+
+Nodes are cut into chunks so long that a node couples to its own chunk and to the two beside it
+only.  Gauss-Seidel visits all even chunks, then all odd ones, and goes through each in order:
+chunks of one kind know nothing of each other, so it makes no difference to a bit whether they are
+visited one after the other or at once.  As an order of Gauss-Seidel it is as good as any; chunks
+are long, so it hardly differs from that of the numbers.
+
+Where the numbers of nodes do not allow it, as with meshes of a mesh generator, nodes get other
+ones, level by level, by the reverse Cuthill-McKee order [GL], which also keeps what is near in
+the mesh near in memory.
+
+[GL] A. George, J. Liu, "Computer solution of large sparse positive definite systems",
+Prentice-Hall (1981), chapter 4.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..core.threads import Range
+
+Index = NDArray[np.int64]
+Integers = NDArray[np.integer]
+COUNTS = (64, 32, 16, 8, 4)  # chunks that are tried
+LEAST_ENTRIES = 50_000  # blocks of a matrix that is not cut: a sweep takes less than a thread
+LEAST_ROWS = 128  # of a chunk
+
+
+def chunks_of(
+    indptr: Integers, first: Integers, last: Integers, multiple: int = 1
+) -> list[Range]:
+    """Chunks of rows whose least and greatest columns are first and last, (n,); one if need be.
+
+    How many depends on the matrix alone.  multiple: all but the last have so many rows, or a
+    multiple of that.
+    """
+    rows = len(indptr) - 1
+    if indptr[-1] < LEAST_ENTRIES:
+        return [(0, rows)]
+    for count in COUNTS:
+        length = -(-rows // (count * multiple)) * multiple
+        ends = np.minimum(length * np.arange(count + 1), rows)
+        if rows < LEAST_ROWS * count or ends[-2] == rows:
+            continue
+        low = np.minimum.reduceat(first, ends[:-1])
+        high = np.maximum.reduceat(last, ends[:-1])
+        k = np.arange(count)
+        near = low >= ends[np.maximum(k - 1, 0)]
+        if (near & (high < ends[np.minimum(k + 2, count)])).all():
+            return [(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    return [(0, rows)]
+
+
+def chunks_of_sorted(indptr: Integers, indices: Integers) -> list[Range]:
+    """The same for a pattern with a diagonal and ascending columns."""
+    if indptr[-1] < LEAST_ENTRIES:
+        return [(0, len(indptr) - 1)]
+    return chunks_of(indptr, indices[indptr[:-1]], indices[indptr[1:] - 1])
+
+
+def better_numbers(indptr: Integers, indices: Integers, width: int = 1) -> Index | None:
+    """New numbers of nodes, (n,), with which they come in chunks.
+
+    None where they do already, where the matrix is small, and where none are found.  width:
+    nodes that stay together.
+    """
+    if indptr[-1] < LEAST_ENTRIES or len(chunks_of_sorted(indptr, indices)) > 1:
+        return None
+    number, chunks = near_numbers(indptr, indices, width)
+    return number if len(chunks) > 1 else None
+
+
+def near_numbers(
+    indptr: Integers, indices: Integers, width: int = 1, multiple: int = 1
+) -> tuple[Index, list[Range]]:
+    """The reverse Cuthill-McKee numbers of nodes, (n,), and the chunks that they give."""
+    from scipy.sparse import csgraph
+
+    n = len(indptr) - 1
+    graph = units_of(indptr, indices, width)
+    order = csgraph.reverse_cuthill_mckee(sparse.csr_matrix(graph), symmetric_mode=True)
+    order = (width * order.astype(np.int64)[:, None] + np.arange(width)).ravel()
+    number = np.empty(n, dtype=np.int64)
+    number[order] = np.arange(n)
+    columns = number[indices]
+    first = np.minimum.reduceat(columns, indptr[:-1])[order]
+    last = np.maximum.reduceat(columns, indptr[:-1])[order]
+    pointers = np.concatenate([[0], np.cumsum(np.diff(indptr)[order])])
+    return number, chunks_of(pointers, first, last, multiple)
+
+
+def units_of(
+    indptr: NDArray[np.integer], indices: NDArray[np.integer], width: int
+) -> sparse.csr_array:
+    """The graph of units of `width` block rows each, (n / width, n / width), sorted."""
+    n = len(indptr) - 1
+    graph = sparse.csr_array((np.ones(len(indices), np.int8), indices, indptr), shape=(n, n))
+    if width > 1:
+        unit = np.arange(n) // width
+        join = sparse.csr_array((np.ones(n, np.int8), (np.arange(n), unit)))
+        graph = sparse.csr_array(join.T @ graph @ join)
+        graph.sort_indices()
+    return sparse.csr_array((np.ones(graph.nnz), graph.indices, graph.indptr), graph.shape)

@@ -1,0 +1,93 @@
+"""Long vectors on all cores: sums in blocks of fixed length, added in order.
+
+Arrays of any shape are taken flat; they have to be contiguous.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.compiled import njit
+from ..core.threads import BLOCK, over_blocks
+
+Array = NDArray[np.float64]
+
+
+def blocks_of(size: int) -> int:
+    """Number of partial sums of a vector."""
+    return -(-size // BLOCK)
+
+
+def dot(a: Array, b: Array) -> float:
+    """a . b."""
+    sums = np.empty(blocks_of(a.size))
+    over_blocks(_dot, a.size, 2.0 * a.size, a.reshape(-1), b.reshape(-1), sums)
+    return float(np.add.reduce(sums))
+
+
+def norm(a: Array) -> float:
+    """|a|."""
+    return float(np.sqrt(dot(a, a)))
+
+
+def copy_into(a: Array, out: Array) -> None:
+    """out = a."""
+    over_blocks(_copy, a.size, 2.0 * a.size, a.reshape(-1), out.reshape(-1))
+
+
+def add_scaled(a: float, x: Array, y: Array) -> None:
+    """y += a x."""
+    over_blocks(_add_scaled, x.size, 3.0 * x.size, a, x.reshape(-1), y.reshape(-1))
+
+
+def turn(p: Array, factor: float, z: Array) -> None:
+    """p = factor p + z."""
+    over_blocks(_turn, p.size, 3.0 * p.size, p.reshape(-1), factor, z.reshape(-1))
+
+
+def advance(x: Array, r: Array, step: float, p: Array, Ap: Array) -> float:
+    """x += step p, r -= step A p; |r|."""
+    sums = np.empty(blocks_of(x.size))
+    flat = [v.reshape(-1) for v in (x, r, p, Ap)]
+    over_blocks(_advance, x.size, 6.0 * x.size, *flat, step, sums)
+    return float(np.sqrt(np.add.reduce(sums)))
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
+def _dot(begin, end, a, b, sums):
+    for first in range(begin, end, BLOCK):
+        total = 0.0
+        for i in range(first, min(first + BLOCK, end)):
+            total += a[i] * b[i]
+        sums[first // BLOCK] = total
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _copy(begin, end, a, out):
+    for i in range(begin, end):
+        out[i] = a[i]
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _add_scaled(begin, end, factor, x, y):
+    for i in range(begin, end):
+        y[i] += factor * x[i]
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _turn(begin, end, p, factor, z):
+    for i in range(begin, end):
+        p[i] = factor * p[i] + z[i]
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
+def _advance(begin, end, x, r, p, Ap, step, sums):  # noqa: PLR0913
+    for first in range(begin, end, BLOCK):
+        total = 0.0
+        for i in range(first, min(first + BLOCK, end)):
+            x[i] += step * p[i]
+            s = r[i] - step * Ap[i]
+            r[i] = s
+            total += s * s
+        sums[first // BLOCK] = total

@@ -1,0 +1,49 @@
+"""Where bodies give way: the cell that is pressed flat, or turned inside out, in words."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..elements.cell_matrices import rule_of
+from ..meshes.cells import CELLS
+from ..meshes.check import determinant
+from ..meshes.mesh import Mesh
+
+Array = NDArray[np.float64]
+
+
+def flattest(mesh: Mesh, u: Array) -> tuple[float, str]:
+    """The least det F at displacements u (n, dim), and the cell that has it, in words."""
+    least, told, first = np.inf, "", 0
+    for cells in mesh.cells:
+        cell, x = CELLS[cells.kind], mesh.points[cells.nodes]
+        moved = x + u[cells.nodes]
+        for at in rule_of(mesh, cells, finite=True)[0]:
+            ratio = determinant(cell.jacobians(moved, at)) / determinant(cell.jacobians(x, at))
+            k = int(np.where(np.isfinite(ratio), ratio, -np.inf).argmin())
+            if not ratio[k] >= least:
+                least, told = float(ratio[k]), _told(first + k, x[k])
+        first += len(cells.nodes)
+    return least, told
+
+
+def most_strained(mesh: Mesh, u: Array) -> str:
+    """The cell with the largest strain C - 1, in words."""
+    most, told, first = -1.0, "", 0
+    for cells in mesh.cells:
+        cell, x = CELLS[cells.kind], mesh.points[cells.nodes]
+        for at in rule_of(mesh, cells, finite=True)[0]:
+            slopes = np.einsum("kai,kaj->kij", u[cells.nodes], cell.gradients(x, at))
+            F = np.eye(mesh.dim) + slopes
+            strain = np.abs(F.swapaxes(1, 2) @ F - np.eye(mesh.dim)).max(axis=(1, 2))
+            k = int(strain.argmax())
+            if strain[k] > most:
+                most, told = float(strain[k]), _told(first + k, x[k])
+        first += len(cells.nodes)
+    return told
+
+
+def _told(number: int, corners: Array) -> str:
+    centre = ", ".join(f"{c:.4g}" for c in corners.mean(axis=0))
+    return f"cell {number} at ({centre})"

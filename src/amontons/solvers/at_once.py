@@ -1,0 +1,109 @@
+"""What the compiled first stage of `Auto` has found of a problem, as a solution of the driver.
+
+It is judged by the same measures: a problem whose error, weakest contact or rounding will not
+do has no solution here, and goes through the driver from its start.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.clock import compiling, now
+from ..core.errors import InvalidInput, shown
+from ..linear.blocks import spatial
+from ..problem.friction import Form, FrictionProblem
+from ..problem.judge.measures import Criterion, Measure, ratio
+from ..problem.settling import Settled
+from ..problem.solution import Convergence, FrictionSolution, Outcome, Step
+from .asked import Asked
+from .auto.first_stage import CHANGED, CONTACT, ERROR, HIDDEN, START, SWEEPS, WORST, Together
+from .first_iterate import first_iterate
+from .judging import BLUR
+
+Array = NDArray[np.float64]
+SMALL = 30  # contacts of a problem that is solved here before the driver sees it
+STAGE = "Anderson Gauss-Seidel"  # as the first track of the race is called
+
+
+def local_form(problem: FrictionProblem) -> FrictionProblem | None:
+    """The Delassus form of a problem that the first stage takes; None of others.
+
+    Those have no contacts or no load, a law that is another one in other variables, or a W that
+    is dear.  Raises InvalidInput for what is no FrictionProblem.
+    """
+    if not isinstance(problem, FrictionProblem):
+        raise InvalidInput(
+            f"expected a FrictionProblem, got {shown(problem)}; a model has discrete_problem()"
+        )
+    law = problem.law
+    if not problem.contacts or law.varies or law.plain is not law:
+        return None
+    if problem.form is Form.GLOBAL:
+        if problem.measure is not Measure.EXACT:
+            return None
+        problem = problem.condensed()
+    return problem if problem.q_norm > 0 else None
+
+
+def at_once(problem: Any, asked: Asked, start: Any) -> FrictionSolution | None:
+    """The solution of a small problem in Delassus form; None where the driver has to go on.
+
+    The driver's own way costs more than the sweeps of such a problem, even these twice.
+    """
+    if not isinstance(problem, FrictionProblem) or problem.form is Form.GLOBAL:
+        return None
+    plain = asked.callback is None and asked.criterion is Criterion.JUDGE
+    if not plain or asked.max_iterations is not None or problem.contacts > SMALL:
+        return None
+    began, compiled = now(), compiling()
+    mine = local_form(problem)
+    if mine is None or asked.deadline.work is not None or asked.deadline.passed:
+        return None
+    together = Together([mine], asked.tolerance, begin_of(mine, start))
+    together.solve(0, 1)
+    return told(together, 0, problem, asked, now() - began, compiling() - compiled)
+
+
+def begin_of(problem: FrictionProblem, start: Any) -> Array:
+    """Reactions to start from, (nc, 3); start: None, an Iterate or a solution."""
+    if start is None:
+        return np.zeros((problem.contacts, 3))
+    return spatial(first_iterate(problem, start).r)
+
+
+def told(
+    together: Together, p: int, problem: FrictionProblem, asked: Asked, seconds: float,
+    compiled: float = 0.0,
+) -> FrictionSolution | None:  # fmt: skip
+    """The solution of problem p, given in the form `problem`; None where it has none."""
+    row, mine = together.told[p].tolist(), together.problems[p]
+    size, d = float(together.norms[p]), mine.dimension
+    error, worst = ratio(row[ERROR], size), row[WORST]
+    hidden = ratio(row[HIDDEN], size)
+    if not (error <= asked.tolerance and worst <= asked.of_contacts):
+        return None
+    if not hidden <= BLUR * asked.tolerance:
+        return None
+    a, b = together.sizes[p, 0], together.sizes[p + 1, 0]
+    r, u = np.array(together.r[a:b, :d]), np.array(together.u[a:b, :d])
+    settled = Settled(
+        r, np.array(together.status[a:b]), together.sliding[a:b].astype(bool), row[CHANGED] > 0
+    )
+    count, flops = int(row[SWEEPS]), mine.judge_flops
+    history = [Step(0, ratio(row[START], size), 0, 0.0, flops=flops)]
+    if count:
+        flops += together.flops(p) + mine.judge_flops
+        history.append(Step(count, error, 0, seconds, flops=flops, stage=STAGE))
+    record = Convergence(
+        Outcome.CONVERGED, count, error, asked.tolerance, tuple(history), 0, seconds, "Auto",
+        Measure.EXACT, STAGE if count else "", worst, asked.of_contacts,
+        int(row[CONTACT]) if row[CONTACT] >= 0 else None, compiling=compiled,
+        flops=flops,
+    )  # fmt: skip
+    if problem is mine:
+        return FrictionSolution(mine, r, u, None, record, settled=settled)
+    of, u, v = problem.recover(r)
+    return FrictionSolution(of, r, u, v, record, settled=settled)

@@ -1,0 +1,145 @@
+"""The first stage of `Auto` on many small problems, compiled: sweeps and judge in one call.
+
+Most problems of a simulator end in the first chunks of the first track, accelerated sweeps
+(`portfolio`), whose arithmetic takes some microseconds and whose way through the driver fifty.
+Here all problems stand one behind the other in shared arrays, and one call without Python's
+lock goes through a range of them: the same sweeps, judge and reactions, bit by bit, as those of
+`drive` where that ends in these chunks; where it does not, it is asked.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.arrays import read_only
+from ...core.compiled import njit
+from ...problem.friction import FrictionProblem
+from ...problem.judge.contacts import assess
+from ...problem.judge.measures import natural_error
+from ..sweeps.kernels import (
+    EXACT,
+    FIRST_JUDGED,
+    Sweep,
+    anderson_inplace,
+    by_approach,
+    flops_of_acceleration,
+    flops_of_sweep,
+)
+from ..sweeps.local_contact import CLOSE, STEPS
+from .race import FIRST_CHUNKS, GROWTH, SHORTEST
+from .state import HISTORY_CONTACT, nanoseconds_of_sweep
+from .tracks import DEPTH, LEAST
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+# Columns of what is told of a problem.
+SWEEPS, START, ERROR, WORST, CONTACT, HIDDEN, CHANGED, WORK = range(8)
+
+
+def sweeps_of_first_chunks(blocks: int, contacts: int) -> int:
+    """Sweeps of the chunks that the first track of the race has before all others."""
+    cost, total, done = nanoseconds_of_sweep(blocks, contacts, HISTORY_CONTACT), 0.0, 0
+    for _ in range(FIRST_CHUNKS):
+        sweeps = max(LEAST, int(max(GROWTH * total, SHORTEST) / cost))
+        total, done = total + sweeps * cost, done + sweeps
+    return done
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def solve_range(  # noqa: PLR0913
+    first, last, sizes, limits, goals, data, floor, r, u, kept, status, sliding, told
+):
+    """Solve problems first to last - 1, from r; those that are not solved have error inf.
+
+    sizes (problems + 1, 2): contacts and blocks of all before a problem; limits (problems,):
+    sweeps at most; goals: errors.  data: arrays of all problems one behind the other, a row of
+    indptr more for each.  Fills r, u, kept (contacts, 3), status, sliding (contacts,) and told
+    (problems, 8), see the columns; errors unit of u.
+    """
+    indptr, indices, blocks, q, kind, parameters, rho, diagonal, eliminated = data
+    for p in range(first, last):
+        a, b, c, d = sizes[p, 0], sizes[p + 1, 0], sizes[p, 1], sizes[p + 1, 1]
+        goal, work = goals[p], np.zeros(1)
+        s = Sweep(
+            indptr[a + p : b + p + 1], indices[c:d], blocks[c:d], q[a:b], kind[a:b],
+            parameters[a:b], rho[a:b], diagonal[a:b], eliminated[a:b], by_approach(q[a:b]),
+            EXACT, 1.0, CLOSE, STEPS, work,
+        )  # fmt: skip
+        x, nc = r[a:b], b - a
+        error = natural_error(s.indptr, s.indices, s.data, s.q, s.kind, s.parameters, s.rho, x)
+        told[p, SWEEPS], told[p, START] = 0.0, error
+        if not error <= goal:
+            watch = np.array([goal, FIRST_JUDGED * goal, math.inf])
+            history = np.empty((2, DEPTH + 1, 3 * nc))
+            gram, count = np.zeros((DEPTH + 1, DEPTH)), np.zeros(2, dtype=np.int64)
+            told[p, SWEEPS] = anderson_inplace(
+                s, x, x.copy(), history, gram, count, limits[p], watch
+            )
+            error = watch[2]
+        told[p, ERROR], told[p, WORK], told[p, CHANGED] = error, work[0], 0.0
+        while error <= goal:
+            found, worst, contact, hidden, changed = assess(
+                s.indptr, s.indices, s.data, s.q, s.kind, s.parameters, s.rho, x, floor[a:b],
+                u[a:b], kept[a:b], status[a:b], sliding[a:b],
+            )  # fmt: skip
+            told[p, WORST], told[p, CONTACT], told[p, HIDDEN] = worst, contact, hidden
+            if told[p, CHANGED] > 0.0:
+                told[p, ERROR] = found
+            if not changed:
+                break
+            told[p, CHANGED] = 1.0
+            x[:] = kept[a:b]
+
+
+def _joined(arrays: Sequence[NDArray]) -> NDArray:
+    """Arrays one behind the other, read-only as theirs are."""
+    if len(arrays) == 1:
+        return arrays[0]
+    return read_only(np.concatenate(arrays))
+
+
+@dataclass(eq=False)
+class Together:
+    """Problems in Delassus form one behind the other, with room for what is found.
+
+    sizes (problems + 1, 2): contacts and blocks of all before a problem.
+    """
+
+    problems: Sequence[FrictionProblem]
+    tolerance: float
+    r: Array  # starts, then reactions, (contacts, 3)
+
+    def __post_init__(self) -> None:
+        problems = self.problems
+        ends, limits = [(0, 0)], []
+        for p in problems:
+            contacts, blocks = p.contacts, len(p.blocks.indices)
+            ends.append((ends[-1][0] + contacts, ends[-1][1] + blocks))
+            limits.append(sweeps_of_first_chunks(blocks, contacts))
+        self.sizes, self.limits = np.array(ends, np.int64), np.array(limits, np.int64)
+        self.norms = np.array([p.q_norm for p in problems])
+        kernels = [(*p.kernel_data, p.blocks.diagonal, p.blocks.eliminated) for p in problems]
+        self.data = tuple(_joined(x) for x in zip(*kernels, strict=True))
+        self.floor = _joined([p.floor for p in problems])
+        total = len(self.r)
+        self.u, self.kept = np.empty((2, total, 3))
+        self.status, self.sliding = np.empty((2, total), np.int8)
+        self.told = np.full((len(problems), 8), math.inf)
+
+    def solve(self, first: int, last: int) -> None:
+        """Solve some of the problems."""
+        solve_range(
+            first, last, self.sizes, self.limits, self.tolerance * self.norms, self.data,
+            self.floor, self.r, self.u, self.kept, self.status, self.sliding, self.told,
+        )  # fmt: skip
+
+    def flops(self, p: int) -> float:
+        """Floating point operations of the sweeps on a problem, once they are done."""
+        contacts, blocks = self.problems[p].contacts, len(self.problems[p].blocks.indices)
+        each = flops_of_sweep(blocks, contacts) + flops_of_acceleration(3 * contacts, DEPTH)
+        return float(self.told[p, SWEEPS]) * each + float(self.told[p, WORK])

@@ -1,0 +1,94 @@
+"""Sweeps over large problems in several threads: the loops of `kernels`, step by step.
+
+Each gives what the compiled loop of the same name gives, to the last bit: threads share the
+visits of a sweep only (`chunks`), all else is done by the same compiled functions.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.compiled import njit
+from ...core.threads import Range, shared, split, threads
+from .chunks import SUMMED, stages_of
+from .kernels import Sweep, anderson_inplace, content, mix_inplace, sweeps_inplace, visit_inplace
+
+Array = NDArray[np.float64]
+CONTACT_WORK = 150.0  # of a contact, in numbers that a sweep touches
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _visit_part(begin, end, s, r, sums):
+    """Visit some contacts; sums: of their changes squared."""
+    for first in range(begin, end, SUMMED):
+        last = min(first + SUMMED, end)
+        sums[first // SUMMED] = visit_inplace(s, first, last, False, r)
+
+
+@njit(cache=True)
+def _total(sums):
+    """In the order of `sweep_inplace`."""
+    change = 0.0
+    for part in sums:
+        change += part
+    return math.sqrt(change)
+
+
+class SharedSweep:
+    """One sweep after another on the data of one problem."""
+
+    def __init__(self, s: Sweep) -> None:
+        self.s = s
+        self.sums = np.empty(-(-len(s.order) // SUMMED))
+        work = 9.0 * len(s.indices) + CONTACT_WORK * len(s.order)
+        self.stages = [_joined(part, 0.5 * work) for part in stages_of(s.work)]
+
+    @classmethod
+    def of(cls, s: Sweep) -> SharedSweep | None:
+        """None where one thread does the sweeps, in compiled loops."""
+        if threads() < 2 or len(s.work) < 3:
+            return None
+        made = cls(s)
+        return made if any(len(stage) > 1 for stage in made.stages) else None
+
+    def __call__(self, r: Array) -> float:
+        """Sweep on r (nc, 3); the change."""
+        for stage in self.stages:
+            shared(_visit_part, stage, (self.s, r, self.sums))
+        return float(_total(self.sums))
+
+
+def _joined(chunks: list[Range], work: float) -> list[Range]:
+    """Chunks that follow one another, joined to one range for each thread."""
+    return [(chunks[a][0], chunks[b - 1][1]) for a, b in split(len(chunks), work)]
+
+
+def sweeps(s: Sweep, r: Array, count: int, watch: Array) -> int:
+    """As `sweeps_inplace`."""
+    sweep = SharedSweep.of(s)
+    if sweep is None:
+        return sweeps_inplace(s, r, count, watch)
+    for k in range(count):
+        if content(s, r, sweep(r), watch):
+            return k + 1
+    return count
+
+
+def anderson(  # noqa: PLR0913
+    s: Sweep, r: Array, x: Array, history: Array, gram: Array, stored: NDArray, count: int,
+    watch: Array,
+) -> int:  # fmt: skip
+    """As `anderson_inplace`."""
+    sweep = SharedSweep.of(s)
+    if sweep is None:
+        return anderson_inplace(s, r, x, history, gram, stored, count, watch)
+    for k in range(count):
+        r[:, :] = x
+        if content(s, r, sweep(r), watch):
+            x[:, :] = r
+            return k + 1
+        mix_inplace(r, x, history, gram, stored)
+    return count
