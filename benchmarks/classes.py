@@ -178,11 +178,11 @@ def two_bodies(cells, mu, seed):
 
 
 # --------------------------------------------------------------------- all
-def fclib(folder):
-    """FCLib files with at least five contacts, in Delassus form."""
+def fclib(folder, least=5):
+    """FCLib files with so many contacts at least, in Delassus form."""
     for path in sorted(Path(folder).glob("*.hdf5")):
         problem = am.read_fclib(path)
-        if problem.contacts >= 5:
+        if problem.contacts >= least:
             yield path.stem, problem.condensed()
 
 

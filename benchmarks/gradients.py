@@ -189,7 +189,7 @@ def page(errors, left_out, cases, tried, rows):
             f"{row['forward']:.3g} | {row['vjp']:.3g} | {row['vjp'] / row['stiffness']:.2f} | "
             f"{row['vjp'] / row['forward']:.2f} |"
         )
-    lines += ["", "Up to 60 000 unknowns the system is factorised in each of these times, while "
+    lines += ["", "Up to 60 000 unknowns the system is factorised in each of these times, and "
               "the stiffness has its factor; beyond, all three are multigrid: the stiffness to "
               "1e-11, both others to 1e-9."]  # fmt: skip
     return "\n".join(lines) + "\n"

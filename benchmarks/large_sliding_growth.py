@@ -1,11 +1,11 @@
-"""A load step of ironing in 3D on ever finer meshes: CPU time, and what takes it.
+"""CPU time of load steps of a die that irons a slab in 3D, over the number of unknowns.
 
-    python benchmarks/large_sliding_growth.py [--fine 1 1.5 2 3]
+    python benchmarks/large_sliding_growth.py [--fine 1.3 2 3 4.75]
 
-The die of `large_sliding_models.ironing_in_space` with `fine` times as many cells in each
-direction, pressed in the first load step (which also compiles) and on in the second, which is
-measured.  Shares by the profiler, functions by the module that they are in.  One thread.
-Writes results/large_sliding_growth.md beside this file.
+Both bodies of `large_sliding_models` with that many times the cells in every direction, and one
+with as many contacts as a surface can have; the die is pressed in by two load steps and dragged
+by one.  The second and the third are measured.  Shares by the profiler, functions by the module
+that they are in.  One thread.  Writes results/large_sliding_growth.md beside this file.
 """
 
 import os
@@ -26,24 +26,29 @@ from machine import describe
 import amontons as am
 
 HERE = Path(__file__).parent
-PARTS = {
-    "linear solves": ("linear/direct.py",),
-    "search": ("contact/facing.py",),
-    "pairs": ("contact/current_pairs.py", "contact/current_mortar.py"),
-    "elements": ("elements/hyperelasticity.py",),
+PARTS = {  # modules by the beginnings of their paths in the package; the rest is the assembly
+    "linear solves": ("linear/", "solvers/newton/linear_steps"),
+    "search": ("mechanics/contact/facing", "mechanics/contact/segments"),
+    "pairs": ("mechanics/contact/",),
+    "cells": ("mechanics/elements/",),
 }
+PASSES = 40  # by which time in other libraries is handed to who called them
+
 HEAD = """# Ironing in 3D, ever finer
 
 Regenerate: `python benchmarks/large_sliding_growth.py`.
 
 {machine}
 
-One load step of a die pressed into a slab, friction 0.3, finite strains: CPU seconds, Newton
-steps, shares of linear solves (a direct factor in every Newton step), of the search of facets,
-of the integrals over pairs and their slopes, and of the cells' forces and tangents.
+A die pressed into a slab, then dragged over it, friction 0.3, finite strains, to the default
+tolerance: CPU seconds of one load step, Newton steps, shares of linear solves (multigrid from
+8 000 unknowns on, below that a direct factor), of the search of facets that face each other, of
+the integrals over pairs and their slopes, of forces and tangents of cells, and of the assembly
+of the matrix with all else.  Pressing goes 0.025 deep, dragging 0.025 far.  All cells are
+refined alike but in the last rows, which have as many contacts as 100 000 unknowns will hold.
 
-| unknowns | contacts | CPU s | Newton steps | {parts} | rest | peak memory, GB |
-|---|---|---|---|{lines}---|---|
+| step | unknowns | contacts | closed | CPU s | Newton steps | {parts} | rest | memory, GB |
+|---|---|---|---|---|---|{lines}---|---|
 """
 
 
@@ -53,59 +58,101 @@ def ironing(fine):
     def cells(*counts):
         return tuple(round(fine * k) for k in counts)
 
-    slab = am.box((3, 1.6, 1), cells(15, 8, 4))
-    upper = die((0.8, 1.0, 0.5), cells(5, 6, 3), (0.9, 1.0, 0.3))
-    return Case(slab, upper, (1.0, 10.0), 0.2, 1.0, 0.3, 8, 20)
+    return _ironing(cells(15, 8, 4), cells(5, 6, 3))
 
 
-def shares(profile, total):
-    """Parts of the time inside functions of some modules, calls of others included."""
+def _ironing(of_slab, of_die):
+    slab = am.box((3, 1.6, 1), of_slab)
+    upper = die((0.8, 1.0, 0.5), of_die, (0.9, 1.0, 0.3))
+    return Case(slab, upper, (1.0, 10.0), 0.05, 0.05, 0.3, 2, 2)
+
+
+def many_contacts():
+    """Two thousand contacts of a hundred thousand unknowns."""
+    return _ironing((60, 32, 9), (44, 44, 6))
+
+
+def part_of(path):
+    """The number of the part that a module of the package belongs to; None elsewhere."""
+    _, inside, module = path.replace(os.sep, "/").rpartition("/amontons/")
+    if not inside or "site-packages" in module:
+        return None
+    for k, starts in enumerate(PARTS.values()):
+        if module.startswith(starts):
+            return k
+    return len(PARTS)
+
+
+def shares(profile):
+    """Parts of the time in functions of PARTS, other libraries counted for their callers."""
     stats = pstats.Stats(profile).stats
-    out = []
-    for files in PARTS.values():
-        seconds = 0.0
-        for (path, _, _), (_, _, _, _, callers) in stats.items():
-            if path.endswith(files):  # entered from another module
-                others = (c for (at, _, _), c in callers.items() if not at.endswith(files))
-                seconds += sum(c[3] for c in others)
-        out.append(seconds / total)
-    return out
+    number = {key: k for k, key in enumerate(stats)}
+    own = [part_of(path) for path, _, _ in stats]
+    of = np.zeros((len(stats), len(PARTS) + 1))
+    for k, part in enumerate(own):
+        of[k, len(PARTS) if part is None else part] = 1.0
+    for _ in range(PASSES):
+        before = of.copy()
+        for key, (_, _, _, _, callers) in stats.items():
+            k = number[key]
+            weights = [(c[3], number[caller]) for caller, c in callers.items() if caller != key]
+            total = sum(weight for weight, _ in weights)
+            if own[k] is None and total > 0:
+                of[k] = sum(weight * before[at] for weight, at in weights) / total
+    seconds = np.array([entry[2] for entry in stats.values()])
+    return seconds @ of / seconds.sum()
 
 
-def measured(fine):
-    """A row of the page, and unknowns and seconds."""
-    model = ironing(fine).model()
+def measured(case, kinds=("press", "drag")):
+    """Rows of the page, unknowns and seconds of every kind of step."""
+    model = case.model()
     unknowns = sum(body.mesh.points.size for body in model.bodies)
-    steps = am.evolve(model, am.QuasiStatic(1.0), until=2)
+    steps = am.evolve(model, am.QuasiStatic(1.0), until=case.presses + 1)
     next(steps)
-    profile = cProfile.Profile(time.process_time)
-    began = time.process_time()
-    profile.enable()
-    step = next(steps)
-    profile.disable()
-    seconds = time.process_time() - began
-    parts = shares(profile, seconds)
-    count = len(step.solution.convergence.history)
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-    cells = " | ".join(f"{part:.0%}" for part in [*parts, 1 - sum(parts)])
-    row = (f"| {unknowns} | {len(step.solution.r)} | {seconds:.2f} | {count} | {cells} "
-           f"| {peak:.1f} |")  # fmt: skip
-    print(row, flush=True)
-    return row, unknowns, seconds
+    rows, seconds = [], []
+    for kind in kinds:
+        profile = cProfile.Profile(time.process_time)
+        began = time.process_time()
+        profile.enable()
+        step = next(steps)
+        profile.disable()
+        seconds.append(time.process_time() - began)
+        parts = shares(profile)
+        count = step.solution.convergence.linear_iterations
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+        cells = " | ".join(f"{part:.0%}" for part in parts)
+        closed = int((step.solution.r[:, 0] > 0).sum())
+        rows.append(f"| {kind} | {unknowns} | {len(step.solution.r)} | {closed} "
+                    f"| {seconds[-1]:.2f} | {count} | {cells} | {peak:.1f} |")  # fmt: skip
+        print(rows[-1], flush=True)
+    return rows, unknowns, seconds
 
 
 def main():
     """Measure and write the page."""
     parser = argparse.ArgumentParser()
-    parser.add_argument("--fine", type=float, nargs="+", default=[1, 1.5, 2, 3])
-    rows = [measured(fine) for fine in parser.parse_args().fine]
-    sizes, seconds = (np.log([row[k] for row in rows]) for k in (1, 2))
+    parser.add_argument("--fine", type=float, nargs="+", default=[1.3, 2, 3, 4.75])
+    measured(ironing(1))  # compiles, and makes what is made once
+    found = []
+    for fine in parser.parse_args().fine:
+        found.append(measured(ironing(fine)))
+        write(found, [])
+    write(found, [measured(many_contacts())])
+
+
+def write(found, more):
+    """The page of what is measured: sizes that are alike, and others."""
     machine = "; ".join(f"{k} {v}" for k, v in describe().items())
     head = HEAD.format(machine=machine, parts=" | ".join(PARTS), lines="---|" * len(PARTS))
-    text = head + "\n".join(row[0] for row in rows) + "\n"
-    if len(rows) > 1:
-        slope = np.polyfit(sizes, seconds, 1)[0]
-        text += f"\nCPU time grows as unknowns to the power of {slope:.2f}.\n"
+    lines = [row for rows, _, _ in [*found, *more] for row in rows]
+    text = head + "\n".join(lines) + "\n"
+    if len(found) > 1:
+        sizes = np.log([unknowns for _, unknowns, _ in found])
+        slopes = np.polyfit(sizes, np.log([seconds for _, _, seconds in found]), 1)[0]
+        text += (
+            "\nCPU time grows as unknowns to the power of {:.2f} in pressing, {:.2f} in "
+            "dragging\n(least squares over all rows of meshes that are refined alike).\n"
+        ).format(*slopes)
     (HERE / "results/large_sliding_growth.md").write_text(text)
 
 

@@ -1,6 +1,7 @@
 """Contact multigrid on the problems of hueeber2008, against one linear elasticity solve.
 
     python benchmarks/multigrid.py [--levels 3,4,5,6,7] [--repeats 3] [--only mortar,shell]
+    python benchmarks/multigrid.py --only unstructured [--sizes 0.033,0.0145]
 
 Linear solve: the same bodies with their contact faces clamped, conjugate gradients with one
 V(1,1) cycle of `GeometricMultigrid`, zero start, to the same relative residual.  Contact: the
@@ -9,7 +10,8 @@ of the judge included.  Levels, node blocks and what else depends on the matrice
 prepared before on both sides; compiled code is warm.  Both sides use the same engine: stored
 blocks and block Gauss-Seidel, from 50 000 dofs on no matrix and Chebyshev smoothing.  CPU
 seconds of one thread, best of the repeats.  Two bodies are judged by their residual: forming W
-for the judge would take many times as long as the solve.
+for the judge would take many times as long as the solve.  Unstructured: the cube in tetrahedra
+of gmsh (not installed by default), with set-up: what depends on the matrices alone.
 
 Writes results/multigrid.md and results/multigrid.json beside this file; with --only, parts that
 are not named stay as stored.
@@ -20,9 +22,11 @@ import os
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import argparse
+import importlib.util
 import json
 import resource
 import sys
+import tempfile
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -37,6 +41,7 @@ import amontons as am
 from amontons.mechanics.model import assembly
 from amontons.problem import matrices
 from amontons.solvers.driver import drive
+from amontons.solvers.multigrid.levels import ContactLevels
 from reproduce.hueeber2008.shell import model as shell
 
 HERE = Path(__file__).parent
@@ -173,6 +178,58 @@ def two_bodies_row(model, repeats):
     return row
 
 
+def unstructured(size, mu):
+    """The cube in tetrahedra with edges of about `size`."""
+    import gmsh
+
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.option.setNumber("Mesh.Algorithm3D", 10)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+        gmsh.option.setNumber("Mesh.MeshSizeMin", size)
+        box = gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)
+        gmsh.model.occ.synchronize()
+        gmsh.model.addPhysicalGroup(3, [box], name="body")
+        for name, z in (("bottom", 0.0), ("top", 1.0)):
+            corner = (-0.1, -0.1, z - 0.1), (1.1, 1.1, z + 0.1)
+            found = gmsh.model.getEntitiesInBoundingBox(*corner[0], *corner[1], dim=2)
+            gmsh.model.addPhysicalGroup(2, [tag for _, tag in found], name=name)
+        gmsh.model.mesh.generate(3)
+        with tempfile.TemporaryDirectory() as folder:
+            path = str(Path(folder) / "cube.msh")
+            gmsh.write(path)
+            mesh = am.read_mesh(path)
+    finally:
+        gmsh.finalize()
+    whole = cube(1, mu)
+    body = am.Body(mesh, am.LinearElastic(young=200, poisson=0.3))
+    return am.Model([body], supports=whole.supports, contacts=whole.contacts)
+
+
+def unstructured_row(size, repeats, mu=0.3):
+    """Contact against a linear solve, both with algebraic levels and with their set-up."""
+    problem = unstructured(size, mu).assemble()
+    held = clamped(problem)
+    setup, _ = best(1, lambda: am.GeometricMultigrid().factor(held.M, held.near_nullspace))
+    reference = linear(held, (), repeats)
+    prepare, _ = best(1, lambda: ContactLevels.of(problem.fresh()))
+    row = {"unknowns": problem.unknowns, "contacts": problem.contacts, "mu": mu,
+           "linear_setup": setup, "setup": prepare}  # fmt: skip
+    for tolerance in TOLERANCES:
+        seconds, solution = contact(problem, tolerance, repeats)
+        linear_seconds, iterations = reference[tolerance]
+        row[f"{tolerance:.0e}"] = {
+            "linear_seconds": linear_seconds, "linear_iterations": iterations,
+            "seconds": seconds, "cycles": solution.convergence.iterations,
+            "ratio": seconds / linear_seconds,
+            "whole_ratio": (prepare + seconds) / (setup + linear_seconds),
+            "outcome": solution.convergence.outcome.name.lower(),
+        }  # fmt: skip
+    row["counts"] = solution.counts
+    return row
+
+
 def two_bodies_rows(model, sizes, repeats):
     """Rows of the sizes of a model; the judge reads residuals and forms no W."""
     usual, matrices.CHEAP = matrices.CHEAP, 0.0
@@ -218,6 +275,9 @@ def page(record):
         lines.append(f"| {row['mu']} | {counts} | {cycles} |")
     lines += ["", "## Two blocks, dual mortar on meshes that do not match", ""]
     lines += _two_bodies_table(record["mortar"])
+    if "unstructured" in record:
+        lines += ["", "## Tetrahedra of a mesh generator, mu = 0.3", ""]
+        lines += _unstructured_table(record["unstructured"])
     lines += ["", "## The body in the spherical shell, mu = 0.5, levels 2 to 4", ""]
     lines += _two_bodies_table(record["shell"])
     return "\n".join(lines) + "\n"
@@ -236,6 +296,23 @@ def _two_bodies_table(rows):
                 f"{part['linear_iterations']}, {part['linear_seconds']:.3g} | "
                 f"{part['free_iterations']}, {part['free_seconds']:.3g} | "
                 f"{part['cycles']}, {part['seconds']:.3g} | {part['ratio']:.2f} |"
+            )
+    return lines
+
+
+def _unstructured_table(rows):
+    lines = ["| unknowns | contacts | open / slip / stick | to | linear: set-up, iterations, "
+             "s | contact: set-up, cycles, s | ratio | with set-up |",
+             "|" + "---|" * 8]  # fmt: skip
+    for row in rows:
+        counts = " / ".join(str(row["counts"][k]) for k in ("open", "slip", "stick"))
+        for tolerance in TOLERANCES:
+            part = row[f"{tolerance:.0e}"]
+            lines.append(
+                f"| {row['unknowns']} | {row['contacts']} | {counts} | {tolerance:.0e} | "
+                f"{row['linear_setup']:.3g}, {part['linear_iterations']}, "
+                f"{part['linear_seconds']:.3g} | {row['setup']:.3g}, {part['cycles']}, "
+                f"{part['seconds']:.3g} | {part['ratio']:.2f} | {part['whole_ratio']:.2f} |"
             )
     return lines
 
@@ -273,6 +350,7 @@ def main():
     parser.add_argument("--levels", default="1,2,3,4,5,6,7")
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--friction-level", type=int, default=5)
+    parser.add_argument("--sizes", default="0.033,0.0145", help="edges of tetrahedra")
     parser.add_argument("--only", help="parts to measure again, with commas")
     given = parser.parse_args()
     levels = [int(x) for x in given.levels.split(",")]
@@ -289,6 +367,9 @@ def main():
         "mortar": lambda: two_bodies_rows(stacked, (2, 4, 8), repeats),
         "shell": lambda: two_bodies_rows(lambda k: shell(k, 0.5), (2, 3, 4), repeats),
     }
+    if importlib.util.find_spec("gmsh"):
+        sizes = [float(x) for x in given.sizes.split(",")]
+        parts["unstructured"] = lambda: [unstructured_row(size, repeats) for size in sizes]
     record = {"friction_level": given.friction_level}
     if given.only:
         record = json.loads((HERE / "results/multigrid.json").read_text())

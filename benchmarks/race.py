@@ -117,7 +117,7 @@ def crossing(found, tolerance):
 def solved(problem, tolerance, cap):
     """CPU seconds of Auto, infinite where it does not converge; what ended it; error."""
     best = (math.inf, "", math.inf)
-    for _ in range(RUNS):
+    for _ in range(RUNS + 1):
         fresh = problem.fresh()
         _ = fresh.kernel_data, fresh.q_norm, fresh.blocks.eliminated
         began = time.process_time()
@@ -127,6 +127,8 @@ def solved(problem, tolerance, cap):
 
         found = am.drive(fresh, tolerance=tolerance, callback=late)
         seconds = time.process_time() - began
+        if found.convergence.compiling > 0:  # its first time
+            continue
         if not found.converged:
             return math.inf, found.convergence.detail, found.convergence.error
         best = min(best, (seconds, found.convergence.detail, found.convergence.error))
@@ -178,7 +180,7 @@ def oracle(row, tolerance, names=None):
 
 # ------------------------------------------------------------------------------ simulation
 CONSTANTS = {
-    "window": rules.WINDOW, "first": rules.FIRST_CHUNKS,
+    "window": rules.WINDOW, "first": rules.FIRST_CHUNKS, "grace": rules.GRACE,
     "shares": {e.name: e.share for e in ALONE},
     "optimisms": {e.name: e.optimism for e in ALONE},
     "needs": {e.name: 1.0 for e in ALONE if e.needs is not None},
@@ -191,6 +193,7 @@ class Replay:
     def __init__(self, found):
         self.first, self.rows, _ = found
         self.at = 0
+        self.foreseen = math.inf  # the least cost at which it has promised the goal
 
     @property
     def cost(self):
@@ -218,6 +221,12 @@ class Replay:
         rest = math.log(max(self.error / goal, 1.0))
         return rest * (self.cost - cost) / math.log(error / self.error)
 
+    def promise(self, goal, c):
+        """Cost to the goal at its rate, more where it has broken promises."""
+        rest = self.rate(goal, c["window"], c["first"])
+        self.foreseen = min(self.foreseen, self.cost + rest)
+        return rest * max(1.0, self.cost / (c["grace"] * self.foreseen))
+
 
 def simulated(row, goal, c):
     """CPU seconds of the race on the traces, infinite where no track gets there."""
@@ -231,7 +240,7 @@ def simulated(row, goal, c):
             needed = row["needs"][name] * c["needs"][name]
             if track.cost < needed:
                 return needed - track.cost
-        promise = track.rate(goal, c["window"], c["first"])
+        promise = track.promise(goal, c)
         unknown = track.cost < c["shares"][name] * total
         return min(promise, c["optimisms"][name] * total) if unknown else promise
 
@@ -279,7 +288,8 @@ def score(rows, c):
 
 def tuned(rows, rounds=1, seed=1):
     """Constants found by a search along one of them after another."""
-    grid = {"window": (0.5, 0.6, 0.7, 0.8, 0.9), "first": (1, 2, 3, 4)}
+    grid = {"window": (0.5, 0.6, 0.7, 0.8, 0.9), "first": (1, 2, 3, 4),
+            "grace": (1.0, 1.5, 2.0, 4.0)}  # fmt: skip
     inner = {"shares": (0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3),
              "optimisms": (0.1, 0.3, 1.0, 3.0, 10.0),
              "needs": (0.3, 0.5, 0.7, 1.0, 1.5, 2.0)}  # fmt: skip

@@ -1,11 +1,14 @@
 """The whole `amontons solve` on ever finer cubes of hueeber2008: time and memory per unknown.
 
     python benchmarks/scale.py [--levels 3,4,5,6,7] [--folder FOLDER]
+    python benchmarks/scale.py --level 8
 
 Each level is a process of its own, `amontons solve example:cube --set mesh.cells=N -o DIR`,
 from start to files written; compiled code is warm.  Wall and CPU seconds and the largest
 resident memory are those of this process; assembling, preparing and solving are what it reports
 itself.  Memory per unknown is what it takes above a solve of 54 unknowns.
+Levels that are not asked for stay as stored.  A level that would need more memory than is free,
+by the bytes per unknown of the largest one before, is left out, and said.
 Writes results/scale.md and results/scale.json beside this file.
 """
 
@@ -49,6 +52,30 @@ def run(level, folder):
     }  # fmt: skip
 
 
+def stored():
+    """Rows of former runs."""
+    path = HERE / "results/scale.json"
+    return json.loads(path.read_text())["rows"] if path.exists() else []
+
+
+def expected_gb(level, rows, base):
+    """Memory that a level takes as the largest smaller one does per unknown; 0: not known."""
+    smaller = [row for row in rows if row["level"] < level]
+    if not smaller:
+        return 0.0
+    per_unknown = (smaller[-1]["peak_gb"] - base) / smaller[-1]["unknowns"]
+    return base + 3 * (2**level + 1) ** 2 * 2**level * per_unknown
+
+
+def free_gb():
+    """Memory that is free, infinite where this system does not say."""
+    path = Path("/proc/meminfo")
+    if not path.exists():
+        return float("inf")
+    lines = dict(line.split(":") for line in path.read_text().splitlines())
+    return int(lines["MemAvailable"].split()[0]) / 1e6
+
+
 def page(record):
     """The results as Markdown."""
     machine = "; ".join(f"{k} {v}" for k, v in record["machine"].items())
@@ -81,10 +108,16 @@ def main():
     with tempfile.TemporaryDirectory() as scratch:
         folder = given.folder or Path(scratch)
         run(1, folder)
-        record = {"base_gb": run(1, folder)["peak_gb"], "rows": []}
-        for level in given.levels.split(","):
-            record["rows"].append(run(int(level), folder))
-            print(json.dumps(record["rows"][-1]), file=sys.stderr, flush=True)
+        record = {"base_gb": run(1, folder)["peak_gb"], "rows": stored()}
+        for level in map(int, given.levels.split(",")):
+            kept = [row for row in record["rows"] if row["level"] != level]
+            needed, free = expected_gb(level, kept, record["base_gb"]), free_gb()
+            if needed > free:
+                print(f"level {level} would need {needed:.1f} GB, {free:.1f} GB are free",
+                      file=sys.stderr)  # fmt: skip
+                continue
+            record["rows"] = sorted([*kept, run(level, folder)], key=lambda row: row["level"])
+            print(json.dumps(record["rows"]), file=sys.stderr, flush=True)
     record["machine"] = describe()
     (HERE / "results/scale.json").write_text(json.dumps(record, indent=1) + "\n")
     (HERE / "results/scale.md").write_text(page(record))

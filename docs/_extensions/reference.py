@@ -15,7 +15,7 @@ GROUPS = {
     "Solve": (
         "The verb, what it takes and what it returns.",
         "solve drive FrictionProblem Form FrictionSolution ModelSolution ContactStatus "
-        "Convergence Outcome Criterion Iterate ResultWarning DoubtWarning warn_of",
+        "Convergence Outcome Criterion Iterate ResultWarning DoubtWarning warn_of threads",
     ),
     "Models": (
         "Bodies on meshes, supports, loads and contacts.",

@@ -26,8 +26,12 @@ from .analysis.gradients.steps import (
 from .analysis.gradients.with_jax import jax_function as jax_function
 from .analysis.gradients.with_torch import torch_function as torch_function
 from .analysis.paths.path_crossing import PathCrossing as PathCrossing
+from .analysis.solutions.second_start import Other as Other, maybe_others as maybe_others
 from .app.api import solve as solve
 from .app.audit import audit as audit
+from .analysis.stability.coalescence import Flutter as Flutter
+from .analysis.stability.modes import Modes as Modes
+from .app.stability import modes as modes
 from .analysis.limits.collapse import Collapse as Collapse
 from .analysis.limits.jamming import Jamming as Jamming
 from .app.limits import collapse_load as collapse_load, jamming_friction as jamming_friction
@@ -49,6 +53,9 @@ from .core.threads import threads as threads
 from .core.warned import (
     DoubtWarning as DoubtWarning, ResultWarning as ResultWarning, warn_of as warn_of,
 )
+from .io.certificates import (
+    check_certificate as check_certificate, write_certificate as write_certificate,
+)
 from .io.checkpoint import (
     export_fclib as export_fclib, load_start as load_start, load_state as load_state,
     save_state as save_state,
@@ -58,6 +65,7 @@ from .io.fclib import read_fclib as read_fclib, write_fclib as write_fclib
 from .io.matrices import StoredMatrices as StoredMatrices, read_matrices as read_matrices
 from .io.meshes import read_mesh as read_mesh
 from .io.readers import read_case as read_case
+from .io.rigid_bodies import export_rigid as export_rigid
 from .io.rigid_bodies import write_rigid as write_rigid
 from .io.plots.film import film as film
 from .io.series import export_xdmf as export_xdmf

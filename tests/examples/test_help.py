@@ -23,6 +23,7 @@ cells = 3
 [material.default]
 young = 1.0
 poisson = 0.3
+density = 1.0
 [[fix]]
 on = "top"
 value = [0.05, -0.1]
@@ -31,7 +32,8 @@ slave = "bottom"
 obstacle = { plane = { normal = [0, 1] } }
 friction = { coulomb = 0.5 }
 """
-GOOD = {"enumerate": (0, 1), "uniqueness": (0, 1)}  # exit codes; 1: undecided
+GOOD = {"enumerate": (0, 1), "uniqueness": (0, 1), "jam": (0, 1),  # exit codes; 1: undecided
+        "modes": (0, 1)}  # 1: one grows  # fmt: skip
 
 
 def commands():

@@ -23,7 +23,7 @@ ALONE = {  # package: the folders or files that import it
 }  # fmt: skip
 INSIDE = {  # the same inside of a room
     "analysis": ("multipliers", "solutions", "certificates", "paths", "gradients",
-                 "limits"),
+                 "limits", "stability"),
     "mechanics": ("meshes", "elements", "contact", "model", "steps"),
     "problem": ("law", "judge"),
 }

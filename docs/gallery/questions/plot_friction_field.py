@@ -40,6 +40,7 @@ bends = np.diff(np.eye(nodes), 2, axis=0) / h**2
 
 
 def misfit(mu):
+    """Its value and its slope, (nodes,)."""
     global last
     last = am.solve(problem.with_mu(mu), am.SemismoothNewton(),
                     start=am.Iterate(last.r, last.v))
@@ -57,6 +58,7 @@ L = np.linalg.cholesky(20 * np.eye(nodes) + h * bends.T @ bends)
 
 
 def in_z(z):
+    """The same in z."""
     mu = np.maximum(0.3 + solve_triangular(L.T, z), 0.02)
     value, gradient = misfit(mu)
     return value, solve_triangular(L, gradient, lower=True)

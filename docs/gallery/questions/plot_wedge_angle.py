@@ -40,6 +40,7 @@ def wedge(angle):
 
 
 def axes(angle):
+    """Vertical parts of the axes of all contacts, (contacts, 2)."""
     return wedge(angle).discretisation.sites.frames[:, :, 1]
 
 

@@ -25,7 +25,7 @@ def modes(
     velocity: Any = None, mass: Any = None, mass_damping: float = 0.0,
     stiffness_damping: float = 0.0, damping: Any = None, lumped: bool = False,
 ) -> Modes:  # fmt: skip
-    """Complex modes of small motions about a solution: does it flutter, or diverge?
+    """Complex modes of small motions about a solution, and which of them grow.
 
     target: a solution; a model is solved.  count modes nearest to the frequency `near`.
     velocity: motion of the slaves against what they meet, components or a function of x: the
@@ -61,20 +61,13 @@ def modes(
         found, toward, speed = _sliding(model, velocity)
     else:
         found = target.solution if isinstance(target, ModelSolution) else solve(model).solution
-    from ..mechanics.model.fields import by_body
     from ..mechanics.steps.system import Inertia
 
     own = Inertia(model, mass_damping, stiffness_damping, lumped)
     M = own.M[parts.free][:, parts.free]
     C = _rayleigh(M, parts.M, mass_damping, stiffness_damping, damping)
     state = SlidingState.of(Linearised.of(found), M, C, toward=toward, speed=speed)
-
-    def spread(v: Any) -> Any:
-        whole = np.zeros(parts.dofs, dtype=complex)
-        whole[parts.free] = v
-        return by_body(model.bodies, parts, whole)
-
-    return modes_of(state, count, near, spread)
+    return modes_of(state, count, near, model)
 
 
 def _rayleigh(M: Any, K: Any, by_mass: float, by_stiffness: float, more: Any) -> Any:
@@ -98,7 +91,8 @@ def _sliding(model: Model, velocity: Any) -> tuple[FrictionSolution, Any, float]
         raise InvalidInput("velocity: expected a motion along the surface at every contact")
     toward = along / size[:, None]
     problem: Any = model.assemble()
-    rest = solve(replace(problem, law=problem.law.with_mu(np.zeros(len(toward)))), tolerance=1e-6)
+    smooth = problem.law.with_mu(np.zeros(len(toward)))
+    rest = solve(replace(problem, law=smooth), tolerance=1e-6)
     reach = FAR * float(np.abs(rest.u).max(initial=0.0) or 1.0)
     w = problem.w.copy()
     w[:, 1:] = reach * toward

@@ -25,6 +25,13 @@ class Prepared:
     def __reduce__(self) -> tuple:
         return Prepared, ()
 
+    def copied(self) -> Prepared:
+        """What is there now, for who goes on with other sources."""
+        other = Prepared()
+        with self._lock:
+            other._made = dict(self._made)
+        return other
+
     def once(
         self, make: Callable[P, T], sources: tuple, *arguments: P.args, **named: P.kwargs
     ) -> T:

@@ -67,8 +67,8 @@ if hasattr(os, "register_at_fork"):  # not on Windows, which can not fork
 def threads(count: int | None = None) -> int:
     """How many threads a solve may use from now on in this process; `count` sets it.
 
-    Without being told it is AMONTONS_THREADS, else OMP_NUM_THREADS, else the physical cores that
-    this process may use, 16 at most.  Results do not depend on it, to the last bit.
+    Without being told it is AMONTONS_THREADS, else OMP_NUM_THREADS, else the physical cores
+    that this process may use, 16 at most.  Results do not depend on it, to the last bit.
     Raises InvalidInput for a count below 1.
     """
     if count is not None:
@@ -166,6 +166,25 @@ def over_chunks(
             kernel(first, last, *arguments)
         return
     _in_threads(kernel, groups, arguments)
+
+
+def over_stages(
+    kernel: Kernel,
+    chunks: Sequence[Range],
+    work: float,
+    *arguments: Any,
+    backward: bool = False,
+    tell: bool = False,
+) -> None:
+    """kernel(first, last, *arguments) on all even chunks, then on all odd ones.
+
+    backward: the other way round; tell: the kernel is told by a last argument which they are.
+    """
+    for odd in (True, False) if backward else (False, True):
+        some = chunks[odd::2]
+        if some:
+            share = 0.5 * work if len(chunks) > 1 else work
+            over_chunks(kernel, some, share, *arguments, *((odd,) if tell else ()))
 
 
 def shared(kernel: Kernel, ranges: Sequence[Range], arguments: tuple[Any, ...]) -> None:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable, Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.files import replacing
+from ..core.errors import InvalidInput, shown
+from ..core.files import make_folder, replacing, write_bytes
 from ..mechanics.meshes.write import with_all_kinds
 from ..mechanics.multibody import Ball, Polyhedron
 
@@ -18,6 +21,14 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 AROUND = 24  # points of a ball on its equator
+LIST = "steps.pvd"
+PVD = """<?xml version="1.0"?>
+<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">
+  <Collection>
+{}
+  </Collection>
+</VTKFile>
+"""
 
 
 def write_rigid(step: RigidStep, path: str | os.PathLike[str]) -> None:
@@ -33,7 +44,7 @@ def write_rigid(step: RigidStep, path: str | os.PathLike[str]) -> None:
     points, triangles, velocity, body = [], [], [], []
     first = 0
     for k, one in enumerate(step.system.bodies):
-        own, faces = _surface(one.shape)
+        own, faces = surface_of(one.shape)
         arms = own @ rotation[k].T
         points.append(motion.position[k] + arms)
         spin = rotation[k] @ motion.spin[k]
@@ -52,7 +63,31 @@ def write_rigid(step: RigidStep, path: str | os.PathLike[str]) -> None:
         meshio.write(place, mesh)
 
 
-def _surface(shape: Ball | Polyhedron) -> tuple[Array, Index]:
+def export_rigid(
+    steps: Iterable[RigidStep], folder: str | os.PathLike[str], every: int = 1
+) -> Iterator[RigidStep]:
+    """The same steps, every so many of them written; FOLDER/steps.pvd opens as a film.
+
+    The list is complete after every step.  Raises NotWritten where a file can not be.
+    """
+    if not (isinstance(every, int | np.integer) and every > 0):
+        raise InvalidInput(f"expected a whole number > 0, got {shown(every)}", ("every",))
+    return _exported(steps, Path(folder), every)
+
+
+def _exported(steps: Iterable[RigidStep], place: Path, every: int) -> Iterator[RigidStep]:
+    make_folder(place)
+    lines: list[str] = []
+    for step in steps:
+        if step.state.index % every == 0:
+            name = f"step-{step.state.index:05d}.vtu"
+            write_rigid(step, place / name)
+            lines.append(f'    <DataSet timestep="{step.time!r}" file="{name}"/>')
+            write_bytes(place / LIST, PVD.format("\n".join(lines)).encode())
+        yield step
+
+
+def surface_of(shape: Ball | Polyhedron) -> tuple[Array, Index]:
     """Points from the centre of mass (n, 3), and triangles (k, 3), anticlockwise outside."""
     if isinstance(shape, Polyhedron):
         fans = [

@@ -78,7 +78,7 @@ def _largest_eigenvalue(A: NodeBlocks) -> float:
     """Of D^-1 A, D the diagonal blocks, by Lanczos's method in the product of D."""
     D = A.diagonal_blocks
     x = np.cos(np.arange(3.0 * A.nodes)).reshape(-1, 3)
-    z, before, beta = np.empty_like(x), np.zeros_like(x), 0.0
+    z, before = np.empty_like(x), np.zeros_like(x)
     y = _applied(A.inverse, _applied(D, x))  # nothing where D has none
     alphas, betas = [], []
     for _ in range(STEPS):
@@ -86,11 +86,11 @@ def _largest_eigenvalue(A: NodeBlocks) -> float:
         if not square > 0 or (alphas and square <= 1e-20 * alphas[-1] ** 2):
             break
         beta = float(np.sqrt(square))
-        before, x = (x if alphas else np.zeros_like(x)), y / beta
+        before, x = x if alphas else before, y / beta
         A.times(x, z)
         alphas.append(dot(x, z))
         betas.append(beta)
-        y = _applied(A.inverse, z) - alphas[-1] * x - (beta if len(alphas) > 1 else 0.0) * before
+        y = _applied(A.inverse, z) - alphas[-1] * x - beta * before
     beside = betas[1:]
     matrix = np.diag(alphas) + np.diag(beside, 1) + np.diag(beside, -1)
     return float(np.linalg.eigvalsh(matrix)[-1]) if alphas else 1.0

@@ -109,11 +109,13 @@ def velocity_inplace(  # noqa: PLR0913
     u: Array,
 ) -> None:  # fmt: skip
     """u = W r + q by rows of blocks; q, r, u (nc, 3)."""
-    over_rows(_velocity, len(q), 10.0 * len(indices), indptr, indices, data, q, r, u)
+    work = 10.0 * len(indices)
+    over_rows(velocity_of_rows_inplace, len(q), work, indptr, indices, data, q, r, u)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"}, nogil=True)
-def _velocity(begin, end, indptr, indices, data, q, r, u):  # noqa: PLR0913
+def velocity_of_rows_inplace(begin, end, indptr, indices, data, q, r, u):  # noqa: PLR0913
+    """u = W r + q in rows of contacts begin to end - 1, for kernels."""
     for i in range(begin, end):
         u0, u1, u2 = q[i, 0], q[i, 1], q[i, 2]
         for k in range(uint64(indptr[i]), uint64(indptr[i + 1])):

@@ -1,10 +1,10 @@
-"""Chunks of consecutive nodes that threads can sweep at the same time, and numbers that allow it.
+"""Chunks of consecutive nodes that threads can sweep at once, and numbers that allow it.
 
 Nodes are cut into chunks so long that a node couples to its own chunk and to the two beside it
 only.  Gauss-Seidel visits all even chunks, then all odd ones, and goes through each in order:
-chunks of one kind know nothing of each other, so it makes no difference to a bit whether they are
-visited one after the other or at once.  As an order of Gauss-Seidel it is as good as any; chunks
-are long, so it hardly differs from that of the numbers.
+chunks of one kind know nothing of each other, so no bit depends on whether they are visited one
+after the other or at once.  As an order of Gauss-Seidel it is as good as any; chunks are long,
+so it hardly differs from that of the numbers.
 
 Where the numbers of nodes do not allow it, as with meshes of a mesh generator, nodes get other
 ones, level by level, by the reverse Cuthill-McKee order [GL], which also keeps what is near in

@@ -281,9 +281,9 @@ def _end(stencil, buffer, i, a):
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"}, nogil=True)
-def _grid_pass(begin, end, shape, values, lines, shifts, stencils, inverses, used, held, x, b, d, out,
-               keep, step, mode):  # noqa: PLR0913 # fmt: skip
-    """On the lines begin to end of nodes along x:
+def _grid_pass(begin, end, shape, values, lines, shifts, stencils, inverses, used, held, x, b,
+               d, out, keep, step, mode):  # noqa: PLR0913 # fmt: skip
+    """One of three operations on the lines begin to end of nodes along x.
 
     mode 0: out = A x; 1: out = b - A x; 2: d = keep d + step D^-1 (b - A x), out = x + d.
     """

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numba import uint64
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..core.compiled import njit
-from ..core.threads import Kernel, Range, over_chunks, over_rows
+from ..core.threads import Range, over_rows, over_stages
 from .chunks import chunks_of_sorted
 
 if TYPE_CHECKING:
@@ -56,18 +56,12 @@ class NodeBlocks:
     def from_sparse(cls, matrix: sparse.sparray, place: Index | None, nodes: int) -> NodeBlocks:
         """The blocks of a scalar matrix (n, n) whose unknown i sits at place[i] of 3 nodes.
 
-        place None: unknown i at i.  Padding gets ones on the diagonal.
+        place ascending; None: unknown i at i.  Padding gets ones on the diagonal.
         """
-        if place is None:
-            tiles = sparse.csr_array(matrix).tobsr((3, 3))
-        else:
-            coo = matrix.tocoo()
-            idle = np.setdiff1d(np.arange(3 * nodes), place)
-            rows = np.concatenate([place[coo.coords[0]], idle])
-            columns = np.concatenate([place[coo.coords[1]], idle])
-            values = np.concatenate([coo.data, np.ones(len(idle))])
-            shape = (3 * nodes, 3 * nodes)
-            tiles = sparse.coo_array((values, (rows, columns)), shape=shape).tobsr((3, 3))
+        rows = sparse.csr_array(matrix)
+        if place is not None:
+            rows = _spread(rows, place, 3 * nodes)
+        tiles = rows.tobsr((3, 3))
         tiles = with_diagonal(tiles)
         return cls.of(tiles.indptr, tiles.indices, np.asarray(tiles.data, dtype=float))
 
@@ -115,7 +109,7 @@ class NodeBlocks:
 
     @cached_property
     def chunks(self) -> list[Range]:
-        """Ranges of rows that are swept at the same time, every second of them; see `chunks`."""
+        """Ranges of rows, every second of which is swept at once; see `chunks`."""
         return chunks_of_sorted(self.indptr, self.indices)
 
     @property
@@ -161,23 +155,20 @@ class NodeBlocks:
         return NodeBlocks(indptr, indices, data, self.inverse[order])
 
 
-def over_stages(
-    kernel: Kernel,
-    chunks: list[Range],
-    work: float,
-    *arguments: Any,
-    backward: bool = False,
-    tell: bool = False,
-) -> None:
-    """kernel(first, last, *arguments) on all even chunks, then on all odd ones.
-
-    backward: the other way round; tell: the kernel is told by a last argument which they are.
-    """
-    for odd in (True, False) if backward else (False, True):
-        some = chunks[odd::2]
-        if some:
-            share = 0.5 * work if len(chunks) > 1 else work
-            over_chunks(kernel, some, share, *arguments, *((odd,) if tell else ()))
+def _spread(rows: sparse.csr_array, place: Index, size: int) -> sparse.csr_array:
+    """A matrix with its unknowns at ascending places, and ones on the diagonal elsewhere."""
+    counts = np.ones(size, dtype=np.int64)
+    counts[place] = np.diff(rows.indptr)
+    pointers = np.concatenate([[0], np.cumsum(counts)])
+    idle = np.ones(size, dtype=bool)
+    idle[place] = False
+    own = pointers[:-1][idle]
+    taken = np.ones(pointers[-1], dtype=bool)
+    taken[own] = False
+    columns, values = np.empty(pointers[-1], dtype=np.int64), np.empty(pointers[-1])
+    columns[taken], values[taken] = place[rows.indices], rows.data
+    columns[own], values[own] = np.flatnonzero(idle), 1.0
+    return sparse.csr_array((values, columns, pointers), shape=(size, size))
 
 
 def with_diagonal(tiles: sparse.bsr_array) -> sparse.bsr_array:

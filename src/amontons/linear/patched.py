@@ -13,10 +13,10 @@ from numba import uint64
 from numpy.typing import NDArray
 
 from ..core.compiled import njit
+from ..core.threads import over_stages
 from .node_blocks import (
     NodeBlocks,
     later_product,
-    over_stages,
     row_product,
     visited_product,
 )

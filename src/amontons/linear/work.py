@@ -2,17 +2,35 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from threading import local
 
 import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
 
 
 class Work(local):
-    """x, b and r of a level, (nodes, 3); every thread has its own."""
+    """x, b and r of a level, (nodes, 3); every thread has its own, each from its first use."""
 
     def __init__(self, nodes: int) -> None:
         self.nodes = nodes
-        self.x, self.b, self.r = (np.zeros((nodes, 3)) for _ in range(3))
+
+    @cached_property
+    def x(self) -> Array:
+        """Zero at first."""
+        return np.zeros((self.nodes, 3))
+
+    @cached_property
+    def b(self) -> Array:
+        """Zero at first."""
+        return np.zeros((self.nodes, 3))
+
+    @cached_property
+    def r(self) -> Array:
+        """Zero at first."""
+        return np.zeros((self.nodes, 3))
 
     def __reduce__(self) -> tuple:
         return Work, (self.nodes,)

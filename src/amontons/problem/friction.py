@@ -229,7 +229,7 @@ class FrictionProblem(Told, Equations):
         alike = np.array_equal(old.indptr, new.indptr)
         if alike and np.array_equal(old.indices, new.indices):
             new = BlockRows(old.indptr, old.indices, new.data, old.diagonal)
-        problem = replace(self, W=given, blur=None)
+        problem = replace(self, W=given, blur=None, _shared=self._shared.copied())
         problem._shared.put(block_rows, (given,), new)
         return problem
 

@@ -10,15 +10,16 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..core.clock import TimeLimit
-from ..core.errors import InvalidInput, shown, within
+from ..core.errors import AmontonsError, InvalidInput, shown
 from ..problem.friction import FrictionProblem
 from ..problem.solution import FrictionSolution
 from . import Auto
@@ -59,7 +60,7 @@ def solve_many(
     workers = _workers(threads)
     local = {}
     for k, problem in enumerate(problems):
-        with within("problems", k):
+        with _named("problems", k):
             mine = local_form(problem)
         if mine is not None:
             local[k] = mine
@@ -67,7 +68,10 @@ def solve_many(
     end = time.monotonic() + asked.deadline.left  # the clock of a thread is its own
     with ThreadPoolExecutor(workers) as pool:
         if local:
-            rows = [begin_of(mine, begins[k]) for k, mine in local.items()]
+            rows = []
+            for k, mine in local.items():
+                with _named("starts", k):
+                    rows.append(begin_of(mine, begins[k]))
             together = Together(list(local.values()), asked.tolerance, np.concatenate(rows))
             seconds = _in_ranges(pool, together, end)
             for p, k in enumerate(local):
@@ -103,8 +107,18 @@ def _driven(
     """What `drive` makes of problem k in the time that is left."""
     if asked.deadline.work is None and end < math.inf:
         asked = replace(asked, time_limit=max(end - time.monotonic(), LEAST_LIMIT))
-    with within("problems", k):
+    with _named("problems", k):
         return drive_as_asked(problem, asked, start, Auto())
+
+
+@contextmanager
+def _named(*place: str | int) -> Iterator[None]:
+    """Say in an error to which of the many it belongs."""
+    try:
+        yield
+    except AmontonsError as error:
+        inside = error.at if error.at != ("start",) else ()
+        raise type(error)(error.text, (*place, *inside)) from error
 
 
 # ---------------------------------------------------------------- what is given

@@ -62,7 +62,7 @@ def test_both_directions_agree_with_differences(law):
         gradient = s.vjp(r=R, u=U)
         whole = (R * change.r).sum() + (U * change.u).sum()
         assert (gradient.load * dq).sum() == pytest.approx(whole, rel=1e-9, abs=1e-12)
-        found = slope(lambda e: solved(q + e * dq).r, 1e-4)
+        found = slope(lambda e, q=q, dq=dq: solved(q + e * dq).r, 1e-4)
         size = max(np.abs(found).max(), np.abs(dq).max())
         assert np.abs(found - change.r).max() <= 1e-7 * size
         compared += 1
@@ -83,7 +83,11 @@ def test_friction_as_a_field(name):
 
         R, change = rng.standard_normal(q.shape), rng.uniform(-1, 1, len(q))
         s = solved(numbers)
-        found = slope(lambda e: (R * solved(numbers + e * change).r).sum(), 1e-4)
+
+        def number(e, R=R, numbers=numbers, change=change, solved=solved):
+            return (R * solved(numbers + e * change).r).sum()
+
+        found = slope(number, 1e-4)
         gradient = s.vjp(r=R)
         assert getattr(gradient, name) @ change == pytest.approx(found, rel=1e-7, abs=1e-8)
         assert (R * s.jvp(**{name: change}).r).sum() == pytest.approx(found, rel=1e-7, abs=1e-8)
@@ -300,13 +304,9 @@ def test_gradients_through_steps(method):
         )  # fmt: skip
 
     along = {"young": (lambda x: make(young=x), 200.0), "mu": (lambda x: make(mu=x), 0.3)}
-    try:
-        gradient = am.evolution_gradient(
-            make(), method, slopes, until=until, start=start, tolerance=1e-12, along=along
-        )
-    except am.UnsupportedForm as reason:
-        assert getattr(method, "restitution", 0) and "restitution was made smaller" in str(reason)
-        return
+    gradient = am.evolution_gradient(
+        make(), method, slopes, until=until, start=start, tolerance=1e-12, along=along
+    )
     assert not gradient.weak.any()
     for name, (family, at) in along.items():
         found = slope(lambda e, f=family, a=at: number(f(a + e)), 1e-4 * at)

@@ -99,6 +99,28 @@ def test_slopes_at_random_states(split):
     assert max(errors) < 1e-7
 
 
+def test_slopes_where_a_node_meets_a_node():
+    """As a millionth of a facet beside it, but for the kinks of warped facets.
+
+    The shared parts have corners that coincide up to rounding; old slopes missed by half.
+    """
+    for seed, noise in enumerate((0.0, 1e-16, 1e-14, 1e-12) * 2):
+        rng = np.random.default_rng(seed)
+        pair, rest = surfaces(apart=0.0)
+        rest[:, 2] += 0.03 * rng.standard_normal(len(rest))
+        p, way, found = pair.slaves[5], rng.standard_normal(3), []
+        q = pair.master.all[
+            np.linalg.norm(rest[pair.master.all] - rest[p], axis=1).argmin()
+        ]
+        for beside in (noise, 1e-6):
+            x = rest.copy()
+            x[p] = x[q] + beside * way
+            here = pair.at(x)
+            force = np.ones(here.normals.shape) * here.met[:, None]
+            found.append(here.slopes.spread(force).toarray())
+        assert np.abs(found[0] - found[1]).max() < 1e-2 * np.abs(found[1]).max()
+
+
 @pytest.mark.parametrize("split", [(False, False), (True, True)])
 def test_forces_balance_and_rotations_change_nothing(split):
     pair, rest = surfaces(split=split)

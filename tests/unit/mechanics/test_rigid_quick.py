@@ -1,13 +1,14 @@
 """Small steps are solved without a problem object: the same answers as the solvers give."""
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import amontons as am
 from amontons.linear.blocks import BlockRows, inverse_norms
-from amontons.mechanics.multibody import quick
+from amontons.mechanics.multibody import sweeping
 from amontons.mechanics.multibody.quick import Found, eliminated_of
 
 FLOOR = am.Plane((0, 0, 1))
@@ -67,6 +68,28 @@ def test_quick_steps_follow_those_of_the_solvers(make, step, until):
     assert max(abs(s.energies.defect) for s in ours) < 1e-12 * ours[0].energies.potential
 
 
+def test_sweeps_with_momentum_follow_the_solvers_too(monkeypatch):
+    """As many contacts have them, which plain sweeps are too dear for."""
+    monkeypatch.setattr(sweeping, "WORK", 0)
+    for system, step in ((pile(), 2e-3), (pendulum(), 2e-3)):
+        ours, theirs = both(system, step, 0.3)
+        swept = [s._solved for s in ours if isinstance(s._solved, Found)]
+        assert len(swept) > 50 and max(found.sweeps for found in swept) > 2
+        np.testing.assert_allclose(ours[-1].position, list(theirs)[-1].position, atol=1e-10)
+
+
+def test_bad_impulses_of_the_last_step_are_no_start():
+    """After an impact none are better: the step is that from no impulses, bit by bit."""
+    system = pile()
+    late = list(am.evolve_rigid(system, step=2e-3, until=0.4))[-1].state
+    bad, none = (
+        next(am.evolve_rigid(system, step=2e-3, until=0.402,
+                             start=replace(late, impulses=factor * late.impulses)))
+        for factor in (1e6, 0.0)
+    )  # fmt: skip
+    np.testing.assert_array_equal(bad.r, none.r)
+
+
 def test_one_step_is_that_of_the_solvers_to_rounding():
     """From the same states, with impacts among them."""
     system = pile()
@@ -107,8 +130,8 @@ def test_what_sweeps_do_not_solve_goes_to_the_solvers_with_the_same_start(monkey
     """And what these do not solve is reported: a tolerance that rounding does not allow."""
     system = pile()
     late = list(am.evolve_rigid(system, step=2e-3, until=0.4))[-1].state
-    monkeypatch.setattr(quick, "WORK", 0)
-    monkeypatch.setattr(quick, "MOMENTUM", 0)
+    monkeypatch.setattr(sweeping, "WORK", 0)
+    monkeypatch.setattr(sweeping, "MOMENTUM", 0)
     step = next(am.evolve_rigid(system, step=2e-3, until=0.402, start=late))
     assert not isinstance(step._solved, Found) and step.solution.converged
     with pytest.raises(am.NotConverged, match="step"):

@@ -1,15 +1,20 @@
 """Shapes of rigid bodies, and where they meet."""
 
+import itertools
+from xml.etree import ElementTree
+
 import meshio
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from PIL import Image
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
 import amontons as am
 from amontons.mechanics.multibody import Ball, Polyhedron, RigidBodies, RigidBody, cuboid
+from amontons.mechanics.multibody.apart import edges_apart
 from amontons.mechanics.multibody.meeting import meetings
 
 
@@ -173,3 +178,80 @@ def test_surfaces_for_viewers(tmp_path):
     np.testing.assert_allclose(read.point_data["velocity"][:8], expected, atol=1e-12)
     am.write_rigid(step, tmp_path / "bodies.ply")
     assert len(meshio.read(tmp_path / "bodies.ply").cells[0].data) == len(body)
+
+
+@pytest.mark.parametrize(
+    ("points", "edges", "directions"),
+    [(np.asarray(cuboid((1, 2, 3)).points), 12, 3),
+     (np.concatenate([np.eye(3), -np.eye(3)]) * [1, 2, 3], 12, 6),
+     ([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], 6, 6)],
+)  # fmt: skip
+def test_parallel_edges_are_one_direction(points, edges, directions):
+    facets, corners = Polyhedron(points).facets, np.asarray(Polyhedron(points).points)
+    assert len(facets.edges) == edges and len(facets.lines) == directions
+    along = corners[facets.edges[:, 1]] - corners[facets.edges[:, 0]]
+    for group in np.split(along, facets.lines[1:]):
+        assert np.abs(np.cross(group, group[0])).max() < 1e-12
+
+
+def test_edges_are_as_far_apart_as_the_best_pair_of_all_that_are_outermost():
+    """Against all pairs of edges, whose common normals separate the bodies or do not."""
+    rng = np.random.default_rng(4)
+    for _ in range(40):
+        shapes = (cuboid(rng.uniform(0.5, 1, 3)), Polyhedron(rng.standard_normal((8, 3)) / 2))
+        at = np.array([[0, 0, 0], rng.uniform(0.4, 1.2, 3)])
+        bodies = [RigidBody(s, position=p, orientation=rng.standard_normal(4))
+                  for s, p in zip(shapes, at, strict=True)]  # fmt: skip
+        packed = RigidBodies(bodies).packed
+        R = np.array([Rotation.from_quat(b.orientation, scalar_first=True).as_matrix()
+                      for b in bodies])  # fmt: skip
+        each = [slice(*packed.first_vertex[[k, k + 1]]) for k in range(2)]
+        v = np.concatenate([at[k] + packed.vertices[each[k]] @ R[k].T for k in range(2)])
+        found = edges_apart(0, 1, packed.first_vertex, v, packed.edges, packed.first_line,
+                            packed.lines, at)  # fmt: skip
+        ends = [packed.edges[slice(*packed.first_edge[[k, k + 1]])] for k in range(2)]
+        best = -np.inf
+        for a in ends[0]:
+            for b in ends[1]:
+                m = np.cross(v[a[1]] - v[a[0]], v[b[1]] - v[b[0]])
+                m *= np.sign(m @ (at[1] - at[0])) / np.linalg.norm(m)
+                top, bottom = (v[each[0]] @ m).max(), (v[each[1]] @ m).min()
+                if v[a] @ m == pytest.approx(top) and v[b] @ m == pytest.approx(bottom):
+                    best = max(best, bottom - top)
+        assert found[0] == pytest.approx(best, abs=1e-12)
+
+
+def fall():
+    """A brick and a ball that fall on a floor."""
+    bodies = [RigidBody(cuboid((0.2, 0.1, 0.1)), position=(0, 0, 0.06)),
+              RigidBody(Ball(0.05), position=(0.02, 0, 0.2))]  # fmt: skip
+    system = RigidBodies(bodies, [am.Plane((0, 0, 1))])
+    return am.evolve_rigid(system, step=5e-3, until=0.1)
+
+
+def test_steps_are_written_with_a_list_that_viewers_open(tmp_path):
+    steps = list(am.export_rigid(fall(), tmp_path / "fall", every=5))
+    assert len(steps) == 20
+    sets = ElementTree.parse(tmp_path / "fall" / "steps.pvd").getroot().iter("DataSet")
+    found = [(float(s.get("timestep")), s.get("file")) for s in sets]
+    assert [time for time, _ in found] == [step.time for step in steps[4::5]]
+    for step, (_, name) in zip(steps[4::5], found, strict=True):
+        read = meshio.read(tmp_path / "fall" / name)
+        np.testing.assert_allclose(read.points[:8].mean(axis=0), step.position[0], atol=1e-12)
+    with pytest.raises(am.InvalidInput, match="every"):
+        am.export_rigid(fall(), tmp_path, every=0)
+
+
+def test_a_film_shows_bodies_where_they_are(tmp_path):
+    """The same view in all pictures, another one in each."""
+    steps = list(fall())
+    path = am.film(steps[::6], tmp_path / "fall.gif")
+    with Image.open(path) as film:
+        assert film.n_frames == 4
+        pictures = []
+        for k in range(4):
+            film.seek(k)
+            pictures.append(np.asarray(film.convert("RGB"), dtype=int))
+    assert all(np.abs(a - b).max() > 30 for a, b in itertools.pairwise(pictures))
+    with pytest.raises(am.InvalidInput, match="steps"):
+        am.film([*steps, 1], path)

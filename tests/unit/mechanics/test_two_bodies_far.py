@@ -187,6 +187,41 @@ def test_patch_in_3d(kinds, swap):
     assert np.ptp(solution.pressure) < 1e-10
 
 
+def uneven(mesh, seed):
+    """The mesh with its nodes moved by a fifth of a cell, those of sides along them."""
+    rng, x = np.random.default_rng(seed), mesh.points.copy()
+    low, high = x.min(axis=0), x.max(axis=0)
+    for k in range(3):
+        inner = (x[:, k] > low[k] + 1e-9) & (x[:, k] < high[k] - 1e-9)
+        x[inner, k] += 0.1 * rng.uniform(-1, 1, inner.sum())
+    return replace(mesh, points=x)
+
+
+@pytest.mark.parametrize(("kinds", "orders", "swap", "seed"), [
+    (("hex", "hex"), (1, 1), False, 1), (("tet", "hex"), (1, 1), True, 2),
+    (("hex", "hex"), (1, 2), True, 3), (("hex", "tet"), (2, 2), True, 2),
+])  # fmt: skip
+def test_patch_with_friction_on_uneven_meshes(kinds, orders, swap, seed):
+    """Quadrilaterals that are no parallelograms: one stretch and one pressure all the same."""
+    bodies, supports = [], [am.Fix("lower.bottom", (None, None, 0)),
+                            am.Fix("upper.top", (None, None, -0.6))]  # fmt: skip
+    for name, cells, kind, order, z in zip(("lower", "upper"), ((3, 3, 1), (2, 2, 1)), kinds,
+                                           orders, (-1, 0), strict=True):  # fmt: skip
+        mesh = uneven(am.box((1, 1, 1), cells, origin=(0, 0, z), kind=kind), seed - 10 * z)
+        bodies.append(am.Body(mesh, NEO, name=name, order=order))
+        supports += [am.Fix(f"{name}.left", (0, None, None)),
+                     am.Fix(f"{name}.front", (None, 0, None))]  # fmt: skip
+    sides = ("upper.bottom", "lower.top")[:: -1 if swap else 1]
+    model = am.Model(bodies, supports, contacts=[pair(sides, 0.3)])
+    solution = am.solve(model, tolerance=1e-10)
+    for body, moved in zip(model.bodies, solution.displacement, strict=True):
+        basis = np.c_[body.mesh.points, np.ones(len(body.mesh.points))]
+        fit = np.linalg.lstsq(basis, moved, rcond=None)[0]
+        assert np.abs(basis @ fit - moved).max() < 1e-10
+    assert np.ptp(solution.pressure) < 1e-9
+    assert np.abs(solution.shear).max() < 1e-9
+
+
 def test_a_cube_dragged_over_a_slab():
     """All nodes slide, against their motion, with mu times what presses them."""
 

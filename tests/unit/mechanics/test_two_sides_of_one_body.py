@@ -126,7 +126,6 @@ def test_the_tangent_with_a_cap_is_exact():
 
 @pytest.mark.parametrize(("options", "word"), [
     ({"mu": 0.3, "stick_stiffness": 10.0}, "spring along the surface"),
-    ({"mu": 0.3, "clearance": 0.01}, "clearance"),
 ])  # fmt: skip
 def test_what_sliding_pairs_do_not_have_is_said(options, word):
     with pytest.raises((am.UnsupportedLaw, am.UnsupportedForm), match=word):

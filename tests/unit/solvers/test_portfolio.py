@@ -9,7 +9,7 @@ import pytest
 import amontons as am
 from amontons.mechanics.ready.gallery import random_delassus
 from amontons.solvers.auto.portfolio import MOST_TURNS, RESTARTS, TRACKS, Portfolio, restarts
-from amontons.solvers.auto.race import Chunk, Entry, Race
+from amontons.solvers.auto.race import LOST_CHUNKS, Chunk, Entry, Race
 from amontons.solvers.auto.state import State
 from amontons.solvers.contract import Target
 
@@ -96,6 +96,9 @@ def test_every_track_alone_solves_an_easy_problem(entry):
 
 
 # ------------------------------------------------------------------ who goes on
+UNIT = 1e6  # nanoseconds: far more than letting a track in costs
+
+
 def falling(factor, cost, count=10**6):
     """A method whose error falls by a factor with every chunk of that cost; it may end."""
 
@@ -104,19 +107,19 @@ def falling(factor, cost, count=10**6):
         yield Chunk(state.start, 0, 0.0)
         for _ in range(count):
             error *= factor
-            _ = yield Chunk(state.start, 1, cost, error=error)
+            _ = yield Chunk(state.start, 1, cost * UNIT, error=error)
 
     return chunks
 
 
-def costs(*entries, chunks=200):
-    """Cost of each track after some chunks, or at the goal."""
+def costs(*entries, most=200):
+    """Cost of each track in UNIT when they have cost so much together, or at the goal."""
     state = state_of(random_delassus(0, 10))
     race = Race(state, entries)
-    for k, _ in enumerate(race.iterates()):
-        if state.error <= state.goal or k + 1 >= chunks:
+    for _ in race.iterates():
+        if state.error <= state.goal or race.total >= most * UNIT:
             break
-    return {t.entry.name: t.cost for t in race.tracks}, state.error <= state.goal
+    return {t.entry.name: t.cost / UNIT for t in race.tracks}, state.error <= state.goal
 
 
 def test_the_track_that_promises_the_end_first_goes_on():
@@ -129,10 +132,31 @@ def test_the_track_that_promises_the_end_first_goes_on():
 
 def test_dear_steps_count_by_their_cost():
     spent, done = costs(Entry("cheap", falling(0.9, 1.0), share=0.1),
-                        Entry("dear", falling(0.5, 100.0), share=0.1))  # fmt: skip
+                        Entry("dear", falling(0.5, 100.0), share=0.1), most=1000)  # fmt: skip
     assert done
     assert spent["cheap"] > 150
     assert spent["dear"] <= 300
+
+
+def test_a_first_track_that_is_nearly_there_goes_on_alone():
+    spent, done = costs(Entry("first", falling(0.5, 0.01)), Entry("other", falling(0.1, 0.01)))
+    assert done
+    assert list(spent) == ["first"]
+
+
+def test_broken_promises_count_less():
+    def stalling(state):
+        error = state.first_error
+        yield Chunk(state.start, 0, 0.0)
+        for k in range(10**6):  # as if the end were near, again and again
+            error *= 0.5 if k < 20 else 0.99
+            _ = yield Chunk(state.start, 1, UNIT, error=error)
+
+    spent, done = costs(Entry("stalls", stalling),
+                        Entry("steady", falling(0.9, 1.0), share=0.1), most=1000)  # fmt: skip
+    assert done
+    assert spent["stalls"] < 120
+    assert spent["steady"] > 150
 
 
 def test_tracks_without_progress_share_what_they_cost():
@@ -146,12 +170,22 @@ def test_a_method_of_newtons_kind_is_given_time():
         yield Chunk(state.start, 0, 0.0)
         for k in range(20):
             error = state.first_error * (1e-12 if k == 9 else 1.0)
-            _ = yield Chunk(state.start, 1, 1.0, error=error)
+            _ = yield Chunk(state.start, 1, UNIT, error=error)
 
     spent, done = costs(Entry("slow", falling(0.999, 1.0)),
-                        Entry("late", late, needs=lambda state: 20.0))  # fmt: skip
+                        Entry("late", late, needs=lambda state: 20.0 * UNIT))  # fmt: skip
     assert done
     assert spent["late"] == 10
+
+
+def test_the_last_resort_has_its_share_and_no_more():
+    spent, done = costs(
+        Entry("slow", falling(0.9999, 1.0)),
+        Entry("last", falling(1.0, 1.0), 0.2, needs=lambda state: 30 * UNIT, last=True),
+        most=500,
+    )
+    assert not done
+    assert spent["last"] == pytest.approx(100, abs=5)
 
 
 def test_a_method_that_ends_leaves_the_race():
@@ -163,15 +197,22 @@ def test_a_method_that_ends_leaves_the_race():
 
 def test_the_race_ends_when_every_method_has():
     race = Race(state_of(random_delassus(0, 10)), (Entry("a", falling(0.9, 1.0, count=5)),))
-    assert len(list(race.iterates())) == 5
+    assert sum(iterate.iterations for iterate in race.iterates()) == 5
     assert not race.tracks
 
 
 def test_the_race_ends_where_nothing_helps():
     state = state_of(random_delassus(0, 10))
-    step = state.step_cost
-    entries = (Entry("a", falling(1.0, step)), Entry("b", falling(1.0, 3 * step)))
-    assert 300 < len(list(Race(state, entries).iterates())) < 2000
+    race = Race(state, (Entry("a", falling(1.0, 1.0)), Entry("b", falling(1.0, 3.0))))
+    assert len(list(race.iterates())) < 200
+    assert LOST_CHUNKS < race.chunks < 2 * LOST_CHUNKS
+
+
+def test_what_is_not_handed_out_is_counted():
+    race = Race(state_of(random_delassus(0, 10)), (Entry("a", falling(0.9, 0.01, count=7)),))
+    found = list(race.iterates())
+    assert len(found) == 1  # all of them together cost less than a judgement is worth
+    assert found[0].iterations == 7
 
 
 def test_first_error_is_that_of_a_given_start():

@@ -13,14 +13,13 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.clock import Deadline, TimeLimit, deadline_of, now
+from ...core.clock import RATE, Deadline, TimeLimit, deadline_of, now
 from ...core.errors import InvalidInput, SingularOperator, TimeUp
 from ...core.onlookers import say
 from ...linear.dense import dense
 from ...problem.friction import FrictionProblem
 from ...problem.law import Coulomb, Law, Tresca
-from ...problem.law.law import MU
-from ...problem.solution import FrictionSolution
+from ...problem.solution import Convergence, FrictionSolution
 from ...solvers.driver import drive
 from ..scaled import COPIES, UNRESOLVED, Scaled
 from ..solutions.discs.search import enumerate_discs
@@ -30,19 +29,21 @@ from .critical_friction import CriticalFriction, critical_friction
 from .energy_bound import energy_bound
 from .one_load.answer import LoadCertificate, LoadOutcome
 from .one_load.certificate import certify_load
+from .singular import blocked, if_held, if_singular
 from .status_pieces import friction_shape
-from .verdict import Uniqueness, Verdict
+from .verdict import Cause, Uniqueness, Verdict, without_verdict
 
 Array = NDArray[np.float64]
 ENUMERATED = 25  # contacts up to which all solutions are looked for before a certificate
 REGIONS = 10  # contacts in 3D up to which all solutions are looked for after it
 INSTANT = 8  # contacts up to which the quick verdict examines all patterns: milliseconds
-QUICK = 400  # rows of W up to which the quick verdict is given: some ten milliseconds
+QUICK = 400  # rows of W up to which the quick verdict is always given: some ten milliseconds
+SHARE = 0.2  # of the operations of a solve, for the quick verdict
+BOUND_WORK = 7.0  # operations of the cheapest bound per cube of the rows
 SECONDS = 60.0  # whose work a verdict without a time limit may take
 QUICK_SECONDS = 1.0  # the same of a quick one
 ABOVE = 1e-9  # relative, at which a friction is proved to be safe
 BOUNDS = 0.5  # part of the time for the bounds on the critical friction
-PENETRATES = 1e-6  # gap of a contact that can not react, relative to the load
 SAME_MOTION = " Reactions differ, the motion is the same."
 
 
@@ -58,6 +59,11 @@ def assess(
     """
     deadline = deadline_of(time_limit, SECONDS)
     began = now()
+    if isinstance(problem.law, Coulomb):
+        found = if_held(problem, solution, deadline, assess)
+        found = found or if_singular(problem, solution, deadline, held)
+        if found is not None:
+            return _finished(found, began)
     try:
         local = problem.condensed(deadline)
         coulomb = isinstance(problem.law, Coulomb)
@@ -65,45 +71,80 @@ def assess(
     except (SingularOperator, InvalidInput, TimeUp) as error:
         no_w = isinstance(error, SingularOperator)
         reason = f"Contact alone holds {held}, so there is no W" if no_w else str(error)
-        return _without_verdict(problem, _sentence(reason), began)
-    if _blocked(local):
+        return without_verdict(problem, _sentence(reason), began)
+    if blocked(local):
         return _without_solution(local, began)
     if isinstance(problem.law, Tresca):
         return _given_friction(cast(Array, given), local.contacts, began, deadline)
     if not isinstance(given, Scaled):
-        return _without_verdict(local, _not_known(problem.law), began)
+        return without_verdict(local, _not_known(problem.law), began)
     verdict = _every_load(given, deadline.share(BOUNDS))
     if verdict.verdict is Verdict.UNDECIDED:
         verdict = _this_load(given, solution, verdict, deadline)
     return _finished(verdict, began)
 
 
-def quick_verdict(problem: FrictionProblem) -> Uniqueness | None:
-    """The part of the verdict that costs next to nothing.
+def quick_verdict(problem: FrictionProblem, spent: float = 0.0) -> Uniqueness | None:
+    """The part of the verdict that costs next to nothing beside a solve.
 
-    None for problems too large for it, and where contact alone holds a body.
-    Never condenses a problem that is not condensed for other reasons.
+    spent: operations of the solve, of which a fifth may be used; up to QUICK rows of W, some
+    ten milliseconds, nobody asks.  Where that is not enough, `cause` says what was met and
+    `decided_by` what would decide.  None under laws of which nothing is proved.
     """
-    if problem.contacts * problem.dimension > QUICK:
+    if not isinstance(problem.law, Coulomb | Tresca):
         return None
-    began, deadline = now(), Deadline.counted(QUICK_SECONDS)
+    began, rows = now(), problem.contacts * problem.dimension
+    allowed = max(SHARE * spent, BOUND_WORK * float(min(rows, QUICK)) ** 3)
+    deadline = Deadline.counted(max(QUICK_SECONDS if rows <= QUICK else 0.0, allowed / RATE))
     try:
-        if not problem.condensing_is_cheap:
-            return None
+        cause = _why_not(problem, rows, allowed)
+        if cause is not None:
+            return _not_examined(problem, cause, rows, began)
         local = problem.condensed()
     except SingularOperator:  # contact alone holds a body
-        return None
-    if _blocked(local):
+        return _not_examined(problem, Cause.NO_W, rows, began)
+    except InvalidInput:  # W does not fit into memory
+        return _not_examined(problem, Cause.LARGE, rows, began)
+    if blocked(local):
         return _without_solution(local, began)
     if isinstance(problem.law, Tresca):
         return _given_friction(dense(local.W), local.contacts, began, deadline)
-    if not isinstance(problem.law, Coulomb):
-        return None
-    scaled = Scaled.of(local)
+    try:
+        scaled = Scaled.of(local)
+    except InvalidInput:
+        return _not_examined(problem, Cause.LARGE, rows, began)
     verdict = _by_energy(scaled, deadline)
     if verdict.verdict is Verdict.UNDECIDED and _is_small(local):
         verdict = _by_bounds(verdict, critical_friction(scaled, time_limit=deadline))
+    if verdict.verdict is Verdict.UNDECIDED:
+        cause = Cause.FRICTION if verdict.lower > 0 else Cause.SINGULAR
+        verdict = replace(verdict, cause=cause)
     return _finished(verdict, began)
+
+
+def operations_of(record: Convergence) -> float:
+    """Of a solve: counted, or as many as its seconds are good for."""
+    return record.flops if record.flops is not None else record.seconds * RATE
+
+
+def _why_not(problem: FrictionProblem, rows: int, allowed: float) -> Cause | None:
+    """Why a problem is not examined, None where it is."""
+    if problem.loose_modes.shape[1]:
+        return Cause.NO_W
+    if BOUND_WORK * float(rows) ** 3 > allowed:
+        return Cause.LARGE
+    return None if problem.condensing_is_cheap else Cause.NOT_FORMED
+
+
+def _not_examined(
+    problem: FrictionProblem, cause: Cause, rows: int, began: float
+) -> Uniqueness:
+    """The verdict where something stood in the way."""
+    reason = cause.value[1]
+    if cause is Cause.LARGE:
+        seconds = BOUND_WORK * float(rows) ** 3 / RATE
+        reason += f": a bound takes some {seconds:.2g} s, more than a fifth of a solve"
+    return replace(without_verdict(problem, f"{reason}.", began), cause=cause)
 
 
 def _finished(verdict: Uniqueness, began: float) -> Uniqueness:
@@ -118,26 +159,13 @@ def _is_small(local: FrictionProblem) -> bool:
 
 
 # --------------------------------------------------------------------- no solution
-def _blocked(local: FrictionProblem) -> bool:
-    """True where a contact penetrates that can not react; rounding of a gap does not count."""
-    assert local.q is not None
-    reacts = local.rho > 0
-    return bool((local.q[~reacts, 0] < -PENETRATES * local.q_norm).any())
-
-
 def _not_known(law: Law) -> str:
     return f"Nothing is proved here of {law.name}, only of Coulomb's and of Tresca's."
 
 
 def _without_solution(local: FrictionProblem, began: float) -> Uniqueness:
     reason = "There is no solution: a contact penetrates that can not react."
-    return _without_verdict(local, reason, began)
-
-
-def _without_verdict(problem: FrictionProblem, reason: str, began: float) -> Uniqueness:
-    friction = problem.law.parameters[:, MU].max(initial=0.0)
-    return Uniqueness(Verdict.UNDECIDED, float(friction), 0.0, np.inf, "none", reason,
-                      seconds=now() - began)  # fmt: skip
+    return without_verdict(local, reason, began)
 
 
 # ------------------------------------------------------------------- every load

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any
 
 import numpy as np
 
+from ...core.clock import now
 from ...core.faces import Told
 from ...core.words import shortened
+from ...problem.friction import FrictionProblem
+from ...problem.law.law import MU
 from ...problem.solution import FrictionSolution
+from ..hyperstatic.indeterminacy import Indeterminacy
 from ..solutions.enumerate import PieceSolution
 from .critical_friction import CriticalFriction, Witness
 from .one_load.answer import LoadCertificate
@@ -39,6 +43,21 @@ _MEANING = {
 }
 
 
+class Cause(Enum):
+    """Why a quick verdict is not settled: its name in JSON files, in words, what decides."""
+
+    LARGE = ("large", "The problem is large",
+             "amontons uniqueness bounds the friction and examines this load")  # fmt: skip
+    NO_W = ("no_w", "Contact alone holds a body, so there is no W",
+            "amontons uniqueness tells motion and reactions apart")  # fmt: skip
+    NOT_FORMED = ("w_not_formed", "W was not needed, and takes longer to form",
+                  "amontons uniqueness forms it")  # fmt: skip
+    SINGULAR = ("singular", "W is singular or hardly definite",
+                "amontons uniqueness tells motion and reactions apart")  # fmt: skip
+    FRICTION = ("friction", "Friction is above the cheapest bound",
+                "amontons uniqueness looks for a better one, then at this load")  # fmt: skip
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Uniqueness(Told):
     """The verdict, and all that supports it.
@@ -50,6 +69,9 @@ class Uniqueness(Told):
     resolution: of UNIQUE_THIS_LOAD, any other solution would differ by less; of NOT_UNIQUE, to
     which both are known; relative to the largest reaction or, if that is larger, to what the
     load can make.  0 for every load, None where nothing is known.
+    indeterminacy: where W is singular or missing, what is known of motion and reactions apart;
+    lower and upper are then about motions.
+    cause: of a quick verdict that is not settled, what stood in its way.
     """
 
     verdict: Verdict
@@ -65,6 +87,8 @@ class Uniqueness(Told):
     critical: CriticalFriction | None = None
     seconds: float = 0.0
     resolution: float | None = None
+    indeterminacy: Indeterminacy | None = None
+    cause: Cause | None = None
 
     def __str__(self) -> str:
         upper = "unknown" if np.isinf(self.upper) else f"{self.upper:.4g}"
@@ -84,7 +108,7 @@ class Uniqueness(Told):
             self.reason,
             f"friction {self.friction:g}",
         ]
-        if self.criterion == "given friction":
+        if self.criterion == "given friction" or self.indeterminacy is not None:
             return "\n".join(lines[:2])
         if math.isinf(self.lower):
             lines.append("every load has one solution at any friction")
@@ -110,7 +134,8 @@ class Uniqueness(Told):
         """One line with the cheap part of it."""
         if self.verdict is Verdict.UNIQUE_EVERY_LOAD:
             return f"uniqueness: one solution for every load. {self.reason}"
-        return f"uniqueness: not settled. {self.reason} Ask with --uniqueness"
+        decides = "" if self.cause is None else f" {self.cause.value[2]}."
+        return f"uniqueness: not settled. {self.reason}{decides} Ask with --uniqueness"
 
     @property
     def record(self) -> dict[str, Any]:
@@ -133,7 +158,33 @@ class Uniqueness(Told):
                 "friction": self.friction, "lower": self.lower, "upper": self.upper,
                 "criterion": self.criterion, "witness": witness, "other": other,
                 "comparison": comparison, "resolution": self.resolution,
-                "seconds": self.seconds}  # fmt: skip
+                "seconds": self.seconds,
+                "cause": None if self.cause is None else self.cause.value[0],
+                "decided_by": None if self.cause is None else self.cause.value[2],
+                **({} if self.indeterminacy is None else self.indeterminacy.record),
+                }  # fmt: skip
+
+
+def without_verdict(problem: FrictionProblem, reason: str, began: float) -> Uniqueness:
+    """UNDECIDED, with the reason; began: when the question was asked."""
+    friction = problem.law.parameters[:, MU].max(initial=0.0)
+    return Uniqueness(Verdict.UNDECIDED, float(friction), 0.0, np.inf, "none", reason,
+                      seconds=now() - began)  # fmt: skip
+
+
+def with_indeterminacy(verdict: Uniqueness, found: Indeterminacy) -> Uniqueness:
+    """The verdict with what is known of motion and reactions apart, in its reason too."""
+    if found.motion == "not_unique" or found.has_other_reactions:
+        known = Verdict.NOT_UNIQUE
+    elif found.motion_is_unique and found.reactions_are_unique:
+        known = Verdict.UNIQUE_THIS_LOAD
+    else:
+        known = Verdict.UNDECIDED
+    resolution = verdict.resolution
+    if known is Verdict.UNIQUE_THIS_LOAD:
+        resolution = resolution if found.bound is None else found.bound.distance
+    return replace(verdict, verdict=known, reason=f"{verdict.reason} {found}",
+                   resolution=resolution, indeterminacy=found)  # fmt: skip
 
 
 def _comparison(bounds: CriticalFriction | None) -> list[str]:

@@ -23,7 +23,7 @@ def jax_function(
     NotConverged comes out of calls as JAX hands it on.
     """
     try:
-        import jax
+        import jax  # type: ignore[import-not-found]  # an extra
     except ImportError as reason:
         raise MissingDependency(
             "jax_function: needs jax, pip install 'amontons[jax]'"
@@ -53,5 +53,6 @@ def jax_function(
     def back(data: Any, slopes: Any) -> Any:
         return (jax.pure_callback(made.backward, told(data), dict(data), slopes),)
 
-    solved.defvjp(with_residual, back)
-    return solved
+    ruled: Any = solved
+    ruled.defvjp(with_residual, back)
+    return ruled

@@ -22,7 +22,7 @@ def torch_function(
     precision.  Every solve starts from the one before.  Raises MissingDependency without torch.
     """
     try:
-        import torch
+        import torch  # type: ignore[import-not-found]  # an extra
     except ImportError as reason:
         raise MissingDependency(
             "torch_function: needs torch, pip install 'amontons[torch]'"

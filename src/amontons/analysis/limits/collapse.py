@@ -13,7 +13,7 @@ that the load at which a motion first can begin lies below the one of limit anal
 
   a face being the contacts whose tangential motions are the same for all w, with sums of r_T
   and r_N.  Where |r^_T| <= mu least(r_N) on every face, least over all r in balance inside of
-  the cones, all terms are zero: a face does not slip if that is strict, and u_N = 0 if r^_N > 0.
+  the cones, all terms are zero: a face does not slip if that is strict, u_N = 0 if r^_N > 0.
   If no w but 0 does that (a rank), no motion begins at x.
 
 The least r_N of a face is one linear program each.  They are taken over intervals of x, with r^

@@ -110,12 +110,12 @@ def jamming_friction(
     kept = np.ones(problem.contacts, dtype=bool) if touching is None else np.array(touching)
     if kept.shape != (problem.contacts,) or kept.dtype != bool:
         raise InvalidInput(f"touching: expected a mask of {problem.contacts} contacts")
-    search = _Search(problem, shape, kept)
-    low, up, r, v, margin = search.bounds(kept, np.zeros_like(kept))
-    closed, every, reason = kept, False, ""
     if not kept.any():
         return Jamming(np.inf, np.inf, True, None, None, 0.0, None, 0.0, shape, 0,
                        now() - began, "No contact touches without load.")  # fmt: skip
+    search = _Search(problem, shape, kept)
+    low, up, r, v, margin = search.bounds(kept, np.zeros_like(kept))
+    closed, every, reason = kept, False, ""
     while True:
         start = min(up, LARGEST) * (1 - GAP)
         found, done = search.any_pattern(start, kept, deadline)

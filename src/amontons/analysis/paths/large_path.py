@@ -47,6 +47,9 @@ class LargePath(ABC):
     step: LargeDeformation
     name: ClassVar[str]
 
+    def __post_init__(self) -> None:
+        self.step.parts.check_tangent()
+
     @abstractmethod
     def at(self, p: float) -> LargeDeformation:
         """The problem at a value of the parameter."""

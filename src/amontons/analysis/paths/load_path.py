@@ -48,6 +48,7 @@ class LoadPath(LargePath):
     name: ClassVar[str] = "load"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not isinstance(self.step.law, Coulomb):
             raise UnsupportedLaw(f"path: expected Coulomb friction, got {self.step.law.name}")
         if self.drift is None:

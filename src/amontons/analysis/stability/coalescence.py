@@ -37,7 +37,8 @@ DONE = 1e-13  # relative step at which it ends
 MODES = 24  # of p = 0 whose pairs are looked at
 CHECKED = 1e-3  # relative distance before and beyond a point at which modes are looked at
 SAME = 1e-7
-LARGEST = 1e3
+LARGEST = 1e3  # friction beyond which nothing is looked for
+AHEAD = 1.2  # of the last point that is wanted: starts up to there are tried, too
 
 
 @dataclass(frozen=True)
@@ -53,17 +54,20 @@ def flutter_points(state: SlidingState, count: int, most: int) -> tuple[Flutter,
     state = replace(state, C=None)
     if not state.mu > 0 or not state.F_1.nnz:
         return ()
-    found: list[tuple[float, float]] = []
+    known: list[float] = []
+    out: list[Flutter] = []
     for l, p in _starts(state, max(count, 2)):
+        if len(out) >= most and p > AHEAD * out[most - 1].mu / state.mu:
+            break
         point = _newton(state, l, p)
-        if point is None or any(abs(point[1] - q) <= SAME * q for _, q in found):
+        if point is None or any(abs(point[1] - q) <= SAME * q for q in known):
             continue
-        found.append(point)
-    out = []
-    for l, p in sorted(found, key=lambda point: point[1]):
-        if len(out) < most and _begins(state, l, p):
-            out.append(Flutter(p * state.mu, float(np.sqrt(l) / (2 * np.pi))))
-    return tuple(out)
+        known.append(point[1])
+        if _begins(state, *point):
+            frequency = float(np.sqrt(point[0]) / (2 * np.pi))
+            out.append(Flutter(float(point[1] * state.mu), frequency))
+            out.sort(key=lambda each: each.mu)
+    return tuple(out[:most])
 
 
 def divergence_points(state: SlidingState) -> Array:
@@ -82,8 +86,9 @@ def divergence_points(state: SlidingState) -> Array:
         start = np.cos(np.arange(1.0, n + 1.0))
         values = eigs(inverse, k=min(6, n - 2), v0=solve(slope @ start), tol=0,
                       return_eigenvectors=False)  # fmt: skip
+    values = np.asarray(values)
     size = np.abs(values).max(initial=0.0)
-    real = values[(np.abs(values.imag) <= 1e-9 * np.abs(values)) & (values.real > 0)].real
+    real: Any = values[(np.abs(values.imag) <= 1e-9 * np.abs(values)) & (values.real > 0)].real
     real = real[real > max(1 / LARGEST, 1e-12 * size)]
     return np.sort(state.mu / real)
 
@@ -148,7 +153,8 @@ class _Dense:
         self.whole = whole
 
     def solve(self, b: Array, *, transposed: bool) -> Array:
-        return np.linalg.solve(self.whole.T if transposed else self.whole, b)
+        found: Any = np.linalg.solve(self.whole.T if transposed else self.whole, b)
+        return found
 
 
 def _newton(state: SlidingState, l: float, p: float) -> tuple[float, float] | None:
@@ -163,7 +169,8 @@ def _newton(state: SlidingState, l: float, p: float) -> tuple[float, float] | No
         b, c = made.b, made.c
         return made
 
-    return _iterate(solver, lambda x: -(M @ x), lambda x: slope @ x, lambda x: slope.T @ x, l, p)
+    products = lambda x: -(M @ x), lambda x: slope @ x, lambda x: slope.T @ x
+    return _iterate(solver, *products, l, p)
 
 
 class _Sparse:
@@ -171,7 +178,7 @@ class _Sparse:
 
     def __init__(self, Q: sparse.csc_array, b: Array, c: Array) -> None:
         n = Q.shape[0]
-        for _ in range(2):  # the solutions are better borders
+        for _ in range(1 if b is not c else 2):  # the solutions are better borders
             self.b, self.c = b / np.linalg.norm(b), c / np.linalg.norm(c)
             whole = sparse.block_array(
                 [[Q, self.b[:, None]], [self.c[None], None]], format="csc"
@@ -190,6 +197,7 @@ def _iterate(
     solver: Any, by_l: Any, by_p: Any, by_p_transposed: Any, l: float, p: float
 ) -> tuple[float, float] | None:
     """Newton's method for g = 0, dg/dl = 0; by_l, by_p: products with derivatives of Q."""
+    size = np.inf
     for _ in range(STEPS):
         try:
             system = solver(l, p)

@@ -19,6 +19,7 @@ of the mode-coupling type instability in friction induced oscillations", Mech. R
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -97,19 +98,27 @@ class SlidingState:
         """n + k."""
         return self.K.shape[0] + self.B.shape[0]
 
+    @cached_property
+    def scale(self) -> float:
+        """A typical entry of K: r and the rows of B are scaled by it, or B v would be noise."""
+        return float(np.abs(self.K.diagonal()).mean()) or 1.0
+
     def stiffness(self, p: float = 1.0) -> sparse.csc_array:
-        """[[K, -F_0 - p F_1], [B, D]]."""
-        F = -(self.F_0 + p * self.F_1)
-        return sparse.csc_array(sparse.block_array([[self.K, F], [self.B, self.D]]))
+        """[[K, -F_0 - p F_1], [B, D]], the rows of B and r scaled."""
+        a = self.scale
+        F = -a * (self.F_0 + p * self.F_1)
+        return sparse.csc_array(
+            sparse.block_array([[self.K, F], [a * self.B, a * a * self.D]])
+        )
 
     @property
     def by_friction(self) -> sparse.csc_array:
         """The derivative of `stiffness` by p."""
         k = self.B.shape[0]
         zero, low = sparse.csc_array(self.K.shape), sparse.csc_array((k, self.K.shape[0]))
-        return sparse.csc_array(
-            sparse.block_array([[zero, -self.F_1], [low, sparse.csc_array((k, k))]])
-        )
+        none = sparse.csc_array((k, k))
+        slope = -self.scale * self.F_1
+        return sparse.csc_array(sparse.block_array([[zero, slope], [low, none]]))
 
     def wide(self, matrix: Any) -> sparse.csc_array:
         """A matrix (n, n) with rows and columns of zeros for r."""

@@ -8,7 +8,7 @@ from ... import __version__
 from . import flags
 from .folders import results_folder
 from .group import Commands
-from .more_commands import audit, convert, examples, jam
+from .more_commands import audit, check, convert, examples, jam, modes
 
 EPILOG = """\b
 Examples:
@@ -263,6 +263,7 @@ Examples:
   amontons uniqueness example:hild            another solution, and the critical friction
   amontons uniqueness example:hild --mu 1     one solution, whatever the load
   amontons uniqueness problem.hdf5 --json - | jq .verdict
+  amontons uniqueness example:hild --mu 1 --certificate c.h5     then amontons check c.h5
 
 \b
 Exit codes: 0 settled, either way, 1 undecided, 2 bad input, 130 interrupted while undecided:
@@ -277,6 +278,9 @@ Ctrl-C ends the search with what is known, a second one at once.
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
               help="Replace a value of the case.")  # fmt: skip
 @click.option("--json", "json_copy", metavar="FILE", help="The same as JSON; - prints it.")
+@click.option("--certificate", metavar="FILE",
+              help="What proves that there is one solution, as an HDF5 file for amontons check."
+              )  # fmt: skip
 @flags.of_decks
 def uniqueness(**options: object) -> int:
     """Say whether a problem has one solution: for every load, for this load, or several.
@@ -388,6 +392,8 @@ def run(**options: object) -> int:
 
 
 main.add_command(audit)
+main.add_command(check)
 main.add_command(convert)
 main.add_command(examples)
 main.add_command(jam)
+main.add_command(modes)

@@ -84,6 +84,24 @@ def convert(**options: object) -> None:
 @click.command(
     epilog="""\b
 Examples:
+  amontons uniqueness example:hild --mu 1 --certificate c.h5
+  amontons check c.h5
+
+\b
+Exit codes: 0 it proves what it says, 2 it does not.
+"""
+)
+@click.argument("certificate")
+def check(certificate: str) -> int:
+    """Check a certificate of uniqueness, with code that shares nothing with the rest."""
+    from .uniqueness import check as run
+
+    return run(certificate)
+
+
+@click.command(
+    epilog="""\b
+Examples:
   amontons jam example:brake                  from which friction on the arm can stay locked
   amontons jam case.toml --json - | jq .upper
 
@@ -106,6 +124,42 @@ def jam(**options: object) -> int:
     loads are not read; its friction is the shape over the contacts.  Both bounds are proved.
     """
     from .jam import run
+
+    return run(**options)  # type: ignore[arg-type]
+
+
+@click.command(
+    epilog="""\b
+Examples:
+  amontons modes case.toml --count 20 --picture modes.png
+  amontons modes case.toml --velocity 1,0 --flutter     the lower side slides along x everywhere
+  amontons modes case.toml --near 6474 --json - | jq .stable
+
+\b
+Exit codes: 0 no mode grows, 1 one grows, 2 bad input.
+"""
+)
+@click.argument("source")
+@click.option("--count", type=click.IntRange(min=1), default=10, show_default=True, metavar="N",
+              help="How many modes.")  # fmt: skip
+@click.option("--near", type=float, default=0.0, show_default=True, metavar="F",
+              help="Those nearest to a frequency, per unit of time.")  # fmt: skip
+@click.option("--velocity", metavar="X,Y[,Z]",
+              help="The slaves slide that way everywhere. [as the solution does]")  # fmt: skip
+@click.option("--flutter", is_flag=True,
+              help="Also the frictions at which modes meet and begin to grow.")  # fmt: skip
+@click.option("--mu", type=float, metavar="X", help="Friction coefficient of all contacts.")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
+              help="Replace a value of the case.")  # fmt: skip
+@click.option("--json", "json_copy", metavar="FILE", help="The same as JSON; - prints it.")
+@click.option("--picture", metavar="FILE", help="Draw the modes: .png, .svg or .pdf.")
+@flags.of_decks
+def modes(**options: object) -> int:
+    """Find the complex modes of small motions about a sliding state, and which of them grow.
+
+    SOURCE is a case file (.toml), a deck (.inp) or example:NAME with densities; it is solved.
+    """
+    from .modes import run
 
     return run(**options)  # type: ignore[arg-type]
 

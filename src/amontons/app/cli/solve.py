@@ -10,7 +10,7 @@ from pathlib import Path
 
 import click
 
-from ...analysis.certificates.uniqueness import assess, quick_verdict
+from ...analysis.certificates.uniqueness import assess, operations_of, quick_verdict
 from ...analysis.certificates.verdict import Uniqueness
 from ...core.clock import TimeLimit
 from ...core.errors import FileFormatError, UnsupportedForm
@@ -30,10 +30,7 @@ from .solve_deck import solve_in_steps
 from .sources import naming_culprits, open_source, start_from, with_flags
 from .terminal import REPORT, check_folder, check_writable, say_notes, say_when
 
-NOT_EXAMINED = (
-    "uniqueness: not examined, the problem is large or contact alone holds a body; ask with "
-    "--uniqueness"
-)
+NOT_EXAMINED = "uniqueness: not examined, nothing is proved of this law"
 
 
 def run(
@@ -124,7 +121,7 @@ def _verdict(
     if full:
         known = solution if solution.converged else None
         return assess(solution.problem, known, time_limit=time_limit)
-    return quick_verdict(solution.problem)
+    return quick_verdict(solution.problem, operations_of(solution.convergence))
 
 
 def _report(result: output.Output, full: bool, folder: Path) -> None:

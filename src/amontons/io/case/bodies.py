@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from ...mechanics.model.parts import Body, Material
 
 NUMBERS = ("young", "poisson", "density", "expansion")
-GENERAL = ("name", "order", "move", "axisymmetric", "integration")  # keys of every mesh
+GENERAL = ("name", "order", "move", "axisymmetric", "integration",
+           "corotational")  # keys of every mesh
 LAWS = {  # of materials, with their keys
     "linear-elastic": ("young", "poisson", "plane", "density", "expansion"),
     "orthotropic-elastic": ("young", "poisson", "shear", "axes", "plane", "density",
@@ -67,6 +68,9 @@ def read_bodies(top: Table, path: Path) -> list[Body]:
         integration = table.text("integration", "") or None
         with top.blamed("material"):
             body = Body(mesh, law, name, order)
+        if "corotational" in table.data:
+            with table.blamed("corotational"):
+                body = replace(body, corotational=table.data["corotational"])
         if integration is not None:
             with table.blamed("integration"):
                 body = replace(body, integration=integration)

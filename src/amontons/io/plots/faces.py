@@ -17,6 +17,7 @@ from ...analysis.basins.study import Basins
 from ...analysis.paths.diagram import Diagram
 from ...analysis.paths.path import Branch
 from ...analysis.solutions.enumerate import Solutions
+from ...analysis.stability.modes import Modes
 from ...core.errors import InvalidInput, shown
 from ...mechanics.steps import TimeStep
 from ...problem.solution import Convergence, FrictionSolution
@@ -25,6 +26,7 @@ from .audit import audit_figure
 from .basins import basins_figure
 from .branch import branch_figure
 from .convergence import convergence_figure
+from .modes import modes_figure
 from .saving import save_figure
 from .scene import Frame, Scene, magnification
 from .several import all_solutions_figure
@@ -98,6 +100,11 @@ def _(result: Sequence[TimeStep], **options: Any) -> Figure:
 @figure_of.register
 def _(result: Basins, **options: Any) -> Figure:
     return basins_figure(result, **options)
+
+
+@figure_of.register
+def _(result: Modes, **options: Any) -> Figure:
+    return modes_figure(result, **options)
 
 
 @figure_of.register

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -22,11 +23,13 @@ from numpy.typing import NDArray
 from ...core.errors import InvalidInput, MissingDependency, NotWritten, shown
 from ...core.files import replacing, write_bytes
 from ...mechanics.elements import von_mises
+from ...mechanics.multibody import RigidStep
 from ...mechanics.steps import TimeStep
 from ...problem.solution import ContactStatus
 from ..vtk import stresses
 from .bodies import JOINTS, draw_bodies
 from .layout import Sheet
+from .rigid_film import rigid_figures
 from .saving import picture
 from .scene import Frame, Scene, magnification, room_needed
 from .steps import SECONDS, few_colours, film_of, joint_legend, moment
@@ -55,12 +58,13 @@ class _Shot:
 
 
 def film(
-    steps: Iterable[TimeStep], path: str | os.PathLike[str], *,
+    steps: Iterable[TimeStep] | Iterable[RigidStep], path: str | os.PathLike[str], *,
     colour: FilmColour | str = FilmColour.DISPLACEMENT, magnify: float | None = None,
     seconds: float = SECONDS, units: Units = UNKNOWN,
 ) -> Path:  # fmt: skip
     """Write a film of steps of one model, a .gif, or an .mp4 where ffmpeg is installed.
 
+    Steps of rigid bodies show these as they are: no colour and magnify.
     magnify: factor on displacements, by default 1 at large deformations and else a round one;
     seconds: of one picture.  Raises InvalidInput for no steps, other suffixes and bad options,
     MissingDependency without ffmpeg, NotWritten.
@@ -79,10 +83,14 @@ def film(
     if path.suffix.lower() == ".mp4" and not FFMpegWriter.isAvailable():
         raise MissingDependency(f"{path.name}: an .mp4 needs ffmpeg, which was not found; a "
                                 "name that ends in .gif needs nothing")  # fmt: skip
-    steps = list(steps)
-    if not steps or not all(isinstance(step, TimeStep) for step in steps):
-        raise InvalidInput(f"steps: expected steps in time, one at least, got {shown(steps)}")
-    pictures = [picture(figure) for figure in _figures(steps, colour, magnify, units)]
+    given: list[Any] = list(steps)
+    if given and all(isinstance(step, RigidStep) for step in given):
+        figures = rigid_figures(given, units)
+    elif given and all(isinstance(step, TimeStep) for step in given):
+        figures = _figures(given, colour, magnify, units)
+    else:
+        raise InvalidInput(f"steps: expected steps in time, one at least, got {shown(given)}")
+    pictures = [picture(figure) for figure in figures]
     if path.suffix.lower() == ".gif":
         write_bytes(path, film_of([few_colours(drawn, 256) for drawn in pictures], seconds))
     else:

@@ -66,7 +66,8 @@ class MortarPair:
 
     free (nc, d): components of the slaves without a support; normals lie in these.
     names: of both surfaces, for messages.  fold: of one surface against itself, whose sides
-    slave and master are then, and all nodes of which have a row.
+    slave and master are then, and all nodes of which have a row.  offset (nc,): what is added
+    to gaps, of a clearance that is not that of the meshes.
     """
 
     slaves: Index
@@ -75,6 +76,7 @@ class MortarPair:
     free: Mask
     names: tuple[str, str] = ("slave", "master")
     fold: Fold | None = None
+    offset: Array | float = 0.0
 
     @property
     def around(self) -> tuple[Skin, Mask]:
@@ -322,7 +324,7 @@ class MortarMeeting:
     @cached_property
     def gap(self) -> Array:
         """g, (nc,); of nodes that do not meet their distance."""
-        along = (self.normals * self.distances).sum(axis=1)
+        along = (self.normals * self.distances).sum(axis=1) + self.pair.offset
         return np.where(self.met, along, np.linalg.norm(self.distances, axis=1))
 
     def motion(self, earlier: MortarMeeting) -> Array:

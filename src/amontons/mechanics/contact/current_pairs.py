@@ -46,13 +46,15 @@ class Pair(Protocol):
 class Meeting:
     """A pair with an obstacle `side` at some positions.
 
-    slaves (nc,): nodes; x (nc, d): where the slaves are; nodes: of the model.
+    slaves (nc,): nodes; x (nc, d): where the slaves are; nodes: of the model; offset (nc,): of
+    the gaps.
     """
 
     side: Obstacle
     slaves: Index
     x: Array
     nodes: int
+    offset: Array | float = 0.0
 
     @property
     def met(self) -> Mask:
@@ -74,7 +76,7 @@ class Meeting:
     @cached_property
     def gap(self) -> Array:
         """(nc,)."""
-        return self.side.gap(self.x)
+        return self.side.gap(self.x) + self.offset
 
     @cached_property
     def normals(self) -> Array:
@@ -94,14 +96,16 @@ def between_bodies(pair: Pair) -> MortarPair | None:
 
 @dataclass(frozen=True, eq=False)
 class ObstaclePair:
-    """Slave nodes (nc,) of the model in front of an obstacle."""
+    """Slave nodes (nc,) of the model in front of an obstacle; offset (nc,): of their gaps."""
 
     obstacle: Obstacle
     slaves: Index
+    offset: Array | float = 0.0
 
     def at(self, positions: Array) -> Meeting:
         """The slaves and where they are."""
-        return Meeting(self.obstacle, self.slaves, positions[self.slaves], len(positions))
+        return Meeting(self.obstacle, self.slaves, positions[self.slaves], len(positions),
+                       self.offset)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

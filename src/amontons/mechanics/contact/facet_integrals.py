@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .facing import Skin
-from .plane_integrals import plane_integrals, rule
+from .plane_integrals import plane_integrals, rules
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -119,7 +119,7 @@ class FacetPairs:
         e, h = self.widths
         mass, cross = np.zeros((k, ways, a, a + e)), np.zeros((k, ways, a, b + h))
         numbers = np.stack([self.corners, self.facing, self.bent, self.opposite], axis=1)
-        plane_integrals(self.slave, self.master, numbers, rule(second=e + h > 0), step,
+        plane_integrals(self.slave, self.master, numbers, *rules(second=e + h > 0), step,
                         mass, cross)  # fmt: skip
         return mass, cross
 

@@ -2,33 +2,93 @@
 
 Both are projected along the slave's normal onto the plane through it, the master's outline is
 cut by the sides of the slave's, and the part they share is filled with triangles from its first
-corner.  Numbers are complex: real parts decide, imaginary ones carry derivatives along, first
-those by the coordinates in the plane, then those of these by the corners in space.
+corner.  Where corners coincide some of these have an area of rounding, of either sign, and yet
+derivatives that only all together are right: none is left out.  Numbers are complex: real parts
+decide, imaginary ones carry derivatives along, first those by the coordinates in the plane,
+then those of these by the corners in space.
+
+Functions of quadrilaterals that are no parallelograms are no polynomials in the plane, as
+their reference point (s, t) is the root of an equation.  With x = c + a s + b t + h st the
+determinant a x b + (a x h) s + (h x b) t vanishes outside of the facet, at a distance that
+tells how fast Gauss rules with n points a way converge ([T]).  With m points for h = 0 the
+error, as patch tests on random meshes show it, is below
+
+    lost (2 rho)^2 rho^(2 (n - m)),    rho = d / (1 + (1 - d^2)^(1/2)),                    (1)
+
+d = (|a x h| + |h x b|) / |a x b|, lost = LOST or, of second order, LOST_SECOND; n is the least
+with which that is EXACT, as uniform pressures between meshes that do not match need it.
 
 Arguments of all loops: corners (n, 2) in the plane with their number; facets (a, 3) padded,
-with their numbers of corners; rule (q, 3): points and weights on the unit triangle.
+with their numbers of corners; rules (m, q, 3): points and weights on the unit triangle, each
+with more points than the one before, counts (m,) of them.
+
+[T] L. N. Trefethen, "Is Gauss quadrature better than Clenshaw-Curtis?", SIAM Review 50 (2008).
 """
 
 from __future__ import annotations
+
+from functools import cache
 
 import numpy as np
 
 from ...core.compiled import njit
 from .clipping import triangle_rule
 
+MOST = 12  # Gauss points a way, however a quadrilateral is folded
+LOST, LOST_SECOND = 4e-5, 4e-3
+EXACT = 2e-11  # relative error of integrals that is none
 ROOM = 10  # corners of what two quadrilaterals share, and two to spare
 NEWTON = 20  # steps to the reference point of a quadrilateral
 ENOUGH = 1e-14
 ON_LINE = 1e-10  # distance of a corner from the line of a side, over its length, that is none
+FLAT = 1e-10  # area of a triangle, over that of the square on a side, which may be rounding
 
 
-def rule(*, second: bool) -> np.ndarray:
-    """Points and weights (q, 3) on the unit triangle, exact for products of shape functions.
+@cache
+def rules(*, second: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Points and weights (m, q, 3) on the unit triangle, and their counts (m,).
 
-    second: of first with second order.
+    The first is exact for products of shape functions that are polynomials; second: of first
+    with second order.
     """
-    at, weight = triangle_rule(4 if second else 3)
-    return np.concatenate([at, weight[:, None]], axis=1)
+    orders = range(4 if second else 3, MOST + 1)
+    counts = np.array([n * n for n in orders])
+    out = np.zeros((len(counts), counts[-1], 3))
+    for k, n in enumerate(orders):
+        at, weight = triangle_rule(n)
+        out[k, : n * n] = np.concatenate([at, weight[:, None]], axis=1)
+    return out, counts
+
+
+@njit(cache=True, error_model="numpy")
+def _folded(x, n):
+    """d of (1) for a facet with corners x (n, 2); of triangles 0, at most 1."""
+    if n == 3:
+        return 0.0
+    size = 0.0
+    sides = 0.0
+    parts = np.empty((3, 2))
+    for e in range(2):
+        x0, x1, x2, x3 = x[0, e].real, x[1, e].real, x[2, e].real, x[3, e].real
+        parts[0, e], parts[1, e] = x1 + x2 - x0 - x3, x2 + x3 - x0 - x1
+        parts[2, e] = x0 - x1 + x2 - x3
+    a, b, h = parts[0], parts[1], parts[2]
+    size = abs(a[0] * b[1] - a[1] * b[0])
+    sides = abs(a[0] * h[1] - a[1] * h[0]) + abs(h[0] * b[1] - h[1] * b[0])
+    return min(sides / size, 1.0) if size > 0 else 1.0
+
+
+@njit(cache=True, error_model="numpy")
+def _level(x, na, y, nb, lost, levels):
+    """Which of the rules a pair needs."""
+    d = max(_folded(x, na), _folded(y, nb))
+    rho = d / (1 + np.sqrt(max(1 - d * d, 0.0)))
+    left = lost * 4 * rho * rho
+    for k in range(levels - 1):
+        if left < EXACT:
+            return k
+        left *= rho * rho
+    return levels - 1
 
 
 @njit(cache=True, error_model="numpy")
@@ -160,7 +220,7 @@ def _in_plane(slave, master, numbers, x, y):
 
 
 @njit(cache=True, error_model="numpy")
-def _shared(x, y, numbers, rule, mass, cross):
+def _shared(x, y, numbers, rules, counts, mass, cross):  # noqa: PLR0913
     """int phi phi into mass (a, a + e) and int phi N into cross (a, b + h) of one pair.
 
     x (a, 2), y (b, 2): corners of slave and master in the plane.
@@ -177,15 +237,19 @@ def _shared(x, y, numbers, rule, mass, cross):
         if count < 3:
             return
     a, b = x.shape[0], y.shape[0]
+    lost = LOST_SECOND if numbers[2] + numbers[3] > 0 else LOST
+    level = _level(x, na, y, nb, lost, len(counts))
+    rule = rules[level]
+    flat = FLAT * ((x[1, 0] - x[0, 0]).real ** 2 + (x[1, 1] - x[0, 1]).real ** 2)
     phi = np.zeros(mass.shape[1], np.complex128)
     opposite = np.zeros(cross.shape[1], np.complex128)
     for p in range(1, count - 1):
         a0, a1 = one[p, 0] - one[0, 0], one[p, 1] - one[0, 1]
         b0, b1 = one[p + 1, 0] - one[0, 0], one[p + 1, 1] - one[0, 1]
         double = a0 * b1 - a1 * b0
-        if double.real <= 0:
+        if double.real < -flat:
             continue
-        for q in range(rule.shape[0]):
+        for q in range(counts[level]):
             at0 = one[0, 0] + rule[q, 0] * a0 + rule[q, 1] * b0
             at1 = one[0, 1] + rule[q, 0] * a1 + rule[q, 1] * b1
             _shapes(x, na, at0, at1, phi[:a])
@@ -201,7 +265,7 @@ def _shared(x, y, numbers, rule, mass, cross):
 
 
 @njit(cache=True, error_model="numpy")
-def _slopes(p, q, x, y, numbers, rule, step, m, c, mass, cross):  # noqa: PLR0913
+def _slopes(p, q, x, y, numbers, rules, counts, step, m, c, mass, cross):  # noqa: PLR0913
     """Derivatives of one pair by its corners p (a, 3), q (b, 3) into mass and cross.
 
     x, y: those corners in the plane; m, c: room for values.  The first corner of the slave is
@@ -236,7 +300,7 @@ def _slopes(p, q, x, y, numbers, rule, step, m, c, mass, cross):  # noqa: PLR091
             x[node, f] += 1j * step
         else:
             y[node - a, f] += 1j * step
-        _shared(x, y, numbers, rule, m, c)
+        _shared(x, y, numbers, rules, counts, m, c)
         if node < a:
             x[node, f] = x[node, f].real
         else:
@@ -253,7 +317,7 @@ def _slopes(p, q, x, y, numbers, rule, step, m, c, mass, cross):  # noqa: PLR091
 
 
 @njit(cache=True, error_model="numpy")
-def plane_integrals(slave, master, numbers, rule, step, mass, cross):  # noqa: PLR0913
+def plane_integrals(slave, master, numbers, rules, counts, step, mass, cross):  # noqa: PLR0913
     """Integrals of k pairs of facets (k, a, 3), (k, b, 3).
 
     numbers (k, 4): of corners of both, then of their nodes beside these.
@@ -269,7 +333,7 @@ def plane_integrals(slave, master, numbers, rule, step, mass, cross):  # noqa: P
         p[:], q[:] = slave[i], master[i]
         _in_plane(p, q, numbers[i], x, y)
         if step > 0:
-            _slopes(p, q, x, y, numbers[i], rule, step, m, c, mass[i], cross[i])
+            _slopes(p, q, x, y, numbers[i], rules, counts, step, m, c, mass[i], cross[i])
             continue
-        _shared(x, y, numbers[i], rule, m, c)
+        _shared(x, y, numbers[i], rules, counts, m, c)
         mass[i, 0], cross[i, 0] = m.real, c.real

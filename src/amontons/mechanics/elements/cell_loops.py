@@ -95,9 +95,11 @@ def _scatter(local, cell, pointers, columns, out, unit):
                     out[back, j, i] += local[i, j, a, b]
 
 
-@njit(cache=True, error_model="numpy")
-def stiffness_inplace(points, nodes, slopes, weights, moduli, pointers, columns, out, unit):
-    """Add (1) to the blocks out (m, dim, dim) of the pattern (pointers, columns).
+@njit(cache=True, error_model="numpy", nogil=True)
+def stiffness_inplace(
+    begin, end, points, nodes, slopes, weights, moduli, pointers, columns, out, unit
+):
+    """Add (1) of cells begin to end to the blocks out (m, dim, dim) of (pointers, columns).
 
     moduli (dim, dim, dim, dim): T[i, j, k, l] = d stress_ik / d gradient_jl.
     """
@@ -106,7 +108,8 @@ def stiffness_inplace(points, nodes, slopes, weights, moduli, pointers, columns,
     G, D = np.zeros((dim, count)), np.zeros((dim, dim, count, count))
     local = np.zeros(D.shape)
     pairs, sums = D.reshape(dim, dim, -1), local.reshape(dim, dim, -1)
-    for cell in nodes:
+    for c in range(begin, end):
+        cell = nodes[c]
         D[:] = 0.0
         for q in range(len(weights)):
             volume = weights[q] * _gradients(points, cell, slopes[q], jac, H, G, unit)

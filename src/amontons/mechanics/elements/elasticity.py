@@ -18,6 +18,7 @@ from scipy import sparse
 
 from ...core.arrays import number, read_only
 from ...core.errors import InvalidInput
+from ...core.threads import over_stages
 from ...core.words import helpful
 from ..meshes.cells import CELLS
 from ..meshes.check import around, determinant
@@ -29,6 +30,7 @@ from .cell_matrices import add_blocks, cell_stiffness, rule_of
 from .hybrid import averaged, element_formulation, is_hybrid, volume_modes, volume_modulus
 from .hybrid_loops import volume_terms_inplace
 from .pattern import node_pattern
+from .slabs import in_slabs
 from .uniform import mean_gradient
 
 Array = NDArray[np.float64]
@@ -181,16 +183,32 @@ def stiffness(
         geometry = geometry_of(mesh, cells, rule)
         if formulation != "hybrid":
             moduli = law.moduli(mesh.dim)
-            stiffness_inplace(*geometry, moduli, pointers, columns, blocks, unit)
+            _add_stiffness(geometry, moduli, (pointers, columns), blocks)
             continue
         moduli = law.shape_moduli(mesh.dim)  # type: ignore[attr-defined]  # of hybrid cells
-        stiffness_inplace(*geometry, moduli, pointers, columns, blocks, unit)
+        _add_stiffness(geometry, moduli, (pointers, columns), blocks)
         modes, _ = volume_modes(mesh, cells, rule)
         bulk = volume_modulus(law) * np.eye(modes.shape[1])
         bulk = np.tile(bulk, (len(modes), 1, 1))
         rest = np.zeros(mesh.points.shape)
         volume_terms_inplace(rest, *geometry, modes, bulk, pointers, columns, blocks, unit)
     return sparse.bsr_array((blocks, columns, pointers), shape=(mesh.points.size,) * 2)
+
+
+def _add_stiffness(
+    geometry: tuple[Array, Index, Array, Array],
+    moduli: Array,
+    pattern: tuple[NDArray[np.int32], NDArray[np.int32]],
+    blocks: Array,
+) -> None:
+    """Add (1) of `cell_loops` to the blocks (m, dim, dim) of a pattern, in threads."""
+    points, nodes, slopes, weights = geometry
+    sorted_nodes, slabs = in_slabs(points, nodes)
+    nodes = read_only(sorted_nodes.view())
+    unit = (1.0,) * points.shape[1]
+    work = float(nodes.size * len(weights) * blocks[0].size * nodes.shape[1])
+    arguments = points, nodes, slopes, weights, moduli, *pattern, blocks, unit
+    over_stages(stiffness_inplace, slabs, work, *arguments)
 
 
 def geometry_of(mesh: Mesh, cells: Cells, rule: Rule) -> tuple[Array, Index, Array, Array]:

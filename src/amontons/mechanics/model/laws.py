@@ -48,8 +48,7 @@ OF_LINEAR_BODIES = {
 WHERE_NODES_ARE = {  # what contact in the current configuration does not take
     name: f"{what} small strains and contact in the reference configuration"
     for name, what in (("mu_across", "orthotropic friction needs"),
-                       ("stick_stiffness", "a spring along the surface needs"),
-                       ("clearance", "a given clearance needs"))
+                       ("stick_stiffness", "a spring along the surface needs"))
 }  # fmt: skip
 SLANT = 1e-6  # part of a direction in the tangent plane that is one
 

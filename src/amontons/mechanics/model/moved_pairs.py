@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ...linear.condensed import Structure
 from ..contact.carried import TiedMeeting
 from ..contact.current import ContactPoint
 from ..contact.current_mortar import MortarMeeting
@@ -35,6 +36,7 @@ from ..contact.current_pairs import AnyMeeting, Meeting, Meetings
 from ..contact.current_slopes import blocks_of
 from .nodal_forces import NodalForces
 from .nonlinear_parts import NonlinearParts
+from .tangent_structure import structure_of
 
 Array = NDArray[np.float64]
 
@@ -72,14 +74,9 @@ def _unchained(parts: NonlinearParts, others: sparse.csr_array, gathered: Any) -
 def _others(parts: NonlinearParts, meeting: Meetings) -> sparse.csr_array:
     """Forces on other nodes per force on the slaves, (dofs, nc d)."""
     d = parts.at.shape[1]
-    counts = (parts.contact.free * meeting.met[:, None]).astype(float)
-    by_slave = meeting.others.tocsc()
-    p = np.repeat(np.arange(len(counts)), np.diff(by_slave.indptr))
-    values = by_slave.data[:, None] * counts[p]
-    rows = by_slave.indices[:, None] * d + np.arange(d)
-    columns = p[:, None] * d + np.arange(d)
-    entries = (values.ravel(), (rows.ravel(), columns.ravel()))
-    return sparse.csr_array(entries, shape=(parts.X.size, parts.at.size))
+    counts = parts.contact.free * meeting.met[:, None]
+    spread = sparse.kron(meeting.others, sparse.eye_array(d), format="csr")
+    return sparse.csr_array(spread @ sparse.diags_array(counts.ravel().astype(float)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,6 +126,12 @@ class Linearisation:
         change[parts.at] = at
         return change[parts.free]
 
+    @property
+    def structure(self) -> Structure:
+        """What the matrix consists of."""
+        nothing = sparse.csr_array((len(self.parts.free), self.parts.at.size))
+        return structure_of(self.parts, self.u, self.by_force, nothing)
+
     def passed(self, change: Array) -> Array:
         """First-order change of F, (n,), with a change of f_int - f, (dofs,)."""
         parts, out = self.parts, change.copy()
@@ -160,84 +163,94 @@ class PairLinearisation:
         out[self.parts.at] = self.point.residual()
         return out[self.parts.free]
 
-    def passed(self, change: Array) -> Array:
-        """First-order change of F, (n,), with a change of f_int - f, (dofs,)."""
-        return self._passed(change)[self.parts.free]
+    @property
+    def structure(self) -> Structure:
+        """What the matrix consists of."""
+        returned = _others(self.parts, self.point.meeting)[self.parts.free]
+        return structure_of(self.parts, self.u, self.partials[0], returned)
 
-    def _passed(self, change: Array) -> Array:
-        """The same of all dofs."""
-        out = balanced(self.parts, self.point.meeting, change)
-        at = self.parts.at
-        out[at] = np.einsum("pij,pj->pi", self.partials[0], out[at])
+    @cached_property
+    def _kept(self) -> Array:
+        """1 for rows of F that are f_int - f, 0 for those of contacts, (dofs,)."""
+        out = np.ones(len(self.rest))
+        out[self.parts.at] = 0.0
         return out
 
     @cached_property
-    def _by_x(self) -> tuple[sparse.csr_array, sparse.csr_array]:
-        """Derivatives by the place of all nodes, (., dofs), as if no node were held.
+    def _passing(self) -> sparse.csr_array:
+        """Derivative of F by f_int - f on all nodes without `_kept`, (dofs, dofs).
 
-        Of f_int - f without what contacts give to other nodes, and of the law, (nc d, dofs).
+        At fixed positions: few rows, those of contacts and of what their forces act on.
         """
+        others, gathers = _others(self.parts, self.point.meeting), self.parts.gathers
+        if self.parts.chained:
+            gathers = _unchained(self.parts, others, gathers)
+        return sparse.csr_array(self._law - self._by_needed @ (others @ gathers))
+
+    @cached_property
+    def _law(self) -> sparse.csr_array:
+        """Derivative of the rows of contacts by the forces on their side, (dofs, dofs)."""
+        at, dofs = self.parts.at.ravel(), len(self.rest)
+        own = sparse.csr_array((np.ones(len(at)), (at, np.arange(len(at)))),
+                               shape=(dofs, len(at)))  # fmt: skip
+        return sparse.csr_array(own @ (blocks_of(self.partials[0]) @ self.parts.gathers))
+
+    @property
+    def _by_needed(self) -> sparse.csr_array:
+        """Derivative of F by f_int - f without what contacts give to others, (dofs, dofs)."""
+        return sparse.csr_array(sparse.diags_array(self._kept) + self._law)
+
+    def passed(self, change: Array) -> Array:
+        """First-order change of F, (n,), with a change of f_int - f, (dofs,)."""
+        return (self._kept * change + self._passing @ change)[self.parts.free]
+
+    @cached_property
+    def _near(self) -> sparse.csr_array:
+        """dF/dx without the rows of `blocks` that are `_kept`, (dofs, dofs)."""
         parts, meeting = self.parts, self.point.meeting
-        by_force, by_normal, by_gap, by_motion = self.partials
+        dofs, at = len(self.rest), parts.at.ravel()
+        _, by_normal, by_gap, by_motion = self.partials
         force = _own(parts, meeting, self.needed)
-        stiffness, law = sparse.csr_array(parts.matrix(self.blocks).tocsr()), []
-        turned: sparse.csr_array | None = None
+        rows, turned = [], sparse.csr_array((dofs, dofs))
         start = 0
         for part, old in zip(meeting.parts, self.earlier.parts, strict=True):
             mine = slice(start, start + len(part.slaves))
             start = mine.stop
             slopes = by_normal[mine], by_gap[mine], by_motion[mine]
             if isinstance(part, MortarMeeting) and isinstance(old, MortarMeeting):
-                spread = part.slopes.spread(force[mine])
-                turned = spread if turned is None else sparse.csr_array(turned + spread)
-                law.append(_law_of_pair(part, old, *slopes))
+                turned = turned + part.slopes.spread(force[mine])
+                rows.append(_law_of_pair(part, old, *slopes))
             elif isinstance(part, TiedMeeting):
-                law.append(_law_of_tie(part, old, *slopes))
+                rows.append(_law_of_tie(part, old, *slopes))
             else:
-                law.append(_law_at_obstacle(part, *slopes))
-        rest = self._without_others(stiffness, turned)
-        own = blocks_of(by_force) @ (parts.gathers @ rest)
-        return rest, sparse.csr_array(own + sparse.vstack(law))
-
-    def _without_others(
-        self, stiffness: sparse.csr_array, turned: sparse.csr_array | None
-    ) -> sparse.csr_array:
-        """Derivative of f_int - f without what contacts give to other nodes, (dofs, dofs).
-
-        turned: of these at held forces, which pass through chains of contacts themselves.
-        """
-        parts, gathers = self.parts, self.parts.gathers
-        others = _others(parts, self.point.meeting)
+                rows.append(_law_at_obstacle(part, *slopes))
+        stiffness = parts.matrix(self.blocks).tocsr()
+        given = self._by_needed
         if parts.chained:
-            gathers = _unchained(parts, others, gathers)
-            stiffness = stiffness if turned is None else stiffness - turned
-        rest = stiffness - others @ (gathers @ stiffness)
-        if turned is not None and not parts.chained:
-            rest = rest - turned
-        return sparse.csr_array(rest)
+            given = sparse.csr_array(sparse.diags_array(self._kept) + self._passing)
+        local = sparse.csr_array(sparse.vstack(rows))
+        own = sparse.csr_array((np.ones(len(at)), (at, np.arange(len(at)))),
+                               shape=(dofs, len(at)))  # fmt: skip
+        out = self._passing @ stiffness - given @ turned + own @ local
+        return sparse.csr_array(out)
 
     @cached_property
     def matrix(self) -> sparse.csc_array:
         """dF/dv, (n, n)."""
-        rest, law = self._by_x
-        rows = np.arange(rest.shape[0])
-        rows[self.parts.at.ravel()] = rest.shape[0] + np.arange(law.shape[0])
         free = self.parts.free
-        chosen = sparse.csr_array(sparse.vstack([rest, law], format="csr"))[rows[free]]
-        return sparse.csc_array(chosen.tocsc()[:, free])
+        stiffness = self.parts.on_free(self.blocks)
+        stiffness.data *= self._kept[free][stiffness.indices]
+        return sparse.csc_array(stiffness + self._near[free].tocsc()[:, free])
 
     def shifted(
         self, load: NodalForces | Array, prescribed: Array, drift: Array | None = None
     ) -> Array:
         """First-order change of F, (n,), with changes of load, prescribed (dofs,) and drift."""
-        rest, law = self._by_x
-        at = self.parts.at
-        change = rest @ prescribed
-        change[at] = (law @ prescribed).reshape(at.shape)
-        change -= self._passed(NodalForces.of(load).at(self.u))
+        change = self._kept * (self.parts.matrix(self.blocks) @ prescribed)
+        change += self._near @ prescribed
         if drift is not None:
-            change[at] += np.einsum("pij,pj->pi", self.partials[3], drift)
-        return change[self.parts.free]
+            change[self.parts.at] += np.einsum("pij,pj->pi", self.partials[3], drift)
+        return change[self.parts.free] - self.passed(NodalForces.of(load).at(self.u))
 
 
 def _law_of_pair(

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...core.errors import InvertedCells
+from ...core.errors import InvertedCells, UnsupportedForm
 from ..contact.carried import TiedPair
 from ..contact.current import CurrentContact
 from ..contact.current_mortar import MortarPair, folded
@@ -29,6 +29,7 @@ from ..elements.hyperelasticity import HyperelasticBody, is_hyperelastic
 from ..elements.linear_body import LinearBody
 from .finite_checks import chains, check_nodes, check_supported
 from .supports import locate
+from .tangent_structure import Numbering
 from .worst_cells import flattest, most_strained
 
 if TYPE_CHECKING:
@@ -79,6 +80,14 @@ class NonlinearParts:
         return (RESOLVED * float(np.linalg.norm(forces)),
                 RESOLVED * float(np.linalg.norm(around)))  # fmt: skip
 
+    def check_tangent(self) -> None:
+        """Raise UnsupportedForm where the tangent is not the derivative of the forces."""
+        if any(isinstance(body, CorotationalBody) for body in self.bodies):
+            raise UnsupportedForm(
+                "corotational bodies have no path: their tangent leaves out what stresses do "
+                "in a rotation, on which stability hangs; give them SaintVenantKirchhoff"
+            )
+
     @property
     def dimension(self) -> int:
         """2 or 3."""
@@ -88,6 +97,11 @@ class NonlinearParts:
     def has_pairs(self) -> bool:
         """True where two bodies that deform meet."""
         return any(isinstance(pair, MortarPair) for pair in self.contact.pairs)
+
+    @cached_property
+    def numbering(self) -> Numbering:
+        """What the free dofs are."""
+        return Numbering.of(self)
 
     @cached_property
     def chained(self) -> int:
@@ -202,7 +216,22 @@ class NonlinearParts:
 
         pressures (c,): of hybrid cells, else those of the displacements.
         """
-        return np.concatenate([f.ravel() for f in self._of_each("forces", u, pressures)])
+        for known, forces in tuple(self._known) if pressures is None else ():
+            if np.array_equal(known, u):
+                return forces
+        forces = np.concatenate([f.ravel() for f in self._of_each("forces", u, pressures)])
+        if pressures is None:
+            self._keep(u, forces)
+        return forces
+
+    @cached_property
+    def _known(self) -> deque[tuple[Array, Array]]:
+        """States and the forces there: one is asked for its residual and its error."""
+        return deque(maxlen=KEPT)
+
+    def _keep(self, u: Array, forces: Array) -> None:
+        forces.flags.writeable = False
+        self._known.append((u.copy(), forces))
 
     def tangent(self, u: Array, pressures: Array | None = None) -> tuple[Array, Array]:
         """(forces (dofs,), node blocks (m, d, d) of their derivative) at displacements u."""
@@ -263,7 +292,7 @@ def _nonlinear_parts(model: Model) -> NonlinearParts:
     d = X.shape[1]
     slaves = [p.rows.nodes + linear.offsets[p.body] // d for p in linear.placed]
     nodes = np.concatenate([np.zeros(0, dtype=np.int64), *slaves])
-    pairs = _pairs(model, slaves, linear)
+    pairs = _cleared(model, _pairs(model, slaves, linear), linear, X)
     check_nodes(pairs, nodes, free_dofs(linear).reshape(-1, d))
     at = nodes[:, None] * d + np.arange(d)
     is_free = free_dofs(linear)
@@ -324,6 +353,22 @@ def _pairs(model: Model, slaves: list[Index], linear: Discretisation) -> list[Pa
         blocks = sparse.bsr_array(linear.stored_stiffness, blocksize=(d, d))
         beside = (np.ones(len(blocks.indices)), blocks.indices, blocks.indptr)
         out.append(TiedPair.of(pair, x, sparse.csr_array(beside, shape=(len(x), len(x)))))
+    return out
+
+
+def _cleared(
+    model: Model, pairs: list[Pair], linear: Discretisation, X: Array
+) -> list[Pair]:
+    """The pairs with the gaps at X that contacts are said to have, where nodes meet there."""
+    out = []
+    for contact, pair, placed in zip(
+        model.contacts or [None], pairs, linear.placed or [None], strict=True
+    ):
+        if contact is not None and placed is not None and contact.clearance is not None:
+            found = pair.at(X)
+            offset = np.where(found.met, placed.rows.gap - found.gap, 0.0)
+            pair = replace(pair, offset=offset)  # type: ignore[type-var]  # noqa: PLW2901
+        out.append(pair)
     return out
 
 

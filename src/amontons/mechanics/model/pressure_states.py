@@ -19,7 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ...linear.condensed import Structure
 from ...solvers.newton.states import Linear
+from .moved_pairs import Linearisation, PairLinearisation
 
 if TYPE_CHECKING:
     from .large_deformation import LargeDeformation
@@ -29,10 +31,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Reduced(Linear):
-    """The linear problem of a step of v: matrix (n, n), residual (n,)."""
+    """The linear problem of a step of v: matrix (n, n), residual (n,); here: its state."""
 
     matrix: sparse.csc_array
     residual: Array
+    here: Linearisation | PairLinearisation
+
+    @property
+    def structure(self) -> Structure:
+        """What the matrix consists of."""
+        return self.here.structure
 
 
 class PressureStates:
@@ -68,7 +76,7 @@ class PressureStates:
         here = self.problem.linearisation(v, pressures=c)
         parts = self.problem.parts
         missing = parts.forces(here.u) - parts.forces(here.u, c)
-        return Reduced(here.matrix, here.residual + here.passed(missing))
+        return Reduced(here.matrix, here.residual + here.passed(missing), here)
 
     def size(self, w: Array, here: Linear) -> float:
         """|residual(w)|: that of `here` contains pressures that volumes do not ask for."""

@@ -8,7 +8,7 @@ those of the body, in which the inertia J does not change.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -99,7 +99,8 @@ class RigidBodies:
     """Bodies, planes that they stand on, friction between all, gravity and joints.
 
     mu: coefficient of friction of all; restitution: normal velocity after over before an
-    impact, from 0 to 1, of all; gravity (3,): acceleration.  apart: pairs of bodies that pass
+    impact, from 0 to 1, of all; gravity (3,): acceleration, or a function of time: in axes
+    that the ground takes along, less its acceleration.  apart: pairs of bodies that pass
     through each other, such as those with a joint.
     """
 
@@ -107,7 +108,7 @@ class RigidBodies:
     planes: Sequence[Plane] = ()
     mu: float = 0.5
     restitution: float = 0.0
-    gravity: ArrayLike = (0.0, 0.0, -9.81)
+    gravity: ArrayLike | Callable[[float], ArrayLike] = (0.0, 0.0, -9.81)
     joints: Sequence[Joint] = ()
     apart: Sequence[tuple[int, int]] = ()
 
@@ -125,10 +126,9 @@ class RigidBodies:
         if not 0 <= number("restitution", self.restitution) <= 1:
             text = f"expected a number from 0 to 1, got {self.restitution!r}"
             raise InvalidInput(text, ("restitution",))
-        gravity = finite("gravity", self.gravity, 1)
-        if gravity.shape != (3,):
-            raise InvalidInput(f"expected 3 numbers, got {shown(self.gravity)}", ("gravity",))
-        object.__setattr__(self, "gravity", read_only(gravity))
+        now = self.gravity_at(0.0)
+        if not callable(self.gravity):
+            object.__setattr__(self, "gravity", read_only(now))
         for k, joint in enumerate(self.joints):
             self._check_joint(joint, ("joints", k))
         for k, pair in enumerate(self.apart):
@@ -151,6 +151,15 @@ class RigidBodies:
             )  # fmt: skip
         if finite("point", joint.point, 1).shape != (3,):
             raise InvalidInput(f"point: expected 3 numbers, got {shown(joint.point)}", at)
+
+    def gravity_at(self, time: float) -> Array:
+        """The acceleration (3,) at a time; raises InvalidInput for what is none."""
+        given = self.gravity(time) if callable(self.gravity) else self.gravity
+        found = finite("gravity", given, 1)
+        if found.shape != (3,):
+            when = f" at t = {time:g}" if callable(self.gravity) else ""
+            raise InvalidInput(f"expected 3 numbers{when}, got {shown(given)}", ("gravity",))
+        return found
 
     @cached_property
     def packed(self) -> Packed:

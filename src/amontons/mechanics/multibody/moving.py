@@ -15,6 +15,8 @@ away.  What was mended takes part, though rotations open it by their squares.  (
 open contacts close without overlap, u1_N >= -gap / h, turns a rocking block round a step too
 early at each impact; at the same step its times are wrong by six times as much.)
 
+Gravity that changes in time is that of the middle of a step.
+
 Energies: kinetic + potential gain what contacts do, r . (u0 + u1) / 2 (of W_f for rotations),
 and what the mending of overlaps does.  That is an identity of the scheme, to rounding.
 
@@ -26,7 +28,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,9 +43,10 @@ from ...solvers.driver import drive_as_asked
 from .bodies import GROUND, RigidBodies
 from .ends import ended, freely, middle_of
 from .meeting import Meetings, meetings
-from .quick import Found, Posed, found_quickly, law_of, pose
+from .quick import Found, Posed, law_of, pose
 from .rows import Rows, delassus, impulses, rotations, rows_at, turned
 from .states import Motion, RigidEnergies, RigidState, RigidStep
+from .sweeping import found_quickly
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -137,7 +140,6 @@ class _Stepping:
         masses = np.array([body.mass for body in system.bodies])
         inertia = np.array([body.inertia for body in system.bodies])
         self.inverse = np.linalg.inv(inertia)
-        self.gravity = np.array(system.gravity, dtype=float)
         self.bodies = masses, inertia, self.inverse
         self.near = TOUCHING * system.packed.reach
         begin = at_start(system).motion
@@ -156,6 +158,7 @@ class _Stepping:
     def advance(self, state: RigidState, time: float, deadline: Deadline) -> RigidStep:
         """One step from a state to a time."""
         h, before = self.h, state.motion
+        gravity = np.array(self.system.gravity_at(time - 0.5 * h))
         begin, masses = before.position, self.bodies[0]
         middle = middle_of(*before, h)
         at = self._rows(*middle)
@@ -172,7 +175,7 @@ class _Stepping:
             else:
                 at = self._closed(at, gaps)
         R, nc = middle[1], len(at.keys)
-        free = freely(before.velocity, before.spin, self.bodies[1], self.gravity, h)
+        free = freely(before.velocity, before.spin, self.bodies[1], gravity, h)
         solved, r = None, np.zeros((0, 3))
         if len(at.rows.slave):
             posed = Posed(*pose(
@@ -182,7 +185,7 @@ class _Stepping:
             solved = self._solve(posed, nc, f"step {state.index + 1}", deadline)
             r = solved.r if isinstance(solved, Found) else solved.r.copy()
         motion, energies = ended(
-            at.rows, r, R, self.bodies, self.gravity, h, begin, tuple(before), free
+            at.rows, r, R, self.bodies, gravity, h, begin, tuple(before), free
         )
         new = RigidState(state.index + 1, time, Motion(*motion), at.keys, r[:nc])
         return RigidStep(self.system, new, at.found, at.rows.axes[:nc], r[:nc], r[nc:],
@@ -215,8 +218,9 @@ class _Stepping:
         apart = np.where(found.master >= 0, self.near[found.master], 0.0)
         kept = gaps <= self.near[found.slave] + apart
         rows = np.concatenate([kept, np.ones(len(at.rows.slave) - nc, dtype=bool)])
-        found = Meetings(*(a[kept] for a in found._replace(gaps=gaps)))
-        return _Met(found, at.keys[kept], Rows(*(a[rows] for a in at.rows)), at.apart, 0.0)
+        left: list[Any] = [a[kept] for a in found._replace(gaps=gaps)]
+        those: list[Any] = [a[rows] for a in at.rows]
+        return _Met(Meetings(*left), at.keys[kept], Rows(*those), at.apart, 0.0)
 
     # ------------------------------------------------------------------ problems
     def _solve(

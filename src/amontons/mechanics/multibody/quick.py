@@ -1,11 +1,11 @@
 """The contact problem of a step solved in compiled sweeps, without a problem object.
 
-`pose` forms W and q of a step and starts from the last impulses, or from none where those are
-worse, as after an impact; `found_quickly` sweeps (Gauss-Seidel, each contact exactly) until the
-judge is content, as the solvers do by default, and lets open contacts carry nothing.  What a
-few sweeps do not solve is swept with momentum (`solvers.sweeps.momentum`), which many contacts
-of bricks need; what that can not solve either goes to the solvers, from where it has come, with
-the same W and q: nothing is formed twice.
+`pose` forms W and q of a step, and a start from the last impulses; `solved` starts from these,
+or from none where they are worse, as after an impact, sweeps (Gauss-Seidel, each contact
+exactly) until the judge is content, as the solvers do by default, and lets open contacts carry
+nothing.  What a few sweeps do not solve is swept with momentum (`solvers.sweeps.momentum`),
+which many contacts of bricks need; what that can not solve either goes to the solvers, from
+where it has come, with the same W and q: nothing is formed twice.  `sweeping` says how many.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.clock import now
 from ...core.compiled import njit
 from ...linear.block_kernels import WELL_CONDITIONED
 from ...linear.blocks import BlockRows
@@ -30,7 +29,6 @@ from ...problem.law import Coulomb, Law, Tied, joined
 from ...problem.law.law import COULOMB, TIED
 from ...problem.settling import Settled
 from ...problem.solution import Convergence, FrictionSolution, Outcome, Step
-from ...solvers.judging import BLUR
 from ...solvers.sweeps.kernels import EXACT, FIRST_JUDGED, Sweep, sweeps_inplace
 from ...solvers.sweeps.local_contact import CLOSE
 from ...solvers.sweeps.momentum import momentum_inplace
@@ -38,11 +36,6 @@ from .rows import coupled, fill_blocks, row_velocities
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-WORK = 100_000  # blocks of W that plain sweeps multiply at most
-FEWEST = 20  # of them, that are worth to begin with
-MOMENTUM = 2000  # sweeps with momentum before the solvers are asked
-MORE = 200_000_000  # what these cost at most, in blocks, for many contacts
-CONTACT = 15  # blocks that take as long as the solution of a contact
 SETTLING = 4  # rounds in which open contacts lose what they carry
 
 
@@ -73,7 +66,7 @@ def law_of(contacts: int, joints: int, mu: float) -> Law:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What `solve_quickly` has found; the solution as the solvers tell it when asked for.
+    """What sweeps have found; the solution as the solvers tell it when asked for.
 
     r, u (n, 3); status, sliding (n,); errors unit-free: in the sum, of the weakest contact.
     """
@@ -106,24 +99,6 @@ class Found:
         return FrictionSolution(
             self.posed.problem(law), self.r, self.u, None, record, settled=kept
         )
-
-
-def found_quickly(
-    posed: Posed, contacts: int, mu: float, tolerance: float
-) -> tuple[Found | None, Array]:
-    """What sweeps find, None where they do not meet the tolerance; and how far they came."""
-    blocks = max(len(posed.indices), 1)
-    sweeps = WORK // blocks
-    more = min(MOMENTUM, MORE // (blocks + CONTACT * len(posed.q)))
-    began = now()
-    r, (u, status, sliding), done, error, worst, contact = _solved(
-        *posed, contacts, mu, tolerance, BLUR * tolerance,
-        sweeps if sweeps >= FEWEST else 0, more if more >= FEWEST else 0,
-    )  # fmt: skip
-    if done < 0:
-        return None, r
-    return Found(posed, contacts, mu, tolerance, r, u, status, sliding, done, error,
-                 (worst, contact), now() - began), r  # fmt: skip
 
 
 @njit(cache=True, error_model="numpy")
@@ -252,7 +227,7 @@ def _largest_eigenvalue(A):
 
 
 @njit(cache=True, error_model="numpy")
-def _solved(  # noqa: PLR0913
+def solved(  # noqa: PLR0913
     indptr, indices, data, diagonal, q, start, contacts, mu, tolerance, blur, sweeps, more
 ):
     """(r, (u, status, sliding), sweeps done or -1, error, contactwise error, its contact)."""

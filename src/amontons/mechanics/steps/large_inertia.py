@@ -55,6 +55,7 @@ Index = NDArray[np.int64]
 ITERATIONS = 40  # of Newton's method
 ROUNDING = 1e-13  # residual, of the sizes of what it sums up, at which it ends
 GOOD = 1e-8  # residual that is still taken where it falls no more
+BLUR = 1e-14  # strain that rounding makes of positions: what it stresses is no residual
 TOUCHING = 1e-9  # gaps below this part of the size of a contact's area count as closed
 
 
@@ -66,6 +67,7 @@ class _Trial:
     impulse: Array
     missing: Array
     error: float
+    good: float  # error that is still taken
 
 
 class LargeMovingModel:
@@ -86,6 +88,9 @@ class LargeMovingModel:
         ]  # fmt: skip
         self.frames = InFrames.of(self.parts, inertia, method)
         weights = self._all.sites.weights
+        self.blur = BLUR * float(
+            np.linalg.norm(np.concatenate([own.unit_forces() for own in self.parts.bodies]))
+        )
         self._closed = TOUCHING * weights ** (1 / (model.dimension - 1))
         self.fixed = np.setdiff1d(np.arange(self._all.dofs), self.parts.free)
 
@@ -179,9 +184,9 @@ class _Step:
         missing = inertia + damped + inner - load - pushed
         free = m.parts.free
         terms = (m.M @ v0, m.M @ v1, inner, damped, load, pushed)
-        size = sum(float(np.linalg.norm(term[free])) for term in terms)
-        error = float(np.linalg.norm(missing[free])) / (size or 1.0)
-        return _Trial(v1, impulse, missing, error)
+        size = sum(float(np.linalg.norm(term[free])) for term in terms) or 1.0
+        error = float(np.linalg.norm(missing[free])) / size
+        return _Trial(v1, impulse, missing, error, max(GOOD, h * m.blur / size))
 
     def solver(self, solve: Any) -> Any:
         """solve of a linearised step: (trial, matrix) -> (velocities, solution)."""
@@ -255,11 +260,11 @@ class _Step:
                 v1, solution = solve(trial, matrix)
                 trial = self._trial(v1, solution.r.ravel())
                 stalled = trial.error > 0.5 * best
-                ends = trial.error <= ROUNDING or (stalled and trial.error <= GOOD)
+                ends = trial.error <= ROUNDING or (stalled and trial.error <= trial.good)
                 if ends or limit.passed:
                     break
                 best = min(best, trial.error)
-            if solution is not None and trial.error <= GOOD:
+            if solution is not None and trial.error <= trial.good:
                 return trial, solution
             why = f"its balance of momentum is left with {trial.error:.1e}"
         except InvertedCells:

@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 
 def check_turning(method: Any, model: Model) -> None:
-    """Raise UnsupportedForm for options, bodies and contacts that large deformations do not have."""
+    """Raise UnsupportedForm for options and parts that large deformations do not have."""
     for name, wanted in (("theta", 0.5), ("reach", 0.0), ("stiffness_damping", 0.0)):
         framed = name == "stiffness_damping" and all(b.corotational for b in model.bodies)
         if getattr(method, name) != wanted and not framed:

@@ -17,7 +17,7 @@ not, is believed less: its rest counts C / (GRACE F) times.  Besides
     nothing     where no track promises anything, the one that has cost least
 
     the end     where five times as much was spent as when the best error last halved, and a
-                thousand Newton steps' worth, some seconds at least, since
+                thousand Newton steps' worth, and many chunks or some seconds, since
 
 So no track is ever given up, none takes more than its share while it does not progress, and
 only ratios of costs matter, which are operation counts.
@@ -46,8 +46,8 @@ GROWTH = 0.2  # cost of a chunk, of what its track has cost
 SHORTEST = 3e4  # nanoseconds of a chunk at least, or the calls cost more than the sweeps
 # Nanoseconds that letting the other tracks in costs: joints, symbolic factors; per block of W.
 ENTRY, ENTRY_BLOCK = 3e5, 150.0
-# All cost, in what it was at the last progress; Newton steps and nanoseconds since.
-LOST, LOST_STEPS, LOST_LEAST = 5.0, 1000.0, 2e9
+# All cost, in what it was at the last progress; Newton steps since, and nanoseconds or chunks.
+LOST, LOST_STEPS, LOST_LEAST, LOST_CHUNKS = 5.0, 1000.0, 2e9, 500
 # Cost between two iterates that are handed out, of all cost, and its bounds in nanoseconds: the
 # driver's judgement costs more than a chunk of a small problem, but it looks at the clock.
 PAUSE, LEAST_PAUSE, MOST_PAUSE = 0.1, 1e6, 5e7
@@ -89,7 +89,7 @@ class Entry:
     share: of all cost up to which it is taken to be unknown, and then to need `optimism` times
     all cost.  needs: nanoseconds that a method of Newton's kind is taken to need, whatever its
     rate, until it has cost them; None for sweeps.  last: it runs where no other promises the
-    goal for that, and has its share and no more.
+    goal for that, and has no more than its share while another promises it at all.
     """
 
     name: str
@@ -193,7 +193,9 @@ class Race:
         self.total = 0.0  # nanoseconds of all tracks
         self.shown = 0.0  # total when an iterate was handed out last
         self.held: Iterate | None = None  # counts of those since then
-        self.mark = (self.state.first_error, 0.0)  # error and total at the last progress
+        self.chunks = 0
+        # error, total and chunks at the last progress
+        self.mark = (self.state.first_error, 0.0, 0)
 
     def iterates(self) -> Iterator[Iterate]:
         """The best reaction now and then, until nothing helps or is left."""
@@ -223,6 +225,7 @@ class Race:
             self.tracks.remove(track)
             return
         self.total += track.cost - before
+        self.chunks += 1
         self.held = found if self.held is None else _counted_with(self.held, found)
         if self._is_due():
             found, self.held, self.shown = self.held, None, self.total
@@ -235,13 +238,14 @@ class Race:
 
     def _is_lost(self) -> bool:
         """True where nothing has helped for long."""
-        error, total = self.mark
+        error, total, chunks = self.mark
         if self.state.error < 0.5 * error:
-            self.mark = self.state.error, self.total
+            self.mark = self.state.error, self.total, self.chunks
             return False
         since = self.total - total
-        long = max(LOST_STEPS * self.state.step_cost, LOST_LEAST)
-        return self.total > LOST * total and since > long
+        if not (self.total > LOST * total and since > LOST_STEPS * self.state.step_cost):
+            return False
+        return since > LOST_LEAST or self.chunks - chunks > LOST_CHUNKS
 
     def _next(self) -> Track:
         """The track that promises the goal for the least cost."""

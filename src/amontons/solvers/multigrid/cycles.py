@@ -39,6 +39,7 @@ from numpy.typing import NDArray
 from ...core.errors import UnsupportedForm
 from ...core.options import check_options
 from ...linear.hierarchy import Hierarchy
+from ...linear.vectors import add_scaled, copy_into, dot, norm
 from ...problem.friction import Form, FrictionProblem
 from ..anderson import Anderson
 from ..contract import (
@@ -181,7 +182,7 @@ class _Run:
         best = at_update = last = np.inf
         patience = Patience(self.options.patience)
         while True:
-            before[:] = x
+            copy_into(x, before)
             self.smooth(x, backward=False)
             for _ in range(self.options.contact_sweeps):
                 self.contacts.sweep(self.f, x)
@@ -217,7 +218,7 @@ class _Run:
         law = self.contacts.natural_map(x, self.r)
         kept = self.r[self.contacts.node]
         self.r[self.contacts.node] = 0.0
-        balance = float(np.linalg.norm(self.r))
+        balance = norm(self.r)
         self.r[self.contacts.node] = kept
         return max(balance / self.load, law / self.length)
 
@@ -256,7 +257,6 @@ class _Run:
         step = x - before
         product = self.r
         self.level.A.times(step, product)
-        length = contacts.step_length(
-            step, float(np.vdot(force, step)), float(np.vdot(step, product))
-        )
-        x[:] = before + length * step
+        length = contacts.step_length(step, dot(force, step), dot(step, product))
+        copy_into(before, x)
+        add_scaled(length, step, x)

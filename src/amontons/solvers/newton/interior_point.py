@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 from ...core.clock import NEVER, Deadline
 from ...core.compiled import njit
 from ...core.options import check_options
-from ...linear.blocks import velocity_inplace
+from ...linear.blocks import velocity_of_rows_inplace
 from ...problem.friction import Form, FrictionProblem
 from ...problem.judge.measures import natural_error
 from ...problem.law.law import MU
@@ -145,7 +145,7 @@ def relax_inplace(  # noqa: PLR0913
     lam, w, beta = np.empty((nc, 3)), np.empty((nc, 3)), np.empty(nc)
     p, fa, fb = np.empty(3), np.empty(3), np.empty(3)
     for count in range(steps):
-        velocity_inplace(indptr, indices, data, q, r, u)
+        velocity_of_rows_inplace(0, len(q), indptr, indices, data, q, r, u)
         gap = away = 0.0
         able = 0
         for i in range(nc):
@@ -201,7 +201,7 @@ def relax_inplace(  # noqa: PLR0913
                     rhs[i, 1] = fa[1] + keep * residual[i, 1]
                     rhs[i, 2] = fa[2] + keep * residual[i, 2]
             solve_inplace(order, upper_start, upper, lower_start, lower, U, L, inverse, rhs, dr)
-            velocity_inplace(indptr, indices, data, zero, dr, du)
+            velocity_of_rows_inplace(0, len(q), indptr, indices, data, zero, dr, du)
             for i in range(nc):
                 if rho[i] <= 0.0:
                     continue

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import InvertedCells, SingularOperator
 from ...core.options import check_options
-from ...linear import Direct, LinearSolver
+from ...linear import LinearSolver
 from ...linear.base import Factor
 from ...problem.friction import FrictionProblem
 from ...problem.protocol import Problem
@@ -44,6 +44,7 @@ from ..contract import (
     check_positive,
 )
 from ..judging import first_of, sent
+from .linear_steps import LOOSEST, LinearSteps, forcing
 from .states import Linear, PlainStates, States
 
 Array = NDArray[np.float64]
@@ -130,7 +131,7 @@ class NonlinearNewton:
     halvings: int = 7  # of a Newton step in the line search
     patience: int = 12  # Newton steps without halving the residual before the load step is cut
     smallest_share: float = 1e-4  # of the load in one load step
-    linear: LinearSolver = Direct()
+    linear: LinearSolver | None = None  # of its steps; by default chosen by their size
     crossing: Crossing | None = None  # what leads on where load steps end, see `PathCrossing`
 
     solves: ClassVar[tuple[type, ...]] = (NonlinearProblem,)
@@ -148,10 +149,11 @@ class NonlinearNewton:
 
         Only states better than all before are shown to the driver.
         """
-        shown = _Shown()
+        shown, linear = _Shown(), LinearSteps(self.linear)
         if start.v is not None:
             try:
-                yield from shown.best(self._newton(problem, problem.states(start.v), target))
+                states = problem.states(start.v)
+                yield from shown.best(self._newton(problem, states, target, linear))
             except (_Failed, InvertedCells):
                 pass  # the start was no help
         share, step, reason = 0.0, 1.0, ""
@@ -160,7 +162,7 @@ class NonlinearNewton:
             if step < self.smallest_share:
                 if self.crossing is not None:
                     v, told = self.crossing.across(problem, share, v, target)
-                    found = self._newton(problem, problem.states(v), target)
+                    found = self._newton(problem, problem.states(v), target, linear)
                     yield from shown.best(found, told)
                 hint = "" if self.crossing is not None else JUMP
                 if remark := problem.at_share(share).remark(v):
@@ -172,13 +174,13 @@ class NonlinearNewton:
             both = (self._predict, self._predict_contact)
             for predict in both[::-1] if problem.meets_first else both:
                 try:
-                    first = predict(problem, share, goal, v, target)
+                    first = predict(problem, share, goal, v, target, linear)
                     if goal == 1.0:
                         states = problem.states(first, (problem.at_share(share), v))
-                        yield from shown.best(self._newton(problem, states, target))
+                        yield from shown.best(self._newton(problem, states, target, linear))
                     then = problem.at_share(goal)
                     states = then.states(first, (problem.at_share(share), v))
-                    v, steps = self._equilibrium(then, states, target)
+                    v, steps = self._equilibrium(then, states, target, linear)
                     break
                 except (_Failed, InvertedCells) as failure:
                     reason = str(failure)
@@ -190,19 +192,21 @@ class NonlinearNewton:
             step *= 2 if steps <= EASY else 1
 
     def _predict(
-        self, problem: NonlinearProblem, share: float, goal: float, v: Array, target: Target
-    ) -> Array:
+        self, problem: NonlinearProblem, share: float, goal: float, v: Array, target: Target,
+        linear: LinearSteps,
+    ) -> Array:  # fmt: skip
         """The tangent predictor from a state at one share of the load to another."""
         try:
             here, change = problem.predicted(share, goal, v)
             now = problem.at_share(share)
-            return v + self._solve(now, v, here, here.residual + change)[0]
+            return v + self._solve(now, v, here, here.residual + change, linear)[0]
         except (InvertedCells, SingularOperator) as reason:
             raise _Failed(str(reason)) from reason
 
     def _predict_contact(
-        self, problem: NonlinearProblem, share: float, goal: float, v: Array, target: Target
-    ) -> Array:
+        self, problem: NonlinearProblem, share: float, goal: float, v: Array, target: Target,
+        linear: LinearSteps,
+    ) -> Array:  # fmt: skip
         """The solution of the tangent problem with contact: its statuses are right together.
 
         Newton's steps change them one after another, and may go round in circles where many
@@ -228,17 +232,17 @@ class NonlinearNewton:
         raise _Failed("the tangent problem with contact was not solved")
 
     def _equilibrium(
-        self, problem: NonlinearProblem, states: States, target: Target
+        self, problem: NonlinearProblem, states: States, target: Target, linear: LinearSteps
     ) -> tuple[Array, int]:
         """(v, Newton steps) at a load between, found loosely."""
         steps, v = 0, states.v(states.start)
-        found = self._newton(problem, states, target)
+        found = self._newton(problem, states, target, linear)
         while problem.error(problem.reactions(v), v) > LOOSE:
             v, steps = next(found)[0], steps + 1
         return v, steps
 
     def _newton(
-        self, problem: NonlinearProblem, states: States, target: Target
+        self, problem: NonlinearProblem, states: States, target: Target, linear: LinearSteps
     ) -> Iterator[tuple[Array, Array, float]]:
         """(v, r, |F| one step before) of Newton steps; _Failed when they lead nowhere."""
         sizes: list[float] = []
@@ -252,7 +256,9 @@ class NonlinearNewton:
                 sizes.append(size)
                 if again or patience.over(size):
                     self._stop(problem, v)
-                moved, factor = self._solve(problem, v, here, here.residual)
+                moved, factor = self._solve(
+                    problem, v, here, here.residual, linear, forcing(sizes)
+                )
             except SingularOperator as reason:
                 raise _Failed(str(reason)) from reason
             step = states.whole(w, moved)
@@ -271,22 +277,21 @@ class NonlinearNewton:
             raise Breakdown(reason)
         raise _Failed(reason)
 
+    @staticmethod
     def _solve(
-        self, problem: NonlinearProblem, v: Array, here: Linear, F: Array
-    ) -> tuple[Array, Factor]:
+        problem: NonlinearProblem, v: Array, here: Linear, F: Array, linear: LinearSteps,
+        tolerance: float = LOOSEST,
+    ) -> tuple[Array, Factor]:  # fmt: skip
         """-dF/dv^-1 F and the factors; with more contacts closed where a body is loose."""
         try:
-            factor = self.linear.factor(here.matrix)
+            return linear.solved(here, F, tolerance)
         except SingularOperator:
             for pieces in problem.closed_pieces(v):
-                closed = problem.linearisation(v, pieces)
                 try:
-                    factor = self.linear.factor(closed.matrix)
+                    return linear.solved(problem.linearisation(v, pieces), F, tolerance)
                 except SingularOperator:
                     continue
-                return factor.solve(-F), factor
             raise
-        return factor.solve(-F), factor
 
     def _length(
         self, states: States, w: Array, step: Array, sizes: list[float]

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ...linear.condensed import Structure
+
 if TYPE_CHECKING:
     from .nonlinear import NonlinearProblem
 
@@ -19,6 +21,11 @@ class Linear(Protocol):
 
     residual: Array
     matrix: sparse.csc_array
+
+    @property
+    def structure(self) -> Structure | None:
+        """What the matrix consists of, for multigrid; None where that is not known."""
+        return None
 
 
 class States(Protocol):

@@ -84,8 +84,8 @@ class Sweep(NamedTuple):
     relaxation: float
     close: float  # relative change at which iterations on one contact end
     steps: int  # of them at most
-    # (1 + ends,): floating point operations on single contacts and of judgements, added up; then
-    # where chunks end in the order that threads can work on, see `shared`
+    # (1 + chunks,): floating point operations on single contacts and of judgements, added up;
+    # then where chunks end in the order that threads can work on, see `chunks`
     work: Any
 
 

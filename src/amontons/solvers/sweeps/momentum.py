@@ -1,6 +1,6 @@
 """Gauss-Seidel sweeps with Nesterov's momentum, restarted when a sweep changes more.
 
-    x = r_k + b_k (r_k - r_{k-1}),   open where x_N < 0
+    x = r_k + b_k (r_k - r_{k-1}),   open where x_N < 0 and nothing ties
     r_{k+1} = sweep(x)
     t_{k+1} = (1 + sqrt(1 + 4 t_k^2)) / 2,   b_k = (t_k - 1) / t_{k+1},   t_0 = 1
 
@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
+from ...problem.law.law import TIED
 from .kernels import Sweep, content, sweep_flops, sweep_inplace
 from .shared import SharedSweep
 
@@ -30,15 +31,15 @@ MOMENTUM_FLOPS = 3  # per component of r
 
 
 @njit(cache=True, error_model="numpy")
-def push_inplace(r, old, t):
+def push_inplace(kind, r, old, t):
     """r becomes the next point to sweep from, old what r was; returns the next t."""
     after = 0.5 * (1.0 + math.sqrt(1.0 + 4.0 * t * t))
     b = (t - 1.0) / after
     for i in range(len(r)):
-        x0 = r[i, 0] + b * (r[i, 0] - old[i, 0])
+        goes = r[i, 0] + b * (r[i, 0] - old[i, 0]) > 0.0 or kind[i] == TIED
         for a in range(3):
             now = r[i, a]
-            r[i, a] = now + b * (now - old[i, a]) if x0 > 0.0 else 0.0
+            r[i, a] = now + b * (now - old[i, a]) if goes else 0.0
             old[i, a] = now
     return after
 
@@ -51,7 +52,7 @@ def momentum_inplace(s, r, old, pace, sweeps, watch):
     where a call goes on.  watch: see `watch_for`.
     """
     for k in range(sweeps):
-        after = push_inplace(r, old, pace[0])
+        after = push_inplace(s.kind, r, old, pace[0])
         change = sweep_inplace(s, False, r)
         pace[0] = 1.0 if change > pace[1] else after
         pace[1] = change
@@ -66,7 +67,7 @@ def _momentum(s: Sweep, r: Array, old: Array, pace: Array, sweeps: int, watch: A
     if sweep is None:
         return momentum_inplace(s, r, old, pace, sweeps, watch)
     for k in range(sweeps):
-        after = push_inplace(r, old, pace[0])
+        after = push_inplace(s.kind, r, old, pace[0])
         change = sweep(r)
         pace[:] = 1.0 if change > pace[1] else after, change
         if content(s, r, change, watch):

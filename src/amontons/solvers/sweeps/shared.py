@@ -14,7 +14,14 @@ from numpy.typing import NDArray
 from ...core.compiled import njit
 from ...core.threads import Range, shared, split, threads
 from .chunks import SUMMED, stages_of
-from .kernels import Sweep, anderson_inplace, content, mix_inplace, sweeps_inplace, visit_inplace
+from .kernels import (
+    Sweep,
+    anderson_inplace,
+    content,
+    mix_inplace,
+    sweeps_inplace,
+    visit_inplace,
+)
 
 Array = NDArray[np.float64]
 CONTACT_WORK = 150.0  # of a contact, in numbers that a sweep touches

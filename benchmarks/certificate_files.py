@@ -1,0 +1,108 @@
+"""Certificates as files: all accepted by the separate checker, forged bytes found.
+
+    python benchmarks/certificate_files.py [--certificates 1000] [--forgeries 10000]
+
+Random problems of two to six contacts in 2D and 3D, every load and one load.  Each forgery
+changes one byte of one of the files at random; one counts as accepted where the checker still
+agrees while W, q, mu, r0, the claim or anything else that the hash covers is another.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+
+import h5py
+import numpy as np
+from machine import describe
+
+import amontons as am
+from amontons.io import certificate_checker as checker
+
+RESULTS = Path(__file__).parent / "results"
+
+
+def problem_of(seed: int) -> am.FrictionProblem:
+    """2D and 3D in turn; little friction for every load, in 2D also much for this load."""
+    random = np.random.default_rng(seed)
+    d, nc = 2 + seed % 2, int(random.integers(2, 7))
+    A = random.standard_normal((nc * d, nc * d))
+    W = A @ A.T / (nc * d) + 0.1 * np.eye(nc * d)
+    W *= 10.0 ** random.uniform(-6, 6)
+    q = random.standard_normal((nc, d)) - np.eye(d)[0]
+    much = seed % 4 == 0
+    mu = random.uniform(0, 1.5 if much else 0.08, nc)
+    return am.FrictionProblem.from_delassus(W, q, mu)
+
+
+def main() -> None:
+    """Write, check, forge, and a page of what came out."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--certificates", type=int, default=1000)
+    parser.add_argument("--forgeries", type=int, default=10000)
+    asked = parser.parse_args()
+    count: Counter[str] = Counter()
+    seconds, files, seed = [], [], 0
+    with tempfile.TemporaryDirectory() as folder:
+        while len(files) < asked.certificates:
+            problem, seed = problem_of(seed), seed + 1
+            path = Path(folder) / f"{seed}.h5"
+            try:
+                claim = am.write_certificate(
+                    problem, am.uniqueness(problem, time_limit=20), path
+                )
+            except am.InvalidInput:
+                count["without a certificate"] += 1
+                continue
+            began = time.process_time()
+            am.check_certificate(path)  # raises where it is refused
+            seconds.append(time.process_time() - began)
+            count[f"{problem.dimension}D {claim}"] += 1
+            files.append(path)
+        refused, harmless, wrong = forge(files, asked.forgeries, Path(folder) / "forged.h5")
+    rows = "\n".join(f"| {name} | {number} |" for name, number in sorted(count.items()))
+    page = f"""# Certificates as files
+
+`python benchmarks/certificate_files.py --certificates {asked.certificates} --forgeries
+{asked.forgeries}`, {describe()}.
+
+{len(files)} certificates of random problems were accepted by the separate checker
+(`amontons.io.certificate_checker`), none refused; one takes {np.median(seconds) * 1e3:.1f} ms
+(median), {max(seconds) * 1e3:.0f} ms at most.
+
+| kind | number |
+|---|---|
+{rows}
+
+Of {asked.forgeries} single bytes changed at random {refused} were refused, {harmless} changed
+nothing that the certificate says (unused bytes of the file), and **{wrong} changed it unseen**.
+"""
+    (RESULTS / "certificate_files.md").write_text(page, encoding="utf-8")
+    print(page)
+
+
+def forge(files: list[Path], number: int, forged: Path) -> tuple[int, int, int]:
+    """(refused, accepted with the same content, accepted with another) of changed bytes."""
+    random = np.random.default_rng(0)
+    refused = harmless = wrong = 0
+    for _ in range(number):
+        path = files[random.integers(len(files))]
+        data = bytearray(path.read_bytes())
+        data[random.integers(len(data))] ^= int(random.integers(1, 256))
+        forged.write_bytes(data)
+        try:
+            am.check_certificate(forged)
+        except am.InvalidInput:
+            refused += 1
+            continue
+        with h5py.File(path) as right, h5py.File(forged) as other:
+            same = checker.digest(right) == checker.digest(other)
+        harmless, wrong = harmless + same, wrong + (not same)
+    return refused, harmless, wrong
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,94 @@
+"""Motion and reactions where W is singular or missing: what the verdict says, and its time.
+
+    python benchmarks/hyperstatic.py [NAME ...]
+
+Packings of spheres at rest and spinning, walls and arches of rigid blocks, a wall of elastic
+blocks that contact alone holds, the dome; a minute of the clock for each.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from classes import arch, spinning, wall
+from machine import describe
+
+import amontons as am
+from amontons.mechanics.ready.packings import SpherePacking
+
+RESULTS = Path(__file__).parent / "results"
+
+
+def masonry() -> am.Model:
+    """Nine elastic blocks and a half under their weight, on a floor."""
+    steel = am.LinearElastic(2.2e9, 0.2, density=2000)
+    made = am.Wall(3, 3, size=(0.4, 0.2, 0.2), cells=(10, 4, 4), material=steel)
+    return made.model([], [am.BodyForce((0, 0, -2000 * 9.81))])
+
+
+CASES: dict[str, Callable[[], Any]] = {
+    "70 spheres": lambda: SpherePacking(70).problem(1e-3),
+    "200 spheres": lambda: SpherePacking(200).problem(1e-3),
+    "700 spheres": lambda: SpherePacking(700).problem(1e-3),
+    "200 spheres spinning": lambda: spinning(SpherePacking(200, mu=0.3), 5.0, 0),
+    "rigid wall 6x4": lambda: wall(6, 4).problem(0.6),
+    "rigid arch 15": lambda: arch(15).problem(0.6),
+    "elastic wall": masonry,
+    "dome": lambda: am.read_case("example:dome").model,
+}
+
+
+def row(name: str) -> str:
+    """One line of the table."""
+    problem = CASES[name]()
+    began = time.process_time()
+    solution = am.solve(problem, time_limit=120, check=False)
+    solved = time.process_time() - began
+    began = time.process_time()
+    found = am.uniqueness(problem, solution, time_limit=60)
+    seconds = time.process_time() - began
+    apart = found.indeterminacy
+    if apart is None:
+        return (f"| {name} | {solution.r.shape[0]} | {solved:.1f} | {found.reason} | | | | "
+                f"{seconds:.1f} |")  # fmt: skip
+    bound = "" if apart.bound is None else f"{apart.bound.distance:.2g}"
+    other = "none" if apart.other is None else f"{apart.other.distance:.1%} away"
+    ranges = apart.reactions
+    told = apart.reason
+    if ranges is not None:
+        told = "unique" if apart.reactions_are_unique else (
+            f"{int(ranges.open.sum())} contacts, {ranges.dimension} free numbers, by up to "
+            f"{ranges.largest:.2g}; {int(ranges.exact.sum())} exact"
+        )  # fmt: skip
+    return (f"| {name} | {solution.r.shape[0]} | {solved:.1f} | {apart.motion} | {bound} | "
+            f"{other} of {apart.starts} | {told} | {seconds:.1f} |")  # fmt: skip
+
+
+def main() -> None:
+    """The page."""
+    rows = []
+    for name in sys.argv[1:] or CASES:
+        rows.append(row(name))
+        print(rows[-1], flush=True)
+    page = f"""# Where W is singular or missing
+
+`python benchmarks/hyperstatic.py`, {describe()}; CPU seconds, the first with compilation, at
+most a minute of the clock for each verdict.
+
+Bound: how far any other motion can be, relative to the free motion, in the norm of energy.
+Other: another motion, of so many solutions from other starts. Reactions: of how many contacts
+they are not unique with this motion, by up to which part of the largest.
+
+| problem | contacts | solve, s | motion | bound | other | reactions | verdict, s |
+|---|---|---|---|---|---|---|---|
+{chr(10).join(rows)}
+"""
+    (RESULTS / "hyperstatic.md").write_text(page, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

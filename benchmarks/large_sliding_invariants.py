@@ -1,0 +1,171 @@
+"""What large sliding must not depend on: tangents, patches on random meshes, turns, moments.
+
+    python benchmarks/large_sliding_invariants.py [--states 1000] [--meshes 5]
+
+Tangents are compared with central differences at random states, every other of which has slave
+nodes 1e-4 beside nodes or middles of edges of the master.  A state is left out, and counted,
+where a piece of the law, or which facets face each other, changes within the difference.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import replace
+
+import numpy as np
+
+import amontons as am
+from amontons.mechanics.model.large_deformation import large_deformation, large_step
+
+NEO = am.NeoHookean(1.0, 0.3)
+STEP = 1e-6
+CASES = [  # dimension, kinds of cells and orders of both bodies
+    (2, ("quad", "tri"), (1, 1)), (2, ("quad", "quad"), (2, 2)), (3, ("hex", "hex"), (1, 1)),
+    (3, ("tet", "hex"), (1, 1)), (3, ("hex", "tet"), (2, 2)), (3, ("hex", "hex"), (1, 2)),
+]  # fmt: skip
+
+
+def uneven(mesh, rng, size):
+    """Nodes moved at random, those of sides along them."""
+    x = mesh.points.copy()
+    low, high = x.min(axis=0), x.max(axis=0)
+    for k in range(x.shape[1]):
+        inner = (x[:, k] > low[k] + 1e-9) & (x[:, k] < high[k] - 1e-9)
+        x[inner, k] += size * rng.uniform(-1, 1, inner.sum())
+    return replace(mesh, points=x)
+
+
+def bodies(dim, kinds, orders, rng, *, wider=0.0):
+    """Two cubes of uneven meshes, one on the other."""
+    counts = ((4, 2), (3, 2)) if dim == 2 else ((3, 3, 1), (2, 2, 1))
+    out = []
+    for name, kind, order, cells, z in zip(("lower", "upper"), kinds, orders, counts, (-1, 0),
+                                           strict=True):  # fmt: skip
+        more = wider if name == "lower" else 0.0
+        size = (1 + 2 * more,) * (dim - 1) + (1,)
+        mesh = am.box(size, cells, kind=kind, origin=(-more,) * (dim - 1) + (z,))
+        mesh = uneven(mesh, rng, 0.2 / max(cells))
+        out.append(am.Body(mesh, NEO, name=name, order=order))
+    return out
+
+
+def beside_edges(parts, v, rng):
+    """v with slave nodes moved to 1e-4 beside nodes and middles of edges of the master."""
+    pair = parts.contact.pairs[0]
+    u = np.zeros(parts.X.size)
+    u[parts.free] = v
+    x = parts.X + u.reshape(parts.X.shape)
+    at = x[pair.master.nodes]
+    marks = np.concatenate([at, (at + np.roll(at, 1, axis=1)) / 2]).reshape(-1, x.shape[1])
+    away = np.linalg.norm(x[pair.slaves, None, :-1] - marks[None, :, :-1], axis=2)
+    near = away.min(axis=1) < 0.15
+    goal = marks[away.argmin(axis=1)[near]][:, :-1]
+    x[pair.slaves[near], :-1] = goal + 1e-4 * rng.standard_normal(goal.shape)
+    return (x - parts.X).ravel()[parts.free]
+
+
+def alike(one, other):
+    """Whether the same facets face each other, and the same nodes carry force."""
+    return one.met.tolist() == other.met.tolist() and all(
+        getattr(one.shared, name).tolist() == getattr(other.shared, name).tolist()
+        for name in ("slave", "master", "kept"))  # fmt: skip
+
+
+def tangents(states):
+    """The worst relative error of the tangent over random states of all cases."""
+    for dim, kinds, orders in CASES:
+        rng, begin = np.random.default_rng(1), time.process_time()
+        both = bodies(dim, kinds, orders, rng, wider=0.2)
+        model = am.Model(both, [am.Fix("lower.bottom", 0), am.Fix("upper.top", 0)],
+                         [am.Contact("upper.bottom", master="lower.top", mu=0.3)])  # fmt: skip
+        parts = large_deformation(model).parts
+        problem = large_step(model, np.zeros(parts.X.size), np.zeros(parts.X.size),
+                             0.01 * rng.standard_normal(parts.X.size))  # fmt: skip
+        worst, counted, left = 0.0, 0, 0
+        count = states // len(CASES) + 1
+        for k in range(count):
+            v = 0.015 * rng.standard_normal(problem.unknowns)
+            v = beside_edges(parts, v, rng) if k % 2 else v
+            way = rng.standard_normal(problem.unknowns)
+            ends = [v - STEP * way, v + STEP * way]
+            points = [problem.contact_point(each) for each in (v, *ends)]
+            same = all((point.pieces == points[0].pieces).all() and alike(
+                point.meeting.parts[0], points[0].meeting.parts[0]) for point in points)
+            if not same:
+                left += 1
+                continue
+            before, after = (problem.residual(each) for each in ends)
+            found = problem.tangent(v) @ way
+            error = np.abs(found - (after - before) / (2 * STEP)).max() / np.abs(found).max()
+            worst, counted = max(worst, error), counted + 1
+        print(f"| tangent | {dim}D {'/'.join(kinds)} {orders} | {counted} ({left} left out) | "
+              f"{worst:.1e} | {time.process_time() - begin:.0f} |", flush=True)
+
+
+def patches(meshes):
+    """The worst departure from one stretch, over random meshes, both sides, mu 0 and 0.3."""
+    for dim, kinds, orders in CASES:
+        worst, begin, failed = 0.0, time.process_time(), 0
+        for seed in range(meshes):
+            both = bodies(dim, kinds, orders, np.random.default_rng(seed))
+            free = (None,) * (dim - 1)
+            held = [am.Fix("lower.bottom", (*free, 0)), am.Fix("upper.top", (*free, -0.6))]
+            for k, side in enumerate(("left", "front")[: dim - 1]):
+                hold = tuple(0 if j == k else None for j in range(dim))
+                held += [am.Fix(f"{body.name}.{side}", hold) for body in both]
+            sides = ("upper.bottom", "lower.top")[:: -1 if seed % 2 else 1]
+            for mu in (0.0, 0.3):
+                model = am.Model(both, held, [am.Contact(sides[0], master=sides[1], mu=mu)])
+                found = am.solve(model, tolerance=1e-11, check=False)
+                failed += not found.converged
+                for body, moved in zip(model.bodies, found.displacement, strict=True):
+                    basis = np.c_[body.mesh.points, np.ones(len(body.mesh.points))]
+                    fit = np.linalg.lstsq(basis, moved, rcond=None)[0]
+                    worst = max(worst, float(np.abs(basis @ fit - moved).max()))
+        print(f"| patch | {dim}D {'/'.join(kinds)} {orders} | {2 * meshes} solves, {failed} "
+              f"above 1e-11 | {worst:.1e} | {time.process_time() - begin:.0f} |", flush=True)
+
+
+def round_end(cells, name, *, down):
+    """A block with a round end."""
+    mesh = am.box((1.0, 1.0), cells)
+    x, y = mesh.points[:, 0] - 0.5, mesh.points[:, 1]
+    points = np.stack([x, y + (1.0 - np.sqrt(1.0 - x**2)) * (1 - y)], axis=1)
+    return am.Body(replace(mesh, points=points if down else -points), NEO, name=name)
+
+
+def moments():
+    """Sum and moment of contact forces between round ends that slide, over meshes."""
+    for n in (6, 12, 24, 48):
+        begin = time.process_time()
+        both = [round_end((n, n), "one", down=True),
+                round_end((n + n // 3, n), "other", down=False)]  # fmt: skip
+        way = (lambda x, t: 0.3 * max(t - 1, 0), lambda x, t: -0.2 * min(t, 1))
+        model = am.Model(both, [am.Fix("one.top", way), am.Fix("other.top", 0)],
+                         [am.Contact("one.bottom", master="other.bottom", mu=0.3)])  # fmt: skip
+        *_, step = am.evolve(model, am.QuasiStatic(0.2), until=2.0, tolerance=1e-11)
+        parts = large_deformation(step.model).parts
+        u = step.state.displacement.reshape(parts.X.shape)
+        f = (parts.meet(u).columns(step.frames) @ step.state.force.ravel()).reshape(u.shape)
+        x, size = parts.X + u, np.abs(f).sum()
+        lost = abs((x[:, 0] * f[:, 1] - x[:, 1] * f[:, 0]).sum())
+        total = np.abs(f.sum(axis=0)).max() / size
+        print(f"| moment | 2D round ends, {n} facets | sum of forces {total:.0e} | "
+              f"{lost / size:.1e} | {time.process_time() - begin:.0f} |", flush=True)
+
+
+def main():
+    """Print the table."""
+    asked = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    asked.add_argument("--states", type=int, default=1000)
+    asked.add_argument("--meshes", type=int, default=5)
+    given = asked.parse_args()
+    print("| what | model | over | worst, relative | CPU s |\n|---|---|---|---|---|")
+    tangents(given.states)
+    patches(given.meshes)
+    moments()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,189 @@
+"""What is known of a problem whose W is singular or missing: its motion, and its reactions.
+
+The two are told apart: a motion may be the only one while reactions hold each other in many
+ways.  `held_tangents` and the ball of `motion` prove the motion where they can; `ranges` says
+what is open of the reactions of the motion that was found.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...core.clock import Deadline
+from ...core.errors import InvalidInput, TimeUp
+from ...core.faces import Told
+from ...core.onlookers import say
+from ...linear.rank import matrix_rank, semidefinite_rank
+from ...problem.friction import FrictionProblem
+from ...problem.solution import FrictionSolution
+from .face import face_of
+from .motion import NO_MORE, MotionBound, OtherMotion, motion_bound, other_motion
+from .ranges import SPREAD, ReactionRanges, reaction_ranges
+
+RANGES, BALL, MOTIONS = 0.4, 0.15, 0.9  # parts of the time that is left
+NAMED = 3  # contacts whose ranges are told in words
+_PROVED = {
+    "unique_every_load": "The motion is unique, whatever the load.",
+    "unique_this_load": "The motion is unique.",
+    "not_unique": "There is another motion.",
+}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Indeterminacy(Told):
+    """Motion and reactions apart, of one solution.
+
+    proved: "unique_every_load" or "unique_this_load" where the motion is proved to be the only
+    one, by what `why` says; "not_unique" where another is; "" without a proof.  bound: how far
+    any other motion of this load can be; other: another motion; starts: solutions from other
+    starts that were compared.  reactions: what the motion leaves open of them; None where there
+    was no time, see reason.
+    """
+
+    proved: str = ""
+    why: str = ""
+    bound: MotionBound | None = None
+    other: OtherMotion | None = None
+    starts: int = 0
+    reactions: ReactionRanges | None = None
+    reason: str = ""
+
+    @property
+    def motion(self) -> str:
+        """"unique_every_load", "unique_this_load", "not_unique" or "undecided"."""
+        if self.proved:
+            return self.proved
+        if self.other is not None:
+            return "not_unique"
+        unique = self.bound is not None and self.bound.distance <= NO_MORE
+        return "unique_this_load" if unique else "undecided"
+
+    @property
+    def motion_is_unique(self) -> bool:
+        """True where that is proved, for every load or for this one."""
+        return self.motion.startswith("unique")
+
+    @property
+    def has_other_reactions(self) -> bool:
+        """True where another state of reactions with the same motion was attained."""
+        return self.reactions is not None and self.reactions.largest > SPREAD
+
+    @property
+    def reactions_are_unique(self) -> bool:
+        """True where the motion leaves nothing open, by rank and without doubt."""
+        found = self.reactions
+        return found is not None and found.sure and found.dimension == 0
+
+    def __str__(self) -> str:
+        return f"{self.of_motion} {self.of_reactions}".strip()
+
+    @property
+    def of_motion(self) -> str:
+        """What is known of the motion, in a sentence or two."""
+        if self.proved:
+            return f"{_PROVED[self.proved]} {self.why}".strip()
+        if self.motion == "unique_this_load":
+            assert self.bound is not None
+            return (f"The motion is unique, to {self.bound.distance:.0e} of the free one: "
+                    "without friction it is the same.")  # fmt: skip
+        if self.other is not None:
+            a, b = self.other.errors
+            return (f"There is another motion, {self.other.distance:.1%} away; the errors of "
+                    f"both by the judge are {a:.0e} and {b:.0e}, and no proof is possible, as "
+                    "any rounding of a singular W makes another problem.")  # fmt: skip
+        starts = f" from {self.starts} other starts" if self.starts else ""
+        text = f"No other motion was found{starts}, and no proof that there is none"
+        if self.bound is not None:
+            text += (f"; any other differs by at most {self.bound.distance:.2g} of the free "
+                     "motion in the norm of energy")  # fmt: skip
+        return text + "."
+
+    @property
+    def of_reactions(self) -> str:
+        """What is known of the reactions, in a sentence or two."""
+        found = self.reactions
+        if found is None:
+            return self.reason
+        one = "With this motion" if self.motion == "undecided" else "With it"
+        if self.reactions_are_unique:
+            return f"{one} all reactions are unique."
+        if not self.has_other_reactions:
+            return f"{one} no other reactions were found."
+        least = "" if found.sure else "at least "
+        count, of = int(found.open.sum()), len(found.open)
+        text = (f"{one} the reactions of {count} of {of} contacts are not, in {least}"
+                f"{found.dimension} free numbers, by up to {found.largest:.2g} of the "
+                "largest: ")  # fmt: skip
+        widest = np.argsort(-found.spread, kind="stable")[:NAMED]
+        parts = []
+        for k in widest:
+            low, high = found.low[k, 0], found.high[k, 0]
+            exact = "" if found.exact[k] else " at least"
+            parts.append(f"contact {k}{exact} {low:.3g} to {high:.3g}")
+        return text + ", ".join(parts) + (", …." if count > NAMED else ".")
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """Plain data, as JSON files have it."""
+        bound, other, found = self.bound, self.other, self.reactions
+        return {
+            "motion": {
+                "verdict": self.motion,
+                "bound": None if bound is None else {
+                    "distance": bound.distance, "energy": bound.energy,
+                },
+                "other": None if other is None else {
+                    "distance": other.distance, "errors": list(other.errors),
+                    "r": other.solution.r.tolist(), "u": other.solution.u.tolist(),
+                },
+                "starts": self.starts, "reason": self.of_motion,
+            },
+            "reactions": None if found is None else {
+                "unique": self.reactions_are_unique, "dimension": found.dimension,
+                "sure": found.sure, "contacts": np.flatnonzero(found.open).tolist(),
+                "low": found.low.tolist(), "high": found.high.tolist(),
+                "exact": found.exact.tolist(),
+                "most": [float(x) if np.isfinite(x) else None for x in found.most],
+                "largest_range": found.largest, "reason": self.of_reactions,
+            },
+        }  # fmt: skip
+
+
+def is_singular(problem: FrictionProblem, deadline: Deadline) -> bool:
+    """Whether reactions may hold each other: W is singular, or contact alone holds bodies.
+
+    By the rank of H where there is one, else of W.  Raises TimeUp, InvalidInput.
+    """
+    if problem.W is not None:
+        return not semidefinite_rank(problem.W, deadline).is_full
+    if problem.loose_modes.shape[1]:
+        return True
+    assert problem.H is not None
+    return not matrix_rank(problem.H, deadline).is_full
+
+
+def indeterminacy(
+    problem: FrictionProblem, solution: FrictionSolution, deadline: Deadline, *,
+    proved: str = "", why: str = "",
+) -> Indeterminacy:  # fmt: skip
+    """What is known in time of a Coulomb problem with a solution; proved, why: its motion."""
+    ranges, reason = None, ""
+    try:
+        say("reactions of this motion")
+        share = deadline.share(RANGES)
+        face = face_of(problem, solution, share)
+        ranges = reaction_ranges(face, solution.r, share)
+    except (TimeUp, InvalidInput) as error:
+        reason = f"What the motion leaves open of the reactions is not known: {error}."
+    bound, other, starts = None, None, 0
+    if not proved:
+        with suppress(TimeUp):
+            say("other motions")
+            bound = motion_bound(problem, solution, deadline.share(BALL))
+            if bound is None or bound.distance > NO_MORE:
+                other, starts = other_motion(problem, solution, deadline.share(MOTIONS))
+    return Indeterminacy(proved, why, bound, other, starts, ranges, reason)

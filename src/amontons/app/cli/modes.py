@@ -1,0 +1,58 @@
+"""`amontons modes`: complex modes of small motions about a sliding state."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import click
+
+from ...core.errors import InvalidInput
+from ...io.results import FIGURES, to_json, versions
+from ..stability import modes
+from .sources import open_source
+from .terminal import check_writable, deliver_json
+
+SCHEMA = "amontons/modes/1"
+GROWS = 1  # exit code
+
+
+def run(  # noqa: PLR0913
+    source: str, overrides: Sequence[str], mu: float | None, count: int, near: float,
+    velocity: str | None, flutter: bool, json_copy: str | None, picture: str | None,
+) -> int:  # fmt: skip
+    """Find modes, show; the exit code."""
+    check_writable(json_copy, "--json")
+    check_writable(picture, "--picture", FIGURES)
+    opened = open_source(source, overrides)
+    if not opened.has_model:
+        raise InvalidInput(f"{source}: expected a model; an FCLib problem has no mass")
+    target: Any = opened.target_with(mu)
+    found = modes(target, count, near=near, velocity=_velocity(velocity))
+    points = found.flutter() if flutter else None
+    if json_copy != "-":
+        click.echo(f"{opened.title}\n{found}")
+        for point in points or ():
+            click.echo(f"flutter from friction {point.mu:.7g} on, at {point.frequency:.7g}")
+        if points == ():
+            click.echo("no flutter at any friction was found")
+    if json_copy is not None:
+        record = {"schema": SCHEMA, "title": opened.title, **found.record}
+        record["flutter"] = None if points is None else [
+            {"friction": p.mu, "frequency": p.frequency} for p in points
+        ]  # fmt: skip
+        deliver_json(to_json({**record, "versions": versions()}), json_copy)
+    if picture is not None:
+        found.plot(picture, title=opened.title)
+    return 0 if found.stable else GROWS
+
+
+def _velocity(text: str | None) -> tuple[float, ...] | None:
+    if text is None:
+        return None
+    try:
+        return tuple(float(word) for word in text.split(","))
+    except ValueError:
+        raise InvalidInput(
+            f"--velocity {text}: expected numbers with commas between them, such as 1,0"
+        ) from None

@@ -1,0 +1,135 @@
+"""Where W is singular: the motion and the reactions apart, against closed forms."""
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+import amontons as am
+from amontons.analysis.certificates.verdict import Verdict
+from amontons.analysis.hyperstatic.face import centred, face_of, longest
+from amontons.analysis.hyperstatic.held_tangents import held_tangents
+from amontons.analysis.hyperstatic.motion import motion_bound, other_motion
+from amontons.analysis.hyperstatic.ranges import reaction_ranges
+from amontons.core.clock import Deadline
+from amontons.mechanics.ready.hild import hild_triangle
+from amontons.mechanics.ready.packings import SpherePacking
+
+
+def table(legs, weight=4.0, mu=0.5, height=1.0):
+    """A rigid table on a floor, its mass 1 at a height above the feet (k, 2)."""
+    H = np.zeros((6, 3 * len(legs)))
+    axes = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]], dtype=float)  # normal, tangents
+    for k, (x, y) in enumerate(legs):
+        for a, axis in enumerate(axes):
+            H[:3, 3 * k + a] = axis
+            H[3:, 3 * k + a] = np.cross([x, y, -height], axis)
+    f = np.array([0, 0, -weight, 0, 0, 0])
+    return am.FrictionProblem.from_global(
+        sparse.eye_array(6).tocsc(), H, f, np.zeros((len(legs), 3)), np.full(len(legs), mu)
+    )
+
+
+SQUARE = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+
+
+@pytest.mark.parametrize("form", ["global", "delassus"])
+def test_a_table_on_four_legs_rests_in_one_way_and_stands_in_many(form):
+    """Every leg may carry nothing, or half of the weight; twelve forces, six balances.
+
+    In the Delassus form W of the same table, which is what the twelve forces are felt by.
+    """
+    legs = SQUARE * 6  # more rows than lists are made of: six times the same legs
+    problem = table(legs)
+    problem = problem if form == "global" else problem.condensed()
+    found = am.uniqueness(problem, time_limit=60)
+    apart = found.indeterminacy
+    assert found.verdict is Verdict.NOT_UNIQUE
+    assert apart.motion == "unique_this_load"
+    assert apart.reactions.dimension == 3 * 24 - 6
+    assert apart.reactions.open.all()
+    ranges = apart.reactions
+    assert ranges.exact.any()
+    np.testing.assert_allclose(ranges.low[ranges.exact, 0], 0.0, atol=1e-6)
+    np.testing.assert_allclose(ranges.high[ranges.exact, 0], 2.0, rtol=1e-5)
+    assert (ranges.most >= 2.0 * (1 - 1e-5)).all()  # a bound of what was attained
+    assert problem.error(ranges.other) < 1e-8
+    assert "motion is unique" in found.in_full
+    assert found.record["reactions"]["contacts"] == list(range(24))
+
+
+def test_three_legs_leave_the_floor_only_horizontal_forces_to_choose():
+    legs = [(-1.0, -1.0), (1.0, -1.0), (0.0, 2.0)]
+    problem = table(legs, weight=3.0)
+    solution = am.solve(problem)
+    face = face_of(problem, solution, Deadline.after(10))
+    found = reaction_ranges(face, solution.r, Deadline.after(20))
+    assert found.dimension == 3  # nine forces
+    np.testing.assert_allclose(found.low[:, 0], 1.0, atol=1e-6)
+    np.testing.assert_allclose(found.high[:, 0], 1.0, atol=1e-6)
+    assert (found.high[:, 1] - found.low[:, 1]).max() > 0.1
+    assert (np.hypot(found.other[:, 1], found.other[:, 2]) <= 0.5 * found.other[:, 0]).all()
+
+
+def test_what_is_attained_solves_the_problem_with_the_same_motion():
+    problem = SpherePacking(60, mu=0.8, seed=3).problem(1e-3)
+    solution = am.solve(problem, tolerance=1e-10)
+    apart = am.uniqueness(problem, solution, time_limit=30).indeterminacy
+    other = apart.reactions.other
+    assert problem.error(other) < 1e-8
+    u = problem.condensed().motion(other)[0]
+    speed = np.abs(problem.free_velocity).max()
+    np.testing.assert_allclose(u, solution.u, atol=1e-8 * speed)
+
+
+def test_the_ball_holds_all_motions():
+    """Friction at random: none moves farther from another than the bound says."""
+    problem = SpherePacking(30, mu=0.3, seed=1).problem(1e-3, shake=0.02)
+    solution = am.solve(problem)
+    bound = motion_bound(problem, solution, Deadline.after(20))
+    free = np.sqrt(problem.f @ problem.solve_M(problem.f))
+    random = np.random.default_rng(0)
+    for mu in random.uniform(0, 2, (5, problem.contacts)):
+        v = am.solve(problem.with_mu(mu)).v
+        assert np.sqrt(v @ problem.M @ v) <= np.sqrt(bound.energy) * free * (1 + 1e-6)
+    local = problem.condensed()
+    in_forces = motion_bound(local, am.solve(local), Deadline.after(20))
+    assert in_forces.distance == pytest.approx(bound.distance, rel=1e-4)
+
+
+def test_another_motion_is_found_beside_doubled_contacts():
+    """Hild's triangle above its second friction, every contact twice: W has half its rank."""
+    single = hild_triangle(6).assemble().condensed().with_mu(4.8)
+    W = single.W if isinstance(single.W, np.ndarray) else single.W.toarray()
+    n = single.contacts
+    twice = np.arange(2 * n).reshape(n, 2)
+    rows = np.concatenate([twice, twice]).ravel()
+    problem = am.FrictionProblem.from_delassus(
+        W[np.ix_(rows, rows)], single.q[np.r_[:n, :n]], np.full(2 * n, 4.8)
+    )
+    listed = am.all_solutions(single)
+    assert len(listed) > 1
+    stuck = next(s for s in listed.solutions if s.pattern == "ssssss")
+    first = am.solve(problem, start=am.Iterate(np.concatenate([stuck.r, stuck.r]) / 2))
+    assert np.abs(first.r[:n] + first.r[n:] - stuck.r).max() < 1e-6
+    other, compared = other_motion(problem, first, Deadline.after(30))
+    assert compared > 0
+    assert other is not None
+    assert max(other.errors) < 1e-9
+    summed = other.solution.r[:n] + other.solution.r[n:]
+    assert min(np.abs(summed - s.r).max() for s in listed.solutions) < 1e-5
+
+
+def test_held_tangents_are_zero_rows_at_rest():
+    W = np.diag([1.0, 0.0, 2.0, 1.0, 0.0, 0.0])
+    q = np.array([[-1.0, 0.0], [-1.0, 0.5], [1.0, 0.0]])
+    held = held_tangents(W, q)
+    assert held.tolist() == [[False, True], [False, False], [False, False]]
+
+
+def test_the_way_to_the_edge_of_a_cone():
+    """From (1, 0, 0) sideways to |r_T| = mu r_N, and downwards along the axis."""
+    problem = table([(0.0, 0.0)], mu=0.5)
+    face = face_of(problem, am.solve(problem), Deadline.after(5))
+    p = np.array([[0.0, -1.0, 1.0, 0.0], [1.0, 0.0, 0.5, 2.0], [0.0, 0.0, 0.0, 0.0]])
+    np.testing.assert_allclose(longest(face, face.c0, p), [0.5, 1.0, np.inf, 0.25])
+    assert centred(face, Deadline.after(5))[0] == pytest.approx(face.c0, abs=1e-6)

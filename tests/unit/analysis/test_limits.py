@@ -1,0 +1,146 @@
+"""Jamming and collapse against formulas: wedges, columns, hinges of arches."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from block_assemblies import arch, column, four_hinges, sideways
+
+import amontons as am
+from amontons.app.cli.sources import open_source
+from amontons.mechanics.ready.gallery import GALLERY
+
+
+def wedge(degrees, material):
+    """A wedge between two planes: rigid or not, it jams at the tangent of its half angle."""
+    mesh = am.box((2, 10), cells=(2, 3), origin=(-1, 0))
+    x, y = mesh.points.T
+    angle = np.radians(degrees)
+    points = np.column_stack([x * (4 + y * np.tan(angle)), y])
+    c, s = np.cos(angle), np.sin(angle)
+    mesh = replace(mesh, points=points, grid=None, levels=())
+    return am.Model(
+        [am.Body(mesh, material)],
+        contacts=[am.Contact("right", am.Plane((-c, s), (4.0, 0)), mu=0.3),
+                  am.Contact("left", am.Plane((c, s), (-4.0, 0)), mu=0.3)],
+        loads=[am.BodyForce((0, -1.0))],
+    )  # fmt: skip
+
+
+MATERIALS = {"rigid": am.Rigid(1.0), "elastic": am.LinearElastic(100, 0.3)}
+
+
+@pytest.mark.parametrize("material", MATERIALS.values(), ids=MATERIALS)
+@pytest.mark.parametrize("degrees", [5, 20, 40])
+def test_a_wedge_jams_at_the_tangent_of_its_half_angle(degrees, material):
+    found = am.jamming_friction(wedge(degrees, material))
+    wanted = np.tan(np.radians(degrees))
+    assert found.lower <= wanted * (1 + 1e-9) and found.upper >= wanted * (1 - 1e-9)
+    assert found.upper - found.lower <= 3e-6 * wanted and found.every
+
+
+def test_the_brake_arm():
+    model = open_source("example:brake").model
+    found = am.jamming_friction(model)
+    assert found.lower < found.upper == pytest.approx(0.38638, abs=1e-5)
+    W = model.assemble().condensed().W
+    r = found.r.ravel()
+    assert np.abs((W @ r)[::2]).max() <= 1e-12 * np.abs(W @ np.abs(r)).max()  # u_N = 0
+    assert (np.abs(found.r[:, 1]) <= found.upper * found.r[:, 0] * (1 + 1e-12)).all()
+    v = found.v  # strictly inside of the dual cone
+    assert (v[:, 0] > found.lower * (1 - 1e-5) * np.abs(v[:, 1])).all()
+
+
+def test_discs_in_space_are_cut_as_far_as_needed():
+    """A cone in a conical hole, rigid: the tangent again, and not that of a polygon."""
+    angle = np.radians(20)
+    turn = 2 * np.pi * np.arange(7) / 7
+    normal = np.column_stack([-np.cos(angle) * np.cos(turn), -np.cos(angle) * np.sin(turn),
+                              np.full(7, np.sin(angle))])  # fmt: skip
+    place = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(7)])
+    around = np.column_stack([-np.sin(turn), np.cos(turn), np.zeros(7)])
+    along = np.cross(normal, around)
+    H = np.zeros((6, 21))
+    for i in range(7):
+        for k, axis in enumerate((normal[i], around[i], along[i])):
+            H[:, 3 * i + k] = [*axis, *np.cross(place[i], axis)]
+    problem = am.FrictionProblem.from_global(
+        np.zeros((6, 6)), H, np.zeros(6), np.zeros((7, 3)), np.full(7, 0.1)
+    )
+    found = am.jamming_friction(problem, time_limit=5)
+    assert found.lower <= np.tan(angle) * (1 + 1e-9) <= found.upper * (1 + 2e-6)
+    assert found.upper == pytest.approx(np.tan(angle), rel=1e-4)
+
+
+def test_what_never_jams_and_what_is_refused():
+    free = am.FrictionProblem.from_delassus(np.eye(2), [[0.0, 0.0]], [0.5])
+    found = am.jamming_friction(free)
+    assert found.r is None and found.lower > 100 and found.every
+    tresca = am.FrictionProblem.from_delassus(np.eye(2), [[0.0, 0.0]], am.Tresca([1.0]))
+    with pytest.raises(am.UnsupportedLaw, match="expected Coulomb"):
+        am.jamming_friction(tresca)
+    apart = am.Model(
+        [am.Body(am.box((1, 1), 1, origin=(0, 0.1)), am.LinearElastic(1, 0.3))],
+        [am.Fix("top", 0)], [am.Contact("bottom", am.Plane((0, 1)), mu=0.3)],
+    )  # fmt: skip
+    assert "No contact touches" in str(am.jamming_friction(apart))
+
+
+# ------------------------------------------------------------------ collapse
+def on_one(block, point):
+    """A weight that grows on one voussoir."""
+
+    def live(k, centre, area):
+        return ((0.0, -1.0), np.array(point)) if k == block else ((0.0, 0.0), centre)
+
+    return live
+
+
+ARCHES = {  # radius, thickness, angle, voussoirs, live load
+    "Oppenheim 1992": (10, 1.5, np.radians(157.5), 7, sideways),
+    "semicircle": (10, 2.0, np.pi, 9, sideways),
+    "weight beside the crown": (10, 2.0, np.radians(120), 12, on_one(8, (-3.0, 9.0))),
+}
+
+
+@pytest.mark.parametrize("name", ARCHES)
+def test_arches_collapse_by_four_hinges(name):
+    *shape, live = ARCHES[name]
+    problem, grows = arch(*shape, 0.7, live)
+    found = am.collapse_load(problem, grows)
+    wanted = four_hinges(*shape, live)
+    assert found.upper == pytest.approx(wanted, rel=1e-7)
+    assert found.lower < wanted and found.width < 0.01
+    if name.startswith("Opp"):
+        assert wanted == pytest.approx(0.37, abs=0.005)  # of g, as published
+
+
+@pytest.mark.parametrize(("count", "width", "height", "mu"),
+                         [(1, 1, 2, 0.7), (1, 2, 1, 0.4), (5, 1, 0.5, 0.7), (4, 3, 0.5, 0.3)])
+def test_columns_overturn_or_slide(count, width, height, mu):
+    problem, grows = column(count, width, height, mu)
+    found = am.collapse_load(problem, grows)
+    wanted = min(width / (count * height), mu)
+    assert found.upper == pytest.approx(wanted, rel=1e-7)
+    assert found.lower < wanted and found.width < 0.01
+
+
+def test_a_wall_of_blocks_is_bounded_on_both_sides():
+    """Where both differ nothing is claimed in between; the frictionless wall can not stand."""
+    wall = am.Wall(2, 2, (2.0, 1.0), (2, 1), am.LinearElastic(1, 0.3, density=1.0),
+                   bond=am.Bond.STACK, rigid=True)  # fmt: skip
+    model = wall.model(loads=[am.BodyForce((0, -1.0))])
+    found = am.collapse_load(model, [am.BodyForce((1.0, 0.0))], gap=0.05)
+    assert 0 < found.lower <= found.upper < 1
+    pushed = am.collapse_load(model, [am.BodyForce((0.0, -1.0))])
+    assert pushed.upper == np.inf and "Any live load" in str(pushed)
+    lifted = replace(model, loads=[am.BodyForce((0, 1.0))])
+    assert not am.collapse_load(lifted, [am.BodyForce((1.0, 0.0))]).balanced
+
+
+def test_wrong_live_loads_are_refused():
+    problem, _ = column(1, 1, 2, 0.7)
+    with pytest.raises(am.InvalidInput, match="live: expected 3 finite numbers"):
+        am.collapse_load(problem, np.zeros(2))
+    with pytest.raises(am.InvalidInput, match="global form"):
+        am.collapse_load(GALLERY["one-contact"](), np.zeros(2))

@@ -1,0 +1,153 @@
+"""Certificates as files: accepted where they prove, refused where somebody changed them."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import amontons as am
+from amontons.core.errors import InvalidInput
+from amontons.io import certificate_checker as checker
+from amontons.mechanics.ready.hild import hild_triangle
+
+
+def problem_of(seed, d, friction):
+    """A random definite W of three contacts."""
+    random = np.random.default_rng(seed)
+    n = 3 * d
+    A = random.standard_normal((n, n))
+    W = A @ A.T / n + 0.1 * np.eye(n)
+    q = random.standard_normal((3, d)) - np.eye(d)[0]
+    return am.FrictionProblem.from_delassus(W, q, friction * random.uniform(0.5, 1, 3))
+
+
+def written(tmp_path, problem, name="c.h5"):
+    verdict = am.uniqueness(problem, time_limit=30)
+    path = tmp_path / name
+    return path, am.write_certificate(problem, verdict, path)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("seed", range(4))
+def test_every_load_is_proved_and_more_friction_is_not(tmp_path, seed, d):
+    problem = problem_of(seed, d, 0.05)
+    path, claim = written(tmp_path, problem)
+    assert claim == "every load"
+    assert "every load has exactly one solution" in am.check_certificate(path)
+    reseal(path, lambda file: file["mu"].write_direct(file["mu"][()] + 50.0))
+    with pytest.raises(InvalidInput, match="definite"):
+        am.check_certificate(path)
+
+
+def test_one_load_is_proved_also_on_several_branches(tmp_path):
+    claims = set()
+    for mu, branches in ((2.0, 1), (2.9, 2)):
+        path, claim = written(tmp_path, hild_triangle(10).assemble().with_mu(mu))
+        claims.add(claim)
+        assert "this load" in am.check_certificate(path)
+        with h5py.File(path) as file:
+            assert len(file["patterns"]) >= branches
+    assert claims == {"this load"}
+
+
+def reseal(path, change):
+    """Change a file and give it a new hash, as a forger would."""
+    with h5py.File(path, "r+") as file:
+        change(file)
+        file.attrs["sha256"] = checker.digest(file)
+
+
+def flipped(file, name):
+    values = file[name][()]
+    file[name].write_direct(np.ascontiguousarray(-values))
+
+
+FORGERIES = {
+    "other solution": lambda file: file["r0"].write_direct(file["r0"][()] + 1.0),
+    "other load": lambda file: flipped(file, "q"),
+    "a sign of the multipliers": lambda file: flipped(file, "V0"),
+    "W of the other sign": lambda file: flipped(file, "W"),
+    "a form left out": lambda file: file["V0"].write_direct(0 * file["V0"][()]),
+    "more friction": lambda file: file["mu"].write_direct(file["mu"][()] * 3),
+    "another claim": lambda file: file.attrs.modify("claim", "every load"),
+    "no number": lambda file: file["W"].write_direct(file["W"][()] * np.nan),
+}
+
+
+@pytest.mark.parametrize("forgery", FORGERIES)
+def test_a_forger_who_seals_the_file_again_is_found(tmp_path, forgery):
+    path, _ = written(tmp_path, hild_triangle(4).assemble().with_mu(2.5))
+    am.check_certificate(path)
+    reseal(path, FORGERIES[forgery])
+    with pytest.raises(InvalidInput, match="refused"):
+        am.check_certificate(path)
+
+
+def test_a_pattern_that_is_left_out_is_missed(tmp_path):
+    path, _ = written(tmp_path, hild_triangle(4).assemble().with_mu(2.5))
+
+    def lessen(file):
+        patterns = file["patterns"][()]
+        patterns[0] = patterns[0].replace(b".", b"c", 1)
+        file["patterns"].write_direct(patterns)
+
+    reseal(path, lessen)
+    with pytest.raises(InvalidInput, match="patterns are missing"):
+        am.check_certificate(path)
+
+
+def test_wrong_bytes_are_found_or_change_nothing(tmp_path):
+    path, _ = written(tmp_path, hild_triangle(3).assemble().with_mu(2.0))
+    right, random = path.read_bytes(), np.random.default_rng(0)
+    with h5py.File(path) as file:
+        content = checker.digest(file)
+    forged = tmp_path / "forged.h5"
+    refused = 0
+    for place in random.integers(0, len(right), 150):
+        wrong = bytearray(right)
+        wrong[place] ^= int(random.integers(1, 256))
+        forged.write_bytes(wrong)
+        try:
+            am.check_certificate(forged)
+        except InvalidInput:
+            refused += 1
+            continue
+        with h5py.File(forged) as file:
+            assert checker.digest(file) == content
+    assert refused > 20
+
+
+def test_what_is_not_unique_has_no_certificate(tmp_path):
+    problem = hild_triangle(3).assemble().with_mu(4.0)
+    with pytest.raises(InvalidInput, match="not_unique"):
+        am.write_certificate(problem, am.uniqueness(problem), tmp_path / "c.h5")
+    assert not (tmp_path / "c.h5").exists()
+
+
+def test_the_checker_stands_alone(tmp_path):
+    """Copied elsewhere it runs with numpy and h5py, and imports nothing of the package."""
+    source = Path(checker.__file__).read_text(encoding="utf-8")
+    alone = tmp_path / "checker.py"
+    alone.write_text(source, encoding="utf-8")
+    assert "amontons" not in "".join(line for line in source.splitlines() if "import" in line)
+    path, _ = written(tmp_path, problem_of(0, 3, 0.05))
+    for name, code in ((path, 0), (alone, 1)):
+        ran = subprocess.run([sys.executable, "-I", str(alone), str(name)], check=False,
+                             capture_output=True, text=True)  # fmt: skip
+        assert ran.returncode == code
+    assert "refused" in ran.stderr
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_positive_definite_never_errs(seed):
+    """Rank one short in rational numbers: not definite, whatever rounding says."""
+    random = np.random.default_rng(seed)
+    A = random.integers(-4, 5, (6, 5)).astype(float)
+    singular = A @ A.T
+    nothing = np.zeros((6, 6))
+    assert not checker.positive_definite(singular, nothing)
+    assert checker.positive_definite(singular + 1e-6 * np.eye(6) * singular.max(), nothing)
+    assert not checker.positive_definite(np.eye(6), np.full((6, 6), 0.5))
