@@ -1,21 +1,18 @@
-"""The cases of `large_sliding` as decks of CalculiX, and what it says of them.
+"""A setting of `large_sliding` as a deck of CalculiX, and what it says of it.
 
 2D cases are one layer of C3D8 whose nodes keep their z.  Its neo-Hookean energy splits off the
-volume, G/2 (J^-2/3 tr C - 3) + K/2 (J - 1)^2: the same moduli at small strains, a little other
-forces at large ones.  Contact is TYPE=SURFACE TO SURFACE with a linear pressure-overclosure of
-`STIFF` times the softer modulus over a facet's length; increments are automatic, none longer
-than one load step of the case.
+volume, `split_off_volume`.  Contact is TYPE=SURFACE TO SURFACE with a linear
+pressure-overclosure of `STIFF` times the softer modulus over a facet's length, a tenth of it
+along the surface; increments are automatic, none longer than one load step of the case.
 """
 
 import os
-import resource
-import subprocess
 from pathlib import Path
 
 import numpy as np
-from large_sliding_models import POISSON, corners, penetration
+from large_sliding_peers import limited
 
-STIFF = 50.0
+STIFF, STICK = 50.0, 0.1
 FACE = {(0, 1, 2, 3): 1, (4, 5, 6, 7): 2, (0, 1, 4, 5): 3, (1, 2, 5, 6): 4, (2, 3, 6, 7): 5,
         (0, 3, 4, 7): 6}  # fmt: skip
 
@@ -30,22 +27,20 @@ def cells_of(mesh):
     return np.concatenate(layers), np.concatenate([block.nodes, block.nodes + n], axis=1)
 
 
-def nodes_on(mesh, name):
-    """Numbers (from 0) of the nodes of a surface in `cells_of`."""
-    nodes = np.unique(corners(mesh, name))
-    return nodes if mesh.points.shape[1] == 3 else np.r_[nodes, nodes + len(mesh.points)]
-
-
-def faces_on(mesh, name):
-    """(cell, face number of CalculiX) of every facet of a surface."""
+def faces_on(mesh, facets):
+    """(cell, face number of CalculiX) of every facet (f, a) of a surface."""
     _, cells = cells_of(mesh)
-    there = np.zeros(cells.max() + 1, dtype=bool)
-    there[nodes_on(mesh, name)] = True
-    found = []
-    for number, hit in enumerate(there[cells]):
-        slots = tuple(int(k) for k in np.flatnonzero(hit))
-        if slots in FACE:
-            found.append((number, FACE[slots]))
+    n = len(mesh.points)
+    there = np.zeros(2 * n, dtype=bool)
+    there[np.unique(facets)] = True
+    if mesh.points.shape[1] == 2:
+        there[n:] = there[:n]
+    wanted, found = {frozenset(f) for f in facets.tolist()}, []
+    for number in np.flatnonzero(there[cells].sum(axis=1) >= 4):
+        for slots, face in FACE.items():
+            nodes = frozenset((cells[number, list(slots)] % n).tolist())
+            if nodes in wanted:
+                found.append((number, face))
     return found
 
 
@@ -55,67 +50,69 @@ def listed(numbers):
     return [", ".join(map(str, numbers[k : k + 12])) for k in range(0, len(numbers), 12)]
 
 
-def deck(case, swap):
-    """Lines of the deck."""
-    lines, start, first = ["*HEADING", "two bodies that slide"], [0, 0], 1
-    plane = case.lower.points.shape[1] == 2
-    sets = {}
-    for k, (mesh, name) in enumerate(((case.lower, "LOWER"), (case.upper, "UPPER"))):
+def deck(given, factor=1.0, stick=STICK):
+    """Lines of the deck; factor: on the stiffness of contact, stick: along over across it."""
+    lines, starts = ["*HEADING", "two bodies that slide"], [[0, 0]]
+    for k, (mesh, _) in enumerate(given.bodies):
         points, cells = cells_of(mesh)
+        node, cell = starts[-1]
         lines.append("*NODE, NSET=NALL")
-        lines += [f"{start[0] + i + 1}, " + ", ".join(f"{value:.11e}" for value in p)
+        lines += [f"{node + i + 1}, " + ", ".join(f"{value:.11e}" for value in p)
                   for i, p in enumerate(points)]  # fmt: skip
-        lines.append(f"*ELEMENT, TYPE=C3D8, ELSET={name}")
-        lines += [f"{start[1] + i + 1}, " + ", ".join(str(start[0] + j + 1) for j in cell)
-                  for i, cell in enumerate(cells)]  # fmt: skip
-        held = "bottom" if k == 0 else "top"
-        sets[name] = [int(start[0] + i + 1) for i in nodes_on(mesh, held)]
-        side = "top" if k == 0 else "bottom"
-        lines.append(f"*SURFACE, NAME=S{name}, TYPE=ELEMENT")
-        lines += [f"{start[1] + cell + 1}, S{face}" for cell, face in faces_on(mesh, side)]
-        G = case.moduli[k] / (2 * (1 + POISSON))
-        K = case.moduli[k] / (3 * (1 - 2 * POISSON))
-        lines += [f"*MATERIAL, NAME=M{name}", "*HYPERELASTIC, NEO HOOKE",
-                  f"{G / 2:.12e}, {2 / K:.12e}",
-                  f"*SOLID SECTION, ELSET={name}, MATERIAL=M{name}"]  # fmt: skip
-        start = [start[0] + len(points), start[1] + len(cells)]
-        first = start[0]
-    for name, nodes in sets.items():
-        lines += [f"*NSET, NSET=N{name}", *listed(nodes)]
-    return lines + contact(case, swap) + step(case, plane, first)
+        lines.append(f"*ELEMENT, TYPE=C3D8, ELSET=B{k}")
+        lines += [f"{cell + i + 1}, " + ", ".join(str(node + j + 1) for j in nodes)
+                  for i, nodes in enumerate(cells)]  # fmt: skip
+        shear, bulk = given.moduli(k)
+        lines += [f"*MATERIAL, NAME=M{k}", "*HYPERELASTIC, NEO HOOKE",
+                  f"{shear / 2:.12e}, {2 / bulk:.12e}",
+                  f"*SOLID SECTION, ELSET=B{k}, MATERIAL=M{k}"]  # fmt: skip
+        starts.append([node + len(points), cell + len(cells)])
+    for name, (k, facets) in zip(("SLAVE", "MASTER"), given.sides, strict=True):
+        lines.append(f"*SURFACE, NAME={name}, TYPE=ELEMENT")
+        lines += [f"{starts[k][1] + cell + 1}, S{face}"
+                  for cell, face in faces_on(given.bodies[k][0], facets)]  # fmt: skip
+    stiffness = factor * STIFF * min(young for _, young in given.bodies) / given.facet
+    lines += ["*SURFACE INTERACTION, NAME=SI",
+              "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", f"{stiffness:.6e}"]  # fmt: skip
+    if given.mu:
+        lines += ["*FRICTION", f"{given.mu}, {stick * stiffness:.6e}"]
+    lines += ["*CONTACT PAIR, INTERACTION=SI, TYPE=SURFACE TO SURFACE", "SLAVE, MASTER"]
+    return lines + step(given, [node for node, _ in starts])
 
 
-def contact(case, swap):
-    """Interaction and pair."""
-    size = np.ptp(case.lower.points[:, 0]) / (len(corners(case.lower, "top")) or 1)
-    if case.lower.points.shape[1] == 3:
-        size = np.sqrt(np.prod(np.ptp(case.lower.points, axis=0)[:2])
-                       / len(corners(case.lower, "top")))  # fmt: skip
-    stiffness = STIFF * min(case.moduli) / size
-    sides = ("SUPPER", "SLOWER")[:: -1 if swap else 1]
-    return ["*SURFACE INTERACTION, NAME=SI",
-            "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", f"{stiffness:.6e}",
-            "*FRICTION", f"{case.mu}, {stiffness / 10:.6e}",
-            "*CONTACT PAIR, INTERACTION=SI, TYPE=SURFACE TO SURFACE",
-            ", ".join(sides)]  # fmt: skip
+def twins(given, body, nodes, first):
+    """Numbers (n, 1 or 2) in the deck of nodes (n,) of a body."""
+    out = [first[body] + np.asarray(nodes) + 1]
+    if given.dim == 2:
+        out.append(out[0] + len(given.bodies[body][0].points))
+    return np.stack(out, axis=1)
 
 
-def step(case, plane, nodes):
-    """Amplitudes and the one step, whose time counts load steps."""
-    times = [0, case.presses, *([case.steps] if case.drags else [])]
-    lines = []
-    for name, c in (("AX", 0), ("AD", -1)):
-        table = [f"{t}, {case.top(t)[c]:.12e}" for t in times]
-        lines += [f"*AMPLITUDE, NAME={name}", *table]
-    height, across = ("2", "3") if plane else ("3", "2")
-    lines += ["*BOUNDARY", "NLOWER, 1, 3, 0.", f"NUPPER, {across}, {across}, 0."]
-    if plane:
-        lines.append("NALL, 3, 3, 0.")
-    return [*lines, "*STEP, NLGEOM, INC=100000", "*STATIC", f"1., {case.steps}., 1e-6, 1.",
-            "*BOUNDARY, AMPLITUDE=AX", "NUPPER, 1, 1, 1.",
-            "*BOUNDARY, AMPLITUDE=AD", f"NUPPER, {height}, {height}, 1.",
-            "*NODE PRINT, NSET=NUPPER, TOTALS=ONLY", "RF",
-            "*NODE PRINT, NSET=NALL", "U", "*END STEP", ""]  # fmt: skip
+def step(given, first):
+    """Supports, the way of the driven nodes, and the one step, whose time counts load steps."""
+    fixed, amplitudes, moved = [], [], []
+    for body, nodes, components in given.supports:
+        numbers = twins(given, body, nodes, first).ravel()
+        fixed += [f"{n}, {c + 1}, {c + 1}, 0." for n in numbers for c in components]
+    body, nodes, ways = given.driven
+    names = {}
+    for k, numbers in enumerate(twins(given, body, nodes, first)):
+        for c in range(given.dim):
+            table = ways[:, k, c]
+            key = table.tobytes()
+            if key not in names:
+                names[key] = f"A{len(names)}"
+                amplitudes.append(f"*AMPLITUDE, NAME={names[key]}")
+                amplitudes += [f"{t}, {value:.12e}" for t, value in enumerate(table)]
+            for n in numbers:
+                moved += [f"*BOUNDARY, AMPLITUDE={names[key]}", f"{n}, {c + 1}, {c + 1}, 1."]
+    if given.dim == 2:
+        fixed.append("NALL, 3, 3, 0.")
+    driven = listed(twins(given, body, nodes, first).ravel().tolist())
+    return [*amplitudes, "*NSET, NSET=NDRIVEN", *driven, "*BOUNDARY", *fixed,
+            "*STEP, NLGEOM, INC=100000", "*STATIC", f"1., {given.steps}., 1e-6, 1.",
+            *moved, "*NODE PRINT, NSET=NDRIVEN", "RF", "*NODE PRINT, NSET=NALL", "U",
+            "*END STEP", ""]  # fmt: skip
 
 
 def blocks(text, head):
@@ -132,32 +129,29 @@ def blocks(text, head):
     return found
 
 
-def solved(case, folder, swap=False, limit=600):
+def solved(given, folder, limit=600, factor=1.0, stick=STICK):
     """Run CalculiX; load steps, Newton steps, seconds, penetration and forces by step."""
     path = Path(folder) / "case"
-    path.with_suffix(".inp").write_text("\n".join(deck(case, swap)))
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    try:
-        subprocess.run(["ccx", "case"], cwd=folder, capture_output=True, timeout=limit,
-                       check=False, env={**os.environ, "OMP_NUM_THREADS": "1"})  # fmt: skip
-    except subprocess.TimeoutExpired:
-        pass
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    path.with_suffix(".inp").write_text("\n".join(deck(given, factor, stick)))
+    seconds, _ = limited(["ccx", "case"], limit, cwd=folder,
+                         env={**os.environ, "OMP_NUM_THREADS": "1"})  # fmt: skip
     text = path.with_suffix(".dat").read_text()
     counted = [line for line in path.with_suffix(".cvg").read_text().splitlines()
                if line.split() and line.split()[0].isdigit()]  # fmt: skip
-    d = case.lower.points.shape[1]
-    first, second = (len(mesh.points) for mesh in (case.lower, case.upper))
-    worst, forces = 0.0, []
+    d, worst, forces = given.dim, 0.0, []
     for _, rows in blocks(text, "displacements"):
-        moved = np.array(rows)[:, 1 : d + 1]
-        start = first * (2 if d == 2 else 1)
-        both = [case.lower.points + moved[:first],
-                case.upper.points + moved[start : start + second]]  # fmt: skip
-        worst = max(worst, penetration(case, both))
-    for time, rows in blocks(text, "total force"):
-        forces.append([time, rows[-1][0], rows[-1][1 if d == 2 else 2]])
-    seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        table = {int(row[0]): row[1 : d + 1] for row in rows}
+        moved, start = [], 0
+        for mesh, _ in given.bodies:
+            n = len(mesh.points)
+            moved.append(mesh.points + [table[start + i + 1] for i in range(n)])
+            start += n * (2 if d == 2 else 1)
+        worst = max(worst, given.penetration(moved))
+    for time, rows in blocks(text, "forces"):
+        there = np.array(rows)[:, 1 : d + 1]
+        per = there.reshape(len(given.driven[1]), -1, d).sum(axis=1)
+        forces.append(given.row(time, per))
     done = forces[-1][0] if forces else 0.0
     return {"steps": len(forces), "newton": len(counted), "seconds": seconds,
-            "penetration": worst, "forces": forces, "reached": done / case.steps}  # fmt: skip
+            "penetration": worst, "forces": forces, "reached": done / given.steps,
+            "why": "out of time" if seconds >= limit - 1 else ""}  # fmt: skip

@@ -1,7 +1,6 @@
 """More of `large_sliding`: bodies that roll, turn, fold and are pressed into each other.
 
-Models of neo-Hookean bodies with the displacement of a driven side over the load step; there
-is no counterpart of them in other programs here.
+Models of neo-Hookean bodies with the displacement of a driven side over the load step.
 """
 
 from dataclasses import dataclass, replace
@@ -29,10 +28,11 @@ class Driven:
     sides: tuple[str, str]
     mu: float
     order: int = 1
+    poisson: float = POISSON
 
-    def model(self, swap=False):
-        """The model; with swap the other side is the slave."""
-        bodies = [am.Body(mesh, am.NeoHookean(young, POISSON), name=name, order=self.order)
+    def model(self, swap=False, law=am.NeoHookean):
+        """The model; with swap the other side is the slave; law(young, poisson)."""
+        bodies = [am.Body(mesh, law(young, POISSON), name=name, order=self.order)
                   for name, (mesh, young) in self.bodies.items()]  # fmt: skip
         dim = bodies[0].mesh.dim
 
@@ -55,14 +55,14 @@ def about(points, angle, centre):
 
 
 # ------------------------------------------------------------------------------- rolling
-def rolling():
+def rolling(fine=1):
     """A tyre on a hub is pressed on a slab and rolls on it by a quarter of its outline."""
-    ring = am.box((2 * np.pi, 0.5), (72, 4))
+    ring = am.box((2 * np.pi, 0.5), (72 * fine, 4 * fine))
     angle, height = ring.points.T
     radius = 0.5 + height
     points = np.stack([radius * np.sin(angle), 1 - radius * np.cos(angle)], axis=1)
     ring = joined_ends(replace(ring, points=points), "left", "right")
-    slab = am.box((3.5, 0.8), (44, 6), origin=(-0.8, -0.8))
+    slab = am.box((3.5, 0.8), (44 * fine, 6 * fine), origin=(-0.8, -0.8))
 
     def way(x, step):
         down, turn = -0.06 * min(step / 5, 1), np.pi / 2 * max(step - 5, 0) / 40
@@ -87,10 +87,10 @@ def joined_ends(mesh, one, other):
 
 
 # ------------------------------------------------------------------------------- turning
-def turned(order=1):
+def turned(order=1, fine=1):
     """A block pressed on another is turned about their axis once."""
-    below = am.box((1, 1, 0.5), (5, 5, 2), origin=(-0.5, -0.5, -0.5))
-    above = am.box((0.8, 0.8, 0.5), (3, 3, 2), origin=(-0.4, -0.4, 0))
+    below = am.box((1, 1, 0.5), (5 * fine, 5 * fine, 2 * fine), origin=(-0.5, -0.5, -0.5))
+    above = am.box((0.8, 0.8, 0.5), (3 * fine, 3 * fine, 2 * fine), origin=(-0.4, -0.4, 0))
 
     def way(x, step):
         out = about(x, 2 * np.pi * max(step - 4, 0) / 72, (0, 0))
@@ -103,12 +103,12 @@ def turned(order=1):
 
 
 # ------------------------------------------------------------------------------- folding
-def folded():
+def folded(fine=1):
     """A strip bent to a U: its arms are pressed together, one is pulled along the other."""
     arm, gap, thick = 2.0, 0.3, 0.2
     radius = (gap + thick) / 2
     half = np.pi * radius
-    mesh = am.box((2 * arm + half, thick), (72, 4))
+    mesh = am.box((2 * arm + half, thick), (72 * fine, 4 * fine))
     s, h = mesh.points.T
     angle = np.clip((s - arm) / radius, 0, np.pi) - np.pi / 2
     past = np.maximum(s - arm - half, 0)
@@ -134,10 +134,10 @@ def folded():
 
 
 # ----------------------------------------------------------------------------- pressed in
-def pressed_in():
+def pressed_in(fine=1):
     """A pin with a cone in front is pressed into a tube, 3 % narrower; a quarter of both."""
-    tube = round_quarter((1.0, 1.5), (0.0, 1.5), (8, 2, 10), lambda z: 1.0)
-    pin = round_quarter((0.5, 1.0), (-1.6, -0.1), (7, 2, 9), taper)
+    tube = round_quarter((1.0, 1.5), (0.0, 1.5), np.multiply((8, 2, 10), fine), lambda z: 1.0)
+    pin = round_quarter((0.5, 1.0), (-1.6, -0.1), np.multiply((7, 2, 9), fine), taper)
     fixed = [am.Fix("tube.top", (None, None, 0))]
     for name in ("tube", "pin"):
         fixed.append(am.Fix(f"{name}.left", (None, 0, None)))
@@ -157,7 +157,7 @@ def taper(z):
 
 def round_quarter(radii, along, cells, outer):
     """A quarter of a tube from z to z; outer(z) scales the outer radius."""
-    box = am.box((1, 1, 1), cells)
+    box = am.box((1, 1, 1), tuple(map(int, cells)))
     turn, out, z = box.points.T
     z = along[0] + (along[1] - along[0]) * z
     radius = radii[0] + (radii[1] * outer(z) - radii[0]) * out

@@ -47,6 +47,7 @@ Solve = Callable[[Array], Array]
 REFINE_ABOVE = 1e-14  # relative residual of the trial solve above which solves are refined
 CORRECT_ABOVE = 1e-12  # the same after a refinement, from which GMRES takes its place
 CORRECTED, CORRECTIONS = 1e-15, 30  # residual and steps at which that ends
+SMALL = 50_000  # entries up to which threads cost more than they save
 INTERRUPTIBLE = 20_000  # unknowns from which a factorisation takes longer than one waits
 FAILURES = (ArithmeticError, RuntimeError, MemoryError, ValueError, ImportError)  # of packages
 QUICK_ORDER = 30_000  # unknowns up to which nested dissection costs MUMPS more than it saves
@@ -286,6 +287,7 @@ def _rslab_factor(
     from rslab import Interrupt
 
     stop = Interrupt()
+    threads = threads or int(matrix.nnz <= SMALL)  # the factor is the same for any number
     options: dict[str, Any] = {"threads": threads} if threads else {}
     options |= {"preconditioner": least} if least else {}
     if matrix.shape[0] > INTERRUPTIBLE:

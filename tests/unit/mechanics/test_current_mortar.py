@@ -146,3 +146,20 @@ def test_patch(swap, mu):
 def test_what_two_bodies_do_not_have_is_said():
     with pytest.raises(am.UnsupportedForm, match="method='mortar'"):
         am.solve(two_blocks((0, -0.1), mu=0.1, method="nodal"))
+
+
+def test_meetings_outlast_a_step():
+    """Parts without a law of their own are one object, which keeps where pairs have met."""
+    model = two_blocks((0.0, -0.05), mu=0.3)
+    parts = large_deformation(model).parts
+    u = np.zeros(parts.X.shape)
+    assert large_deformation(model).parts.meet(u) is parts.meet(u)
+
+
+def test_the_work_of_a_step_does_not_depend_on_the_one_before():
+    """Forces kept from the last step are those that a restart from its state computes."""
+    model = two_blocks(lambda x, t: (0.2 * max(t - 1, 0), -0.05 * min(t, 1)), mu=0.3)
+    steps = list(am.evolve(model, am.QuasiStatic(0.5), until=2.0))
+    again = next(iter(am.evolve(model, am.QuasiStatic(0.5), until=2.0, start=steps[2].state)))
+    assert again.energies == steps[3].energies
+    np.testing.assert_array_equal(again.state.displacement, steps[3].state.displacement)

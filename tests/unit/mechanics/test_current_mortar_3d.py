@@ -167,3 +167,20 @@ def test_the_moment_of_forces_vanishes_as_gaps_do():
             left = np.linalg.norm(across[here.met], axis=1).sum()
             assert moment <= left + 1e-14
             assert left < 0.2 * along + 1e-3
+
+
+def test_slopes_of_surfaces_that_face_nothing_are_those_of_the_normals_alone():
+    pair, x = surfaces()
+    away = x.copy()
+    away[: len(pair.slaves), 0] += 10
+    here = pair.at(away)
+    assert not here.met.any()
+    slopes, force = here.slopes, np.ones((len(here.met), 3))
+    assert slopes.distances.nnz == slopes.gap.nnz == 0
+    assert slopes.spread(force * here.met[:, None]).nnz == 0
+    way = np.random.default_rng(0).standard_normal(x.shape)
+    turned = (pair.at(away + STEP * way).normals - pair.at(away - STEP * way).normals)
+    np.testing.assert_allclose(slopes.normals @ way.ravel(), turned.ravel() / (2 * STEP),
+                               atol=1e-6)  # fmt: skip
+    # motion since then is that against the closest node of the other side
+    assert abs(slopes.motion(here) @ np.ones(x.size)).max() == 0

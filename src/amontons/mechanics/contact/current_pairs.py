@@ -12,9 +12,9 @@ An obstacle is a pair whose other side has no unknowns: B is 1 at p, nobody take
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,6 +113,7 @@ class Meetings:
     """All pairs of a model at some positions, one after another: nc contacts."""
 
     parts: Sequence[AnyMeeting]
+    _last: list[Any] = field(default_factory=list, init=False, repr=False)  # of `motion`
 
     @property
     def only_obstacles(self) -> bool:
@@ -157,6 +158,10 @@ class Meetings:
         onto = sparse.csr_array(self.averages.T)
         return sparse.csr_array(onto - sparse.csr_array(entries, shape=onto.shape))
 
+    def pushed(self, axes: Array, r: Array) -> Array:
+        """Forces (nodes d,) of reactions r (nc, d) in the frames axes (nc, d, d): H r."""
+        return (self.averages.T @ np.einsum("pkc,pk->pc", axes, r)).ravel()
+
     def columns(self, axes: Array) -> sparse.csc_array:
         """H (nodes d, nc d): column p d + k holds the forces of a unit along axis k of p.
 
@@ -168,7 +173,12 @@ class Meetings:
         return sparse.csc_array(spread @ sparse.bsr_array(local, shape=(nc * d,) * 2).tocsr())
 
     def motion(self, u: Array, before: Array, earlier: Meetings) -> Array:
-        """s, (nc, d), from displacements `before` to u (nodes, d), where earlier met then."""
+        """s, (nc, d), from displacements `before` to u (nodes, d), where earlier met then.
+
+        u: of this meeting; the last answer is kept.
+        """
+        if self._last and self._last[0] is earlier:
+            return self._last[1].copy()
         out = []
         for part, old in zip(self.parts, earlier.parts, strict=True):
             if isinstance(part, MortarMeeting) and isinstance(old, MortarMeeting):
@@ -177,7 +187,8 @@ class Meetings:
                 out.append(part.motion(old))
             else:
                 out.append(u[part.slaves] - before[part.slaves])
-        return np.concatenate(out)
+        self._last[:] = earlier, np.concatenate(out)
+        return self._last[1].copy()
 
     # ------------------------------------------- derivatives by the place of the slave
     def _joined(self, name: str) -> Array:

@@ -6,11 +6,14 @@ follows from
 
     d(A h) = dW Q h - A dmass Q h + A dh       for h linear in own and cross.               (1)
 
+Derivatives stand in dense blocks, one for a pair of facets, until they are summed up once:
+sparse products of single steps would cost more than all numbers in them.
 Notation is that of `current_mortar`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -24,6 +27,28 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+Entries = tuple[Array, Index, Index]  # values, rows and columns
+
+
+@dataclass(frozen=True, eq=False)
+class SlotSlopes:
+    """Derivatives of a vector at slave nodes in parts.
+
+    values (q, a, d, w): added at rows (q, a), < 0 for none, by the dofs (q, w).
+    """
+
+    values: Array
+    rows: Index
+    dofs: Index
+
+    def times(self, factors: Array) -> Entries:
+        """Entries of the derivatives of factors_p (nc, m, d) times the vector of p."""
+        there = self.rows >= 0
+        by_row = np.where(there[:, :, None, None], factors[self.rows], 0.0)
+        values = by_row @ self.values
+        m = factors.shape[1]
+        rows = np.where(there[:, :, None], self.rows[:, :, None] * m + np.arange(m), -1)
+        return values, rows[..., None], self.dofs[:, None, None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,9 +57,57 @@ class MortarSlopes:
 
     at: MortarMeeting
 
-    @cached_property
+    def combined(
+        self, by_normal: Array, by_distance: Array, by_motion: Array, earlier: MortarMeeting
+    ) -> sparse.csr_array:
+        """Derivative of by_normal n + by_distance G + by_motion s, (nc m, nodes d).
+
+        All factors (nc, m, d); that of G of nodes that meet.
+        """
+        both = (self.at.met & earlier.met)[:, None, None]
+        by_distance = by_distance - by_motion * both
+        entries = [self._normals.times(by_normal), self._distances.times(by_distance),
+                   averaged(self.at.met_averages, by_distance),
+                   averaged(earlier.references, by_motion)]  # fmt: skip
+        nc, m = by_normal.shape[:2]
+        return assembled(entries, (nc * m, self.at.x.size))
+
+    def _alone(self, count: int = 0, **factors: Array) -> sparse.csr_array:
+        """`combined` without the motion; factors left out are zero."""
+        nc, d = self.at.normals.shape
+        nothing = np.zeros((nc, count or d, d))
+        return self.combined(factors.get("by_normal", nothing),
+                             factors.get("by_distance", nothing), nothing, self.at)  # fmt: skip
+
+    @property
+    def _eyes(self) -> Array:
+        nc, d = self.at.normals.shape
+        return np.broadcast_to(np.eye(d), (nc, d, d))
+
+    @property
     def normals(self) -> sparse.csr_array:
         """dn/dx, (nc d, nodes d)."""
+        return self._alone(by_normal=self._eyes)
+
+    @property
+    def distances(self) -> sparse.csr_array:
+        """dG/dx, (nc d, nodes d), of nodes that meet; zero for the others."""
+        return self._alone(by_distance=self._eyes)
+
+    @property
+    def gap(self) -> sparse.csr_array:
+        """dg/dx, (nc, nodes d), of nodes that meet; zero for the others."""
+        apart = (self.at.distances * self.at.met[:, None])[:, None]
+        return self._alone(1, by_normal=apart, by_distance=self.at.normals[:, None])
+
+    def motion(self, earlier: MortarMeeting) -> sparse.csr_array:
+        """ds/dx, (nc d, nodes d)."""
+        nothing = np.zeros(self._eyes.shape)
+        return self.combined(nothing, nothing, self._eyes, earlier)
+
+    @cached_property
+    def _normals(self) -> SlotSlopes:
+        """Of n, a part per facet."""
         (skin, heeded), n = self.at.pair.around, self.at.normals
         (f, a), (nc, d) = skin.nodes.shape, n.shape
         length = np.linalg.norm(self.at.sums, axis=1)
@@ -46,49 +119,22 @@ class MortarSlopes:
         row = np.where(heeded, own[skin.nodes], -1)
         values = np.where((row >= 0)[:, :, None, None], project[row], 0.0)
         values = values @ (share / skin.corners[:, None, None, None])  # (f, a, d, a d)
-        columns = np.broadcast_to(_dofs(skin.nodes, d)[:, None, None], values.shape)
-        rows = np.broadcast_to((row[:, :, None] * d + np.arange(d))[..., None], values.shape)
-        return summed(values, rows, columns, (nc * d, self.at.x.size))
-
-    def motion(self, earlier: MortarMeeting) -> sparse.csr_array:
-        """ds/dx, (nc d, nodes d)."""
-        d = self.at.x.shape[1]
-        both = sparse.diags_array(np.repeat((self.at.met & earlier.met).astype(float), d))
-        moved = sparse.kron(earlier.references, sparse.eye_array(d))
-        return sparse.csr_array(moved - both @ self.distances)
+        return SlotSlopes(values, row, _dofs(skin.nodes, d))
 
     @cached_property
-    def gap(self) -> sparse.csr_array:
-        """dg/dx, (nc, nodes d), of nodes that meet; zero for the others."""
-        met = self.at.met[:, None]
-        by_normal = blocks_of((self.at.distances * met)[:, None]) @ self.normals
-        along = blocks_of(self.at.normals[:, None]) @ self.distances
-        return sparse.csr_array(by_normal + along)
+    def _integrals(self) -> tuple[Array, Array, Index]:
+        """Of own (k, a, a + e, w) and cross (k, a, b + h, w) of every pair by dofs (k, w).
 
-    @cached_property
-    def _slopes(self) -> tuple[sparse.csr_array, sparse.csr_array]:
-        """Derivatives of own (f a (a + e), nodes d) and cross (k a (b + h), nodes d)."""
+        Those of own add up to the ones of their facet.
+        """
         parts, pair = self.at.shared, self.at.pair
         slave, master = pair.slave.nodes[parts.slave], pair.master.nodes[parts.master]
         own, cross = self.at.facet_pairs(parts.slave, parts.master).slopes()
-        k = len(slave)
-        dofs = _dofs(np.concatenate([slave, master], axis=1), self.at.x.shape[1])
-        out = []
-        for values, group, count in (
-            (own, parts.of, len(parts.facets)), (cross, np.arange(k), k),
-        ):  # fmt: skip
-            inner = values.shape[1] * values.shape[2]
-            values = values.reshape(k, inner, dofs.shape[1])
-            rows = np.broadcast_to(
-                (group[:, None] * inner + np.arange(inner))[:, :, None], values.shape
-            )
-            columns = np.broadcast_to(dofs[:, None], values.shape)
-            out.append(summed(values, rows, columns, (count * inner, self.at.x.size)))
-        return out[0], out[1]
+        return own, cross, _dofs(np.concatenate([slave, master], axis=1), self.at.x.shape[1])
 
     @cached_property
-    def distances(self) -> sparse.csr_array:
-        """dG/dx, (nc d, nodes d), of nodes that meet; zero for the others."""
+    def _distances(self) -> SlotSlopes:
+        """Of G by the integrals, a part per pair of facets; B is held."""
         parts, pair, d = self.at.shared, self.at.pair, self.at.x.shape[1]
         at = pair.slave.values(self.at.x)[parts.facets]
         there = pair.master.values(self.at.x)[parts.master]
@@ -99,87 +145,121 @@ class MortarSlopes:
         scale = np.where(kept, self.at.by_weight[row], 0.0)
         apart = y - np.where(kept[:, :, None], self.at.distances[row], 0.0)
         apart = apart * scale[:, :, None]
-        a = psi.shape[1]
+        a, scaled = psi.shape[1], psi * scale[:, :, None]
         # (f, p, c, r, t): by own_rt, where the first a of t are mass_rt
         beside = at.copy()
         beside[:, :a] -= y
-        by_own = np.einsum("fpr,ftc->fpcrt", psi * scale[:, :, None], beside)
-        by_own[..., :a] += np.einsum("fpc,pr,t->fpcrt", apart, np.eye(a), np.ones(a))
-        by_cross = -np.einsum("kpr,kbc->kpcrb", (psi * scale[:, :, None])[parts.of], there)
-        own, cross = self._slopes
-        nc, facets, numbers = len(pair.slaves), np.arange(len(y)), np.arange(len(there))
-        whole = sparse.kron(self.at.met_averages, sparse.eye_array(d))
-        whole = whole + _placed(by_own, row, facets, nc, own.shape[0]) @ own
-        whole = whole + _placed(by_cross, row[parts.of], numbers, nc, cross.shape[0]) @ cross
-        return sparse.csr_array(whole)
+        by_own = scaled[:, :, None, :, None] * beside.swapaxes(1, 2)[:, None, :, None, :]
+        by_own[..., :a] += (apart[:, :, :, None] * np.eye(a)[:, None])[..., None]
+        by_cross = there.swapaxes(1, 2)[:, None, :, None, :]
+        by_cross = -scaled[parts.of][:, :, None, :, None] * by_cross
+        own, cross, dofs = self._integrals
+        values = _through(by_own[parts.of], own) + _through(by_cross, cross)
+        return SlotSlopes(values.reshape(-1, a, d, dofs.shape[1]), row[parts.of], dofs)
 
     def spread(self, force: Array) -> sparse.csr_array:
         """Derivative of sum_p B_pj lambda_p at all nodes j by x, (nodes d, nodes d).
 
-        force (nc, d): lambda, held.
+        force (nc, d): lambda, held.  With z_r = sum_p psi_pr lambda_p / D_p on every facet that
+        is z own at nodes of the slave and -z cross at those of the master.
         """
         parts, slave, master = self.at.shared, self.at.pair.slave, self.at.pair.master
         scaled = force * self.at.by_weight[:, None]
-        by_own, others, by_cross = self._by_integrals(scaled)
-        own, cross = self._slopes
-        facets, numbers = np.arange(len(parts.facets)), np.arange(len(parts.of))
-        a, b, n = slave.nodes.shape[1], master.nodes.shape[1], len(self.at.x)
-
-        def onto(mine: Index, its: slice, theirs: Index, their: slice) -> sparse.csr_array:
-            """At nodes mine of the slave's facets, and theirs of the master's."""
-            out = _placed(by_own[:, its], mine, facets, n, own.shape[0])
-            out += _placed(others[:, their], theirs, parts.of, n, own.shape[0])
-            across = _placed(by_cross[:, their], theirs, numbers, n, cross.shape[0])
-            return sparse.csr_array(out @ own + across @ cross)
-
+        w = np.where(parts.kept[:, :, None], scaled[self.at.rows], 0.0)  # (f, p, c)
+        z = parts.psi.swapaxes(1, 2) @ w  # (f, r, c)
+        by_x = self._slopes_of(z, w)
+        a, b = slave.nodes.shape[1], master.nodes.shape[1]
         left = np.where(~parts.kept & slave.real[parts.facets], slave.nodes[parts.facets], -1)
-        out = onto(left, slice(a), master.nodes[parts.master], slice(b))
+        out = self._onto(z, by_x, (left, slice(a)), (master.nodes[parts.master], slice(b)))
         if self.at.has_bulges:
-            bent = onto(slave.middles[parts.facets], slice(a, None),
-                        master.middles[parts.master], slice(b, None))  # fmt: skip
-            out = out + sparse.kron(self.at.bulges.T, sparse.eye_array(force.shape[1])) @ bent
-        return sparse.csr_array(out - self._by_weights(scaled))
+            bent = self._onto(z, by_x, (slave.middles[parts.facets], slice(a, None)),
+                              (master.middles[parts.master], slice(b, None)))  # fmt: skip
+            lifts = sparse.kron(self.at.bulges.T, sparse.eye_array(z.shape[2]), format="csr")
+            out = out + lifts @ bent
+        return sparse.csr_array(out)
 
-    def _by_integrals(self, scaled: Array) -> tuple[Array, Array, Array]:
-        """Derivatives of sum_p D_p B_pj lambda_p / D_p by own and cross; scaled: lambda / D.
+    def _slopes_of(self, z: Array, w: Array) -> sparse.csr_array:
+        """dz/dx, (f a d, nodes d), of z (f, a, d) of `spread`; w (f, p, d): lambda / D."""
+        parts, row = self.at.shared, self.at.rows
+        f, a, d = z.shape
+        n, nc = self.at.x.size, len(self.at.pair.slaves)
+        own, _, dofs = self._integrals
+        mass = own[:, :, :a]
+        inverse = np.where(parts.kept[:, :, None], parts.inverse, 0.0)
+        # (f, r, c, s, t): by mass_st
+        by_mass = np.zeros((f, a, d, a, a))
+        by_mass += (inverse.swapaxes(1, 2)[:, :, None] * w.swapaxes(1, 2)[:, None])[..., None]
+        across = inverse.swapaxes(1, 2)[:, :, None, None, :]
+        by_mass -= z.swapaxes(1, 2)[:, None, :, :, None] * across
+        values = _through(by_mass[parts.of], mass)
+        rows = (parts.of[:, None] * a * d + np.arange(a * d))[:, :, None]
+        held = assembled([(values, rows, dofs[:, None])], (f * a * d, n))
+        # D_p in lambda / D_p
+        weights = assembled([(mass.sum(axis=2), row[parts.of][:, :, None], dofs[:, None])],
+                            (nc, n))  # fmt: skip
+        scale = np.where(parts.kept, self.at.by_weight[row], 0.0)
+        by_weight = -(parts.psi * scale[:, :, None])[..., None] * w[:, :, None]  # (f, p, r, c)
+        rows = (np.arange(f * a * d).reshape(f, 1, a, d), row[:, :, None, None])
+        kept = np.broadcast_to(row[:, :, None, None] >= 0, by_weight.shape)
+        entries = [np.broadcast_to(k, by_weight.shape)[kept] for k in rows]
+        across = sparse.coo_array((by_weight[kept], entries), shape=(f * a * d, nc))
+        return sparse.csr_array(held + across.tocsr() @ weights)
 
-        At corners and middles of the slave by own, (f, s, c, r, t), of the master by own,
-        (k, b, c, r, t), and by cross, (k, b, c, r, b').
+    def _onto(
+        self, z: Array, by_x: sparse.csr_array, mine: tuple[Index, slice],
+        theirs: tuple[Index, slice],
+    ) -> sparse.csr_array:  # fmt: skip
+        """Of z own at nodes of the slave's facets (f, s), and -z cross at the master's (k, b).
+
+        by_x: dz/dx; with the nodes come their slots in own and cross.
         """
         parts = self.at.shared
-        kept, psi = parts.kept, parts.psi
-        a, width, across = psi.shape[1], parts.own.shape[2], parts.cross.shape[2]
-        w = np.where(kept[:, :, None], scaled[self.at.rows], 0.0)  # (f, p, c)
-        through = np.einsum("fpr,fpc->frc", psi, w)
-        inner = np.where(kept[:, :, None], parts.inverse @ parts.own, 0.0)
-        here = np.einsum("frc,ts->fscrt", through, np.eye(width))
-        here[..., :a] += np.einsum("frc,frs,t->fscrt", w, inner, np.ones(a))
-        here[..., :a] -= np.einsum("frc,fts->fscrt", through, inner)
-        outer = np.where(kept[parts.of][:, :, None], parts.inverse[parts.of] @ parts.cross, 0.0)
-        there = np.einsum("krc,ktb->kbcrt", through[parts.of], outer)
-        there -= np.einsum("krc,krb,t->kbcrt", w[parts.of], outer, np.ones(a))
-        there = np.pad(there, [(0, 0)] * 4 + [(0, width - a)])
-        return here, there, -np.einsum("krc,be->kbcre", through[parts.of], np.eye(across))
+        f, a, d = z.shape
+        own, cross, dofs = self._integrals
+        forms, local = [], []
+        for (nodes, slots), held, slopes, of in (
+            (mine, parts.own, own, np.arange(f)), (theirs, -parts.cross, -cross, parts.of)
+        ):  # fmt: skip
+            held = held[:, :, slots].swapaxes(1, 2)[..., None]  # (., s, r, 1)
+            at = np.where(nodes[:, :, None] >= 0, nodes[:, :, None] * d + np.arange(d), -1)
+            columns = of[:, None, None] * a * d + np.arange(a * d).reshape(a, d)
+            forms.append((np.broadcast_to(held, (*nodes.shape, a, d)), at[:, :, None],
+                          columns[:, None]))  # fmt: skip
+            by_pair = slopes[:, :, slots].swapaxes(1, 2)  # (k, s, r, w)
+            values = z.swapaxes(1, 2)[parts.of][:, None] @ by_pair  # (k, s, c, w)
+            at = at if len(nodes) == len(dofs) and of is parts.of else at[parts.of]
+            local.append((values, at[..., None], dofs[:, None, None]))
+        n = self.at.x.size
+        return assembled(forms, (n, f * a * d)) @ by_x + assembled(local, (n, n))
 
-    def _by_weights(self, scaled: Array) -> sparse.csr_array:
-        """sum_p B_pj lambda_p dD_p / D_p, (nodes d, nodes d); scaled (nc, d): lambda / D."""
-        row = self.at.rows
-        nc, d = scaled.shape
-        a = row.shape[1]
-        ones = np.broadcast_to(np.ones(a), (*row.shape, a))
-        rows = np.broadcast_to(row[:, :, None], ones.shape)
-        slots = np.arange(self.at.shared.own.size).reshape(self.at.shared.own.shape)
-        own = self._slopes[0]
-        weights = summed(ones, rows, slots[:, :, :a], (nc, own.shape[0])) @ own
-        kept = (np.asarray(self.at.met, dtype=float), (np.arange(nc), self.at.pair.slaves))
-        off = self.at.met_averages - sparse.coo_array(kept, shape=self.at.averages.shape)
-        off = off.tocoo()
-        p, j = (np.asarray(k, dtype=np.int64) for k in off.coords)
-        entries = off.data[:, None] * scaled[p]
-        rows = j[:, None] * d + np.arange(d)
-        columns = np.broadcast_to(p[:, None], entries.shape)
-        onto = summed(entries, rows, columns, (self.at.x.size, nc))
-        return sparse.csr_array(onto @ weights)
+
+def _through(factors: Array, slopes: Array) -> Array:
+    """sum_rt factors (k, p, c, r, t) slopes (k, r, t, w), (k, p c, w)."""
+    k, p, c, r, t = factors.shape
+    return factors.reshape(k, p * c, r * t) @ slopes.reshape(k, r * t, slopes.shape[3])
+
+
+def averaged(averages: sparse.csr_array, factors: Array) -> Entries:
+    """Entries of the derivatives of factors_p (nc, m, d) times sum_j averages_pj x_j."""
+    d = factors.shape[2]
+    counts = np.diff(averages.indptr)
+    rows = np.repeat(np.arange(len(factors)), counts)
+    values = averages.data[:, None, None] * factors[rows]
+    m = factors.shape[1]
+    columns = averages.indices.astype(np.int64)[:, None] * d + np.arange(d)
+    return values, (rows[:, None] * m + np.arange(m))[..., None], columns[:, None]
+
+
+def assembled(entries: Sequence[Entries], shape: tuple[int, int]) -> sparse.csr_array:
+    """Sum of parts (values, rows, columns), broadcast, without those in negative rows."""
+    flat = []
+    for values, rows, columns in entries:
+        kept = (values != 0) & (rows >= 0)
+        flat.append([values[kept]] + [
+            np.broadcast_to(k, values.shape)[kept] for k in (rows, columns)
+        ])  # fmt: skip
+    values, rows, columns = (np.concatenate(part) for part in zip(*flat, strict=True))
+    return sparse.coo_array((values, (rows, columns)), shape=shape).tocsr()
 
 
 def blocks_of(values: Array) -> sparse.csr_array:
@@ -201,17 +281,3 @@ def summed(
     kept = (rows >= 0) & (values != 0)
     entries = (values[kept], (rows[kept], columns[kept]))
     return sparse.coo_array(entries, shape=shape).tocsr()
-
-
-def _placed(values: Array, nodes: Index, of: Index, n: int, width: int) -> sparse.csr_array:
-    """Entries (k, s, c, r, t) at nodes (k, s), < 0 for none, as a matrix (n c, width).
-
-    of (k,): which r t columns they stand in.
-    """
-    k, s, c = values.shape[:3]
-    inner = values.shape[3] * values.shape[4]
-    flat = values.reshape(k, s, c, inner)
-    rows = np.where(nodes[:, :, None] >= 0, nodes[:, :, None] * c + np.arange(c), -1)
-    columns = (of[:, None] * inner + np.arange(inner))[:, None, None]
-    rows = np.broadcast_to(rows[..., None], flat.shape)
-    return summed(flat, rows, np.broadcast_to(columns, flat.shape), (n * c, width))

@@ -4,7 +4,8 @@ Both are projected along the slave's normal onto the plane through it, the maste
 cut by the sides of the slave's, and the part they share is filled with triangles from its first
 corner.  Where corners coincide some of these have an area of rounding, of either sign, and yet
 derivatives that only all together are right: none is left out.  Numbers are complex: real parts
-decide, imaginary ones carry derivatives along.
+decide, imaginary ones carry derivatives along, first those by the coordinates in the plane,
+then those of these by the corners in space.
 
 Functions of quadrilaterals that are no parallelograms are no polynomials in the plane, as
 their reference point (s, t) is the root of an equation.  With x = c + a s + b t + h st the
@@ -38,7 +39,6 @@ LOST, LOST_SECOND = 4e-5, 4e-3
 EXACT = 2e-11  # relative error of integrals that is none
 ROOM = 10  # corners of what two quadrilaterals share, and two to spare
 NEWTON = 20  # steps to the reference point of a quadrilateral
-AGAIN = 2  # steps after the last, for the imaginary parts
 ENOUGH = 1e-14
 ON_LINE = 1e-10  # distance of a corner from the line of a side, over its length, that is none
 FLAT = 1e-10  # area of a triangle, over that of the square on a side, which may be rounding
@@ -174,9 +174,8 @@ def _shapes(x, n, at0, at1, phi):
         s, t = (r0 * b1 - r1 * b0) / det, (a0 * r1 - a1 * r0) / det
         phi[0], phi[1], phi[2] = 1 - s - t, s, t
         return
-    s, t, left = 0.5 + 0j, 0.5 + 0j, NEWTON
-    while left > 0:
-        left -= 1
+    s, t = 0.5 + 0j, 0.5 + 0j
+    for _ in range(NEWTON):
         a0 = (1 - t) * (x[1, 0] - x[0, 0]) + t * (x[2, 0] - x[3, 0])
         a1 = (1 - t) * (x[1, 1] - x[0, 1]) + t * (x[2, 1] - x[3, 1])
         b0 = (1 - s) * (x[3, 0] - x[0, 0]) + s * (x[2, 0] - x[1, 0])
@@ -188,8 +187,8 @@ def _shapes(x, n, at0, at1, phi):
         det = a0 * b1 - a1 * b0
         ds, dt = (r0 * b1 - r1 * b0) / det, (a0 * r1 - a1 * r0) / det
         s, t = s + ds, t + dt
-        if left > AGAIN and abs(ds.real) + abs(dt.real) < ENOUGH:
-            left = AGAIN
+        if abs(ds.real) + abs(dt.real) < ENOUGH:
+            break  # a step from there is exact in the imaginary parts, too
     phi[0], phi[1], phi[2], phi[3] = (1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t
 
 
@@ -212,15 +211,22 @@ def _bulging(phi, count, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _shared(slave, master, numbers, rules, counts, mass, cross):  # noqa: PLR0913
-    """int phi phi into mass (a, a + e) and int phi N into cross (a, b + h) of one pair."""
+def _in_plane(slave, master, numbers, x, y):
+    """Corners of both in the plane of the slave into x (a, 2) and y (b, 2)."""
+    axes = np.empty((2, 3), np.complex128)
+    _axes(slave, numbers[0], axes)
+    _flat(slave, numbers[0], slave[0], axes, x)
+    _flat(master, numbers[1], slave[0], axes, y)
+
+
+@njit(cache=True, error_model="numpy")
+def _shared(x, y, numbers, rules, counts, mass, cross):  # noqa: PLR0913
+    """int phi phi into mass (a, a + e) and int phi N into cross (a, b + h) of one pair.
+
+    x (a, 2), y (b, 2): corners of slave and master in the plane.
+    """
     na, nb = numbers[0], numbers[1]
     mass[:], cross[:] = 0j, 0j
-    axes = np.empty((2, 3), np.complex128)
-    _axes(slave, na, axes)
-    x, y = np.empty((4, 2), np.complex128), np.empty((4, 2), np.complex128)
-    _flat(slave, na, slave[0], axes, x)
-    _flat(master, nb, slave[0], axes, y)
     one, other = np.empty((ROOM, 2), np.complex128), np.empty((ROOM, 2), np.complex128)
     for p in range(nb):  # seen from behind it goes round the other way
         one[p, 0], one[p, 1] = y[nb - 1 - p, 0], y[nb - 1 - p, 1]
@@ -230,7 +236,7 @@ def _shared(slave, master, numbers, rules, counts, mass, cross):  # noqa: PLR091
         one, other = other, one
         if count < 3:
             return
-    a, b = slave.shape[0], master.shape[0]
+    a, b = x.shape[0], y.shape[0]
     lost = LOST_SECOND if numbers[2] + numbers[3] > 0 else LOST
     level = _level(x, na, y, nb, lost, len(counts))
     rule = rules[level]
@@ -259,6 +265,58 @@ def _shared(slave, master, numbers, rules, counts, mass, cross):  # noqa: PLR091
 
 
 @njit(cache=True, error_model="numpy")
+def _slopes(p, q, x, y, numbers, rules, counts, step, m, c, mass, cross):  # noqa: PLR0913
+    """Derivatives of one pair by its corners p (a, 3), q (b, 3) into mass and cross.
+
+    x, y: those corners in the plane; m, c: room for values.  The first corner of the slave is
+    the origin there and the second lies on the first axis: these three coordinates stay.
+    """
+    a, b = len(p), len(q)
+    u, v = x.copy(), y.copy()
+    by_plane = np.zeros((2 * (a + b), 3 * (a + b)))
+    for way in range(3 * (a + b)):
+        node, e = way // 3, way % 3
+        if (node < a and node >= numbers[0]) or node - a >= numbers[1]:
+            continue  # of the padding
+        if node < a:
+            p[node, e] += 1j * step
+        else:
+            q[node - a, e] += 1j * step
+        _in_plane(p, q, numbers, u, v)
+        for f in range(2):
+            for r in range(numbers[0]):
+                by_plane[2 * r + f, way] = u[r, f].imag / step
+            for r in range(numbers[1]):
+                by_plane[2 * (a + r) + f, way] = v[r, f].imag / step
+        if node < a:
+            p[node, e] = p[node, e].real
+        else:
+            q[node - a, e] = q[node - a, e].real
+    for w in range(2 * (a + b)):
+        node, f = w // 2, w % 2
+        if w in (0, 1, 3) or (node < a and node >= numbers[0]) or node - a >= numbers[1]:
+            continue
+        if node < a:
+            x[node, f] += 1j * step
+        else:
+            y[node - a, f] += 1j * step
+        _shared(x, y, numbers, rules, counts, m, c)
+        if node < a:
+            x[node, f] = x[node, f].real
+        else:
+            y[node - a, f] = y[node - a, f].real
+        for way in range(3 * (a + b)):
+            factor = by_plane[w, way]
+            if factor == 0:
+                continue
+            for r in range(a):
+                for t in range(m.shape[1]):
+                    mass[way, r, t] += factor * (m[r, t].imag / step)
+                for t in range(c.shape[1]):
+                    cross[way, r, t] += factor * (c[r, t].imag / step)
+
+
+@njit(cache=True, error_model="numpy")
 def plane_integrals(slave, master, numbers, rules, counts, step, mass, cross):  # noqa: PLR0913
     """Integrals of k pairs of facets (k, a, 3), (k, b, 3).
 
@@ -267,23 +325,15 @@ def plane_integrals(slave, master, numbers, rules, counts, step, mass, cross):  
     by the (a + b) 3 coordinates in the second place, of a complex step.
     """
     k, a, b = slave.shape[0], slave.shape[1], master.shape[1]
-    x, y = np.empty((a, 3), np.complex128), np.empty((b, 3), np.complex128)
-    width, across = mass.shape[3], cross.shape[3]
-    m, c = np.empty((a, width), np.complex128), np.empty((a, across), np.complex128)
+    x, y = np.empty((a, 2), np.complex128), np.empty((b, 2), np.complex128)
+    m = np.empty((a, mass.shape[3]), np.complex128)
+    c = np.empty((a, cross.shape[3]), np.complex128)
+    p, q = np.empty((a, 3), np.complex128), np.empty((b, 3), np.complex128)
     for i in range(k):
-        for way in range(mass.shape[1]):
-            x[:], y[:] = slave[i], master[i]
-            if step > 0:
-                node, e = way // 3, way % 3
-                if (node < a and node >= numbers[i, 0]) or node - a >= numbers[i, 1]:
-                    continue  # of the padding
-                if node < a:
-                    x[node, e] += 1j * step
-                else:
-                    y[node - a, e] += 1j * step
-            _shared(x, y, numbers[i], rules, counts, m, c)
-            for r in range(a):
-                for t in range(width):
-                    mass[i, way, r, t] = m[r, t].imag / step if step > 0 else m[r, t].real
-                for t in range(across):
-                    cross[i, way, r, t] = c[r, t].imag / step if step > 0 else c[r, t].real
+        p[:], q[:] = slave[i], master[i]
+        _in_plane(p, q, numbers[i], x, y)
+        if step > 0:
+            _slopes(p, q, x, y, numbers[i], rules, counts, step, m, c, mass[i], cross[i])
+            continue
+        _shared(x, y, numbers[i], rules, counts, m, c)
+        mass[i, 0], cross[i, 0] = m.real, c.real

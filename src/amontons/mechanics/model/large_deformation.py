@@ -22,7 +22,7 @@ Comput. Methods Appl. Mech. Engrg. 280 (2014).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -73,6 +73,7 @@ class LargeDeformation(NonlinearProblem):
     drift: Array
     known: tuple[NodalForces | Array, Array, Array] | None = None
     name: str = ""
+    _last: list[Array] = field(default_factory=list, init=False, repr=False)  # of `_local`
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "load", NodalForces.of(self.load))
@@ -200,11 +201,17 @@ class LargeDeformation(NonlinearProblem):
         return self._local(v)[0]
 
     def _local(self, v: Array) -> tuple[Array, Array, Array, Array]:
-        """r, u, frames of `CurrentContact.local`, and f_int - f, balanced (dofs,)."""
-        u = self.displacement(v)
-        motion, meeting = self._meeting(u)
-        rest = balanced(self.parts, meeting, self._needed(u))
-        return *self.parts.contact.local(rest[self.parts.at], motion, meeting), rest
+        """r, u, frames of `CurrentContact.local`, and f_int - f, balanced (dofs,).
+
+        The last state is kept: it is asked for its reactions, then for its error.
+        """
+        if not (self._last and np.array_equal(self._last[0], v)):
+            u = self.displacement(v)
+            motion, meeting = self._meeting(u)
+            rest = balanced(self.parts, meeting, self._needed(u))
+            local = self.parts.contact.local(rest[self.parts.at], motion, meeting)
+            self._last[:] = v.copy(), *local, rest
+        return tuple(part.copy() for part in self._last[1:])  # type: ignore[return-value]
 
     def local_velocity(self, v: Array) -> Array:
         """u = [gap, slip since the last step], (nc, d), in the frames at the state v."""

@@ -41,7 +41,7 @@ def recover_large(
     force = np.einsum("pkc,pk->pc", axes, r) * meeting.passed[:, None]
     traction = r / sites.weights[:, None]
     load = (model.load_factor * nodal_forces(model, model.loads)).at(moved)
-    pushed = meeting.columns(axes) @ r.ravel()
+    pushed = meeting.pushed(axes, r)
     try:
         held = support_forces(linear, parts.forces(moved) - load - pushed)
     except InvertedCells:  # of a state that has not converged: nobody knows its forces

@@ -216,13 +216,14 @@ class PairLinearisation:
         for part, old in zip(meeting.parts, self.earlier.parts, strict=True):
             mine = slice(start, start + len(part.slaves))
             start = mine.stop
+            slopes = by_normal[mine], by_gap[mine], by_motion[mine]
             if isinstance(part, MortarMeeting) and isinstance(old, MortarMeeting):
                 turned = turned + part.slopes.spread(force[mine])
-            rows.append(
-                blocks_of(by_normal[mine]) @ normal_slopes(part, dofs)
-                + blocks_of(by_gap[mine][:, :, None]) @ gap_slopes(part, dofs)
-                + blocks_of(by_motion[mine]) @ motion_slopes(part, old, dofs)
-            )
+                rows.append(_law_of_pair(part, old, *slopes))
+            elif isinstance(part, TiedMeeting):
+                rows.append(_law_of_tie(part, old, *slopes))
+            else:
+                rows.append(_law_at_obstacle(part, *slopes))
         stiffness = parts.matrix(self.blocks).tocsr()
         given = self._by_needed
         if parts.chained:
@@ -252,33 +253,36 @@ class PairLinearisation:
         return change[self.parts.free] - self.passed(NodalForces.of(load).at(self.u))
 
 
-def normal_slopes(part: AnyMeeting, dofs: int) -> sparse.csr_array:
-    """Derivatives of the normals by the positions of all nodes, (nc d, dofs)."""
-    if not isinstance(part, Meeting):
-        return part.slopes.normals
-    return _at_slaves(part, part.side.normal_slopes(part.x), dofs)
-
-
-def gap_slopes(part: AnyMeeting, dofs: int) -> sparse.csr_array:
-    """The same of the gaps, (nc, dofs)."""
-    if not isinstance(part, Meeting):
-        return part.slopes.gap
-    return _at_slaves(part, part.side.gap_slopes(part.x)[:, None], dofs)
-
-
-def motion_slopes(
-    part: AnyMeeting, old: AnyMeeting, dofs: int
+def _law_of_pair(
+    part: MortarMeeting, old: MortarMeeting, by_normal: Array, by_gap: Array, by_motion: Array
 ) -> sparse.csr_array:
-    """The same of the motion since `old`, (nc d, dofs)."""
-    if isinstance(part, MortarMeeting) and isinstance(old, MortarMeeting):
-        return part.slopes.motion(old)
-    if isinstance(part, TiedMeeting):
-        return part.slopes.motion(old)
-    d = part.x.shape[1]
-    return _at_slaves(part, np.broadcast_to(np.eye(d), (len(part.slaves), d, d)), dofs)
+    """Derivative of the law by the place of all nodes through n, g = n . G and s."""
+    apart = part.distances * part.met[:, None]
+    by_normal = by_normal + by_gap[:, :, None] * apart[:, None, :]
+    by_distance = by_gap[:, :, None] * part.normals[:, None, :]
+    return part.slopes.combined(by_normal, by_distance, by_motion, old)
 
 
-def _at_slaves(part: Meeting | MortarMeeting, values: Array, dofs: int) -> sparse.csr_array:
+def _law_of_tie(
+    part: TiedMeeting, old: AnyMeeting, by_normal: Array, by_gap: Array, by_motion: Array
+) -> sparse.csr_array:
+    """The same where the averages stay."""
+    slopes = part.slopes
+    out = blocks_of(by_normal) @ slopes.normals + blocks_of(by_motion) @ slopes.motion(old)
+    return sparse.csr_array(out + blocks_of(by_gap[:, :, None]) @ slopes.gap)
+
+
+def _law_at_obstacle(
+    part: AnyMeeting, by_normal: Array, by_gap: Array, by_motion: Array
+) -> sparse.csr_array:
+    """The same where the other side is an obstacle."""
+    assert isinstance(part, Meeting)
+    by_x = by_normal @ part.side.normal_slopes(part.x) + by_motion
+    by_x = by_x + by_gap[:, :, None] * part.side.gap_slopes(part.x)[:, None, :]
+    return _at_slaves(part, by_x, part.nodes * part.x.shape[1])
+
+
+def _at_slaves(part: Meeting, values: Array, dofs: int) -> sparse.csr_array:
     """Rows (nc, m, d) by the place of the slave alone, (nc m, dofs)."""
     nc, m, d = values.shape
     rows = np.broadcast_to(np.arange(nc * m).reshape(nc, m, 1), values.shape)

@@ -276,6 +276,8 @@ def nonlinear_parts(model: Model) -> NonlinearParts:
     parts = model._shared.once(_nonlinear_parts, (), model)
     if model.divided_at is not None and parts.folds:
         parts = parts.divided(model.divided_at.reshape(parts.X.shape))
+    if parts.contact.law is model.law:
+        return parts  # with the meetings that it keeps
     return replace(parts, contact=replace(parts.contact, law=model.law))
 
 

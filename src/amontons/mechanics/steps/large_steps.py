@@ -5,6 +5,7 @@ Every step begins from the last state and goes to its load in load steps where i
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -39,6 +40,7 @@ class LargeSlowModel:
 
     def __init__(self, model: Model, crossing: Crossing | None = None) -> None:
         self.motion, self.crossing = Motion(model), crossing
+        self._acted: tuple[State, Model, Forces] | None = None  # at the end of the last step
 
     def begin(self, state: State) -> State:
         """The state before the first step: undeformed, also where supports hold the body."""
@@ -80,13 +82,14 @@ class LargeSlowModel:
         tied = body.law.tied[:, None]  # what bonds give way is no slip
         way = np.where(tied, 0.0, solution.u[:, 1:])
         work = quasi_static_friction(state.force[:, 1:], solution.r[:, 1:], way)
-        energies = self._energies(body, state, q1, load, solution.r, float(work.sum()))
+        acting = self._forces(body, q1, load, solution.r)
+        energies = self._energies(body, state, q1, load, acting, float(work.sum()))
         passed = time - state.time
         velocity = (q1 - q0) / passed if passed else np.zeros_like(q1)
         new = State(state.index + 1, time, q1, velocity, solution.r,
                     np.where(tied, solution.u[:, 1:], state.slip + way),
                     **rubbed(state, way, solution.sliding, work))  # fmt: skip
-        acting = self._forces(body, q1, load, solution.r)
+        self._acted = new, body, acting
         rest = acting.inner - acting.load - acting.pushed
         active = np.arange(len(way))
         return TimeStep(body, new, solution, active, energies, solution.u[:, 0],
@@ -98,13 +101,17 @@ class LargeSlowModel:
         return with_diagnosis(solution, self.motion.body)
 
     def _energies(
-        self, body: Model, state: State, q1: Array, load: NodalForces, r: Array,
+        self, body: Model, state: State, q1: Array, load: NodalForces, after: Forces,
         friction: float,
     ) -> Energies:  # fmt: skip
-        """The balance of `slow_energies`; r (nc, d): reactions after the step."""
+        """The balance of `slow_energies`; after: the forces at the displacements q1."""
         q0, load_0 = state.displacement, self.motion.load_of(state)
-        before = self._forces(body, q0, load_0, state.force)
-        after = self._forces(body, q1, load, r)
+        kept = self._acted
+        if kept is not None and kept[0] is state and kept[1] is body:
+            shape = nonlinear_parts(body).X.shape
+            before = replace(kept[2], load=load_0.at(q0.reshape(shape)))
+        else:
+            before = self._forces(body, q0, load_0, state.force)
         path = path_work(before, after, q1 - q0)
         bend = self._bend(q0, q1, load_0, load)
         return slow_energies(before, after, q1 - q0, self.motion.parts.fixed, friction, path,
@@ -127,7 +134,7 @@ class LargeSlowModel:
         parts = nonlinear_parts(body)
         moved = q.reshape(parts.X.shape)
         meeting = parts.meet(moved)
-        pushed = meeting.columns(frames(meeting.normals)) @ r.ravel()
+        pushed = meeting.pushed(frames(meeting.normals), r)
         stored = Springs.of(self.motion.body.law, r.shape[1]).energy(r)
         return Forces(parts.forces(moved), load.at(moved), pushed, parts.energy(moved), stored)
 
