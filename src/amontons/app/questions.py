@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ..core.clock import TimeLimit, deadline_of
-from ..core.errors import InvalidInput, TimeUp, UnsupportedForm, UnsupportedLaw
 from ..problem.friction import FrictionProblem
 from ..problem.law import Coulomb, Tresca
 from ..problem.solution import FrictionSolution
 from .api import checked
+from .askable import (
+    begun,
+    check_followed,
+    check_has_W,
+    check_searchable,
+    checked_base,
+    discrete_of,
+    with_W,
+)
 from .model_solution import ModelSolution
 from .progress import searching
 
@@ -35,7 +40,6 @@ if TYPE_CHECKING:
 FEW = 10  # starts of Newton's method where a search ends without any solution
 LEAST = 1.0  # seconds for them beyond a time limit
 SEARCH, WORK = 0.5, 60.0  # share of a limit, or seconds of work, for the search in `basins`
-HUGE = 1e12  # friction above which rounding hides what the law says
 
 
 @searching("all solutions")
@@ -52,12 +56,12 @@ def all_solutions(
     little; more than 200 are left to `multistart`, which proves nothing.  In 3D some contacts
     with much friction, some tens with little.  Raises UnsupportedForm under Tresca's law.
     """
-    limit = _begun(time_limit)
-    discrete = _discrete(problem)
+    limit = begun(time_limit)
+    discrete = discrete_of(problem)
     from ..analysis.solutions import enumerate as exact
 
-    _searchable(discrete)
-    _check_has_W(problem, "all solutions", limit)
+    check_searchable(discrete)
+    check_has_W(problem, "all solutions", limit)
     if discrete.dimension == 3:
         from ..analysis.solutions.discs.search import enumerate_discs
 
@@ -87,7 +91,7 @@ def multistart(
     modes.  Raises UnsupportedForm under Tresca's law; NotConverged where load steps of large
     strains find no solution.
     """
-    limit = _begun(time_limit)
+    limit = begun(time_limit)
     problem = checked(problem)
     if not isinstance(problem, FrictionProblem):
         from ..analysis.solutions import large_multistart as large
@@ -108,9 +112,9 @@ def _many_starts(
     """`multistart` of a problem that is linear but for its law."""
     from ..analysis.solutions.multistart import multistart as search
 
-    limit = _begun(time_limit)
-    discrete = _discrete(problem)
-    _check_has_W(problem, "multistart", limit)
+    limit = begun(time_limit)
+    discrete = discrete_of(problem)
+    check_has_W(problem, "multistart", limit)
     return search(discrete, starts=starts, seed=seed, time_limit=limit)
 
 
@@ -146,8 +150,8 @@ def basins(
                            reaction_size, displacement_size)  # fmt: skip
     check_callback(callback)
     deadline = deadline_of(time_limit)
-    discrete = _discrete(problem)
-    _check_has_W(problem, "basins", _begun(time_limit))
+    discrete = discrete_of(problem)
+    check_has_W(problem, "basins", begun(time_limit))
     atlas = Atlas(discrete, within)
     if solutions is not None:
         given_solutions(atlas, solutions)
@@ -160,37 +164,6 @@ def basins(
         given_solutions(atlas, all_solutions(discrete, time_limit=limit))
     makers = {} if isinstance(problem, FrictionProblem) else {"nitsche": by_nitsche(problem)}
     return study(atlas, methods, parameters, starts, options, deadline, callback, makers)
-
-
-def _begun(time_limit: TimeLimit) -> TimeLimit:
-    """The limit as a deadline from now on, so that assembling counts too; None without one."""
-    return None if time_limit is None else deadline_of(time_limit)
-
-
-def _searchable(problem: FrictionProblem) -> None:
-    """Raise UnsupportedForm where there is no mu to search with."""
-    if isinstance(problem.law, Tresca):
-        raise UnsupportedLaw(
-            "all solutions: expected Coulomb friction; with given bounds (Tresca) there is one "
-            "motion, see uniqueness"
-        )
-    if not isinstance(problem.law, Coulomb):
-        raise UnsupportedLaw(
-            f"all solutions: expected Coulomb friction, got {problem.law.name}"
-        )
-
-
-def _discrete(problem: FrictionProblem | Model) -> FrictionProblem:
-    """The problem, or that of a model; raises InvalidInput for friction without limits."""
-    problem = checked(problem)
-    discrete = problem if isinstance(problem, FrictionProblem) else problem.assemble()
-    mu = discrete.law.mu if isinstance(discrete.law, Coulomb) else np.zeros(1)
-    if (largest := float(mu.max(initial=0.0))) > HUGE:
-        raise InvalidInput(
-            f"mu: expected friction of at most {HUGE:g} to ask for all solutions, got "
-            f"{largest:g}; contacts that can not slip are bonded, hold them by supports"
-        )
-    return discrete
 
 
 def follow(
@@ -217,8 +190,8 @@ def follow(
 
     checks.check_options(options)
     bounds = Limits(checks.checked_interval(interval), **checks.checked_limits(limits))
-    _check_followed(problem, "follow", bounds.deadline)
-    path, y, p = asked.on_path(problem, parameter, bounds, _base(base), start, at)
+    check_followed(problem, "follow", bounds.deadline)
+    path, y, p = asked.on_path(problem, parameter, bounds, checked_base(base), start, at)
     if along is None:
         return follow_path(path, y, p, bounds, options=options)
     return asked.followed_along(path, y, p, bounds, options, along)
@@ -239,23 +212,9 @@ def first_order(
     from ..analysis.paths.following import Limits
 
     bounds = Limits(checks.checked_interval(interval))
-    _check_followed(problem, "first_order", bounds.deadline)
-    path, y, p = asked.on_path(problem, parameter, bounds, _base(base), start, at)
+    check_followed(problem, "first_order", bounds.deadline)
+    path, y, p = asked.on_path(problem, parameter, bounds, checked_base(base), start, at)
     return asked.tangents_at(path, y, p, tolerance)
-
-
-def _check_followed(problem: Any, verb: str, limit: TimeLimit) -> None:
-    """Raise where a problem is no PathProblem, and has no load and friction to follow."""
-    from ..analysis.paths.path import PathProblem
-
-    if isinstance(problem, PathProblem):
-        return
-    discrete = checked(problem)
-    _check_has_W(discrete, verb, limit)
-    if not discrete.contacts:
-        raise UnsupportedForm(
-            f"{verb}: without contacts the state is in proportion to the load, one solve is all"
-        )
 
 
 def diagram(
@@ -277,24 +236,9 @@ def diagram(
     bounds = Limits(checks.checked_interval(interval), **checks.checked_limits(limits))
     a, b = bounds.interval
     values = (a, (a + b) / 2, b) if at is None else checks.checked_values(at, bounds.interval)
-    _check_has_W(checked(problem), "diagram", bounds.deadline)
-    path: Any = path_of(problem, parameter, bounds.interval, _base(base))
+    check_has_W(checked(problem), "diagram", bounds.deadline)
+    path: Any = path_of(problem, parameter, bounds.interval, checked_base(base))
     return bifurcation_diagram(path, bounds, values, options=options)
-
-
-def _check_has_W(problem: FrictionProblem | Model, verb: str, limit: TimeLimit) -> None:
-    """Raise SingularOperator where `verb` needs W and contact alone holds a body."""
-    if problem.kind.has_q:  # others are followed in displacements
-        from ..mechanics.model.diagnosis import check_has_W
-        from ..mechanics.steps.timed import steady
-
-        examined = problem if isinstance(problem, FrictionProblem) else steady(problem)
-        with suppress(TimeUp):  # the verb says so
-            check_has_W(examined, verb, deadline_of(limit))
-
-
-def _base(base: Any) -> FrictionProblem | Model | None:
-    return None if base is None else checked(base, "base")
 
 
 @searching("uniqueness")
@@ -309,8 +253,8 @@ def uniqueness(
     counted in operations, so that a busy machine comes to the same verdict.  The verdict is
     undecided, with the reason, where there is neither a proof nor a second solution.
     """
-    limit = _begun(time_limit)
-    discrete = _discrete(problem)
+    limit = begun(time_limit)
+    discrete = discrete_of(problem)
     found = solution.solution if isinstance(solution, ModelSolution) else solution
     from ..analysis.certificates.uniqueness import assess
 
@@ -334,7 +278,7 @@ def existence(
     """
     from ..analysis.certificates.opening import opening
 
-    return opening(_discrete(problem), time_limit=_begun(time_limit))
+    return opening(discrete_of(problem), time_limit=begun(time_limit))
 
 
 @searching("critical friction")
@@ -351,10 +295,10 @@ def critical_friction(
     """
     from ..analysis.certificates.critical_friction import critical_friction as bounds
 
-    limit = _begun(time_limit)
-    discrete = _discrete(problem)
+    limit = begun(time_limit)
+    discrete = discrete_of(problem)
     if isinstance(discrete.law, Coulomb):  # else it says so
-        _check_has_W(problem, "critical friction", limit)
+        check_has_W(problem, "critical friction", limit)
     return bounds(discrete, gap=gap, time_limit=limit)
 
 
@@ -373,8 +317,8 @@ def p_matrix_friction(
     """
     from ..analysis.certificates.older_criteria import p_matrix_friction as ask
 
-    limit = _begun(time_limit)
-    discrete = _with_W(problem, "the P-matrix criterion", limit)
+    limit = begun(time_limit)
+    discrete = with_W(problem, "the P-matrix criterion", limit)
     return ask(discrete, given_tangents=given_tangents, gap=gap, time_limit=limit)
 
 
@@ -392,13 +336,6 @@ def full_contact_friction(
     """
     from ..analysis.certificates.older_criteria import full_contact_friction as ask
 
-    limit = _begun(time_limit)
-    discrete = _with_W(problem, "full contact", limit)
+    limit = begun(time_limit)
+    discrete = with_W(problem, "full contact", limit)
     return ask(discrete, sharp=sharp, gap=gap, time_limit=limit)
-
-
-def _with_W(problem: FrictionProblem | Model, verb: str, limit: TimeLimit) -> FrictionProblem:
-    discrete = _discrete(problem)
-    if isinstance(discrete.law, Coulomb):  # else the verb says so
-        _check_has_W(problem, verb, limit)
-    return discrete
