@@ -157,7 +157,7 @@ def digest(file):
     """SHA-256 of all that the claim depends on."""
     parts = [str(sorted((k, str(v)) for k, v in file.attrs.items() if k != "sha256"))]
     for name in sorted(file):
-        data = file[name][()]
+        data = np.asarray(file[name])
         parts += [name, str(data.dtype), str(data.shape), data.tobytes().hex()]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
@@ -166,7 +166,7 @@ def check(path):
     """What a file claims, in a sentence; raises Refused where it does not prove that."""
     with h5py.File(path, "r") as file:
         need(file.attrs.get("sha256") == digest(file), "the file was changed: another SHA-256")
-        claim, data = str(file.attrs["claim"]), {k: file[k][()] for k in file}
+        claim, data = str(file.attrs["claim"]), {k: np.asarray(file[k]) for k in file}
     W, q, mu = data["W"], data["q"], data["mu"]
     nc, d = q.shape
     need(W.shape == (nc * d, nc * d) and mu.shape == (nc,) and d in (2, 3), "shapes differ")

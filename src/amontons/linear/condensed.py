@@ -114,7 +114,8 @@ class Condensed:
         rows[at[free]] = found.scale[free]
         rows = sparse.csr_array(sparse.diags_array(rows) @ self.turn)
         self._top = rows[self.held]
-        self._left = (rows + _taken_back(structure, found) @ rows)[self.rest]
+        left = sparse.csr_array(rows + _taken_back(structure, found) @ rows)
+        self._left = left[self.rest]
         back = sparse.csr_array(self.turn.T)
         local = sparse.csr_array(self._top @ self.A @ back)
         self._across = sparse.csr_array(local[:, self.rest])

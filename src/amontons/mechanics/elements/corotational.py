@@ -167,7 +167,7 @@ class CorotationalBody(LinearBody):
         g = super().forces(0.5 * (old.left + new.left) + viscous * change)
         P = 0.5 * (old.R + new.R)
         x = frames.centred(frames.Y + 0.5 * (before + after))
-        y = frames.seen(x, np.linalg.inv(P).swapaxes(1, 2))
+        y = frames.seen(x, np.linalg.inv(P).swapaxes(1, 2).astype(float))
         f, tau = frames.without_moment(g, y)
         if before.shape[1] == 3:
             z, k = frames.seen(x, P), super().forces(change)
