@@ -62,6 +62,8 @@ def folder(tmp_path, monkeypatch):
     (tmp_path / "case.toml").write_text(CASE)
     am.write_fclib(random_delassus(0, 4), tmp_path / "problem.hdf5")
     am.write_fclib(box_tower(3), tmp_path / "KaplasTower.hdf5")
+    single = am.FrictionProblem.from_delassus(W=[[1, 0.2], [0.2, 1]], q=[[-1, 0.5]], mu=[0.3])
+    am.write_certificate(single, am.uniqueness(single), tmp_path / "c.h5")
     am.write_fclib(am.read_case(tmp_path / "case.toml").model.assemble(), "global.hdf5")
     if importlib.util.find_spec("netgen") is not None:
         from netgen.occ import Box

@@ -309,7 +309,7 @@ def test_a_small_body_that_contact_alone_holds(tmp_path):
     case.write_text(FREE)
     result = run("solve", case, "-o", tmp_path / "out")
     assert result.exit_code == 0
-    assert "contact alone holds a body" in result.stdout
+    assert "Contact alone holds a body" in result.stdout
     pushed = run("solve", case, "-o", tmp_path / "out", "--set", "traction.value=[1.0, -1.0]")
     assert pushed.exit_code == 1
     assert "there is no solution" in pushed.stderr

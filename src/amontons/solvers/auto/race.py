@@ -17,7 +17,8 @@ not, is believed less: its rest counts C / (GRACE F) times.  Besides
     nothing     where no track promises anything, the one that has cost least
 
     the end     where five times as much was spent as when the best error last halved, and a
-                thousand Newton steps' worth, and many chunks or some seconds, since
+                thousand Newton steps' worth, and many chunks or some seconds, with few contacts
+                less, since
 
 So no track is ever given up, none takes more than its share while it does not progress, and
 only ratios of costs matter, which are operation counts.
@@ -46,8 +47,9 @@ GROWTH = 0.2  # cost of a chunk, of what its track has cost
 SHORTEST = 3e4  # nanoseconds of a chunk at least, or the calls cost more than the sweeps
 # Nanoseconds that letting the other tracks in costs: joints, symbolic factors; per block of W.
 ENTRY, ENTRY_BLOCK = 3e5, 150.0
-# All cost, in what it was at the last progress; Newton steps since, and nanoseconds or chunks.
-LOST, LOST_STEPS, LOST_LEAST, LOST_CHUNKS = 5.0, 1000.0, 2e9, 500
+# All cost, in what it was at the last progress; Newton steps since, and nanoseconds, so many of
+# them for each contact up to some seconds, or chunks.
+LOST, LOST_STEPS, LOST_EACH, LOST_MOST, LOST_CHUNKS = 5.0, 1000.0, 5e6, 2e9, 500
 # Cost between two iterates that are handed out, of all cost, and its bounds in nanoseconds: the
 # driver's judgement costs more than a chunk of a small problem, but it looks at the clock.
 PAUSE, LEAST_PAUSE, MOST_PAUSE = 0.1, 1e6, 5e7
@@ -194,6 +196,7 @@ class Race:
         self.shown = 0.0  # total when an iterate was handed out last
         self.held: Iterate | None = None  # counts of those since then
         self.chunks = 0
+        self.shows_all = False  # where the driver ends what can not come to an end
         # error, total and chunks at the last progress
         self.mark = (self.state.first_error, 0.0, 0)
 
@@ -216,6 +219,7 @@ class Race:
     def enter(self) -> None:
         """Let all others of the table in; what tells which of them run costs something too."""
         state = self.state
+        self.shows_all = state.problem.gains_energy
         self.tracks += [Track(e, state) for e in self.table[1:] if e.when(state)]
 
     def _go_on(self, track: Track) -> Iterator[Iterate]:
@@ -234,7 +238,8 @@ class Race:
     def _is_due(self) -> bool:
         """True where the driver should see the best reaction: it may do, or it has waited."""
         pause = min(max(PAUSE * self.total, LEAST_PAUSE), MOST_PAUSE)
-        return self.state.error <= self.state.goal or self.total - self.shown >= pause
+        waited = self.shows_all or self.total - self.shown >= pause
+        return waited or self.state.error <= self.state.goal
 
     def _is_lost(self) -> bool:
         """True where nothing has helped for long."""
@@ -245,7 +250,8 @@ class Race:
         since = self.total - total
         if not (self.total > LOST * total and since > LOST_STEPS * self.state.step_cost):
             return False
-        return since > LOST_LEAST or self.chunks - chunks > LOST_CHUNKS
+        long = min(LOST_EACH * self.state.problem.contacts, LOST_MOST)
+        return since > long or self.chunks - chunks > LOST_CHUNKS
 
     def _next(self) -> Track:
         """The track that promises the goal for the least cost."""
