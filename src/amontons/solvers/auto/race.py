@@ -47,9 +47,9 @@ GROWTH = 0.2  # cost of a chunk, of what its track has cost
 SHORTEST = 3e4  # nanoseconds of a chunk at least, or the calls cost more than the sweeps
 # Nanoseconds that letting the other tracks in costs: joints, symbolic factors; per block of W.
 ENTRY, ENTRY_BLOCK = 3e5, 150.0
-# All cost, in what it was at the last progress; Newton steps since, and nanoseconds, so many of
-# them for each contact up to some seconds, or chunks.
-LOST, LOST_STEPS, LOST_EACH, LOST_MOST, LOST_CHUNKS = 5.0, 1000.0, 5e6, 2e9, 500
+# All cost, in what it was at the last progress; Newton steps since, and nanoseconds or chunks;
+# nanoseconds as dense factors cost, by the cube of contacts, up to some seconds.
+LOST, LOST_STEPS, LOST_CUBED, LOST_MOST, LOST_CHUNKS = 5.0, 1000.0, 2e6, 2e9, 500
 # Cost between two iterates that are handed out, of all cost, and its bounds in nanoseconds: the
 # driver's judgement costs more than a chunk of a small problem, but it looks at the clock.
 PAUSE, LEAST_PAUSE, MOST_PAUSE = 0.1, 1e6, 5e7
@@ -250,7 +250,7 @@ class Race:
         since = self.total - total
         if not (self.total > LOST * total and since > LOST_STEPS * self.state.step_cost):
             return False
-        long = min(LOST_EACH * self.state.problem.contacts, LOST_MOST)
+        long = min(LOST_CUBED * self.state.problem.contacts**3, LOST_MOST)
         return since > long or self.chunks - chunks > LOST_CHUNKS
 
     def _next(self) -> Track:
