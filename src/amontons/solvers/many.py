@@ -8,7 +8,6 @@ another, so answers have the same bits for any number of threads, and those of `
 from __future__ import annotations
 
 import math
-import os
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 
 from ..core.clock import TimeLimit
 from ..core.errors import AmontonsError, InvalidInput, shown
+from ..core.threads import threads as allowed
 from ..problem.friction import FrictionProblem
 from ..problem.solution import FrictionSolution
 from . import Auto
@@ -48,8 +48,8 @@ def solve_many(
 
     tolerance, contact_tolerance: as of `solve`, for every problem.  time_limit: seconds for all
     together; what is not solved then has the outcome TIME_LIMIT.  starts: one start or None for
-    each problem, such as the solutions of the step before.  threads: by default as many as this
-    process has cores; they change no bit of any answer.
+    each problem, such as the solutions of the step before.  threads: by default as many as
+    `am.threads()` says; they change no bit of any answer.
     Never raises for a solve that fails: look at `converged`.  Raises InvalidInput, which names
     the problem by its number, for what is no problem or no start, and other errors of a solve
     with that number too.
@@ -138,9 +138,7 @@ def _starts(starts: Sequence[Start] | None, problems: list[FrictionProblem]) -> 
 def _workers(threads: int | None) -> int:
     """How many threads work."""
     if threads is None:
-        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (
-            os.cpu_count() or 1
-        )  # fmt: skip
+        return allowed()
     if not isinstance(threads, int) or isinstance(threads, bool) or threads < 1:
         raise InvalidInput(
             f"expected a whole number >= 1, or None, got {shown(threads)}", ("threads",)
