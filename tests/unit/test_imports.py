@@ -3,6 +3,7 @@
 import ast
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -35,21 +36,29 @@ INNER = {
 }
 
 
+@cache
+def nodes(path):
+    """Imports and keywords of a file: every file is parsed once for all tests."""
+    kinds = ast.Import | ast.ImportFrom | ast.keyword
+    return [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, kinds)]
+
+
+@cache
 def imported(path):
     """(module, names) of every import, absolute ones as they stand, relative ones from us."""
     package = path.relative_to(PACKAGE).parts[:-1]
-    for node in ast.walk(ast.parse(path.read_text())):
+    found = []
+    for node in nodes(path):
         if isinstance(node, ast.Import):
-            for name in node.names:
-                yield name.name, ""
+            found += [(name.name, "") for name in node.names]
         elif isinstance(node, ast.ImportFrom) and node.level == 0:
-            yield node.module, ""
+            found.append((node.module, ""))
         elif isinstance(node, ast.ImportFrom):
             assert node.level <= len(package) + 1, f"{path}: import from above the package"
             inside = package[: len(package) + 1 - node.level]
             inside += tuple(node.module.split(".")) if node.module else ()
-            for name in node.names:
-                yield "amontons", ".".join((*inside, name.name))
+            found += [("amontons", ".".join((*inside, name.name))) for name in node.names]
+    return found
 
 
 def ours(path):
@@ -102,7 +111,7 @@ def test_kernels_are_kept_in_our_folder():
 
 def test_no_kernel_assumes_that_numbers_are_finite():
     for path in FILES:
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in nodes(path):
             if isinstance(node, ast.keyword) and node.arg == "fastmath":
                 allowed = ast.literal_eval(node.value)  # True would let a NaN become anything
                 assert isinstance(allowed, set), path
