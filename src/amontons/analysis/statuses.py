@@ -13,6 +13,7 @@ States = NDArray[np.integer]
 
 FREE, PLUS, MINUS, STICK = range(4)  # r = 0; slip in 2D, r_T = mu r_N, -mu r_N; u = 0
 TANGENT = 4  # no status: u_T = 0 and r_N = 0, which only the P-matrix criterion has
+LOAD = 4  # no contact: the load as an unknown of the pattern search, which has no TANGENT
 FRICTIONLESS = 5  # u_N = 0 without friction, u_T of any sign
 SLIP = 6  # in any direction: 2D plus or minus, 3D on a disc
 CLOSED = 7  # stick or slip

@@ -222,10 +222,12 @@ def diagram(
     interval: tuple[float, float] = (0.0, 1.0), *, base: FrictionProblem | Model | None = None,
     at: Sequence[float] | None = None, options: Continuation | None = None, **limits: Any,
 ) -> Diagram:  # fmt: skip
-    """All branches through all solutions at the values `at` of a parameter, in 2D.
+    """All branches of an interval, in 2D; `whole` of the answer tells where that is proved.
 
-    at: by default both ends and the middle of the interval; all solutions there are searched
-    for as in `all_solutions`, with their share of the time each.  Others as in `follow`.
+    Under a load all pieces on the interval are searched for.  With values `at` of the
+    parameter, under friction at both ends and the middle, and where that search does not end:
+    all branches through all solutions there, as `all_solutions` finds them, with their share
+    of the time each.  Others as in `follow`.
     """
     from ..analysis.paths import checks
     from ..analysis.paths.diagram import bifurcation_diagram
@@ -234,8 +236,7 @@ def diagram(
 
     checks.check_options(options)
     bounds = Limits(checks.checked_interval(interval), **checks.checked_limits(limits))
-    a, b = bounds.interval
-    values = (a, (a + b) / 2, b) if at is None else checks.checked_values(at, bounds.interval)
+    values = None if at is None else checks.checked_values(at, bounds.interval)
     check_has_W(checked(problem), "diagram", bounds.deadline)
     path: Any = path_of(problem, parameter, bounds.interval, checked_base(base))
     return bifurcation_diagram(path, bounds, values, options=options)

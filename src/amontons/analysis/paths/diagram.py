@@ -1,4 +1,10 @@
-"""Bifurcation diagrams: all branches found from all solutions, closed ones included."""
+"""Bifurcation diagrams: all branches found from all solutions, closed ones included.
+
+In 2D under a load parameter `load_search` tells all linear pieces that have a solution
+anywhere on the interval, with proof: every branch goes through the middle of some of them, so
+that none is missed, wherever it begins and ends.  Otherwise branches go through all solutions
+at some values of the parameter, and nothing is known of what passes none of these.
+"""
 
 from __future__ import annotations
 
@@ -27,6 +33,7 @@ if TYPE_CHECKING:
     from ...mechanics.model import Model
 
 Array = NDArray[np.float64]
+SEARCH = 20.0  # seconds' work on the whole interval where no time is given
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -34,10 +41,10 @@ class Diagram(Shown):
     """Branches of one problem, each line of the diagram in one of them only.
 
     complete: all solutions at every value in `at` were found, with proof, and lie on a branch.
-    That is proved of these values, not of the interval: a closed branch, or one that turns back
-    at both ends, that passes none of them is not seen.  lost: solutions, as (parameter,
-    state), through which no branch could be followed; sets: points of connected sets of
-    solutions at one parameter, which are no curves over it.
+    whole: the interval between whose ends the same is proved of every value; without it a
+    closed branch, or one that turns back at both ends, that passes none of `at` is not seen.
+    lost: solutions, as (parameter, state), through which no branch could be followed; sets:
+    points of connected sets of solutions at one parameter, which are no curves over it.
     """
 
     branches: tuple[Branch, ...]
@@ -47,6 +54,7 @@ class Diagram(Shown):
     lost: tuple[tuple[float, Array], ...] = ()
     sets: tuple[tuple[float, Array], ...] = ()
     seconds: float = 0.0
+    whole: tuple[float, float] | None = None
 
     def __len__(self) -> int:
         return len(self.branches)
@@ -90,6 +98,7 @@ class Diagram(Shown):
         return {
             "branches": [branch.record() for branch in self.branches],
             "at": list(self.at),
+            "whole": None if self.whole is None else list(self.whole),
             "complete": self.complete,
             "reason": self.reason,
             "critical": self.critical,
@@ -102,54 +111,118 @@ class Diagram(Shown):
 
 
 def bifurcation_diagram(
-    path: FrictionPath, limits: Limits, at: Sequence[float], *,
+    path: FrictionPath, limits: Limits, at: Sequence[float] | None = None, *,
     options: Continuation | None = None,
 ) -> Diagram:  # fmt: skip
-    """The branches through all solutions at the values `at`, and those that leave them.
+    """The branches through all solutions, and those that leave them.
 
-    Solutions come from `enumerate_solutions`, which at each value has half of its share of the
-    time.  options: those of step-by-step continuation, also where the curves are straight.
+    at: values of the parameter at which all solutions are searched for with
+    `enumerate_solutions`, which at each has half of its share of the time.  Without them the
+    whole interval, where its pieces are straight lines, else both ends and the middle.
+    options: those of step-by-step continuation, also where the curves are straight.
     """
-    from ..solutions.enumerate import enumerate_solutions
-
     if not isinstance(path, FrictionPath):
         raise UnsupportedForm(
             "diagram: all solutions of a model with hyperelastic laws can not be searched for; "
             "use follow"
         )
-    began, deadline = now(), limits.deadline
-    path = timed(path, deadline)
-    branches: list[Branch] = []
-    lost: list[tuple[float, Array]] = []
-    sets: list[tuple[float, Array]] = []
-    doubts: list[str] = []
-    for k, p in enumerate(at):
-        search = deadline.share(0.5 / (len(at) - k))
-        found = enumerate_solutions(path.at(p), time_limit=search)
-        if not found.complete:
-            doubts.append(f"at {p:g}: {found.reason}")
-        for solution in found.solutions:
-            y = path.state(solution.r)
-            if solution.freedom:
-                sets.append((p, y))
-                continue
-            try:
-                if not _found_again(branches, path, y, p, limits, options):
-                    lost.append((p, y))
-            except TimeUp as reason:
-                doubts.append(f"at {p:g}: {reason}")
-                break
-    if lost:
-        doubts.append(f"{len(lost)} solutions lie on no branch")
-    if sets:
-        doubts.append(f"{len(sets)} sets of solutions are no curves")
-    values = ", ".join(f"{p:g}" for p in at)
-    reason = "; ".join(doubts) or (
-        f"all solutions at {values} are on these branches; nothing is proved between these "
-        "values, where a closed branch would not be seen"
-    )
-    return Diagram(tuple(branches), tuple(at), not doubts, reason, tuple(lost), tuple(sets),
-                   now() - began)  # fmt: skip
+    a, b = limits.interval
+    drawn = _Drawn(timed(path, limits.deadline), limits, options)
+    values = (a, (a + b) / 2, b) if at is None else tuple(at)
+    whole = drawn.whole() if at is None and path.straight and not path.tresca else None
+    if whole is None:
+        drawn.through(values)
+    return drawn.diagram(values, whole)
+
+
+class _Drawn:
+    """The branches so far, and what speaks against their being all."""
+
+    def __init__(
+        self, path: FrictionPath, limits: Limits, options: Continuation | None
+    ) -> None:
+        self.began = now()
+        self.path, self.limits, self.options = path, limits, options
+        self.branches: list[Branch] = []
+        self.lost: list[tuple[float, Array]] = []
+        self.sets: list[tuple[float, Array]] = []
+        self.doubts: list[str] = []
+        self.why_not_whole = ""
+
+    def whole(self) -> tuple[float, float] | None:
+        """Branches through all pieces of the interval; where that is all proved, else None."""
+        from ..solutions.enumerate import CONTACTS
+        from ..solutions.load_search import pieces_between
+
+        a, b = self.limits.interval
+        deadline = self.limits.deadline
+        search = deadline.share(0.25) if deadline.left < np.inf else Deadline.counted(SEARCH)
+        if self.path.start.contacts > CONTACTS:
+            return None
+        try:
+            found = pieces_between(self.path.at(a), self.path.at(b), search)
+        except TimeUp as reason:
+            self.why_not_whole = str(reason)
+            return None
+        self.why_not_whole = found.doubt
+        for piece in found.pieces:
+            middle = (piece.low + piece.high) / 2
+            p = a + (b - a) * middle
+            if not self._reached(p, self.path.state(piece.at(middle))):
+                return None
+        low, high = (a + (b - a) * t for t in found.interval)
+        return None if found.doubt or self.doubts or self.lost else (low, high)
+
+    def through(self, values: Sequence[float]) -> None:
+        """Branches through all solutions at these values."""
+        from ..solutions.enumerate import enumerate_solutions
+
+        for k, p in enumerate(values):
+            search = self.limits.deadline.share(0.5 / (len(values) - k))
+            found = enumerate_solutions(self.path.at(p), time_limit=search)
+            if not found.complete:
+                self.doubts.append(f"at {p:g}: {found.reason}")
+            for solution in found.solutions:
+                y = self.path.state(solution.r)
+                if solution.freedom:
+                    self.sets.append((p, y))
+                elif not self._reached(p, y):
+                    break
+
+    def _reached(self, p: float, y: Array) -> bool:
+        """Put a solution on a branch, or note that there is none; False where time is up."""
+        try:
+            if not _found_again(self.branches, self.path, y, p, self.limits, self.options):
+                self.lost.append((p, y))
+        except TimeUp as reason:
+            self.doubts.append(f"at {p:g}: {reason}")
+            return False
+        return True
+
+    def diagram(self, at: tuple[float, ...], whole: tuple[float, float] | None) -> Diagram:
+        """What was found, in words too."""
+        doubts = list(self.doubts)
+        if self.lost:
+            doubts.append(f"{len(self.lost)} solutions lie on no branch")
+        if self.sets:
+            doubts.append(f"{len(self.sets)} sets of solutions are no curves")
+        return Diagram(
+            tuple(self.branches), at, not doubts, "; ".join(doubts) or self._why(at, whole),
+            tuple(self.lost), tuple(self.sets), now() - self.began, whole,
+        )  # fmt: skip
+
+    def _why(self, at: tuple[float, ...], whole: tuple[float, float] | None) -> str:
+        if whole is not None:
+            return (
+                f"all solutions from {whole[0]:g} to {whole[1]:g} are on these branches: no "
+                "other pattern of statuses has one at any of these loads"
+            )
+        values = ", ".join(f"{p:g}" for p in at)
+        tried = f" ({self.why_not_whole})" if self.why_not_whole else ""
+        return (
+            f"all solutions at {values} are on these branches; nothing is proved between these "
+            f"values, where a closed branch would not be seen{tried}"
+        )
 
 
 def _found_again(

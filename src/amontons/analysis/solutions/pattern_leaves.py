@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ..statuses import States
+from ..statuses import ANY, LOAD, States
 from . import pattern_search as search
 
 Array = NDArray[np.float64]
@@ -19,12 +19,12 @@ NODE = 10.0  # operations of a pattern per square of the reactions
 
 def leaves_of(
     A: Array, spread: Array, c: Array, box: tuple[Array, Array], reacts: Mask, frictional: Mask,
-    cuts: list[Cut] | None = None,
+    cuts: list[Cut] | None = None, *, loaded: bool = False,
 ) -> Iterator[tuple[States, int, bool]]:  # fmt: skip
     """(complete patterns that the search could not exclude, nodes, done?) in turns.
 
     Arguments as of `pattern_search.search_inplace`; box: low, high; cuts takes the excluded
-    patterns with their multipliers.
+    patterns with their multipliers.  loaded: the last contact is the load (`statuses.LOAD`).
     """
     m, nc = len(c), len(reacts)
     levels = m + 2
@@ -34,7 +34,10 @@ def leaves_of(
     nodes = max(20, NODES * 20**2 // max(20, nc) ** 2)  # a node costs some nc^2 and more
     leaves, cut = np.empty((2, nodes, nc), dtype=np.int8)
     proofs = np.empty((nodes, m))
-    search.start_inplace(D, basic, nonbasic, states, A, c)
+    root = np.full(nc, ANY, dtype=np.int8)
+    if loaded:
+        root[-1] = LOAD
+    search.start_inplace(D, basic, nonbasic, states, A, c, root)
     done, level = False, 0
     while not done:
         done, level, nodes, count, excluded = search.search_inplace(

@@ -25,7 +25,7 @@ BOUNDS = np.array([  # a, b, u_N, u_T of a status
     [POSITIVE, FIXED, FIXED, NEGATIVE],  # PLUS
     [FIXED, POSITIVE, FIXED, POSITIVE],  # MINUS
     [POSITIVE, POSITIVE, FIXED, FIXED],  # STICK
-    [UNBOUND, UNBOUND, UNBOUND, UNBOUND],  # no state of a contact here
+    [POSITIVE, FIXED, POSITIVE, FIXED],  # LOAD: no contact, a and u_N = 1 - a
     [POSITIVE, FIXED, FIXED, UNBOUND],  # FRICTIONLESS
     [UNBOUND, UNBOUND, UNBOUND, UNBOUND],
     [POSITIVE, POSITIVE, FIXED, UNBOUND],  # CLOSED
@@ -256,13 +256,13 @@ def _child(state, number, reacts, frictional):
     return STICK if number == 0 else PLUS + number - 1
 
 
-def start_inplace(D, basic, nonbasic, states, A, c):
-    """The root: all contacts undecided, u basic, the reactions at zero."""
+def start_inplace(D, basic, nonbasic, states, A, c, root):
+    """The root: contacts as in `root` (nc,), u basic, the reactions at zero."""
     m = len(c)
     D[0, :, :m], D[0, :, m] = A, c
     reactions = np.array([4 * (k // 2) + k % 2 for k in range(m)], dtype=np.int64)
     basic[0], nonbasic[0] = reactions + 2, reactions
-    states[0] = ANY
+    states[0] = root
 
 
 @njit(cache=True)

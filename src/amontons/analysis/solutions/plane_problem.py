@@ -2,7 +2,8 @@
 
 Every solution dissipates, r u <= 0, so r W r + q r <= 0: where W is positive definite that
 ellipsoid bounds all reactions and velocities beforehand, and proofs hold without further
-assumption; so they do where W is singular but no reaction in the cone has W r = 0.
+assumption; so they do where W is singular but no reaction in the cone has W r = 0.  Of loads
+between several, the ellipsoids are about points between theirs, and none is larger.
 """
 
 from __future__ import annotations
@@ -44,14 +45,19 @@ class Box:
 
 
 class PlaneProblem:
-    """u = W r + c in scaled variables, and the box of all solutions."""
+    """u = W r + c in scaled variables, and the box of all solutions.
 
-    def __init__(self, scaled: Scaled) -> None:
+    loads (k, 2 nc): the box holds the solutions of all c between them, by default the one
+    that is given.
+    """
+
+    def __init__(self, scaled: Scaled, loads: Array | None = None) -> None:
         self.scaled, self.W, self.mu, self.reacts = scaled, scaled.W, scaled.mu, scaled.reacts
         nc = self.contacts = scaled.contacts
-        self.c = scaled.q.ravel().copy()
-        normal = self.c[0::2]  # a view: rounding of the gap of a contact that can not react
-        normal[~self.reacts & (np.abs(normal) <= SLACK)] = 0.0
+        self.loads = np.array(scaled.q.reshape(1, -1) if loads is None else loads)
+        normal = self.loads[:, 0::2]  # a view: rounding of the gap of what can not react
+        normal[:, ~self.reacts] *= np.abs(normal[:, ~self.reacts]) > SLACK
+        self.c = self.loads[0]
         generators = np.zeros((2 * nc, 2 * nc))  # r = generators x
         self.shrink = 1 / power_of_two(np.maximum(self.mu, 1.0))
         for i in range(nc):
@@ -72,7 +78,8 @@ class PlaneProblem:
             found = self._wide_box(min(size, REACH))
         low, high = found
         size = np.sqrt(self.scaled.size)
-        load = load_size(self.scaled.q, self.mu, self.reacts) or 1.0
+        sizes = (load_size(c.reshape(-1, 2), self.mu, self.reacts) for c in self.loads)
+        load = max(sizes) or 1.0
         x = np.repeat(size / load * self.shrink * np.maximum(self.mu, 1.0), 2)
         u = np.repeat(1 / (load * size), 2)
         each = np.stack([x.reshape(-1, 2), u.reshape(-1, 2)], axis=1).ravel()
@@ -112,16 +119,17 @@ class PlaneProblem:
             G[t, 4 * i : 4 * i + 2] = np.array([1.0, -1.0]) * along[t] / slope[i]
             G[:, 4 * i + 2 : 4 * i + 4] = self.W[[n, t]].T
         H, dH = _inverted(X, G, rho)
-        p, dp = (x[:, 0] for x in _inverted(X, self.c[:, None], rho))
+        p, dp = _inverted(X, self.loads.T, rho)
         size, dsize = np.linalg.norm(H, axis=0), np.linalg.norm(dH, axis=0)
-        ball, dball = float(np.linalg.norm(p)), float(np.linalg.norm(dp))
-        middle, reach = -(p @ H) / 2, (size + dsize) * (ball + dball) / 2
+        ball, dball = (float(np.linalg.norm(x, axis=0).max()) for x in (p, dp))
+        middle, reach = -(p.T @ H) / 2, (size + dsize) * (ball + dball) / 2
         reach += (dsize * ball + size * dball + dsize * dball) / 2
         reach += 8 * gamma(m + 4) * (size + dsize) * (ball + dball)
-        start = np.zeros((self.contacts, 4))
-        start[:, 2:] = self.c.reshape(-1, 2)
-        reach += 4 * EPSILON * (np.abs(start).ravel() + np.abs(middle))
-        return start.ravel() + middle - reach, start.ravel() + middle + reach
+        start = np.zeros((len(self.loads), self.contacts, 4))
+        start[:, :, 2:] = self.loads.reshape(len(self.loads), -1, 2)
+        start = start.reshape(len(self.loads), -1)
+        reach = reach + 4 * EPSILON * (np.abs(start) + np.abs(middle))
+        return (start + middle - reach).min(axis=0), (start + middle + reach).max(axis=0)
 
     def _cone_bound(self) -> float:
         """Bound of the sum S of all a, b where no reaction in the cone has W r = 0, else inf.
@@ -147,7 +155,7 @@ class PlaneProblem:
         if (self.A.T @ y)[able].min(initial=1.0) < 0.5 + 1e-6:
             return np.inf
         g = float(np.linalg.norm(self.generators, axis=0).max())
-        Q = max(0.0, -float((self.generators.T @ self.c)[able].min(initial=0.0)))
+        Q = max(0.0, -float((self.generators.T @ self.loads.T)[able].min(initial=0.0)))
         Y = 4 * float(y @ W @ y + indefinite * (y @ y)) * (1 + 1e-6) + 1e-6
         rest = max(0.0, 1 - 2 * indefinite * float(np.linalg.norm(y)) * g)
         rest = rest**2 - Y * indefinite * g**2
@@ -156,11 +164,11 @@ class PlaneProblem:
     def _wide_box(self, size: float) -> tuple[Array, Array]:
         """Bounds of all variables where the reactions are bounded by their sum alone."""
         reach_u = np.abs(self.A).max(axis=1, initial=0.0) * size * (1 + 1e-12)
-        reach_u += 1e-12 * np.abs(self.c)
+        reach_u += 1e-12 * np.abs(self.loads).max(axis=0)
         low, high = np.zeros((2, self.contacts, 4))
         high[:, :2] = size
-        low[:, 2:] = (self.c - reach_u).reshape(-1, 2)
-        high[:, 2:] = (self.c + reach_u).reshape(-1, 2)
+        low[:, 2:] = (self.loads.min(axis=0) - reach_u).reshape(-1, 2)
+        high[:, 2:] = (self.loads.max(axis=0) + reach_u).reshape(-1, 2)
         return low.ravel(), high.ravel()
 
     # ---------------------------------------------------------------- one pattern

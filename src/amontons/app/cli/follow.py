@@ -48,16 +48,17 @@ def run(
     target = opened.target if mu is None else opened.target.with_mu(mu)
     name = ALIASES.get(parameter, parameter)
     at: Sequence[float] = ()
+    whole: tuple[float, float] | None = None
     limits: dict[str, Any] = {"max_points": max_points, "time_limit": time_limit,
                               "options": opened.settings.continuation()}  # fmt: skip
     if every:
         found = questions.diagram(target, name, (low, high), **limits)
         branches, complete, reason = list(found), found.complete, found.reason
-        at = found.at
+        at, whole = found.at, found.whole
     else:
         branches = [questions.follow(target, name, (low, high), **limits)]
         complete, reason = None, ""
-    text = to_json(record(branches, parameter, (low, high), complete, reason, at))
+    text = to_json(record(branches, parameter, (low, high), complete, reason, at, whole))
     model: Any = opened.model if opened.has_model else None
     table = csv_of(branches, [name for name in (x, y) if name is not None], model)
     figure = None
@@ -82,11 +83,12 @@ def run(
 def record(
     branches: Sequence[Branch], parameter: str, interval: tuple[float, float],
     complete: bool | None, reason: str, at: Sequence[float] = (),
+    whole: tuple[float, float] | None = None,
 ) -> dict[str, Any]:  # fmt: skip
     """What follow.json holds; points and events name their branch.
 
     complete: all solutions at the values `at` are on these branches, which says nothing of the
-    values between them.
+    values between them; whole: the interval on which the same is proved of all values.
     """
     parts = [branch.record() for branch in branches]
 
@@ -97,7 +99,8 @@ def record(
         "schema": SCHEMA, "parameter": parameter, "interval": list(interval),
         "points": rows("points"), "events": rows("events"),
         "branches": [{"stops": part["stops"], "closed": part["closed"]} for part in parts],
-        "complete": complete, "at": list(at), "reason": reason, "versions": versions(),
+        "complete": complete, "at": list(at), "whole": None if whole is None else list(whole),
+        "reason": reason, "versions": versions(),
     }  # fmt: skip
 
 
