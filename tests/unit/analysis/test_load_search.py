@@ -132,6 +132,11 @@ def test_a_contact_given_twice_leaves_a_doubt():
     assert "singular" in found.doubt
 
 
+def test_without_any_load_nothing_is_searched():
+    rest = LOOPED[0].with_load(np.zeros((2, 2)))
+    assert pieces(rest, rest).doubt == "there is no load at either end"
+
+
 def test_without_contacts_there_is_one_piece():
     none = problem(np.zeros((0, 0)), np.zeros((0, 2)), [])
     found = pieces(none, none)

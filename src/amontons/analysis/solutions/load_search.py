@@ -13,7 +13,8 @@ statuses at that load, a contact at rest on both of its slips.  Theirs are solut
 piece, within `NEAR`; what is neither that nor sure leaves a doubt.
 
 Where all of q_i of a contact vanishes at an end, as where a load grows from zero on closed
-gaps, all patterns meet: the interval begins or ends START of its length inside.
+gaps, all patterns meet: the interval begins or ends START of its length inside.  Where all of q
+does, solutions at all other loads are multiples of those at the other end.
 """
 
 from __future__ import annotations
@@ -107,11 +108,13 @@ def pieces_between(
     a, b = (Scaled.of(problem, deadline) for problem in (start, end))
     if not a.contacts:
         return LoadPieces((LoadPiece("", 0.0, 1.0, a.q, b.q),), (0.0, 1.0), 0, "", 0)
+    if not (a.q.any() or b.q.any()):
+        return LoadPieces((), (0.0, 1.0), 0, "there is no load at either end", 0)
     scaled = a if a.to_u[0] >= b.to_u[0] else b  # the larger unit
     loads = np.stack([(x.q * (x.to_u / scaled.to_u)).ravel() for x in (a, b)])
     low, high = _searched(loads)
     corners = np.stack([(1 - t) * loads[0] + t * loads[1] for t in (low, high)])
-    search = _Search(PlaneProblem(scaled, corners), deadline)
+    search = _Search(PlaneProblem(scaled, corners), ~loads.any(axis=1), deadline)
     search.run()
     sure = [line for line in search.lines if line.is_sure]
     others = [line for line in search.lines if not line.is_sure]
@@ -142,10 +145,12 @@ def _searched(loads: Array) -> tuple[float, float]:
 
 
 class _Search:
-    """The search for patterns, and what it left."""
+    """The search for patterns, and what it left; zero (2,): which ends have no load at all."""
 
-    def __init__(self, plane: PlaneProblem, deadline: Deadline) -> None:
-        self.plane, self.deadline = plane, deadline
+    def __init__(
+        self, plane: PlaneProblem, zero: NDArray[np.bool_], deadline: Deadline
+    ) -> None:
+        self.plane, self.zero, self.deadline = plane, zero, deadline
         self.corners = [copy(plane), copy(plane)]
         for corner, load in zip(self.corners, plane.loads, strict=True):
             corner.c = load
@@ -183,6 +188,8 @@ class _Search:
         unit = 1 / box.to_u * plane.scaled.to_u.repeat(2)
         A, spread, c = np.zeros((m + 2, m + 2)), np.zeros(m + 2), np.zeros(m + 2)
         first, last = (unit * load for load in plane.loads)
+        if self.zero.any():  # loads are multiples: one stands for all
+            first = last = last if self.zero[0] else first
         A[:m, :m], A[:m, m], A[m, m] = box.A, last - first, -1.0
         spread[:m] = box.spread + 4 * EPSILON * (np.abs(first) + np.abs(last))
         c[:m], c[m] = first, 1.0
