@@ -224,10 +224,10 @@ def diagram(
 ) -> Diagram:  # fmt: skip
     """All branches of an interval, in 2D; `whole` of the answer tells where that is proved.
 
-    Under a load all pieces on the interval are searched for.  With values `at` of the
-    parameter, under friction at both ends and the middle, and where that search does not end:
-    all branches through all solutions there, as `all_solutions` finds them, with their share
-    of the time each.  Others as in `follow`.
+    All pieces on the interval are searched for.  With values `at` of the parameter, and where
+    that search does not end (then at both ends and the middle): all branches through all
+    solutions there, as `all_solutions` finds them, with their share of the time each.  Others
+    as in `follow`.
     """
     from ..analysis.paths import checks
     from ..analysis.paths.diagram import bifurcation_diagram

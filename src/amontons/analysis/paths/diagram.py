@@ -1,8 +1,8 @@
 """Bifurcation diagrams: all branches found from all solutions, closed ones included.
 
-In 2D under a load parameter `load_search` tells all linear pieces that have a solution
-anywhere on the interval, with proof: every branch goes through the middle of some of them, so
-that none is missed, wherever it begins and ends.  Otherwise branches go through all solutions
+In 2D `interval_search` tells all pieces that have a solution anywhere on the interval, with
+proof: every branch goes through the middle of some of them, so that none is missed, wherever it
+begins and ends.  Otherwise branches go through all solutions
 at some values of the parameter, and nothing is known of what passes none of these.
 """
 
@@ -81,7 +81,7 @@ class Diagram(Shown):
         """The smallest value at which a fold makes solutions appear or vanish.
 
         With friction as the parameter: the critical friction of that load, as far as the
-        branches tell.
+        branches tell; where they are `whole`, for certain.
         """
         return min(self.folds, default=None)
 
@@ -118,7 +118,7 @@ def bifurcation_diagram(
 
     at: values of the parameter at which all solutions are searched for with
     `enumerate_solutions`, which at each has half of its share of the time.  Without them the
-    whole interval, where its pieces are straight lines, else both ends and the middle.
+    whole interval, and both ends and the middle where that is not proved.
     options: those of step-by-step continuation, also where the curves are straight.
     """
     if not isinstance(path, FrictionPath):
@@ -129,7 +129,8 @@ def bifurcation_diagram(
     a, b = limits.interval
     drawn = _Drawn(timed(path, limits.deadline), limits, options)
     values = (a, (a + b) / 2, b) if at is None else tuple(at)
-    whole = drawn.whole() if at is None and path.straight and not path.tresca else None
+    plane = path.start.dimension == 2 and not path.tresca
+    whole = drawn.whole() if at is None and plane else None
     if whole is None:
         drawn.through(values)
     return drawn.diagram(values, whole)
@@ -152,7 +153,7 @@ class _Drawn:
     def whole(self) -> tuple[float, float] | None:
         """Branches through all pieces of the interval; where that is all proved, else None."""
         from ..solutions.enumerate import CONTACTS
-        from ..solutions.load_search import pieces_between
+        from ..solutions.interval_search import pieces_between
 
         a, b = self.limits.interval
         deadline = self.limits.deadline
@@ -166,9 +167,7 @@ class _Drawn:
             return None
         self.why_not_whole = found.doubt
         for piece in found.pieces:
-            middle = (piece.low + piece.high) / 2
-            p = a + (b - a) * middle
-            if not self._reached(p, self.path.state(piece.at(middle))):
+            if not self._reached(a + (b - a) * piece.middle, self.path.state(piece.r)):
                 return None
         low, high = (a + (b - a) * t for t in found.interval)
         return None if found.doubt or self.doubts or self.lost else (low, high)

@@ -359,6 +359,7 @@ def _proof(piece: PlaneProblem, cuts: list[Cut] | None) -> Proof | None:
     """What the search left, in the units of the problem."""
     if cuts is None:
         return None
-    rows = [y / piece.box.to_u for _, y in cuts]
+    to_u = piece.scaled.to_u.repeat(2) / piece.box.u
+    rows = [y / to_u for _, y in cuts]
     multipliers = np.array(rows).reshape(-1, piece.contacts, 2)
     return Proof(tuple(word(states) for states, _ in cuts), multipliers)

@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.compiled import njit
-from ..statuses import ANY, CLOSED, FREE, FRICTIONLESS, PLUS, STICK
+from ..statuses import ANY, CLOSED, FREE, FRICTIONLESS, MINUS, PLUS, STICK
 
 UNBOUND, POSITIVE, NEGATIVE, FIXED = 0, 1, 2, 3  # bounds of a variable, closed
 BOUNDS = np.array([  # a, b, u_N, u_T of a status
@@ -257,7 +257,7 @@ def _child(state, number, reacts, frictional):
 
 
 def start_inplace(D, basic, nonbasic, states, A, c, root):
-    """The root: contacts as in `root` (nc,), u basic, the reactions at zero."""
+    """The root: contacts as in `root`, for all or (nc,), u basic, the reactions at zero."""
     m = len(c)
     D[0, :, :m], D[0, :, m] = A, c
     reactions = np.array([4 * (k // 2) + k % 2 for k in range(m)], dtype=np.int64)
@@ -280,14 +280,15 @@ def _copy_inplace(D, basic, nonbasic, states, level):
 
 @njit(cache=True)
 def search_inplace(  # noqa: PLR0913
-    A, spread, c, low, high, reacts, frictional, D, basic, nonbasic, states, turn, level,
-    leaves, cut, proofs,
+    A, spread, c, low, high, reacts, frictional, partner, D, basic, nonbasic, states, turn,
+    level, leaves, cut, proofs,
 ):  # fmt: skip
     """Go on from `level` for at most len(leaves) nodes: (done?, level, nodes, leaves, cuts).
 
     D, basic, nonbasic, states: one dictionary and pattern per level; turn (levels, 3): contact
-    that a level branches on, its next child, and the age of its dictionary.  leaves (k, nc)
-    takes complete patterns; cut (k, nc) and proofs (k, m) the excluded ones and multipliers.
+    that a level branches on, its next child, and the age of its dictionary.  partner (nc,): the
+    contact that slips with another one, and else is free, or -1.  leaves (k, nc) takes
+    complete patterns; cut (k, nc) and proofs (k, m) the excluded ones and multipliers.
     """
     nodes = found = cuts = 0
     while level >= 0:
@@ -302,6 +303,8 @@ def search_inplace(  # noqa: PLR0913
         _copy_inplace(D, basic, nonbasic, states, level)
         level += 1
         states[level, p] = state
+        if partner[p] >= 0:
+            states[level, partner[p]] = state if state == PLUS or state == MINUS else FREE
         nodes += 1
         answer, turn[level, 2] = _feasible_inplace(
             D[level], basic[level], nonbasic[level], states[level], A, spread, c, low,

@@ -30,9 +30,9 @@ class Box:
     """u = A x + c and bounds of a, b, u_N, u_T of every contact, low and high (4 nc,).
 
     In units of |W_ii| and |q|, not rounded, with which the search needs fewest patterns; so A
-    and c are.  spread (2 nc,): bound of the error of A x by that.  to_u (2 nc,): velocities of
-    the problem per unit.  bounded: every solution is in the box; otherwise there may be some
-    with larger reactions.
+    and c are.  spread (2 nc,): bound of the error of A x by that.  u, x (2 nc,): numbers here
+    per unit of scaled ones, of velocities and of a and b.  bounded: every solution is in the
+    box; otherwise there may be some with larger reactions.
     """
 
     A: Array
@@ -40,26 +40,32 @@ class Box:
     low: Array
     high: Array
     spread: Array
-    to_u: Array
+    u: Array
+    x: Array
     bounded: bool
 
 
 class PlaneProblem:
     """u = W r + c in scaled variables, and the box of all solutions.
 
-    loads (k, 2 nc): the box holds the solutions of all c between them, by default the one
-    that is given.
+    loads (k, 2 nc), mu (nc,): the box holds the solutions of all c between these and with
+    coefficients up to mu; by default those that are given.  shrink (nc,): factors of the
+    generators, by default so that none is much longer than 1.
     """
 
-    def __init__(self, scaled: Scaled, loads: Array | None = None) -> None:
-        self.scaled, self.W, self.mu, self.reacts = scaled, scaled.W, scaled.mu, scaled.reacts
+    def __init__(
+        self, scaled: Scaled, loads: Array | None = None, mu: Array | None = None,
+        shrink: Array | None = None,
+    ) -> None:  # fmt: skip
+        self.scaled, self.W, self.reacts = scaled, scaled.W, scaled.reacts
         nc = self.contacts = scaled.contacts
         self.loads = np.array(scaled.q.reshape(1, -1) if loads is None else loads)
+        self.mu = scaled.mu if mu is None else mu
         normal = self.loads[:, 0::2]  # a view: rounding of the gap of what can not react
         normal[:, ~self.reacts] *= np.abs(normal[:, ~self.reacts]) > SLACK
         self.c = self.loads[0]
         generators = np.zeros((2 * nc, 2 * nc))  # r = generators x
-        self.shrink = 1 / power_of_two(np.maximum(self.mu, 1.0))
+        self.shrink = 1 / power_of_two(np.maximum(self.mu, 1.0)) if shrink is None else shrink
         for i in range(nc):
             generators[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = self.shrink[i] * np.array(
                 [[1.0, 1.0], [self.mu[i], -self.mu[i]]]
@@ -70,7 +76,7 @@ class PlaneProblem:
     @cached_property
     def box(self) -> Box:
         """What bounds the solutions."""
-        found = self._ellipsoid()
+        found = self.range_of(self._bounded)
         bounded = found is not None
         if found is None:
             size = self._cone_bound()
@@ -89,10 +95,12 @@ class PlaneProblem:
         A = u[:, None] * (self.W @ self.generators) / x
         return Box(A, u * self.c, low * each - room, high * each + room,
                    gamma(2 * self.contacts + 12) * terms,
-                   self.scaled.to_u.repeat(2) / u, bounded)  # fmt: skip
+                   u, x, bounded)  # fmt: skip
 
-    def _ellipsoid(self) -> tuple[Array, Array] | None:
-        """The box of r W r + c r <= 0, rounding included; None where W is not surely definite.
+    def range_of(self, G: Array) -> tuple[Array, Array] | None:
+        """The range of G^T r, of u_N and u_T more than that, G (2 nc, 4 nc) in rows of four.
+
+        Over r W r + c r <= 0, rounding included; None where W is not surely definite.
 
         L L^T <= W, for L is the factor of W less what rounding can do to it (`rounding`).  So
         x = L^T r lies in the ball about -p / 2 through 0, p = L^-1 c, and g r = (L^-1 g) x.
@@ -111,13 +119,6 @@ class PlaneProblem:
         rho = float(off.sum(axis=1).max(initial=0.0))
         if not rho < 0.5:
             return None
-        G = np.zeros((m, 2 * m))  # what is bounded, as functions of r: a, b, u_N, u_T
-        along = np.repeat(0.5 / self.shrink, 2)
-        slope = np.where(self.mu > 0, self.mu, np.inf)
-        for i, (n, t) in enumerate(np.arange(m).reshape(-1, 2)):
-            G[n, 4 * i : 4 * i + 2] = along[n] if self.mu[i] > 0 else 2 * along[n]
-            G[t, 4 * i : 4 * i + 2] = np.array([1.0, -1.0]) * along[t] / slope[i]
-            G[:, 4 * i + 2 : 4 * i + 4] = self.W[[n, t]].T
         H, dH = _inverted(X, G, rho)
         p, dp = _inverted(X, self.loads.T, rho)
         size, dsize = np.linalg.norm(H, axis=0), np.linalg.norm(dH, axis=0)
@@ -130,6 +131,29 @@ class PlaneProblem:
         start = start.reshape(len(self.loads), -1)
         reach = reach + 4 * EPSILON * (np.abs(start) + np.abs(middle))
         return (start + middle - reach).min(axis=0), (start + middle + reach).max(axis=0)
+
+    @property
+    def _bounded(self) -> Array:
+        """What is bounded, as functions (2 nc, 4 nc) of r: a, b, u_N, u_T of every contact."""
+        m = len(self.W)
+        G = np.zeros((m, 2 * m))
+        along = np.repeat(0.5 / self.shrink, 2)
+        slope = np.where(self.mu > 0, self.mu, np.inf)
+        for i, (n, t) in enumerate(np.arange(m).reshape(-1, 2)):
+            G[n, 4 * i : 4 * i + 2] = along[n] if self.mu[i] > 0 else 2 * along[n]
+            G[t, 4 * i : 4 * i + 2] = np.array([1.0, -1.0]) * along[t] / slope[i]
+            G[:, 4 * i + 2 : 4 * i + 4] = self.W[[n, t]].T
+        return G
+
+    @property
+    def most_pressed(self) -> Array:
+        """Bounds of r_N / shrink, (nc,)."""
+        m = len(self.W)
+        G = np.zeros((m, 2 * m))
+        G[np.arange(0, m, 2), np.arange(0, 2 * m, 4)] = 1 / self.shrink
+        found = self.range_of(G)
+        size = min(self._cone_bound(), REACH)
+        return np.full(m // 2, size) if found is None else found[1][0::4]
 
     def _cone_bound(self) -> float:
         """Bound of the sum S of all a, b where no reaction in the cone has W r = 0, else inf.
