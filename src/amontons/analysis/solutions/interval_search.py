@@ -126,7 +126,7 @@ class _Family:
         rows = np.abs(self.loads.reshape(2, -1, 2)).max(axis=2)
         still = (rows <= DATA * size).any(axis=1)
         self.interval = (START if still[0] else 0.0, 1.0 - START if still[1] else 1.0)
-        self.zero = ~self.loads.any(axis=1)
+        self.zero: NDArray[np.bool_] = np.logical_not(self.loads.any(axis=1))
         whole = PlaneProblem(self.scaled, self.loads, self.mus.max(axis=0))
         self.shrink, self.bounded = whole.shrink, whole.box.bounded
 
