@@ -34,7 +34,7 @@ from .held import HeldNodes
 from .joint_masters import with_masters
 from .large_deformation import LargeDeformation, large_deformation
 from .large_fields import recover_large
-from .laws import NEEDS_FORCES, OF_LINEAR_BODIES, WHERE_NODES_ARE, check_law
+from .laws import NEEDS_FORCES, OF_LINEAR_BODIES, check_law
 from .nitsche import nitsche_matrices, nitsche_problem
 from .nodal_forces import NodalForces, follows, nodal_forces
 from .parts import FINITE, SMALL, Body, BodyForce, Contact, Load, Pressure
@@ -225,7 +225,6 @@ class Moved(Formulation):
 
     problem = LargeDeformation
     finds_contact_where_nodes_are = True
-    lacks = WHERE_NODES_ARE
     doubts = CHECKS
     keeps = ""
 
