@@ -28,7 +28,7 @@ from ...problem.protocol import Problem
 from ...problem.solution import FrictionSolution
 from ..elements.plasticity import is_plastic
 from .assembly import Discretisation
-from .doubts import CHECKS, OF_THE_START, Check
+from .doubts import CHECKS, OF_THE_START, OF_WHERE_NODES_ARE, Check
 from .fields import ContactFields, recover_fields
 from .held import HeldNodes
 from .joint_masters import with_masters
@@ -225,7 +225,7 @@ class Moved(Formulation):
 
     problem = LargeDeformation
     finds_contact_where_nodes_are = True
-    doubts = CHECKS
+    doubts = CHECKS + OF_WHERE_NODES_ARE
     keeps = ""
 
     def joined(self, contacts: tuple[Contact, ...]) -> tuple[Contact, ...]:
