@@ -229,7 +229,7 @@ def test_a_wall_of_blocks_that_turn_rocks_or_topples(push, falls):
 
 @pytest.mark.parametrize("bond", [Bond.RUNNING, Bond.TOOTHED])
 def test_a_wall_of_blocks_that_turn_stands(bond):
-    """Under its weight: the floor bears it after a while, within the waves that damping left."""
+    """The floor bears its weight after a while, within the waves that damping has left."""
     stone = am.LinearElastic(1e7, 0.2, plane="stress", density=2000.0)
     wall = am.Wall(2, 2, (1.0, 0.5), (2, 1), stone, bond=bond, corotational=True)
     model = wall.model([], [am.BodyForce((0, -2e4))])

@@ -38,6 +38,7 @@ from .current_pairs import Meetings, Pair
 
 Array = NDArray[np.float64]
 Pieces = NDArray[np.int8]
+Partials = tuple[Array, Array, Array, Array, Array | None]
 BACK = 3  # beside the statuses: slip against t, 2D only
 
 
@@ -274,7 +275,7 @@ class ContactPoint:
         by_x += by_gap[:, :, None] * self.meeting.gap_slopes[:, None, :]
         return by_force, by_x * self.contact.free[:, None, :], by_motion
 
-    def partials(self, pieces: Pieces | None = None) -> tuple[Array, ...]:
+    def partials(self, pieces: Pieces | None = None) -> Partials:
         """Derivatives of (2) by lambda, n, g (nc, d), s and E; the others (nc, d, d).
 
         E, of `surface_axes`, of which this law does not know: None.

@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...problem.law.law import MU
-from .current import ContactPoint, Pieces
+from .current import ContactPoint, Partials, Pieces
 from .surface_axes import twist
 
 Array = NDArray[np.float64]
@@ -84,7 +84,7 @@ class FramedPoint(ContactPoint):
         """T P, (nc, d)."""
         return np.einsum("pij,pj->pi", self._tensors[0], friction)
 
-    def partials(self, pieces: Pieces | None = None) -> tuple[Array, ...]:
+    def partials(self, pieces: Pieces | None = None) -> Partials:
         """Derivatives of (2) by lambda, n, g (nc, d), s (nc, d, d), and E (nc, d, 2 d)."""
         pieces = self.pieces if pieces is None else pieces
         n = self.n

@@ -91,12 +91,10 @@ def with_thickness(law: Any, C: Array) -> tuple[Array, Array, Array, Array]:
     x = -soft / stiff * np.log(plane)  # that of small logarithmic strains
     low, high = np.full(len(x), -REACH), np.full(len(x), REACH)
     x, moved = np.clip(x, -0.5 * REACH, 0.5 * REACH), np.full(len(x), np.inf)
+    C[:, 2, 2] = c = np.exp(x)
     with np.errstate(over="ignore", invalid="ignore"):
+        W, S, D = _whole(law, C)
         for _ in range(ITERATIONS):
-            C[:, 2, 2] = c = np.exp(x)
-            W, S, D = _whole(law, C)
-            if (moved <= SAME).all():
-                break
             pull = S[:, 2, 2] * c
             slope = pull + 0.5 * D[:, 2, 2, 2, 2] * c**2
             low, high = np.where(pull < 0, x, low), np.where(pull > 0, x, high)
@@ -107,6 +105,10 @@ def with_thickness(law: Any, C: Array) -> tuple[Array, Array, Array, Array]:
             goal = np.where(inside, goal, (low + high) / 2)
             goal = np.where(moved > SAME, goal, x)  # those that are found stay
             moved, x = np.abs(goal - x), goal
+            C[:, 2, 2] = c = np.exp(x)
+            W, S, D = _whole(law, C)
+            if (moved <= SAME).all():
+                break
         lost = ~((moved <= SAME) & (D[:, 2, 2, 2, 2] > 0) & (np.abs(x) < 0.9 * REACH))
     if lost.any():
         worst = int(np.argmax(lost))

@@ -39,7 +39,7 @@ def _passed(pair: object, X: Array, x: Array) -> ResultWarning | None:
     if not isinstance(pair, MortarPair) or pair.fold is not None:
         return None
     slave = pair.slave
-    alone = ~(np.isin(slave.nodes, pair.slaves) & slave.real).any(axis=1)
+    alone = ~np.asarray((np.isin(slave.nodes, pair.slaves) & slave.real).any(axis=1))
     if not alone.any():
         return None
     held = slave.part(np.flatnonzero(alone))

@@ -30,7 +30,7 @@ from scipy import sparse
 
 from ...linear.condensed import Structure
 from ..contact.carried import TiedMeeting
-from ..contact.current import ContactPoint
+from ..contact.current import ContactPoint, Partials
 from ..contact.current_mortar import MortarMeeting
 from ..contact.current_pairs import AnyMeeting, Meeting, Meetings
 from ..contact.current_slopes import blocks_of
@@ -154,7 +154,7 @@ class PairLinearisation:
     blocks: Array
     point: ContactPoint
     earlier: Meetings
-    partials: tuple[Array, ...]
+    partials: Partials
 
     @cached_property
     def residual(self) -> Array:
