@@ -244,3 +244,20 @@ def test_a_glued_mesh_moves_as_one_that_is_whole():
     for bond, near in (({}, 1e-7), ({"stiffness": 1e6, "stick_stiffness": 1e6}, 1e-3)):
         glue = am.Contact("upper.bottom", master="lower.top", tied=True, **bond)
         np.testing.assert_allclose(ends(halves, [glue]), whole, atol=near)
+
+
+def test_a_plate_drifts_to_the_easier_direction_of_orthotropic_friction():
+    """m v' = -m g D^2 v / |D v|, D the coefficients along and across: integrated beside it."""
+    from scipy.integrate import solve_ivp
+
+    squares, weight, end = np.array([0.04, 0.25]), 10.0, 0.04
+    plate = am.Body(am.box((1, 1, 0.1), (1, 1, 1)), am.NeoHookean(1e4, 0.0, density=1.0))
+    floor = am.Contact("bottom", am.Plane((0, 0, 1)), mu=0.2, mu_across=0.5,
+                       direction=(1, 0, 0))  # fmt: skip
+    model = am.Model([plate], [], [floor], [am.BodyForce((0, 0, -weight))])
+    start = am.at_rest(model, velocity=(1.0, 1.0, 0.0))
+    *_, step = am.evolve(model, am.MoreauJean(4e-3), until=end, start=start)
+    way = solve_ivp(lambda t, v: -weight * squares * v / np.sqrt(squares @ v**2), (0, end),
+                    [1.0, 1.0], rtol=1e-10)  # fmt: skip
+    np.testing.assert_allclose(step.v[0][:, :2].mean(axis=0), way.y[:, -1], rtol=5e-3)
+    assert step.energies.contact < 0
