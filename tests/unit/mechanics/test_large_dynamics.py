@@ -183,3 +183,81 @@ def test_a_step_that_is_too_long_says_so():
     start = am.at_rest(model, velocity=lambda x: (0.0, -10 * x[1]))
     with pytest.raises(am.NotConverged, match="step 1: no state at its end is found"):
         list(am.evolve(model, am.MoreauJean(1.0), until=1.0, start=start))
+
+
+FORCES = [{"tresca": 0.3}, {"mu": 0.5, "cap": 0.3}, {"mu": 0.3, "stiffness": 1e3},
+          {"mu": 0.3, "cohesion": 0.2}, {"mu": 0.3, "stick_stiffness": 100.0}]  # fmt: skip
+
+
+@pytest.mark.parametrize("law", FORCES)
+def test_laws_of_stresses_are_those_of_small_strains(law):
+    """A stiff block that slides under its weight: bounds, tensions and springs of impulses."""
+    found = []
+    for material in (am.LinearElastic(1e4, 0.0, density=1.0), am.NeoHookean(1e4, 0.0, 1.0)):
+        body = am.Body(am.box((1, 0.1), (4, 1)), material)
+        contact = am.Contact("bottom", am.Plane((0, 1)), **law)
+        model = am.Model([body], [], [contact], [am.BodyForce((0, -10.0))])
+        start = am.at_rest(model, velocity=(1.0, 0.0))
+        *_, step = am.evolve(model, am.MoreauJean(2e-3), until=0.05, start=start)
+        found.append([step.v[0][:, 0].mean(), step.energies.total, step.state.path.mean()])
+        assert abs(step.energies.defect) < 1e-12
+        assert step.energies.contact <= 0
+    np.testing.assert_allclose(*found, rtol=2e-3)
+    if "tresca" in law:  # 0.3 per area on a mass of 0.1
+        assert found[1][0] == pytest.approx(1 - 3 * 0.05, abs=1e-9)
+
+
+@pytest.mark.parametrize("law", [SOFT, am.LinearElastic(1e3, 0.3, density=1.0)])
+def test_glued_bodies_spin_and_keep_energy_and_momenta(law):
+    """Meshes that do not match: the tie stays closed, and its impulses do no work."""
+    turns = {"corotational": True} if law is not SOFT else {}
+    lower = am.Body(am.box((1, 0.5), (4, 2)), law, name="lower", **turns)
+    upper = am.Body(am.box((1, 0.5), (3, 2), origin=(0, 0.5)), law, name="upper", **turns)
+    model = am.Model([lower, upper], [],
+                     [am.Contact("upper.bottom", master="lower.top", tied=True)])  # fmt: skip
+    start = am.at_rest(model, velocity=lambda x: (-3 * x[1], 3 * x[0] + 0.2))
+    steps = list(am.evolve(model, am.MoreauJean(5e-3), until=0.1, start=start, tolerance=1e-11))
+
+    def books(step):
+        both = zip(model.bodies, step.displacement, step.v, strict=True)
+        states = [replace(step.state, displacement=u.ravel(), velocity=v.ravel())
+                  for _, u, v in both]  # fmt: skip
+        parts = [momenta(b, s) for b, s in zip(model.bodies, states, strict=True)]
+        return np.append(sum(parts), step.energies.total)
+
+    np.testing.assert_allclose(books(steps[-1]), books(steps[0]), atol=1e-10)
+    assert max(abs(step.gap).max() for step in steps) < 1e-11
+    assert abs(steps[-1].state.force).max() > 1e-2
+
+
+def test_a_glued_mesh_moves_as_one_that_is_whole():
+    """Matching meshes: the same motion; an elastic bond that is stiff comes near to it."""
+    def ends(bodies, contacts):
+        model = am.Model(bodies, [], contacts)
+        start = am.at_rest(model, velocity=lambda x: (x[1] ** 2, 2 * x[0] ** 2))
+        *_, step = am.evolve(model, am.MoreauJean(1e-2), until=0.1, start=start)
+        return step.displacement[-1][-1]
+
+    whole = ends([am.Body(am.box((1, 1), 4), SOFT)], [])
+    halves = [am.Body(am.box((1, 0.5), (4, 2), origin=(0, y)), SOFT, name=name)
+              for y, name in ((0, "lower"), (0.5, "upper"))]  # fmt: skip
+    for bond, near in (({}, 1e-7), ({"stiffness": 1e6, "stick_stiffness": 1e6}, 1e-3)):
+        glue = am.Contact("upper.bottom", master="lower.top", tied=True, **bond)
+        np.testing.assert_allclose(ends(halves, [glue]), whole, atol=near)
+
+
+def test_a_plate_drifts_to_the_easier_direction_of_orthotropic_friction():
+    """m v' = -m g D^2 v / |D v|, D the coefficients along and across: integrated beside it."""
+    from scipy.integrate import solve_ivp
+
+    squares, weight, end = np.array([0.04, 0.25]), 10.0, 0.04
+    plate = am.Body(am.box((1, 1, 0.1), (1, 1, 1)), am.NeoHookean(1e4, 0.0, density=1.0))
+    floor = am.Contact("bottom", am.Plane((0, 0, 1)), mu=0.2, mu_across=0.5,
+                       direction=(1, 0, 0))  # fmt: skip
+    model = am.Model([plate], [], [floor], [am.BodyForce((0, 0, -weight))])
+    start = am.at_rest(model, velocity=(1.0, 1.0, 0.0))
+    *_, step = am.evolve(model, am.MoreauJean(4e-3), until=end, start=start)
+    way = solve_ivp(lambda t, v: -weight * squares * v / np.sqrt(squares @ v**2), (0, end),
+                    [1.0, 1.0], rtol=1e-10)  # fmt: skip
+    np.testing.assert_allclose(step.v[0][:, :2].mean(axis=0), way.y[:, -1], rtol=5e-3)
+    assert step.energies.contact < 0

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import amontons as am
+from amontons.mechanics.meshes import Facets
 
 NEO = am.NeoHookean(1.0, 0.3)
 
@@ -215,3 +216,34 @@ def test_a_cell_that_is_inverted_from_the_start():
     with pytest.raises(am.InvalidInput, match=r"cell|inside out"):
         am.solve(model([lower, am.Body(replace(upper.mesh, points=points), NEO, name="upper")],
                        am.Fix("upper.top", (0, -0.05))))  # fmt: skip
+
+
+@pytest.mark.parametrize(("held", "count"), [(0.35, 2), (0.7, 4)])
+def test_facets_of_held_nodes_alone_that_are_passed_are_told(held, count):
+    """They bear no force; with the master as the slave nothing comes through, or is told."""
+    mesh = am.box((1, 0.5), (6, 3), origin=(0, 1.0))
+    facets = mesh.surface("bottom")[0]
+    left = (mesh.points[facets.nodes][:, :, 0] <= held).all(axis=1)
+    part = Facets(facets.kind, facets.nodes[left])
+    mesh = am.Mesh(mesh.points, mesh.cells, {**mesh.surfaces, "part": (part,)})
+    law = am.NeoHookean(1.0, 0.3)
+    bodies = [am.Body(am.box((1, 1), (8, 4)), law, name="low"), am.Body(mesh, law, name="up")]
+    supports = [am.Fix("low.bottom", (0, 0.05)), am.Fix("up.part", 0), am.Fix("up.top", 0)]
+    for slave, master, told in (("up.bottom", "low.top", 1), ("low.top", "up.bottom", 0)):
+        contact = am.Contact(slave, master=master, mu=0.3)
+        solution = am.solve(am.Model(bodies, supports, [contact]))
+        assert solution.converged
+        found = [w for w in solution.warnings if w.name == "held-slave-facets"]
+        assert len(found) == told
+        if told:
+            assert f"all nodes of {count} of its 6 facets" in found[0].message
+            assert "make the other surface the slave" in found[0].message
+
+
+def test_a_slave_that_is_held_everywhere_says_what_to_do():
+    law = am.NeoHookean(1.0, 0.3)
+    bodies = [am.Body(am.box((1, 1), 2), law, name="low"),
+              am.Body(am.box((1, 1), 3, origin=(0, 1)), law, name="up")]  # fmt: skip
+    supports = [am.Fix("low.bottom", (0, 0.05)), am.Fix("up.bottom", 0), am.Fix("up.top", 0)]
+    with pytest.raises(am.InvalidInput, match="make the master the slave"):
+        am.solve(am.Model(bodies, supports, [am.Contact("up.bottom", master="low.top", mu=0)]))

@@ -124,24 +124,6 @@ def test_the_tangent_with_a_cap_is_exact():
     assert checked_tangents(problem, draws) > 5
 
 
-@pytest.mark.parametrize(("options", "word"), [
-    ({"mu": 0.3, "stick_stiffness": 10.0}, "spring along the surface"),
-])  # fmt: skip
-def test_what_sliding_pairs_do_not_have_is_said(options, word):
-    with pytest.raises((am.UnsupportedLaw, am.UnsupportedForm), match=word):
-        am.solve(blocks(NEO, (0.05, -0.05), **options))
-
-
-def test_orthotropic_friction_is_refused():
-    lower = am.Body(am.box((2, 2, 1), (3, 3, 1), origin=(-0.5, -0.5, -1)), NEO, name="lower")
-    upper = am.Body(am.box((1, 1, 1), 2), NEO, name="upper")
-    pair = am.Contact("upper.bottom", master="lower.top", mu=0.3, mu_across=0.1,
-                      direction=(1, 0, 0), kinematics="finite")  # fmt: skip
-    supports = [am.Fix("lower.bottom", 0), am.Fix("upper.top", 0)]
-    with pytest.raises(am.UnsupportedLaw, match="orthotropic"):
-        am.solve(am.Model([lower, upper], supports, [pair]))
-
-
 def test_a_held_node_may_pass_beside_the_master():
     """Ends of both blocks are held, one lower in the end than the side that it has left."""
 

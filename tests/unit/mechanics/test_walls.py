@@ -197,3 +197,50 @@ def test_the_script_of_the_wall_runs(capsys):
     assert steps[-1].resultant(floor)[0] < 0  # against the shear
     module.main(steps=1)
     assert "shear force" in capsys.readouterr().out
+
+
+def struck(push, until):
+    """Steps of a wall of three rows, half blocks in the second, hit by the velocity push y."""
+    stone = am.LinearElastic(1e8, 0.2, plane="stress", density=2000.0)
+    wall = am.Wall(3, 1, (1.0, 0.5), (2, 1), stone, corotational=True, mu=0.7, mu_support=0.7)
+    model = wall.model([], [am.BodyForce((0, -2000 * 9.81))])
+    start = am.at_rest(model, velocity=lambda x: (push * x[1], 0.0))
+    return list(am.evolve(model, am.MoreauJean(8e-3, stiffness_damping=2e-3), until=until,
+                          start=start))  # fmt: skip
+
+
+@pytest.mark.parametrize(("push", "falls"), [(0.8, False), (4.0, True)])
+def test_a_wall_of_blocks_that_turn_rocks_or_topples(push, falls):
+    """As one stiff block of its outline, which turns about its foot, it falls from 2.4 on."""
+    steps = struck(push, 0.32)
+    way = np.array([step.displacement[-1][-1] for step in steps])
+    books = max(abs(step.energies.defect) for step in steps)
+    kinetic = 0.5 * 2000 * push**2 * 1.5**3 / 3
+    assert books < 1e-10 * kinetic
+    assert max(step.energies.contact for step in steps) < 1e-7 * kinetic
+    if falls:
+        assert way[-1, 1] < -0.4
+        assert way[-1, 0] > 1.0
+    else:
+        assert way[:, 0].max() < 0.2
+        assert way[-1, 0] < 0.6 * way[:, 0].max()  # on its way back
+        assert min(step.gap.min() for step in steps) > -5e-3
+
+
+@pytest.mark.parametrize("bond", [Bond.RUNNING, Bond.TOOTHED])
+def test_a_wall_of_blocks_that_turn_stands(bond):
+    """The floor bears its weight after a while, within the waves that damping has left."""
+    stone = am.LinearElastic(1e7, 0.2, plane="stress", density=2000.0)
+    wall = am.Wall(2, 2, (1.0, 0.5), (2, 1), stone, bond=bond, corotational=True)
+    model = wall.model([], [am.BodyForce((0, -2e4))])
+    *_, step = am.evolve(model, am.MoreauJean(4e-3, stiffness_damping=4e-3), until=0.1)
+    floor = [pair.force for name, pair in step.pairs.items()
+             if name.startswith("row 1") and name.endswith("bottom")]  # fmt: skip
+    area = 0.5 * sum(right - left for row in wall.spans for left, right in row)
+    assert sum(floor)[1] == pytest.approx(2e4 * area, rel=0.1)
+
+
+def test_rigid_blocks_do_not_turn_in_frames():
+    stone = am.LinearElastic(1e7, 0.2, density=2000.0)
+    with pytest.raises(am.InvalidInput, match="blocks that turn are elastic"):
+        am.Wall(2, 2, (1.0, 0.5), (2, 1), stone, rigid=True, corotational=True)

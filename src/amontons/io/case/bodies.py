@@ -29,12 +29,12 @@ LAWS = {  # of materials, with their keys
     "orthotropic-elastic": ("young", "poisson", "shear", "axes", "plane", "density",
                             "expansion"),
     "elasto-plastic": ("young", "poisson", "yield_stress", "hardening", "density", "expansion"),
-    "neo-hookean": ("young", "poisson", "density"),
-    "ciarlet-geymonat": ("young", "poisson", "a", "density"),
-    "mooney-rivlin": ("c10", "c01", "bulk", "density"),
-    "ogden": ("shears", "exponents", "bulk", "density"),
-    "reduced-polynomial": ("coefficients", "bulk", "density"),
-    "saint-venant-kirchhoff": ("young", "poisson", "density"), "rigid": ("density",),
+    "neo-hookean": ("young", "poisson", "plane", "density"),
+    "ciarlet-geymonat": ("young", "poisson", "a", "plane", "density"),
+    "mooney-rivlin": ("c10", "c01", "bulk", "plane", "density"),
+    "ogden": ("shears", "exponents", "bulk", "plane", "density"),
+    "reduced-polynomial": ("coefficients", "bulk", "plane", "density"),
+    "saint-venant-kirchhoff": ("young", "poisson", "plane", "density"), "rigid": ("density",),
 }  # fmt: skip
 MAX_NODES = 5_000_000  # of a box: a typing error must not fill the memory
 
@@ -237,7 +237,7 @@ def read_material(table: Table) -> Material | Rigid:
     if law == "orthotropic-elastic":
         return _orthotropic(table, plane, density)
     if "bulk" in LAWS[law]:
-        return _rubber(table, law, density)
+        return _rubber(table, law, density, plane)
     young, poisson = table.number("young"), table.number("poisson")
     with table.blamed():
         if law == "elasto-plastic":
@@ -246,19 +246,19 @@ def read_material(table: Table) -> Material | Rigid:
                 table.data.get("yield_stress"), table.number("hardening", 0.0),
             )  # fmt: skip
         if law == "saint-venant-kirchhoff":
-            return SaintVenantKirchhoff(young, poisson, density)
+            return SaintVenantKirchhoff(young, poisson, density, plane)
         if law == "neo-hookean":
-            return NeoHookean(young, poisson, density)
+            return NeoHookean(young, poisson, density, plane)
         if law == "ciarlet-geymonat":
             return CiarletGeymonat(
-                young, poisson, table.number("a") if "a" in table.data else None, density
+                young, poisson, table.number("a") if "a" in table.data else None, density, plane
             )
         return LinearElastic(
             young, poisson, plane, density, table.number("expansion", 0.0)
         )
 
 
-def _rubber(table: Table, law: str, density: float | None) -> Material:
+def _rubber(table: Table, law: str, density: float | None, plane: str) -> Material:
     """A law of what is isochoric, and a bulk modulus."""
     from ...mechanics.model import MooneyRivlin, Ogden, ReducedPolynomial
 
@@ -266,14 +266,14 @@ def _rubber(table: Table, law: str, density: float | None) -> Material:
     if law == "mooney-rivlin":
         c10, c01 = table.number("c10"), table.number("c01", 0.0)
         with table.blamed():
-            return MooneyRivlin(c10, c01, bulk, density)
+            return MooneyRivlin(c10, c01, bulk, density, plane)
     if law == "reduced-polynomial":
         coefficients = table.numbers("coefficients", range(1, 7))
         with table.blamed():
-            return ReducedPolynomial(coefficients, bulk, density)
+            return ReducedPolynomial(coefficients, bulk, density, plane)
     shears, exponents = (table.numbers(k, range(1, 7)) for k in ("shears", "exponents"))
     with table.blamed():
-        return Ogden(shears, exponents, bulk, density)
+        return Ogden(shears, exponents, bulk, density, plane)
 
 
 def _orthotropic(table: Table, plane: str, density: float | None) -> Material:

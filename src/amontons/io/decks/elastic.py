@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -67,8 +67,9 @@ class Elastic:
             raise self.card.error(str(reason)) from None
 
     def _finite(self, plane: str) -> Rubber | SaintVenantKirchhoff:
-        if plane not in ("", "strain"):
-            raise self.card.error(f"finite strains are those of solids, not of plane {plane}")
+        if plane == "axisymmetric":
+            raise self.card.error("finite strains around an axis are not read")
+        plane = plane or "strain"
         for there, what in (
             (self.flow is not None, "*PLASTIC"), (self.grows, "*EXPANSION"),
             (self.shear is not None, "other constants than isotropic ones"),
@@ -76,9 +77,9 @@ class Elastic:
             if there:
                 raise self.card.error(f"{what}: small strains alone have it")
         if self.rubber is not None:
-            return self.rubber
+            return replace(self.rubber, plane=plane)
         try:
-            return SaintVenantKirchhoff(float(self.young), float(self.poisson))  # type: ignore[arg-type]
+            return SaintVenantKirchhoff(float(self.young), float(self.poisson), plane=plane)  # type: ignore[arg-type]
         except InvalidInput as reason:
             raise self.card.error(str(reason)) from None
 

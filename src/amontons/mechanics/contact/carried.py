@@ -119,6 +119,7 @@ class TiedMeeting:
 
     pair: TiedPair
     x: Array
+    axes = along = None  # bonds are alike in all tangents
 
     @property
     def slaves(self) -> Index:

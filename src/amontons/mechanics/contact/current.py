@@ -16,7 +16,7 @@ Who meets nobody has no cohesion and no bound of his own.
 rho > 0 has the unit of force over length.  drift is (1 - gamma) V_T of [LR], else zero.
 
 Components that supports prescribe are left out: lambda and s count as zero there, the support
-takes them.
+takes them.  Orthotropic friction, and springs along the surface, are `framed_point`.
 
 [AC] P. Alart, A. Curnier, CMAME 92 (1991).
 [LR] T. Ligurský, Y. Renard, CMAME 280 (2014).
@@ -35,10 +35,10 @@ from ...problem.law import Law
 from ...problem.law.law import MU, TRESCA
 from ...problem.law.states import OPEN, SLIP, STICK
 from .current_pairs import Meetings, Pair
-from .geometry import frames
 
 Array = NDArray[np.float64]
 Pieces = NDArray[np.int8]
+Partials = tuple[Array, Array, Array, Array, Array | None]
 BACK = 3  # beside the statuses: slip against t, 2D only
 
 
@@ -54,26 +54,50 @@ class CurrentContact:
     rho: Array
     free: NDArray[np.bool_]
 
+    @cached_property
+    def framed(self) -> bool:
+        """True where the law speaks of tangents that the surface carries."""
+        law, give = self.law, self.law.give
+        return law.stretch is not None or (
+            give is not None and bool(((give[:, 1] > 0) & ~law.tied).any())
+        )
+
+    @cached_property
+    def softness(self) -> Array:
+        """Length per force, (nc,): 1 / rho, with that of springs along the surface."""
+        give = self.law.give
+        return 1 / self.rho if give is None or not self.framed else 1 / self.rho + give[:, 1]
+
     def meet(self, positions: Array) -> Meetings:
         """Where the pairs meet at the positions (nodes, d) of all nodes."""
         return Meetings([pair.at(positions) for pair in self.pairs])
 
     def local(
-        self, force: Array, motion: Array, meeting: Meetings
+        self, force: Array, motion: Array, meeting: Meetings, drawn: Array | None = None
     ) -> tuple[Array, Array, Array]:
         """(r, u, frames): reactions and [gap, slip], (nc, d), in the frames (nc, d, d) there.
 
-        force lambda and motion s, (nc, d), in global axes.
+        force lambda and motion s, (nc, d), in global axes; drawn (nc, d-1): how far springs
+        were drawn at the end of the last step, in the frames, a part of the slip.
         """
-        axes = frames(meeting.normals)
+        axes = meeting.frames
         r = np.einsum("pkc,pc->pk", axes, force * self.free)
         u = np.einsum("pkc,pc->pk", axes, motion * self.free)
         u[:, 0] = meeting.gap
+        if drawn is not None:
+            u[:, 1:] += drawn
         return r, u, axes
 
-    def at(self, force: Array, motion: Array, meeting: Meetings) -> ContactPoint:
+    def at(
+        self, force: Array, motion: Array, meeting: Meetings, drawn: Array | None = None
+    ) -> ContactPoint:
         """The law at forces lambda and motions s, both (nc, d), where the pairs meet."""
-        return ContactPoint(self, force * self.free, motion * self.free, meeting)
+        known = self, force * self.free, motion * self.free, meeting
+        if not self.framed:
+            return ContactPoint(*known)
+        from .framed_point import FramedPoint  # which is a ContactPoint
+
+        return FramedPoint(*known, drawn)
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,7 +224,12 @@ class ContactPoint:
         normal = (np.maximum(self.z_normal, 0.0) - self.cohesion)[:, None] * self.n
         length = np.linalg.norm(self.z_tangent, axis=1)
         scale = np.where(length > self.bound, self.bound / np.where(length > 0, length, 1), 1.0)
-        return self._with_ties(self.force - normal - scale[:, None] * self.z_tangent)
+        friction = self._released(scale[:, None] * self.z_tangent)
+        return self._with_ties(self.force - normal - friction)
+
+    def _released(self, friction: Array) -> Array:
+        """P as the friction force that it is, (nc, d)."""
+        return friction
 
     def _selected(self, pieces: Pieces) -> Array:
         """(2) as if the given pieces were active."""
@@ -214,7 +243,7 @@ class ContactPoint:
             length = np.where(self.along > 0, self.along, 1.0)
             slip = (np.where(_slides(kind), bound, 0.0) / length)[:, None] * self.z_tangent
         stuck = (kind == STICK)[:, None] * self.z_tangent
-        return self._with_ties(self.force - normal - slip - stuck)
+        return self._with_ties(self.force - normal - self._released(slip + stuck))
 
     def margins(self, pieces: Pieces) -> Array:
         """Distances to the borders of given pieces, (nc, 3): all positive inside of them.
@@ -241,13 +270,16 @@ class ContactPoint:
 
         With obstacles alone: x moves n and g only, its part in s is the third array.
         """
-        by_force, by_normal, by_gap, by_motion = self.partials(pieces)
+        by_force, by_normal, by_gap, by_motion, _ = self.partials(pieces)
         by_x = by_normal @ self.meeting.normal_slopes
         by_x += by_gap[:, :, None] * self.meeting.gap_slopes[:, None, :]
         return by_force, by_x * self.contact.free[:, None, :], by_motion
 
-    def partials(self, pieces: Pieces | None = None) -> tuple[Array, Array, Array, Array]:
-        """Derivatives of (2) by lambda, n, g (nc, d) and s; the others (nc, d, d)."""
+    def partials(self, pieces: Pieces | None = None) -> Partials:
+        """Derivatives of (2) by lambda, n, g (nc, d), s and E; the others (nc, d, d).
+
+        E, of `surface_axes`, of which this law does not know: None.
+        """
         pieces = self.pieces if pieces is None else pieces
         n, d = self.n, self.n.shape[1]
         closed = ((pieces > 0) & (pieces < 4)).astype(float)
@@ -272,7 +304,7 @@ class ContactPoint:
         if self.tied.any():
             self._tie_inplace(by_force, by_normal, by_gap, by_motion)
         free = self.contact.free[:, None, :]
-        return by_force * free, by_normal, by_gap, by_motion * free
+        return by_force * free, by_normal, by_gap, by_motion * free, None
 
     def _tie_inplace(
         self, by_force: Array, by_normal: Array, by_gap: Array, by_motion: Array

@@ -67,7 +67,8 @@ class MortarPair:
     free (nc, d): components of the slaves without a support; normals lie in these.
     names: of both surfaces, for messages.  fold: of one surface against itself, whose sides
     slave and master are then, and all nodes of which have a row.  offset (nc,): what is added
-    to gaps, of a clearance that is not that of the meshes.
+    to gaps, of a clearance that is not that of the meshes.  axes (2 nc, nodes): c of
+    `surface_axes`, of tangents that the slave carries; None for none.
     """
 
     slaves: Index
@@ -77,6 +78,7 @@ class MortarPair:
     names: tuple[str, str] = ("slave", "master")
     fold: Fold | None = None
     offset: Array | float = 0.0
+    axes: sparse.csr_array | None = None
 
     @property
     def around(self) -> tuple[Skin, Mask]:
@@ -153,6 +155,16 @@ class MortarMeeting:
         return self.pair.slaves
 
     # ---------------------------------------------------------------- normals
+    @property
+    def axes(self) -> sparse.csr_array | None:
+        """Those of the pair."""
+        return self.pair.axes
+
+    @cached_property
+    def along(self) -> Array | None:
+        """E of `surface_axes`, (nc, 2, 3); None for none."""
+        return None if self.axes is None else (self.axes @ self.x).reshape(-1, 2, 3)
+
     @cached_property
     def sums(self) -> Array:
         """Area vectors around the slaves, into the slave, in free directions, (nc, d)."""

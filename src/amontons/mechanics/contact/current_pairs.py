@@ -22,7 +22,8 @@ from scipy import sparse
 
 from .carried import TiedMeeting, TiedPair
 from .current_mortar import MortarMeeting, MortarPair
-from .geometry import Obstacle
+from .geometry import Obstacle, frames
+from .surface_axes import carried_frames
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -47,7 +48,7 @@ class Meeting:
     """A pair with an obstacle `side` at some positions.
 
     slaves (nc,): nodes; x (nc, d): where the slaves are; nodes: of the model; offset (nc,): of
-    the gaps.
+    the gaps; axes, along: of `Meetings`, None for none.
     """
 
     side: Obstacle
@@ -55,6 +56,8 @@ class Meeting:
     x: Array
     nodes: int
     offset: Array | float = 0.0
+    axes: sparse.csr_array | None = None
+    along: Array | None = None
 
     @property
     def met(self) -> Mask:
@@ -96,16 +99,21 @@ def between_bodies(pair: Pair) -> MortarPair | None:
 
 @dataclass(frozen=True, eq=False)
 class ObstaclePair:
-    """Slave nodes (nc,) of the model in front of an obstacle; offset (nc,): of their gaps."""
+    """Slave nodes (nc,) of the model in front of an obstacle; offset (nc,): of their gaps.
+
+    axes (2 nc, nodes): c of `surface_axes`, of tangents that the slave carries; None for none.
+    """
 
     obstacle: Obstacle
     slaves: Index
     offset: Array | float = 0.0
+    axes: sparse.csr_array | None = None
 
     def at(self, positions: Array) -> Meeting:
         """The slaves and where they are."""
+        along = None if self.axes is None else (self.axes @ positions).reshape(-1, 2, 3)
         return Meeting(self.obstacle, self.slaves, positions[self.slaves], len(positions),
-                       self.offset)  # fmt: skip
+                       self.offset, self.axes, along)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +126,11 @@ class Meetings:
     @property
     def only_obstacles(self) -> bool:
         """True where derivatives are those by the place of the slave alone."""
+        return self.axes is None and self.all_at_obstacles
+
+    @property
+    def all_at_obstacles(self) -> bool:
+        """True where no body meets another."""
         return all(isinstance(part, Meeting) for part in self.parts)
 
     @cached_property
@@ -129,6 +142,31 @@ class Meetings:
     def normals(self) -> Array:
         """(nc, d)."""
         return np.concatenate([part.normals for part in self.parts])
+
+    @cached_property
+    def axes(self) -> sparse.csr_array | None:
+        """c of `surface_axes`, (2 nc, nodes), zero where there are none; None without any."""
+        nodes = [part.axes.shape[1] for part in self.parts if part.axes is not None]
+        if not nodes:
+            return None
+        return sparse.csr_array(sparse.vstack([
+            sparse.csr_array((2 * len(part.slaves), nodes[0])) if part.axes is None
+            else part.axes for part in self.parts
+        ]))  # fmt: skip
+
+    @cached_property
+    def along(self) -> Array:
+        """E of `surface_axes`, (nc, 2, 3), zero where there is none."""
+        return np.concatenate([
+            np.zeros((len(part.slaves), 2, 3)) if part.along is None else part.along
+            for part in self.parts
+        ])  # fmt: skip
+
+    @cached_property
+    def frames(self) -> Array:
+        """Rows n, t1(, t2) of every contact, (nc, d, d)."""
+        normals = self.normals
+        return frames(normals) if self.axes is None else carried_frames(normals, self.along)
 
     @cached_property
     def met(self) -> Mask:
@@ -157,6 +195,13 @@ class Meetings:
         entries = (np.ones(nc), (slaves, np.arange(nc)))
         onto = sparse.csr_array(self.averages.T)
         return sparse.csr_array(onto - sparse.csr_array(entries, shape=onto.shape))
+
+    def distances(self) -> Array:
+        """T x of ties, (nc, d); zero of others."""
+        return np.concatenate([
+            part.distances if isinstance(part, TiedMeeting) else np.zeros_like(part.normals)
+            for part in self.parts
+        ])  # fmt: skip
 
     def pushed(self, axes: Array, r: Array) -> Array:
         """Forces (nodes d,) of reactions r (nc, d) in the frames axes (nc, d, d): H r."""

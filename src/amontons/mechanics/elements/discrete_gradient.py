@@ -32,7 +32,8 @@ from ..meshes.facets import Cells
 from ..meshes.mesh import Mesh
 from .cell_matrices import rule_of
 from .energies import check_least
-from .hybrid import averaged, element_formulation, volume_modes, volumes_of
+from .hybrid import averaged, element_formulation, is_thin, volume_modes, volumes_of
+from .plane_stress import Thin
 from .point_loops import add_volume_inplace
 from .uniform import uniform
 
@@ -44,6 +45,7 @@ class DiscreteCells:
     """Cells of one law and their X."""
 
     def __init__(self, mesh: Mesh, cells: Cells, law: Any) -> None:
+        law = Thin(law) if is_thin(law, mesh) else law
         self.law, self._nodes, dim = law, cells.nodes, mesh.dim
         formulation = element_formulation(mesh, cells, law)
         self._modes = None

@@ -50,6 +50,7 @@ class Isotropic:
 
     young: float
     poisson: float
+    plane: str = "strain"
     finite: ClassVar[bool] = False  # a law of finite strains
 
     @property
@@ -58,8 +59,15 @@ class Isotropic:
         return self.young / (2 * (1 + self.poisson))
 
     def lame_lambda(self, dim: int = 3) -> float:
-        """First Lamé constant, at F = I, also of plane strain; unit of stress."""
-        return self.young * self.poisson / ((1 + self.poisson) * (1 - 2 * self.poisson))
+        """First Lamé constant, at F = I, in 2D that of the plane state; unit of stress."""
+        lame = self.young * self.poisson / ((1 + self.poisson) * (1 - 2 * self.poisson))
+        return self.plane_lambda(lame, dim)
+
+    def plane_lambda(self, lame: float, dim: int) -> float:
+        """What lame, the first Lamé constant, becomes in plane stress; else itself."""
+        if dim == 2 and self.plane == "stress":
+            return 2 * lame * self.shear / (lame + 2 * self.shear)
+        return lame
 
     def moduli(self, dim: int) -> Array:
         """d stress_ik / d gradient_jl at [i, j, k, l], (dim, dim, dim, dim), unit of stress."""
@@ -116,13 +124,6 @@ class LinearElastic(Isotropic):
             raise InvalidInput(f'plane: expected "strain" or "stress", got {self.plane!r}')
         if self.density is not None and not self.density > 0:
             raise InvalidInput(f"density: expected a finite number > 0, got {self.density!r}")
-
-    def lame_lambda(self, dim: int = 3) -> float:
-        """First Lamé constant, in 2D that of the plane state; unit of stress."""
-        value = super().lame_lambda(dim)
-        if dim == 2 and self.plane == "stress":
-            return 2 * value * self.shear / (value + 2 * self.shear)
-        return value
 
     def shape_stress(self, gradient: Array) -> Array:
         """`stress` without that of the volume term of hybrid cells."""

@@ -28,6 +28,7 @@ from ...core.arrays import number, real
 from ...core.errors import InvalidInput, InvertedCells
 from ...core.words import helpful
 from .elasticity import Isotropic, LinearElastic
+from .plane_stress import check_plane, is_thin_at, thin_stress
 from .point_loops import add_volume_inplace, mooney_rivlin_inplace, ogden_inplace
 
 Array = NDArray[np.float64]
@@ -35,9 +36,13 @@ Response = tuple[Array, Array, Array]
 
 
 class PointLaw(Isotropic):
-    """A law that says energy, stress and moduli of any C."""
+    """A law that says energy, stress and moduli of any C.
+
+    plane: "strain" or "stress", read in 2D only, see `plane_stress`.
+    """
 
     finite: ClassVar[bool] = True
+    plane: str = "strain"
 
     def respond(self, C: Array) -> Response:
         """w (n,), S (n, 3, 3) and D (n, 3, 3, 3, 3) of C (n, 3, 3), without the volume term."""
@@ -61,6 +66,8 @@ class PointLaw(Isotropic):
 
         Raises InvertedCells where J <= 0.
         """
+        if is_thin_at(self, gradient):
+            return thin_stress(self, gradient)
         F, J = deformation(gradient)
         return pushed(F, J, self.whole(F.swapaxes(1, 2) @ F, J)[1])
 
@@ -72,6 +79,9 @@ class PointLaw(Isotropic):
     def moduli(self, dim: int) -> Array:
         """d stress_ik / d gradient_jl at [i, j, k, l] at F = I, unit of stress."""
         D = self.whole(np.eye(3)[None], np.ones(1))[2][0]
+        if dim == 2 and self.plane == "stress":
+            across = D[:, :, 2, 2]
+            D = D - np.einsum("ij,kl->ijkl", across, across / D[2, 2, 2, 2])
         return np.ascontiguousarray(np.einsum("ikjl->ijkl", D[:dim, :dim, :dim, :dim]))
 
     def shape_moduli(self, dim: int) -> Array:
@@ -124,8 +134,8 @@ class _Isochoric(PointLaw):
         return (3 * self.bulk - 2 * self.shear) / (2 * (3 * self.bulk + self.shear))
 
     def lame_lambda(self, dim: int = 3) -> float:
-        """First Lamé constant at F = I; unit of stress."""
-        return self.bulk - 2 * self.shear / 3
+        """First Lamé constant at F = I, in 2D that of the plane state; unit of stress."""
+        return self.plane_lambda(self.bulk - 2 * self.shear / 3, dim)
 
     def volume(self, J: Array) -> tuple[Array, Array, Array]:
         """U = bulk / 2 (J - 1)^2, U' and U'' of J of any shape."""
@@ -140,6 +150,7 @@ class _Isochoric(PointLaw):
                 f"expected constants with a shear modulus > 0 at rest, got {self.shear:g}"
             )
         check_density(self.density)
+        check_plane(self.plane)
         if not self.poisson > 0:
             raise InvalidInput(
                 f"bulk: expected more than two thirds of the shear modulus {self.shear:g}, "
@@ -154,13 +165,15 @@ class MooneyRivlin(_Isochoric):
 
     c10, c01, bulk: unit of stress; the shear modulus at rest is 2 (c10 + c01).  c01 = 0 is the
     neo-Hookean law of Abaqus, with bulk = 2 / D1.  density: mass per volume of the reference
-    configuration, read by dynamics only; also in the laws below.
+    configuration, read by dynamics only; plane: "strain" or "stress", read in 2D only
+    (`plane_stress`); both also in the laws below.
     """
 
     c10: float
     c01: float
     bulk: float
     density: float | None = None
+    plane: str = "strain"
 
     def __post_init__(self) -> None:
         number("c10", self.c10)
@@ -195,6 +208,7 @@ class ReducedPolynomial(_Isochoric):
     coefficients: Sequence[float]
     bulk: float
     density: float | None = None
+    plane: str = "strain"
 
     def __post_init__(self) -> None:
         values = np.atleast_1d(real("coefficients", self.coefficients))
@@ -237,6 +251,7 @@ class Ogden(_Isochoric):
     exponents: Sequence[float]
     bulk: float
     density: float | None = None
+    plane: str = "strain"
 
     def __post_init__(self) -> None:
         for name in ("shears", "exponents"):
@@ -281,10 +296,11 @@ class SaintVenantKirchhoff(PointLaw):
     young: float
     poisson: float
     density: float | None = None
+    plane: str = "strain"
     volume: ClassVar[None] = None  # type: ignore[assignment]  # no such term
 
     def __post_init__(self) -> None:
-        LinearElastic(self.young, self.poisson, density=self.density)  # its checks
+        LinearElastic(self.young, self.poisson, self.plane, self.density)  # its checks
         if not self.poisson >= 0:
             raise InvalidInput(f"poisson: expected between 0 and 0.5, got {self.poisson!r}")
 

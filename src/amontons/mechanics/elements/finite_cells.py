@@ -157,7 +157,9 @@ class PointCells(FiniteCells):
             check_least(deformations_inplace(u, *geometry, F, self.unit))
             flat = F.reshape(-1, 3, 3)
             given = held[some].ravel() if len(held) else None
-            W, S, D = self.law.whole(flat.swapaxes(1, 2) @ flat, np.linalg.det(flat), given)
+            C = flat.swapaxes(1, 2) @ flat
+            check_least(float(np.linalg.det(C).min(initial=np.inf)))  # flat but for rounding
+            W, S, D = self.law.whole(C, np.linalg.det(flat), given)
             yield geometry, F, W.reshape(F.shape[:2]), S.reshape(F.shape), D.reshape(
                 *F.shape, 3, 3
             )

@@ -1,8 +1,9 @@
 """Hyperelasticity at finite strains: laws, nodal forces and exact tangents on any mesh.
 
 Energies are per volume of the reference configuration, with F = I + grad u and C = F^T F; see
-`cell_loops` for the family of which both laws are members.  2D is plane strain, with
-unit thickness.  Both laws are linear elasticity with the same young and poisson at F = I.
+`cell_loops` for the family of which both laws are members.  2D is plane strain, or plane
+stress (`plane_stress`), with unit thickness where nothing is deformed.  Both laws are linear
+elasticity with the same young and poisson at F = I.
 
 [C] P. G. Ciarlet, "Mathematical elasticity I", North-Holland 1988, section 4.10.
 [BW] J. Bonet, R. D. Wood, "Nonlinear continuum mechanics for finite element analysis",
@@ -35,8 +36,9 @@ from .elasticity import (
 )
 from .energies import PointLaw, deformation
 from .finite_cells import FamilyCells, FiniteCells, PointCells
-from .hybrid import element_formulation
+from .hybrid import element_formulation, is_thin
 from .pattern import node_pattern
+from .plane_stress import Thin, is_thin_at, thin_stress
 from .point_loops import family_inplace
 from .uniform_cells import UniformCells
 
@@ -47,6 +49,7 @@ class _Family(Isotropic):
     """What all members of the family have."""
 
     finite: ClassVar[bool] = True
+    plane: str = "strain"
 
     @property
     def coefficients(self) -> tuple[float, float, float, float, float]:
@@ -63,6 +66,8 @@ class _Family(Isotropic):
 
         Raises InvertedCells where J <= 0.
         """
+        if is_thin_at(self, gradient):
+            return thin_stress(self, gradient)
         return self._cauchy(gradient, self.coefficients)
 
     def shape_stress(self, gradient: Array) -> Array:
@@ -93,7 +98,8 @@ class _Family(Isotropic):
 class NeoHookean(_Family):
     """Compressible neo-Hookean law: young, unit of stress, > 0; -1 < poisson < 0.5.
 
-    density: mass per volume of the reference configuration, read by dynamics only.
+    density: mass per volume of the reference configuration, read by dynamics only; plane:
+    "strain" or "stress", read in 2D only (`plane_stress`).
 
     W = shear / 2 (tr C - 3) - shear ln J + lame_lambda / 2 (ln J)^2, [BW] eq. (6.27).
     """
@@ -101,9 +107,10 @@ class NeoHookean(_Family):
     young: float
     poisson: float
     density: float | None = None
+    plane: str = "strain"
 
     def __post_init__(self) -> None:
-        LinearElastic(self.young, self.poisson, density=self.density)  # its checks
+        LinearElastic(self.young, self.poisson, self.plane, self.density)  # its checks
 
     @property
     def coefficients(self) -> tuple[float, float, float, float, float]:
@@ -129,16 +136,17 @@ class CiarletGeymonat(_Family):
     W = a (tr C - 3) + b (tr cof C - 3) + c (J^2 - 1) - d ln J with b = shear / 2 - a,
     c = lame_lambda / 4 - shear / 2 + a, d = lame_lambda / 2 + shear ([C] section 4.10, [LR]).
     a, unit of stress: polyconvex for a, b, c > 0; the middle of what that allows by default,
-    shear / 4 where lame_lambda >= 2 shear.  density: as in `NeoHookean`.
+    shear / 4 where lame_lambda >= 2 shear.  density, plane: as in `NeoHookean`.
     """
 
     young: float
     poisson: float
     a: float | None = None
     density: float | None = None
+    plane: str = "strain"
 
     def __post_init__(self) -> None:
-        LinearElastic(self.young, self.poisson, density=self.density)  # its checks
+        LinearElastic(self.young, self.poisson, self.plane, self.density)  # its checks
         if not self.poisson > 0:
             raise InvalidInput(
                 f"poisson: Ciarlet-Geymonat needs one above 0, got {self.poisson!r}; "
@@ -207,9 +215,12 @@ def is_hyperelastic(material: object) -> bool:
 
 def _finite_cells(mesh: Mesh, cells: Cells, law: Hyperelastic) -> FiniteCells:
     """The cells of one block of a mesh."""
+    thin = is_thin(law, mesh)
+    given = Thin(law) if thin else law
     if element_formulation(mesh, cells, law) in ("incompatible", "hybrid-incompatible"):
-        return UniformCells(mesh, cells, law)
-    return (PointCells if isinstance(law, PointLaw) else FamilyCells)(mesh, cells, law)
+        return UniformCells(mesh, cells, given)
+    by_points = thin or isinstance(law, PointLaw)
+    return (PointCells if by_points else FamilyCells)(mesh, cells, given)
 
 
 class HyperelasticBody:

@@ -84,6 +84,7 @@ class UniformCells(FiniteCells):
     def _respond(self, F: Array, J: Array, given: Array | None) -> tuple[Array, Array, Array]:
         """W (k,), S (k, 3, 3) and D (k, 3, 3, 3, 3), the latter with changes of pressure."""
         C = F.swapaxes(1, 2) @ F
+        check_least(float(np.linalg.det(C).min(initial=np.inf)))  # flat but for rounding
         W, S, D = self.law.respond(C)
         if self.law.volume is None:
             return W, S, D

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import InvalidInput, InvertedCells, shown
 from .energies import PointLaw, Response, check_density
+from .plane_stress import check_even, check_plane
 
 Array = NDArray[np.float64]
 SAMPLES = 12  # deformations at which what is given is compared with differences
@@ -29,7 +30,8 @@ class UserEnergy(PointLaw):
     well as NumPy's; plain functions of a module, if models are to be sent to other processes.
     volume: of J (n,), returns U, dU/dJ and d2U/dJ2, each (n,); cells are then hybrid where the
     law is nearly incompressible at rest.  A C is never turned, so no energy can depend on the
-    frame; it need not be isotropic.  density: mass per volume, read by dynamics only.
+    frame; it need not be isotropic.  density: mass per volume, read by dynamics only; plane:
+    "strain" or "stress", read in 2D only (`plane_stress`).
 
     Raises InvalidInput where shapes, symmetries or derivatives are wrong, which is tried at
     some deformations with stretches of 0.7 to 1.4, or where the body is stressed at rest.  What
@@ -43,6 +45,7 @@ class UserEnergy(PointLaw):
     volume_of: Callable[[Array], Any] | None = None
     name: str = "user's energy"
     density: float | None = None
+    plane: str = "strain"
 
     def __post_init__(self) -> None:
         for field in ("energy", "stress_of", "moduli_of", "volume_of"):
@@ -52,11 +55,14 @@ class UserEnergy(PointLaw):
         if self.volume_of is None:
             object.__setattr__(self, "volume", None)
         check_density(self.density)
+        check_plane(self.plane)
         self._check()
         D = self.whole(np.eye(3)[None], np.ones(1))[2][0]
         bulk = float(np.einsum("iijj->", D)) / 9
         shear = (float(np.einsum("ijij->", D)) - 3 * bulk) / 10
         self._put(bulk, shear)
+        if self.plane == "stress":
+            check_even(self, _samples())
 
     def _put(self, bulk: float, shear: float) -> None:
         """Constants at rest, the mean over all directions; InvalidInput where not positive."""

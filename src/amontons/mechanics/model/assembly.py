@@ -236,7 +236,8 @@ def discretise(
     _check_once(bodies, contacts, placed)
     whole_H = _of_all([p.H for p in placed], beside)
     if contacts and not whole_H.shape[1]:
-        refuse_held([p.held for p in placed], bodies, supports, offsets, prescribed)
+        refuse_held([p.held for p in placed], bodies, supports, offsets, prescribed,
+                    between_bodies=any(c.master is not None for c in contacts))  # fmt: skip
     load = external_load(bodies, loads, beside)
     d = bodies[0].mesh.dim
     M, H, load = _unknowns(K, whole_H, load, prescribed, free, eliminated)

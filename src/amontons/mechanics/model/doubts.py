@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from ...core.warned import ResultWarning
 from .coefficients import like_percent
 from .fields import ContactFields
+from .held_facets import held_facets
 from .loading import no_load
 from .locking import volumetric_locking
 from .matching import nodal_on_non_matching
@@ -30,7 +31,8 @@ CHECKS: tuple[Check, ...] = (
     like_percent,
 )
 OF_THE_START = (sliding_beyond_pairs, sliding_beyond_curvature)  # its pairs, normals
-OF_MOTIONS = (large_rotation, *OF_THE_START)
+OF_WHERE_NODES_ARE = (held_facets,)  # where pairs are found there
+OF_MOTIONS = (large_rotation, *OF_THE_START, *OF_WHERE_NODES_ARE)
 
 
 def model_warnings(

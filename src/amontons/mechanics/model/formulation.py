@@ -28,13 +28,13 @@ from ...problem.protocol import Problem
 from ...problem.solution import FrictionSolution
 from ..elements.plasticity import is_plastic
 from .assembly import Discretisation
-from .doubts import CHECKS, OF_THE_START, Check
+from .doubts import CHECKS, OF_THE_START, OF_WHERE_NODES_ARE, Check
 from .fields import ContactFields, recover_fields
 from .held import HeldNodes
 from .joint_masters import with_masters
 from .large_deformation import LargeDeformation, large_deformation
 from .large_fields import recover_large
-from .laws import NEEDS_FORCES, OF_LINEAR_BODIES, WHERE_NODES_ARE, check_law
+from .laws import NEEDS_FORCES, OF_LINEAR_BODIES, check_law
 from .nitsche import nitsche_matrices, nitsche_problem
 from .nodal_forces import NodalForces, follows, nodal_forces
 from .parts import FINITE, SMALL, Body, BodyForce, Contact, Load, Pressure
@@ -225,8 +225,7 @@ class Moved(Formulation):
 
     problem = LargeDeformation
     finds_contact_where_nodes_are = True
-    lacks = WHERE_NODES_ARE
-    doubts = CHECKS
+    doubts = CHECKS + OF_WHERE_NODES_ARE
     keeps = ""
 
     def joined(self, contacts: tuple[Contact, ...]) -> tuple[Contact, ...]:

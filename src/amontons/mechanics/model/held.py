@@ -77,15 +77,17 @@ class HeldNodes:
 
 def refuse_held(
     every: Sequence[HeldNodes | None], bodies: Sequence[Body], supports: Sequence[Fix],
-    offsets: Index, prescribed: Array,
+    offsets: Index, prescribed: Array, *, between_bodies: bool,
 ) -> None:  # fmt: skip
-    """Raise InvalidInput: supports fix the slaves of all contacts."""
+    """Raise InvalidInput: supports fix the slaves of all contacts; of two bodies, or none."""
     for k, held in enumerate(every):
         with within("contacts", k):
             if held is not None:
                 gap = held.left(prescribed)
                 check_outside(held, gap, bodies, supports, offsets, "")
     text = "every slave node is fixed by a support, no contact is left"
+    if between_bodies:
+        text += "; make the master the slave, if that can move"
     raise InvalidInput(text, ("contacts",))
 
 

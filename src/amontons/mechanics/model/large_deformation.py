@@ -10,8 +10,8 @@ at its node.  The displacements v of the free dofs are all the unknowns of
 which is continuous and piecewise smooth; all its entries are forces.  Friction speaks of the
 motion since `before`, the displacements at the end of the last step: [LR] section 3.
 With two bodies that deform (1) has the forces of contacts on other nodes, see `moved_pairs`.
-`linearised` is the tangent problem at a state, as a `FrictionProblem`: it has the same
-reactions, gaps and slips there, so that statuses, files and pictures need nothing else.
+`linearised` is the tangent problem at a state, a `FrictionProblem` with the same reactions,
+gaps and slips there, so that statuses, files and pictures need nothing else.
 
 Left out: friction on components of a contact's motion that supports hold.
 
@@ -60,10 +60,10 @@ class LargeDeformation(NonlinearProblem):
     """One static problem, or one step, of large deformations.
 
     load, prescribed (dofs,): nodal forces, also as an array of dead ones, and values on the
-    fixed dofs, zero on the free ones;
-    before (dofs,): displacements of all nodes since which friction counts; drift (nc, d):
-    motion added to that of the contacts since then; known: load, prescribed values (dofs,)
-    and state v (n,) from which load steps may begin, by default the undeformed state.
+    fixed dofs, zero on the free ones; before (dofs,): displacements of all nodes since which
+    friction counts; drift (nc, d): motion added to that of the contacts since then; drawn
+    (nc, d-1): of springs, see `contact.framed_point`; known: load, prescribed values (dofs,)
+    and state v (n,) from which load steps may begin, the undeformed state where None.
     """
 
     parts: NonlinearParts
@@ -73,6 +73,7 @@ class LargeDeformation(NonlinearProblem):
     drift: Array
     known: tuple[NodalForces | Array, Array, Array] | None = None
     name: str = ""
+    drawn: Array | None = None
     _last: list[Array] = field(default_factory=list, init=False, repr=False)  # of `_local`
 
     def __post_init__(self) -> None:
@@ -140,7 +141,7 @@ class LargeDeformation(NonlinearProblem):
         """
         motion, meeting = self._meeting(u)
         rest = balanced(self.parts, meeting, rest)
-        return self.parts.contact.at(rest[self.parts.at], motion, meeting), rest
+        return self.parts.contact.at(rest[self.parts.at], motion, meeting, self.drawn), rest
 
     def _needed(self, u: Array, pressures: Array | None = None) -> Array:
         """f_int - f (dofs,) at displacements u (nodes, d), or at given pressures, too."""
@@ -209,14 +210,14 @@ class LargeDeformation(NonlinearProblem):
             u = self.displacement(v)
             motion, meeting = self._meeting(u)
             rest = balanced(self.parts, meeting, self._needed(u))
-            local = self.parts.contact.local(rest[self.parts.at], motion, meeting)
+            local = self.parts.contact.local(rest[self.parts.at], motion, meeting, self.drawn)
             self._last[:] = v.copy(), *local, rest
         return tuple(part.copy() for part in self._last[1:])  # type: ignore[return-value]
 
     def local_velocity(self, v: Array) -> Array:
         """u = [gap, slip since the last step], (nc, d), in the frames at the state v."""
-        motion, meeting = self._meeting(self.displacement(v))
-        return self.parts.contact.local(np.zeros_like(motion), motion, meeting)[1]
+        s, meeting = self._meeting(self.displacement(v))
+        return self.parts.contact.local(0 * s, s, meeting, self.drawn)[1]
 
     def motion(self, r: Array, v: Array | None = None) -> tuple[Array, Array]:
         """([gap, slip], v) at the state v, without one at 0."""
@@ -249,7 +250,7 @@ class LargeDeformation(NonlinearProblem):
         held = rest.copy()
         held[self.parts.free] = self.load.at(self.displacement(v))[self.parts.free]
         load = np.hypot(np.linalg.norm(held), np.linalg.norm(rest[self.parts.at]))
-        length = np.hypot(np.linalg.norm(u), np.linalg.norm(r / self.rho[:, None]))
+        length = np.linalg.norm([u, r * self.parts.contact.softness[:, None]])
         least = self.parts.resolved
         return max(float(load), least[0]), max(float(length), least[1])
 
@@ -261,7 +262,8 @@ class LargeDeformation(NonlinearProblem):
             u = self._local(v)[1]
         except InvertedCells:
             return Weakest(np.inf, None)
-        own = np.linalg.norm(u, axis=1) + np.linalg.norm(r / self.rho[:, None], axis=1)
+        own = np.linalg.norm(u, axis=1)
+        own += np.linalg.norm(r, axis=1) * self.parts.contact.softness
         law = self._law_at(self.parts.meet(self.displacement(v)))
         return judge.weakest_of(r, u, law, self.rho, own + self.parts.resolved[1])
 
@@ -269,7 +271,7 @@ class LargeDeformation(NonlinearProblem):
     @property
     def known_state(self) -> Array:
         """The state v (n,) at share 0 of the load."""
-        return np.zeros(self.unknowns) if self.known is None else self.known[2]
+        return self.known[2] if self.known else np.zeros(self.unknowns)
 
     @property
     def shortest(self) -> float:  # type: ignore[override]  # read only
@@ -314,7 +316,7 @@ class LargeDeformation(NonlinearProblem):
         tangent = now.linearised(v)
         moved = then.prescribed - now.prescribed
         displaced = now.displacement(v)
-        _, blocks = now._needed_slopes(displaced)
+        blocks = now._needed_slopes(displaced)[1]
         force = (then.load - now.load).at(displaced) - self.parts.matrix(blocks) @ moved
         meeting = self.parts.meet(displaced)
         across = meeting.averages @ moved.reshape(displaced.shape)
@@ -356,7 +358,7 @@ class LargeDeformation(NonlinearProblem):
         needed, blocks = self._needed_slopes(moved)
         r, u, axes, rest = self._local(v)
         meeting = parts.meet(moved)
-        if meeting.only_obstacles:
+        if meeting.all_at_obstacles:
             blocks[parts.diagonal] -= turned_forces(axes, r, meeting.normal_slopes)
         H = sparse.csc_array(meeting.columns(axes).tocsr()[parts.free])
         M = parts.on_free(blocks)
@@ -382,11 +384,11 @@ def large_deformation(model: Model) -> LargeDeformation:
 
 def large_step(
     model: Model, load: NodalForces | Array, prescribed: Array, before: Array | None = None,
-    known: tuple[NodalForces | Array, Array, Array] | None = None,
+    known: tuple[NodalForces | Array, Array, Array] | None = None, drawn: Array | None = None,
 ) -> LargeDeformation:  # fmt: skip
     """One step under nodal forces and prescribed values (dofs,), since displacements `before`.
 
-    before (dofs,): of all nodes, zero by default; known: see `LargeDeformation`.
+    before (dofs,): of all nodes, zero by default; known, drawn: see `LargeDeformation`.
     """
     parts = nonlinear_parts(model)
     _ = model.rests_on_contact  # raises where nothing holds a body
@@ -395,4 +397,4 @@ def large_step(
     elif parts.folds:
         parts = nonlinear_parts(model.divided(before))
     return LargeDeformation(parts, NodalForces.of(load), prescribed, before,
-                            np.zeros(parts.at.shape), known, model.name)  # fmt: skip
+                            np.zeros(parts.at.shape), known, model.name, drawn)  # fmt: skip

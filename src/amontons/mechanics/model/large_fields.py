@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from ...core.errors import InvalidInput, InvertedCells
 from ...problem.solution import FrictionSolution
-from ..contact import frames
 from .fields import ContactFields, at_once, by_body, load_wrench
 from .nodal_forces import nodal_forces
 from .nonlinear_parts import nonlinear_parts
@@ -37,7 +36,7 @@ def recover_large(
     r, u, moved = solution.r, solution.u, whole.reshape(parts.X.shape)
     sites = linear.sites
     meeting = parts.meet(moved)
-    axes = frames(meeting.normals)
+    axes = meeting.frames
     force = np.einsum("pkc,pk->pc", axes, r) * meeting.passed[:, None]
     traction = r / sites.weights[:, None]
     load = (model.load_factor * nodal_forces(model, model.loads)).at(moved)

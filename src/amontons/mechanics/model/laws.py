@@ -37,19 +37,13 @@ TOUCHING = 1e-6  # gap, relative to the size of a node's area, up to which both 
 APART = 0.5  # the same, up to which sides may be tied
 SPRINGS = BONDS
 NEEDS_FORCES = {  # numbers of laws that need both r and u, and why some formulations lack them
-    name: f"{what} needs contact forces, method 'nodal' or 'mortar', and small strains with "
-    "contact in the reference configuration"
+    name: f"{what} needs contact forces, method 'nodal' or 'mortar'"
     for name, what in (("mu_across", "orthotropic friction"), ("mu", VaryingFriction.name),
                        *((name, "compliance of contact") for name in SPRINGS))
 }  # fmt: skip
 OF_LINEAR_BODIES = {
     "mu": f"{VaryingFriction.name} needs bodies that do not yield",
 }
-WHERE_NODES_ARE = {  # what contact in the current configuration does not take
-    name: f"{what} small strains and contact in the reference configuration"
-    for name, what in (("mu_across", "orthotropic friction needs"),
-                       ("stick_stiffness", "a spring along the surface needs"))
-}  # fmt: skip
 SLANT = 1e-6  # part of a direction in the tangent plane that is one
 
 
@@ -156,7 +150,8 @@ def _tied(contact: Contact, placed: Placed) -> Tied:
 def _angle(contact: Contact, placed: Placed) -> Array:
     """From t1 to the direction in the tangent plane of each contact, (k,), in radians."""
     direction = np.asarray(contact.direction, dtype=float)
-    _, along, across = np.moveaxis(placed.rows.frames @ direction, 1, 0)
+    frames = placed.rows.frames if placed.axes is None else placed.axes.frames
+    _, along, across = np.moveaxis(frames @ direction, 1, 0)
     if (np.hypot(along, across) < SLANT * np.linalg.norm(direction)).any():
         raise InvalidInput(
             f"contact on {contact.slave!r}: expected a direction along the surface, got "

@@ -91,7 +91,7 @@ def _nearly_incompressible(law: Material, dim: int) -> bool:
     """False in plane stress, where the thickness gives way, and of orthotropic laws."""
     if isinstance(law, OrthotropicElastic):
         return False
-    thin = dim == 2 and isinstance(law, LinearElastic) and law.plane == "stress"
+    thin = dim == 2 and law.plane == "stress"
     return law.poisson >= NEARLY and not thin
 
 

@@ -21,6 +21,7 @@ from .supports import locate
 if TYPE_CHECKING:
     from .assembly import Discretisation
     from .model import Model
+    from .placing import Placed
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -33,9 +34,10 @@ def met_pairs(model: Model, slaves: list[Index], linear: Discretisation) -> list
     out: list[Pair] = []
     if not model.contacts:  # a floor that no node can meet
         out.append(ObstaclePair(Plane(np.eye(d)[-1]), np.zeros(0, dtype=np.int64)))
-    for contact, nodes in zip(model.contacts, slaves, strict=True):
+    for contact, nodes, own in zip(model.contacts, slaves, linear.placed, strict=True):
+        axes = _axes(own, linear)
         if contact.obstacle is not None:
-            out.append(ObstaclePair(contact.obstacle, nodes))  # type: ignore[arg-type]
+            out.append(ObstaclePair(contact.obstacle, nodes, axes=axes))  # type: ignore[arg-type]
             continue
         skins, meshes = [], []
         for side in (contact.slave, *contact.masters):
@@ -46,10 +48,11 @@ def met_pairs(model: Model, slaves: list[Index], linear: Discretisation) -> list
         names = (contact.slave, ", ".join(contact.masters))
         if len(meshes) == 2 and is_itself(*meshes[0], *meshes[1]):
             x = np.concatenate([body.mesh.points for body in model.bodies])
-            out.append(folded(nodes, skins[0], is_free[nodes], x, names))
+            pair = folded(nodes, skins[0], is_free[nodes], x, names)
+            out.append(replace(pair, axes=axes))
             continue
         master = Skin.joined(skins[1:])
-        pair = MortarPair(nodes, skins[0], master, is_free[nodes], names)
+        pair = MortarPair(nodes, skins[0], master, is_free[nodes], names, axes=axes)
         if not contact.tied:
             out.append(pair)
             continue
@@ -58,6 +61,17 @@ def met_pairs(model: Model, slaves: list[Index], linear: Discretisation) -> list
         beside = (np.ones(len(blocks.indices)), blocks.indices, blocks.indptr)
         out.append(TiedPair.of(pair, x, sparse.csr_array(beside, shape=(len(x), len(x)))))
     return out
+
+
+def _axes(placed: Placed, linear: Discretisation) -> sparse.csr_array | None:
+    """c of `contact.surface_axes` by the nodes of the model, (2 nc, nodes); None for none."""
+    if placed.axes is None:
+        return None
+    rows = placed.axes.rows.tocoo()
+    d = placed.axes.frames.shape[1]
+    columns = rows.coords[1] + int(linear.offsets[placed.body]) // d
+    shape = (rows.shape[0], linear.dofs // d)
+    return sparse.coo_array((rows.data, (rows.coords[0], columns)), shape=shape).tocsr()
 
 
 def cleared(

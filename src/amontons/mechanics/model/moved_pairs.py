@@ -30,7 +30,7 @@ from scipy import sparse
 
 from ...linear.condensed import Structure
 from ..contact.carried import TiedMeeting
-from ..contact.current import ContactPoint
+from ..contact.current import ContactPoint, Partials
 from ..contact.current_mortar import MortarMeeting
 from ..contact.current_pairs import AnyMeeting, Meeting, Meetings
 from ..contact.current_slopes import blocks_of
@@ -154,7 +154,7 @@ class PairLinearisation:
     blocks: Array
     point: ContactPoint
     earlier: Meetings
-    partials: tuple[Array, Array, Array, Array]
+    partials: Partials
 
     @cached_property
     def residual(self) -> Array:
@@ -209,7 +209,7 @@ class PairLinearisation:
         """dF/dx without the rows of `blocks` that are `_kept`, (dofs, dofs)."""
         parts, meeting = self.parts, self.point.meeting
         dofs, at = len(self.rest), parts.at.ravel()
-        _, by_normal, by_gap, by_motion = self.partials
+        _, by_normal, by_gap, by_motion, by_axis = self.partials
         force = _own(parts, meeting, self.needed)
         rows, turned = [], sparse.csr_array((dofs, dofs))
         start = 0
@@ -229,6 +229,10 @@ class PairLinearisation:
         if parts.chained:
             given = sparse.csr_array(sparse.diags_array(self._kept) + self._passing)
         local = sparse.csr_array(sparse.vstack(rows))
+        if by_axis is not None and meeting.axes is not None:
+            local = local + blocks_of(by_axis) @ sparse.kron(
+                meeting.axes, sparse.eye_array(len(parts.points[0])), format="csr"
+            )
         own = sparse.csr_array((np.ones(len(at)), (at, np.arange(len(at)))),
                                shape=(dofs, len(at)))  # fmt: skip
         out = self._passing @ stiffness - given @ turned + own @ local

@@ -29,6 +29,7 @@ from ..contact import (
     pair_contact,
 )
 from ..contact.segments import Surface
+from ..contact.surface_axes import SurfaceAxes
 from ..elements.elasticity import LinearElastic, materials_by_region
 from ..elements.given import GivenMatrices
 from ..elements.rigid import Rigid
@@ -56,6 +57,7 @@ class Placed:
     By Nitsche's method Gauss points of the slave take the place of its nodes, and `nitsche`
     holds their tractions, also in the dofs of the whole model.
     sides: mesh and surface of slave and master, None with an obstacle.
+    axes: tangents that the slave carries, at finite sliding where the law speaks of them.
     """
 
     body: int
@@ -66,6 +68,7 @@ class Placed:
     held: HeldNodes | None = None
     nitsche: NitscheTerms | None = None
     sides: tuple[Mesh, str, Mesh, str] | None = None
+    axes: SurfaceAxes | None = None
 
     @property
     def each(self) -> str:
@@ -113,8 +116,20 @@ def place(
     all_kept[met] = kept
     held = _held_nodes(bodies, contact, held_dofs, offsets)
     terms = None if terms is None else terms.at(kept)
+    axes = _axes(bodies, contact, rows.nodes[kept])
     return Placed(k, all_kept, points, rows.at(kept), H[:, np.repeat(kept, d)], held, terms,
-                  _sides(bodies, contact))  # fmt: skip
+                  _sides(bodies, contact), axes)  # fmt: skip
+
+
+def _axes(bodies: Sequence[Body], contact: Contact, nodes: Index) -> SurfaceAxes | None:
+    """Tangents that the slave carries where a law in 3D speaks of them; None else."""
+    k, surface = locate(bodies, contact.slave)
+    speaks = contact.mu_across is not None or (
+        contact.stick_stiffness is not None and not contact.tied
+    )
+    if not (speaks and is_finite(bodies, contact) and bodies[k].mesh.dim == 3):
+        return None
+    return SurfaceAxes.of(bodies[k].mesh, surface, nodes)
 
 
 def _offsets(bodies: Sequence[Body]) -> Index:
@@ -256,8 +271,13 @@ def located(bodies: Sequence[Body], contact: Contact) -> list[tuple[int, str]]:
 
 def slides_far(bodies: Sequence[Body], contact: Contact) -> bool:
     """Whether a pair of two bodies meets where they are now."""
-    finite = contact.kinematics == FINITE or any(b.turns for b in bodies)
-    return finite and contact.master is not None and contact.method == "mortar"
+    return (is_finite(bodies, contact) and contact.master is not None
+            and contact.method == "mortar")  # fmt: skip
+
+
+def is_finite(bodies: Sequence[Body], contact: Contact) -> bool:
+    """Whether a contact is found where the nodes are now."""
+    return contact.kinematics == FINITE or any(body.turns for body in bodies)
 
 
 def is_mortar(mesh: Mesh, surface: str, contact: Contact) -> bool:

@@ -9,6 +9,10 @@ joint of two blocks goes to the left one.  Nodes of an elastic plate are slaves 
 below; a rigid plate has none to give, so the blocks of the last row are its slaves.
 
 A wall of rigid blocks has the same contacts with 6 unknowns per block, and H of that rank.
+
+Blocks that turn (`corotational`) meet by averages where they are: a bed joint is one contact
+with all blocks of the row below, so that a block may slide from one to the next, and takes the
+edges of its face; head joints have what is above.
 """
 
 from __future__ import annotations
@@ -49,7 +53,9 @@ class Wall:
     plate: height of the plate that lies on top, 0 for none; base: height of the support below,
     0 for a floor that is no body.  Both have the material plate_material, by default that of
     the blocks.  rigid: no block deforms, nor do plate and base without a material of their own;
-    they keep the density of the material.
+    they keep the density of the material.  corotational: blocks turn, by whatever angle, each
+    in a frame of its own, and joints open, close and slide where they are now.  What falls so
+    far that other faces would meet passes through.
     """
 
     rows: int
@@ -64,8 +70,15 @@ class Wall:
     plate_material: LinearElastic | Rigid | None = None
     base: float = 0.0
     rigid: bool = False
+    corotational: bool = False
 
     def __post_init__(self) -> None:
+        plate_is_rigid = isinstance(self.plate_material, Rigid)
+        if self.corotational and (self.rigid or plate_is_rigid):
+            raise InvalidInput(
+                "corotational: blocks that turn are elastic, as plate and base are; expected "
+                "no rigid ones"
+            )
         for name in ("rows", "blocks"):
             value = getattr(self, name)
             if not (isinstance(value, int) and value >= 1):
@@ -129,7 +142,7 @@ class Wall:
             (span[1] - span[0], *self.size[1:]), (along, *self.cells[1:]),
             origin=(span[0], *self._thickness_zero, row * self.size[-1]),
         )  # fmt: skip
-        return Body(mesh, self._block_material, name=name)
+        return Body(mesh, self._block_material, name=name, corotational=self.corotational)
 
     def _slab(self, name: str, row: int, bottom: float, height: float) -> Body:
         """A plate as long as a row, from a height on."""
@@ -139,7 +152,8 @@ class Wall:
             (right - left, *self.size[1:-1], height), (along, *self.cells[1:-1], 1),
             origin=(left, *self._thickness_zero, bottom),
         )  # fmt: skip
-        return Body(mesh, self.plate_material or self._block_material, name=name)
+        return Body(mesh, self.plate_material or self._block_material, name=name,
+                    corotational=self.corotational)  # fmt: skip
 
     @property
     def _block_material(self) -> LinearElastic | Rigid:
@@ -160,15 +174,16 @@ class Wall:
                 name = f"row {row + 1} block {k + 1}"
                 if row == 0 and self.base:
                     out.append(Contact(f"{name}.bottom", master="base.top",
-                                       mu=self.mu_support, method="nodal"))  # fmt: skip
+                                       mu=self.mu_support, method=self._method))  # fmt: skip
                 elif row == 0:
                     out.append(Contact(f"{name}.bottom", Plane(up), mu=self.mu_support))
                 else:
-                    out += self._beds(f"{name}.bottom", span, row - 1, self.mu)
+                    out += self._beds(f"{name}.bottom", span, row - 1, self.mu, own=row)
                 if k:
                     left = f"row {row + 1} block {k}.right"
-                    joint = Contact(f"{name}.left", master=left, mu=self.mu,
-                                    where=self._head(span[0], row), method="nodal")  # fmt: skip
+                    head = self._head(span[0], row)
+                    joint = Contact(f"{name}.left", master=left, mu=self.mu, where=head,
+                                    method=self._method)  # fmt: skip
                     out.append(joint)
         if self._plate_is_rigid:
             out += [Contact(f"row {self.rows} block {k + 1}.top", master="plate.bottom",
@@ -179,10 +194,23 @@ class Wall:
             out += self._beds("plate.bottom", ends, self.rows - 1, self.mu_support)
         return out
 
+    @property
+    def _method(self) -> str:
+        return "mortar" if self.corotational else "nodal"
+
     def _beds(
-        self, slave: str, span: tuple[float, float], below: int, mu: float
-    ) -> list[Contact]:
-        """Contacts of a lower face with all blocks of the row below it."""
+        self, slave: str, span: tuple[float, float], below: int, mu: float,
+        own: int | None = None,
+    ) -> list[Contact]:  # fmt: skip
+        """Contacts of a lower face with all blocks of the row below it; own: row of a block."""
+        if self.corotational:
+            first, *more = (
+                f"row {below + 1} block {k + 1}.top" for k in range(len(self.spans[below]))
+            )
+            given = None  # but for an edge that its head joint has
+            if own is not None and self._overhangs(span[0], own):
+                given = _Between(span[0] + self._tolerance, np.inf)
+            return [Contact(slave, master=first, more_masters=more, mu=mu, where=given)]
         out, taken = [], -np.inf
         for k, (left, right) in enumerate(self.spans[below]):
             if min(right, span[1]) - max(left, span[0]) > self._tolerance:

@@ -11,7 +11,12 @@ contacts alone ([ST], [G]).  f is the load at the mean time, of loads that follo
 
 Gaps are those at q0; normals, tangents and averages, in H, those of q0 + h v0 / 2.  A contact
 takes part where its gap and `prediction` h u_N are not positive together; its law is that of
-`moreau_jean`: between r and u1 + e u0, and where contacts would create energy on u_theta.
+`moreau_jean`: between r and u1 + e u0, and where contacts would create energy on u_theta, with
+bounds of impulses, and springs of contacts that give way as in `springs`.
+
+Ties have the averages T of `contact.carried`, which never change: T v1 = 0, so that they do no
+work on v_h, and as T q_h = 0 their impulses have neither sum nor moment.  A bond has springs
+drawn by T q0 at the beginning of a step.
 
 (1) is solved by Newton's method with the symmetric matrix M + h/2 C + h^2/4 K(q1), a contact
 problem of impulses in every iteration, until its residual is rounding.
@@ -35,7 +40,6 @@ from ...core.errors import InvertedCells, NotConverged
 from ...problem.friction import FrictionProblem
 from ...problem.solution import FrictionSolution
 from ...solvers.contract import Iterate
-from ..contact import frames
 from ..elements.corotational import CorotationalBody
 from ..elements.discrete_gradient import DiscreteBody
 from ..elements.elasticity import materials_by_region
@@ -92,6 +96,8 @@ class LargeMovingModel:
             np.linalg.norm(np.concatenate([own.unit_forces() for own in self.parts.bodies]))
         )
         self._closed = TOUCHING * weights ** (1 / (model.dimension - 1))
+        self.springs = Springs.of(body.law, model.dimension)
+        self.law = self.springs.of_impulses(body.law, method.step, method.theta)
         self.fixed = np.setdiff1d(np.arange(self._all.dofs), self.parts.free)
 
     def begin(self, state: State) -> State:
@@ -145,21 +151,24 @@ class _Step:
         q0, v0 = state.displacement, state.velocity
         parts = parts.divided(q0.reshape(shape)) if parts.folds else parts
         self.parts = parts
-        parts = parts.divided(q0.reshape(shape)) if parts.folds else parts
-        self.parts = parts
         start = parts.meet(q0.reshape(shape))
         meeting = parts.meet((q0 + h / 2 * v0).reshape(shape))
-        self.H = sparse.csc_array(meeting.columns(frames(meeting.normals)))
+        self.H = sparse.csc_array(meeting.columns(meeting.frames))
         u0 = self.local(v0)
         closing = start.gap + method.prediction * h * u0[:, 0] <= model._closed
-        self.active = np.flatnonzero(closing & meeting.met)
-        self.law = motion.body.law.at(self.active)
+        springs, tied = model.springs, model.law.tied
+        self.active = np.flatnonzero((closing | springs.presses | tied) & meeting.met)
+        self.law = model.law.at(self.active)
         self.load = 0.5 * (motion.load(state.time) + motion.load(time))
         self.held = (motion.prescribed(time) - motion.prescribed(state.time)) / h
-        springs = Springs.of(motion.body.law, u0.shape[1]).at(self.active)
-        none = np.zeros(len(self.active), dtype=bool)
-        self.shifts = Shifts.of(u0[self.active], start.gap[self.active], method, springs,
-                                np.zeros_like(u0[self.active]), none)  # fmt: skip
+        gap, pulled = start.gap.copy(), state.force.copy()
+        if tied.any():  # as far as bonds are drawn, in the frames of this step
+            drawn = np.einsum("pkc,pc->pk", meeting.frames, start.distances())
+            gap[tied], give = drawn[tied, 0], springs.C
+            pulled[tied] = (-drawn / np.where(give > 0, give, np.inf))[tied]
+        self.shifts = Shifts.of(u0[self.active], gap[self.active], method,
+                                springs.at(self.active), pulled[self.active],
+                                tied[self.active])  # fmt: skip
         d = u0.shape[1]
         columns = (self.active[:, None] * d + np.arange(d)).ravel()
         self._columns = sparse.csc_array(self.H[:, columns])  # type: ignore[index]
@@ -168,6 +177,12 @@ class _Step:
     def local(self, v: Array) -> Array:
         """Local values of motions (dofs,), (nc, d)."""
         return (self.H.T @ v).reshape(-1, self.model.parts.dimension)
+
+    def _whole(self, impulse: Array) -> Array:
+        """Impulses (nc, d) of all contacts, of those (k d,) of the active ones."""
+        out = np.zeros_like(self._before)
+        out[self.active] = impulse.reshape(-1, out.shape[1])
+        return out
 
     def _moved(self, v1: Array) -> Array:
         return self.state.displacement + self.model.method.step / 2 * (self.state.velocity + v1)
@@ -285,10 +300,12 @@ class _Step:
         kinetic, elastic = 0.5 * v1 @ (m.M @ v1), m.parts.energy(q1.reshape(shape))
         gain = kinetic + elastic - 0.5 * v0 @ (m.M @ v0) - m.parts.energy(q0.reshape(shape))
         load = self.load.at(((q0 + q1) / 2).reshape(shape))
+        stored = m.springs.energy(self._whole(trial.impulse) / h)
+        taken = stored - m.springs.energy(self.state.force)
         return Energies(
-            kinetic=float(kinetic), elastic=float(elastic), gain=float(gain),
+            kinetic=float(kinetic), elastic=float(elastic) + stored, gain=float(gain) + taken,
             loads=float(load @ dq), supports=float(held @ dq) / h,
-            contact=float((self._columns @ trial.impulse) @ dq) / h,
+            contact=float((self._columns @ trial.impulse) @ dq) / h + taken,
             damping=float(dq @ (m.C @ dq)) / h + m.lost(q0, q1),
         ), held  # fmt: skip
 
@@ -297,18 +314,18 @@ class _Step:
     ) -> TimeStep:
         """The step with its state."""
         m, h, state = self.model, self.model.method.step, self.state
-        q1, d = self._moved(trial.velocity), m.parts.dimension
-        impulse = np.zeros_like(self._before)
-        impulse[self.active] = trial.impulse.reshape(-1, d)
-        mean = 0.5 * (self._before + self.local(trial.velocity))[:, 1:]
-        work = np.minimum((impulse[:, 1:] * mean).sum(axis=1), 0.0)
+        q1, impulse = self._moved(trial.velocity), self._whole(trial.impulse)
+        mean = 0.5 * (self._before + self.local(trial.velocity))
+        slip = m.springs.slipped(h * mean, state.force, impulse / h)
+        mean = mean[:, 1:]
+        work = (impulse[:, 1:] * mean).sum(axis=1) + m.springs.taken(state.force, impulse / h)
         sliding = np.zeros(len(mean), dtype=bool)
         sliding[self.active] = solution.sliding
         new = State(state.index + 1, self.time, q1, trial.velocity, impulse / h,
                     state.slip + h * mean,
-                    **rubbed(state, h * mean, sliding, work))  # fmt: skip
+                    **rubbed(state, slip, sliding, np.minimum(work, 0.0)))  # fmt: skip
         meeting = self.parts.meet(q1.reshape(m.parts.X.shape))
         load = self.load.at(((state.displacement + q1) / 2).reshape(m.parts.X.shape))
         return TimeStep(m.motion.body, new, solution, self.active, energies, meeting.gap,
                         support_forces(m._all, held / h), load,
-                        frames(meeting.normals))  # fmt: skip
+                        meeting.frames)  # fmt: skip

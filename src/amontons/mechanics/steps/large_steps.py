@@ -15,7 +15,6 @@ from ...core.clock import NEVER, Deadline
 from ...problem.law import VaryingFriction
 from ...problem.law.law import MU
 from ...problem.solution import FrictionSolution
-from ..contact import frames
 from ..contact.current_mortar import MortarMeeting
 from ..model import Model
 from ..model.diagnosis import with_diagnosis
@@ -65,7 +64,8 @@ class LargeSlowModel:
         q0 = state.displacement
         body = self.motion.body
         body = body.divided(q0) if nonlinear_parts(body).folds else body
-        problem = large_step(body, load, prescribed, q0, self._known(state))
+        drawn = self._drawn(state)
+        problem = large_step(body, load, prescribed, q0, self._known(state), drawn)
         if isinstance(problem.law, VaryingFriction):  # of the speed in this step
             problem = problem.with_law(problem.law.lasting(abs(time - state.time) or 1.0))
         arrive = None
@@ -78,23 +78,35 @@ class LargeSlowModel:
         assert solution.v is not None
         q1 = problem.displacement(solution.v).ravel()
         meeting = problem.contact_point(solution.v).meeting
-        axes = frames(meeting.normals)
+        axes = meeting.frames
         tied = body.law.tied[:, None]  # what bonds give way is no slip
-        way = np.where(tied, 0.0, solution.u[:, 1:])
-        work = quasi_static_friction(state.force[:, 1:], solution.r[:, 1:], way)
+        way = solution.u[:, 1:] if drawn is None else solution.u[:, 1:] - drawn
+        slid = way if drawn is None else Springs.of(body.law, axes.shape[1]).slipped(
+            np.column_stack([way[:, 0], way]), state.force, solution.r
+        )
+        way, slid = np.where(tied, 0.0, way), np.where(tied, 0.0, slid)
+        work = quasi_static_friction(state.force[:, 1:], solution.r[:, 1:], slid)
         acting = self._forces(body, q1, load, solution.r)
         energies = self._energies(body, state, q1, load, acting, float(work.sum()))
         passed = time - state.time
         velocity = (q1 - q0) / passed if passed else np.zeros_like(q1)
         new = State(state.index + 1, time, q1, velocity, solution.r,
                     np.where(tied, solution.u[:, 1:], state.slip + way),
-                    **rubbed(state, way, solution.sliding, work))  # fmt: skip
+                    **rubbed(state, slid, solution.sliding, work))  # fmt: skip
         self._acted = new, body, acting
         rest = acting.inner - acting.load - acting.pushed
         active = np.arange(len(way))
         return TimeStep(body, new, solution, active, energies, solution.u[:, 0],
                         support_forces(self.motion.parts, rest), acting.load, axes,
                         passage, passed=meeting.passed)  # fmt: skip
+
+    def _drawn(self, state: State) -> Array | None:
+        """How far springs along the surface are drawn, (nc, d-1); None without any."""
+        law = self.motion.body.law
+        springs = Springs.of(law, state.force.shape[1])
+        if not (springs.sticks & ~law.tied).any():
+            return None
+        return np.where(law.tied[:, None], 0.0, -springs.C[:, 1:] * state.force[:, 1:])
 
     def explained(self, solution: FrictionSolution) -> FrictionSolution:
         """The same record; one that failed says which bodies give way."""
@@ -134,7 +146,7 @@ class LargeSlowModel:
         parts = nonlinear_parts(body)
         moved = q.reshape(parts.X.shape)
         meeting = parts.meet(moved)
-        pushed = meeting.pushed(frames(meeting.normals), r)
+        pushed = meeting.pushed(meeting.frames, r)
         stored = Springs.of(self.motion.body.law, r.shape[1]).energy(r)
         return Forces(parts.forces(moved), load.at(moved), pushed, parts.energy(moved), stored)
 
@@ -156,10 +168,15 @@ def last_motion(problem: LargeDeformation, state: State, duration: float) -> Arr
     n = meeting.normals
     along = meeting.averages @ moved.reshape(parts.X.shape)
     along -= n * (n * along).sum(axis=1)[:, None]
-    force = np.einsum("pk,pkc->pc", state.force[:, 1:], frames(n)[:, 1:])
-    size, bound = np.linalg.norm(force, axis=1), parts.contact.law.parameters[:, MU]
-    bound = bound * np.maximum(state.force[:, 0], 0.0)
-    against = -force / np.where(size > 0, size, 1.0)[:, None]
+    law = parts.contact.law
+    pressed = law.pressed(state.force)  # T^-1 r, and T^-1 of that is where it slips from
+    size, bound = np.linalg.norm(pressed[:, 1:], axis=1), law.parameters[:, MU]
+    bound = bound * np.maximum(pressed[:, 0], 0.0)
+    pressed[:, 0] = 0.0
+    back = law.pressed(pressed)[:, 1:]
+    back = np.einsum("pk,pkc->pc", back, meeting.frames[:, 1:])
+    length = np.linalg.norm(back, axis=1)
+    against = -back / np.where(length > 0, length, 1.0)[:, None]
     slipped = against * np.linalg.norm(along, axis=1)[:, None]
     rubs = pairs & (bound > 0)
     slips = size >= (1 - AT_BOUND) * bound

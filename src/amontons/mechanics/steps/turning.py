@@ -46,13 +46,6 @@ def check_turning(method: Any, model: Model) -> None:
                 "or a hyperelastic law, or LinearElastic bodies and kinematics='small' of all "
                 "contacts"
             )
-    for k, contact in enumerate(model.contacts):
-        if contact.tied:
-            raise UnsupportedForm(
-                "dynamics of large deformations have no ties; read both bodies as one mesh "
-                "where they match, or use QuasiStatic", ("contacts", k, "tied"),
-                f"contact on {contact.slave!r}",
-            )  # fmt: skip
 
 
 @dataclass(frozen=True)

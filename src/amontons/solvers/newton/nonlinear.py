@@ -214,7 +214,8 @@ class NonlinearNewton:
         """
         from ..auto.hybrid import Auto  # which takes this method, too
 
-        tangent = problem.towards(share, goal, v)
+        whole = problem.towards(share, goal, v)
+        tangent = whole if whole.law.varies else whole.plain  # with springs behind v
         start = Iterate(np.zeros((tangent.contacts, tangent.dimension)))
         try:
             iterates = first_of(Auto().iterates(tangent, start, target), CONTACT_STEPS)
@@ -223,7 +224,7 @@ class NonlinearNewton:
                 state = iterate.v if iterate.v is not None else tangent.velocity(iterate.r)[1]
                 error = tangent.error(iterate.r, state)
                 if error <= STATUSES and state is not None:
-                    return state
+                    return state[: whole.unknowns]
                 if target.deadline.passed:
                     break
                 iterate = sent(iterates, Judgement(error, None, target.deadline))
