@@ -163,8 +163,8 @@ def main():
             "`python -m benchmarks.cattaneo_tetrahedra`", "",
             "; ".join(f"{k} {v}" for k, v in describe().items()), "",
             "Errors in percent of p0 (p) and mu p0 (shear): over the contact, and farther than",
-            "a facet from edges (away).  Locked in: shear after pressing, where theory has none.",
-             "", *page(rows), ""]  # fmt: skip
+            "a facet from edges (away).  Locked in: shear after pressing; theory has none.",
+            "", *page(rows), ""]  # fmt: skip
     (HERE / "cattaneo_tetrahedra.md").write_text(
         "\n".join(text) + ("\n" + notes.read_text() if notes.exists() else "")
     )
