@@ -9,8 +9,6 @@ contact in parts of mu p0: everywhere, and farther than a facet from the edges o
 zones.  Rows are added to results/cattaneo_tetrahedra.json; the page is written of all.
 """
 
-import argparse
-import json
 import sys
 import tempfile
 import time
@@ -20,12 +18,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from cattaneo_mindlin import MU, RADIUS, SIDE, YOUNG, zones_of
-from machine import describe
+from cattaneo_mindlin import MU, RADIUS, SIDE, YOUNG, keep, zones_of
 
 import amontons as am
 
-HERE = Path(__file__).parent / "results"
 NEAR, GROWTH, COARSER = 1.25, 0.3, 1.17  # where cells are small; beyond; of the master
 RUNS = {f"order {order}, {size}": (order, size)
         for order, sizes in ((1, (0.2, 0.13, 0.09, 0.07)), (2, (0.2, 0.13)))
@@ -145,29 +141,11 @@ def page(rows):
 
 def main():
     """Run what is asked for and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--only", action="append", default=[])
-    parser.add_argument("--missing", action="store_true", help="leave out what is stored")
-    asked = parser.parse_args()
-    stored = HERE / "cattaneo_tetrahedra.json"
-    rows = json.loads(stored.read_text()) if stored.exists() else []
-    for name in RUNS:
-        there = any(row["name"] == name for row in rows)
-        if (asked.only and name not in asked.only) or (asked.missing and there):
-            continue
-        rows = [row for row in rows if row["name"] != name] + [run(name)]
-        print(rows[-1], flush=True)
-        stored.write_text(json.dumps(rows) + "\n")
-    notes = HERE / "cattaneo_tetrahedra_notes.txt"
-    text = ["# Two spheres, pushed and drawn back, on tetrahedra", "",
-            "`python -m benchmarks.cattaneo_tetrahedra`", "",
-            "; ".join(f"{k} {v}" for k, v in describe().items()), "",
-            "Errors in percent of p0 (p) and mu p0 (shear): over the contact, and farther than",
-            "a facet from edges (away).  Locked in: shear after pressing; theory has none.",
-            "", *page(rows), ""]  # fmt: skip
-    (HERE / "cattaneo_tetrahedra.md").write_text(
-        "\n".join(text) + ("\n" + notes.read_text() if notes.exists() else "")
-    )
+    keep(__doc__, RUNS, run, page, [
+        "Two spheres, pushed and drawn back, on tetrahedra",
+        "Errors in percent of p0 (p) and mu p0 (shear): over the contact, and farther than a",
+        "facet from edges (away).  Locked in: shear after pressing; theory has none.",
+    ])  # fmt: skip
 
 
 if __name__ == "__main__":
