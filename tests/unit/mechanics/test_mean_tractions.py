@@ -18,14 +18,17 @@ def uneven(mesh, size, seed=3):
     return am.Mesh(x, mesh.cells, mesh.surfaces)
 
 
-def stacked(dim, kinds, order=1, method="mortar", wider=0.0):
+def stacked(  # noqa: PLR0913
+    dim, kinds, order=1, method="mortar", wider=0.0,
+    law: am.LinearElastic | am.NeoHookean = STEEL,
+):  # fmt: skip
     """A block on another one, pressed evenly; the slave may be wider than its master."""
     size, flat = (1.0,) * (dim - 1), (0,) * (dim - 1)
     lower = uneven(am.box((*size, 1.0), 2, kinds[0], origin=(*flat, -1)), 0.06)
     wide = (1.0 + wider, *size[1:], 1.0)
     upper = am.box(wide, 3, kinds[1], origin=(-wider / 2, *flat[1:], 0))
-    bodies = [am.Body(lower, STEEL, "lower", order=order),
-              am.Body(uneven(upper, 0.04), STEEL, "upper", order=order)]  # fmt: skip
+    bodies = [am.Body(lower, law, "lower", order=order),
+              am.Body(uneven(upper, 0.04), law, "upper", order=order)]  # fmt: skip
     return am.Model(
         bodies, [am.Fix("lower.bottom", 0), am.Fix("upper.top", (*flat, -0.02))],
         [am.Contact("upper.bottom", master="lower.top", mu=0.5, method=method)],
@@ -71,11 +74,17 @@ def test_weights_are_integrals_of_products_of_shape_functions():
     np.testing.assert_allclose(am.mean_tractions(found)[order, 1], wanted, rtol=1e-12)
 
 
-def test_steps_have_means_too():
-    model = stacked(2, ("quad", "tri"))
-    step = next(iter(am.evolve(model, am.QuasiStatic(1.0), until=1.0)))
-    found = am.mean_tractions(step)
-    np.testing.assert_allclose(found.mean(axis=0), [0, 1], atol=1e-6)
+def test_steps_at_finite_strains_have_means_too():
+    """nu = 0: sigma = E / 2 (l - 1 / l) with l = 0.99."""
+    model = stacked(2, ("quad", "tri"), law=am.NeoHookean(100.0, 0.0))
+    step = next(iter(am.evolve(model, am.QuasiStatic(1.0), until=1.0, tolerance=1e-11)))
+    wanted = np.tile([0.0, 50 * (1 / 0.99 - 0.99)], (len(step.fields.pressure), 1))
+    np.testing.assert_allclose(am.mean_tractions(step), wanted, atol=1e-7)
+
+
+def test_what_has_no_model_is_refused():
+    with pytest.raises(am.InvalidInput, match="expected the solution of a model"):
+        am.mean_tractions(np.zeros(3))  # type: ignore[arg-type]  # that is what is tested
 
 
 def test_shear_that_uneven_tetrahedra_lock_in_is_halved():

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ...core.errors import InvalidInput, shown
 from ..contact.clipping import line_rule, square_rule, triangle_rule
 from ..meshes.cells import CELLS
 from ..meshes.facets import Facets, corner_facets
@@ -56,8 +57,12 @@ def mean_tractions(solved: Solved) -> Array:
     these scatter, and means have half of the error where a contact is ten facets wide or more.
     Elsewhere (hexahedra, second order) nodes are better.  Areas are undeformed.  Contacts that
     do not sit on corners of facets, one at each (Nitsche's, nodal ones of second order), keep
-    their own.
+    their own.  Raises InvalidInput for what has no model.
     """
+    if not (hasattr(solved, "model") and hasattr(solved, "fields")):
+        raise InvalidInput(
+            f"mean_tractions: expected the solution of a model, or a step, got {shown(solved)}"
+        )
     model, fields = solved.model, solved.fields
     out = fields.force / fields.weights[:, None]
     for (body, facets), (_, _, numbers) in zip(fields.facets, pairs_of(model), strict=True):
