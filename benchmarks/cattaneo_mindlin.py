@@ -151,30 +151,42 @@ def page(rows):
     return [f"| {' | '.join(line)} |" for line in lines]
 
 
-def main():
-    """Run what is asked for and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
+def keep(doc, runs, run, page, head):
+    """Run what the command line asks for, add it to what is stored, write the page of all.
+
+    doc: of the program, results/NAME.json, .md and _notes.txt by its name; runs: names; head:
+    title, and lines above the table.
+    """
+    name = Path(sys.argv[0]).stem
+    parser = argparse.ArgumentParser(description=doc)
     parser.add_argument("--only", action="append", default=[])
     parser.add_argument("--missing", action="store_true", help="leave out what is stored")
     asked = parser.parse_args()
-    stored = HERE / "cattaneo_mindlin.json"
+    stored = HERE / f"{name}.json"
     rows = json.loads(stored.read_text()) if stored.exists() else []
-    for name in RUNS:
-        there = any(row["name"] == name for row in rows)
-        if (asked.only and name not in asked.only) or (asked.missing and there):
+    for one in runs:
+        there = any(row["name"] == one for row in rows)
+        if (asked.only and one not in asked.only) or (asked.missing and there):
             continue
-        rows = [row for row in rows if row["name"] != name] + [run(name)]
+        rows = [row for row in rows if row["name"] != one] + [run(one)]
         print(rows[-1], flush=True)
         stored.write_text(json.dumps(rows) + "\n")
-    notes = HERE / "cattaneo_mindlin_notes.txt"
-    text = ["# Two spheres, pushed and drawn back", "",
-            "`python -m benchmarks.cattaneo_mindlin`", "",
-            "; ".join(f"{k} {v}" for k, v in describe().items()), "",
-            "Errors of the shear in percent of mu p0 and their orders in h (at nodes).", "",
+    notes = HERE / f"{name}_notes.txt"
+    machine = "; ".join(f"{k} {v}" for k, v in describe().items())
+    title, *words = head
+    text = [f"# {title}", "", f"`python -m benchmarks.{name}`", "", machine, "", *words, "",
             *page(rows), ""]  # fmt: skip
-    (HERE / "cattaneo_mindlin.md").write_text(
+    (HERE / f"{name}.md").write_text(
         "\n".join(text) + ("\n" + notes.read_text() if notes.exists() else "")
     )
+
+
+def main():
+    """Run what is asked for and write the page."""
+    keep(__doc__, RUNS, run, page, [
+        "Two spheres, pushed and drawn back",
+        "Errors of the shear in percent of mu p0 and their orders in h (at nodes).",
+    ])  # fmt: skip
 
 
 if __name__ == "__main__":

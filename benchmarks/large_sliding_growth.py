@@ -1,11 +1,12 @@
 """CPU time of load steps of a die that irons a slab in 3D, over the number of unknowns.
 
-    python benchmarks/large_sliding_growth.py [--fine 1.3 2 3 4.75]
+    python benchmarks/large_sliding_growth.py [--fine 1.3 2 3 4.75] [--no-dense]
 
 Both bodies of `large_sliding_models` with that many times the cells in every direction, and one
 with as many contacts as a surface can have; the die is pressed in by two load steps and dragged
 by one.  The second and the third are measured.  Shares by the profiler, functions by the module
-that they are in.  One thread.  Writes results/large_sliding_growth.md beside this file.
+that they are in.  One thread.  Rows are kept in results/large_sliding_growth.json; the page is
+written of all.
 """
 
 import os
@@ -14,6 +15,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import argparse
 import cProfile
+import json
 import pstats
 import resource
 import time
@@ -131,15 +133,21 @@ def measured(case, kinds=("press", "drag")):
 
 
 def main():
-    """Measure and write the page."""
+    """Measure what is asked for and write the page of all that is stored."""
     parser = argparse.ArgumentParser()
-    parser.add_argument("--fine", type=float, nargs="+", default=[1.3, 2, 3, 4.75])
+    parser.add_argument("--fine", type=float, nargs="*", default=[1.3, 2, 3, 4.75])
+    parser.add_argument("--dense", action=argparse.BooleanOptionalAction, default=True)
+    asked = parser.parse_args()
     measured(ironing(1))  # compiles, and makes what is made once
-    found = []
-    for fine in parser.parse_args().fine:
-        found.append(measured(ironing(fine)))
-        write(found, [])
-    write(found, [measured(many_contacts())])
+    stored = HERE / "results/large_sliding_growth.json"
+    found = json.loads(stored.read_text()) if stored.exists() else {}
+    for name in [*map(str, asked.fine), *["dense"] * asked.dense]:
+        case = many_contacts() if name == "dense" else ironing(float(name))
+        found[name] = measured(case)
+        stored.write_text(json.dumps(found, indent=1) + "\n")
+        alike = sorted((name for name in found if name != "dense"), key=float)
+        write([found[name] for name in alike],
+              [found[name] for name in found if name == "dense"])  # fmt: skip
 
 
 def write(found, more):

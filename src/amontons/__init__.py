@@ -88,7 +88,7 @@ _HOME = {
                         "OrthotropicElastic", "Pressure", "Pretension", "ReducedPolynomial",
                         "Reference", "Rigid",
                         "SaintVenantKirchhoff", "Spring", "Temperature", "Traction",
-                        "UserEnergy", "distributed", "find_contacts"),
+                        "UserEnergy", "distributed", "find_contacts", "mean_tractions"),
 }  # fmt: skip
 _GONE = {
     "AlgebraicMultigrid": "GeometricMultigrid(levels=()), whose levels are then algebraic ones",

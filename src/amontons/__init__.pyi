@@ -90,6 +90,7 @@ from .mechanics.model import (
     Reference as Reference, Rigid as Rigid, Spring as Spring,
     Temperature as Temperature, Traction as Traction, distributed as distributed,
     FoundContacts as FoundContacts, FoundPair as FoundPair, find_contacts as find_contacts,
+    mean_tractions as mean_tractions,
 )
 from .mechanics.ready.packings import SpherePacking as SpherePacking
 from .mechanics.multibody import (

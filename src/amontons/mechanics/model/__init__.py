@@ -10,6 +10,7 @@ from ..elements.user_energy import UserEnergy
 from .constraints import Axes, Coupling, Equation, Pretension, Reference, Spring
 from .fields import ContactFields
 from .finding import FoundContacts, FoundPair, find_contacts
+from .mean_tractions import mean_tractions
 from .model import Model
 from .parts import Body, BodyForce, Contact, Fix, NodalForce, Pressure, Temperature, Traction
 from .processes import distributed
@@ -20,4 +21,4 @@ __all__ = ["Axes", "Body", "BodyForce", "CiarletGeymonat", "Contact", "ContactFi
            "OrthotropicElastic", "Pressure", "Pretension", "ReducedPolynomial",
            "Reference", "Rigid",
            "SaintVenantKirchhoff", "Spring", "Temperature", "Traction", "UserEnergy",
-           "distributed", "find_contacts"]  # fmt: skip
+           "distributed", "find_contacts", "mean_tractions"]  # fmt: skip
