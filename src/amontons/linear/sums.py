@@ -8,6 +8,7 @@ Entries are added up in the order in which they are given.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,7 +55,7 @@ def sum_of_products(products: Sequence[Product], shape: tuple[int, int]) -> spar
     return _stored(_multiplied(indptr, indices, data, *below, shape[1]), shape)
 
 
-def _rows(matrix: sparse.csr_array | None, n: int) -> tuple[Index, Index, Array]:
+def _rows(matrix: sparse.csr_array | None, n: int) -> tuple[Any, Any, Any]:
     """(row pointers, columns, values), of the unit matrix (n, n) for None."""
     if matrix is None:
         return np.arange(n + 1), np.arange(n), np.ones(n)
@@ -63,8 +64,8 @@ def _rows(matrix: sparse.csr_array | None, n: int) -> tuple[Index, Index, Array]
 
 def by_components(matrix: sparse.csr_array, factors: Array) -> sparse.csr_array:
     """The Kronecker product with the unit matrix (d, d), columns times factors (columns, d)."""
-    (n, m), d = matrix.shape, factors.shape[1]
-    shape = n * d, m * d
+    m, d = factors.shape
+    shape = (len(matrix.indptr) - 1) * d, m * d
     found = _spread(matrix.indptr, matrix.indices, matrix.data, np.ascontiguousarray(factors))
     return _stored(found, shape)
 
@@ -93,7 +94,7 @@ def among(matrix: sparse.csr_array, chosen: Index) -> sparse.csc_array:
 
 
 def _stored(
-    parts: tuple[Index, NDArray[np.integer], Array], shape: tuple[int, int]
+    parts: tuple[Any, Any, Any], shape: tuple[int, int]
 ) -> sparse.csr_array:
     """(row pointers, columns, values) as a matrix, in numbers of the size that SciPy takes."""
     pointers, columns, values = parts

@@ -335,7 +335,7 @@ class MortarMeeting:
     def approach(self) -> sparse.csr_array:
         """A' of (3') for the next step, (nc, nodes); no entries where nobody is open."""
         beside = self._beside
-        shape = self.averages.shape
+        shape = len(beside), len(self.x)
         if not beside.any():
             return sparse.csr_array(shape)
         parts, master = self.shared, self.pair.master

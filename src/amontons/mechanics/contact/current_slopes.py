@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...linear.sums import Blocks, sum_of_blocks, sum_of_products
+from ...linear.sums import Blocks, by_components, sum_of_blocks, sum_of_products
 
 if TYPE_CHECKING:
     from .current_mortar import MortarMeeting
@@ -70,7 +70,7 @@ class MortarSlopes:
         if earlier.approach.nnz:
             closed = self.at.closed_by(earlier)[:, None, None]
             entries.append(averaged(earlier.approach, -closed * by_motion))
-            beside = earlier.approach @ self.at.x * earlier.by_opening[:, None]
+            beside = np.asarray(earlier.approach @ self.at.x) * earlier.by_opening[:, None]
             by_gap = (by_motion @ beside[:, :, None]) * both
             by_normal = by_normal + by_gap * self.at.distances[:, None]
             by_distance = by_distance + by_gap * self.at.normals[:, None]
@@ -182,8 +182,9 @@ class MortarSlopes:
         if self.at.has_bulges:
             bent = self._onto(z, by_x, (slave.middles[parts.facets], slice(a, None)),
                               (master.middles[parts.master], slice(b, None)))  # fmt: skip
-            lifts = sparse.kron(self.at.bulges.T, sparse.eye_array(z.shape[2]), format="csr")
-            out = sum_of_products([(None, out), (lifts, bent)], out.shape)
+            lifts = by_components(sparse.csr_array(self.at.bulges.T), np.ones(self.at.x.shape))
+            n = self.at.x.size
+            out = sum_of_products([(None, out), (lifts, bent)], (n, n))
         return out
 
     def _slopes_of(self, z: Array, w: Array) -> sparse.csr_array:
@@ -209,9 +210,9 @@ class MortarSlopes:
         by_weight = np.where((row >= 0)[:, :, None, None], by_weight, 0.0)
         by_weight = by_weight.reshape(f, a, a * d).swapaxes(1, 2)
         rows = np.arange(f * a * d).reshape(f, a * d)
-        across = sum_of_blocks([(by_weight, rows, np.maximum(row, 0))], (f * a * d, nc))
+        by_weights = sum_of_blocks([(by_weight, rows, np.maximum(row, 0))], (f * a * d, nc))
         rest = sum_of_blocks([held], (f * a * d, n))
-        return sum_of_products([(None, rest), (across, weights)], rest.shape)
+        return sum_of_products([(None, rest), (by_weights, weights)], (f * a * d, n))
 
     def _onto(
         self, z: Array, by_x: sparse.csr_array, mine: tuple[Index, slice],
