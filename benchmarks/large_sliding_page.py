@@ -13,6 +13,7 @@ FORCES = {"turned by 360 degrees": ((2, "normal"), (3, "moment")),
           "pressed into a tube": ((2, "axial"),)}  # fmt: skip
 USUAL = ((2, "normal"), (1, "horizontal"))
 ONE = ("Hertz, large",)  # nothing but a normal force
+WHOLE = ("folded strip",)  # let go in the second half: the whole path is compared
 
 
 def columns(case):
@@ -21,13 +22,14 @@ def columns(case):
 
 
 def late(row):
-    """Forces at the load steps of the second half of the path, (k, 4), without the last one.
+    """Forces at load steps of the second half (or all) of the path, (k, 4), without the last.
 
     Between them where a program has taken steps of its own.
     """
     forces = np.array(row["forces"])
     last = round(forces[-1, 0] / row["reached"])
-    steps = np.arange(int(0.55 * last) + 1, last)
+    first = 1 if row["case"] in WHOLE else int(0.55 * last) + 1
+    steps = np.arange(first, last)
     inside = [np.interp(steps, forces[:, 0], column) for column in forces.T[1:]]
     return np.column_stack([steps, *inside])
 
