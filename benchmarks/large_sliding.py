@@ -11,7 +11,7 @@ half of the drag without one at the end, and ripple, the standard deviation of t
 Runs are added to results/large_sliding.json, and results/large_sliding.md is written from all
 of them; --only runs those whose name, "case; program", holds the text, --limit: CPU seconds of
 one.  A second table compares with every peer's own limit: its stiffness (CalculiX: the penalty,
-GetFEM: r) times 10 and 100, and all with half the mesh width.
+GetFEM: r) times 10 and 100, all with half the mesh width, and load steps of half the length.
 """
 
 import os
@@ -24,6 +24,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +32,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 
 from large_sliding_ccx import solved as by_calculix
-from large_sliding_models import CASES, split_off_volume
+from large_sliding_models import CASES, Case, split_off_volume
 from large_sliding_more import MORE
 from large_sliding_page import written
 from large_sliding_peers import by_getfem, setting
@@ -40,8 +41,9 @@ import amontons as am
 
 HERE = Path(__file__).parent
 OURS = ("amontons", "amontons, exchanged")
-PEERS = ("amontons, fine", "amontons, law of CalculiX", "amontons, law of CalculiX, fine",
-         "GetFEM", "GetFEM, x 10", "GetFEM, fine",
+PEERS = ("amontons, half steps", "amontons, fine", "amontons, law of CalculiX",
+         "amontons, law of CalculiX, fine",
+         "GetFEM", "GetFEM, half steps", "GetFEM, x 10", "GetFEM, x 100", "GetFEM, fine",
          "CalculiX", "CalculiX, exchanged", "CalculiX, x 10", "CalculiX, x 100",
          "CalculiX, x 10, fine")  # fmt: skip
 ALONE = ("ironing, second order", "ironing, beyond the rim", "turned, second order")
@@ -79,10 +81,20 @@ def by_amontons(case, given, swap=False, law=am.NeoHookean, limit=600):
             "reached": reached, "why": why}  # fmt: skip
 
 
+def in_parts(case, parts):
+    """The same case with every load step in so many parts."""
+    if isinstance(case, Case):
+        return replace(case, presses=case.presses * parts, drags=case.drags * parts)
+    way = case.way
+    return replace(case, way=lambda x, step: way(x, step / parts), steps=case.steps * parts)
+
+
 def child(name, program, limit):
     """One run; its row as JSON on the last line."""
     words = program.split(", ")
     case = ALL[name](fine=2) if "fine" in words else ALL[name]()
+    parts = 2 if "half steps" in words else 1
+    case = in_parts(case, parts)
     swap = "exchanged" in words
     given = setting(case, swap)
     factor = float(next((word[2:] for word in words if word.startswith("x ")), 1.0))
@@ -93,6 +105,7 @@ def child(name, program, limit):
         by = by_getfem if words[0] == "GetFEM" else by_calculix
         with tempfile.TemporaryDirectory() as folder:
             row = by(given, folder, limit, factor)
+    row["forces"] = [[force[0] / parts, *force[1:]] for force in row["forces"]]
     row |= {"facet": given.facet, "unknowns": given.unknowns}
     print(json.dumps({"case": name, "program": program, **row}))
 

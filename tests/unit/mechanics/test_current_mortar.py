@@ -96,6 +96,35 @@ def test_forces_balance_and_rotations_are_no_slip():
         np.testing.assert_allclose(after.gap[both], before.gap[both], atol=1e-13)
 
 
+def wheel(turned, *, swap, step=0.01):
+    """A wheel of radius 1 that has rolled by an angle over a floor: (pair, positions).
+
+    Its node at the angle a from the lowest point meets the floor's at a, turned by a.
+    """
+    at = np.arange(-30, 31) * step
+    low, n = np.stack([at, 0 * at], axis=1), len(at)
+    ring = np.stack([turned + np.sin(at - turned), 1 - np.cos(at - turned)], axis=1)
+    facets = np.stack([np.arange(n - 1), np.arange(1, n)], axis=1)
+    over = Skin.of((Facets("line", facets),), 0)
+    under = Skin.of((Facets("line", facets[:, ::-1]),), n)
+    sides = (under, over) if swap else (over, under)
+    slaves = np.arange(n) + n * swap
+    return MortarPair(slaves, *sides, np.ones((n, 2), dtype=bool)), np.concatenate([ring, low])
+
+
+def test_a_wheel_that_rolls_has_no_slip_where_it_comes_down():
+    way, place = 0.1, 40  # the node at that angle
+    slips = []
+    for swap in (False, True):
+        pair, before = wheel(0.0, swap=swap)
+        _, after = wheel(way, swap=swap)
+        here, earlier = pair.at(after), pair.at(before)
+        assert earlier.gap[place] > 0.9 * way**2 / 2
+        slips.append(here.motion(earlier)[place, 0])
+    # against one normal alone way^3 / 3 as the slave, and way^3 / 6 the other way as the floor
+    assert np.abs(slips).max() < 1.3 * way**3 / 12
+
+
 def two_blocks(top, *, mu, law=NEO, cells=(3, 5), swap=False, **options):
     """A block on a wider one, whose bottom is held."""
     n, m = cells

@@ -14,7 +14,15 @@ what slides is the change of B, not of x.  Rotations of everything leave B as it
 A force lambda_p acts on p, and -B_pj lambda_p on the other nodes j: together no force, and no
 moment but G_p x lambda_p, which is none where the sides touch all along.
 A node that met nobody at the end of the last step has as s_p its motion against the master node
-that was closest then.
+that was closest then.  One that was open then, by g' > 0, met the point over there along its
+normal n', but both sides turn towards each other until they touch: they come closer without a
+slip along the mean of n' and the master's normal n_M, towards the point d beside that one,
+
+    d_p = g' (n' - m (n' . n_M) / (m . n_M)) = sum_j A'_pj x'_j,    m = n' + n_M,
+    s_p = sum_j (B' - (1 - g_p / g') A')_pj x_j - G_p,                                    (3')
+
+A' on master nodes by gradients of their functions.  With (3) alone slips of nodes that close
+have errors of first order in the load step, opposite for both sides as slaves.
 
 Nodes of which hardly anything faces the master, and those without a row, carry no force of
 their own: the others of their facets take their share, and B_ps > 0 at such a node s ([PW]).
@@ -47,7 +55,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from .current_slopes import MortarSlopes, summed
+from ...linear.sums import sum_of_blocks, sum_of_products
+from .current_slopes import MortarSlopes
 from .dual import dual_functions, nodes_with_multiplier
 from .facet_integrals import FacetPairs
 from .facing import Skin, candidates, nearest
@@ -57,6 +66,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 HARDLY = 0.1  # part of a node's area that has to face the master for it to carry force
+ACROSS = 0.5  # m . n_M of (3') below which sides hardly face each other: d is zero
 SLIVER = 1e-8  # part of a facet; biorthogonal functions on less are lost in rounding
 
 
@@ -266,22 +276,21 @@ class MortarMeeting:
         """B, (nc, nodes); of nodes that do not meet nothing but 1 at the slave."""
         parts, pair = self.shared, self.pair
         nc, shape = len(pair.slaves), (len(pair.slaves), len(self.x))
-        own = sparse.csr_array((np.ones(nc), (np.arange(nc), pair.slaves)), shape=shape)
-        row = self.rows
-        left = parts.psi @ parts.mass * ~parts.kept[:, None, :]
-        onto = parts.psi[parts.of] @ parts.cross
-        a, b = left.shape[1], pair.master.nodes.shape[1]
-        beside = _onto(left, row, pair.slave.nodes[parts.facets], shape)
-        across = _onto(onto[..., :b], row[parts.of], pair.master.nodes[parts.master], shape)
-        scale = sparse.diags_array(self.by_weight)
-        out = own + scale @ (beside - across)
-        if self.has_bulges:
-            raised = parts.psi @ parts.own[:, :, a:]
-            bent = _onto(raised, row, pair.slave.middles[parts.facets], shape)
-            middles = pair.master.middles[parts.master]
-            bent -= _onto(onto[..., b:], row[parts.of], middles, shape)
-            out += scale @ bent @ self.bulges
-        return sparse.csr_array(out)
+        row, slave, master = self.rows, pair.slave, pair.master
+        scale = np.where(row >= 0, self.by_weight[row], 0.0)[:, :, None]
+        left = scale * (parts.psi @ parts.mass) * ~parts.kept[:, None, :]
+        onto = (scale * parts.psi)[parts.of] @ parts.cross
+        a, b = left.shape[1], master.nodes.shape[1]
+        own = np.ones((nc, 1, 1)), np.arange(nc)[:, None], pair.slaves[:, None]
+        beside = left, row, slave.nodes[parts.facets]
+        across = -onto[..., :b], row[parts.of], master.nodes[parts.master]
+        out = sum_of_blocks([own, beside, across], shape)
+        if not self.has_bulges:
+            return out
+        raised = scale * (parts.psi @ parts.own[:, :, a:]), row, slave.middles[parts.facets]
+        facing = -onto[..., b:], row[parts.of], master.middles[parts.master]
+        bent = sum_of_blocks([raised, facing], shape)
+        return sum_of_products([(None, out), (bent, self.bulges)], shape)
 
     @property
     def has_bulges(self) -> bool:
@@ -306,7 +315,11 @@ class MortarMeeting:
     @property
     def met_averages(self) -> sparse.csr_array:
         """B without the rows of nodes that do not meet, (nc, nodes)."""
-        return sparse.csr_array(sparse.diags_array(self.met.astype(float)) @ self.averages)
+        if self.met.all():
+            return self.averages
+        found = self.averages
+        data = found.data * np.repeat(self.met, np.diff(found.indptr))
+        return sparse.csr_array((data, found.indices, found.indptr), shape=found.shape)
 
     @cached_property
     def closest(self) -> Index:
@@ -323,10 +336,56 @@ class MortarMeeting:
     def references(self) -> sparse.csr_array:
         """B, (nc, nodes), of nodes that do not meet: 1 at the slave, -1 at the closest."""
         away = np.flatnonzero(~self.met)
+        if not len(away):
+            return self.averages
         entries = (-np.ones(len(away)), (away, self.closest[away]))
         return sparse.csr_array(
             self.averages + sparse.csr_array(entries, shape=self.averages.shape)
         )
+
+    @cached_property
+    def approach(self) -> sparse.csr_array:
+        """A' of (3') for the next step, (nc, nodes); no entries where nobody is open."""
+        beside = self._beside
+        shape = len(beside), len(self.x)
+        if not beside.any():
+            return sparse.csr_array(shape)
+        parts, master = self.shared, self.pair.master
+        share = (parts.psi[parts.of] @ parts.cross).sum(axis=2)  # (k, a)
+        row = self.rows[parts.of]
+        there = np.where((row >= 0)[:, :, None], (self.by_weight[:, None] * beside)[row], 0.0)
+        slopes = master.gradients(self.x, parts.master)
+        moved = share[:, :, None] * (there @ slopes.swapaxes(1, 2))
+        return sum_of_blocks([(moved, row, master.nodes[parts.master])], shape)
+
+    @cached_property
+    def by_opening(self) -> Array:
+        """1 / g' of (3'), (nc,), zero where a node is not open or meets nobody."""
+        opened = self.met & (self.gap > 0)
+        return np.where(opened, 1.0, 0.0) / np.where(opened, self.gap, 1.0)
+
+    @cached_property
+    def _beside(self) -> Array:
+        """d of (3'), (nc, d)."""
+        parts, n, row = self.shared, self.normals, self.rows[self.shared.of]
+        opened = np.where(self.met, np.maximum(self.gap, 0.0), 0.0)
+        areas = self.pair.master.areas(self.x)
+        facing = areas / np.linalg.norm(areas, axis=1)[:, None]
+        share = (parts.psi[parts.of] @ parts.cross).sum(axis=2)
+        theirs, kept = np.zeros(n.shape), row >= 0
+        np.add.at(theirs, row[kept], (share[:, :, None] * facing[parts.master][:, None])[kept])
+        size = np.linalg.norm(theirs, axis=1)
+        theirs /= np.where(size > 0, size, 1.0)[:, None]
+        mean = n + theirs
+        along = (mean * theirs).sum(axis=1)
+        turned = np.where(along > ACROSS, along, np.inf)
+        way = n - mean * ((n * theirs).sum(axis=1) / turned)[:, None]
+        return np.where((along > ACROSS)[:, None], opened[:, None] * way, 0.0)
+
+    def closed_by(self, earlier: MortarMeeting) -> Array:
+        """1 - g / g' of (3'), (nc,), zero where nobody was open or is met no more."""
+        both = self.met & earlier.met & (earlier.by_opening > 0)
+        return np.where(both, 1 - self.gap * earlier.by_opening, 0.0)
 
     @cached_property
     def distances(self) -> Array:
@@ -342,18 +401,12 @@ class MortarMeeting:
     def motion(self, earlier: MortarMeeting) -> Array:
         """s of (3), (nc, d), since `earlier`, at the end of the last step."""
         both = (self.met & earlier.met)[:, None]
-        return earlier.references @ self.x - np.where(both, self.distances, earlier.distances)
+        out = earlier.references @ self.x - np.where(both, self.distances, earlier.distances)
+        if earlier.approach.nnz:
+            out -= self.closed_by(earlier)[:, None] * (earlier.approach @ self.x)
+        return out
 
     @cached_property
     def slopes(self) -> MortarSlopes:
         """Derivatives by the positions of all nodes."""
         return MortarSlopes(self)
-
-
-def _onto(
-    values: Array, rows: Index, nodes: Index, shape: tuple[int, int]
-) -> sparse.csr_array:
-    """Sum of blocks (k, a, b) in rows (k, a), < 0 for none, at nodes (k, b)."""
-    return summed(values, np.broadcast_to(rows[:, :, None], values.shape),
-                  np.broadcast_to(nodes[:, None], values.shape), shape)  # fmt: skip
-

@@ -185,16 +185,19 @@ class Meetings:
         Times displacements (nodes, d) the motion against the other side; its transpose times
         forces lambda (nc, d) those on all nodes.
         """
+        if len(self.parts) == 1:
+            return self.parts[0].averages
         return sparse.csr_array(sparse.vstack([part.averages for part in self.parts]))
 
     @cached_property
     def others(self) -> sparse.csr_array:
         """B^T without 1 at p: forces on the other nodes, (nodes, nc)."""
         slaves = np.concatenate([part.slaves for part in self.parts])
-        nc = len(slaves)
-        entries = (np.ones(nc), (slaves, np.arange(nc)))
-        onto = sparse.csr_array(self.averages.T)
-        return sparse.csr_array(onto - sparse.csr_array(entries, shape=onto.shape))
+        found = self.averages
+        rows = np.repeat(np.arange(len(slaves)), np.diff(found.indptr))
+        data = found.data - (found.indices == slaves[rows])
+        rest = sparse.csr_array((data, found.indices, found.indptr), shape=found.shape)
+        return sparse.csr_array(rest.T)
 
     def distances(self) -> Array:
         """T x of ties, (nc, d); zero of others."""

@@ -13,7 +13,6 @@ Notation is that of `current_mortar`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -22,12 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ...linear.sums import Blocks, by_components, sum_of_blocks, sum_of_products
+
 if TYPE_CHECKING:
     from .current_mortar import MortarMeeting
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-Entries = tuple[Array, Index, Index]  # values, rows and columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,14 +41,14 @@ class SlotSlopes:
     rows: Index
     dofs: Index
 
-    def times(self, factors: Array) -> Entries:
+    def times(self, factors: Array) -> Blocks:
         """Entries of the derivatives of factors_p (nc, m, d) times the vector of p."""
         there = self.rows >= 0
         by_row = np.where(there[:, :, None, None], factors[self.rows], 0.0)
-        values = by_row @ self.values
-        m = factors.shape[1]
+        (q, a), m = self.rows.shape, factors.shape[1]
+        values = (by_row @ self.values).reshape(q, a * m, self.dofs.shape[1])
         rows = np.where(there[:, :, None], self.rows[:, :, None] * m + np.arange(m), -1)
-        return values, rows[..., None], self.dofs[:, None, None]
+        return values, rows.reshape(q, a * m), self.dofs
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,11 +66,19 @@ class MortarSlopes:
         """
         both = (self.at.met & earlier.met)[:, None, None]
         by_distance = by_distance - by_motion * both
-        entries = [self._normals.times(by_normal), self._distances.times(by_distance),
-                   averaged(self.at.met_averages, by_distance),
-                   averaged(earlier.references, by_motion)]  # fmt: skip
+        entries = []
+        if earlier.approach.nnz:
+            closed = self.at.closed_by(earlier)[:, None, None]
+            entries.append(averaged(earlier.approach, -closed * by_motion))
+            beside = np.asarray(earlier.approach @ self.at.x) * earlier.by_opening[:, None]
+            by_gap = (by_motion @ beside[:, :, None]) * both
+            by_normal = by_normal + by_gap * self.at.distances[:, None]
+            by_distance = by_distance + by_gap * self.at.normals[:, None]
+        entries += [self._normals.times(by_normal), self._distances.times(by_distance),
+                    averaged(self.at.met_averages, by_distance),
+                    averaged(earlier.references, by_motion)]  # fmt: skip
         nc, m = by_normal.shape[:2]
-        return assembled(entries, (nc * m, self.at.x.size))
+        return sum_of_blocks(entries, (nc * m, self.at.x.size))
 
     def _alone(self, count: int = 0, **factors: Array) -> sparse.csr_array:
         """`combined` without the motion; factors left out are zero."""
@@ -174,9 +182,10 @@ class MortarSlopes:
         if self.at.has_bulges:
             bent = self._onto(z, by_x, (slave.middles[parts.facets], slice(a, None)),
                               (master.middles[parts.master], slice(b, None)))  # fmt: skip
-            lifts = sparse.kron(self.at.bulges.T, sparse.eye_array(z.shape[2]), format="csr")
-            out = out + lifts @ bent
-        return sparse.csr_array(out)
+            lifts = by_components(sparse.csr_array(self.at.bulges.T), np.ones(self.at.x.shape))
+            n = self.at.x.size
+            out = sum_of_products([(None, out), (lifts, bent)], (n, n))
+        return out
 
     def _slopes_of(self, z: Array, w: Array) -> sparse.csr_array:
         """dz/dx, (f a d, nodes d), of z (f, a, d) of `spread`; w (f, p, d): lambda / D."""
@@ -192,18 +201,18 @@ class MortarSlopes:
         across = inverse.swapaxes(1, 2)[:, :, None, None, :]
         by_mass -= z.swapaxes(1, 2)[:, None, :, :, None] * across
         values = _through(by_mass[parts.of], mass)
-        rows = (parts.of[:, None] * a * d + np.arange(a * d))[:, :, None]
-        held = assembled([(values, rows, dofs[:, None])], (f * a * d, n))
+        rows = parts.of[:, None] * a * d + np.arange(a * d)
+        held = values, rows, dofs
         # D_p in lambda / D_p
-        weights = assembled([(mass.sum(axis=2), row[parts.of][:, :, None], dofs[:, None])],
-                            (nc, n))  # fmt: skip
+        weights = sum_of_blocks([(mass.sum(axis=2), row[parts.of], dofs)], (nc, n))
         scale = np.where(parts.kept, self.at.by_weight[row], 0.0)
         by_weight = -(parts.psi * scale[:, :, None])[..., None] * w[:, :, None]  # (f, p, r, c)
-        rows = (np.arange(f * a * d).reshape(f, 1, a, d), row[:, :, None, None])
-        kept = np.broadcast_to(row[:, :, None, None] >= 0, by_weight.shape)
-        entries = [np.broadcast_to(k, by_weight.shape)[kept] for k in rows]
-        across = sparse.coo_array((by_weight[kept], entries), shape=(f * a * d, nc))
-        return sparse.csr_array(held + across.tocsr() @ weights)
+        by_weight = np.where((row >= 0)[:, :, None, None], by_weight, 0.0)
+        by_weight = by_weight.reshape(f, a, a * d).swapaxes(1, 2)
+        rows = np.arange(f * a * d).reshape(f, a * d)
+        by_weights = sum_of_blocks([(by_weight, rows, np.maximum(row, 0))], (f * a * d, nc))
+        rest = sum_of_blocks([held], (f * a * d, n))
+        return sum_of_products([(None, rest), (by_weights, weights)], (f * a * d, n))
 
     def _onto(
         self, z: Array, by_x: sparse.csr_array, mine: tuple[Index, slice],
@@ -220,17 +229,21 @@ class MortarSlopes:
         for (nodes, slots), held, slopes, of in (
             (mine, parts.own, own, np.arange(f)), (theirs, -parts.cross, -cross, parts.of)
         ):  # fmt: skip
-            held = held[:, :, slots].swapaxes(1, 2)[..., None]  # (., s, r, 1)
+            s = nodes.shape[1]
+            held = held[:, :, slots].swapaxes(1, 2)  # (., s, r)
             at = np.where(nodes[:, :, None] >= 0, nodes[:, :, None] * d + np.arange(d), -1)
             columns = of[:, None, None] * a * d + np.arange(a * d).reshape(a, d)
-            forms.append((np.broadcast_to(held, (*nodes.shape, a, d)), at[:, :, None],
-                          columns[:, None]))  # fmt: skip
+            for c in range(d):
+                forms.append((held, at[..., c], columns[..., c]))
             by_pair = slopes[:, :, slots].swapaxes(1, 2)  # (k, s, r, w)
             values = z.swapaxes(1, 2)[parts.of][:, None] @ by_pair  # (k, s, c, w)
-            at = at if len(nodes) == len(dofs) and of is parts.of else at[parts.of]
-            local.append((values, at[..., None], dofs[:, None, None]))
+            at = at if of is parts.of else at[parts.of]
+            values = values.reshape(len(dofs), s * d, dofs.shape[1])
+            local.append((values, at.reshape(len(dofs), s * d), dofs))
         n = self.at.x.size
-        return assembled(forms, (n, f * a * d)) @ by_x + assembled(local, (n, n))
+        by_z = sum_of_blocks(forms, (n, f * a * d))
+        rest = sum_of_blocks(local, (n, n))
+        return sum_of_products([(by_z, by_x), (None, rest)], (n, n))
 
 
 def _through(factors: Array, slopes: Array) -> Array:
@@ -239,27 +252,13 @@ def _through(factors: Array, slopes: Array) -> Array:
     return factors.reshape(k, p * c, r * t) @ slopes.reshape(k, r * t, slopes.shape[3])
 
 
-def averaged(averages: sparse.csr_array, factors: Array) -> Entries:
+def averaged(averages: sparse.csr_array, factors: Array) -> Blocks:
     """Entries of the derivatives of factors_p (nc, m, d) times sum_j averages_pj x_j."""
-    d = factors.shape[2]
-    counts = np.diff(averages.indptr)
-    rows = np.repeat(np.arange(len(factors)), counts)
+    m, d = factors.shape[1:]
+    rows = np.repeat(np.arange(len(factors)), np.diff(averages.indptr))
     values = averages.data[:, None, None] * factors[rows]
-    m = factors.shape[1]
     columns = averages.indices.astype(np.int64)[:, None] * d + np.arange(d)
-    return values, (rows[:, None] * m + np.arange(m))[..., None], columns[:, None]
-
-
-def assembled(entries: Sequence[Entries], shape: tuple[int, int]) -> sparse.csr_array:
-    """Sum of parts (values, rows, columns), broadcast, without those in negative rows."""
-    flat = []
-    for values, rows, columns in entries:
-        kept = (values != 0) & (rows >= 0)
-        flat.append([values[kept]] + [
-            np.broadcast_to(k, values.shape)[kept] for k in (rows, columns)
-        ])  # fmt: skip
-    values, rows, columns = (np.concatenate(part) for part in zip(*flat, strict=True))
-    return sparse.coo_array((values, (rows, columns)), shape=shape).tocsr()
+    return values, rows[:, None] * m + np.arange(m), columns
 
 
 def blocks_of(values: Array) -> sparse.csr_array:
@@ -272,12 +271,3 @@ def blocks_of(values: Array) -> sparse.csr_array:
 def _dofs(nodes: Index, d: int) -> Index:
     """Dofs (k, a d) of nodes (k, a)."""
     return (nodes[:, :, None] * d + np.arange(d)).reshape(len(nodes), nodes.shape[1] * d)
-
-
-def summed(
-    values: Array, rows: Index, columns: Index, shape: tuple[int, int]
-) -> sparse.csr_array:
-    """Sum of entries without those in negative rows."""
-    kept = (rows >= 0) & (values != 0)
-    entries = (values[kept], (rows[kept], columns[kept]))
-    return sparse.coo_array(entries, shape=shape).tocsr()

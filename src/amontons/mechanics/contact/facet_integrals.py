@@ -7,9 +7,9 @@ functions of first order of both and the integrals over the part they share, on 
 
 Facets of second order are projected as those on their corners are; behind phi and N stand then
 the functions of their other nodes, which move the surface by the bulges of `facing`.
-The integrals depend on the corners of the two facets alone.  Derivatives are those of a complex
-step: the real parts decide where parts end, imaginary ones of 1e-100 carry the derivative
-through, exact to rounding as nothing is subtracted.
+The integrals depend on the corners of the two facets alone.  Derivatives between lines are
+those of a complex step: the real parts decide where parts end, imaginary ones of 1e-100 carry
+the derivative through, exact to rounding as nothing is subtracted.
 
 [PL] M. Puso, T. Laursen, "A mortar segment-to-segment contact method for large deformation
 solid mechanics", Comput. Methods Appl. Mech. Engrg. 193 (2004) 601-629.
@@ -17,6 +17,7 @@ solid mechanics", Comput. Methods Appl. Mech. Engrg. 193 (2004) 601-629.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .facing import Skin
-from .plane_integrals import plane_integrals, rules
+from .plane_integrals import plane_integrals, plane_slopes, rules
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -97,16 +98,14 @@ class FacetPairs:
         """mass (k, a, a + e) and cross (k, a, b + h)."""
         if self.slave.shape[2] == 2:
             return self._on_lines(self.slave, self.master)
-        mass, cross = self._in_space(1, 0.0)
-        return mass[:, 0], cross[:, 0]
+        return self._in_space(plane_integrals)
 
     def slopes(self) -> tuple[Array, Array]:
         """Their derivatives by all corners, (k, a, a + e, (a + b) d) and (k, a, b + h, ...)."""
         (k, a, d), b = self.slave.shape, self.master.shape[1]
         ways = (a + b) * d
         if d == 3:
-            mass, cross = self._in_space(ways, STEP)
-            return np.moveaxis(mass, 1, -1), np.moveaxis(cross, 1, -1)
+            return self._in_space(plane_slopes, ways)
         both = np.concatenate([self.slave, self.master], axis=1).reshape(k, ways)
         moved = both[:, None, :] + 1j * STEP * np.eye(ways)
         moved = moved.reshape(k, ways, a + b, d)
@@ -114,13 +113,12 @@ class FacetPairs:
         mass, cross = (np.moveaxis(part.imag, 1, -1) / STEP for part in found)
         return mass, cross
 
-    def _in_space(self, ways: int, step: float) -> tuple[Array, Array]:
+    def _in_space(self, kernel: Callable[..., None], *ways: int) -> tuple[Array, Array]:
         (k, a, _), b = self.slave.shape, self.master.shape[1]
         e, h = self.widths
-        mass, cross = np.zeros((k, ways, a, a + e)), np.zeros((k, ways, a, b + h))
+        mass, cross = np.zeros((k, a, a + e, *ways)), np.zeros((k, a, b + h, *ways))
         numbers = np.stack([self.corners, self.facing, self.bent, self.opposite], axis=1)
-        plane_integrals(self.slave, self.master, numbers, *rules(second=e + h > 0), step,
-                        mass, cross)  # fmt: skip
+        kernel(self.slave, self.master, numbers, *rules(second=e + h > 0), mass, cross)
         return mass, cross
 
     def _on_lines(self, slave: Values, master: Values) -> tuple[Values, Values]:

@@ -139,6 +139,24 @@ class Skin:
             return np.stack([edge[:, 1], -edge[:, 0]], axis=1)
         return 0.5 * np.cross(p[:, 2] - p[:, 0], p[:, -1] - p[:, 1])
 
+    def gradients(self, x: Array, chosen: Index) -> Array:
+        """Surface gradients of the functions of corners at the centres of facets, (k, a, d).
+
+        chosen (k,): which facets.
+        """
+        a, d = self.nodes.shape[1], x.shape[1]
+        by = np.zeros((len(chosen), d - 1, a))  # by the coordinates of the reference facet
+        if d == 2:
+            by[:, 0, :2] = -1.0, 1.0
+        else:
+            by[:, 0, :3], by[:, 1, :3] = (-1.0, 1.0, 0.0), (-1.0, 0.0, 1.0)
+            four = self.corners[chosen] == 4
+            if a == 4:
+                by[four, 0], by[four, 1] = (-0.5, 0.5, 0.5, -0.5), (-0.5, -0.5, 0.5, 0.5)
+        tangents = by @ x[self.nodes[chosen]]  # (k, d - 1, d)
+        metric = tangents @ tangents.swapaxes(1, 2)
+        return by.swapaxes(1, 2) @ (np.linalg.inv(metric) @ tangents)
+
     def area_slopes(self, x: Array) -> Array:
         """Derivatives of these by the nodes, (f, d, a, d)."""
         f, a = self.nodes.shape

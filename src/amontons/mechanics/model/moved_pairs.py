@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...linear.condensed import Structure
+from ...linear.sums import among, by_components, in_rows, sum_of_products
 from ..contact.carried import TiedMeeting
 from ..contact.current import ContactPoint, Partials
 from ..contact.current_mortar import MortarMeeting
@@ -73,10 +74,8 @@ def _unchained(parts: NonlinearParts, others: sparse.csr_array, gathered: Any) -
 
 def _others(parts: NonlinearParts, meeting: Meetings) -> sparse.csr_array:
     """Forces on other nodes per force on the slaves, (dofs, nc d)."""
-    d = parts.at.shape[1]
     counts = parts.contact.free * meeting.met[:, None]
-    spread = sparse.kron(meeting.others, sparse.eye_array(d), format="csr")
-    return sparse.csr_array(spread @ sparse.diags_array(counts.ravel().astype(float)))
+    return by_components(meeting.others, counts.astype(float))
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +165,7 @@ class PairLinearisation:
     @property
     def structure(self) -> Structure:
         """What the matrix consists of."""
-        returned = _others(self.parts, self.point.meeting)[self.parts.free]
+        returned = self._others[self.parts.free]
         return structure_of(self.parts, self.u, self.partials[0], returned)
 
     @cached_property
@@ -177,66 +176,63 @@ class PairLinearisation:
         return out
 
     @cached_property
-    def _passing(self) -> sparse.csr_array:
-        """Derivative of F by f_int - f on all nodes without `_kept`, (dofs, dofs).
-
-        At fixed positions: few rows, those of contacts and of what their forces act on.
-        """
-        others, gathers = _others(self.parts, self.point.meeting), self.parts.gathers
-        if self.parts.chained:
-            gathers = _unchained(self.parts, others, gathers)
-        return sparse.csr_array(self._law - self._by_needed @ (others @ gathers))
+    def _others(self) -> sparse.csr_array:
+        """Forces on other nodes per force on the slaves, (dofs, nc d)."""
+        return _others(self.parts, self.point.meeting)
 
     @cached_property
     def _law(self) -> sparse.csr_array:
         """Derivative of the rows of contacts by the forces on their side, (dofs, dofs)."""
-        at, dofs = self.parts.at.ravel(), len(self.rest)
-        own = sparse.csr_array((np.ones(len(at)), (at, np.arange(len(at)))),
-                               shape=(dofs, len(at)))  # fmt: skip
-        return sparse.csr_array(own @ (blocks_of(self.partials[0]) @ self.parts.gathers))
+        by_force = blocks_of(self.partials[0]) @ self.parts.gathers
+        return in_rows(by_force, self.parts.at.ravel(), len(self.rest))
 
-    @property
-    def _by_needed(self) -> sparse.csr_array:
-        """Derivative of F by f_int - f without what contacts give to others, (dofs, dofs)."""
-        return sparse.csr_array(sparse.diags_array(self._kept) + self._law)
+    def _left(self, needed: Any) -> Any:
+        """What (1) leaves of f_int - f on all nodes, of an array or matrix (dofs, ...)."""
+        own = self.parts.gathers @ needed
+        if self.parts.chained:
+            own = _unchained(self.parts, self._others, own)
+        return own
 
     def passed(self, change: Array) -> Array:
         """First-order change of F, (n,), with a change of f_int - f, (dofs,)."""
-        return (self._kept * change + self._passing @ change)[self.parts.free]
+        rest = change - self._others @ self._left(change)
+        return (self._kept * rest + self._law @ rest)[self.parts.free]
 
     @cached_property
     def _near(self) -> sparse.csr_array:
         """dF/dx without the rows of `blocks` that are `_kept`, (dofs, dofs)."""
         parts, meeting = self.parts, self.point.meeting
-        dofs, at = len(self.rest), parts.at.ravel()
+        shape = len(self.rest), len(self.rest)
         _, by_normal, by_gap, by_motion, by_axis = self.partials
         force = _own(parts, meeting, self.needed)
-        rows, turned = [], sparse.csr_array((dofs, dofs))
+        stiffness = sparse.csr_array(parts.matrix(self.blocks))
+        rows, taken = [], [(-self._others, sparse.csr_array(self._left(stiffness)))]
         start = 0
         for part, old in zip(meeting.parts, self.earlier.parts, strict=True):
             mine = slice(start, start + len(part.slaves))
             start = mine.stop
             slopes = by_normal[mine], by_gap[mine], by_motion[mine]
             if isinstance(part, MortarMeeting) and isinstance(old, MortarMeeting):
-                turned = turned + part.slopes.spread(force[mine])
+                turned = part.slopes.spread(force[mine])
+                taken.append((None, -turned))
+                if parts.chained:
+                    taken.append((self._others, sparse.csr_array(self._left(turned))))
                 rows.append(_law_of_pair(part, old, *slopes))
             elif isinstance(part, TiedMeeting):
                 rows.append(_law_of_tie(part, old, *slopes))
             else:
                 rows.append(_law_at_obstacle(part, *slopes))
-        stiffness = parts.matrix(self.blocks).tocsr()
-        given = self._by_needed
-        if parts.chained:
-            given = sparse.csr_array(sparse.diags_array(self._kept) + self._passing)
-        local = sparse.csr_array(sparse.vstack(rows))
+        change = sum_of_products(taken, shape)  # of what is left of f_int - f
+        local = rows[0] if len(rows) == 1 else sparse.csr_array(sparse.vstack(rows))
         if by_axis is not None and meeting.axes is not None:
-            local = local + blocks_of(by_axis) @ sparse.kron(
-                meeting.axes, sparse.eye_array(len(parts.points[0])), format="csr"
-            )
-        own = sparse.csr_array((np.ones(len(at)), (at, np.arange(len(at)))),
-                               shape=(dofs, len(at)))  # fmt: skip
-        out = self._passing @ stiffness - given @ turned + own @ local
-        return sparse.csr_array(out)
+            turned = sparse.kron(meeting.axes, sparse.eye_array(len(parts.points[0])), "csr")
+            local = sparse.csr_array(local + blocks_of(by_axis) @ turned)
+        own = in_rows(local, parts.at.ravel(), len(self.rest))
+        kept = sparse.csr_array(
+            (change.data * np.repeat(self._kept, np.diff(change.indptr)), change.indices,
+             change.indptr), shape=shape)  # fmt: skip
+        products = [(None, kept), (self._law, stiffness), (self._law, change), (None, own)]
+        return sum_of_products(products, shape)
 
     @cached_property
     def matrix(self) -> sparse.csc_array:
@@ -244,7 +240,7 @@ class PairLinearisation:
         free = self.parts.free
         stiffness = self.parts.on_free(self.blocks)
         stiffness.data *= self._kept[free][stiffness.indices]
-        return sparse.csc_array(stiffness + self._near[free].tocsc()[:, free])
+        return sparse.csc_array(stiffness + among(self._near, free))
 
     def shifted(
         self, load: NodalForces | Array, prescribed: Array, drift: Array | None = None

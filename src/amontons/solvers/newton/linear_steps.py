@@ -4,7 +4,8 @@ A factor of a body in three dimensions costs n^2 operations, multigrid n.  From 
 on the steps of one solve begin with `linear.condensed`, whose levels stay while the constraints
 of contact stay the same and GMRES does not need many more steps than with new ones.  Where it
 fails the direct solver takes over until the end of the solve; that also says whether a matrix
-is singular.  What is kept never outlives a solve, which so does not depend on earlier ones.
+is singular.  Small systems go to `linear.small`.  What is kept never outlives a solve, which so
+does not depend on earlier ones.
 
 Steps are as exact as Newton's method can use [EW], choice 2: a small part of the square of the
 last ratio of residuals, so that its last steps stay quadratic.
@@ -25,6 +26,7 @@ from ...core.errors import SingularOperator
 from ...linear import Direct, LinearSolver
 from ...linear.base import Factor
 from ...linear.condensed import Condensed, CondensedFactor, Structure
+from ...linear.small import factor_of_small
 from .states import Linear
 
 Array = NDArray[np.float64]
@@ -50,7 +52,7 @@ class LinearSteps:
 
     def __init__(self, linear: LinearSolver | None) -> None:
         self._direct = Direct() if linear is None else linear
-        self._iterative = linear is None
+        self._chosen = self._iterative = linear is None
         self._kept: CondensedFactor | None = None
         self._usual = 0  # GMRES steps with new levels
 
@@ -63,7 +65,9 @@ class LinearSteps:
                     return self._by_multigrid(here.matrix, structure, F, tolerance)
                 except SingularOperator:
                     self._iterative, self._kept = False, None
-        factor = self._direct.factor(here.matrix)
+        factor = factor_of_small(here.matrix) if self._chosen else None
+        if factor is None:
+            factor = self._direct.factor(here.matrix)
         return factor.solve(-F), factor
 
     def _by_multigrid(
