@@ -1,21 +1,20 @@
 """A stiffness whose rows are spread over the processes of MPI, and Newton's steps with it.
 
 Every process holds the rows of its own unknowns; all call the same methods, which PETSc carries
-out together.  One matrix A serves products, smoothers and multigrid.  Where a direction is held,
-by a support or because a contact has closed there, its row and column in A are those of the
-diagonal, so that A is symmetric positive definite and has the same pattern at all times:
+out together.  One matrix A serves products, smoothers and multigrid.  It is the matrix of a
+Newton step: with the free directions F and the held ones D, held by a support or because a
+contact has closed there,
 
-    A = [K_FF + L, 0; 0, D],    F: the free directions, L: of contacts that slide, symmetrised.
+    A = [K_FF, 0; 0, diag K_DD],    rows i of contacts that slide: sum_j G_r,ij K_jF + G_u,iF
 
-What A has lost stands in the rows `touched` (k, n), a thin matrix with the rows that have an
-entry in the row or column of a direction that may ever be held.  K x is A x with these rows
-taken from there.  The matrix of a Newton step,
+j the directions of the same node.  So it has the same pattern at all times, and is symmetric
+unless contacts slide.  What A has lost stands in the rows `touched` (k, n), a thin matrix with
+the rows that have an entry in the row or column of a direction that may ever be held: K x is
+A x with these rows taken from there.
 
-    J x = A_FF x + (G_r K x + G_u x - A_FF x) in the rows of contacts that slide,
-
-is not symmetric and never stored; GMRES is preconditioned from the right by multigrid (GAMG) for
-A.  Its aggregates are made once.  Its coarse matrices are made anew only when they have become
-bad: when many directions have changed, or an iteration gains less than it did.
+GMRES is preconditioned from the right by multigrid (GAMG).  Its aggregates are made once.  Its
+coarse matrices are made anew only when they have become bad: when many directions have changed,
+or an iteration gains less than it did.
 """
 
 from __future__ import annotations
@@ -34,8 +33,9 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 RESTART = 30  # vectors that GMRES keeps
-CHANGED = 0.05  # share of the contact directions that may change before multigrid follows
-WORSE = 1.5  # iterations per digit, compared with those of fresh coarse matrices
+CHANGED = 0.2  # share of the contact directions that may change before multigrid follows
+WORSE = 3.0  # iterations per digit, compared with those of fresh coarse matrices
+SLAB = 20_000  # nodes whose rows are handed over at a time
 FIRST_WORSE = 8.0  # iterations per digit that are called bad whatever they were
 
 
@@ -56,7 +56,7 @@ class Sliding:
 class SpreadMatrix:
     """K on all processes of `comm`, its held directions and the solver of Newton's steps.
 
-    rows: K of the own unknowns as a CSR matrix (own, n), columns in the numbers of PETSc,
+    rows: K of the own unknowns in blocks (own, n), columns in the numbers of PETSc,
     where processes follow one another; basis: T = I + C (own, n) in which contact is seen on
     one side, C C = 0, None where nobody has one (the same answer on all processes).
     modes (own, k): rigid motions; d: unknowns a node; may_be_held (own,): directions that are
@@ -64,7 +64,7 @@ class SpreadMatrix:
     """
 
     def __init__(  # noqa: PLR0913  # what a matrix is made of
-        self, comm: Any, rows: sparse.csr_array, basis: sparse.csr_array | None, *,
+        self, comm: Any, rows: sparse.bsr_array, basis: sparse.bsr_array | None, *,
         modes: Array, d: int, may_be_held: Mask, directions: int, options: Petsc,
     ) -> None:  # fmt: skip
         self.comm, self.d, self.options, self.directions = comm, d, options, directions
@@ -73,55 +73,55 @@ class SpreadMatrix:
         self.T = None
         if basis is not None:
             self.T = _matrix(comm, basis, d)
-            self.A = self.A.PtAP(self.T)
+            plain, self.A = self.A, self.A.PtAP(self.T)
+            plain.destroy()
             self.A.setBlockSize(d)
         self.first, last = self.A.getOwnershipRange()
         assert last - self.first == self.own
         self.A.setOption(petsc().Mat.Option.KEEP_NONZERO_PATTERN, True)
-        self.diagonal = self.A.getDiagonal().array.copy()
+        self._x, self._y = self.A.createVecs()
+        self.A.getDiagonal(self._x)
+        self.diagonal = self._x.array_r.copy()
         self._take_rows(may_be_held)
         self._give_modes(modes)
         self.held = np.zeros(self.own, dtype=bool)
-        self.sliding: Sliding | None = None
         self.ksp: Any = None
+        self._fresh = True
         self.iterations = self.rebuilt = 0
         self._built = np.zeros(self.own, dtype=bool)
         self._stale, self._rate = False, 0.0
 
-    # ------------------------------------------------------------------ vectors
-    def vector(self, values: Array | None = None) -> Any:
-        """A vector of PETSc with these own values, (own,), or zeros."""
-        v = self.A.createVecRight()
-        v.array = 0.0 if values is None else values
-        return v
+    def destroy(self) -> None:
+        """Give the memory back; all processes have to, and have no use of this object then."""
+        for part in (self.ksp, self.A, self.T, self.touched, self._fetch, self._near, self._x,
+                     self._y, self._rest):  # fmt: skip
+            if part is not None:
+                part.destroy()
 
+    # ------------------------------------------------------------------ vectors
     def total(self, value: float | Array) -> Any:
         """The sum of numbers over all processes."""
         return self.comm.allreduce(value)
 
     def to_basis(self, v: Array) -> Array:
         """T^-1 v of own values (own,): T = I + C, and C C = 0."""
-        if self.T is None:
-            return v
-        x, y = self.vector(v), self.vector()
-        self.T.mult(x, y)
-        return 2 * v - y.array_r
+        return v if self.T is None else 2 * v - self.from_basis(v)
 
     def from_basis(self, v: Array) -> Array:
         """T v of own values (own,)."""
         if self.T is None:
             return v
-        x, y = self.vector(v), self.vector()
-        self.T.mult(x, y)
-        return y.array_r.copy()
+        self._x.array = v
+        self.T.mult(self._x, self._y)
+        return self._y.array_r.copy()
 
     def load_in_basis(self, f: Array) -> Array:
         """T' f of own values (own,)."""
         if self.T is None:
             return f
-        x, y = self.vector(f), self.vector()
-        self.T.multTranspose(x, y)
-        return y.array_r.copy()
+        self._x.array = f
+        self.T.multTranspose(self._x, self._y)
+        return self._y.array_r.copy()
 
     def force_from_basis(self, f: Array) -> Array:
         """T'^-1 f of own values (own,)."""
@@ -135,7 +135,8 @@ class SpreadMatrix:
         own = PETSc.IS().createStride(self.own, self.first, 1, comm=self.comm)
         marked = self.A.createSubMatrix(PETSc.IS().createGeneral(index, comm=self.comm), own)
         columns = np.unique(marked.getValuesCSR()[1])  # symmetric: the rows that touch it
-        flags = self.vector()
+        marked.destroy()
+        flags = self.A.createVecRight()
         flags.setValues(columns.astype(PETSc.IntType), np.ones(len(columns)))
         flags.assemble()
         touched = np.flatnonzero((flags.array_r > 0) | may_be_held)
@@ -144,6 +145,7 @@ class SpreadMatrix:
             PETSc.IS().createGeneral(rows, comm=self.comm), own
         )
         self.touched_rows = touched
+        self._rest = self.touched.createVecLeft()
         pointers, columns, values = self.touched.getValuesCSR()
         self._pattern = pointers, columns, values
         self._of = np.repeat(touched, np.diff(pointers))
@@ -155,13 +157,15 @@ class SpreadMatrix:
             flags, PETSc.IS().createGeneral(known.astype(PETSc.IntType), comm=self.comm),
             self._near, None,
         )  # fmt: skip
+        flags.destroy()
 
     def _give_modes(self, modes: Array) -> None:
         """Rigid motions in the basis, orthonormal, as PETSc asks for."""
         PETSc = petsc()
         kept: list[Any] = []
         for column in modes.T:
-            v = self.vector(self.to_basis(np.ascontiguousarray(column)))
+            v = self.A.createVecRight()
+            v.array = self.to_basis(np.ascontiguousarray(column))
             size = v.norm()
             for _ in range(2):  # the second time takes off what rounding left
                 for other in kept:
@@ -184,75 +188,58 @@ class SpreadMatrix:
     def hold(self, held: Mask, sliding: Sliding) -> None:
         """Hold own directions (own,), and let contacts slide by their conditions."""
         PETSc = petsc()
-        flags = self.vector(held.astype(float))
-        self._fetch.scatter(flags, self._near, mode=PETSc.ScatterMode.FORWARD)
-        alone = held[self._of] | (self._near.array_r[self._place] > 0)
+        self._x.array = held.astype(float)
+        self._fetch.scatter(self._x, self._near, mode=PETSc.ScatterMode.FORWARD)
         pointers, columns, values = self._pattern
-        values = np.where(alone, 0.0, values)
+        free = np.where(self._near.array_r[self._place] > 0, 0.0, values)  # columns
+        values = np.where(held[self._of], 0.0, free)
         mine = self._on_diagonal & held[self._of]
         values[mine] = self.diagonal[self._of[mine]]
+        self.held = held
+        self._let_slide(values, free, sliding)
         index = (self.first + self.touched_rows).astype(PETSc.IntType)
         if len(index):
             self.A.setValuesIJV(pointers, columns, values, rowmap=index)
         self.A.assemble()
-        self._add(sliding)
-        self.held, self.sliding = held, sliding
-        changed = self.total(np.array([(held != self._built).sum(), len(sliding.rows)]))
-        self.any_sliding = changed[1] > 0
-        self._changed = float(changed[0])
+        self._changed = float(self.total(int((held != self._built).sum())))
 
-    def _add(self, sliding: Sliding) -> None:
-        """Add the symmetric, positive part of G_u in the rows that slide."""
-        PETSc = petsc()
-        both = sliding.wanted[:, :, None] & sliding.wanted[:, None, :]
-        L = np.where(both, sliding.G_u, 0.0)
-        L = 0.5 * (L + L.transpose(0, 2, 1))
-        sizes, axes = np.linalg.eigh(L)
-        L = np.einsum("kia,ka,kja->kij", axes, np.maximum(sizes, 0.0), axes)
-        where = (self.first + sliding.rows).astype(PETSc.IntType)
-        for rows, block in zip(where, L, strict=True):
-            if block.any():
-                self.A.setValues(rows, rows, block, addv=PETSc.InsertMode.ADD_VALUES)
-        self.A.assemble()
+    def _let_slide(self, values: Array, free: Array, sliding: Sliding) -> None:
+        """Write the rows of contacts that slide into the values of the touched rows.
+
+        The rows of one node have the same columns, so that an entry of another direction of it
+        stands a whole number of rows further on.
+        """
+        pointers, columns, _ = self._pattern
+        d = self.d
+        at = np.searchsorted(self.touched_rows, sliding.rows)
+        for contact, a in np.argwhere(sliding.wanted):
+            spans = [slice(*pointers[row : row + 2]) for row in at[contact]]
+            out = sum(sliding.G_r[contact, a, b] * free[spans[b]] for b in range(d))
+            where = np.searchsorted(columns[spans[a]], self.first + sliding.rows[contact])
+            out[where] += np.where(self.held[sliding.rows[contact]], 0.0,
+                                   sliding.G_u[contact, a])  # fmt: skip
+            values[spans[a]] = out
 
     # ------------------------------------------------------------------ products
-    def times(self, x: Any) -> Array:
-        """K x, (own,), of a vector of PETSc; held directions included."""
-        y, rest = self.A.createVecLeft(), self.touched.createVecLeft()
-        self.A.mult(x, y)
-        self.touched.mult(x, rest)
-        out = y.array_r.copy()
-        out[self.touched_rows] = rest.array_r
+    def times(self, x: Array) -> Array:
+        """K x of own values (own,), held directions included."""
+        self._x.array = x
+        self.A.mult(self._x, self._y)
+        self.touched.mult(self._x, self._rest)
+        out = self._y.array_r.copy()
+        out[self.touched_rows] = self._rest.array_r
         return out
-
-    def mult(self, _: Any, x: Any, y: Any) -> None:
-        """J x, as PETSc calls it."""
-        self.A.mult(x, y)
-        if not self.any_sliding:
-            return
-        s = self.sliding
-        assert s is not None
-        free = x.copy()
-        free.array = np.where(self.held, 0.0, x.array_r)
-        rest = self.touched.createVecLeft()
-        self.touched.mult(free, rest)
-        out = y.array
-        whole = np.zeros(self.own)
-        whole[self.touched_rows] = rest.array_r
-        part = np.einsum("kij,kj->ki", s.G_r, whole[s.rows])
-        part += np.einsum("kij,kj->ki", s.G_u, free.array_r[s.rows])
-        out[s.rows[s.wanted]] = part[s.wanted]
 
     # ------------------------------------------------------------------ solving
     def solve(self, b: Array, reduction: float) -> Array:
-        """x (own,) with |J x - b| <= reduction |b|, 0 in held directions.
+        """x (own,) with |A x - b| <= reduction |b|, 0 in held directions.
 
         Raises SingularOperator, on all processes, where GMRES does not get there.
         """
-        right = self.vector(np.where(self.held, 0.0, b))
-        x = self.vector()
+        right, x = self._y, self._x
+        right.array = np.where(self.held, 0.0, b)
         if right.norm() == 0:
-            return x.array_r.copy()
+            return np.zeros(self.own)
         self._prepare()
         self.ksp.setTolerances(rtol=reduction, atol=0.0, max_it=self.options.max_iterations)
         self.ksp.solve(right, x)
@@ -272,32 +259,29 @@ class SpreadMatrix:
 
     def _prepare(self) -> None:
         """Make the solver, or let multigrid follow the matrix where it is time to."""
-        PETSc = petsc()
         if self.ksp is None:
-            J = PETSc.Mat().createPython(self.A.getSizes(), context=self, comm=self.comm)
-            J.setUp()
-            self.ksp = krylov_of_steps(J, self.A, self.comm)
+            self.ksp = krylov_of_steps(self.A)
             self._fresh = True
         else:
             many = self._changed > CHANGED * self.directions
             self._fresh = many or self._stale
             self.ksp.getPC().setReusePreconditioner(not self._fresh)
-            self.ksp.setOperators(self.ksp.getOperators()[0], self.A)
+            self.ksp.setOperators(self.A)
         if self._fresh:
             self.rebuilt += 1
             self._built = self.held.copy()
             self.ksp.setUp()
 
 
-def krylov_of_steps(J: Any, A: Any, comm: Any) -> Any:
-    """GMRES for J with multigrid for A, whose aggregates are kept."""
+def krylov_of_steps(A: Any) -> Any:
+    """GMRES with multigrid whose aggregates are kept."""
     PETSc = petsc()
     options = PETSc.Options()
     name = PREFIX + "pc_gamg_reuse_interpolation"
     if not options.hasName(name):
         options.setValue(name, True)
-    ksp = PETSc.KSP().create(comm)
-    ksp.setOperators(J, A)
+    ksp = PETSc.KSP().create(A.getComm())
+    ksp.setOperators(A)
     ksp.setType("gmres")
     ksp.setPCSide(PETSc.PC.Side.RIGHT)
     ksp.setGMRESRestart(RESTART)
@@ -307,11 +291,31 @@ def krylov_of_steps(J: Any, A: Any, comm: Any) -> Any:
     return ksp
 
 
-def _matrix(comm: Any, rows: sparse.csr_array, d: int) -> Any:
-    """PETSc's matrix of the own rows (own, n) of all processes."""
+def _matrix(comm: Any, rows: sparse.bsr_array, d: int) -> Any:
+    """PETSc's matrix of the own rows (own, n) of all processes, filled slab by slab."""
     PETSc = petsc()
     own, size = rows.shape
-    parts = (rows.indptr.astype(PETSc.IntType), rows.indices.astype(PETSc.IntType), rows.data)
-    A = PETSc.Mat().createAIJ(((own, size), (own, size)), bsize=d, csr=parts, comm=comm)
+    last = comm.scan(own)
+    inside = (rows.indices >= (last - own) // d) & (rows.indices < last // d)
+    nodes = np.repeat(np.arange(own // d), np.diff(rows.indptr))
+    counts = [
+        np.repeat(d * np.bincount(nodes[some], minlength=own // d), d).astype(PETSc.IntType)
+        for some in (inside, ~inside)
+    ]
+    A = PETSc.Mat().create(comm)
+    A.setSizes(((own, size), (own, size)), bsize=d)
+    A.setType("aij")
+    A.setPreallocationNNZ(counts)
+    for first in range(0, own // d, SLAB):
+        ends = rows.indptr[first : first + SLAB + 1]
+        some = slice(ends[0], ends[-1])
+        parts = (rows.data[some], rows.indices[some], ends - ends[0])
+        slab = sparse.bsr_array(parts, shape=(d * (len(ends) - 1), size)).tocsr()
+        slab.sort_indices()
+        numbers = np.arange(last - own + d * first, last - own + d * first + slab.shape[0])
+        A.setValuesIJV(
+            slab.indptr.astype(PETSc.IntType), slab.indices.astype(PETSc.IntType), slab.data,
+            rowmap=numbers.astype(PETSc.IntType),
+        )  # fmt: skip
     A.assemble()
     return A

@@ -382,7 +382,8 @@ class Equations(Matrices):
     @property
     def _is_estimated(self) -> bool:
         """True for large meshes, where M^-1 f would cost too much only to judge."""
-        return self.unknowns > ESTIMATED and (bool(self.levels) or self.near_nullspace is not None)
+        large = self.unknowns > ESTIMATED
+        return large and (bool(self.levels) or self.near_nullspace is not None)
 
     def _open_velocity(self) -> Array:
         hierarchy = self.hierarchy if self._is_estimated else None

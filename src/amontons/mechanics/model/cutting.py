@@ -65,10 +65,10 @@ class Contacts:
 
     def at(self, index: Index, node: Index) -> Contacts:
         """Some of them, whose nodes have other numbers."""
-        picked = (self.gap, self.frames, self.turn, self.able, self.weights)
-        gap, frames, turn, able, weights = (a[index] for a in picked)
-        return Contacts(self.number[index], node, gap, frames, turn, able, weights,
-                        self.law.at(index))  # fmt: skip
+        return Contacts(
+            self.number[index], node, self.gap[index], self.frames[index], self.turn[index],
+            self.able[index], self.weights[index], self.law.at(index),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,7 +212,7 @@ def _in_frames(  # noqa: PLR0913  # what contacts are made of
     for k in np.flatnonzero(fixed[node].any(axis=1)):
         frames[k] = _turned(frames[k], fixed[node[k]], sites.points[k])
     turn = np.einsum("kai,kbi->kab", sites.frames, frames)
-    able = ~(np.abs(frames) * fixed[node][:, None, :] > 1 - SAME).any(axis=2)
+    able = np.all(np.abs(frames) * fixed[node][:, None, :] <= 1 - SAME, axis=2)
     tiles = sparse.bsr_array((turn, np.arange(nc), np.arange(nc + 1)), shape=(nc * d,) * 2)
     turned = sparse.csc_array(H @ tiles.tocsc()).tocoo()
     row, column = turned.coords
@@ -283,8 +283,8 @@ def shares(given: Whole, owner: Index, processes: int) -> Iterator[Share]:
     number = np.empty(len(owner), dtype=np.int64)
     number[np.argsort(owner, kind="stable")] = np.arange(len(owner))
     starts = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=processes))])
-    B = given.coupling.tocoo()
-    slave = given.contacts.node[B.coords[1] // d]
+    B = _whole_blocks(given.coupling, d)
+    slave, values = given.contacts.node[B.coords[1] // d], np.asarray(B.data, dtype=float)
     counts = tuple(len(body.mesh.points) for body in given.bodies)
     firsts = np.cumsum([0, *counts])
     place = np.empty(len(owner), dtype=np.int64)
@@ -311,9 +311,19 @@ def shares(given: Whole, owner: Index, processes: int) -> Iterator[Share]:
             local, given.contacts.frames[which],
             given.contacts.at(chosen, place[given.contacts.node[chosen]]),
             (place[slave[here]] * d + B.coords[1][here] % d,
-             number[B.coords[0][here] // d] * d + B.coords[0][here] % d, -B.data[here]),
+             number[B.coords[0][here] // d] * d + B.coords[0][here] % d, -values[here]),
             B.nnz > 0, len(given.contacts.node), counts,
         )  # fmt: skip
+
+
+def _whole_blocks(B: sparse.csc_array, d: int) -> sparse.coo_array:
+    """The same with all entries of every block, zeros too: rows of a node have one pattern."""
+    tiles = sparse.bsr_array(sparse.csr_array(B).tobsr((d, d)))
+    where = np.repeat(np.arange(B.shape[0] // d), np.diff(tiles.indptr)), tiles.indices
+    i, j = np.mgrid[:d, :d]
+    rows, columns = (w[:, None, None] * d + part for w, part in zip(where, (i, j), strict=True))
+    entries = tiles.data.ravel(), (rows.ravel(), columns.ravel())
+    return sparse.coo_array(entries, shape=B.shape)
 
 
 def _material(body: Body, mesh: Mesh) -> Any:

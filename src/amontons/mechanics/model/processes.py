@@ -60,11 +60,20 @@ def distributed(
         threads(1)  # one core each
     with ended_together(comm):
         share = _received(model, comm)
-        K, own = together(comm, lambda: _rows(share, comm.rank))
-        problem = _problem(share, K, own, comm, linear or Petsc())
-        del K
+        rows = [together(comm, lambda: _rows(share))]
+        problem = _problem(share, rows, comm, linear or Petsc())
         found = SpreadActiveSet(problem).solve(float(tolerance))
-        return SpreadModelSolution.of(share, problem, found, comm)
+        solution = SpreadModelSolution.of(share, problem, found, comm)
+        problem.K.destroy()
+        return solution
+
+
+class OnAll(Exception):
+    """An error that all processes know of, though it happened on one."""
+
+    def __init__(self, reason: Exception) -> None:
+        self.reason = reason
+        super().__init__(str(reason))
 
 
 @contextmanager
@@ -72,7 +81,9 @@ def ended_together(comm: Any) -> Iterator[None]:
     """End all processes when this one alone fails, as the others would wait for it for ever."""
     try:
         yield
-    except AmontonsError:  # raised by all
+    except OnAll as known:
+        raise known.reason from None
+    except AmontonsError:  # of sums that all have alike
         raise
     except BaseException:
         if comm.size > 1:
@@ -82,22 +93,21 @@ def ended_together(comm: Any) -> Iterator[None]:
 
 
 def together(comm: Any, work: Callable[[], T]) -> T:
-    """What `work` returns here; where it fails on any process, its error on all of them."""
+    """What `work` returns here; raises OnAll where it fails on any process, on all of them."""
     error, out = None, None
     try:
         out = work()
-    except AmontonsError as reason:
+    except Exception as reason:
         error = reason
     errors = [e for e in comm.allgather(error) if e is not None]
     if errors:
-        raise errors[0]
+        raise OnAll(errors[0])
     return out  # type: ignore[return-value]  # work has returned it
 
 
 def _received(model: Model | Callable[[], Model], comm: Any) -> Share:
     """The share of this process; the first one makes and sends all, one after another."""
     found = together(comm, lambda: None if comm.rank else _made(model, comm.size))
-    del model
     if found is None:
         return comm.recv(source=0)
     mine = None
@@ -115,14 +125,15 @@ def _made(model: Model | Callable[[], Model], processes: int) -> tuple[Whole, In
     made = model() if callable(model) else model
     if not isinstance(made, Model):
         raise InvalidInput(
-            f"model: expected a Model, or a function that returns one, got {type(made).__name__}"
+            "model: expected a Model, or a function that returns one, got "
+            f"{type(made).__name__}"
         )
     given = whole(made)
     return given, partition(given.points, processes)
 
 
-def _rows(share: Share, rank: int) -> tuple[sparse.csr_array, Index]:
-    """Rows (own, n) of the stiffness in the frames of contacts, and of own among local nodes.
+def _rows(share: Share) -> tuple[sparse.bsr_array, Index]:
+    """Rows (own, n) of the stiffness in the frames of contacts, and the own local nodes.
 
     Columns are PETSc's numbers.
     """
@@ -142,8 +153,7 @@ def _rows(share: Share, rank: int) -> tuple[sparse.csr_array, Index]:
         np.concatenate(pointers),
     )  # fmt: skip
     own = int(share.own.sum()) * d
-    K = sparse.bsr_array(blocks, shape=(own, int(share.starts[-1]) * d)).tocsr()
-    K.sort_indices()
+    K = sparse.bsr_array(blocks, shape=(own, int(share.starts[-1]) * d))
     return K, np.flatnonzero(share.own)
 
 
@@ -163,14 +173,17 @@ def _rows_of_body(
         blocks[some] = (np.einsum(turn, F, blocks[some]) if nodes is row
                         else np.einsum(turn, blocks[some], F))  # fmt: skip
     pointers = np.concatenate([[0], np.cumsum(counts[own])])
-    return pointers, share.number[local[column]], blocks
+    return pointers, share.number[local[column]], np.asarray(blocks, dtype=float)
 
 
 def _problem(
-    share: Share, K: sparse.csr_array, own: Index, comm: Any, options: Petsc
+    share: Share, rows: list[tuple[sparse.bsr_array, Index]], comm: Any, options: Petsc
 ) -> SpreadProblem:
-    """Matrix, load and supports of this process in the basis of contacts."""
-    d = share.fixed.shape[1]
+    """Matrix, load and supports of this process in the basis of contacts.
+
+    rows: the one result of `_rows`, taken out of the list, so that it can go when PETSc has it.
+    """
+    (K, own), d = rows.pop(), share.fixed.shape[1]
     contacts = share.contacts
     frames = np.zeros((0, d, d)) if not len(contacts.node) else contacts.frames
     dofs = contacts.node[:, None] * d + np.arange(d)
@@ -197,7 +210,7 @@ def _problem(
     )
 
 
-def _basis(share: Share, rank: int) -> sparse.csr_array:
+def _basis(share: Share, rank: int) -> sparse.bsr_array:
     """T = I - B' of own rows, (own, n)."""
     d = share.fixed.shape[1]
     own, first = share.fixed.size, int(share.starts[rank]) * d
@@ -206,5 +219,4 @@ def _basis(share: Share, rank: int) -> sparse.csr_array:
     entries = np.concatenate([np.ones(own), value])
     where = np.concatenate([index, row]), np.concatenate([first + index, column])
     T = sparse.coo_array((entries, where), shape=(own, int(share.starts[-1]) * d)).tocsr()
-    T.sort_indices()
-    return T
+    return sparse.bsr_array(T.tobsr((d, d)))

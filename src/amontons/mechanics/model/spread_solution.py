@@ -78,7 +78,7 @@ class SpreadModelSolution:
         K, contacts, d = problem.K, share.contacts, share.fixed.shape[1]
         v = K.from_basis(found.y).reshape(-1, d)
         forces = problem.contacts
-        rest = K.times(K.vector(found.y)) - problem.f
+        rest = K.times(found.y) - problem.f
         rest[forces.dofs] -= found.r
         rest[~problem.fixed] = 0.0
         support = K.force_from_basis(rest).reshape(-1, d)
@@ -96,7 +96,7 @@ class SpreadModelSolution:
             np.einsum("kab,kb->ka", contacts.turn, found.r),
             np.einsum("kab,kb->ka", contacts.turn, found.u), status.astype(np.int8),
             total[:d],
-            {name: int(n) for name, n in zip(("open", "stick", "slip"), total[d:], strict=True)},
+            dict(zip(("open", "stick", "slip"), total[d:].astype(int).tolist(), strict=True)),
             found.error, found.converged, found.steps, K.iterations, K.rebuilt, found.why, comm,
             share,
         )  # fmt: skip
@@ -182,10 +182,12 @@ class SpreadModelSolution:
         out = PETSc.Vec().createSeq(len(share.nodes) * d)
         numbers = (share.number[:, None] * d + np.arange(d)).ravel().astype(PETSc.IntType)
         index = PETSc.IS().createGeneral(numbers, comm=self.comm)
-        PETSc.Scatter().create(v, index, out, None).scatter(
-            v, out, mode=PETSc.ScatterMode.FORWARD
-        )
-        return out.array_r.reshape(-1, d).copy()
+        scatter = PETSc.Scatter().create(v, index, out, None)
+        scatter.scatter(v, out, mode=PETSc.ScatterMode.FORWARD)
+        found = out.array_r.reshape(-1, d).copy()
+        for part in (scatter, index, out, v):
+            part.destroy()
+        return found
 
 
 def _spatial(values: Array) -> Array:
