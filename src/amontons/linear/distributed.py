@@ -214,7 +214,7 @@ class SpreadMatrix:
         at = np.searchsorted(self.touched_rows, sliding.rows)
         for contact, a in np.argwhere(sliding.wanted):
             spans = [slice(*pointers[row : row + 2]) for row in at[contact]]
-            out = sum(sliding.G_r[contact, a, b] * free[spans[b]] for b in range(d))
+            out = sliding.G_r[contact, a] @ np.stack([free[spans[b]] for b in range(d)])
             where = np.searchsorted(columns[spans[a]], self.first + sliding.rows[contact])
             out[where] += np.where(self.held[sliding.rows[contact]], 0.0,
                                    sliding.G_u[contact, a])  # fmt: skip
@@ -294,7 +294,7 @@ def krylov_of_steps(A: Any) -> Any:
 def _matrix(comm: Any, rows: sparse.bsr_array, d: int) -> Any:
     """PETSc's matrix of the own rows (own, n) of all processes, filled slab by slab."""
     PETSc = petsc()
-    own, size = rows.shape
+    own, size = rows.shape  # type: ignore[misc]  # scipy: may be None
     last = comm.scan(own)
     inside = (rows.indices >= (last - own) // d) & (rows.indices < last // d)
     nodes = np.repeat(np.arange(own // d), np.diff(rows.indptr))

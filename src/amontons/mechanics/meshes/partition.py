@@ -51,7 +51,7 @@ def _bisect(points: Array, index: Index, first: int, parts: int, out: Index) -> 
 
 def touching(mesh: Mesh, mine: Mask) -> tuple[Mesh | None, Index]:
     """The cells of a mesh with a node in mine (n,), as `part_of` gives them."""
-    return part_of(mesh, [mine[block.nodes].any(axis=1) for block in mesh.cells])
+    return part_of(mesh, [np.any(mine[block.nodes], axis=1) for block in mesh.cells])
 
 
 def part_of(mesh: Mesh, wanted: Sequence[Mask]) -> tuple[Mesh | None, Index]:

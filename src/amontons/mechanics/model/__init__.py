@@ -13,9 +13,11 @@ from .finding import FoundContacts, FoundPair, find_contacts
 from .model import Model
 from .parts import Body, BodyForce, Contact, Fix, NodalForce, Pressure, Temperature, Traction
 from .processes import distributed
+from .spread_solution import DistributedSolution
 
 __all__ = ["Axes", "Body", "BodyForce", "CiarletGeymonat", "Contact", "ContactFields",
-           "Coupling", "ElastoPlastic", "Equation", "Fix", "FoundContacts", "FoundPair",
+           "Coupling", "DistributedSolution", "ElastoPlastic",
+           "Equation", "Fix", "FoundContacts", "FoundPair",
            "LinearElastic", "Model", "MooneyRivlin", "NeoHookean", "NodalForce", "Ogden",
            "OrthotropicElastic", "Pressure", "Pretension", "ReducedPolynomial",
            "Reference", "Rigid",

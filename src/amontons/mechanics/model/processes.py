@@ -28,7 +28,7 @@ from ..elements.elasticity import stiffness
 from ..meshes.partition import partition
 from .cutting import Share, Whole, shares, whole
 from .model import Model
-from .spread_solution import SpreadModelSolution
+from .spread_solution import DistributedSolution
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -39,7 +39,7 @@ TOLERANCE = 1e-8
 def distributed(
     model: Model | Callable[[], Model], *, tolerance: float = TOLERANCE,
     linear: Petsc | None = None, comm: Any = None,
-) -> SpreadModelSolution:  # fmt: skip
+) -> DistributedSolution:  # fmt: skip
     """The solution of a model, in the parts in which all processes of `comm` have found it.
 
     All processes call it.  model: a function that makes the model, which is called on the
@@ -63,7 +63,7 @@ def distributed(
         rows = [together(comm, lambda: _rows(share))]
         problem = _problem(share, rows, comm, linear or Petsc())
         found = SpreadActiveSet(problem).solve(float(tolerance))
-        solution = SpreadModelSolution.of(share, problem, found, comm)
+        solution = DistributedSolution.of(share, problem, found, comm)
         problem.K.destroy()
         return solution
 

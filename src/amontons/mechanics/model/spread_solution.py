@@ -41,7 +41,7 @@ class Gathered:
 
 
 @dataclass(frozen=True, eq=False)
-class SpreadModelSolution:
+class DistributedSolution:
     """What a process knows of a solution; numbers without an array are those of all processes.
 
     nodes (o,): its own nodes, numbered through all bodies of the model; displacement and
@@ -73,7 +73,7 @@ class SpreadModelSolution:
     @classmethod
     def of(
         cls, share: Share, problem: SpreadProblem, found: SpreadSolution, comm: Any
-    ) -> SpreadModelSolution:
+    ) -> DistributedSolution:
         """Back in global axes."""
         K, contacts, d = problem.K, share.contacts, share.fixed.shape[1]
         v = K.from_basis(found.y).reshape(-1, d)
