@@ -31,9 +31,11 @@ COLUMNS = ("kind", "cells an edge", "unknowns", "contacts", "processes", "wall s
            "messages each", "their MB each", "sums over all", "load")  # fmt: skip
 
 
-WORDS = """The cube of examples/distributed.py to 1e-8, making the mesh included. Peaks are of whole
-processes: some 230 MB of each are Python and its libraries. Messages and sums contain those of a
-small solve before. Load: processes that want a core, before each run."""
+WORDS = (
+    "The cube of examples/distributed.py to 1e-8, making the mesh included. Peaks are of whole "
+    "processes: some 230 MB of each are Python and its libraries. Messages and sums contain "
+    "those of a small solve before. Load: processes that want a core, before each run."
+)
 
 
 def model(kind, cells):

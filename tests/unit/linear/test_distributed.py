@@ -17,7 +17,7 @@ from scipy import sparse
 import amontons as am
 from amontons.core.errors import InvalidInput, MissingDependency, UnsupportedForm
 from amontons.linear.petsc import mpi
-from amontons.mechanics.meshes.partition import partition, touching
+from amontons.mechanics.meshes.partition import Cut, partition
 from amontons.mechanics.model.cutting import shares, whole
 from amontons.mechanics.model.processes import (
     _basis,
@@ -141,12 +141,15 @@ def test_nodes_are_cut_evenly_and_alike_everywhere():
 
 def test_a_part_has_all_cells_of_its_nodes():
     mesh = am.box((1, 1), cells=4, kind="tri")
-    mine = np.zeros(len(mesh.points), dtype=bool)
-    mine[7] = True
-    part, nodes = touching(mesh, mine)
-    expected = mesh.cells[0].nodes[(mesh.cells[0].nodes == 7).any(axis=1)]
-    np.testing.assert_array_equal(nodes[part.cells[0].nodes], expected)
-    assert touching(mesh, ~mine & mine)[0] is None
+    owner = np.zeros(len(mesh.points), dtype=int)
+    owner[7] = 2
+    cut = Cut(mesh, owner, 3)
+    table = mesh.cells[0].nodes
+    for number, expected in ((2, (table == 7).any(axis=1)), (0, (table != 7).any(axis=1))):
+        part, nodes = cut.part(number)
+        np.testing.assert_array_equal(nodes[part.cells[0].nodes], table[expected])
+        np.testing.assert_array_equal(part.points, mesh.points[nodes])
+    assert cut.part(1)[0] is None
 
 
 @pytest.mark.parametrize("processes", [1, 3])

@@ -17,7 +17,6 @@ from .mesh import Mesh
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 
 def partition(points: Array, parts: int) -> Index:
@@ -49,26 +48,43 @@ def _bisect(points: Array, index: Index, first: int, parts: int, out: Index) -> 
     _bisect(points, np.sort(index[order[count:]]), first + left, parts - left, out)
 
 
-def touching(mesh: Mesh, mine: Mask) -> tuple[Mesh | None, Index]:
-    """The cells of a mesh with a node in mine (n,), as `part_of` gives them."""
-    return part_of(mesh, [np.any(mine[block.nodes], axis=1) for block in mesh.cells])
+def sorted_by(owner: Index, parts: int) -> tuple[Index, Index]:
+    """Numbers (n,) in the order of their part, and where each part starts, (parts + 1,)."""
+    sizes = np.bincount(owner, minlength=parts)
+    return np.argsort(owner, kind="stable"), np.concatenate([[0], np.cumsum(sizes)])
 
 
-def part_of(mesh: Mesh, wanted: Sequence[Mask]) -> tuple[Mesh | None, Index]:
-    """Some cells of a mesh, (cells,) of every block, without surfaces, and the nodes they use.
+class Cut:
+    """A mesh whose nodes belong to parts, owner (n,); cells sorted by the parts they touch."""
 
-    None where there are none.  Nodes (k,) are numbers in the whole mesh, ascending.
-    """
+    def __init__(self, mesh: Mesh, owner: Index, parts: int) -> None:
+        self.mesh = mesh
+        self.cells: list[tuple[Index, Index]] = []
+        for block in mesh.cells:
+            whose = np.sort(owner[block.nodes], axis=1)
+            new = np.ones(whose.shape, dtype=bool)
+            new[:, 1:] = whose[:, 1:] != whose[:, :-1]
+            order, starts = sorted_by(whose[new], parts)
+            self.cells.append((np.nonzero(new)[0][order], starts))
+
+    def part(self, number: int) -> tuple[Mesh | None, Index]:
+        """The cells with a node of a part, as a mesh without surfaces, and its nodes.
+
+        None where there are none.  Nodes (k,) are numbers in the whole mesh, ascending.
+        """
+        some = [cells[starts[number] : starts[number + 1]] for cells, starts in self.cells]
+        return part_of(self.mesh, some)
+
+
+def part_of(mesh: Mesh, wanted: Sequence[Index]) -> tuple[Mesh | None, Index]:
+    """Some cells of a mesh, numbers (k,) in every block, as `Cut.part` gives them."""
     blocks = [
         replace(block, nodes=block.nodes[some])
         for block, some in zip(mesh.cells, wanted, strict=True)
-        if some.any()
+        if len(some)
     ]
     if not blocks:
         return None, np.zeros(0, dtype=np.int64)
-    used = np.zeros(len(mesh.points), dtype=bool)
-    for block in blocks:
-        used[block.nodes] = True
-    place = np.cumsum(used) - 1
-    cells = tuple(replace(b, nodes=place[b.nodes]) for b in blocks)
-    return Mesh(mesh.points[used], cells, axisymmetric=mesh.axisymmetric), np.flatnonzero(used)
+    used = np.unique(np.concatenate([block.nodes.ravel() for block in blocks]))
+    cells = tuple(replace(b, nodes=np.searchsorted(used, b.nodes)) for b in blocks)
+    return Mesh(mesh.points[used], cells, axisymmetric=mesh.axisymmetric), used

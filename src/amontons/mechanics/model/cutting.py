@@ -28,7 +28,7 @@ from ...problem.law import Law
 from ..elements.given import GivenMatrices
 from ..elements.rigid import Rigid
 from ..meshes.mesh import Mesh
-from ..meshes.partition import touching
+from ..meshes.partition import Cut, sorted_by
 from .assembly import _check_once, _of_all, _placed
 from .held import check_outside, refuse_held
 from .laws import law_of_placed
@@ -278,41 +278,49 @@ def _check_rest(contacts: Contacts, H: sparse.csc_array, prescribed: Array) -> N
 
 
 def shares(given: Whole, owner: Index, processes: int) -> Iterator[Share]:
-    """What the processes get, the first one first; made one after another.  owner (nodes,)."""
-    d = given.dim
+    """What the processes get, the first one first; made one after another.  owner (nodes,).
+
+    Everything is sorted by process once, so that cutting takes no longer for many of them.
+    """
+    d, contacts = given.dim, given.contacts
+    order, starts = sorted_by(owner, processes)
     number = np.empty(len(owner), dtype=np.int64)
-    number[np.argsort(owner, kind="stable")] = np.arange(len(owner))
-    starts = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=processes))])
+    number[order] = np.arange(len(owner))
+    of_contact, contact_starts = sorted_by(owner[contacts.node], processes)
+    slave_of = np.full(len(owner), -1)
+    slave_of[contacts.node] = np.arange(len(contacts.node))
     B = _whole_blocks(given.coupling, d)
-    slave, values = given.contacts.node[B.coords[1] // d], np.asarray(B.data, dtype=float)
+    (row, column), values = B.coords, np.asarray(B.data, dtype=float)
+    slave = contacts.node[column // d]
+    of_entry, entry_starts = sorted_by(owner[slave], processes)
     counts = tuple(len(body.mesh.points) for body in given.bodies)
     firsts = np.cumsum([0, *counts])
-    place = np.empty(len(owner), dtype=np.int64)
+    cuts = [
+        Cut(body.mesh, owner[first : first + count], processes)
+        for body, first, count in zip(given.bodies, firsts, counts, strict=False)
+    ]
     for rank in range(processes):
         bodies, kept = [], []
-        for k, body in enumerate(given.bodies):
-            mesh, used = touching(body.mesh, owner[firsts[k] : firsts[k + 1]] == rank)
+        for k, (cut, body) in enumerate(zip(cuts, given.bodies, strict=True)):
+            mesh, used = cut.part(rank)
             if mesh is not None:
                 bodies.append((k, mesh, _material(body, mesh)))
                 kept.append(firsts[k] + used)
         nodes = np.concatenate(kept)
-        own = owner[nodes] == rank
-        mine = np.flatnonzero(owner == rank)
-        place[mine] = np.arange(len(mine))
+        mine = order[starts[rank] : starts[rank + 1]]
         dofs = (mine[:, None] * d + np.arange(d)).ravel()
-        local = np.flatnonzero(np.isin(nodes, given.contacts.node))
-        at = np.searchsorted(order := np.sort(given.contacts.node), nodes[local])
-        which = np.argsort(given.contacts.node)[at] if len(order) else np.zeros(0, np.int64)
-        chosen = np.flatnonzero(owner[given.contacts.node] == rank)
-        here = owner[slave] == rank
+        local = np.flatnonzero(slave_of[nodes] >= 0)
+        chosen = of_contact[contact_starts[rank] : contact_starts[rank + 1]]
+        here = of_entry[entry_starts[rank] : entry_starts[rank + 1]]
+        own_slave = number[slave[here]] - starts[rank]
         yield Share(
-            nodes, number[nodes], own, starts, bodies, given.fixed[mine],
+            nodes, number[nodes], owner[nodes] == rank, starts, bodies, given.fixed[mine],
             given.prescribed[mine], given.load[mine], given.modes[dofs],
-            local, given.contacts.frames[which],
-            given.contacts.at(chosen, place[given.contacts.node[chosen]]),
-            (place[slave[here]] * d + B.coords[1][here] % d,
-             number[B.coords[0][here] // d] * d + B.coords[0][here] % d, -values[here]),
-            B.nnz > 0, len(given.contacts.node), counts,
+            local, contacts.frames[slave_of[nodes[local]]],
+            contacts.at(chosen, number[contacts.node[chosen]] - starts[rank]),
+            (own_slave * d + column[here] % d, number[row[here] // d] * d + row[here] % d,
+             -values[here]),
+            B.nnz > 0, len(contacts.node), counts,
         )  # fmt: skip
 
 

@@ -161,7 +161,7 @@ class DistributedSolution:
             last = first + len(mesh.points)
             stress.append(von_mises(stress_of(mesh, material, moved[first:last])[1]))
             whose = [owner[first:last][block.nodes].min(axis=1) for block in mesh.cells]
-            mine, nodes = part_of(mesh, [each == self.comm.rank for each in whose])
+            mine, nodes = part_of(mesh, [np.flatnonzero(w == self.comm.rank) for w in whose])
             if mine is not None:
                 meshes.append(mine)
                 used.append(first + nodes)
