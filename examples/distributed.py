@@ -1,10 +1,10 @@
-"""Contact on several processes: the stiffness is spread over them, PETSc solves.
+"""Contact on several processes: each holds a part of the mesh, PETSc solves.
 
     mpirun -n 4 python distributed.py blocks --level 4
 
 needs the extra `distributed`, see docs/distributed.md.  "cube": one block dragged over a rigid
-plane; "blocks": two blocks whose meshes do not match.  --save writes the displacements and
-reactions, --serial solves on one process without PETSc, to compare.
+plane, of hexahedra, or "tets"; "blocks": two blocks whose meshes do not match.  --save writes
+displacements and reactions, gathered, --write parts for ParaView.
 """
 
 import argparse
@@ -16,14 +16,20 @@ import numpy as np
 import amontons as am
 
 
-def cube(level):
+def cube(level, kind="hex"):
     """The cube of Hüeber, Stadler and Wohlmuth (2008), section 5.1: 2^level cells an edge."""
-    block = am.Body(am.box((1, 1, 1), cells=2**level), am.LinearElastic(young=200, poisson=0.3))
+    mesh = am.box((1, 1, 1), cells=2**level, kind=kind)
+    block = am.Body(mesh, am.LinearElastic(young=200, poisson=0.3))
     return am.Model(
         [block],
         supports=[am.Fix("top", lambda x: (0, 0.2, 0.06 - 0.15 * x[0]))],
         contacts=[am.Contact("bottom", am.Plane(normal=(0, 0, 1)), mu=1.0)],
     )
+
+
+def tets(level):
+    """The same of tetrahedra."""
+    return cube(level, "tet")
 
 
 def blocks(level):
@@ -44,40 +50,35 @@ def blocks(level):
     )
 
 
-def work(model):
-    """Solve and return what one wants to know; runs on the first process."""
-    started = time.perf_counter()
-    problem = model.assemble()
-    solution = am.drive(problem, am.CompressedDelassus(), tolerance=1e-9)
-    fields = model.recover(solution)
-    return {
-        "unknowns": problem.unknowns,
-        "contacts": problem.contacts,
-        "outcome": solution.convergence.outcome.name.lower(),
-        "error": solution.convergence.error,
-        "counts": solution.counts,
-        "resultant": fields.resultant.tolist(),
-        "linear iterations": problem.factor().iterations,
-        "seconds": time.perf_counter() - started,
-    }, solution
+CASES = {"cube": cube, "tets": tets, "blocks": blocks}
 
 
 def main():
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("case", choices=("cube", "blocks"))
+    parser.add_argument("case", choices=CASES)
     parser.add_argument("--level", type=int, default=3)
-    parser.add_argument("--serial", action="store_true")
-    parser.add_argument("--save", help="an .npz file for v and r")
+    parser.add_argument("--tolerance", type=float, default=1e-8)
+    parser.add_argument("--save", help="an .npz file for v, r and u")
+    parser.add_argument("--write", help="a .pvtu file for ParaView")
     given = parser.parse_args()
-    model = {"cube": cube, "blocks": blocks}[given.case](given.level)
-    found = work(model) if given.serial else am.distributed(model, work)
-    if found is None:  # not the first process
+    started = time.perf_counter()
+    solution = am.distributed(  # all processes call it; the first one makes the mesh
+        lambda: CASES[given.case](given.level), tolerance=given.tolerance
+    )
+    seconds = time.perf_counter() - started
+    if given.write:
+        solution.write(given.write)
+    whole = solution.gather() if given.save else None
+    if solution.comm.rank:
         return
-    record, solution = found
-    print(json.dumps(record))
-    if given.save:
-        np.savez(given.save, v=solution.v, r=solution.r)
+    print(json.dumps({
+        "converged": solution.converged, "error": solution.error, "counts": solution.counts,
+        "resultant": solution.resultant.tolist(), "newton steps": solution.steps,
+        "linear iterations": solution.iterations, "seconds": seconds,
+    }))  # fmt: skip
+    if whole is not None:
+        np.savez(given.save, v=np.concatenate(whole.displacement), r=whole.r, u=whole.u)
 
 
 if __name__ == "__main__":

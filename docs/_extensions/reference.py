@@ -21,7 +21,7 @@ GROUPS = {
         "Bodies on meshes, supports, loads and contacts.",
         "Model Body LinearElastic OrthotropicElastic NeoHookean CiarletGeymonat Rigid Fix "
         "Traction Pressure BodyForce NodalForce Temperature Contact ContactFields Nitsche "
-        "Plane Sphere LevelSet distributed",
+        "Plane Sphere LevelSet distributed DistributedSolution",
     ),
     "Constraints": (
         "Linear constraints between nodes, surfaces and bodies; bolts and springs.",

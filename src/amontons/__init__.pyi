@@ -89,6 +89,7 @@ from .mechanics.model import (
     Pretension as Pretension, ReducedPolynomial as ReducedPolynomial,
     Reference as Reference, Rigid as Rigid, Spring as Spring,
     Temperature as Temperature, Traction as Traction, distributed as distributed,
+    DistributedSolution as DistributedSolution,
     FoundContacts as FoundContacts, FoundPair as FoundPair, find_contacts as find_contacts,
     mean_tractions as mean_tractions,
 )

@@ -17,7 +17,6 @@ ALONE = {  # package: the folders or files that import it
     "netgen": "mechanics/meshes/cad",
     "pyamg": "linear", "matplotlib": "io/plots", "click": "app/cli", "rslab": "linear",
     "pypardiso": "linear", "mumps": "linear", "petsc4py": "linear", "mpi4py": "linear",
-    "pymetis": "mechanics/meshes",
     "meshio": "mechanics/meshes io/vtk",  # reads meshes, writes pictures
     "jax": "analysis/gradients/with_jax", "torch": "analysis/gradients/with_torch",
     "h5py": "core/hdf5 io",  # checks; the exchange format, results, states

@@ -1,271 +1,321 @@
-"""A stiffness spread over the processes of MPI: everyone holds a part, the first one leads.
+"""A stiffness whose rows are spread over the processes of MPI, and Newton's steps with it.
 
-Each process has assembled the cells of its own part.  Products with the stiffness are sums over
-the parts; for solves PETSc makes a distributed matrix of them.  The first process alone runs
-the program: it decides, judges and solves the contact problem, and asks the others to take part
-in every product and every solve (`Share.serve`).  So no decision, not even one by the clock,
-can differ between processes.  Vectors are whole on the first process.
+Every process holds the rows of its own unknowns; all call the same methods, which PETSc carries
+out together.  One matrix A serves products, smoothers and multigrid.  It is the matrix of a
+Newton step: with the free directions F and the held ones D, held by a support or because a
+contact has closed there,
+
+    A = [K_FF, 0; 0, diag K_DD],    rows i of contacts that slide: sum_j G_r,ij K_jF + G_u,iF
+
+j the directions of the same node.  So it has the same pattern at all times, and is symmetric
+unless contacts slide.  What A has lost stands in the rows `touched` (k, n), a thin matrix with
+the rows that have an entry in the row or column of a direction that may ever be held: K x is
+A x with these rows taken from there.
+
+GMRES is preconditioned from the right by multigrid (GAMG).  Its aggregates are made once.  Its
+coarse matrices are made anew only when they have become bad: when many directions have changed,
+or an iteration gains less than it did.
 """
 
 from __future__ import annotations
 
-import time
-import traceback
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..core.errors import UnsupportedForm
-from .base import by_columns
-from .petsc import Petsc, check_converged, krylov, petsc
+from ..core.errors import SingularOperator
+from .petsc import PREFIX, Petsc, petsc
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-T = TypeVar("T")
-PAUSE = 1e-4  # s between looks for the next task: waiting must not take a core from the leader
+Mask = NDArray[np.bool_]
+RESTART = 30  # vectors that GMRES keeps
+CHANGED = 0.2  # share of the contact directions that may change before multigrid follows
+WORSE = 3.0  # iterations per digit, compared with those of fresh coarse matrices
+SLAB = 20_000  # nodes whose rows are handed over at a time
+FIRST_WORSE = 8.0  # iterations per digit that are called bad whatever they were
 
 
 @dataclass(frozen=True, eq=False)
-class Prepared:
-    """PETSc's solver, its vectors, and the way (`collect`) to one `whole` on the leader."""
+class Sliding:
+    """Rows (k, t) of own unknowns with conditions G_r (K x) + G_u x in node blocks (k, d, d).
 
-    ksp: Any
-    x: Any
-    b: Any
-    collect: Any
-    whole: Any
-
-
-class Share:
-    """What one process holds; all processes of `comm` call the same methods in turn.
-
-    part: the stiffness of its own cells on the unknowns `dofs`, (k,); d unknowns a node.
-    owner (nodes,): process that holds the row of a node in PETSc; points (nodes, d).
+    rows (k, d): own numbers of the unknowns of k contacts; wanted (k, d): rows that are
+    replaced; G_r, G_u (k, d, d).
     """
 
-    def __init__(
-        self, comm: Any, part: sparse.csr_array, dofs: Index, owner: Index, points: Array
-    ) -> None:
-        self.comm, self.part, self.dofs = comm, part, dofs
-        self.owner, self.points = owner, points
-        self.number = np.empty(len(owner), dtype=np.int64)  # of a node in PETSc
-        self.number[np.argsort(owner, kind="stable")] = np.arange(len(owner))
-        self.prepared: list[Prepared] = []
+    rows: Index
+    wanted: Mask
+    G_r: Array
+    G_u: Array
 
-    @property
-    def size(self) -> int:
-        """Unknowns of all parts."""
-        return self.points.size
 
-    # ------------------------------------------------------------------ leading, serving
-    def lead(self, work: Callable[[], T]) -> T | None:
-        """Run `work` on the first process while the others serve it; None on the others."""
-        if self.comm.rank:
-            self._serve()
-            return None
-        try:
-            return work()
-        finally:
-            self._task(None)
+class SpreadMatrix:
+    """K on all processes of `comm`, its held directions and the solver of Newton's steps.
 
-    def call(self, name: str, *given: Any) -> Any:
-        """Let all processes do a method of this class; the first one calls."""
-        self._task((name, given))
-        return self._do(name, given)
+    rows: K of the own unknowns in blocks (own, n), columns in the numbers of PETSc,
+    where processes follow one another; basis: T = I + C (own, n) in which contact is seen on
+    one side, C C = 0, None where nobody has one (the same answer on all processes).
+    modes (own, k): rigid motions; d: unknowns a node; may_be_held (own,): directions that are
+    held, or may be; directions: of all contacts, which may change.
+    """
 
-    def _task(self, task: Any) -> Any:
-        """Hand a task to all."""
-        ready = self.comm.Ibarrier()
-        while not ready.Test():
-            time.sleep(PAUSE)
-        return self.comm.bcast(task)
+    def __init__(  # noqa: PLR0913  # what a matrix is made of
+        self, comm: Any, rows: sparse.bsr_array, basis: sparse.bsr_array | None, *,
+        modes: Array, d: int, may_be_held: Mask, directions: int, options: Petsc,
+    ) -> None:  # fmt: skip
+        self.comm, self.d, self.options, self.directions = comm, d, options, directions
+        self.own = len(may_be_held)
+        self.A = _matrix(comm, rows, d)
+        self.T = None
+        if basis is not None:
+            self.T = _matrix(comm, basis, d)
+            plain, self.A = self.A, self.A.PtAP(self.T)
+            plain.destroy()
+            self.A.setBlockSize(d)
+        self.first, last = self.A.getOwnershipRange()
+        assert last - self.first == self.own
+        self.A.setOption(petsc().Mat.Option.KEEP_NONZERO_PATTERN, True)
+        self._x, self._y = self.A.createVecs()
+        self.A.getDiagonal(self._x)
+        self.diagonal = self._x.array_r.copy()
+        self._take_rows(may_be_held)
+        self._give_modes(modes)
+        self.held = np.zeros(self.own, dtype=bool)
+        self.ksp: Any = None
+        self._fresh = True
+        self.iterations = self.rebuilt = 0
+        self._built = np.zeros(self.own, dtype=bool)
+        self._stale, self._rate = False, 0.0
 
-    def _serve(self) -> None:
-        while (task := self._task(None)) is not None:
-            self._do(*task)
+    def destroy(self) -> None:
+        """Give the memory back; all processes have to, and have no use of this object then."""
+        for part in (self.ksp, self.A, self.T, self.touched, self._fetch, self._near, self._x,
+                     self._y, self._rest):  # fmt: skip
+            if part is not None:
+                part.destroy()
 
-    def _do(self, name: str, given: tuple) -> Any:
-        """One task; all processes end when one fails, as the others wait for it."""
-        try:
-            return getattr(self, name)(*given)
-        except BaseException:
-            if self.comm.size > 1:
-                traceback.print_exc()
-                self.comm.Abort(1)
-            raise
+    # ------------------------------------------------------------------ vectors
+    def total(self, value: float | Array) -> Any:
+        """The sum of numbers over all processes."""
+        return self.comm.allreduce(value)
 
-    # ------------------------------------------------------------------ tasks
-    def times(self, v: Array) -> Array | None:
-        """K v for v of shape (size,) on all, on the first process."""
-        out = np.zeros(self.size)
-        out[self.dofs] = self.part @ v[self.dofs]
-        return self._total(out)
+    def to_basis(self, v: Array) -> Array:
+        """T^-1 v of own values (own,): T = I + C, and C C = 0."""
+        return v if self.T is None else 2 * v - self.from_basis(v)
 
-    def diagonal(self) -> Array | None:
-        """The diagonal, (size,), on the first process."""
-        out = np.zeros(self.size)
-        out[self.dofs] = self.part.diagonal()
-        return self._total(out)
+    def from_basis(self, v: Array) -> Array:
+        """T v of own values (own,)."""
+        if self.T is None:
+            return v
+        self._x.array = v
+        self.T.mult(self._x, self._y)
+        return self._y.array_r.copy()
 
-    def coupled(self, inside: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
-        """Unknowns in an equation with one of those inside, (size,), on the first process."""
-        pattern = (np.ones(self.part.nnz), self.part.indices, self.part.indptr)
-        touch = sparse.csr_array(pattern, shape=self.part.shape) @ inside[self.dofs]
-        out = np.zeros(self.size)
-        out[self.dofs] = touch
-        total = self._total(out)
-        return None if total is None else total > 0
+    def load_in_basis(self, f: Array) -> Array:
+        """T' f of own values (own,)."""
+        if self.T is None:
+            return f
+        self._x.array = f
+        self.T.multTranspose(self._x, self._y)
+        return self._y.array_r.copy()
 
-    def rows(self, index: Index) -> sparse.csr_array | None:
-        """Rows and columns of some unknowns, (k,) ascending, on the first process."""
-        place = np.full(self.size, -1)
-        place[index] = np.arange(len(index))
-        local = place[self.dofs]
-        kept = np.flatnonzero(local >= 0)
-        block = self.part[kept][:, kept].tocoo()
-        where = local[kept]
-        entries = (block.data, where[block.coords[0]], where[block.coords[1]])
-        found = self.comm.gather(entries)
-        if found is None:
-            return None
-        data, i, j = (np.concatenate(column) for column in zip(*found, strict=True))
-        return sparse.coo_array((data, (i, j)), shape=(len(index),) * 2).tocsr()
+    def force_from_basis(self, f: Array) -> Array:
+        """T'^-1 f of own values (own,)."""
+        return f if self.T is None else 2 * f - self.load_in_basis(f)
 
-    def prepare(self, fixed: NDArray[np.bool_], options: Petsc) -> int:
-        """Make PETSc's matrix, fixed unknowns uncoupled, and its multigrid; their number."""
+    # ------------------------------------------------------------------ set-up
+    def _take_rows(self, may_be_held: Mask) -> None:
+        """Keep the rows that have an entry in the row or column of a marked direction."""
         PETSc = petsc()
-        d = self.points.shape[1]
-        own = np.flatnonzero(self.owner == self.comm.rank)
-        A = PETSc.Mat().create(self.comm)
-        A.setSizes([[own.size * d, self.size]] * 2)
-        A.setBlockSize(d)
-        A.setType("aij")
-        i, j, values = self._entries(fixed, own)
-        A.setPreallocationCOO(i.astype(PETSc.IntType), j.astype(PETSc.IntType))
-        A.setValuesCOO(values)
-        points = PETSc.Vec().createWithArray(self.points[own].ravel(), bsize=d, comm=self.comm)
-        A.setNearNullSpace(PETSc.NullSpace().createRigidBody(points))
-        x, b = A.createVecs()
-        collect, whole = PETSc.Scatter.toZero(x)
-        self.prepared.append(Prepared(krylov(A, options), x, b, collect, whole))
-        return len(self.prepared) - 1
+        index = (self.first + np.flatnonzero(may_be_held)).astype(PETSc.IntType)
+        own = PETSc.IS().createStride(self.own, self.first, 1, comm=self.comm)
+        marked = self.A.createSubMatrix(PETSc.IS().createGeneral(index, comm=self.comm), own)
+        columns = np.unique(marked.getValuesCSR()[1])  # symmetric: the rows that touch it
+        marked.destroy()
+        flags = self.A.createVecRight()
+        flags.setValues(columns.astype(PETSc.IntType), np.ones(len(columns)))
+        flags.assemble()
+        touched = np.flatnonzero((flags.array_r > 0) | may_be_held)
+        rows = (self.first + touched).astype(PETSc.IntType)
+        self.touched = self.A.createSubMatrix(
+            PETSc.IS().createGeneral(rows, comm=self.comm), own
+        )
+        self.touched_rows = touched
+        self._rest = self.touched.createVecLeft()
+        pointers, columns, values = self.touched.getValuesCSR()
+        self._pattern = pointers, columns, values
+        self._of = np.repeat(touched, np.diff(pointers))
+        self._on_diagonal = columns == self.first + self._of
+        known, place = np.unique(columns, return_inverse=True)
+        self._place = place.ravel()
+        self._near = PETSc.Vec().createSeq(len(known))
+        self._fetch = PETSc.Scatter().create(
+            flags, PETSc.IS().createGeneral(known.astype(PETSc.IntType), comm=self.comm),
+            self._near, None,
+        )  # fmt: skip
+        flags.destroy()
 
-    def _entries(self, fixed: NDArray[np.bool_], own: Index) -> tuple[Index, Index, Array]:
-        """Rows, columns and values of the part in PETSc's numbers, fixed unknowns uncoupled."""
-        part = self.part.tocoo()
-        i, j = self.dofs[part.coords[0]], self.dofs[part.coords[1]]
-        kept = ~(fixed[i] | fixed[j])
-        alone = (own[:, None] * self.points.shape[1] + np.arange(self.points.shape[1])).ravel()
-        alone = alone[fixed[alone]]
-        scale = np.abs(self.part.diagonal()).mean()
-        values = np.concatenate([part.data[kept], np.full(len(alone), scale)])
-        both = [self._numbers(np.concatenate([side[kept], alone])) for side in (i, j)]
-        return both[0], both[1], values
+    def _give_modes(self, modes: Array) -> None:
+        """Rigid motions in the basis, orthonormal, as PETSc asks for."""
+        PETSc = petsc()
+        kept: list[Any] = []
+        for column in modes.T:
+            v = self.A.createVecRight()
+            v.array = self.to_basis(np.ascontiguousarray(column))
+            size = v.norm()
+            for _ in range(2):  # the second time takes off what rounding left
+                for other in kept:
+                    v.axpy(-v.dot(other), other)
+            if v.norm() > 1e-8 * size > 0:
+                v.normalize()
+                kept.append(v)
+        self.A.setNearNullSpace(PETSc.NullSpace().create(vectors=kept, comm=self.comm))
 
-    def _numbers(self, dofs: Index) -> Index:
-        """PETSc's numbers of unknowns."""
-        d = self.points.shape[1]
-        return self.number[dofs // d] * d + dofs % d
+    def blocks(self, dofs: Index) -> Array:
+        """K in the blocks of own unknowns dofs (k, d) that may be held, (k, d, d)."""
+        pointers, columns, values = self._pattern
+        shape = (len(self.touched_rows), self.A.getSize()[1])
+        rows = sparse.csr_array((values, columns, pointers), shape=shape)
+        at = np.searchsorted(self.touched_rows, dofs)
+        d = dofs.shape[1]
+        i, j = np.repeat(at, d, axis=1).ravel(), np.tile(dofs + self.first, (1, d)).ravel()
+        return np.asarray(rows[i, j]).reshape(-1, d, d)
 
-    def solve(self, number: int) -> None:
-        """Solve with the right-hand side that the first process has put into `whole`."""
-        s, modes = self.prepared[number], petsc().ScatterMode
-        s.collect.scatter(s.whole, s.b, mode=modes.REVERSE)
-        s.ksp.solve(s.b, s.x)
-        s.collect.scatter(s.x, s.whole, mode=modes.FORWARD)
+    def hold(self, held: Mask, sliding: Sliding) -> None:
+        """Hold own directions (own,), and let contacts slide by their conditions."""
+        PETSc = petsc()
+        self._x.array = held.astype(float)
+        self._fetch.scatter(self._x, self._near, mode=PETSc.ScatterMode.FORWARD)
+        pointers, columns, values = self._pattern
+        free = np.where(self._near.array_r[self._place] > 0, 0.0, values)  # columns
+        values = np.where(held[self._of], 0.0, free)
+        mine = self._on_diagonal & held[self._of]
+        values[mine] = self.diagonal[self._of[mine]]
+        self.held = held
+        self._let_slide(values, free, sliding)
+        index = (self.first + self.touched_rows).astype(PETSc.IntType)
+        if len(index):
+            self.A.setValuesIJV(pointers, columns, values, rowmap=index)
+        self.A.assemble()
+        self._changed = float(self.total(int((held != self._built).sum())))
 
-    def _total(self, mine: Array) -> Array | None:
-        """The sum over all processes, on the first."""
-        out = np.empty_like(mine) if self.comm.rank == 0 else None
-        self.comm.Reduce(mine, out)
+    def _let_slide(self, values: Array, free: Array, sliding: Sliding) -> None:
+        """Write the rows of contacts that slide into the values of the touched rows.
+
+        The rows of one node have the same columns, so that an entry of another direction of it
+        stands a whole number of rows further on.
+        """
+        pointers, columns, _ = self._pattern
+        d = self.d
+        at = np.searchsorted(self.touched_rows, sliding.rows)
+        for contact, a in np.argwhere(sliding.wanted):
+            spans = [slice(*pointers[row : row + 2]) for row in at[contact]]
+            out = sliding.G_r[contact, a] @ np.stack([free[spans[b]] for b in range(d)])
+            where = np.searchsorted(columns[spans[a]], self.first + sliding.rows[contact])
+            out[where] += np.where(self.held[sliding.rows[contact]], 0.0,
+                                   sliding.G_u[contact, a])  # fmt: skip
+            values[spans[a]] = out
+
+    # ------------------------------------------------------------------ products
+    def times(self, x: Array) -> Array:
+        """K x of own values (own,), held directions included."""
+        self._x.array = x
+        self.A.mult(self._x, self._y)
+        self.touched.mult(self._x, self._rest)
+        out = self._y.array_r.copy()
+        out[self.touched_rows] = self._rest.array_r
         return out
 
+    # ------------------------------------------------------------------ solving
+    def solve(self, b: Array, reduction: float) -> Array:
+        """x (own,) with |A x - b| <= reduction |b|, 0 in held directions.
 
-class DistributedMatrix:
-    """The stiffness on some of its unknowns, in the hands of the process that leads.
+        Raises SingularOperator, on all processes, where GMRES does not get there.
+        """
+        right, x = self._y, self._x
+        right.array = np.where(self.held, 0.0, b)
+        if right.norm() == 0:
+            return np.zeros(self.own)
+        self._prepare()
+        self.ksp.setTolerances(rtol=reduction, atol=0.0, max_it=self.options.max_iterations)
+        self.ksp.solve(right, x)
+        steps = self.ksp.getIterationNumber()
+        self.iterations += steps
+        reason = self.ksp.getConvergedReason()
+        if reason <= 0:
+            raise SingularOperator(
+                f"PETSc: no convergence in {self.options.max_iterations} iterations (reason "
+                f"{reason}); are all bodies held by supports, and by contacts that do not open?"
+            )
+        rate = steps / max(-np.log10(reduction), 0.5)
+        if self._fresh:
+            self._rate = rate
+        self._stale = rate > max(WORSE * self._rate, FIRST_WORSE)
+        return np.where(self.held, 0.0, x.array_r)
 
-    free (n,) ascending.  It has products, a factor and some rows; nothing gathers the whole.
-    """
-
-    dtype = np.dtype(float)
-    ndim = 2
-
-    def __init__(self, share: Share, free: Index, solver: Petsc) -> None:
-        self.share, self.free, self.solver = share, free, solver
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """(n, n)."""
-        n = len(self.free)
-        return n, n
-
-    def __matmul__(self, v: Array) -> Array:
-        whole = np.zeros(self.share.size)
-        whole[self.free] = v
-        return self.share.call("times", whole)[self.free]
-
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
-        raise UnsupportedForm(
-            "the stiffness is spread over several processes and can not be stored on one; use "
-            "CompressedDelassus or Auto, or problem.condensed() with a solver of the local form"
-        )
-
-    def __add__(self, other: object) -> Array:
-        return self.__array__()
-
-    def on(self, free: Index) -> DistributedMatrix:
-        """The rows and columns of some of all unknowns."""
-        return DistributedMatrix(self.share, free, self.solver)
-
-    def part(self, index: Index) -> sparse.csr_array:
-        """Rows and columns of some unknowns, (k,) ascending."""
-        return self.share.call("rows", self.free[index])
-
-    def coupled(self, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Unknowns in an equation with one of those inside, (n,), these included."""
-        whole = np.zeros(self.share.size, dtype=bool)
-        whole[self.free] = inside
-        return self.share.call("coupled", whole)[self.free]
-
-    def diagonal(self) -> Array:
-        """The diagonal, (n,)."""
-        return self.share.call("diagonal")[self.free]
-
-    def factor(self) -> DistributedFactor:
-        """PETSc's solver, set up on all processes."""
-        fixed = np.ones(self.share.size, dtype=bool)
-        fixed[self.free] = False
-        number = self.share.call("prepare", fixed, self.solver)
-        d = self.share.points.shape[1]
-        place = self.share.number[self.free // d] * d + self.free % d
-        return DistributedFactor(self.share, number, place, self.solver)
+    def _prepare(self) -> None:
+        """Make the solver, or let multigrid follow the matrix where it is time to."""
+        if self.ksp is None:
+            self.ksp = krylov_of_steps(self.A)
+            self._fresh = True
+        else:
+            many = self._changed > CHANGED * self.directions
+            self._fresh = many or self._stale
+            self.ksp.getPC().setReusePreconditioner(not self._fresh)
+            self.ksp.setOperators(self.A)
+        if self._fresh:
+            self.rebuilt += 1
+            self._built = self.held.copy()
+            self.ksp.setUp()
 
 
-@dataclass
-class DistributedFactor:
-    """A prepared solver of PETSc; place (n,): PETSc's numbers of the unknowns."""
+def krylov_of_steps(A: Any) -> Any:
+    """GMRES with multigrid whose aggregates are kept."""
+    PETSc = petsc()
+    options = PETSc.Options()
+    name = PREFIX + "pc_gamg_reuse_interpolation"
+    if not options.hasName(name):
+        options.setValue(name, True)
+    ksp = PETSc.KSP().create(A.getComm())
+    ksp.setOperators(A)
+    ksp.setType("gmres")
+    ksp.setPCSide(PETSc.PC.Side.RIGHT)
+    ksp.setGMRESRestart(RESTART)
+    ksp.getPC().setType("gamg")
+    ksp.setOptionsPrefix(PREFIX)
+    ksp.setFromOptions()
+    return ksp
 
-    share: Share
-    number: int
-    place: Index
-    options: Petsc
-    exact: bool = False
-    iterations: int = 0
 
-    def solve(self, b: Array) -> Array:
-        """The solution x of A x = b to the options' tolerance, shape of b."""
-        return by_columns(self._solve_one, b)
-
-    def _solve_one(self, b: Array) -> Array:
-        prepared = self.share.prepared[self.number]
-        right = np.zeros(self.share.size)
-        right[self.place] = b
-        prepared.whole.array = right
-        self.share.call("solve", self.number)
-        check_converged(prepared.ksp, self.options)
-        self.iterations += prepared.ksp.getIterationNumber()
-        return prepared.whole.array_r[self.place]
+def _matrix(comm: Any, rows: sparse.bsr_array, d: int) -> Any:
+    """PETSc's matrix of the own rows (own, n) of all processes, filled slab by slab."""
+    PETSc = petsc()
+    own, size = rows.shape  # type: ignore[misc]  # scipy: may be None
+    last = comm.scan(own)
+    inside = (rows.indices >= (last - own) // d) & (rows.indices < last // d)
+    nodes = np.repeat(np.arange(own // d), np.diff(rows.indptr))
+    counts = [
+        np.repeat(d * np.bincount(nodes[some], minlength=own // d), d).astype(PETSc.IntType)
+        for some in (inside, ~inside)
+    ]
+    A = PETSc.Mat().create(comm)
+    A.setSizes(((own, size), (own, size)), bsize=d)
+    A.setType("aij")
+    A.setPreallocationNNZ(counts)
+    for first in range(0, own // d, SLAB):
+        ends = rows.indptr[first : first + SLAB + 1]
+        some = slice(ends[0], ends[-1])
+        parts = (rows.data[some], rows.indices[some], ends - ends[0])
+        slab = sparse.bsr_array(parts, shape=(d * (len(ends) - 1), size)).tocsr()
+        slab.sort_indices()
+        numbers = np.arange(last - own + d * first, last - own + d * first + slab.shape[0])
+        A.setValuesIJV(
+            slab.indptr.astype(PETSc.IntType), slab.indices.astype(PETSc.IntType), slab.data,
+            rowmap=numbers.astype(PETSc.IntType),
+        )  # fmt: skip
+    A.assemble()
+    return A

@@ -25,7 +25,6 @@ from ..linear.blocks import (
     spatial,
     velocity_inplace,
 )
-from ..linear.distributed import DistributedMatrix
 from . import indefinite
 from .judge import measures as judge
 from .judge.contacts import Assessed, assessed
@@ -383,7 +382,7 @@ class Equations(Matrices):
     @property
     def _is_estimated(self) -> bool:
         """True for large meshes, where M^-1 f would cost too much only to judge."""
-        large = self.unknowns > ESTIMATED and not isinstance(self.M, DistributedMatrix)
+        large = self.unknowns > ESTIMATED
         return large and (bool(self.levels) or self.near_nullspace is not None)
 
     def _open_velocity(self) -> Array:

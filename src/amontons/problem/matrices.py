@@ -26,7 +26,6 @@ from ..linear.base import stored
 from ..linear.blocks import BlockRows
 from ..linear.bodies import Bodies, BodyFactor
 from ..linear.dense import DENSE_LIMIT
-from ..linear.distributed import DistributedMatrix
 from ..linear.geometric import MultigridFactor, prepared
 from ..linear.grid_matrix import GridMatrix
 from ..linear.hierarchy import Hierarchy
@@ -38,7 +37,7 @@ from .structure import Structure
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
-OPERATORS = (GridMatrix, DistributedMatrix)  # which M may be instead of a stored matrix
+OPERATORS = (GridMatrix,)  # which M may be instead of a stored matrix
 DIRECT_LIMIT = 600_000  # unknowns of a mesh whose factor takes some 10 GB
 EXACT_WORK = 2e6  # n * nc * d up to which forming W costs nothing that matters
 LARGE_BODY = 10_000  # unknowns of a body with levels from which multigrid is the way
@@ -102,8 +101,6 @@ class GlobalMatrices:
         M = self.M
         if isinstance(M, GridMatrix):
             return GeometricMultigrid().factor(M)  # type: ignore[arg-type]
-        if isinstance(M, DistributedMatrix):
-            return M.factor()
         bodies = self.bodies
         if bodies.largest > DIRECT_LIMIT and self.near_nullspace is not None:
             hierarchy = self.hierarchy

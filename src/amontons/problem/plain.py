@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..core.arrays import Matrix, locked, read_only
-from ..core.errors import InvalidInput, UnsupportedForm
-from ..linear.distributed import DistributedMatrix
+from ..core.errors import InvalidInput
 from .law import Law
 from .protocol import Form
 
@@ -117,8 +116,6 @@ def _with_springs(problem: FrictionProblem, give: Array) -> FrictionProblem:
 
     m, a typical entry of M, is the same for all: equal bodies share what is made of them.
     """
-    if isinstance(problem.M, DistributedMatrix):
-        raise UnsupportedForm("compliance of contact: not on several processes")
     problem = problem.assembled()
     sources = (problem.M, problem.H, give)
     M, H = problem._shared.once(_sprung, sources, *sources, problem.dimension)

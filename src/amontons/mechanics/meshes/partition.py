@@ -1,82 +1,90 @@
-"""Cells of several meshes cut into parts of about equal size with short borders, by METIS."""
+"""Meshes in parts: nodes cut into compact groups, and the cells that touch a group.
+
+The points are bisected again and again along the longest side of their box, which needs no
+graph, no library, and n log(parts) operations.  Parts have equally many nodes, to one.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
-from ...core.errors import InvalidInput, MissingDependency
+from ...core.errors import InvalidInput
 from .mesh import Mesh
 
+Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-FINENESS = 120  # METIS takes whole numbers: so many stand for one node
 
 
-def partition(meshes: Sequence[Mesh], parts: int) -> list[Index]:
-    """Part of every cell, 0 to parts - 1: per mesh (cells,), in the order of its blocks.
+def partition(points: Array, parts: int) -> Index:
+    """The part of every point (n, dim), 0 to parts - 1, (n,).
 
-    All meshes are cut as one; parts have about as many nodes each.  Raises InvalidInput when
-    there are too few cells for so many parts, MissingDependency without pymetis.
+    Equal points, as of two sides in contact, may be in different parts.  Raises InvalidInput
+    for fewer points than parts.
     """
-    counts = [mesh.cell_count for mesh in meshes]
-    if parts == 1:
-        return [np.zeros(count, dtype=np.int64) for count in counts]
-    of_node = sparse.block_diag([_nodes_of_cells(mesh) for mesh in meshes], format="csr")
-    sharing = 1 / np.asarray(of_node.sum(axis=0)).ravel()
-    weight = np.rint(FINENESS * (of_node @ sharing)).astype(np.int64)
-    shared = (of_node @ of_node.T).tocsr()
-    beside = shared.multiply(shared >= meshes[0].dim).tocsr()  # cells with a facet in common
-    beside.setdiag(0)
-    beside.eliminate_zeros()
-    _, label = _pymetis().part_graph(
-        parts, xadj=beside.indptr, adjncy=beside.indices, vweights=np.maximum(weight, 1)
-    )
-    label = np.asarray(label, dtype=np.int64)
-    if np.bincount(label, minlength=parts).min() == 0:
+    if len(points) < parts:
         raise InvalidInput(
-            f"parts: {sum(counts)} cells do not give {parts} parts; use fewer processes"
+            f"mesh: {len(points)} nodes do not give {parts} parts; use fewer processes"
         )
-    return np.split(label, np.cumsum(counts)[:-1])
+    out = np.zeros(len(points), dtype=np.int64)
+    _bisect(points, np.arange(len(points)), 0, parts, out)
+    return out
 
 
-def _nodes_of_cells(mesh: Mesh) -> sparse.csr_array:
-    """Ones where a node belongs to a cell, (cells, nodes)."""
-    tables = []
-    for block in mesh.cells:
-        count, size = block.nodes.shape
-        starts = np.arange(0, count * size + 1, size)
-        entries = (np.ones(count * size), block.nodes.ravel(), starts)
-        tables.append(sparse.csr_array(entries, shape=(count, len(mesh.points))))
-    return sparse.csr_array(sparse.vstack(tables, format="csr"))
+def _bisect(points: Array, index: Index, first: int, parts: int, out: Index) -> None:
+    """Give the points `index` to the parts from `first` on, in place of out (n,)."""
+    if parts == 1:
+        out[index] = first
+        return
+    x = points[index]
+    along = x[:, int(np.argmax(np.ptp(x, axis=0)))]
+    left = parts // 2
+    count = len(index) * left // parts
+    order = np.argsort(along, kind="stable")  # ties by number: the same cut everywhere
+    _bisect(points, np.sort(index[order[:count]]), first, left, out)
+    _bisect(points, np.sort(index[order[count:]]), first + left, parts - left, out)
 
 
-def extract(mesh: Mesh, wanted: NDArray[np.bool_]) -> tuple[Mesh, Index]:
-    """The mesh of some cells, (cells,), without surfaces, and the nodes (k,) it keeps."""
-    blocks, first = [], 0
-    for block in mesh.cells:
-        last = first + len(block.nodes)
-        blocks.append((block, block.nodes[wanted[first:last]]))
-        first = last
-    used = np.unique(np.concatenate([nodes.ravel() for _, nodes in blocks]))
-    cells = tuple(
-        replace(block, nodes=np.searchsorted(used, nodes))
-        for block, nodes in blocks
-        if len(nodes)
-    )
+def sorted_by(owner: Index, parts: int) -> tuple[Index, Index]:
+    """Numbers (n,) in the order of their part, and where each part starts, (parts + 1,)."""
+    sizes = np.bincount(owner, minlength=parts)
+    return np.argsort(owner, kind="stable"), np.concatenate([[0], np.cumsum(sizes)])
+
+
+class Cut:
+    """A mesh whose nodes belong to parts, owner (n,); cells sorted by the parts they touch."""
+
+    def __init__(self, mesh: Mesh, owner: Index, parts: int) -> None:
+        self.mesh = mesh
+        self.cells: list[tuple[Index, Index]] = []
+        for block in mesh.cells:
+            whose = np.sort(owner[block.nodes], axis=1)
+            new = np.ones(whose.shape, dtype=bool)
+            new[:, 1:] = whose[:, 1:] != whose[:, :-1]
+            order, starts = sorted_by(whose[new], parts)
+            self.cells.append((np.nonzero(new)[0][order], starts))
+
+    def part(self, number: int) -> tuple[Mesh | None, Index]:
+        """The cells with a node of a part, as a mesh without surfaces, and its nodes.
+
+        None where there are none.  Nodes (k,) are numbers in the whole mesh, ascending.
+        """
+        some = [cells[starts[number] : starts[number + 1]] for cells, starts in self.cells]
+        return part_of(self.mesh, some)
+
+
+def part_of(mesh: Mesh, wanted: Sequence[Index]) -> tuple[Mesh | None, Index]:
+    """Some cells of a mesh, numbers (k,) in every block, as `Cut.part` gives them."""
+    blocks = [
+        replace(block, nodes=block.nodes[some])
+        for block, some in zip(mesh.cells, wanted, strict=True)
+        if len(some)
+    ]
+    if not blocks:
+        return None, np.zeros(0, dtype=np.int64)
+    used = np.unique(np.concatenate([block.nodes.ravel() for block in blocks]))
+    cells = tuple(replace(b, nodes=np.searchsorted(used, b.nodes)) for b in blocks)
     return Mesh(mesh.points[used], cells, axisymmetric=mesh.axisymmetric), used
-
-
-def _pymetis() -> Any:
-    try:
-        import pymetis  # pyright: ignore[reportMissingImports]
-    except ImportError as error:
-        raise MissingDependency(
-            "cutting a mesh into parts needs the package pymetis: "
-            f'python -m pip install "amontons[distributed]" ({error})'
-        ) from error
-    return pymetis

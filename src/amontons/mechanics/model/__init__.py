@@ -14,9 +14,11 @@ from .mean_tractions import mean_tractions
 from .model import Model
 from .parts import Body, BodyForce, Contact, Fix, NodalForce, Pressure, Temperature, Traction
 from .processes import distributed
+from .spread_solution import DistributedSolution
 
 __all__ = ["Axes", "Body", "BodyForce", "CiarletGeymonat", "Contact", "ContactFields",
-           "Coupling", "ElastoPlastic", "Equation", "Fix", "FoundContacts", "FoundPair",
+           "Coupling", "DistributedSolution", "ElastoPlastic",
+           "Equation", "Fix", "FoundContacts", "FoundPair",
            "LinearElastic", "Model", "MooneyRivlin", "NeoHookean", "NodalForce", "Ogden",
            "OrthotropicElastic", "Pressure", "Pretension", "ReducedPolynomial",
            "Reference", "Rigid",

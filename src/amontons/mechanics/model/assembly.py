@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...core.errors import InvalidInput, within
-from ...linear.distributed import DistributedMatrix
 from ...linear.grid_matrix import GridMatrix
 from ...linear.levels import Levels, continued, free_levels
 from ...problem.structure import Structure
@@ -65,11 +64,11 @@ class Discretisation:
     """
 
     offsets: Index
-    K: sparse.csr_array | GridMatrix | DistributedMatrix
+    K: sparse.csr_array | GridMatrix
     free: Index
     fixed: Index
     prescribed: Array
-    M: sparse.csc_array | GridMatrix | DistributedMatrix
+    M: sparse.csc_array | GridMatrix
     H: sparse.csc_array
     load: Array
     gap: Array
@@ -121,7 +120,7 @@ class Discretisation:
         """K with its entries, also where it is an operator."""
         if isinstance(self.K, GridMatrix):
             return sparse.csr_array(self.K.tocsc())
-        return self.K  # type: ignore[return-value]  # not asked for by several processes
+        return self.K
 
     @property
     def near_nullspace(self) -> Array | None:
@@ -211,10 +210,9 @@ def discretise(
     supports: Sequence[Fix],
     loads: Sequence[Load],
     contacts: Sequence[Contact],
-    given_K: DistributedMatrix | None = None,
     ties: Ties = NO_TIES,
 ) -> Discretisation:
-    """Assemble everything that depends on neither friction nor load factor; K unless given."""
+    """Assemble everything that depends on neither friction nor load factor."""
     beside = Beside.of(bodies, ties.references, ties.constraints)
     offsets = beside.offsets
     given = Prescribed.of(bodies, supports, beside)
@@ -228,7 +226,7 @@ def discretise(
         text = "every degree of freedom is fixed, nothing left to solve"
         raise InvalidInput(text, ("supports",))
     stored = eliminated is not None or springs.nnz > 0
-    K = _stiffness(bodies, beside, springs, stored=stored) if given_K is None else given_K
+    K = _stiffness(bodies, beside, springs, stored=stored)
     prescribed = np.where(is_fixed, given.values, 0.0)
     if eliminated is not None:
         prescribed = eliminated.completed(prescribed)
@@ -277,7 +275,7 @@ def _unknowns(
         values = M.diagonal() * eliminated.driven_values(prescribed)
         H = sparse.csc_array(eliminated.spread.T @ whole_H)
         return M, H, np.where(eliminated.driven, values, force)
-    operator = isinstance(K, GridMatrix | DistributedMatrix)
+    operator = isinstance(K, GridMatrix)
     M = K.on(free) if operator else sparse.csc_array(K[free][:, free])
     return M, sparse.csc_array(whole_H.tocsr()[free]), (load - K @ prescribed)[free]
 

@@ -73,8 +73,13 @@ def check_law(k: int, contact: Contact, dimension: int, lacks: Mapping[str, str]
 
 def law_of(contacts: Sequence[Contact], parts: Discretisation) -> Law:
     """The laws of all contacts one after another, stresses being forces in the unit of r."""
+    return law_of_placed(contacts, parts.placed)
+
+
+def law_of_placed(contacts: Sequence[Contact], every: Sequence[Placed]) -> Law:
+    """The same of contacts that have been placed."""
     laws = []
-    for k, (contact, placed) in enumerate(zip(contacts, parts.placed, strict=True)):
+    for k, (contact, placed) in enumerate(zip(contacts, every, strict=True)):
         with within("contacts", k):
             laws.append(_law(contact, placed))
     return joined(laws)

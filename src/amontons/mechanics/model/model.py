@@ -153,7 +153,7 @@ class Model(Told):
         """Matrices at load factor 1, assembled once and shared by variants of this model."""
         ties = Ties(self.references, self.constraints, self.springs)
         return self._shared.once(
-            discretise, (), self.bodies, self.supports, self.loads, self.contacts, None, ties
+            discretise, (), self.bodies, self.supports, self.loads, self.contacts, ties
         )
 
     def assemble(self) -> FrictionProblem:

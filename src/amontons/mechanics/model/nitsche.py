@@ -6,8 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...core.errors import UnsupportedForm
-from ...linear.distributed import DistributedMatrix
 from ...linear.grid_matrix import GridMatrix
 from ...problem.law import Law
 from ...problem.nitsche import NitscheMatrices, NitscheProblem
@@ -18,8 +16,6 @@ Array = NDArray[np.float64]
 
 def nitsche_matrices(parts: Discretisation, held: bool) -> NitscheMatrices:
     """The matrices on the free dofs; held: supports leave no rigid motion."""
-    if isinstance(parts.M, DistributedMatrix):
-        raise UnsupportedForm("Nitsche's method runs on one process; use nodal contact")
     M = parts.M.tocsc() if isinstance(parts.M, GridMatrix) else parts.M
     terms = [p.nitsche for p in parts.placed if p.nitsche is not None]
     return NitscheMatrices(

@@ -1,112 +1,222 @@
-"""A model solved by several processes of MPI: each assembles the cells of its own part.
+"""A model solved by several processes of MPI: mesh, matrix, vectors and contacts in parts.
 
     mpirun -n 4 python script.py
 
-Every process makes the model (its arrays, not its matrices) and calls `distributed`.  METIS
-cuts the cells of all bodies into one part per process; each assembles its part,
-PETSc solves with the sum.  Contact is found and solved on the first process.
+All processes call `distributed`.  The first one makes the model and cuts it (`cutting`), each
+assembles and keeps its part, and together they run a semismooth Newton method
+(`solvers.active_set.spread`) on PETSc's matrix.  Nothing but the mesh is whole anywhere, until
+`gather` is called.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...core.errors import UnsupportedForm
-from ...linear.distributed import DistributedMatrix, Share
+from ...core.errors import AmontonsError, InvalidInput
+from ...core.threads import asked, threads
+from ...linear.distributed import SpreadMatrix
 from ...linear.petsc import Petsc, mpi, petsc
+from ...solvers.active_set.spread import OwnContacts, SpreadActiveSet, SpreadProblem
 from ..elements.elasticity import stiffness
-from ..elements.given import GivenMatrices
-from ..elements.rigid import Rigid
-from ..meshes.partition import extract, partition
-from .assembly import Discretisation, discretise
+from ..meshes.partition import partition
+from .cutting import Share, Whole, shares, whole
 from .model import Model
-from .parts import Body
-from .rigid import loose_modes
+from .spread_solution import DistributedSolution
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 T = TypeVar("T")
+TOLERANCE = 1e-8
 
 
 def distributed(
-    model: Model, work: Callable[[Model], T], *, linear: Petsc | None = None, comm: Any = None
-) -> T | None:
-    """What `work` returns for the model whose stiffness is spread over all processes of `comm`.
+    model: Model | Callable[[], Model], *, tolerance: float = TOLERANCE,
+    linear: Petsc | None = None, comm: Any = None,
+) -> DistributedSolution:  # fmt: skip
+    """The solution of a model, in the parts in which all processes of `comm` have found it.
 
-    All processes call it with equal models.  work(model) runs on the first one only, and there
-    `model.assemble()`, `drive` and `model.recover` do as always; the others take part in
-    products and solves with the stiffness and return None.  comm: a communicator of mpi4py, by
-    default all processes.  Raises MissingDependency without the extra `distributed`,
-    InvalidInput for more processes than cells, UnsupportedForm when contact alone holds a
-    body, and on the first process what `work` raises.
+    All processes call it.  model: a function that makes the model, which is called on the
+    first process alone, so that the others never hold the whole mesh; or the model, of which
+    the one of the first process counts.  tolerance: of the judge's error, as of `solve`.
+    comm: a communicator of mpi4py, by default all processes.
+
+    Raises on all processes alike: MissingDependency without the extra `distributed`,
+    InvalidInput for more processes than nodes, UnsupportedForm for what several processes can
+    not solve yet (bodies that contact alone holds, large strains, constraints, plastic flow),
+    SingularOperator where multigrid does not converge, and what making the model raises.
     """
-    if any(isinstance(body.material, GivenMatrices) for body in model.bodies):
-        raise UnsupportedForm(
-            "model: several processes assemble their own cells, and a body has a given K"
-        )
-    if any(isinstance(body.material, Rigid) for body in model.bodies):
-        raise UnsupportedForm("model: several processes need bodies that deform, none is Rigid")
+    if not (isinstance(tolerance, float | int) and 0 < tolerance < 1):
+        raise InvalidInput(f"tolerance: expected a number between 0 and 1, got {tolerance!r}")
     petsc()
     comm = mpi().COMM_WORLD if comm is None else comm
-    share = _share(model.bodies, comm)
+    if comm.size > 1 and not asked():
+        threads(1)  # one core each
+    with ended_together(comm):
+        share = _received(model, comm)
+        rows = [together(comm, lambda: _rows(share))]
+        problem = _problem(share, rows, comm, linear or Petsc())
+        found = SpreadActiveSet(problem).solve(float(tolerance))
+        solution = DistributedSolution.of(share, problem, found, comm)
+        problem.K.destroy()
+        return solution
 
-    def lead() -> T:
-        K = DistributedMatrix(share, np.arange(share.size), linear or Petsc())
-        twin = replace(model)
-        parts = discretise(twin.bodies, twin.supports, twin.loads, twin.contacts, K)
-        _check_held(parts)
-        twin._shared.put(discretise, (), parts)
-        return work(twin)
 
-    return share.lead(lead)
+class OnAll(Exception):
+    """An error that all processes know of, though it happened on one."""
+
+    def __init__(self, reason: Exception) -> None:
+        self.reason = reason
+        super().__init__(str(reason))
 
 
-def _check_held(parts: Discretisation) -> None:
-    """Conjugate gradients need a stiffness that can be inverted."""
-    fixed = np.zeros(parts.dofs, dtype=bool)
-    fixed[parts.fixed] = True
-    for piece, _ in loose_modes(parts.parts, fixed):
-        raise UnsupportedForm(
-            f"{piece.name}: supports leave rigid motions free that contact alone can hold; "
-            "several processes need bodies held by supports, solve this model on one"
+@contextmanager
+def ended_together(comm: Any) -> Iterator[None]:
+    """End all processes when this one alone fails, as the others would wait for it for ever."""
+    try:
+        yield
+    except OnAll as known:
+        raise known.reason from None
+    except AmontonsError:  # of sums that all have alike
+        raise
+    except BaseException:
+        if comm.size > 1:
+            traceback.print_exc()
+            comm.Abort(1)
+        raise
+
+
+def together(comm: Any, work: Callable[[], T]) -> T:
+    """What `work` returns here; raises OnAll where it fails on any process, on all of them."""
+    error, out = None, None
+    try:
+        out = work()
+    except Exception as reason:
+        error = reason
+    errors = [e for e in comm.allgather(error) if e is not None]
+    if errors:
+        raise OnAll(errors[0])
+    return out  # type: ignore[return-value]  # work has returned it
+
+
+def _received(model: Model | Callable[[], Model], comm: Any) -> Share:
+    """The share of this process; the first one makes and sends all, one after another."""
+    found = together(comm, lambda: None if comm.rank else _made(model, comm.size))
+    if found is None:
+        return comm.recv(source=0)
+    mine = None
+    for rank, share in enumerate(shares(*found, comm.size)):
+        if rank:
+            comm.send(share, dest=rank)
+        else:
+            mine = share
+    assert mine is not None
+    return mine
+
+
+def _made(model: Model | Callable[[], Model], processes: int) -> tuple[Whole, Index]:
+    """All but the matrix, and the process of every node, on the first process."""
+    made = model() if callable(model) else model
+    if not isinstance(made, Model):
+        raise InvalidInput(
+            "model: expected a Model, or a function that returns one, got "
+            f"{type(made).__name__}"
         )
+    given = whole(made)
+    return given, partition(given.points, processes)
 
 
-def _share(bodies: Sequence[Body], comm: Any) -> Share:
-    """The part of this process, assembled."""
-    labels = comm.bcast(partition([body.mesh for body in bodies], comm.size))
-    dim = bodies[0].mesh.dim
-    points = np.concatenate([body.mesh.points for body in bodies])
-    owner = np.full(len(points), comm.size)
-    parts, nodes, offset = [], [], 0
-    for body, label in zip(bodies, labels, strict=True):
-        _lower(owner[offset : offset + len(body.mesh.points)], body, label)
-        mine = label == comm.rank
-        if mine.any():
-            mesh, used = extract(body.mesh, mine)
-            material = body.material
-            assert not isinstance(material, Rigid | GivenMatrices)
-            if isinstance(material, Mapping):
-                material = {region: material[region] for region in mesh.regions}
-            parts.append(stiffness(mesh, material).tocsr())
-            nodes.append(offset + used)
-        offset += len(body.mesh.points)
-    dofs = (np.concatenate(nodes)[:, None] * dim + np.arange(dim)).ravel()
-    part = sparse.csr_array(sparse.block_diag(parts, format="csr"))
-    return Share(comm, part, dofs, owner, points)
+def _rows(share: Share) -> tuple[sparse.bsr_array, Index]:
+    """Rows (own, n) of the stiffness in the frames of contacts, and the own local nodes.
+
+    Columns are PETSc's numbers.
+    """
+    d = share.fixed.shape[1]
+    frame = np.full(len(share.nodes), -1)
+    frame[share.framed] = np.arange(len(share.framed))
+    parts, first = [], 0
+    for _, mesh, material in share.bodies:
+        local = np.arange(first, first + len(mesh.points))
+        first += len(mesh.points)
+        parts.append(_rows_of_body(stiffness(mesh, material), local, share, frame))
+    pointers = [np.zeros(1, dtype=np.int64)]
+    for block in parts:
+        pointers.append(pointers[-1][-1] + block[0][1:])
+    blocks = (
+        np.concatenate([p[2] for p in parts]), np.concatenate([p[1] for p in parts]),
+        np.concatenate(pointers),
+    )  # fmt: skip
+    own = int(share.own.sum()) * d
+    K = sparse.bsr_array(blocks, shape=(own, int(share.starts[-1]) * d))
+    return K, np.flatnonzero(share.own)
 
 
-def _lower(owner: Index, body: Body, label: Index) -> None:
-    """Nodes belong to the first part that has a cell with them; owner (nodes,) in place."""
-    first = 0
-    for block in body.mesh.cells:
-        part = label[first : first + len(block.nodes)]
-        for column in block.nodes.T:
-            np.minimum.at(owner, column, part)
-        first += len(block.nodes)
+def _rows_of_body(
+    K: sparse.bsr_array, local: Index, share: Share, frame: Index
+) -> tuple[Index, Index, Array]:
+    """Pointers, PETSc's nodes and blocks of the own rows of one body of this process."""
+    own = share.own[local]
+    counts = np.diff(K.indptr)
+    row = np.repeat(np.arange(len(local)), counts)
+    kept = own[row]
+    row, column, blocks = row[kept], K.indices[kept], K.data[kept]
+    for nodes, turn in ((row, "kab,kbc->kac"), (column, "kac,kbc->kab")):
+        at = frame[local[nodes]]
+        some = np.flatnonzero(at >= 0)
+        F = share.frames[at[some]]
+        blocks[some] = (np.einsum(turn, F, blocks[some]) if nodes is row
+                        else np.einsum(turn, blocks[some], F))  # fmt: skip
+    pointers = np.concatenate([[0], np.cumsum(counts[own])])
+    return pointers, share.number[local[column]], np.asarray(blocks, dtype=float)
+
+
+def _problem(
+    share: Share, rows: list[tuple[sparse.bsr_array, Index]], comm: Any, options: Petsc
+) -> SpreadProblem:
+    """Matrix, load and supports of this process in the basis of contacts.
+
+    rows: the one result of `_rows`, taken out of the list, so that it can go when PETSc has it.
+    """
+    (K, own), d = rows.pop(), share.fixed.shape[1]
+    contacts = share.contacts
+    frames = np.zeros((0, d, d)) if not len(contacts.node) else contacts.frames
+    dofs = contacts.node[:, None] * d + np.arange(d)
+
+    def turned(values: Array) -> Array:
+        """Values (o d, ...) at own nodes in the frames of contacts."""
+        out = values.reshape(len(own), d, -1).copy()
+        out[contacts.node] = np.einsum("kab,kbc->kac", frames, out[contacts.node])
+        return out.reshape(values.shape)
+
+    fixed = share.fixed.ravel()
+    may_be_held = fixed.copy()
+    may_be_held[dofs] = True
+    matrix = SpreadMatrix(
+        comm, K, _basis(share, comm.rank) if share.coupled else None,
+        modes=turned(share.modes), d=d, may_be_held=may_be_held,
+        directions=share.all_contacts * d, options=options,
+    )  # fmt: skip
+    y = matrix.to_basis(turned(share.prescribed.ravel()))
+    y[~fixed] = 0.0
+    f = matrix.load_in_basis(turned(share.load.ravel()))
+    return SpreadProblem(
+        matrix, f, y, fixed, OwnContacts(dofs, contacts.gap, contacts.law, contacts.able)
+    )
+
+
+def _basis(share: Share, rank: int) -> sparse.bsr_array:
+    """T = I - B' of own rows, (own, n)."""
+    d = share.fixed.shape[1]
+    own, first = share.fixed.size, int(share.starts[rank]) * d
+    row, column, value = share.coupling
+    index = np.arange(own)
+    entries = np.concatenate([np.ones(own), value])
+    where = np.concatenate([index, row]), np.concatenate([first + index, column])
+    T = sparse.coo_array((entries, where), shape=(own, int(share.starts[-1]) * d)).tocsr()
+    return sparse.bsr_array(T.tobsr((d, d)))

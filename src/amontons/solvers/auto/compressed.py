@@ -38,7 +38,6 @@ from ...core.options import check_options
 from ...linear import Direct
 from ...linear.blocks import spatial
 from ...linear.dense import DENSE_LIMIT
-from ...linear.distributed import DistributedMatrix
 from ...problem.condensation import SOLVE_COLUMNS
 from ...problem.friction import Form, FrictionProblem
 from ..contract import Breakdown, Iterate, Iterates, Target, check_at_least, check_positive
@@ -101,8 +100,7 @@ def _check_fits(problem: FrictionProblem) -> None:
     m = problem.contacts * problem.dimension
     M = problem.M
     assert M is not None
-    spread = isinstance(M, DistributedMatrix)  # a stiffness, symmetric by construction
-    if not spread and abs(M - M.T).max() > 1e-12 * abs(M).max():
+    if abs(M - M.T).max() > 1e-12 * abs(M).max():
         raise Breakdown("M is not symmetric, its far field has no Nyström approximation")
     if 2 * 8.0 * m * m > DENSE_LIMIT:
         raise Breakdown(f"the compressed W would take {16e-9 * m * m:.1f} GB")
@@ -192,14 +190,9 @@ def _near_field(problem: FrictionProblem, layers: int, deadline: Deadline) -> Ar
 
 
 def _slab(
-    M: sparse.csc_array | DistributedMatrix, inside: NDArray[np.bool_], layers: int
+    M: sparse.csc_array, inside: NDArray[np.bool_], layers: int
 ) -> tuple[NDArray[np.int64], sparse.csr_array]:
     """Unknowns within `layers` couplings of those inside, (n,), and their rows and columns."""
-    if isinstance(M, DistributedMatrix):
-        for _ in range(layers):
-            inside = M.coupled(inside)
-        index = np.flatnonzero(inside)
-        return index, M.part(index)
     rows = sparse.csr_array(M)
     pattern = sparse.csr_array((np.ones(rows.nnz), rows.indices, rows.indptr), shape=M.shape)
     for _ in range(layers):

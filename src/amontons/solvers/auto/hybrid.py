@@ -40,7 +40,6 @@ from ...core.errors import InvalidInput, SingularOperator
 from ...core.options import check_options
 from ...linear import Direct
 from ...linear.blocks import spatial
-from ...linear.distributed import DistributedMatrix
 from ...problem.friction import Form, FrictionProblem
 from ...problem.nitsche import NitscheProblem
 from ...problem.protocol import Problem
@@ -215,8 +214,6 @@ def _worth_multigrid(problem: FrictionProblem) -> bool:
     """True for meshes on which a factorisation takes longer than some cycles."""
     if problem.unknowns < MESH:
         return False
-    if isinstance(problem.M, DistributedMatrix):
-        return False  # its levels would have to be spread too
     return _is_mesh(problem) and not problem.condensing_is_cheap
 
 
