@@ -19,6 +19,7 @@ from ...core.errors import TimeUp
 
 Array = NDArray[np.float64]
 INDEFINITE = 1e3  # the value where A is not positive definite
+FARTHEST = 300.0  # size of x, logarithms among them, beyond which nothing is tried
 DENSE = 400  # rows up to which all eigenvalues are computed
 KEPT = 40  # largest ones that count beyond
 DEPTH = 3  # products of the block Krylov space in which they are looked for
@@ -71,6 +72,8 @@ class Pencil(ABC):
             w, y = eigh((C + C.T) / 2, check_finite=False, subset_by_index=few)
         else:
             w, y = self._in_subspace(product, size)
+        if not (len(w) and np.isfinite(w).all()):  # A is singular to rounding
+            return None
         return w, solve_triangular(root, y, lower=True, trans=1, check_finite=False)
 
     def _in_subspace(self, product, size: int) -> tuple[Array, Array]:  # type: ignore[no-untyped-def]
@@ -135,6 +138,8 @@ class Pencil(ABC):
 
         def value(y: Array) -> tuple[float, Array]:
             deadline.pay(self.operations)
+            if np.abs(y).max(initial=0.0) > FARTHEST:
+                return INDEFINITE, np.zeros_like(y)
             found = self.value(y, soft)
             if found[0] < best[0]:
                 best[:] = found[0], y.copy()

@@ -44,7 +44,8 @@ from .tree import DiscTree, PlaneTree
 
 Array = NDArray[np.float64]
 SECONDS = 60.0  # whose work a certificate without a time limit may take
-FEW = 25  # contacts in 2D up to which branches are looked for at once: they prove more
+# contacts in 2D and 3D up to which branches are looked for at once: they prove more
+FEW = {2: 25, 3: 0}
 SHARE = 0.5  # of the time, for multipliers of every contact
 
 
@@ -97,8 +98,7 @@ def certify_load(
 
 def _by_contacts(scaled: Scaled, r: Array, deadline: Deadline) -> LoadMultipliers | None:
     """Multipliers of every contact, None where others are at hand or there was no time."""
-    few = scaled.dimension == 2 and scaled.contacts <= FEW
-    if few or (scaled.q[~scaled.reacts, 0] < 0).any():
+    if scaled.contacts <= FEW[scaled.dimension] or (scaled.q[~scaled.reacts, 0] < 0).any():
         return None
     known = r / scaled.to_r
     size = 1 + float(np.abs(known).max(initial=0.0))
