@@ -86,7 +86,7 @@ def about(W, q, mu, r0, letters, tau, sigma, eta, pinned):
         else:
             need(status == "l" and r0[i, 0] > 0, f"contact {i} does not slip")
             z0[i, 0], moved[i, 1:] = 0, abs(r0[i, 1:] + bound * t[i]) + 16 * U * bound
-        if not pinned[i] and mu[i]:
+        if not pinned[i]:
             size, room = np.linalg.norm(eta[i]), limit[i] * speed - eta[i].dot(u[i, 1:])
             need(status == "f" and size <= limit[i] * (1 - 8 * U), f"eta of contact {i}")
             room += 32 * U * (limit[i] + size) * speed

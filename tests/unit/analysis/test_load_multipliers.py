@@ -180,6 +180,13 @@ def test_idle_and_frictionless_contacts_and_other_units():
         assert found.distance == 0.0
 
 
+def test_a_contact_that_touches_and_can_not_react_may_have_any_reaction():
+    W = np.zeros((4, 4))
+    W[:2, :2] = np.eye(2)
+    scaled = scaled_of(W, np.array([[1.0, 0.0], [0.0, 0.0]]), np.full(2, 0.5))[1]
+    assert not load_multipliers(scaled, np.zeros((2, 2))).proved
+
+
 def test_rough_solutions_are_near_nothing():
     """What misses the balance by more than the load proves no more than its distance."""
     problem = cube(4)

@@ -88,6 +88,23 @@ FORGED_CONTACTS = {
 }
 
 
+def test_a_contact_without_friction_has_no_other_side(tmp_path):
+    problem = many_contacts()
+    mu = np.ones(100)
+    mu[7] = 0.0
+    path, _ = written(tmp_path, problem.with_mu(mu))
+    am.check_certificate(path)
+
+    def forged(file):
+        eta = file["eta"][()]
+        eta[7] = 0.3
+        file["eta"].write_direct(eta)
+
+    reseal(path, forged)
+    with pytest.raises(InvalidInput, match="eta of contact 7"):
+        am.check_certificate(path)
+
+
 @pytest.fixture(scope="module")
 def in_space(tmp_path_factory):
     """A file with multipliers of every contact of `space_problem`."""

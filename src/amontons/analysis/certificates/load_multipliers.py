@@ -181,11 +181,16 @@ def proved_distance(
     given = (tau, sigma, eta)
     if not all(np.isfinite(x).all() for x in given) or min(tau.min(), sigma.min()) <= 0:
         return None
-    limit = sigma * scaled.mu
+    idle = ~scaled.reacts
+    rows = idle.repeat(scaled.dimension)
+    if scaled.W[rows].any() or scaled.W[:, rows].any() or not (z0.u[idle, 0] > 0).all():
+        return None  # a contact may react and move nothing of its own
+    form = _Form(scaled, z0)
+    limit = sigma * form.mu
     eta = np.where(pinned[:, None], limit[:, None] * z0.t, eta)
+    eta = np.where(limit[:, None] > 0, eta, 0.0)
     if not _sides_hold(z0, limit, tau, eta, pinned):
         return None
-    form = _Form(scaled, z0)
     W, k, d = form.W, *scaled.shape
     M = form.applied(tau, sigma, eta, W)
     M = (M + M.T) / 2
@@ -240,7 +245,7 @@ class _Form(Pencil):
 
     def __init__(self, scaled: Scaled, z0: Reference) -> None:
         self.contacts, self.d = scaled.shape
-        self.mu, self.z0 = scaled.mu, z0
+        self.mu, self.z0 = np.where(scaled.reacts, scaled.mu, 0.0), z0
         rests = z0.rests.ravel()
         self.W = scaled.W
         if rests.any():
