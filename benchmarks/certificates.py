@@ -1,6 +1,7 @@
 """Certificates of uniqueness: how far they reach, what they cost, and whether they are right.
 
-    python benchmarks/certificates.py [small] [hild] [mixed] [large] [--problems 500]
+    python benchmarks/certificates.py [small] [hild] [mixed] [large] [cube] [body]
+                                      [--problems 500] [--levels 2,3,4]
 
 Each name is one table (all of them without a name); results/certificates.json keeps the rows,
 so that tables can be made one at a time; results/certificates.md is written from all of them.
@@ -202,6 +203,88 @@ def mixed(arguments: argparse.Namespace) -> list[Row]:
     return rows
 
 
+# ------------------------------------------------------------------ bodies in space
+def block(cells: int) -> FrictionProblem:
+    """The cube of `example:cube`, W formed."""
+    body = am.Body(am.box((1, 1, 1), cells=cells), am.LinearElastic(young=200, poisson=0.3))
+    model = am.Model(
+        [body],
+        supports=[am.Fix("top", lambda x: (0, 0.2, 0.06 - 0.15 * x[0]))],
+        contacts=[am.Contact("bottom", am.Plane(normal=(0, 0, 1)), mu=1.0)],
+    )
+    local = model.assemble().condensed()
+    assert local.q is not None
+    return FrictionProblem.from_delassus(dense(local), local.q, local.mu)
+
+
+def cube(arguments: argparse.Namespace) -> list[Row]:
+    """The verdict of `am.uniqueness`, and the certificate of this load alone."""
+    rows = []
+    am.uniqueness(block(2))  # compiles
+    for level in map(int, arguments.levels.split(",")):
+        given = block(2**level)
+        for mu in (0.3, 1.0):
+            problem = given.with_mu(mu)
+            solution = am.solve(problem, tolerance=1e-10)
+            began = time.process_time()
+            verdict = am.uniqueness(problem, solution)
+            whole = time.process_time() - began
+            own = certified(problem, solution, arguments.limit)
+            rows.append({
+                "contacts": problem.contacts, "mu": mu,
+                "open/slip/stick": "/".join(str(k) for k in solution.counts.values()),
+                "verdict": verdict.verdict.value, "s": f"{whole:.1f}",
+                "this load alone": own["outcome"], "distance": own["distance"],
+                "CPU s": own["CPU s"],
+            })  # fmt: skip
+            print(rows[-1], flush=True)
+    return rows
+
+
+def waves(seed: int, side: int, rough: int) -> np.ndarray:
+    """q (side^2, 3): random waves over a square, those of wave number k as k^-rough."""
+    random = np.random.default_rng(seed)
+    x = np.linspace(0, 1, side)
+    X, Y = (part.ravel() for part in np.meshgrid(x, x, indexing="ij"))
+    q = np.zeros((side * side, 3))
+    for i in range(5):
+        for j in range(5):
+            size = random.standard_normal(3) / (1 + i * i + j * j) ** (rough / 2)
+            a, b = random.uniform(0, 2 * np.pi, 2)
+            q += size * (np.cos(np.pi * i * X + a) * np.cos(np.pi * j * Y + b))[:, None]
+    return 1e-3 * q
+
+
+def body(arguments: argparse.Namespace) -> list[Row]:
+    """400 contacts under random loads: how many are decided."""
+    W = dense(block(19))
+    rows = []
+    for mu in (0.3, 0.6, 1.0):
+        count: Counter[LoadOutcome] = Counter()
+        reached, seconds, seed = [], [], 0
+        while sum(count.values()) < arguments.loads:
+            q, seed = waves(seed, 20, 1 + seed % 2), seed + 1
+            problem = FrictionProblem.from_delassus(W, q, np.full(400, mu))
+            solution = am.solve(problem, tolerance=1e-10, check=False)
+            if not solution.converged:
+                count["not solved"] += 1  # type: ignore[index]
+                continue
+            began = time.process_time()
+            answer = certify_load(problem, solution, time_limit=arguments.limit, brief=True)
+            seconds.append(time.process_time() - began)
+            count[answer.outcome] += 1
+            if answer.multipliers is not None and not answer.multipliers.proved:
+                reached.append(answer.multipliers.reached)
+            print(mu, seed - 1, solution.counts, answer.outcome.value, flush=True)
+        rows.append({
+            "mu": mu, **{o.value: count[o] for o in LoadOutcome},
+            "friction reached by the undecided, least": f"{min(reached, default=1.0):.2f}",
+            "CPU s, median": f"{np.median(seconds):.2f}", "longest": f"{max(seconds):.1f}",
+        })  # fmt: skip
+        print(rows[-1], flush=True)
+    return rows
+
+
 # ------------------------------------------------------------------ the page
 Table = Callable[[argparse.Namespace], list[Row]]
 TABLES: dict[str, tuple[Table, str]] = {
@@ -214,6 +297,10 @@ TABLES: dict[str, tuple[Table, str]] = {
               "have open, sticking and slipping contacts"),
     "large": (large, "This load: many contacts; on the half plane a random load, and how many "
               "are open, slip and stick"),
+    "cube": (cube, "The cube, W given: the verdict of `am.uniqueness` with its CPU seconds, "
+             "and the certificate of this load alone (multipliers of every contact)"),
+    "body": (body, "A block of 400 contacts under random waves of load, 20 for each friction: "
+             "multipliers of every contact alone"),
 }  # fmt: skip
 
 
@@ -231,6 +318,7 @@ def main() -> None:
     parser.add_argument("tables", nargs="*", choices=[[], *TABLES], default=[])
     parser.add_argument("--problems", type=int, default=500)
     parser.add_argument("--loads", type=int, default=20, help="mixed loads per friction")
+    parser.add_argument("--levels", default="2,3,4", help="of the cube, 5 takes minutes for W")
     parser.add_argument("--limit", type=float, default=300.0, help="seconds per certificate")
     arguments = parser.parse_args()
     kept = RESULTS / "certificates.json"

@@ -1,6 +1,10 @@
 """Lists of all solutions and verdicts on uniqueness against exact arithmetic.
 
     python benchmarks/exact_lists.py [--plane 5000] [--space 300] [--seed 1] [--output FOLDER]
+                                     [--kept FILE] [--at-most SECONDS]
+
+With --kept what was done is written to a file now and then, and a later run goes on from
+there; --at-most ends a run after so many CPU seconds, and the page says how far it came.
 
 Random problems with loads that cancel, W that is nearly singular, contacts of very different
 size, and what else makes solutions hard to tell apart.  The truth comes from rational numbers
@@ -10,6 +14,7 @@ size, and what else makes solutions hard to tell apart.  The truth comes from ra
 from __future__ import annotations
 
 import argparse
+import json
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -23,11 +28,15 @@ from machine import describe
 from numpy.typing import NDArray
 
 import amontons as am
+from amontons.analysis.certificates.load_multipliers import load_multipliers
 from amontons.analysis.certificates.uniqueness import Verdict
+from amontons.analysis.scaled import Scaled
+from amontons.analysis.solutions.discs.known import NEAR
 
 Array = NDArray[np.float64]
 Generator = np.random.Generator
 LIMIT = 10.0  # seconds for one question
+EVERY = 50  # problems after which what is done is written
 ROUNDING = 1e-13  # smallest eigenvalue of W, relative, below which a set is one by rounding
 Case = tuple[Array, Array, Array]  # W, q, mu
 NOTE = """\
@@ -35,7 +44,9 @@ NOTE = """\
 False: a verdict that exact arithmetic refutes, or an entry that is said to be exactly one
 solution and is none. Missed: a solution that a complete list lacks, by place or by pattern.
 Border: a determinant or sign is zero in exact arithmetic too; there only missed solutions are
-counted.
+counted. By contacts: multipliers of every contact (`load_multipliers`) prove one of the exact
+solutions to be the only one; false where it is not. Every other problem of a family has its
+contacts in another order, each in units of its own.
 """
 
 
@@ -138,7 +149,22 @@ def draw(number: int, seed: int, d: int) -> tuple[str, Case]:
     names = list(FAMILIES)
     name = names[number % len(names)]
     nc = int(random.integers(1, 6 if d == 2 else 3))
-    return name, FAMILIES[name](random, nc, d)
+    case = FAMILIES[name](random, nc, d)
+    return name, case if number // len(names) % 2 else turned(random, case)
+
+
+def turned(random: Generator, case: Case) -> Case:
+    """The same problem, contacts in another order and each in units of its own, 2^-20 to 2^20.
+
+    Powers of two, so that nothing is rounded.
+    """
+    W, q, mu = case
+    nc, d = q.shape
+    order = random.permutation(nc)
+    rows = (d * order[:, None] + np.arange(d)).ravel()
+    scale = 2.0 ** random.integers(-20, 21, nc)
+    each = np.repeat(scale, d)
+    return W[np.ix_(rows, rows)] * each * each[:, None], q[order] * scale[:, None], mu[order]
 
 
 # ---------------------------------------------------------------- comparing
@@ -150,6 +176,7 @@ class Tally:
     complete: int = 0
     solutions: int = 0
     verdicts: Counter = field(default_factory=Counter)
+    contacts: int = 0
     border: int = 0
     seconds: float = 0.0
     faults: list[str] = field(default_factory=list)
@@ -165,12 +192,31 @@ def compare(case: Case, tally: Tally, label: str) -> None:
     found = am.all_solutions(problem, time_limit=LIMIT)
     verdict = am.uniqueness(problem, time_limit=LIMIT)
     tally.seconds += time.process_time() - began
+    proved = by_contacts(problem, truth)
+    tally.contacts += proved > 0
+    if proved and (len(truth) != 1 or truth.singular):
+        tally.faults.append(f"{label}: false by contacts, {len(truth)} exist")
     tally.problems += 1
     tally.solutions += len(truth)
     tally.complete += found.complete
     tally.verdicts[verdict.verdict.value] += 1
     tally.border += bool(truth.singular)
     tally.faults += [f"{label}: {text}" for text in faults(case, truth, found, verdict)]
+
+
+def by_contacts(problem: am.FrictionProblem, truth: exact_oracle.Answer) -> int:
+    """How many of the exact solutions multipliers of every contact prove to be the only one.
+
+    The distance of a proof is to be less than what the loads of contacts resolve, as in
+    `uniqueness`.
+    """
+    scaled = Scaled.of(problem)
+    proved = 0
+    for one in truth.solutions:
+        r = one.r.reshape(scaled.shape) / scaled.to_r
+        found = load_multipliers(scaled, r, near=NEAR * (1 + float(np.abs(r).max())))
+        proved += found.proved and scaled.resolves(r)
+    return proved
 
 
 def faults(
@@ -226,25 +272,68 @@ def _lowest(W: Array, root: Array) -> float:
 
 
 # ---------------------------------------------------------------- the table
-def run(count: int, seed: int, d: int) -> dict[str, Tally]:
-    """Compare `count` problems of dimension d."""
-    tallies = {name: Tally() for name in FAMILIES}
-    for number in range(count):
+def run(count: int, seed: int, d: int, kept: Kept) -> dict[str, Tally]:
+    """Compare `count` problems of dimension d, as far as time allows."""
+    tallies = kept.tallies[d]
+    while kept.done[d] < count and not kept.is_over:
+        number = kept.done[d]
         name, case = draw(number, seed, d)
         compare(case, tallies[name], f"{d}D {number}")
+        kept.done[d] += 1
+        if kept.done[d] % EVERY == 0 or kept.done[d] == count:
+            kept.write()
     return tallies
+
+
+@dataclass
+class Kept:
+    """What is done, on disk where a path is given; is_over after so many CPU seconds."""
+
+    seed: int
+    path: Path | None = None
+    at_most: float = float("inf")
+    done: dict[int, int] = field(default_factory=lambda: {2: 0, 3: 0})
+    tallies: dict[int, dict[str, Tally]] = field(
+        default_factory=lambda: {d: {name: Tally() for name in FAMILIES} for d in (2, 3)}
+    )
+
+    @property
+    def is_over(self) -> bool:
+        """Whether time is up."""
+        return time.process_time() > self.at_most
+
+    def write(self) -> None:
+        """To disk, if it is kept."""
+        if self.path is not None:
+            tallies = {str(d): {name: vars(t) for name, t in of.items()}
+                       for d, of in self.tallies.items()}  # fmt: skip
+            text = json.dumps({"seed": self.seed, "done": self.done, "tallies": tallies})
+            self.path.write_text(text)
+
+    def read(self) -> None:
+        """What an earlier run of the same seed left."""
+        if self.path is None or not self.path.exists():
+            return
+        found = json.loads(self.path.read_text())
+        if found["seed"] != self.seed:
+            raise SystemExit(f"{self.path}: of seed {found['seed']}, not {self.seed}")
+        self.done = {int(d): n for d, n in found["done"].items()}
+        for d, of in found["tallies"].items():
+            for name, values in of.items():
+                values["verdicts"] = Counter(values["verdicts"])
+                self.tallies[int(d)][name] = Tally(**values)
 
 
 def table(tallies: dict[str, Tally]) -> str:
     """One row per family."""
     head = ["family", "problems", "exact solutions", "lists complete", "every load",
-            "this load", "not unique", "undecided", "border", "false or missed",
-            "CPU s"]  # fmt: skip
+            "this load", "not unique", "undecided", "by contacts", "border",
+            "false or missed", "CPU s"]  # fmt: skip
     rows = [" | ".join(head), " | ".join(["---"] * len(head))]
     for name, t in tallies.items():
         counts = [t.verdicts[v.value] for v in Verdict]
-        row = [name, t.problems, t.solutions, t.complete, *counts, t.border, len(t.faults),
-               f"{t.seconds:.0f}"]  # fmt: skip
+        row = [name, t.problems, t.solutions, t.complete, *counts, t.contacts, t.border,
+               len(t.faults), f"{t.seconds:.0f}"]  # fmt: skip
         rows.append(" | ".join(map(str, row)))
     return "\n".join(f"| {row} |" for row in rows)
 
@@ -256,7 +345,11 @@ def main() -> None:
     parser.add_argument("--space", type=int, default=300)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--output", type=Path, default=Path(__file__).parent / "results")
+    parser.add_argument("--kept", type=Path)
+    parser.add_argument("--at-most", type=float, default=float("inf"))
     options = parser.parse_args()
+    kept = Kept(options.seed, options.kept, options.at_most)
+    kept.read()
     info = describe()
     lines = ["# Lists and verdicts against exact arithmetic", "",
              f"`python benchmarks/exact_lists.py --plane {options.plane} --space "
@@ -264,11 +357,14 @@ def main() -> None:
              f"{info['python']}, numpy {info['numpy']}.", "",
              NOTE.format(**vars(options))]  # fmt: skip
     for title, count, d in (("2D", options.plane, 2), ("3D", options.space, 3)):
-        tallies = run(count, options.seed, d)
+        tallies = run(count, options.seed, d, kept)
+        if kept.done[d] < count:
+            title += f", {kept.done[d]} of {count} so far"
         lines += [f"## {title}", "", table(tallies), ""]
         print(table(tallies))
         for tally in tallies.values():
             print(*tally.faults, sep="\n", end="\n" if tally.faults else "")
+    kept.write()
     (options.output / "exact_lists.md").write_text("\n".join(lines))
 
 

@@ -44,19 +44,64 @@ def positive_definite(A, rounding):
     return True
 
 
+def blocks(tau, sigma, right, below):
+    """[[tau, right], [below, sigma I]] of every contact along the diagonal."""
+    d = right.shape[1] + 1
+    out = np.diag(np.column_stack([tau, *[sigma] * (d - 1)]).ravel())
+    for i in range(len(tau)):
+        out[i * d, i * d + 1 : (i + 1) * d] = right[i]
+        out[i * d + 1 : (i + 1) * d, i * d] = below[i]
+    return out
+
+
 def every_load(W, mu, tau, sigma, alpha, f):
     """Refuse unless these multipliers prove one solution for every load."""
     nc, d = len(mu), len(W) // len(mu)
     need(min(tau.min(), sigma.min(), alpha.min()) > 0, "a multiplier is not positive")
-    D, normal = np.zeros(W.shape), np.arange(nc * d) % d == 0
-    for i in range(nc):
-        D[i * d : (i + 1) * d, i * d : (i + 1) * d] = np.diag([tau[i]] + [sigma[i]] * (d - 1))
-        D[i * d + 1 : (i + 1) * d, i * d] = f[i]
+    D, normal = blocks(tau, sigma, 0 * f, f), np.arange(nc * d) % d == 0
     weight = np.where(normal, 0, (mu * sigma / alpha / 2).repeat(d))[:, None]
     own = np.diag(np.where(normal, (mu * sigma * alpha / 2).repeat(d), 0))
     M = D @ W - W.T @ (weight * W) - own
     size = abs(D) @ abs(W) + abs(W).T @ (weight * abs(W)) + own
     need(positive_definite(M, 2 * (nc * d + 16) * U * size), "M is not positive definite")
+
+
+def about(W, q, mu, r0, letters, tau, sigma, eta, pinned):
+    """Bound of |r - r0| for all solutions, by one tau, sigma and eta of every contact."""
+    (nc, d), wide, limit = r0.shape, np.longdouble, sigma * mu
+    need(min(tau.min(), sigma.min()) > 0, "a multiplier is not positive")
+    u = np.asarray(W.astype(wide) @ r0.astype(wide).ravel() + q.ravel(), float).reshape(nc, d)
+    off = (abs(W) @ abs(r0).ravel() + abs(q).ravel()).reshape(nc, d)
+    off = (nc * d + 4) * float(np.finfo(wide).eps) * off + 2 * U * abs(u)
+    z0, moved, t = u.copy(), np.zeros((nc, d)), np.zeros((nc, d - 1))
+    for i, status in enumerate(letters):
+        bound, speed, shear = mu[i] * r0[i, 0], *np.linalg.norm([u[i, 1:], r0[i, 1:]], axis=1)
+        t[i] = u[i, 1:] / (speed or 1)
+        if status == "f":
+            need(not r0[i].any(), f"contact {i} is not free")
+            z0[i, 0] = max(u[i, 0], 0)
+        elif status == "s":
+            need(shear * (1 + 8 * U) <= bound, f"contact {i} does not stick")
+            z0[i], t[i] = 0, -r0[i, 1:] / (bound or 1)
+        else:
+            need(status == "l" and r0[i, 0] > 0, f"contact {i} does not slip")
+            z0[i, 0], moved[i, 1:] = 0, abs(r0[i, 1:] + bound * t[i]) + 16 * U * bound
+        if not pinned[i]:
+            size, room = np.linalg.norm(eta[i]), limit[i] * speed - eta[i].dot(u[i, 1:])
+            need(status == "f" and size <= limit[i] * (1 - 8 * U), f"eta of contact {i}")
+            room += 32 * U * (limit[i] + size) * speed
+            need(room <= tau[i] * z0[i, 0] * (1 - 8 * U), f"contact {i} can gain")
+    off += abs(u - z0) + 2 * (abs(W) @ moved.ravel()).reshape(nc, d)
+    E = blocks(tau, sigma, np.where(pinned[:, None], limit[:, None] * t, eta), 0 * eta)
+    left = (mu[:, None] > 0).repeat(d, 1).ravel() | (np.arange(nc * d) % d == 0)
+    M, size, push = (x[left] for x in (E @ W, abs(E) @ abs(W), abs(E) @ off.ravel()))
+    M, size = (M[:, left] + M[:, left].T) / 2, 2 * (nc * d + 40) * U * size[:, left]
+    s = 2.0 ** -np.round(np.log2(np.where(M.diagonal() > 0, M.diagonal(), 1)) / 2)
+    least = np.linalg.eigvalsh(M * s * s[:, None])[0] / 2 if off.any() else 0.0
+    taken, size = np.diag(least / s**2), size + np.diag(4 * U * abs(least) / s**2)
+    need(positive_definite(M - taken, size), "the matrix is not definite")
+    need(least > 0 or not off.any(), "no distance")
+    return float(np.linalg.norm(s * push) / least * s.max() * 1.001) if off.any() else 0.0
 
 
 def covered(patterns, mu):
@@ -174,7 +219,14 @@ def check(path):
     if claim == "every load":
         every_load(W, mu, *(data[k] for k in ("tau", "sigma", "alpha", "f")))
         return f"{nc} contacts: every load has exactly one solution."
-    need(claim == "this load" and d == 2, f"unknown claim {claim!r}")
+    need(claim == "this load", f"unknown claim {claim!r}")
+    if "tau" in data:
+        letters = [bytes(x).decode() for x in data["statuses"]]
+        given = [data[k] for k in ("tau", "sigma", "eta", "pinned")]
+        far = about(W, q, mu, data["r0"], letters, *given)
+        need(far <= data["distance"], f"solutions are only within {far:.1e} of r0")
+        return f"{nc} contacts: every solution of this load is within {far:.1e} of r0."
+    need(d == 2, "a tree in 3D")
     patterns = [bytes(p).decode() for p in data["patterns"]]
     need(all(len(p) == nc for p in patterns) and covered(patterns, mu), "patterns are missing")
     z0, off = on_the_law(W, q, mu, data["r0"])

@@ -6,6 +6,8 @@ claim and sha256, and what proves the claim:
     every load   tau, sigma, alpha (nc,), f (nc, d - 1): multipliers of every contact
     this load    r0 (nc, d), patterns (k,) of statuses, V0 ... V(k-1): their multipliers,
                  distance: within which of r0 all solutions are, unit of r
+    this load    r0, statuses (nc,), tau, sigma, eta (nc, d - 1), pinned: multipliers of every
+                 contact about r0, distance
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis.certificates.contact_multipliers import ContactMultipliers, contact_multipliers
+from ..analysis.certificates.load_multipliers import LoadMultipliers
 from ..analysis.certificates.one_load.answer import LoadBranch, LoadCertificate, LoadOutcome
 from ..analysis.certificates.one_load.certificate import certify_load
 from ..analysis.certificates.status_pieces import friction_shape
@@ -30,7 +33,7 @@ from ..core.hdf5 import check_file
 from ..linear.dense import dense
 from ..problem.friction import FrictionProblem
 from ..solvers.driver import drive
-from .certificate_checker import Refused, check, digest
+from .certificate_checker import Refused, about, check, digest
 from .fclib.memory import write_hdf5
 
 Array = NDArray[np.float64]
@@ -38,6 +41,7 @@ FORMAT = "amontons/certificate/1"
 # what a file may make of the checker that is not a certificate, or is broken
 BROKEN = (Refused, FileFormatError, OSError, KeyError, ValueError, TypeError, IndexError,
           RuntimeError, AttributeError, MemoryError, OverflowError, ZeroDivisionError)
+ROOM = 1.1  # times what the checker finds here, for other processors
 GENEROUS = 100.0  # times the distance of a certificate: what the checker may find
 ABOVE = 1e-9  # relative, at which friction is proved to be safe
 SECONDS = 60.0  # whose work multipliers may take that the verdict did not need
@@ -68,8 +72,8 @@ def write_certificate(
     if arrays is None:
         raise InvalidInput(
             f"certificate: expected a verdict of uniqueness that multipliers prove, got "
-            f"{verdict.verdict.value!r}; lists, 3D solutions of one load and motions alone "
-            "have no file format yet"
+            f"{verdict.verdict.value!r}; lists, regions of 3D solutions and motions alone have "
+            "no file format yet"
         )
 
     def fill(file: h5py.File) -> None:
@@ -108,14 +112,16 @@ def _every_load(W: Array, mu: Array, verdict: Uniqueness, deadline: Any) -> Any:
 
 
 def _this_load(local: FrictionProblem, verdict: Uniqueness, deadline: Any) -> Any:
-    """The branches of a 2D certificate, None where there is none."""
-    if local.dimension != 2:
-        return None
+    """What proves it: multipliers of every contact, or 2D branches; None without either."""
     found = verdict.certificate
     if found is None:  # few contacts are decided by lists
         solution = verdict.solution or drive(local, tolerance=1e-10, time_limit=deadline)
         found = certify_load(local, solution, time_limit=deadline)
     if not isinstance(found, LoadCertificate) or found.outcome is not LoadOutcome.CERTIFIED:
+        return None
+    if found.multipliers is not None and found.multipliers.proved:
+        return _of_contacts(local, found.multipliers)
+    if local.dimension != 2:
         return None
     branches = [one for one in found.branches if isinstance(one, LoadBranch)]
     size = float(np.abs(found.r0).max(initial=0.0))
@@ -124,6 +130,22 @@ def _this_load(local: FrictionProblem, verdict: Uniqueness, deadline: Any) -> An
         "patterns": np.array([one.pattern for one in branches], dtype="S"),
         **{f"V{k}": one.multipliers for k, one in enumerate(branches)},
     }  # fmt: skip
+
+
+def _of_contacts(local: FrictionProblem, by: LoadMultipliers) -> Any:
+    """Multipliers of every contact about a solution, None where a contact does not react."""
+    if not np.linalg.norm(dense(local.W).reshape(local.contacts, -1), axis=1).all():
+        return None
+    arrays = {"r0": by.r0, "tau": by.tau, "sigma": by.sigma, "eta": by.eta,
+              "pinned": by.pinned.astype(np.int8)}  # fmt: skip
+    given = {k: v for k, v in arrays.items() if k != "r0"} | {"pinned": by.pinned}
+    W, q, mu = dense(local.W), local.free_velocity, np.array(local.mu)
+    try:
+        far = about(W, q, mu, by.r0, list(by.statuses), **given)
+    except Refused:  # it rounds more than the package
+        return None
+    return {**arrays, "statuses": np.array(list(by.statuses), dtype="S"),
+            "distance": ROOM * far}  # fmt: skip
 
 
 def _room(local: FrictionProblem, found: LoadCertificate, size: float) -> float:

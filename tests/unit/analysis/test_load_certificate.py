@@ -8,6 +8,7 @@ from load_certificate_checker import check_load
 from scipy import sparse
 
 import amontons as am
+from amontons.analysis.certificates.one_load import certificate
 from amontons.analysis.certificates.one_load.answer import LoadOutcome
 from amontons.analysis.certificates.one_load.certificate import certify_load
 from amontons.core.errors import InvalidInput, UnsupportedForm
@@ -117,7 +118,8 @@ def test_one_contact_has_other_solutions_from_mu_1_4(mu):
         assert answer.outcome is expected
 
 
-def test_mixed_statuses_on_a_hundred_contacts():
+def test_mixed_statuses_on_a_hundred_contacts(monkeypatch):
+    monkeypatch.setattr(certificate, "FEW", {2: 1000, 3: 1000})
     problem = hild_triangle(100, mu=0.6).assemble().condensed()
     x = np.linspace(0, 1, 100)
     q = np.column_stack([np.cos(5 * x) - 0.2, 0.5 * np.sin(7 * x)])
@@ -247,6 +249,7 @@ def test_the_clock():
 
 def test_shared_multipliers_are_complete_certificates(monkeypatch):
     # few multipliers on a subspace first, as for many contacts
+    monkeypatch.setattr(certificate, "FEW", {2: 1000, 3: 1000})
     monkeypatch.setattr("amontons.analysis.solutions.discs.multipliers.LARGE", 1)
     monkeypatch.setattr("amontons.analysis.solutions.discs.reduction.SETS", 4)
     called = []

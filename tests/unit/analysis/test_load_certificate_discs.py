@@ -6,6 +6,7 @@ from brute_force_3d import random_problem_3d, solutions_by_brute_force
 from disc_checker import accepted
 
 import amontons as am
+from amontons.analysis.certificates.one_load import certificate as one_load
 from amontons.analysis.certificates.one_load.answer import LoadOutcome
 from amontons.analysis.certificates.one_load.certificate import certify_load
 from amontons.analysis.solutions.discs.search import DiscProof
@@ -21,7 +22,8 @@ def certificate(W, q, mu, r, **options):
 
 
 @pytest.mark.parametrize("seed", [1, 6, 12, 14, 30])
-def test_certified_or_refuted_as_a_fine_search_has_it(seed):
+def test_certified_or_refuted_as_a_fine_search_has_it(monkeypatch, seed):
+    monkeypatch.setattr(one_load, "FEW", {2: 1000, 3: 1000})
     W, q, mu = random_problem_3d(seed)
     truth = solutions_by_brute_force(W, q, mu, angles=18, most=1500)
     answer = certificate(W, q, mu, truth[0][1], time_limit=600)

@@ -53,6 +53,75 @@ def test_one_load_is_proved_also_on_several_branches(tmp_path):
     assert claims == {"this load"}
 
 
+def many_contacts():
+    """100 contacts in 2D, above what is safe for every load."""
+    return hild_triangle(100).assemble().condensed().with_mu(1.0)
+
+
+def space_problem():
+    """25 contacts of a block that is pressed and dragged: open, slipping and sticking ones."""
+    block = am.Body(am.box((1, 1, 1), cells=4), am.LinearElastic(young=200, poisson=0.3))
+    return am.Model(
+        [block],
+        supports=[am.Fix("top", lambda x: (0, 0.2, 0.06 - 0.15 * x[0]))],
+        contacts=[am.Contact("bottom", am.Plane(normal=(0, 0, 1)), mu=1.0)],
+    ).assemble()  # fmt: skip
+
+
+def test_one_load_is_proved_by_multipliers_of_every_contact(tmp_path):
+    path, claim = written(tmp_path, many_contacts())
+    assert claim == "this load"
+    assert "every solution of this load" in am.check_certificate(path)
+    with h5py.File(path) as file:
+        assert "tau" in file
+
+
+FORGED_CONTACTS = {
+    "other solution": lambda file: file["r0"].write_direct(file["r0"][()] * 1.01 + 1e-3),
+    "other load": lambda file: flipped(file, "q"),
+    "other sides": lambda file: flipped(file, "eta"),
+    "nothing pinned": lambda file: file["pinned"].write_direct(0 * file["pinned"][()]),
+    "other statuses": lambda file: turned(file, "statuses"),
+    "more friction": lambda file: file["mu"].write_direct(file["mu"][()] * 3),
+    "a negative number": lambda file: flipped(file, "tau"),
+    "no number": lambda file: file["sigma"].write_direct(file["sigma"][()] * np.nan),
+}
+
+
+def test_a_contact_without_friction_has_no_other_side(tmp_path):
+    problem = many_contacts()
+    mu = np.full(100, 0.5)
+    mu[7] = 0.0
+    path, _ = written(tmp_path, problem.with_mu(mu))
+    am.check_certificate(path)
+
+    def forged(file):
+        eta = file["eta"][()]
+        eta[7] = 0.3
+        file["eta"].write_direct(eta)
+
+    reseal(path, forged)
+    with pytest.raises(InvalidInput, match="eta of contact 7"):
+        am.check_certificate(path)
+
+
+@pytest.fixture(scope="module")
+def in_space(tmp_path_factory):
+    """A file with multipliers of every contact of `space_problem`."""
+    path, _ = written(tmp_path_factory.mktemp("certificates"), space_problem())
+    return path.read_bytes()
+
+
+@pytest.mark.parametrize("forgery", FORGED_CONTACTS)
+def test_forged_multipliers_of_contacts_are_found(tmp_path, in_space, forgery):
+    path = tmp_path / "c.h5"
+    path.write_bytes(in_space)
+    am.check_certificate(path)
+    reseal(path, FORGED_CONTACTS[forgery])
+    with pytest.raises(InvalidInput, match="refused"):
+        am.check_certificate(path)
+
+
 def reseal(path, change):
     """Change a file and give it a new hash, as a forger would."""
     with h5py.File(path, "r+") as file:
@@ -63,6 +132,11 @@ def reseal(path, change):
 def flipped(file, name):
     values = file[name][()]
     file[name].write_direct(np.ascontiguousarray(-values))
+
+
+def turned(file, name):
+    values = file[name][()]
+    file[name].write_direct(np.ascontiguousarray(values[::-1]))
 
 
 FORGERIES = {

@@ -32,12 +32,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular
 
 from ...core.clock import NEVER, Deadline
-from ...core.errors import TimeUp
 from ..multipliers.rounding import EPSILON, is_positive_definite, unit_scale
 from .energy_bound import energy_bound
+from .pencil import INDEFINITE, Pencil
 from .thinning import COARSEST, couplings, spread_out
 
 Array = NDArray[np.float64]
@@ -46,15 +45,10 @@ THINNED = {2: 2, 3: 4}  # contacts of which one begins
 NEAREST, POWER = 4, 4  # contacts between which others are interpolated, power of couplings
 SHIFTS = (-0.7, -0.35, 0.0, 0.2, 0.5, 0.7, 1.0)  # of log alpha, tried with all contacts
 SHARES = (1.0, 0.6, 0.3, 0.0)  # of the variation of the others, until A is definite
-INDEFINITE = 1e3  # the value where A is not
-DENSE = 400  # rows up to which all eigenvalues are computed
-KEPT = 40  # largest ones that count beyond
-DEPTH = 3  # products of the block Krylov space in which they are looked for
 SOFT = (40.0, 100.0)  # over how much of the largest L is smoothed, one search after the other
 STEPS = 60  # of a search where contacts are few
 MANY, FINE_STEPS = 1000, 18  # rows from which on, and steps where a coarser answer was at hand
 ROOMS = (1e-4, 1e-3, 5e-3, 2e-2, 0.1)  # by which less is proved than was found
-SHARPENED = 4  # times that the largest eigenvalue is looked for before the proof
 PROOF = 1.0  # operations of a proof per cube of the rows
 
 
@@ -154,12 +148,12 @@ def _searched(form: _Form, deadline: Deadline, wanted: float) -> Array:
         steps = FINE_STEPS if len(form.W) > MANY else STEPS
         x = form.shifted(x, deadline)
     for soft in SOFT:
-        x = form.improved(x, soft, steps, deadline, wanted)
+        x = form.improved(x, soft, steps, deadline, wanted * (1 + 10 * ROOMS[0]))
     return x
 
 
 @dataclass(eq=False)
-class _Form:
+class _Form(Pencil):
     """A and B of contacts that all react, |W_ii| near 1, and what is asked about them.
 
     x: log tau, log sigma, log alpha (k,) each and f (k (d - 1),).
@@ -171,7 +165,6 @@ class _Form:
     normal: Places
     tangent: Places
     owner: Places  # (k (d - 1),) contact of a tangent
-    subspace: Array | None = None  # of the largest eigenvalues at the last x
 
     @classmethod
     def of(cls, W: Array, shape: Array) -> _Form:
@@ -201,10 +194,9 @@ class _Form:
         return self.contacts * (2 + self.dimension)
 
     @property
-    def operations(self) -> float:
-        """Of one evaluation: all eigenvalues, or a factorisation and products with it."""
-        n = float(len(self.W))
-        return 8.0 * n**3 if n <= DENSE else n**3 / 3 + 5.0 * DEPTH * KEPT * n**2
+    def size(self) -> int:
+        """Rows of W."""
+        return len(self.W)
 
     # ------------------------------------------------------------- coarser and finer
     def thinned(self) -> tuple[_Form, Array]:
@@ -268,67 +260,14 @@ class _Form:
         half = 0.5 * self.shape * sigma
         return half * alpha, (half / alpha)[self.owner]
 
-    def largest(self, x: Array) -> tuple[Array, Array] | None:
-        """(L, v) of the largest few of B v = L A v, ascending; None where A is indefinite."""
-        try:
-            root = cholesky(self.energy(x), lower=True, check_finite=False)
-        except LinAlgError:
-            return None
+    def times(self, x: Array, v: Array) -> Array:
+        """B v for columns v."""
         at_normal, at_tangent = self.weights(x)
+        out = self.W[self.tangent].T @ (at_tangent[:, None] * (self.W[self.tangent] @ v))
+        out[self.normal] += at_normal[:, None] * v[self.normal]
+        return out
 
-        def product(y: Array) -> Array:
-            v = solve_triangular(root, y, lower=True, trans=1, check_finite=False)
-            out = self.W[self.tangent].T @ (at_tangent[:, None] * (self.W[self.tangent] @ v))
-            out[self.normal] += at_normal[:, None] * v[self.normal]
-            return solve_triangular(root, out, lower=True, check_finite=False)
-
-        size = len(self.W)
-        if size <= DENSE:
-            C = product(np.eye(size))
-            few = (max(0, size - KEPT), size - 1)
-            w, y = eigh((C + C.T) / 2, check_finite=False, subset_by_index=few)
-        else:
-            w, y = self._in_subspace(product, size)
-        return w, solve_triangular(root, y, lower=True, trans=1, check_finite=False)
-
-    def _in_subspace(self, product, size: int) -> tuple[Array, Array]:  # type: ignore[no-untyped-def]
-        """Ritz values and vectors of a block Krylov space that begins with the last ones."""
-        begin, depth = self.subspace, DEPTH
-        if begin is None:
-            begin = np.random.default_rng(0).standard_normal((size, KEPT))
-            depth = 3 * DEPTH
-        Q = np.linalg.qr(begin)[0]
-        blocks, images = [Q], []
-        for k in range(depth):
-            images.append(product(blocks[-1]))
-            if k + 1 < depth:
-                basis = np.hstack(blocks)
-                new = images[-1] - basis @ (basis.T @ images[-1])
-                new -= basis @ (basis.T @ new)
-                blocks.append(np.linalg.qr(new)[0])
-        basis, image = np.hstack(blocks), np.hstack(images)
-        H = basis.T @ image
-        w, s = eigh((H + H.T) / 2)
-        y = basis @ s[:, -KEPT:]
-        self.subspace = y
-        return w[-KEPT:], y
-
-    def value(self, x: Array, soft: float, *, gradient: bool = True) -> tuple[float, Array]:
-        """(smoothed log of the largest L, its gradient); INDEFINITE where A is."""
-        found = self.largest(x)
-        if found is None:
-            return INDEFINITE, np.zeros_like(x)
-        w, v = found
-        L = w[-1]
-        p = np.exp(soft * (w / L - 1))
-        value = float(np.log(L) + np.log(p.sum()) / soft)
-        p /= p.sum()
-        if not gradient:
-            return value, np.zeros(0)
-        keep = p > 1e-8
-        return value, self._slope(x, w[keep], v[:, keep], p[keep] / L)
-
-    def _slope(self, x: Array, w: Array, v: Array, p: Array) -> Array:
+    def slope(self, x: Array, w: Array, v: Array, p: Array) -> Array:
         """Gradient by eigenvectors v with v A v = 1, weighted by p (m,)."""
         _, sigma, alpha, f = self.parts(x)
         k, wp = self.contacts, w * p
@@ -345,31 +284,6 @@ class _Form:
         slope[3 * k :] = -(v[self.tangent] * u[self.normal[self.owner]]) @ wp
         return slope
 
-    def improved(
-        self, x: Array, soft: float, steps: int, deadline: Deadline, wanted: float
-    ) -> Array:
-        """x after so many steps, or when t is wanted * 1.01, or in time."""
-        best = [np.inf, x]
-        from scipy.optimize import minimize  # a start of the program does not wait for it
-
-        enough = np.log(wanted * (1 + 10 * ROOMS[0])) if wanted > 0 else -np.inf
-
-        def value(y: Array) -> tuple[float, Array]:
-            deadline.pay(self.operations)
-            found = self.value(y, soft)
-            if found[0] < best[0]:
-                best[:] = found[0], y.copy()
-                if -found[0] > enough:
-                    raise StopIteration
-            return found
-
-        try:
-            minimize(value, x, jac=True, method="L-BFGS-B",
-                     options={"maxiter": steps, "maxfun": 2 * steps})  # fmt: skip
-        except (StopIteration, TimeUp):
-            pass
-        return best[1]
-
     # ---------------------------------------------------------------------- proving
     def multipliers(self, x: Array, t: float) -> ContactMultipliers:
         """In the units of W as given."""
@@ -382,10 +296,7 @@ class _Form:
 
     def proved(self, x: Array, deadline: Deadline, wanted: float) -> ContactMultipliers:
         """The multipliers with the largest t that could be proved."""
-        found = self.largest(x)
-        for _ in range(SHARPENED):  # each goes on from the subspace of the last
-            found = self.largest(x)
-        t = 0.0 if found is None else float(1 / found[0][-1])
+        t = self.sharpened(x)
         by = self.multipliers(x, t)
         given = self.W * self.root * self.root[:, None]
         for room in ROOMS if t > 0 else ():

@@ -107,13 +107,14 @@ class CriticalFriction(Told):
 
 def critical_friction(
     problem: FrictionProblem | Scaled, *, gap: float = 1e-2, time_limit: TimeLimit = None,
-    first: float | None = None,
+    first: float | None = None, brief: bool = False,
 ) -> CriticalFriction:  # fmt: skip
     """Bounds on the friction below which every load has exactly one solution.
 
     gap: relative distance of the bounds that is good enough.  time_limit: seconds; without it
     operations are counted, as many as take about SECONDS.  first: a friction of interest, which
     is proved to be safe before others if it can be; in 3D a lower bound above it is enough.
+    brief: without what takes long, branches in 2D and an upper bound in 3D.
     Raises UnsupportedForm under Tresca's law.
     """
     deadline = deadline_of(time_limit, SECONDS)
@@ -132,8 +133,8 @@ def critical_friction(
         return CriticalFriction(np.inf, np.inf, "determinants", None, None, None, 0,
                                 now() - began, why)  # fmt: skip
     if problem.dimension == 3:
-        return _in_space(pieces, energy, deadline, first, began)
-    search = _Search(pieces, deadline, energy, gap, first)
+        return _in_space(pieces, energy, deadline, first, began, brief=brief)
+    search = _Search(pieces, deadline, energy, gap, first, brief=brief)
     search.run()
     found = search.found
     witness = None if found.states is None else make_witness(pieces, found)
@@ -144,9 +145,10 @@ def critical_friction(
 
 
 def _in_space(
-    pieces: Pieces, energy: float, deadline: Deadline, first: float | None, began: float
-) -> CriticalFriction:
-    """Bounds of a 3D problem."""
+    pieces: Pieces, energy: float, deadline: Deadline, first: float | None, began: float, *,
+    brief: bool,
+) -> CriticalFriction:  # fmt: skip
+    """Bounds of a 3D problem, brief: without an upper one."""
     by, late = None, ""
     if first is None or energy <= first:
         by, late = space.lower_bound(pieces, deadline.share(space.LOWER), first)
@@ -154,7 +156,8 @@ def _in_space(
     if by is not None and by.t > energy:
         lower, criterion = by.t, "contact multipliers"
     upper, witness = np.inf, None
-    found = space.upper_bound(pieces, deadline) if energy > 0 else None
+    search = energy > 0 and not brief
+    found = space.upper_bound(pieces, deadline) if search else None
     if found is not None:
         upper = found.t
         witness = Witness(
@@ -176,6 +179,7 @@ class _Search:
     energy: float  # the bound of `energy_bound`
     gap: float
     first: float | None = None
+    brief: bool = False
     found: Threshold = field(default_factory=Threshold)
     criterion: str = "none"
     reason: str = ""
@@ -198,7 +202,8 @@ class _Search:
             return
         self.criterion = "energy"
         self._by_contacts()
-        self._branch()
+        if not self.brief:
+            self._branch()
 
     def _by_contacts(self) -> None:
         """Raise the lower bound by multipliers of every contact."""

@@ -28,7 +28,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.clock import Deadline
-from ...core.errors import TimeUp
 from .status_pieces import REAL, Pieces
 from .thinning import COARSEST, couplings, spread_out
 
@@ -87,13 +86,12 @@ def _searched(form: _Form, deadline: Deadline) -> tuple[States, Array] | None:
         starts = [(found[0][owner], found[1][owner])]
     best: tuple[States, Array] | None = None
     least = np.inf
-    try:
-        for begin, turned in starts:
-            t, states, directions = form.descended(begin, turned, deadline)
-            if t < least:
-                best, least = (states, directions), t
-    except TimeUp:
-        pass
+    for begin, turned in starts:
+        t, states, directions = form.descended(begin, turned, deadline)
+        if t < least:
+            best, least = (states, directions), t
+        if deadline.passed:
+            break
     return best
 
 
@@ -240,7 +238,9 @@ class _Form:
         if not np.isfinite(t):
             return t, states, directions
         for _ in range(ROUNDS):
-            deadline.pay(WORK * len(self.W) ** 3)
+            if not deadline.affords(WORK * len(self.W) ** 3):
+                break
+            deadline.spend(WORK * len(self.W) ** 3)
             better = self._round(states, directions, t)
             if better is None:
                 break

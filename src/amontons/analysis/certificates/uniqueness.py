@@ -44,6 +44,8 @@ SECONDS = 60.0  # whose work a verdict without a time limit may take
 QUICK_SECONDS = 1.0  # the same of a quick one
 ABOVE = 1e-9  # relative, at which a friction is proved to be safe
 BOUNDS = 0.5  # part of the time for the bounds on the critical friction
+MANY = {2: 25, 3: 100}  # contacts in 2D and 3D from which on short ways come first
+PROMPT = {2: 0.1, 3: 0.2}  # part of the time for the bounds of a short way
 SAME_MOTION = " Reactions differ, the motion is the same."
 
 
@@ -78,7 +80,15 @@ def assess(
         return _given_friction(cast(Array, given), local.contacts, began, deadline)
     if not isinstance(given, Scaled):
         return without_verdict(local, _not_known(problem.law), began)
-    verdict = _every_load(given, deadline.share(BOUNDS))
+    verdict = _by_energy(given, deadline.share(BOUNDS))
+    if verdict.verdict is Verdict.UNDECIDED and given.contacts > MANY[given.dimension]:
+        prompt = deadline.share(PROMPT[given.dimension])
+        verdict = _every_load(given, verdict, prompt, brief=True)
+        if verdict.verdict is Verdict.UNDECIDED:
+            verdict = _this_load(given, solution, verdict, deadline, brief=True)
+            solution = solution or verdict.solution
+    if verdict.verdict is Verdict.UNDECIDED:
+        verdict = _every_load(given, verdict, deadline.share(BOUNDS))
     if verdict.verdict is Verdict.UNDECIDED:
         verdict = _this_load(given, solution, verdict, deadline)
     return _finished(verdict, began)
@@ -206,14 +216,15 @@ def _by_energy(scaled: Scaled, deadline: Deadline) -> Uniqueness:
     return Uniqueness(Verdict.UNDECIDED, friction, lower, np.inf, "energy", reason)
 
 
-def _every_load(scaled: Scaled, deadline: Deadline) -> Uniqueness:
-    """The verdict of the bounds on the critical friction."""
-    cheap = _by_energy(scaled, deadline)
-    if cheap.lower > cheap.friction or not scaled.contacts or deadline.passed:
-        return cheap
-    above = cheap.friction * (1 + ABOVE)  # safe up to there means safe at the friction itself
-    bounds = critical_friction(scaled, time_limit=deadline, first=above)
-    return _by_bounds(cheap, bounds)
+def _every_load(
+    scaled: Scaled, known: Uniqueness, deadline: Deadline, *, brief: bool = False
+) -> Uniqueness:
+    """The verdict of the bounds on the critical friction, and of what is known of it."""
+    if not scaled.contacts or deadline.passed:
+        return known
+    above = known.friction * (1 + ABOVE)  # safe up to there means safe at the friction itself
+    bounds = critical_friction(scaled, time_limit=deadline, first=above, brief=brief)
+    return _by_bounds(known, bounds)
 
 
 def _by_bounds(cheap: Uniqueness, bounds: CriticalFriction) -> Uniqueness:
@@ -237,9 +248,12 @@ def _by_bounds(cheap: Uniqueness, bounds: CriticalFriction) -> Uniqueness:
 # --------------------------------------------------------------------- this load
 def _this_load(
     scaled: Scaled, solution: FrictionSolution | None, verdict: Uniqueness,
-    deadline: Deadline,
+    deadline: Deadline, *, brief: bool = False,
 ) -> Uniqueness:  # fmt: skip
-    """All solutions where they can be enumerated, else the certificate about one."""
+    """All solutions where they can be enumerated, else the certificate about one.
+
+    brief: only by multipliers of every contact.
+    """
     local = scaled.problem
     if local.dimension == 2 and local.contacts <= ENUMERATED and local.q_norm > 0:
         listed = enumerate_solutions(scaled, time_limit=deadline.share(0.5))
@@ -258,7 +272,7 @@ def _this_load(
         reason = "Without load r = 0 is a solution; others were not looked for."
         return replace(verdict, reason=f"{verdict.reason} {reason}")
     try:
-        found = certify_load(scaled, solution, time_limit=deadline)
+        found = certify_load(scaled, solution, time_limit=deadline, brief=brief)
     except InvalidInput as reason:
         why = f"No certificate: {reason}." if given else "The solution is too rough to certify."
         return replace(verdict, reason=f"{verdict.reason} {why}")

@@ -67,7 +67,7 @@ def prove(
         scale = unit_scale(M)
         M, error = (A * scale[:, None] * scale for A in (M, error))
         exact = off is None or not off.any()
-        tau = 0.0 if exact else SHARE * _smallest_eigenvalue(M)
+        tau = 0.0 if exact else SHARE * smallest_eigenvalue(M)
         M[np.diag_indices(len(M))] -= tau
         if not is_positive_definite(M, error):
             continue
@@ -131,7 +131,7 @@ def _penalised(multipliers: Array, rows: tuple[Index, Index], penalty: float) ->
     return W
 
 
-def _smallest_eigenvalue(M: Array) -> float:
+def smallest_eigenvalue(M: Array) -> float:
     """An estimate, by inverse iteration; 0 where M is not positive definite, or overflows."""
     try:
         factor = linalg.cho_factor(M, check_finite=False)

@@ -92,12 +92,36 @@ def polished(scaled: Scaled, r: Array) -> tuple[Array, float]:
     size, rho = np.inf, np.ones((1, scaled.shape[0]))
     for _ in range(3):
         F, A, B = linearise(scaled, r[None], rho)
-        dr = _solve(scaled, A, B, -F)[0]
+        dr = _reduced(scaled, F[0], A[0], B[0])
         last, size = size, float(np.abs(dr).max(initial=0.0))
         if size > last:
             return r, last
         r = r + dr
     return r, size
+
+
+def _reduced(scaled: Scaled, F: Array, A: Array, B: Array) -> Array:
+    """dr of (A + B W) dr = -F; contacts with B = 0 change by -A^-1 F and leave first."""
+    nc, d = scaled.shape
+    alone = ~B.any(axis=(1, 2))
+    dr = np.zeros((nc, d))
+    dr[alone] = np.linalg.solve(A[alone], -F[alone, :, None])[..., 0]
+    rest = np.flatnonzero(~alone)
+    if not len(rest):
+        return dr
+    rows = (d * rest[:, None] + np.arange(d)).ravel()
+    W = scaled.W[rows].reshape(len(rest), d, nc * d)
+    right = -F[rest] - (B[rest] @ (W @ dr.ravel())[..., None])[..., 0]
+    matrix = (B[rest] @ W[:, :, rows]).reshape(len(rest), d, len(rest), d)
+    own = np.arange(len(rest))
+    matrix[own, :, own] += A[rest]
+    matrix = matrix.reshape(len(rows), len(rows))
+    try:
+        x = np.linalg.solve(matrix, right.ravel())
+    except np.linalg.LinAlgError:
+        x = _least_squares(matrix, right.reshape(-1, 1))[:, 0]
+    dr[rest] = np.where(np.isfinite(x), x, 0.0).reshape(-1, d)
+    return dr
 
 
 def jacobian(scaled: Scaled, r: Array) -> Array:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ...solutions.discs.proof import DiscBox
 from ...solutions.enumerate import PieceSolution
+from ..load_multipliers import LoadMultipliers
 
 Array = NDArray[np.float64]
 
@@ -42,7 +43,8 @@ class LoadCertificate:
     other: a second solution where REFUTED.  branches: what proves CERTIFIED; together they have
     all patterns.  distance: bound of the difference of reactions to r0 (nc, 2), relative to
     the largest reaction or, if that is larger, to what the load can make.  examined:
-    inequalities that were solved.
+    inequalities that were solved.  multipliers: of every contact, what proves CERTIFIED without
+    branches; else how far they came, None where they were not looked for.
     """
 
     outcome: LoadOutcome
@@ -54,6 +56,7 @@ class LoadCertificate:
     reason: str
     seconds: float
     unresolved: bool = False  # is it undecided because loads differ too much?
+    multipliers: LoadMultipliers | None = None
 
     def __str__(self) -> str:
         return f"{self.outcome.value}: {self.reason}"

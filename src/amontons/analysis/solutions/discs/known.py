@@ -51,7 +51,7 @@ def known_solution(local: Scaled, r: Array) -> Known:
     slope = np.where(slip, -np.sign(u[:, 1]), np.sign(tangent))
     tangent = np.where(slip | border, slope * bound, tangent)
     r = np.where(closed, np.stack([normal, tangent]), 0.0).T.ravel()
-    u, rounding = _velocity(local, r)
+    u, rounding = velocity_and_rounding(local, r)
     z = np.hstack([r.reshape(-1, 2), u.reshape(-1, 2)])
     z[:, 2] = np.where(closed | (z[:, 2] <= SLACK), 0.0, z[:, 2])
     z[closed & ~slip, 3] = 0.0
@@ -59,7 +59,7 @@ def known_solution(local: Scaled, r: Array) -> Known:
     return Known(r, z, off, _touches(local, z))
 
 
-def _velocity(local: Scaled, r: Array) -> tuple[Array, Array]:
+def velocity_and_rounding(local: Scaled, r: Array) -> tuple[Array, Array]:
     """(W r + q, bound of its error): summed in extended precision where the machine has one."""
     q = local.q.ravel()
     if not r.any():

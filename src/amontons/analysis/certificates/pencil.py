@@ -1,0 +1,155 @@
+"""Multipliers x for which A(x) - t B(x) stays positive definite up to the largest t.
+
+A is to be positive definite, B may be indefinite; both depend smoothly on x.  Minimised is the
+largest L of B v = L A v, t = 1 / L, smoothed over the largest few: log L + log(sum exp(soft
+(L_i / L - 1))) / soft, whose derivative comes from the eigenvectors.  All of it is floating
+point; what was found has to be proved.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular
+
+from ...core.clock import Deadline
+from ...core.errors import TimeUp
+
+Array = NDArray[np.float64]
+INDEFINITE = 1e3  # the value where A is not positive definite
+FARTHEST = 300.0  # size of x, logarithms among them, beyond which nothing is tried
+DENSE = 400  # rows up to which all eigenvalues are computed
+KEPT = 40  # largest ones that count beyond
+DEPTH = 3  # products of the block Krylov space in which they are looked for
+SHARPENED = 4  # times that the largest eigenvalue is looked for before a proof
+
+
+class Pencil(ABC):
+    """A(x) and B(x) of `size` rows, and the search for x."""
+
+    subspace: Array | None = None  # of the largest eigenvalues at the last x
+
+    @property
+    @abstractmethod
+    def size(self) -> int:
+        """Rows of A and B."""
+
+    @abstractmethod
+    def energy(self, x: Array) -> Array:
+        """A (size, size)."""
+
+    @abstractmethod
+    def times(self, x: Array, v: Array) -> Array:
+        """B v for columns v."""
+
+    @abstractmethod
+    def slope(self, x: Array, w: Array, v: Array, p: Array) -> Array:
+        """Gradient of sum p_i v_i (B - w_i A) v_i by x, v_i the columns of v."""
+
+    @property
+    def operations(self) -> float:
+        """Of one evaluation: all eigenvalues, or a factorisation and products with it."""
+        n = float(self.size)
+        return 8.0 * n**3 if n <= DENSE else n**3 / 3 + 5.0 * DEPTH * KEPT * n**2
+
+    def largest(self, x: Array) -> tuple[Array, Array] | None:
+        """(L, v) of the largest few of B v = L A v, ascending; None where A is indefinite."""
+        try:
+            root = cholesky(self.energy(x), lower=True, check_finite=False)
+        except LinAlgError:
+            return None
+
+        def product(y: Array) -> Array:
+            v = solve_triangular(root, y, lower=True, trans=1, check_finite=False)
+            return solve_triangular(root, self.times(x, v), lower=True, check_finite=False)
+
+        size = self.size
+        if size <= DENSE:
+            C = product(np.eye(size))
+            few = (max(0, size - KEPT), size - 1)
+            w, y = eigh((C + C.T) / 2, check_finite=False, subset_by_index=few)
+        else:
+            w, y = self._in_subspace(product, size)
+        if not (len(w) and np.isfinite(w).all()):  # A is singular to rounding
+            return None
+        return w, solve_triangular(root, y, lower=True, trans=1, check_finite=False)
+
+    def _in_subspace(self, product, size: int) -> tuple[Array, Array]:  # type: ignore[no-untyped-def]
+        """Ritz values and vectors of a block Krylov space that begins with the last ones."""
+        begin, depth = self.subspace, DEPTH
+        if begin is None:
+            begin = np.random.default_rng(0).standard_normal((size, KEPT))
+            depth = 3 * DEPTH
+        Q = np.linalg.qr(begin)[0]
+        blocks, images = [Q], []
+        for k in range(depth):
+            images.append(product(blocks[-1]))
+            if k + 1 < depth:
+                basis = np.hstack(blocks)
+                new = images[-1] - basis @ (basis.T @ images[-1])
+                new -= basis @ (basis.T @ new)
+                blocks.append(np.linalg.qr(new)[0])
+        basis, image = np.hstack(blocks), np.hstack(images)
+        H = basis.T @ image
+        w, s = eigh((H + H.T) / 2)
+        y = basis @ s[:, -KEPT:]
+        self.subspace = y
+        return w[-KEPT:], y
+
+    def sharpened(self, x: Array) -> float:
+        """t = 1 / L at x, as well as can be told; inf without an L > 0, 0 without A."""
+        found = self.largest(x)
+        for _ in range(SHARPENED if found is not None and self.size > DENSE else 0):
+            found = self.largest(x)  # each goes on from the subspace of the last
+        if found is None:
+            return 0.0
+        return float(1 / found[0][-1]) if found[0][-1] > 0 else np.inf
+
+    def value(self, x: Array, soft: float, *, gradient: bool = True) -> tuple[float, Array]:
+        """(smoothed log of the largest L, its gradient); INDEFINITE where A is.
+
+        Minus INDEFINITE where no L is positive: every t is good.
+        """
+        found = self.largest(x)
+        if found is None:
+            return INDEFINITE, np.zeros_like(x)
+        w, v = found
+        L = w[-1]
+        if L <= 0:
+            return -INDEFINITE, np.zeros_like(x)
+        p = np.exp(soft * (w / L - 1))
+        value = float(np.log(L) + np.log(p.sum()) / soft)
+        p /= p.sum()
+        if not gradient:
+            return value, np.zeros(0)
+        keep = p > 1e-8
+        return value, self.slope(x, w[keep], v[:, keep], p[keep] / L)
+
+    def improved(
+        self, x: Array, soft: float, steps: int, deadline: Deadline, enough: float
+    ) -> Array:
+        """x after so many steps, or when the value is below -log(enough), or in time."""
+        best = [np.inf, x]
+        from scipy.optimize import minimize  # a start of the program does not wait for it
+
+        goal = np.log(enough) if enough > 0 else -np.inf
+
+        def value(y: Array) -> tuple[float, Array]:
+            deadline.pay(self.operations)
+            if np.abs(y).max(initial=0.0) > FARTHEST:
+                return INDEFINITE, np.zeros_like(y)
+            found = self.value(y, soft)
+            if found[0] < best[0]:
+                best[:] = found[0], y.copy()
+                if -found[0] > goal:
+                    raise StopIteration
+            return found
+
+        try:
+            minimize(value, x, jac=True, method="L-BFGS-B",
+                     options={"maxiter": steps, "maxfun": 2 * steps})  # fmt: skip
+        except (StopIteration, TimeUp):
+            pass
+        return best[1]
