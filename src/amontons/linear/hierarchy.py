@@ -14,9 +14,10 @@ from scipy import sparse
 from ..core.errors import SingularOperator
 from .aggregation import LARGEST, Aggregates
 from .chunks import better_numbers
+from .grid import GridBlocks
 from .level_matrix import LevelMatrix
 from .node_blocks import DEAD, NodeBlocks
-from .patched import PatchedBlocks, Rows
+from .patched import PatchedBlocks, PatchedOperator, Rows, patched
 from .transfer import Transfer
 from .vectors import advance, dot, norm, turn
 from .work import Work
@@ -140,7 +141,7 @@ class Level:
     def __post_init__(self) -> None:
         self.work, self.free = Work(self.A.nodes), np.zeros(self.A.nodes, dtype=bool)
 
-    def of(self, A: LevelMatrix | PatchedBlocks) -> Level:
+    def of(self, A: LevelMatrix | PatchedBlocks | PatchedOperator) -> Level:
         """The same with another matrix."""
         out = copy(self)
         out.A = A
@@ -234,9 +235,16 @@ class Hierarchy:
         """The same with rows of a solve's own on every coarse level."""
         out = copy(self)
         coarse = zip(self.levels[1:], rows, strict=True)
-        own = [level.of(PatchedBlocks(level.A.stored(), own)) for level, own in coarse]
+        own = [level.of(patched(level.A, own)) for level, own in coarse]
         out.levels = [self.levels[0], *own]
         return out
+
+    def rest(self) -> None:
+        """Give up the vectors in which this thread works; the next cycle makes them anew."""
+        for level in self.levels:
+            level.work.rest()
+            if isinstance(level.A, GridBlocks):
+                level.A.rest()
 
     def solve(self, k: int, b: Array, tolerance: float, most: int) -> tuple[Array, int]:
         """(x, iterations) of CG on level k for A x = b with one cycle as preconditioner.

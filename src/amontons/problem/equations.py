@@ -384,7 +384,7 @@ class Equations(Matrices):
     def _is_estimated(self) -> bool:
         """True for large meshes, where M^-1 f would cost too much only to judge."""
         large = self.unknowns > ESTIMATED and not isinstance(self.M, DistributedMatrix)
-        return large and (bool(self.levels) or self.near_nullspace is not None)
+        return large and self.is_mesh
 
     def _open_velocity(self) -> Array:
         hierarchy = self.hierarchy if self._is_estimated else None

@@ -7,13 +7,13 @@ import os
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.files import put
+from ...core.files import put_from
 from .mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -22,6 +22,8 @@ CELL_TYPES = {
     "pyramid": "pyramid", "tri6": "triangle6", "quad9": "quad9", "tet10": "tetra10",
     "hex27": "hexahedron27", "quad8": "quad8", "hex20": "hexahedron20", "wedge15": "wedge15",
 }  # fmt: skip
+
+END = 1000  # bytes of a VTU file that hold its last tags
 
 
 def with_all_kinds() -> Any:
@@ -50,13 +52,14 @@ def write_meshes(
     meshio = with_all_kinds()
     starts = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
     cells: list[Any] = [
-        (CELL_TYPES[block.kind], block.nodes + start)
+        (CELL_TYPES[block.kind], block.nodes + start if start else block.nodes)
         for mesh, start in zip(meshes, starts, strict=False)
         for block in mesh.cells
     ]
     ends = np.cumsum([len(nodes) for _, nodes in cells])[:-1]
     points = np.zeros((starts[-1], 3))
-    points[:, : meshes[0].dim] = np.concatenate([mesh.points for mesh in meshes])
+    for mesh, first, last in zip(meshes, starts, starts[1:], strict=False):
+        points[first:last, : mesh.dim] = mesh.points
     split: Any = {name: np.split(values, ends) for name, values in cell_data.items()}
     whole = meshio.Mesh(points, cells, point_data=point_data, cell_data=split)
     if path.suffix != ".vtu":
@@ -64,12 +67,12 @@ def write_meshes(
         return
     with tempfile.TemporaryFile() as scratch:  # its writer takes no buffer
         meshio.vtu.write(os.dup(scratch.fileno()), whole)
-        scratch.seek(0)
-        put(path, _with_fields(scratch.read(), field_data or {}, remark))
+        _add_fields(scratch, field_data or {}, remark)
+        put_from(path, scratch)
 
 
-def _with_fields(text: bytes, fields: Mapping[str, float], remark: str) -> bytes:
-    """A VTU file with field data before its end, as its writer knows none."""
+def _add_fields(file: BinaryIO, fields: Mapping[str, float], remark: str) -> None:
+    """Put field data before the end of a VTU file, as its writer knows none."""
     arrays = "".join(
         f'<DataArray type="{"Int32" if isinstance(value, int) else "Float64"}" '
         f'Name={quoteattr(name)} '
@@ -78,5 +81,8 @@ def _with_fields(text: bytes, fields: Mapping[str, float], remark: str) -> bytes
         if math.isfinite(value)
     )
     note = f"<!-- {remark.replace('--', '- ')} -->\n" if remark else ""
-    head, end, rest = text.rpartition(b"</UnstructuredGrid>")
-    return head + f"<FieldData>\n{arrays}</FieldData>\n{note}".encode() + end + rest
+    start = max(file.seek(0, os.SEEK_END) - END, 0)
+    file.seek(start)
+    head, end, rest = file.read().rpartition(b"</UnstructuredGrid>")
+    file.seek(start + len(head))
+    file.write(f"<FieldData>\n{arrays}</FieldData>\n{note}".encode() + end + rest)
