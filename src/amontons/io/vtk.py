@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..linear.blocks import spatial
+from ..linear.blocks import kernel_rows
 from ..mechanics.elements import von_mises
 from ..mechanics.elements.corotational import corotated_stress
 from ..mechanics.elements.given import GivenMatrices
@@ -81,8 +81,8 @@ def model_fields(
     names, owner = _parts(model)
     regions, region = _regions(model)
     point = {
-        "displacement": spatial(_joined(fields.displacement)),
-        "reaction": spatial(_joined(fields.reaction)),
+        "displacement": kernel_rows(_joined(fields.displacement)),
+        "reaction": kernel_rows(_joined(fields.reaction)),
         "stress": nodes, "von_mises": at_nodes,
         **contact_fields(model, fields, solution.sliding, starts),
     }  # fmt: skip

@@ -8,10 +8,10 @@ on it, orthonormalised there; the prolongation is smoothed by one damped block J
 with T those motions cut up.  Aggregates and T are made by pyamg; rho is estimated from a fixed
 start, so that the same matrix always has the same levels, to the last bit.
 
-An aggregate is a unit of k / 3 block rows that stay together.  Where nodes have parts (pieces of
-bodies that hang together without contact), an aggregate keeps to one of them, so that coarse
-levels hold the rigid motions of each on its own: what slides or opens does not have to be
-resolved by the finest.  A with parts need not be symmetric: restriction is P^T all the same.
+An aggregate is a unit of k / 3 block rows that stay together.  Where nodes have parts (pieces
+of bodies that hang together without contact), an aggregate keeps to one of them, so that
+coarse levels hold the rigid motions of each on its own: what slides or opens does not have to
+be resolved by the finest.  A with parts need not be symmetric: restriction is P^T all the same.
 
 [VMB] P. Vanek, J. Mandel, M. Brezina, "Algebraic multigrid by smoothed aggregation for second
 and fourth order elliptic problems", Computing 56 (1996).
@@ -125,7 +125,7 @@ def _smoothed(A: NodeBlocks, T: sparse.bsr_array, omega: float) -> sparse.bsr_ar
 
 
 def _by_powers(A: NodeBlocks) -> float:
-    """The growth of D^-1 A in power iterations, D the diagonal blocks, A of any kind."""
+    """The size of D^-1 A, D the diagonal blocks, by power iterations."""
     x = np.cos(np.arange(3.0 * A.nodes)).reshape(-1, 3)
     y, size = np.empty_like(x), norm(x)
     rho = 0.0
@@ -141,7 +141,7 @@ def _by_powers(A: NodeBlocks) -> float:
 
 
 def _by_lanczos(A: NodeBlocks) -> float:
-    """The largest eigenvalue of D^-1 A, by Lanczos's method in the product of D; A symmetric."""
+    """The same of a symmetric A, by Lanczos's method in the product of D."""
     D = A.diagonal_blocks
     x = np.cos(np.arange(3.0 * A.nodes)).reshape(-1, 3)
     z, before = np.empty_like(x), np.zeros_like(x)
