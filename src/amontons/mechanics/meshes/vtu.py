@@ -91,7 +91,7 @@ def _write_array(file: BinaryIO, name: str, parts: Callable[[], Iterator[NDArray
     for part in parts():
         first = part if first is None else first
         part = np.ascontiguousarray(part, dtype=part.dtype.newbyteorder("<"))
-        data = memoryview(part.reshape(-1).view(np.uint8))
+        data = memoryview(part.reshape(-1).view(np.uint8))  # type: ignore[arg-type]
         length += len(data)
         begin = 0
         if rest:

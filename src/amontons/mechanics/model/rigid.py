@@ -58,7 +58,7 @@ class Piece:
         if self.joined is not None:
             return self.joined[chosen]
         own = chosen.reshape(self.points.shape)
-        near = own.any(axis=1)
+        near: NDArray[np.bool_] = np.asarray(own.any(axis=1))
         return rigid_modes(self.points, near)[own[near].ravel()]
 
     def moving(self, motion: Array) -> Array:
