@@ -12,6 +12,8 @@ blocks and block Gauss-Seidel, from 50 000 dofs on no matrix and Chebyshev smoot
 seconds of one thread, best of the repeats.  Two bodies are judged by their residual: forming W
 for the judge would take many times as long as the solve.  Unstructured: the cube in tetrahedra
 of gmsh (not installed by default), with set-up: what depends on the matrices alone.
+Pairs and kinds (`multigrid_models`): one run each, whose times to 1e-8 are first ones with all
+preparation in them, so look at cycles.
 
 Writes results/multigrid.md and results/multigrid.json beside this file; with --only, parts that
 are not named stay as stored.
