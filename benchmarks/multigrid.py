@@ -12,6 +12,8 @@ blocks and block Gauss-Seidel, from 50 000 dofs on no matrix and Chebyshev smoot
 seconds of one thread, best of the repeats.  Two bodies are judged by their residual: forming W
 for the judge would take many times as long as the solve.  Unstructured: the cube in tetrahedra
 of gmsh (not installed by default), with set-up: what depends on the matrices alone.
+Pairs and kinds (`multigrid_models`): one run each, whose times to 1e-8 are first ones with all
+preparation in them, so look at cycles.
 
 Writes results/multigrid.md and results/multigrid.json beside this file; with --only, parts that
 are not named stay as stored.
@@ -26,12 +28,12 @@ import importlib.util
 import json
 import resource
 import sys
-import tempfile
 import time
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import multigrid_models as models
 import numpy as np
 from machine import describe
 
@@ -77,10 +79,14 @@ def stacked(cells, method="mortar"):
 
 
 def best(repeats, run):
-    """(CPU seconds, result) of the quickest of some runs; one more run before warms up."""
-    run()
+    """(CPU seconds, result) of the quickest of some runs; one more before warms up.
+
+    repeats 0: of one run alone.
+    """
+    if repeats:
+        run()
     times = []
-    for _ in range(repeats):
+    for _ in range(max(repeats, 1)):
         started = time.process_time()
         result = run()
         times.append(time.process_time() - started)
@@ -178,43 +184,22 @@ def two_bodies_row(model, repeats):
     return row
 
 
-def unstructured(size, mu):
+def unstructured(size, mu=0.3):
     """The cube in tetrahedra with edges of about `size`."""
-    import gmsh
-
-    gmsh.initialize(interruptible=False)
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.option.setNumber("Mesh.Algorithm3D", 10)
-        gmsh.option.setNumber("Mesh.MeshSizeMax", size)
-        gmsh.option.setNumber("Mesh.MeshSizeMin", size)
-        box = gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)
-        gmsh.model.occ.synchronize()
-        gmsh.model.addPhysicalGroup(3, [box], name="body")
-        for name, z in (("bottom", 0.0), ("top", 1.0)):
-            corner = (-0.1, -0.1, z - 0.1), (1.1, 1.1, z + 0.1)
-            found = gmsh.model.getEntitiesInBoundingBox(*corner[0], *corner[1], dim=2)
-            gmsh.model.addPhysicalGroup(2, [tag for _, tag in found], name=name)
-        gmsh.model.mesh.generate(3)
-        with tempfile.TemporaryDirectory() as folder:
-            path = str(Path(folder) / "cube.msh")
-            gmsh.write(path)
-            mesh = am.read_mesh(path)
-    finally:
-        gmsh.finalize()
     whole = cube(1, mu)
-    body = am.Body(mesh, am.LinearElastic(young=200, poisson=0.3))
+    body = am.Body(models.generated(models.unit_cube, size), am.LinearElastic(200, 0.3))
     return am.Model([body], supports=whole.supports, contacts=whole.contacts)
 
 
-def unstructured_row(size, repeats, mu=0.3):
-    """Contact against a linear solve, both with algebraic levels and with their set-up."""
-    problem = unstructured(size, mu).assemble()
+def row_with_setup(model, repeats):
+    """One body's contact against a linear solve, both with their set-up, all stored."""
+    problem = model.assemble().assembled()
     held = clamped(problem)
-    setup, _ = best(1, lambda: am.GeometricMultigrid().factor(held.M, held.near_nullspace))
-    reference = linear(held, (), repeats)
+    solver = am.GeometricMultigrid(held.levels)
+    setup, _ = best(1, lambda: solver.factor(held.M, held.near_nullspace))
+    reference = linear(held, held.levels, repeats)
     prepare, _ = best(1, lambda: ContactLevels.of(problem.fresh()))
-    row = {"unknowns": problem.unknowns, "contacts": problem.contacts, "mu": mu,
+    row = {"unknowns": problem.unknowns, "contacts": problem.contacts,
            "linear_setup": setup, "setup": prepare}  # fmt: skip
     for tolerance in TOLERANCES:
         seconds, solution = contact(problem, tolerance, repeats)
@@ -228,6 +213,26 @@ def unstructured_row(size, repeats, mu=0.3):
         }  # fmt: skip
     row["counts"] = solution.counts
     return row
+
+
+def pair_rows(sizes, repeats):
+    """Rows of all pairs without friction and with it, sizes doubling."""
+    rows = []
+    for name, make in models.PAIRS.items():
+        for mu in (0.0, 0.3):
+            found = two_bodies_rows(lambda n, make=make, mu=mu: make(n, mu), sizes, repeats)
+            rows += [{"what": f"{name}, mu = {mu:g}", **row} for row in found]
+            print(json.dumps(rows[-len(sizes) :]), file=sys.stderr, flush=True)
+    return rows
+
+
+def kind_rows(sizes, repeats):
+    """Rows of one body of each kind."""
+    return [
+        {"what": name, **row_with_setup(make(size), repeats)}
+        for name, make in models.KINDS.items()
+        for size in sizes
+    ]
 
 
 def two_bodies_rows(model, sizes, repeats):
@@ -260,10 +265,13 @@ def page(record):
     machine = "; ".join(f"{k} {v}" for k, v in record["machine"].items())
     lines = ["# Contact multigrid against one linear solve", ""]
     lines += [f"Regenerate: `python benchmarks/multigrid.py`.  {machine}.", "", _text(), ""]
-    lines += _cube_table(record["cube"], "## The Coulomb cube, levels of the mesh")
-    lines += _cube_table(record["stored"], "## The same, the matrix stored on both sides")
-    lines += _cube_table(record["unstored"], "## The same, the matrix stored on neither side")
-    lines += _cube_table(record["algebraic"], "## Without levels: smoothed aggregation")
+    for name, title in (
+        ("cube", "The Coulomb cube, levels of the mesh"),
+        ("stored", "The same, the matrix stored on both sides"),
+        ("unstored", "The same, the matrix stored on neither side"),
+        ("algebraic", "Without levels: smoothed aggregation"),
+    ):
+        lines += [f"## {title}", "", *_table(record[name], CUBE)]
     lines += [f"## Friction, level {record['friction_level']}", ""]
     lines += ["| mu | open / slip / stick | cycles to 1e-8 | to 1e-10 |", "|---|---|---|---|"]
     for row in record["friction"]:
@@ -273,76 +281,85 @@ def page(record):
             for c, o in zip(row["cycles"], row["outcomes"], strict=True)
         )
         lines.append(f"| {row['mu']} | {counts} | {cycles} |")
-    lines += ["", "## Two blocks, dual mortar on meshes that do not match", ""]
-    lines += _two_bodies_table(record["mortar"])
-    if "unstructured" in record:
-        lines += ["", "## Tetrahedra of a mesh generator, mu = 0.3", ""]
-        lines += _unstructured_table(record["unstructured"])
-    lines += ["", "## The body in the spherical shell, mu = 0.5, levels 2 to 4", ""]
-    lines += _two_bodies_table(record["shell"])
+    lines += [""]
+    for name, title, columns in (
+        ("mortar", "Two blocks, dual mortar on meshes that do not match", PAIR),
+        ("unstructured", "Tetrahedra of a mesh generator, mu = 0.3", SINGLE),
+        ("shell", "The body in the spherical shell, mu = 0.5, levels 2 to 4", PAIR),
+        ("pairs", "Pairs, every size twice as fine as the one before", WHAT | PAIR),
+        ("kinds", "Plates, flat cells, layers, second order, mu = 0.3", WHAT | SINGLE),
+    ):
+        if name in record:
+            lines += [f"## {title}", "", *_table(record[name], columns)]
     return "\n".join(lines) + "\n"
-
-
-def _two_bodies_table(rows):
-    lines = ["| unknowns | contacts | open / slip / stick | to | linear, clamped: iterations, "
-             "s | linear, free: iterations, s | contact: cycles, s | ratio |",
-             "|" + "---|" * 8]  # fmt: skip
-    for row in rows:
-        counts = " / ".join(str(row["counts"][k]) for k in ("open", "slip", "stick"))
-        for tolerance in TOLERANCES:
-            part = row[f"{tolerance:.0e}"]
-            lines.append(
-                f"| {row['unknowns']} | {row['contacts']} | {counts} | {tolerance:.0e} | "
-                f"{part['linear_iterations']}, {part['linear_seconds']:.3g} | "
-                f"{part['free_iterations']}, {part['free_seconds']:.3g} | "
-                f"{part['cycles']}, {part['seconds']:.3g} | {part['ratio']:.2f} |"
-            )
-    return lines
-
-
-def _unstructured_table(rows):
-    lines = ["| unknowns | contacts | open / slip / stick | to | linear: set-up, iterations, "
-             "s | contact: set-up, cycles, s | ratio | with set-up |",
-             "|" + "---|" * 8]  # fmt: skip
-    for row in rows:
-        counts = " / ".join(str(row["counts"][k]) for k in ("open", "slip", "stick"))
-        for tolerance in TOLERANCES:
-            part = row[f"{tolerance:.0e}"]
-            lines.append(
-                f"| {row['unknowns']} | {row['contacts']} | {counts} | {tolerance:.0e} | "
-                f"{row['linear_setup']:.3g}, {part['linear_iterations']}, "
-                f"{part['linear_seconds']:.3g} | {row['setup']:.3g}, {part['cycles']}, "
-                f"{part['seconds']:.3g} | {part['ratio']:.2f} | {part['whole_ratio']:.2f} |"
-            )
-    return lines
 
 
 def _text():
     return " ".join(__doc__.split("\n\n")[2].split())
 
 
-def _cube_table(rows, title):
-    lines = [title, "",
-             "| level | unknowns | contact / slip | reference | resultant off | to | linear: "
-             "iterations, s | contact: cycles, s | ratio |", "|" + "---|" * 9]  # fmt: skip
+def _table(rows, columns):
+    """Lines of a table: a line for every row and tolerance, columns {title: what is in it}."""
+    lines = [f"| {' | '.join(columns)} |", "|" + "---|" * len(columns)]
     for row in rows:
-        reference = REFERENCE.get(f"level{row['level']}")
-        expected, off = "-", "-"
-        if reference:
-            expected = f"{reference['contact']} / {reference['slip']}"
-            plane = np.array(reference["resultant"])
-            off = (
-                f"{np.abs(np.array(row['resultant']) - plane).max() / np.abs(plane).max():.0e}"
-            )
         for tolerance in TOLERANCES:
-            part = row[f"{tolerance:.0e}"]
-            lines.append(
-                f"| {row['level']} | {row['unknowns']} | {row['contact']} / {row['slip']} | "
-                f"{expected} | {off} | {tolerance:.0e} | {part['linear_iterations']}, "
-                f"{part['linear_seconds']:.3g} | {part['cycles']}, {part['seconds']:.3g} | "
-                f"{part['ratio']:.2f} |"
-            )
+            part = row[f"{tolerance:.0e}"] | {"to": f"{tolerance:.0e}"}
+            cells = [str(column(row, part)) for column in columns.values()]
+            lines.append(f"| {' | '.join(cells)} |")
     return [*lines, ""]
+
+
+def _counts(row):
+    return " / ".join(str(row["counts"][k]) for k in ("open", "slip", "stick"))
+
+
+def _cycles(part):
+    """Cycles, or why there is no solution."""
+    return part["cycles"] if part["outcome"] == "converged" else part["outcome"]
+
+
+SIZES = {
+    "unknowns": lambda row, part: row["unknowns"],
+    "contacts": lambda row, part: row["contacts"],
+    "open / slip / stick": lambda row, part: _counts(row),
+    "to": lambda row, part: part["to"],
+}
+WHAT = {"what": lambda row, part: row["what"]}
+RATIO = {"ratio": lambda row, part: f"{part['ratio']:.2f}"}
+CONTACT = {"contact: cycles, s": lambda row, part: f"{_cycles(part)}, {part['seconds']:.3g}"}
+PAIR = SIZES | {
+    "linear, clamped: iterations, s":
+        lambda row, part: f"{part['linear_iterations']}, {part['linear_seconds']:.3g}",
+    "linear, free: iterations, s":
+        lambda row, part: f"{part['free_iterations']}, {part['free_seconds']:.3g}",
+} | CONTACT | RATIO  # fmt: skip
+SINGLE = SIZES | {
+    "linear: set-up, iterations, s":
+        lambda row, part: f"{row['linear_setup']:.3g}, {part['linear_iterations']}, "
+                          f"{part['linear_seconds']:.3g}",
+    "contact: set-up, cycles, s":
+        lambda row, part: f"{row['setup']:.3g}, {_cycles(part)}, {part['seconds']:.3g}",
+} | RATIO | {"with set-up": lambda row, part: f"{part['whole_ratio']:.2f}"}  # fmt: skip
+CUBE = {
+    "level": lambda row, part: row["level"],
+    "unknowns": lambda row, part: row["unknowns"],
+    "contact / slip": lambda row, part: f"{row['contact']} / {row['slip']}",
+    "reference": lambda row, part: _expected(row)[0],
+    "resultant off": lambda row, part: _expected(row)[1],
+    "to": lambda row, part: part["to"],
+    "linear: iterations, s":
+        lambda row, part: f"{part['linear_iterations']}, {part['linear_seconds']:.3g}",
+} | CONTACT | RATIO  # fmt: skip
+
+
+def _expected(row):
+    """Contacts of the published solution, and how far the resultant is off."""
+    reference = REFERENCE.get(f"level{row['level']}")
+    if not reference:
+        return "-", "-"
+    plane = np.array(reference["resultant"])
+    off = np.abs(np.array(row["resultant"]) - plane).max() / np.abs(plane).max()
+    return f"{reference['contact']} / {reference['slip']}", f"{off:.0e}"
 
 
 def main():
@@ -366,10 +383,14 @@ def main():
         "friction": lambda: friction_rows(given.friction_level),
         "mortar": lambda: two_bodies_rows(stacked, (2, 4, 8), repeats),
         "shell": lambda: two_bodies_rows(lambda k: shell(k, 0.5), (2, 3, 4), repeats),
+        "kinds": lambda: kind_rows((1, 2, 4), 0),
     }
     if importlib.util.find_spec("gmsh"):
-        sizes = [float(x) for x in given.sizes.split(",")]
-        parts["unstructured"] = lambda: [unstructured_row(size, repeats) for size in sizes]
+        sizes = map(float, given.sizes.split(","))
+        parts["unstructured"] = lambda: [
+            row_with_setup(unstructured(size), repeats) for size in sizes
+        ]
+        parts["pairs"] = lambda: pair_rows((1, 2, 4, 8), 0)  # cycles count
     record = {"friction_level": given.friction_level}
     if given.only:
         record = json.loads((HERE / "results/multigrid.json").read_text())

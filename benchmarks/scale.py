@@ -1,7 +1,7 @@
 """The whole `amontons solve` on ever finer cubes of hueeber2008: time and memory per unknown.
 
     python benchmarks/scale.py [--levels 3,4,5,6,7] [--folder FOLDER]
-    python benchmarks/scale.py --level 8
+    python benchmarks/scale.py --levels 6,7,8
 
 Each level is a process of its own, `amontons solve example:cube --set mesh.cells=N -o DIR`,
 from start to files written; compiled code is warm.  Wall and CPU seconds and the largest

@@ -16,6 +16,7 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import BinaryIO
 
 from .errors import FileFormatError, NotWritten
 
@@ -23,6 +24,7 @@ STREAMS = ("/dev/", "/proc/")  # /dev/stdout may lead to a plain file that is op
 DESCRIPTORS = {"/dev/stdout": 1, "/dev/stderr": 2}  # these keep their place in such a file
 BINARY = getattr(os, "O_BINARY", 0)  # where lines would end in another way
 NO_SYNC = (errno.EINVAL, errno.ENOTSUP, errno.ENOSYS)  # of file systems without it
+AT_ONCE = 1 << 24  # bytes that are copied from file to file
 KEPT = 20  # letters of a name that its temporary file keeps
 PART = re.compile(r"\.(?P<stem>.{1,20})-[0-9a-f]{8}(?P<suffix>(\.[^.]*)?)")
 
@@ -35,11 +37,22 @@ def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
 
 def put(path: Path, data: bytes) -> None:
     """Fill a new file, such as that of `replacing`, which gives errors their words."""
+    _put(path, [data])
+
+
+def put_from(path: Path, file: BinaryIO) -> None:
+    """The same with all that a file holds, which is read some at a time."""
+    file.seek(0)
+    _put(path, iter(lambda: file.read(AT_ONCE), b""))
+
+
+def _put(path: Path, parts: Iterable[bytes]) -> None:
     place = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | BINARY, 0o666)
     try:
-        left = memoryview(data)
-        while left:
-            left = left[os.write(place, left) :]
+        for part in parts:
+            left = memoryview(part)
+            while left:
+                left = left[os.write(place, left) :]
     finally:
         os.close(place)
 

@@ -216,6 +216,8 @@ def _filled(values: Array, fields: ContactFields, starts: Index, known: Mask) ->
                     np.add.at(total, at, around.mean(axis=1))
                 np.add.at(count, at, 1)
     met = count > 0
+    if not met.any():
+        return values
     if is_state:
         return np.where(met, total, values)
     return np.where(met, total / np.maximum(count, 1), values)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..linear.blocks import spatial
+from ..linear.blocks import kernel_rows
 from ..mechanics.elements import von_mises
 from ..mechanics.elements.corotational import corotated_stress
 from ..mechanics.elements.given import GivenMatrices
@@ -70,20 +71,23 @@ def model_fields(
     from .results import versions
 
     starts = np.cumsum([0, *(len(body.mesh.points) for body in model.bodies)])
-    stress = stresses(model, fields, getattr(solution, "time", None))
-    centres, nodes = (np.concatenate(each) for each in zip(*stress, strict=True))
+    stress = (
+        (_six(centres), von_mises(centres), _six(nodes), von_mises(nodes))
+        for centres, nodes in stresses(model, fields, getattr(solution, "time", None))
+    )
+    centres, at_centres, nodes, at_nodes = (_joined(each) for each in zip(*stress, strict=True))
     record = getattr(solution, "solution", solution).convergence  # of a step in time, too
     converged = int(not record.stamp)
     names, owner = _parts(model)
     regions, region = _regions(model)
     point = {
-        "displacement": spatial(np.concatenate(fields.displacement)),
-        "reaction": spatial(np.concatenate(fields.reaction)),
-        "stress": _six(nodes), "von_mises": von_mises(nodes),
+        "displacement": kernel_rows(_joined(fields.displacement)),
+        "reaction": kernel_rows(_joined(fields.reaction)),
+        "stress": nodes, "von_mises": at_nodes,
         **contact_fields(model, fields, solution.sliding, starts),
     }  # fmt: skip
     cell = {
-        "stress": _six(centres), "von_mises": von_mises(centres), "body": owner,
+        "stress": centres, "von_mises": at_centres, "body": owner,
         "region": region, "CONVERGED": np.full(len(owner), converged, dtype=np.int8),
     }  # fmt: skip
     if fields.plastic:
@@ -109,11 +113,16 @@ def model_fields(
 
 def stresses(
     model: Model, fields: ContactFields, time: float | None
-) -> list[tuple[Array, Array]]:
-    """Stress of cells and nodes of every body; time: of a step."""
+) -> Iterator[tuple[Array, Array]]:
+    """Stress of cells and nodes of every body, one after another; time: of a step."""
     flown = fields.plastic or {}
     each = zip(model.bodies, fields.displacement, warming(model, time), strict=True)
-    return [body_stress(*given, flown.get(k)) for k, given in enumerate(each)]
+    return (body_stress(*given, flown.get(k)) for k, given in enumerate(each))
+
+
+def _joined(parts: Sequence[Array]) -> Array:
+    """Rows of all parts; of one alone not a copy."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def body_stress(

@@ -8,7 +8,10 @@ on it, orthonormalised there; the prolongation is smoothed by one damped block J
 with T those motions cut up.  Aggregates and T are made by pyamg; rho is estimated from a fixed
 start, so that the same matrix always has the same levels, to the last bit.
 
-An aggregate is a unit of k / 3 block rows that stay together.
+An aggregate is a unit of k / 3 block rows that stay together.  Where nodes have parts (pieces
+of bodies that hang together without contact), an aggregate keeps to one of them, so that
+coarse levels hold the rigid motions of each on its own: what slides or opens does not have to
+be resolved by the finest.  A with parts need not be symmetric: restriction is P^T all the same.
 
 [VMB] P. Vanek, J. Mandel, M. Brezina, "Algebraic multigrid by smoothed aggregation for second
 and fourth order elliptic problems", Computing 56 (1996).
@@ -25,21 +28,26 @@ from scipy import sparse
 from .chunks import units_of
 from .node_blocks import NodeBlocks
 from .transfer import Transfer
-from .vectors import dot
+from .vectors import dot, norm
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-STEPS = 12  # of Lanczos's method for rho: within some per cent
+STEPS = 12  # of Lanczos's method for rho, or of the power iteration: within some per cent
+MISSED = 1.1  # by which rho is taken larger after power iterations, which come from below
 OMEGA = 4 / 3
 LARGEST = 600  # block rows that are inverted whole at most
 
 
 @dataclass(frozen=True, eq=False)
 class Aggregates:
-    """What the next coarser level is made of: modes (3 nodes, k), block rows of a unit."""
+    """What the next coarser level is made of: modes (3 nodes, k), block rows of a unit.
+
+    part (units,): of each unit, None where aggregates may join all and A is symmetric.
+    """
 
     modes: Array
     width: int = 1
+    part: Index | None = None
 
     def coarsen(self, A: NodeBlocks) -> tuple[Transfer, Aggregates] | None:
         """Prolongation to aggregates of units of A, and the same of them; None without any.
@@ -50,48 +58,90 @@ class Aggregates:
         from pyamg.aggregation import fit_candidates, standard_aggregation
 
         graph = units_of(A.indptr, A.indices, self.width)
+        if self.part is not None:
+            graph = _within(graph, self.part)
         joined, _ = standard_aggregation(graph)
         if joined.shape[1] >= graph.shape[0] or not (joined.nnz or A.nodes > LARGEST):
             return None
         columns = -self.modes.shape[1] % 3
         modes = np.column_stack([self.modes, np.zeros((len(self.modes), columns))])
         if not joined.nnz:
-            return _nothing(A.nodes, modes.shape[1])
+            return self._nothing(A.nodes, modes.shape[1])
         pieces, coarse = fit_candidates(joined, modes)
         T = sparse.bsr_array(sparse.bsr_array(pieces).tobsr((3, 3)))
-        P = _smoothed(A, T)
+        rho = _by_lanczos(A) if self.part is None else MISSED * _by_powers(A)
+        P = _smoothed(A, T, OMEGA / rho)
         idle = np.flatnonzero(np.einsum("kii->ki", A.diagonal_blocks).ravel() == 0)
         transfer = Transfer.of(P, idle, np.empty(0, dtype=np.int64))
-        return transfer, Aggregates(np.asarray(coarse), modes.shape[1] // 3)
+        width = modes.shape[1] // 3
+        return transfer, Aggregates(np.asarray(coarse), width, self._part_of(joined))
+
+    def _part_of(self, joined: sparse.csr_array) -> Index | None:
+        """The parts of aggregates, from the units (units, aggregates) that they join."""
+        if self.part is None:
+            return None
+        out = np.zeros(joined.shape[1], dtype=np.int64)
+        units = np.repeat(np.arange(joined.shape[0]), np.diff(joined.indptr))
+        out[joined.indices] = self.part[units]
+        return out
+
+    def _nothing(self, nodes: int, count: int) -> tuple[Transfer, Aggregates]:
+        """A next level of one unit that gets nothing and gives nothing."""
+        width, none = count // 3, np.empty(0, dtype=np.int64)
+        pointers = np.minimum(np.arange(nodes + 1), width)
+        zero = (np.zeros((width, 3, 3)), np.arange(width), pointers)
+        tiles = sparse.bsr_array(zero, shape=(3 * nodes, 3 * width))
+        part = None if self.part is None else np.zeros(1, dtype=np.int64)
+        below = Aggregates(np.zeros((3 * width, count)), width, part)
+        return Transfer.of(tiles, none, none), below
 
     def renumbered(self, number: Index | None) -> Aggregates:
         """The same with block rows of other numbers, (nodes,); units stay together."""
         if number is None:
             return self
-        modes = self.modes.reshape(len(number), 3, -1)[np.argsort(number)]
-        return Aggregates(modes.reshape(self.modes.shape), self.width)
+        order = np.argsort(number)
+        modes = self.modes.reshape(len(number), 3, -1)[order].reshape(self.modes.shape)
+        part = None if self.part is None else self.part[order[:: self.width] // self.width]
+        return Aggregates(modes, self.width, part)
 
 
-def _nothing(nodes: int, count: int) -> tuple[Transfer, Aggregates]:
-    """A next level of one unit that gets nothing and gives nothing."""
-    width, none = count // 3, np.empty(0, dtype=np.int64)
-    pointers = np.minimum(np.arange(nodes + 1), width)
-    zero = (np.zeros((width, 3, 3)), np.arange(width), pointers)
-    tiles = sparse.bsr_array(zero, shape=(3 * nodes, 3 * width))
-    return Transfer.of(tiles, none, none), Aggregates(np.zeros((3 * width, count)), width)
+def _within(graph: sparse.csr_array, part: Index) -> sparse.csr_array:
+    """Only what couples units of one part."""
+    entries = graph.tocoo()
+    row, column = entries.coords
+    same = part[row] == part[column]
+    kept = (entries.data[same], (row[same], column[same]))
+    return sparse.csr_array(sparse.coo_array(kept, shape=graph.shape))
 
 
-def _smoothed(A: NodeBlocks, T: sparse.bsr_array) -> sparse.bsr_array:
+def _smoothed(A: NodeBlocks, T: sparse.bsr_array, omega: float) -> sparse.bsr_array:
+    """T - omega D^-1 A T."""
     n = 3 * A.nodes
     scaled = np.matmul(np.repeat(A.inverse, np.diff(A.indptr), axis=0), A.data)
     matrix = sparse.bsr_array((scaled, A.indices, A.indptr), shape=(n, n))
     step = sparse.bsr_array(matrix @ T)
-    step.data *= -OMEGA / _largest_eigenvalue(A)
+    step.data *= -omega
     return sparse.bsr_array((T + step).tobsr((3, 3)))
 
 
-def _largest_eigenvalue(A: NodeBlocks) -> float:
-    """Of D^-1 A, D the diagonal blocks, by Lanczos's method in the product of D."""
+def _by_powers(A: NodeBlocks) -> float:
+    """The size of D^-1 A, D the diagonal blocks, by power iterations."""
+    x = np.cos(np.arange(3.0 * A.nodes)).reshape(-1, 3)
+    y, size = np.empty_like(x), norm(x)
+    rho = 0.0
+    for _ in range(STEPS):
+        A.times(x, y)
+        x = _applied(A.inverse, y)
+        grown = norm(x)
+        if not 0 < grown < np.inf:
+            return 1.0
+        rho, size = grown / size, 1.0
+        x /= grown
+    return rho
+
+
+def _by_lanczos(A: NodeBlocks) -> float:
+    """The same of a symmetric A, by Lanczos's method in the product of D."""
     D = A.diagonal_blocks
     x = np.cos(np.arange(3.0 * A.nodes)).reshape(-1, 3)
     z, before = np.empty_like(x), np.zeros_like(x)

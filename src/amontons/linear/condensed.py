@@ -13,7 +13,7 @@ second kind give to the other side taken back from there,
 A_cc couples neighbours on the surface alone and is factorised; S is, but for friction and
 turning normals, the stiffness of bodies whose constrained nodes follow the other side:
 condensation as of dual mortar methods [WGW].  It is solved by GMRES with right preconditioner,
-one V-cycle of `aggregates` on S formed with the diagonal of A_cc.
+one V-cycle of `aggregation` on S formed with the diagonal of A_cc.
 
 [WGW] T. Wiesner, M. Gee, A. Popp, W. Wall, "Algebraic multigrid methods for dual mortar finite
 element formulations in contact mechanics", Int. J. Numer. Meth. Engng. 114 (2018).
@@ -29,7 +29,6 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..core.errors import SingularOperator
-from .aggregates import aggregated
 from .base import by_columns
 from .direct import Direct
 from .hierarchy import Hierarchy, Nodes
@@ -169,7 +168,7 @@ class Condensed:
         A = NodeBlocks.from_sparse(S, None if nodes.plain else nodes.place, nodes.count)
         modes = np.zeros((3 * nodes.count, self.modes.shape[1]))
         modes[nodes.place] = self.modes
-        return aggregated(A, nodes, modes, part)
+        return Hierarchy.of_parts(A, nodes, modes, part)
 
 
 def _turned(n: int, at: Index, axes: Array) -> sparse.csr_array:

@@ -30,6 +30,7 @@ CORNERS = ((0, 0, 0), (0, 0, 1), (0, 1, 1), (0, 1, 0),
 SMOOTHED = 0.25  # lower end of the smoothed part of the spectrum, relative to its upper end
 POWER_STEPS = 12  # for the upper end
 SAFETY = 1.05  # on it
+UNSTORED_FROM = 16_000  # nodes of a coarse level from which it is not stored: 27 blocks a node
 
 
 @dataclass(eq=False)
@@ -87,6 +88,10 @@ class GridBlocks:
         """out = same = factor D^-1 b at the unknowns."""
         over_rows(_scaled, self._lines, 10.0 * self.nodes, self.shape, self.inverses, self.used,
                   b, out, same, factor)  # fmt: skip
+
+    def rest(self) -> None:
+        """Give up the vectors in which this thread works."""
+        self._work.rest()
 
     # ------------------------------------------------------------------ smoothing
     def smooth(self, b: Array, x: Array, held: NDArray[np.bool_], backward: bool) -> None:
@@ -166,10 +171,11 @@ class GridBlocks:
         inverse = block_inverse(data[own], size)
         return NodeBlocks(indptr.astype(np.int32), indices.astype(np.int32), data, inverse)
 
-    def coarse(self, P: Transfer) -> NodeBlocks:
+    def coarse(self, P: Transfer) -> GridBlocks | NodeBlocks:
         """The matrix on the grid of half as many cells: that of cells of twice the size."""
         cells = tuple(n // 2 for n in self.cells)
-        return GridBlocks(cells, 2.0 * self.element, P.coarse_used).stored()  # type: ignore[arg-type]
+        grid = GridBlocks(cells, 2.0 * self.element, P.coarse_used)  # type: ignore[arg-type]
+        return grid if grid.nodes >= UNSTORED_FROM else grid.stored()
 
     def stored(self) -> NodeBlocks:
         """The whole matrix: 27 blocks a node."""

@@ -11,6 +11,7 @@ from scipy import sparse
 from .grid import GridBlocks
 from .hierarchy import Hierarchy, Nodes
 from .levels import Levels, fine_unknown, free_levels
+from .rigid_modes import rigid_modes
 from .transfer import Transfer
 
 Array = NDArray[np.float64]
@@ -21,20 +22,26 @@ class GridMatrix:
     """A symmetric matrix (n, n) that is never stored: products, some rows, multigrid levels.
 
     cells (nx, ny, nz) of the box; element (24, 24), nodes in VTK order; free (n,): the unknowns
-    among all dofs, node by node with x fastest; levels: prolongations of nodal values.
+    among all dofs, node by node with x fastest; levels: prolongations of nodal values; points
+    (nodes, 3): where the nodes are.
     """
 
     dtype = np.dtype(float)
     ndim = 2
 
     def __init__(
-        self, cells: tuple[int, int, int], element: Array, free: Index, levels: Levels
+        self,
+        cells: tuple[int, int, int],
+        element: Array,
+        free: Index,
+        levels: Levels,
+        points: Array,
     ) -> None:
         count = int(np.prod([n + 1 for n in cells]))
         used = np.zeros(3 * count, dtype=np.uint8)
         used[free] = 1
         self.blocks = GridBlocks(cells, element, used.reshape(-1, 3))
-        self.nodes, self.levels = Nodes(free, count), levels
+        self.nodes, self.levels, self.points = Nodes(free, count), levels, points
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -49,7 +56,13 @@ class GridMatrix:
 
     def on(self, free: Index) -> GridMatrix:
         """The rows and columns of some of all dofs; this matrix has all of them."""
-        return GridMatrix(self.blocks.cells, self.blocks.element, free, self.levels)
+        blocks = self.blocks
+        return GridMatrix(blocks.cells, blocks.element, free, self.levels, self.points)
+
+    @property
+    def rigid_modes(self) -> Array:
+        """Translations and rotations on the unknowns, (n, 6), made anew at every call."""
+        return rigid_modes(self.points)[self.nodes.place]
 
     def part(self, index: Index) -> sparse.csr_array:
         """Rows and columns of some unknowns, (k,) ascending."""
@@ -88,13 +101,14 @@ class GridMatrix:
         """Multigrid levels: the next one is the stiffness of cells of twice the size."""
         fixed = np.ones(3 * self.nodes.count, dtype=bool)
         fixed[self.nodes.place] = False
-        transfers = []
+        transfers, cells = [], np.array(self.blocks.cells)
         for level in self.levels:
             coarse = fixed.reshape(-1, 3)[fine_unknown(level)].ravel()
             if coarse.all():
                 break
-            transfers.append(
-                Transfer.nodal(level, np.flatnonzero(fixed), np.flatnonzero(coarse))
-            )
-            fixed = coarse
+            nx, ny, nz = (int(n) + 1 for n in cells)
+            halved = level.shape[1] == np.prod(cells // 2 + 1) and not (cells % 2).any()
+            idle = np.flatnonzero(fixed), np.flatnonzero(coarse)
+            transfers.append(Transfer.nodal(level, *idle, (nz, ny, nx) if halved else None))
+            fixed, cells = coarse, cells // 2
         return Hierarchy.on(self.blocks, self.nodes, transfers, None)

@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from .aggregation import Aggregates
+from ..core.errors import SingularOperator
+from .aggregation import LARGEST, Aggregates
 from .chunks import better_numbers
+from .grid import GridBlocks
 from .level_matrix import LevelMatrix
 from .node_blocks import DEAD, NodeBlocks
-from .patched import PatchedBlocks, Rows
+from .patched import PatchedBlocks, PatchedOperator, Rows, patched
 from .transfer import Transfer
 from .vectors import advance, dot, norm, turn
 from .work import Work
@@ -139,7 +141,7 @@ class Level:
     def __post_init__(self) -> None:
         self.work, self.free = Work(self.A.nodes), np.zeros(self.A.nodes, dtype=bool)
 
-    def of(self, A: LevelMatrix | PatchedBlocks) -> Level:
+    def of(self, A: LevelMatrix | PatchedBlocks | PatchedOperator) -> Level:
         """The same with another matrix."""
         out = copy(self)
         out.A = A
@@ -198,17 +200,22 @@ class Hierarchy:
             A = levels[-1].A
         geometric = len(levels)
         if A.nodes > COARSEST:
-            fine = A.stored()
-            aggregates = Aggregates(_coarse_modes(levels, nodes, modes))
-            while fine.nodes > COARSEST_UNITS * aggregates.width:
-                found = aggregates.coarsen(fine)
-                if found is None:
-                    break
-                P, aggregates = found
-                number = append_level(levels, P, None, fine, aggregates.width)
-                aggregates = aggregates.renumbered(number)
-                fine = levels[-1].A.stored()
+            append_aggregates(levels, Aggregates(_coarse_modes(levels, nodes, modes)))
         return cls(levels, geometric, nodes)
+
+    @classmethod
+    def of_parts(cls, A: NodeBlocks, nodes: Nodes, modes: Array, part: Index) -> Hierarchy:
+        """Algebraic levels below A, not symmetric perhaps, that join no nodes of two parts.
+
+        modes (3 nodes, k): near-nullspace; part (nodes,): of each node.  Raises
+        SingularOperator where nodes do not gather into few.
+        """
+        levels = [Level(A)]
+        append_aggregates(levels, Aggregates(modes, part=part))
+        coarsest = levels[-1].A.nodes
+        if coarsest > LARGEST:
+            raise SingularOperator(f"multigrid: {coarsest} nodes do not gather into fewer")
+        return cls(levels, 1, nodes)
 
     def invert_coarsest(self) -> None:
         """The inverse of the coarsest matrix, a pseudo-inverse where it is singular."""
@@ -228,9 +235,16 @@ class Hierarchy:
         """The same with rows of a solve's own on every coarse level."""
         out = copy(self)
         coarse = zip(self.levels[1:], rows, strict=True)
-        own = [level.of(PatchedBlocks(level.A.stored(), own)) for level, own in coarse]
+        own = [level.of(patched(level.A, own)) for level, own in coarse]
         out.levels = [self.levels[0], *own]
         return out
+
+    def rest(self) -> None:
+        """Give up the vectors in which this thread works; the next cycle makes them anew."""
+        for level in self.levels:
+            level.work.rest()
+            if isinstance(level.A, GridBlocks):
+                level.A.rest()
 
     def solve(self, k: int, b: Array, tolerance: float, most: int) -> tuple[Array, int]:
         """(x, iterations) of CG on level k for A x = b with one cycle as preconditioner.
@@ -280,6 +294,19 @@ class Hierarchy:
         self.cycle(k + 1, below.b, below.x)
         level.P.add(below.x, x)
         A.smooth(b, x, level.free, True)
+
+
+def append_aggregates(levels: list[Level], aggregates: Aggregates) -> None:
+    """Add all algebraic levels, until few aggregates are left or nothing more joins."""
+    fine = levels[-1].A.stored()
+    while fine.nodes > COARSEST_UNITS * aggregates.width:
+        found = aggregates.coarsen(fine)
+        if found is None:
+            return
+        P, aggregates = found
+        number = append_level(levels, P, None, fine, aggregates.width)
+        aggregates = aggregates.renumbered(number)
+        fine = levels[-1].A.stored()
 
 
 def append_level(

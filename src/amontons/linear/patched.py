@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..core.compiled import njit
 from ..core.threads import over_stages
+from .level_matrix import LevelMatrix
 from .node_blocks import (
     NodeBlocks,
     later_product,
@@ -88,6 +89,81 @@ class PatchedBlocks:
         data, inverse = self.base.data.copy(), self.base.inverse.copy()
         data[self.rows.slots], inverse[self.rows.node] = self.data, self.inverse
         return replace(self.base, data=data, inverse=inverse)
+
+
+@dataclass(eq=False)
+class PatchedOperator:
+    """base, a matrix that is not stored, with rows of its own, to begin with its.
+
+    It is smoothed as the finest level is: as base without the nodes of these rows, which a
+    Gauss-Seidel sweep visits next.
+    """
+
+    base: LevelMatrix
+    rows: Rows
+    data: Array = field(init=False)
+    inverse: Array = field(init=False)
+    own: NDArray[np.bool_] = field(init=False)
+
+    def __post_init__(self) -> None:
+        known = self.base.rows(self.rows.node)
+        self.data, self.inverse = known.data, known.inverse
+        self.own = self.rows.number >= 0
+
+    @property
+    def nodes(self) -> int:
+        """Number of block rows."""
+        return self.base.nodes
+
+    def smooth(self, b: Array, x: Array, held: NDArray[np.bool_], backward: bool) -> None:
+        """One sweep on A x = b over the nodes that are not held; backward: own rows first."""
+        own = self.rows
+        rows = own.node, own.indptr, own.indices, self.data, self.inverse, b, x, held, backward
+        if backward:
+            _sweep_rows(*rows)
+        self.base.smooth(b, x, self.own | held, backward)
+        if not backward:
+            _sweep_rows(*rows)
+
+    def first_smooth(self, b: Array, x: Array, r: Array) -> None:
+        """The same forwards from x = 0, and r = b - A x."""
+        x[:] = 0.0
+        own = self.rows
+        self.smooth(b, x, np.zeros(self.nodes, dtype=bool), False)
+        self.base.residual(x, b, r)
+        _residual_rows(own.node, own.indptr, own.indices, self.data, x, b, r)
+
+    def stored(self) -> NodeBlocks:
+        """The whole matrix."""
+        A = self.base.stored()
+        slots, _ = A.slots(self.rows.node)
+        A.data[slots], A.inverse[self.rows.node] = self.data, self.inverse
+        return A
+
+
+def patched(A: LevelMatrix, rows: Rows) -> PatchedBlocks | PatchedOperator:
+    """A with rows of its own, stored or not as it is."""
+    return PatchedBlocks(A.stored(), rows) if A.is_stored else PatchedOperator(A, rows)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _sweep_rows(node, indptr, indices, data, inverse, b, x, held, backward):  # noqa: PLR0913
+    """A block Gauss-Seidel sweep over the nodes of some rows that are not held."""
+    for step in range(len(node)):
+        k = len(node) - 1 - step if backward else step
+        i = uint64(node[k])
+        if not held[i]:
+            s = row_product(indices, data, x, uint64(indptr[k]), uint64(indptr[k + 1]))
+            _relax(inverse[k], b, s, x, i)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _residual_rows(node, indptr, indices, data, x, b, r):  # noqa: PLR0913
+    """r = b - A x in some rows."""
+    for k in range(len(node)):
+        i = uint64(node[k])
+        s = row_product(indices, data, x, uint64(indptr[k]), uint64(indptr[k + 1]))
+        r[i, 0], r[i, 1], r[i, 2] = b[i, 0] - s[0], b[i, 1] - s[1], b[i, 2] - s[2]
 
 
 @njit(cache=True, error_model="numpy", inline="always")

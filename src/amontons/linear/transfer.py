@@ -12,6 +12,7 @@ from scipy import sparse
 
 from ..core.compiled import njit
 from ..core.threads import over_rows
+from .box_transfer import add_in_box, restrict_in_box
 from .node_blocks import NodeBlocks, row_product, with_diagonal
 
 Array = NDArray[np.float64]
@@ -24,7 +25,8 @@ class Transfer:
     """Rows of fine nodes, entries of coarse ones: weights (k,), or blocks (k, 3, 3).
 
     With weights a component goes to the same component: x_i = sum_j w_ij x_j.  idle, (m,): flat
-    places of fine padding, which receives nothing.
+    places of fine padding, which receives nothing.  box: fine nodes along z, y and x, where the
+    coarse ones are every second of them and values are interpolated in between.
     """
 
     indptr: NDArray[np.int32]
@@ -34,6 +36,7 @@ class Transfer:
     idle: Index
     coarse_idle: Index
     coarse: int
+    box: tuple[int, int, int] | None = None
 
     @classmethod
     def of(cls, tiles: sparse.bsr_array, idle: Index, coarse_idle: Index) -> Transfer:
@@ -60,7 +63,13 @@ class Transfer:
         )
 
     @classmethod
-    def nodal(cls, level: sparse.csr_array, idle: Index, coarse_idle: Index) -> Transfer:
+    def nodal(
+        cls,
+        level: sparse.csr_array,
+        idle: Index,
+        coarse_idle: Index,
+        box: tuple[int, int, int] | None = None,
+    ) -> Transfer:
         """From a prolongation of nodal values, whose arrays it shares."""
         return cls(
             level.indptr.astype(np.int32, copy=False),
@@ -70,6 +79,7 @@ class Transfer:
             idle,
             coarse_idle,
             level.shape[1],
+            box,
         )
 
     @property
@@ -138,11 +148,15 @@ class Transfer:
 
     def add(self, coarse: Array, fine: Array) -> None:
         """fine += P coarse, (nodes, 3)."""
-        values, kernel = self.weights, _add
-        if len(self.blocks):
-            values, kernel = self.blocks, _add_blocks
-        work = 6.0 * self.fine + 2.0 * values.size
-        over_rows(kernel, self.fine, work, self.indptr, self.indices, values, coarse, fine)
+        if self.box is not None:
+            lines = self.box[0] * self.box[1]
+            over_rows(add_in_box, lines, 6.0 * self.fine, self.box, coarse, fine)
+        else:
+            values, kernel = self.weights, _add
+            if len(self.blocks):
+                values, kernel = self.blocks, _add_blocks
+            work = 6.0 * self.fine + 2.0 * values.size
+            over_rows(kernel, self.fine, work, self.indptr, self.indices, values, coarse, fine)
         if self.idle.size:
             fine.reshape(-1)[self.idle] = 0.0
 
@@ -150,10 +164,15 @@ class Transfer:
         """coarse = P^T fine; padding of both is left out."""
         if self.idle.size:
             fine.reshape(-1)[self.idle] = 0.0
-        start, row, values = self._columns
-        kernel = _restrict_blocks if len(self.blocks) else _restrict
-        work = 6.0 * self.fine + 2.0 * values.size
-        over_rows(kernel, self.coarse, work, start, row, values, fine, coarse)
+        if self.box is not None:
+            nz, ny, nx = self.box
+            lines, box = (nz // 2 + 1) * (ny // 2 + 1), self.box
+            over_rows(restrict_in_box, lines, 9.0 * self.fine, box, fine, coarse)
+        else:
+            start, row, values = self._columns
+            kernel = _restrict_blocks if len(self.blocks) else _restrict
+            work = 6.0 * self.fine + 2.0 * values.size
+            over_rows(kernel, self.coarse, work, start, row, values, fine, coarse)
         if self.coarse_idle.size:
             coarse.reshape(-1)[self.coarse_idle] = 0.0
 

@@ -32,5 +32,10 @@ class Work(local):
         """Zero at first."""
         return np.zeros((self.nodes, 3))
 
+    def rest(self) -> None:
+        """Give up the vectors of this thread, until they are used again."""
+        for name in ("x", "b", "r"):
+            self.__dict__.pop(name, None)
+
     def __reduce__(self) -> tuple:
         return Work, (self.nodes,)

@@ -382,8 +382,7 @@ class Equations(Matrices):
     @property
     def _is_estimated(self) -> bool:
         """True for large meshes, where M^-1 f would cost too much only to judge."""
-        large = self.unknowns > ESTIMATED
-        return large and (bool(self.levels) or self.near_nullspace is not None)
+        return self.unknowns > ESTIMATED and self.is_mesh
 
     def _open_velocity(self) -> Array:
         hierarchy = self.hierarchy if self._is_estimated else None

@@ -247,7 +247,10 @@ class FrictionProblem(Told, Equations):
         if not isinstance(self.M, GridMatrix):
             return self
         levels = self.levels or self.matrices.stored_levels()
-        return replace(self, M=self.matrices.stored(), levels=levels)
+        modes = self.near_nullspace
+        if modes is None:
+            modes = self.matrices.stored_modes()
+        return replace(self, M=self.matrices.stored(), levels=levels, near_nullspace=modes)
 
     @property
     def knows_q(self) -> bool:  # type: ignore[override]

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..core.arrays import read_only
 from ..core.clock import NEVER, Deadline
 from ..core.errors import InvalidInput
 from ..core.prepared import Prepared
@@ -70,6 +71,11 @@ class GlobalMatrices:
         return self.shared.once(make, (self.M, self.H), *arguments)
 
     # ---------------------------------------------------------------- M
+    @property
+    def modes(self) -> Array | None:
+        """The rigid modes (n, k), also those that the operator of a grid has for itself."""
+        return self.M.rigid_modes if isinstance(self.M, GridMatrix) else self.near_nullspace
+
     def stored(self) -> sparse.csc_array:
         """M as a stored matrix where it is the operator of a grid."""
         return self._of_M(stored, self.M)
@@ -77,6 +83,10 @@ class GlobalMatrices:
     def stored_levels(self) -> Levels:
         """The levels that such an operator has for itself."""
         return self._of_M(GridMatrix.free_levels, self.M)
+
+    def stored_modes(self) -> Array:
+        """The rigid modes that such an operator has for itself, read-only."""
+        return self._of_M(_modes_of, self.M)
 
     @cached_property
     def bodies(self) -> Bodies:
@@ -111,7 +121,7 @@ class GlobalMatrices:
     @property
     def loose_modes(self) -> Array:
         """Rigid modes that M does not resist, orthonormal columns (n, k), see `linear`."""
-        return self._of_M(loose_modes, self.M, self.bodies, self.near_nullspace)
+        return self._of_M(loose_modes, self.M, self.bodies, self.modes)
 
     def solve(self, b: Array) -> Array:
         """M^-1 b, b of shape (n,) or (n, k)."""
@@ -241,6 +251,11 @@ class GlobalMatrices:
         own = rows == full.indices
         out[rows[own]] = full.data[own]
         return out
+
+
+def _modes_of(M: GridMatrix) -> Array:
+    """Rigid modes of an operator, (n, 6)."""
+    return read_only(M.rigid_modes)
 
 
 def entry_sizes(M: Any, H: Any) -> tuple[Any, Any]:

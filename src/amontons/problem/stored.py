@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.errors import UnsupportedForm
+from ..linear.grid_matrix import GridMatrix
 from .matrices import OPERATORS, GlobalMatrices
 from .protocol import Form, Problem
 
@@ -63,6 +64,12 @@ class Matrices(Problem):
         near_nullspace given).
         """
         return self.matrices.factor()
+
+    @property
+    def is_mesh(self) -> bool:
+        """True of meshed bodies, whose levels or rigid modes are known (global form only)."""
+        known = bool(self.levels) or self.near_nullspace is not None
+        return known or isinstance(self.M, GridMatrix)
 
     @property
     def bodies(self) -> Bodies:

@@ -14,7 +14,7 @@ from scipy import sparse
 
 import amontons as am
 from amontons.core import threads as threads_
-from amontons.linear import chunks
+from amontons.linear import chunks, grid
 from amontons.linear.chunks import near_numbers
 from amontons.linear.grid import GridBlocks
 from amontons.linear.vectors import advance, dot, norm
@@ -257,6 +257,7 @@ def test_stiffness(kind, monkeypatch):
 @pytest.mark.parametrize("kind", ["stored", "operator", "aggregates"])
 def test_contact_multigrid(kind, monkeypatch):
     monkeypatch.setattr(assembly, "GRID_FROM", 1 if kind == "operator" else 1e12)
+    monkeypatch.setattr(grid, "UNSTORED_FROM", 100)
     problem = cube(8).assemble()
     if kind == "aggregates":
         problem = replace(problem.fresh(), levels=(), guess=None)

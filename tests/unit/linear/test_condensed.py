@@ -8,9 +8,8 @@ from scipy import sparse
 
 import amontons as am
 from amontons.core.errors import SingularOperator
-from amontons.linear.aggregates import aggregated
 from amontons.linear.condensed import Axes, Condensed, CondensedFactor
-from amontons.linear.hierarchy import Nodes
+from amontons.linear.hierarchy import Hierarchy, Nodes
 from amontons.linear.node_blocks import NodeBlocks
 from amontons.mechanics.contact.current import STICK
 from amontons.mechanics.model.large_deformation import large_deformation
@@ -212,7 +211,7 @@ def test_aggregates_keep_to_parts():
     matrix = sparse.kron(both - tie - tie.T, sparse.eye_array(3), format="csr")
     A = NodeBlocks.from_sparse(matrix, None, 2 * n)
     modes = np.tile(np.eye(3), (2 * n, 1))
-    levels = aggregated(A, Nodes(np.arange(6 * n), 2 * n), modes, np.repeat([0, 1], n))
+    levels = Hierarchy.of_parts(A, Nodes(np.arange(6 * n), 2 * n), modes, np.repeat([0, 1], n))
     assert len(levels.levels) > 1
     x = levels.solve(0, np.ones((2 * n, 3)), 1e-10, 60)
     assert x[1] < 40

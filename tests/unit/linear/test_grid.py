@@ -5,8 +5,10 @@ import pytest
 from scipy import sparse
 
 import amontons as am
-from amontons.linear import GeometricMultigrid
+from amontons.linear import GeometricMultigrid, grid
 from amontons.linear.grid_matrix import GridMatrix
+from amontons.linear.patched import PatchedOperator, Rows
+from amontons.linear.transfer import Transfer
 from amontons.mechanics.model import assembly
 from amontons.solvers import ContactMultigrid, SemismoothNewton
 from amontons.solvers.driver import drive
@@ -94,6 +96,72 @@ def test_the_same_contact_solution(symmetric, monkeypatch):
     assert found.converged, str(found)
     assert found.convergence.iterations <= 25
     assert np.abs(found.r - expected.r).max() < 1e-7 * np.abs(expected.r).max()
+
+
+@pytest.mark.parametrize("symmetric", [False, True], ids=["clamped", "symmetric"])
+def test_coarse_levels_that_are_not_stored(symmetric, unstored, monkeypatch):
+    """The same solution in as many cycles, to a few, and as many iterations without contact."""
+    counts = []
+    for least in (10**9, 100):
+        monkeypatch.setattr(grid, "UNSTORED_FROM", least)
+        problem = model((16, 8, 8), symmetric).assemble()
+        stored = [level.A.is_stored for level in problem.hierarchy.levels]
+        assert stored == [False, least > 100, *[True] * (len(stored) - 2)]
+        found = drive(problem, ContactMultigrid(), tolerance=1e-10)
+        assert found.converged
+        factor = GeometricMultigrid(tolerance=1e-10).factor(problem.M)
+        factor.solve(problem.f)
+        counts.append((found.convergence.iterations, factor.iterations, found.r))
+    assert abs(counts[0][0] - counts[1][0]) <= 4
+    assert abs(counts[0][1] - counts[1][1]) <= 4
+    assert np.abs(counts[0][2] - counts[1][2]).max() < 1e-7 * np.abs(counts[0][2]).max()
+
+
+def test_rows_of_its_own(unstored):
+    """A whole that is patched: smoothing leaves a solution alone, and ends at one."""
+    A = model((4, 4, 4)).assemble().M.blocks
+    node = np.array([3, 31, 32, 60])
+    rows = Rows.of(A.stored(), node)
+    own = PatchedOperator(A, rows)
+    own.data[rows.indices == np.repeat(node, np.diff(rows.indptr))] *= 1.5
+    own.inverse /= 1.5
+    whole = own.stored()
+    used = A.used.astype(float)
+    x = np.cos(np.arange(3.0 * A.nodes)).reshape(-1, 3) * used
+    b, y = np.empty_like(x), x.copy()
+    whole.times(x, b)
+    b *= used
+    for backward in (False, True):
+        own.smooth(b, y, np.zeros(A.nodes, dtype=bool), backward)
+    np.testing.assert_allclose(y, x, atol=1e-12)
+    y, r = np.empty_like(x), np.empty_like(x)
+    own.first_smooth(b, y, r)
+    whole.times(y, x)
+    np.testing.assert_allclose(r, (b - x) * used, atol=1e-12 * np.abs(b).max())
+
+
+@pytest.mark.parametrize("cells", [(4, 6, 8), (2, 2, 2)])
+def test_interpolation_in_a_box_without_a_matrix(cells):
+    level = am.box(cells, cells).levels[0]
+    shape = tuple(n + 1 for n in reversed(cells))
+    none = np.empty(0, dtype=np.int64)
+    stored, free = Transfer.nodal(level, none, none), Transfer.nodal(level, none, none, shape)
+    rng = np.random.default_rng(0)
+    coarse, fine = (rng.standard_normal((n, 3)) for n in level.shape[::-1])
+    for P in (stored, free):
+        out = fine.copy()
+        P.add(coarse, out)
+        np.testing.assert_allclose(out, fine + level @ coarse, atol=1e-14)
+        P.restrict(fine, back := np.empty_like(coarse))
+        np.testing.assert_allclose(back, level.T @ fine, atol=1e-13)
+
+
+def test_rigid_modes_are_those_of_the_stored_matrix(monkeypatch):
+    expected = model((4, 4, 4)).assemble().near_nullspace
+    monkeypatch.setattr(assembly, "GRID_FROM", 1)
+    problem = model((4, 4, 4)).assemble()
+    assert problem.near_nullspace is None and problem.is_mesh
+    np.testing.assert_array_equal(problem.assembled().near_nullspace, expected)
 
 
 def test_other_solvers_get_the_stored_matrix(unstored):

@@ -6,7 +6,7 @@ import pytest
 import amontons as am
 from amontons.mechanics.meshes.cells import CELLS
 from amontons.mechanics.meshes.check import MIRROR
-from amontons.mechanics.meshes.facets import Cells, Facets, boundary
+from amontons.mechanics.meshes.facets import Cells, Facets, boundary, sides
 from amontons.mechanics.meshes.surfaces import (
     facet_areas,
     facet_normals,
@@ -171,3 +171,23 @@ def test_unknown_and_empty_surfaces():
 def test_boundary_leaves_out_inner_facets():
     mesh = am.box((1, 1, 1), 2, "tet")
     assert sum(len(b.nodes) for b in boundary(mesh.cells)) == 6 * 4 * 2
+
+
+def hub(count):
+    """Triangles around one point, which is a corner of all of them."""
+    angle = 2 * np.pi * np.arange(count) / count
+    points = np.vstack([[0, 0], np.column_stack([np.cos(angle), np.sin(angle)])])
+    rim = 1 + np.arange(count)
+    return am.Mesh(points, (Cells("tri", np.column_stack([0 * rim, rim, np.roll(rim, -1)])),))
+
+
+@pytest.mark.parametrize("mesh", [
+    *(am.box(size, cells, kind) for size, cells, kind in BOXES), hub(5), hub(200),
+])  # fmt: skip
+def test_the_boundary_is_what_one_cell_alone_has(mesh):
+    (found,) = boundary(mesh.cells)
+    ((_, table),) = sides(mesh.cells).items()
+    _, first, count = np.unique(
+        np.sort(table, axis=1), axis=0, return_index=True, return_counts=True
+    )
+    np.testing.assert_array_equal(found.nodes, table[np.sort(first[count == 1])])

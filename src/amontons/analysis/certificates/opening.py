@@ -164,7 +164,7 @@ def _check_definite(problem: FrictionProblem) -> None:
         return
     if problem.loose_modes.shape[1]:
         raise SingularOperator("loose")
-    if problem.near_nullspace is None:  # nobody says which motions could be loose
+    if not problem.is_mesh:  # nobody says which motions could be loose
         problem.factor()
 
 

@@ -221,8 +221,7 @@ def _scales(problem: FrictionProblem) -> str:
     if not rho.size:
         return "no contact can react"
     stiffness = f"1/|W_ii| from {rho.min():.2g} to {rho.max():.2g}"
-    is_mesh = problem.near_nullspace is not None  # also of few unknowns
-    if problem.form is Form.GLOBAL and (is_mesh or not _has_small_blocks(problem)):
+    if problem.form is Form.GLOBAL and (problem.is_mesh or not _has_small_blocks(problem)):
         return f"elastic bodies, u probably displacements; local stiffness {stiffness}"
     if problem.form is Form.GLOBAL:
         return f"rigid bodies, u probably velocities and r impulses; effective mass {stiffness}"

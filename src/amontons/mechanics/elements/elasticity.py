@@ -21,7 +21,7 @@ from ...core.errors import InvalidInput
 from ...core.threads import over_stages
 from ...core.words import helpful
 from ..meshes.cells import CELLS
-from ..meshes.check import around, determinant
+from ..meshes.check import around, determinant, parts_of
 from ..meshes.facets import Cells
 from ..meshes.linear_cells import Rule
 from ..meshes.mesh import Mesh, unknown
@@ -275,13 +275,15 @@ def cell_stress(
 
 def gradient_at(mesh: Mesh, block: Cells, displacement: Array, at: Array) -> Array:
     """Displacement gradients (k, dim, dim) of cells at a point, (k, 3, 3) around an axis."""
-    cell = CELLS[block.kind]
-    x, u = mesh.points[block.nodes], displacement[block.nodes]
-    gradient = np.einsum("kac,kad->kcd", u, cell.gradients(x, at))
-    if mesh.axisymmetric:
-        shape = cell.shape(at)
-        gradient = with_hoop(gradient, x[:, :, 0] @ shape, u[:, :, 0] @ shape)
-    return gradient
+    cell, found = CELLS[block.kind], []
+    for nodes in parts_of(block.nodes):
+        x, u = mesh.points[nodes], displacement[nodes]
+        gradient = np.einsum("kac,kad->kcd", u, cell.gradients(x, at))
+        if mesh.axisymmetric:
+            shape = cell.shape(at)
+            gradient = with_hoop(gradient, x[:, :, 0] @ shape, u[:, :, 0] @ shape)
+        found.append(gradient)
+    return found[0] if len(found) == 1 else np.concatenate(found)
 
 
 def volume_stress(  # noqa: PLR0913  # as cell_stress, and where
@@ -349,5 +351,9 @@ def with_hoop(gradient: Array, r: Array, u: Array) -> Array:
 def von_mises(stress: Array) -> Array:
     """Von Mises equivalent of stresses (k, 3, 3): (k,), unit of stress."""
     pressure = np.trace(stress, axis1=1, axis2=2) / 3
-    deviator = stress - pressure[:, None, None] * np.eye(3)
-    return np.sqrt(1.5 * (deviator**2).sum(axis=(1, 2)))
+    out = np.zeros(len(stress))
+    for i in range(3):  # entry by entry: long arrays take no more than one of them
+        for j in range(3):
+            part = stress[:, i, j] - pressure if i == j else stress[:, i, j]
+            out += part * part
+    return np.sqrt(1.5 * out)

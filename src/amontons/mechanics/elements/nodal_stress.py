@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import InvertedCells
 from ..meshes.cells import CELLS, ReferenceCell
-from ..meshes.check import determinant
+from ..meshes.check import determinant, parts_of
 from .cell_loops import nodal_gradients_inplace
 from .elasticity import (
     cell_stress,
@@ -67,26 +67,26 @@ def _at_nodes(
                 if hybrid:
                     p = volume_stress(mesh, cells, law, u, rule[0], warming)
                     np.add.at(pressure, nodes, p * _corner_volumes(mesh, cells, rule[0]))
-        at = np.flatnonzero(volume)
-        mean = gradient[at] / volume[at, None, None]
-        if mesh.axisymmetric:
-            mean = with_hoop(mean, mesh.points[at, 0], u[at, 0])
-        try:
-            stress = law.shape_stress(mean) if hybrid else law.stress(mean)
-        except InvertedCells:  # at corners, though no cell is at its centre
-            return mean_of_centres(mesh, at_centres)
-        if hybrid:
-            stress = stress + (pressure[at] / volume[at])[:, None, None] * np.eye(3)
-        if warming is not None:
-            held = shape_held(law, mesh, hybrid=hybrid)
-            stress = stress - warming[at, None, None] * held
-        total[at] += volume[at, None, None] * stress
+        for at in parts_of(np.flatnonzero(volume)):
+            mean = gradient[at] / volume[at, None, None]
+            if mesh.axisymmetric:
+                mean = with_hoop(mean, mesh.points[at, 0], u[at, 0])
+            try:
+                stress = law.shape_stress(mean) if hybrid else law.stress(mean)
+            except InvertedCells:  # at corners, though no cell is at its centre
+                return mean_of_centres(mesh, at_centres)
+            if hybrid:
+                stress = stress + (pressure[at] / volume[at])[:, None, None] * np.eye(3)
+            if warming is not None:
+                held = shape_held(law, mesh, hybrid=hybrid)
+                stress = stress - warming[at, None, None] * held
+            total[at] += volume[at, None, None] * stress
         weight += volume
     missing = weight == 0
-    out = total / np.where(missing, 1.0, weight)[:, None, None]
+    total /= np.where(missing, 1.0, weight)[:, None, None]
     if missing.any():
-        out[missing] = mean_of_centres(mesh, at_centres)[missing]
-    return out
+        total[missing] = mean_of_centres(mesh, at_centres)[missing]
+    return total
 
 
 def _groups(mesh: Mesh, laws: Mapping[str, Any]) -> list[tuple[Any, bool]]:

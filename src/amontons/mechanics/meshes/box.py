@@ -118,9 +118,15 @@ def _levels(counts: tuple[int, ...], lengths: Array, kind: str) -> tuple[sparse.
             level = _product([0.5 * (a + b) for a, b in zip(low, high, strict=True)])
         else:  # new nodes halve edges, which all run from low to high corners
             level = 0.5 * (_product(low) + _product(high))
-        out.append(sparse.csr_array(level))
+        out.append(_small(sparse.csr_array(level)))
         counts = tuple(n // 2 if half else n for n, half in zip(counts, halved, strict=True))
     return tuple(out)
+
+
+def _small(level: sparse.csr_array) -> sparse.csr_array:
+    """The same with indices of 4 bytes."""
+    indices, indptr = level.indices.astype(np.int32), level.indptr.astype(np.int32)
+    return sparse.csr_array((level.data, indices, indptr), shape=level.shape)
 
 
 def _halved(counts: tuple[int, ...], lengths: Array) -> NDArray[np.bool_]:

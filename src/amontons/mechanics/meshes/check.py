@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 STRAIGHT = 1e-9  # distance from the middle, relative to the largest cell
+AT_ONCE = 100_000  # cells whose coordinates are gathered
 FLAT = 1e-10  # det / (longest edge)^dim below which a cell counts as degenerate
 # node order of the mirrored cell
 MIRROR = {
@@ -52,7 +53,8 @@ def checked_cells(points: Array, kind: str, nodes: ArrayLike, region: str) -> In
             f"{kind} cells: expected node numbers 0..{len(points) - 1}, "
             f"got {table.min()}..{table.max()}"
         )
-    low, high = _determinants(cell, points[table])
+    found = [_determinants(cell, points[part]) for part in parts_of(table)]
+    low, high = (np.concatenate(each) for each in zip(*found, strict=True))
     turned = high < -FLAT
     table[turned] = table[np.flatnonzero(turned)[:, None], MIRROR[kind]]
     bad = np.flatnonzero(~turned & (low <= FLAT))
@@ -125,6 +127,12 @@ def is_straight(cell: ReferenceCell, coordinates: Array) -> bool:
             initial=0.0) <= STRAIGHT * size
         for k, parents in enumerate(cell.parents)
     )  # fmt: skip
+
+
+def parts_of(table: Index) -> Iterator[Index]:
+    """The rows of a table some at a time: coordinates of all at once take much memory."""
+    for first in range(0, max(len(table), 1), AT_ONCE):
+        yield table[first : first + AT_ONCE]
 
 
 def _determinants(cell: ReferenceCell, coordinates: Array) -> tuple[Array, Array]:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.arrays import integers, read_only
 from ...core.errors import InvalidInput
 from .cells import CELLS, FACET_KIND, FIRST
+from .single_sides import single_sides
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -97,12 +98,28 @@ def boundary(cells: tuple[Cells, ...]) -> tuple[Facets, ...]:
     """Facets that belong to one cell only, outwards."""
     out = []
     dim = CELLS[cells[0].kind].dim if cells else 3
-    for size, nodes in sorted(sides(cells).items()):
-        _, first, count = np.unique(
-            np.sort(nodes, axis=1), axis=0, return_index=True, return_counts=True
-        )
-        out.append(Facets(FACET_KIND[dim, size], nodes[np.sort(first[count == 1])]))
-    return tuple(block for block in out if len(block.nodes))
+    points = 1 + max((int(block.nodes.max(initial=-1)) for block in cells), default=-1)
+    for size in sorted({len(side) for block in cells for side in CELLS[block.kind].facets}):
+        nodes = _all_sides(cells, size)
+        out.append(nodes[single_sides(nodes, points)].astype(np.int64))
+    kinds = [FACET_KIND[dim, nodes.shape[1]] for nodes in out]
+    return tuple(
+        Facets(kind, nodes) for kind, nodes in zip(kinds, out, strict=True) if len(nodes)
+    )
+
+
+def _all_sides(cells: tuple[Cells, ...], size: int) -> NDArray[np.int32]:
+    """All sides of `size` nodes, (k, size), in the order of `sides`."""
+    own = [
+        (block, side) for block in cells for side in CELLS[block.kind].facets
+        if len(side) == size
+    ]  # fmt: skip
+    ends = np.cumsum([0, *(len(block.nodes) for block, _ in own)])
+    out = np.empty((ends[-1], size), dtype=np.int32)
+    for (block, side), first, last in zip(own, ends[:-1], ends[1:], strict=True):
+        for slot, corner in enumerate(side):
+            out[first:last, slot] = block.nodes[:, corner]
+    return out
 
 
 def inner_facets(cells: tuple[Cells, ...], facets: tuple[Facets, ...], points: int) -> int:

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import math
-import os
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.files import put
+from ...core.files import put_from
 from .mesh import Mesh
+from .vtu import write_vtu
 
 Array = NDArray[np.float64]
 CELL_TYPES = {
@@ -45,38 +43,35 @@ def write_meshes(
 
     point_data, cell_data: one row per point or cell, in the order of the meshes.  In 2D the
     third coordinate is zero.  field_data: numbers of the whole, and remark: a line for those
-    who look into the file, both in VTU files only.
+    who look into the file, both in VTU files only.  These empty point_data and cell_data, see
+    `write_vtu`.
     """
-    meshio = with_all_kinds()
     starts = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
+    if path.suffix == ".vtu":
+        blocks = [
+            (block.kind, int(start), block.nodes)
+            for mesh, start in zip(meshes, starts, strict=False)
+            for block in mesh.cells
+        ]
+        points = [_spatial(mesh.points) for mesh in meshes]
+        with tempfile.TemporaryFile() as scratch:
+            write_vtu(scratch, points, blocks, point_data, cell_data, field_data or {}, remark)
+            put_from(path, scratch)
+        return
     cells: list[Any] = [
         (CELL_TYPES[block.kind], block.nodes + start)
         for mesh, start in zip(meshes, starts, strict=False)
         for block in mesh.cells
     ]
     ends = np.cumsum([len(nodes) for _, nodes in cells])[:-1]
-    points = np.zeros((starts[-1], 3))
-    points[:, : meshes[0].dim] = np.concatenate([mesh.points for mesh in meshes])
+    points = np.concatenate([_spatial(mesh.points) for mesh in meshes])
     split: Any = {name: np.split(values, ends) for name, values in cell_data.items()}
-    whole = meshio.Mesh(points, cells, point_data=point_data, cell_data=split)
-    if path.suffix != ".vtu":
-        whole.write(path)
-        return
-    with tempfile.TemporaryFile() as scratch:  # its writer takes no buffer
-        meshio.vtu.write(os.dup(scratch.fileno()), whole)
-        scratch.seek(0)
-        put(path, _with_fields(scratch.read(), field_data or {}, remark))
+    meshio = with_all_kinds()
+    meshio.Mesh(points, cells, point_data=point_data, cell_data=split).write(path)
 
 
-def _with_fields(text: bytes, fields: Mapping[str, float], remark: str) -> bytes:
-    """A VTU file with field data before its end, as its writer knows none."""
-    arrays = "".join(
-        f'<DataArray type="{"Int32" if isinstance(value, int) else "Float64"}" '
-        f'Name={quoteattr(name)} '
-        f'NumberOfTuples="1" format="ascii">{value!r}</DataArray>\n'
-        for name, value in fields.items()
-        if math.isfinite(value)
-    )
-    note = f"<!-- {remark.replace('--', '- ')} -->\n" if remark else ""
-    head, end, rest = text.rpartition(b"</UnstructuredGrid>")
-    return head + f"<FieldData>\n{arrays}</FieldData>\n{note}".encode() + end + rest
+def _spatial(points: Array) -> Array:
+    """Points (n, 3), also of meshes in 2D."""
+    if points.shape[1] == 3:
+        return points
+    return np.column_stack([points, np.zeros(len(points))])

@@ -124,8 +124,8 @@ class Discretisation:
 
     @property
     def near_nullspace(self) -> Array | None:
-        """Rigid modes on the free dofs, (n, k); None with constraints."""
-        if self.eliminated is not None:
+        """Rigid modes on the free dofs, (n, k); None with constraints and of a `GridMatrix`."""
+        if self.eliminated is not None or isinstance(self.K, GridMatrix):
             return None
         return near_nullspace(self.parts, self.free, self.dofs)
 
@@ -356,7 +356,8 @@ def _grid(bodies: Sequence[Body]) -> GridMatrix | None:
     cell = replace(cell, cells=(own,))
     dofs = (cell.cells[0].nodes[0][:, None] * 3 + np.arange(3)).ravel()
     element = stiffness(cell, body.material).toarray()[np.ix_(dofs, dofs)]
-    return GridMatrix(mesh.grid, element, np.arange(mesh.points.size), mesh.levels)  # type: ignore[arg-type]
+    every = np.arange(mesh.points.size)
+    return GridMatrix(mesh.grid, element, every, mesh.levels, mesh.points)  # type: ignore[arg-type]
 
 
 def _check_once(

@@ -24,13 +24,13 @@ from scipy.sparse import csgraph
 from scipy.sparse import linalg as sparse_linalg
 
 from ...core.errors import InvalidInput, SingularOperator
+from ...linear.rigid_modes import rigid_modes
 from ..elements.rigid import Rigid
 from .beside import TURN, Beside
 from .bound import Bound
 from .chains import dependence
 from .constraint_rows import Rows, coupled_nodes, is_rigid
 from .constraints import Constraint, Coupling
-from .rigid import rigid_modes
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

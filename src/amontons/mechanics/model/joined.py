@@ -110,9 +110,9 @@ def _columns(parts: list[Piece], eliminated: Elimination) -> _Columns:
 
 def _of_pieces(parts: list[Piece]) -> tuple[Index, Any]:
     """Where the motions of each piece begin, and their entries as those of a matrix."""
-    starts = np.cumsum([0, *(piece.modes.shape[1] for piece in parts)])
-    i = [np.repeat(piece.dofs, piece.modes.shape[1]) for piece in parts]
-    j = [np.tile(a + np.arange(piece.modes.shape[1]), len(piece.dofs))
+    starts = np.cumsum([0, *(piece.count for piece in parts)])
+    i = [np.repeat(piece.dofs, piece.count) for piece in parts]
+    j = [np.tile(a + np.arange(piece.count), len(piece.dofs))
          for a, piece in zip(starts[:-1], parts, strict=True)]  # fmt: skip
     values = np.concatenate([piece.modes.ravel() for piece in parts])
     return starts, (values, (np.concatenate(i), np.concatenate(j)))
@@ -154,7 +154,7 @@ def _straining(parts: list[Piece], columns: _Columns) -> sparse.csr_array:
     numbers = [
         a + k
         for piece, a in zip(parts, columns.starts[:-1], strict=True) if piece.rigid is not None
-        for k in range(piece.modes.shape[1]) if k not in piece.rigid
+        for k in range(piece.count) if k not in piece.rigid
     ]  # fmt: skip
     entries = (np.ones(len(numbers)), (np.arange(len(numbers)), numbers))
     shape = (len(numbers), columns.motions.shape[1])
@@ -170,11 +170,12 @@ def _joined(members: list[Piece]) -> Piece:
     dofs = np.concatenate([piece.dofs for piece in members])
     rigid, first = [], 0
     for piece in members:
-        count = piece.modes.shape[1]
+        count = piece.count
         rigid += [first + k for k in (range(count) if piece.rigid is None else piece.rigid)]
         first += count
     some = None if all(piece.rigid is None for piece in members) else rigid
-    return Piece(" + ".join(names), dofs, modes, some, tuple(members))
+    none = np.zeros((0, members[0].points.shape[1]))
+    return Piece(" + ".join(names), dofs, none, some, tuple(members), modes)
 
 
 def _refuse(mine: Index, columns: _Columns, null: Array, eliminated: Elimination) -> None:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...core.errors import SingularOperator
+from ...linear.rigid_modes import rigid_modes
 from ..elements.given import GivenMatrices
 from ..meshes.mesh import Mesh
 
@@ -26,17 +27,39 @@ NAMES = {
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """A connected part of a body: name, dofs (k,) in the whole model, modes (k, 3 or 6).
+    """A connected part of a body: name, dofs (k,) in the whole model, its points (n, dim).
 
-    rigid: which of the modes strain nothing, None for all.
-    members: where constraints join several, those; modes are then theirs side by side.
+    rigid: which of its rigid modes strain nothing, None for all.
+    members: where constraints join several, those, without points; the modes of these, (k, …),
+    side by side are its `joined` ones.
     """
 
     name: str
     dofs: Index
-    modes: Array
+    points: Array
     rigid: list[int] | None = None
     members: tuple[Piece, ...] = ()
+    joined: Array | None = None
+
+    @property
+    def count(self) -> int:
+        """Number of rigid modes."""
+        if self.joined is not None:
+            return self.joined.shape[1]
+        return 3 if self.points.shape[1] == 2 else 6
+
+    @property
+    def modes(self) -> Array:
+        """Rigid modes (k, count), made anew at every call: they are long."""
+        return rigid_modes(self.points) if self.joined is None else self.joined
+
+    def modes_at(self, chosen: NDArray[np.bool_]) -> Array:
+        """Their rows at some of the dofs, chosen (k,)."""
+        if self.joined is not None:
+            return self.joined[chosen]
+        own = chosen.reshape(self.points.shape)
+        near: NDArray[np.bool_] = np.asarray(own.any(axis=1))
+        return rigid_modes(self.points, near)[own[near].ravel()]
 
     def moving(self, motion: Array) -> Array:
         """Of a motion (modes, ...) the part of the member that moves most, (3 or 6, ...)."""
@@ -55,10 +78,10 @@ def pieces(mesh: Mesh, name: str, offset: int, material: object = None) -> list[
         nodes = np.flatnonzero(labels == label)
         dofs = offset + (nodes[:, None] * mesh.dim + np.arange(mesh.dim)).ravel()
         rigid = ALONG_AXIS if mesh.axisymmetric else None
-        modes = rigid_modes(mesh.points[nodes])
+        points = mesh.points if len(titles) == 1 else mesh.points[nodes]
         if isinstance(material, GivenMatrices):
-            rigid = material.resisted(modes, dofs - offset)
-        out.append(Piece(title, dofs, modes, rigid))
+            rigid = material.resisted(rigid_modes(points), dofs - offset)
+        out.append(Piece(title, dofs, points, rigid))
     return out
 
 
@@ -89,6 +112,8 @@ def piece_titles(mesh: Mesh, name: str, labels: Index) -> list[str]:
 
 def piece_labels(mesh: Mesh) -> Index:
     """Number of the connected piece of every node, (n,)."""
+    if mesh.grid is not None:
+        return np.zeros(len(mesh.points), dtype=np.int64)
     from scipy.sparse import csgraph
 
     links = [
@@ -101,25 +126,11 @@ def piece_labels(mesh: Mesh) -> Index:
     return csgraph.connected_components(graph, directed=False)[1].astype(np.int64)
 
 
-def rigid_modes(points: Array) -> Array:
-    """Translations, then rotations about the centre scaled to size 1: (n dim, 3 or 6)."""
-    n, dim = points.shape
-    x = points - points.mean(axis=0)
-    size = np.abs(x).max()
-    x = x / (size if size > 0 else 1.0)
-    columns = [np.tile(row, (n, 1)) for row in np.eye(dim)]
-    if dim == 2:
-        columns.append(np.stack([-x[:, 1], x[:, 0]], axis=1))
-    else:
-        columns += [np.cross(axis, x).astype(float, copy=False) for axis in np.eye(3)]
-    return np.stack([column.ravel() for column in columns], axis=1)
-
-
 def loose_modes(parts: list[Piece], fixed: NDArray[np.bool_]) -> list[tuple[Piece, Array]]:
     """Pieces with the modes that supports leave free: bases (6, k), orthonormal, k > 0."""
     out = []
     for piece in parts:
-        held = piece.modes[fixed[piece.dofs]]
+        held = piece.modes_at(fixed[piece.dofs])
         basis = null_space(held if piece.rigid is None else held[:, piece.rigid])
         if piece.rigid is not None:
             basis = np.eye(held.shape[1])[:, piece.rigid] @ basis
@@ -184,9 +195,9 @@ def near_nullspace(parts: list[Piece], free: Index, dofs: int) -> Array:
 
     Pieces share the columns: multigrid groups coupled nodes only, so it never mixes them.
     """
-    out = np.zeros((dofs, max((piece.modes.shape[1] for piece in parts), default=0)))
+    out = np.zeros((dofs, max((piece.count for piece in parts), default=0)))
     for piece in parts:
-        out[piece.dofs, : piece.modes.shape[1]] = piece.modes
+        out[piece.dofs, : piece.count] = piece.modes
     return out[free]
 
 

@@ -207,7 +207,7 @@ def _stages(problem: FrictionProblem, start: Iterate, target: Target) -> Iterato
 
 
 def _is_mesh(problem: FrictionProblem) -> bool:
-    return bool(problem.levels) or problem.near_nullspace is not None
+    return problem.is_mesh
 
 
 def _worth_multigrid(problem: FrictionProblem) -> bool:

@@ -98,6 +98,14 @@ class ContactMultigrid:
         if not problem.contacts:
             return
         levels = ContactLevels.of(problem)
+        try:
+            yield from self._iterates(problem, levels, start, target)
+        finally:
+            levels.hierarchy.rest()
+
+    def _iterates(
+        self, problem: FrictionProblem, levels: ContactLevels, start: Iterate, target: Target
+    ) -> Iterates:
         tangent = levels.truncation.tangent()
         run = _Run(levels, tangent, self, levels.finest(problem), 0)
         x = levels.start(problem, start)

@@ -101,7 +101,9 @@ class Truncation:
         self.hierarchy = hierarchy
         self.near: list[Near] = []
         self.products: list[Product] = []
-        slots: NDArray[Any] = np.empty(0, dtype=np.int64)
+        none: Index = np.empty(0, dtype=np.int64)
+        slots: NDArray[Any] = none
+        coarse: NodeBlocks | None = None
         for k, level in enumerate(hierarchy.levels):
             A = level.A
             idle = np.zeros(3 * A.nodes, dtype=bool)
@@ -111,15 +113,16 @@ class Truncation:
                 idle[hierarchy.levels[k - 1].P.coarse_idle] = True
             idle = idle.reshape(-1, 3)
             if k or A.is_stored:
-                A = A.stored()
+                known = A.stored() if coarse is None else coarse
                 if k < len(contacts):
-                    slots = np.union1d(slots, _touching(A, contacts[k]))
-                near = Near.of(A, slots, idle)
+                    slots = np.union1d(slots, _touching(known, contacts[k]))
+                near = Near.of(known, slots, idle)
             else:
                 near = Near.of_operator(A, contacts[k], idle)
             self.near.append(near)
             if level.P is not None:
-                coarse = hierarchy.levels[k + 1].A.stored()
+                touched = contacts[k + 1] if k + 1 < len(contacts) else none
+                coarse = _near_surface(hierarchy.levels[k + 1].A, level.P, near.row, touched)
                 self.products.append(Product.of(level.P, near, coarse))
                 slots = np.unique(self.products[-1].target)
         for k, product in enumerate(self.products):
@@ -165,6 +168,27 @@ class Truncation:
         index = np.arange(A.nodes)
         inverse = inverse_at_rest(whole, matrix[index, :, index, :], size)
         return (inverse @ b.reshape(-1)).reshape(b.shape)
+
+
+def _near_surface(A: LevelMatrix, P: Transfer, row: Index, contact: Index) -> NodeBlocks:
+    """A stored matrix, or of another one the rows that contacts may change, others empty.
+
+    row: fine rows that they change; contact: contact nodes of A.
+    """
+    if A.is_stored:
+        return A.stored()
+    own = np.zeros(P.fine, dtype=bool)
+    own[row] = True
+    changed = np.zeros(A.nodes, dtype=bool)
+    changed[P.indices[np.repeat(own, np.diff(P.indptr))]] = True
+    if contact.size:
+        changed[A.rows(np.sort(contact)).indices] = True
+    node = np.flatnonzero(changed)
+    found = A.rows(node)
+    indptr = np.zeros(A.nodes + 1, dtype=np.int32)
+    indptr[node + 1] = np.diff(found.indptr)
+    inverse = np.empty((0, 3, 3))
+    return NodeBlocks(np.cumsum(indptr, dtype=np.int32), found.indices, found.data, inverse)
 
 
 def _touching(A: NodeBlocks, nodes: Index) -> Index:
