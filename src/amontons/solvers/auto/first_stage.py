@@ -26,13 +26,12 @@ from ..sweeps.kernels import (
     FIRST_JUDGED,
     Sweep,
     anderson_inplace,
-    by_approach,
     flops_of_acceleration,
     flops_of_sweep,
 )
 from ..sweeps.local_contact import CLOSE, STEPS
 from .race import FIRST_CHUNKS, GROWTH, SHORTEST
-from .state import HISTORY_CONTACT, nanoseconds_of_sweep
+from .state import HISTORY_CONTACT, nanoseconds_of_sweep, visits
 from .tracks import DEPTH, LEAST
 
 Array = NDArray[np.float64]
@@ -67,8 +66,8 @@ def solve_range(  # noqa: PLR0913
         goal, work = goals[p], np.zeros(1)
         s = Sweep(
             indptr[a + p : b + p + 1], indices[c:d], blocks[c:d], q[a:b], kind[a:b],
-            parameters[a:b], rho[a:b], diagonal[a:b], eliminated[a:b], by_approach(q[a:b]),
-            EXACT, 1.0, CLOSE, STEPS, work,
+            parameters[a:b], rho[a:b], diagonal[a:b], eliminated[a:b],
+            visits(q[a:b], d - c), EXACT, 1.0, CLOSE, STEPS, work,
         )  # fmt: skip
         x, nc = r[a:b], b - a
         error = natural_error(s.indptr, s.indices, s.data, s.q, s.kind, s.parameters, s.rho, x)
