@@ -69,8 +69,8 @@ Each track alone, over the oracle; and the race without it, simulated, over the 
 |---|---|---|---|---|---|---|---|"""
 
 CROSSED = """
-Simulated on the traces: with the constants of the race, with the best of {count} random draws about
-them, and on each class with those that are the best on all others.
+Simulated on the traces: with the constants of the race, with the best of {count} random draws
+about them, and on each class with those that are the best on all others.
 
 | problems | solves | geometric mean | 90 % | worst |
 |---|---|---|---|---|"""

@@ -77,16 +77,16 @@ def polish(state: State) -> Chunks:
     turn = yield Chunk(state.start, 0, 0.0)
     while True:
         memory, watch = Acceleration(state.data, state.r, DEEP), watch_for(state.goal)
-        own = first = state.error
+        first = mark = state.error
         waited, better = 0, False
         while not better:
             count, flops = memory.sweep(max(LEAST, int(turn.cost / cost)), watch)
             turn = yield Chunk(memory.r.copy(), count, cost * count, flops, watch[2])
-            waited = 0 if state.latest < 0.5 * own else waited + count
-            own = min(own, state.latest)
-            better = state.error < NEARER * own or (
-                waited > PATIENT and state.error < 0.99 * min(own, first)
-            )
+            own, waited = min(turn.error, first), waited + count
+            if own < 0.5 * mark:
+                mark, waited = own, 0
+            nearer = 0.99 if waited > PATIENT else NEARER
+            better = state.error < nearer * own
 
 
 def _swept(memory: Momentum | Acceleration, cost: float, watch: Array) -> Chunks:
