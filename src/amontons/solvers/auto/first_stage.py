@@ -97,8 +97,6 @@ def solve_range(  # noqa: PLR0913
 
 def _joined(arrays: Sequence[NDArray]) -> NDArray:
     """Arrays one behind the other, read-only as theirs are."""
-    if len(arrays) == 1:
-        return arrays[0]
     return read_only(np.concatenate(arrays))
 
 
@@ -123,12 +121,16 @@ class Together:
         self.sizes, self.limits = np.array(ends, np.int64), np.array(limits, np.int64)
         self.norms = np.array([p.q_norm for p in problems])
         kernels = [(*p.kernel_data, p.blocks.diagonal, p.blocks.eliminated) for p in problems]
-        self.data = tuple(_joined(x) for x in zip(*kernels, strict=True))
-        self.floor = _joined([p.floor for p in problems])
+        if len(kernels) == 1:
+            self.data, self.floor = kernels[0], problems[0].floor
+        else:
+            self.data = tuple(_joined(x) for x in zip(*kernels, strict=True))
+            self.floor = _joined([p.floor for p in problems])
         total = len(self.r)
         self.u, self.kept = np.empty((2, total, 3))
         self.status, self.sliding = np.empty((2, total), np.int8)
-        self.told = np.full((len(problems), 8), math.inf)
+        self.told = np.empty((len(problems), 8))
+        self.told.fill(math.inf)
 
     def solve(self, first: int, last: int) -> None:
         """Solve some of the problems."""
