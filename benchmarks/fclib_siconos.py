@@ -316,7 +316,7 @@ def main():
     parser.add_argument("--siconos", default="/usr/bin/python3", help="Python that has Siconos")
     parser.add_argument("--cap", type=float, default=3.0, help="CPU seconds of one of its runs")
     parser.add_argument("--limit", type=float, default=30.0, help="seconds for one run of ours")
-    parser.add_argument("--only", default="", help="part of names that are run, again too")
+    parser.add_argument("--only", default="", help="parts of names, a,b: run again too")
     parser.add_argument("--anew", action="store_true", help="run all, whatever is stored")
     parser.add_argument("--most", type=int, default=1000, help="problems of a class")
     parser.add_argument("--seed", type=int, default=2026, help="of what is made here")
@@ -360,7 +360,8 @@ def _problems(options):
     counts = Counter()
     for kind, name, problem in chain(small, classes(options.folder, options.seed)):
         few = problem.contacts < COMPARED
-        if options.only in name and few == (kind == "small") and counts[kind] < options.most:
+        chosen = any(part in name for part in options.only.split(","))
+        if chosen and few == (kind == "small") and counts[kind] < options.most:
             counts[kind] += 1
             yield GROUPS.get(kind, GROUPS["FCLib"]), name, problem
 
