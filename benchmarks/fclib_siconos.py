@@ -260,7 +260,7 @@ columns: time with the second condition over that without (geometric mean), and 
 """
 CAPTION = """
 Milliseconds, ours / Siconos (its solver); `-` not solved within the cap; an unsolved run of
-ours shows the error reached.
+ours shows the error reached.  The command goes on with problems that are not in the table.
 
 """
 
