@@ -1,22 +1,25 @@
 """`solve(problem)` against every cone solver of Siconos, in one run.
 
     python benchmarks/fclib_siconos.py [FOLDER] [--seed 2026] [--siconos /usr/bin/python3]
+                                       [--anew]
 
 The problems are those of `classes.py`: the FCLib files of a folder, and packings, rigid blocks,
 walls of meshed blocks and two meshed bodies made from a seed, on which nobody has tuned
 anything (change --seed for others).
 
 Both sides get the Delassus form.  Ours is the whole of `drive(problem)`, judge and status
-included, of a problem that is kept, and of one that is made of arrays each time (conversion
-included); best of 5 to 50 warm runs, one thread.  Siconos is its driver call, its conversion
-left out, best of as many, started from r = 0 with six solvers, asked for each tolerance and for
+included, of a problem that is kept, and of one that is made of arrays each time; best of 3 to
+50 warm runs, one thread.  Siconos is its driver call, and with its own conversion of the
+arrays, best of as many, started from r = 0 with six solvers, asked for each tolerance and for
 1e-2 and 1e-4 of it, because it stops on another error; the fastest run whose answer passes our
 judge counts, chosen in hindsight for each file and tolerance.  CPU seconds on both sides.  Runs
-longer than the cap end: where no solver of theirs is there by then, nothing is compared.  The
-judge asks both sides for the error in the sum and for that of every contact on its own scale;
-what the second condition costs each side stands beside.
+longer than the cap end, and those longer than another solver of theirs took to the tightest
+tolerance, since they can not be the fastest: where no solver of theirs is there by then,
+nothing is compared.  The judge asks both sides for the error in the sum and for that of every
+contact on its own scale; what the second condition costs each side stands beside.
 
-Writes results/fclib_siconos.json and results/fclib_siconos.md beside this file.
+Writes results/fclib_siconos.json and results/fclib_siconos.md beside this file, after each
+problem; what the file has of the same machine, seed and cap is not run again without --anew.
 """
 
 import os
@@ -26,6 +29,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import argparse
 import json
 import select
+import signal
 import subprocess
 import tempfile
 import time
@@ -49,6 +53,7 @@ GROUPS = {  # of `classes`
     "rolling": "packings", "rigid blocks": "rigid blocks", "elastic walls": "elastic walls",
     "two bodies": "two bodies",
 }  # fmt: skip
+ENDED = b'{"process": null}'  # the last line of a process
 RETIGHTEN = (1.0, 1e-2, 1e-4)
 COMPARED = 20  # contacts from which a ratio counts
 WARM = 1.0  # seconds up to which a solve is made more often than once
@@ -60,13 +65,15 @@ def ours(problem, tolerance, limit, contact_tolerance=None):
     options = {"tolerance": tolerance, "contact_tolerance": contact_tolerance,
                "time_limit": limit}  # fmt: skip
     best, fresh = np.inf, np.inf
+    began = time.process_time()
     solution = drive(problem, **options)
-    seconds = solution.convergence.seconds
+    seconds = time.process_time() - began
     if solution.convergence.compiling:
-        seconds = timed(lambda: drive(problem, **options))
-    for _ in range(int(np.clip(0.1 / seconds, 5, 50)) if seconds < WARM else 0):
+        seconds = min(timed(lambda: drive(problem, **options)) for _ in range(2))
+    for _ in range(int(np.clip(0.1 / seconds, 2, 50)) if seconds < WARM else 0):
         best = min(best, timed(lambda: drive(problem, **options)))
-        fresh = min(fresh, timed(lambda: drive(again(problem), **options)))
+        if contact_tolerance is None:
+            fresh = min(fresh, timed(lambda: drive(again(problem), **options)))
     record = solution.convergence
     return {
         "converged": solution.converged,
@@ -91,63 +98,94 @@ def again(problem):
     return am.FrictionProblem.from_delassus(problem.W, problem.q, problem.mu)
 
 
-def theirs(problem, python, cap):
-    """Every run of every Siconos solver: solver, asked, seconds, error by our judge."""
-    W = sparse.csr_array(problem.W)
-    runs = []
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "problem.npz"
-        np.savez(path, data=W.data, indices=W.indices, indptr=W.indptr,
-                 q=problem.q.ravel(), mu=problem.mu)  # fmt: skip
-        asked = sorted({t * k for t in TOLERANCES for k in RETIGHTEN}, reverse=True)
-        for solver in SOLVERS:
-            runs += _worker(problem, python, path, solver, asked, cap)
-    return runs
+class Siconos:
+    """The solvers of Siconos, in processes of one that has imported it."""
+
+    def __init__(self, python):
+        command = [python, str(HERE / "siconos_worker.py")]
+        self.process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+        self.buffer = b""
+
+    def runs(self, problem, cap):
+        """Every run of every solver: solver, asked, seconds, error by our judge."""
+        W = sparse.csr_array(problem.W)
+        runs = []
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "problem.npz"
+            np.savez(path, data=W.data, indices=W.indices, indptr=W.indptr,
+                     q=problem.q.ravel(), mu=problem.mu)  # fmt: skip
+            asked = sorted({t * k for t in TOLERANCES for k in RETIGHTEN}, reverse=True)
+            for solver in SOLVERS:
+                runs += self._of_solver(problem, path, solver, asked, cap)
+                there = [x["seconds"] for x in runs if _passes(x, min(TOLERANCES))]
+                cap = min(cap, *there) if there else cap
+        return runs
+
+    def _of_solver(self, problem, path, solver, asked, cap):
+        """One process, killed when a tolerance takes longer than the cap."""
+        texts = ",".join(f"{a:g}" for a in asked)
+        self.process.stdin.write(f"{path} {solver} {texts}\n".encode())
+        self.process.stdin.flush()
+        child = json.loads(self._line())["process"]
+        # Quick runs are made again, and before the first the problem is made.
+        runs, killed, most = [], False, 2 * cap + 2.0
+        while True:
+            line = self._line(child, most)
+            if line is None:
+                os.kill(child, signal.SIGKILL)
+                killed, most = True, np.inf
+            elif line == ENDED:
+                return runs
+            elif not killed:
+                found = json.loads(line)
+                r = np.array(found.pop("r")).reshape(-1, 3)
+                runs.append({"solver": solver, **found, "error": problem.error(r),
+                             "contact_error": problem.weakest(r).error})  # fmt: skip
+                most = _cpu(child) + 2 * max(cap, 0.1)
+                if found["seconds"] > cap:
+                    os.kill(child, signal.SIGKILL)
+                    killed, most = True, np.inf
+
+    def _line(self, child=0, most=np.inf):
+        """The next line; None where the child takes more CPU seconds than that before."""
+        while True:
+            line, end, rest = self.buffer.partition(b"\n")
+            if end:
+                self.buffer = rest
+                if line:
+                    return line
+            elif select.select([self.process.stdout], [], [], 0.1)[0]:
+                more = os.read(self.process.stdout.fileno(), 1 << 20)
+                if not more:
+                    raise SystemExit("the worker has ended: does this Python have Siconos?")
+                self.buffer += more
+            elif most < np.inf and _cpu(child) > most:
+                return None
 
 
-def _worker(problem, python, path, solver, asked, cap):
-    """One process per solver, killed when a tolerance takes longer than the cap."""
-    texts = ",".join(f"{a:g}" for a in asked)
-    command = [python, str(HERE / "siconos_worker.py"), str(path), solver, texts]
-    process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
-    )
-    runs, spent = [], 0.0
-    for k in range(len(asked)):
-        ready = False
-        while not ready and _cpu(process.pid) - spent < 2 * cap + (5 if k == 0 else 0):
-            ready = bool(select.select([process.stdout], [], [], 0.1)[0])
-        spent = _cpu(process.pid)
-        line = process.stdout.readline() if ready else ""
-        if not line:
-            break
-        found = json.loads(line)
-        r = np.array(found.pop("r")).reshape(-1, 3)
-        runs.append({"solver": solver, **found, "error": problem.error(r),
-                     "contact_error": problem.weakest(r).error})  # fmt: skip
-        if found["seconds"] > cap:
-            break
-    process.kill()
-    process.wait()
-    return runs
+def _passes(found, tolerance):
+    """True for a run whose answer our judge takes, in the sum and contact by contact."""
+    return found["error"] <= tolerance and found["contact_error"] <= tolerance**0.5
 
 
 def _cpu(pid):
-    """CPU seconds of a process that runs, Linux; else of the clock."""
-    path = Path(f"/proc/{pid}/stat")
-    if not path.exists():
-        return time.monotonic()
-    after = path.read_text().rpartition(")")[2].split()
+    """CPU seconds of a process, Linux; 0 of one that has ended."""
+    try:
+        after = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except FileNotFoundError:
+        return 0.0
     return (int(after[11]) + int(after[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def compare(problem, python, cap, limit):
+def compare(problem, siconos, cap, limit):
     """One file: ours and the best of theirs at each tolerance."""
-    runs = theirs(problem, python, cap)
+    runs = siconos.runs(problem, cap)
     rows = {}
     for tolerance in TOLERANCES:
         in_sum = [x for x in runs if x["error"] <= tolerance]
-        passing = [x for x in in_sum if x["contact_error"] <= tolerance**0.5]
+        passing = [x for x in runs if _passes(x, tolerance)]
         best = min(passing, key=lambda x: x["seconds"], default=None)
         mine = ours(problem, tolerance, limit)
         quick = mine["seconds"] < WARM
@@ -159,7 +197,7 @@ def compare(problem, python, cap, limit):
         counts = best is not None and best["seconds"] > COUNTED_SECONDS
         if counts and row["ours"]["converged"] and problem.contacts >= COMPARED:
             row["ratio"] = row["ours"]["seconds"] / best["seconds"]
-            row["fresh"] = row["ours"]["fresh"] / best["seconds"]
+            row["fresh"] = row["ours"]["fresh"] / (best["seconds"] + best["conversion"])
         rows[f"{tolerance:g}"] = row
     return {"contacts": problem.contacts, "tolerances": rows, "siconos_runs": runs}
 
@@ -222,7 +260,7 @@ columns: time with the second condition over that without (geometric mean), and 
 """
 CAPTION = """
 Milliseconds, ours / Siconos (its solver); `-` not solved within the cap; an unsolved run of
-ours shows the error reached.
+ours shows the error reached.  The command goes on with problems that are not in the table.
 
 """
 
@@ -278,28 +316,39 @@ def main():
     parser.add_argument("--siconos", default="/usr/bin/python3", help="Python that has Siconos")
     parser.add_argument("--cap", type=float, default=3.0, help="CPU seconds of one of its runs")
     parser.add_argument("--limit", type=float, default=30.0, help="seconds for one run of ours")
-    parser.add_argument("--only", default="", help="part of a name; keep the stored rest")
+    parser.add_argument("--only", default="", help="parts of names, a,b: run again too")
+    parser.add_argument("--anew", action="store_true", help="run all, whatever is stored")
     parser.add_argument("--most", type=int, default=1000, help="problems of a class")
     parser.add_argument("--seed", type=int, default=2026, help="of what is made here")
     options = parser.parse_args()
     (HERE / "results").mkdir(exist_ok=True)
     stored = HERE / "results/fclib_siconos.json"
-    kept = options.only and stored.exists()
-    results = json.loads(stored.read_text())["files"] if kept else {}
+    chosen = f" --cap {options.cap:g} --seed {options.seed}"
+    chosen += f" --most {options.most}" if options.most < 1000 else ""
+    machine = describe()
+    before = json.loads(stored.read_text()) if stored.exists() else {}
+    same = before.get("options") == chosen and before.get("machine") == machine
+    results = before["files"] if same and not options.anew else {}
+    siconos = Siconos(options.siconos)
     for group, name, problem in _problems(options):
-        found = compare(problem, options.siconos, options.cap, options.limit)
+        if name in results and not options.only:
+            continue
+        found = compare(problem, siconos, options.cap, options.limit)
         results[name] = {"group": group, **found}
         print(name, [_cell(x) for x in found["tolerances"].values()], flush=True)
-    machine = describe()
+        _write(results, machine, chosen, stored)
+
+
+def _write(results, machine, chosen, stored):
+    """The record and the page, of what there is so far."""
     summaries = {
         group: summarise({n: r for n, r in results.items() if r["group"] == group})
         for group in dict.fromkeys(GROUPS.values())
         if any(r["group"] == group for r in results.values())
     }
-    print(json.dumps(summaries, indent=1))
-    record = {"machine": machine, "summary": summaries, "files": results}
-    chosen = f" --cap {options.cap:g} --seed {options.seed}"
-    chosen += f" --most {options.most}" if options.most < 1000 else ""
+    record = {
+        "machine": machine, "options": chosen, "summary": summaries, "files": results
+    }  # fmt: skip
     stored.write_text(json.dumps(record, indent=1))
     (HERE / "results/fclib_siconos.md").write_text(table(results, summaries, machine, chosen))
 
@@ -311,7 +360,8 @@ def _problems(options):
     counts = Counter()
     for kind, name, problem in chain(small, classes(options.folder, options.seed)):
         few = problem.contacts < COMPARED
-        if options.only in name and few == (kind == "small") and counts[kind] < options.most:
+        chosen = any(part in name for part in options.only.split(","))
+        if chosen and few == (kind == "small") and counts[kind] < options.most:
             counts[kind] += 1
             yield GROUPS.get(kind, GROUPS["FCLib"]), name, problem
 

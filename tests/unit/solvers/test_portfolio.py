@@ -9,9 +9,12 @@ import pytest
 import amontons as am
 from amontons.mechanics.ready.gallery import random_delassus
 from amontons.solvers.auto.portfolio import MOST_TURNS, RESTARTS, TRACKS, Portfolio, restarts
-from amontons.solvers.auto.race import LOST_CHUNKS, Chunk, Entry, Race
-from amontons.solvers.auto.state import State
+from amontons.solvers.auto.race import LOST_CHUNKS, Chunk, Entry, Race, Track
+from amontons.solvers.auto.state import FEW, State, visits
+from amontons.solvers.auto.tracks import polish
 from amontons.solvers.contract import Target
+from amontons.solvers.sweeps.kernels import by_approach, sweep_data, watch_for
+from amontons.solvers.sweeps.momentum import Momentum
 
 
 def state_of(problem, tolerance=1e-8):
@@ -93,6 +96,54 @@ def test_every_track_alone_solves_an_easy_problem(entry):
     errors = [problem.error(iterate.r) for iterate, _ in zip(found, range(400), strict=False)]
     assert min(errors) < 1e-8
     assert all(b <= a * (1 + 1e-9) for a, b in zip(errors, errors[1:], strict=False))
+
+
+def rolling(count, mu):
+    """A time step of spheres that turn at random, condensed."""
+    packing = am.SpherePacking(count, mu=mu, seed=1)
+    still, random = packing.problem(1e-3), np.random.default_rng(3)
+    omega = np.zeros((count, 6))
+    omega[:, 3:] = 10 * random.standard_normal((count, 3))
+    f = still.f + still.M @ omega.ravel()
+    return am.FrictionProblem.from_global(still.M, still.H, f, still.w, still.mu).condensed()
+
+
+def swept_alone(state, sweeps):
+    """Error of the deep track alone after so many sweeps at least; the track."""
+    track = Track(next(e for e in TRACKS if e.chunks is polish), state)
+    done = 0
+    while done < sweeps and state.error > state.goal:
+        done += track.advance().iterations
+    return state.error, track
+
+
+def test_the_deep_track_ends_what_momentum_comes_near_to():
+    state = state_of(rolling(40, 0.6))
+    near = Momentum(sweep_data(state.problem), state.start)
+    near.sweep(60, watch_for(0.0))
+    state.offer(near.r, 60, "momentum")
+    before = state.error
+    assert swept_alone(state, 400)[0] < 1e-2 * before
+
+
+def test_the_deep_track_goes_on_from_a_better_reaction_of_others():
+    problem = rolling(40, 0.6)
+    state = state_of(problem)
+    _, track = swept_alone(state, 20)
+    better = am.drive(problem, tolerance=1e-7).r
+    state.offer(better, 1, "another")
+    track.advance()  # sweeps from its own, and sees the better one
+    track.advance()
+    assert state.latest < 1e-5 * problem.q_norm
+
+
+def test_many_contacts_that_are_all_coupled_are_swept_as_they_are_numbered():
+    few, meshed = random_delassus(0, FEW), random_delassus(0, FEW + 1)
+    assert list(state_of(meshed).data.order) == list(range(FEW + 1))
+    assert list(state_of(few).data.order) == list(by_approach(few.kernel_data[3]))
+    for problem in (few, meshed):
+        q, blocks = problem.kernel_data[3], len(problem.blocks.indices)
+        assert list(visits(q, blocks)) == list(state_of(problem).data.order)
 
 
 # ------------------------------------------------------------------ who goes on

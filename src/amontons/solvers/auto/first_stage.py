@@ -26,13 +26,12 @@ from ..sweeps.kernels import (
     FIRST_JUDGED,
     Sweep,
     anderson_inplace,
-    by_approach,
     flops_of_acceleration,
     flops_of_sweep,
 )
 from ..sweeps.local_contact import CLOSE, STEPS
 from .race import FIRST_CHUNKS, GROWTH, SHORTEST
-from .state import HISTORY_CONTACT, nanoseconds_of_sweep
+from .state import HISTORY_CONTACT, nanoseconds_of_sweep, visits
 from .tracks import DEPTH, LEAST
 
 Array = NDArray[np.float64]
@@ -67,8 +66,8 @@ def solve_range(  # noqa: PLR0913
         goal, work = goals[p], np.zeros(1)
         s = Sweep(
             indptr[a + p : b + p + 1], indices[c:d], blocks[c:d], q[a:b], kind[a:b],
-            parameters[a:b], rho[a:b], diagonal[a:b], eliminated[a:b], by_approach(q[a:b]),
-            EXACT, 1.0, CLOSE, STEPS, work,
+            parameters[a:b], rho[a:b], diagonal[a:b], eliminated[a:b],
+            visits(q[a:b], d - c), EXACT, 1.0, CLOSE, STEPS, work,
         )  # fmt: skip
         x, nc = r[a:b], b - a
         error = natural_error(s.indptr, s.indices, s.data, s.q, s.kind, s.parameters, s.rho, x)
@@ -98,8 +97,6 @@ def solve_range(  # noqa: PLR0913
 
 def _joined(arrays: Sequence[NDArray]) -> NDArray:
     """Arrays one behind the other, read-only as theirs are."""
-    if len(arrays) == 1:
-        return arrays[0]
     return read_only(np.concatenate(arrays))
 
 
@@ -124,12 +121,16 @@ class Together:
         self.sizes, self.limits = np.array(ends, np.int64), np.array(limits, np.int64)
         self.norms = np.array([p.q_norm for p in problems])
         kernels = [(*p.kernel_data, p.blocks.diagonal, p.blocks.eliminated) for p in problems]
-        self.data = tuple(_joined(x) for x in zip(*kernels, strict=True))
-        self.floor = _joined([p.floor for p in problems])
+        if len(kernels) == 1:
+            self.data, self.floor = kernels[0], problems[0].floor
+        else:
+            self.data = tuple(_joined(x) for x in zip(*kernels, strict=True))
+            self.floor = _joined([p.floor for p in problems])
         total = len(self.r)
         self.u, self.kept = np.empty((2, total, 3))
         self.status, self.sliding = np.empty((2, total), np.int8)
-        self.told = np.full((len(problems), 8), math.inf)
+        self.told = np.empty((len(problems), 8))
+        self.told.fill(math.inf)
 
     def solve(self, first: int, last: int) -> None:
         """Solve some of the problems."""

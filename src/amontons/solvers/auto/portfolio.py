@@ -8,6 +8,7 @@ is measured in `benchmarks/results/race.md`.
     relaxation          1.6 on close packings, 0.9 on rock piles and between meshed bodies
     interior point      more reactions than balances: stacks, walls, arches of rigid blocks
     smoothing Newton    sliding stacks, the last digits
+    deep Anderson       from the best reaction of all: the end of what momentum comes near to
     inexact Newton      joints between deformable bodies
     semismooth Newton   where W is full (deformable bodies), or the law is not Coulomb's
     restarts            RESTARTS again and again, from the best reaction: proximal point;
@@ -36,12 +37,13 @@ from .stages import (
     proximal_point,
     semismooth_steps,
 )
-from .state import State
+from .state import DENSE, State
 from .tracks import (
     anderson,
     inexact_newton,
     interior_point,
     momentum,
+    polish,
     relaxed,
     semismooth_newton,
     smoothing_newton,
@@ -49,8 +51,8 @@ from .tracks import (
 )
 
 Array = NDArray[np.float64]
-DENSE = 0.5  # share of blocks of W above which it comes from a mesh
 MOST_TURNS = 12  # repetitions of the restarts before Auto gives up
+DEEP_SWEEPS = 1000  # before which the others may end: it needs a reaction that is near
 
 
 def _can_end(state: State) -> bool:
@@ -89,6 +91,10 @@ def _dense_steps(state: State) -> float:
     return 3 * state.dense_step_cost
 
 
+def _deep_sweeps(state: State) -> float:
+    return DEEP_SWEEPS * state.deep_cost
+
+
 def _at_joints(state: State) -> float:
     assert state.joints is not None
     return 6 * state.joints.newton_cost(8)
@@ -117,6 +123,7 @@ TRACKS = (
     Entry("Gauss-Seidel, relaxation 0.9", partial(relaxed, 0.9), 0.02, 3.0),
     Entry("interior point", interior_point, 0.05, 1.0, _steps(20), _has_cone),
     Entry("smoothing Newton", smoothing_newton, 0.15, 1.0, _steps(30), _has_cone),
+    Entry("Anderson Gauss-Seidel, deep", polish, 0.1, 1.0, _deep_sweeps, _can_end, True),
     Entry("inexact Newton", inexact_newton, 0.3, 0.3, _at_joints, _has_joints),
     Entry("semismooth Newton", semismooth_newton, 0.1, 1.0, _dense_steps, _has_steps),
     Entry("restarts", partial(staged, restarts), 0.2, 1.0, _steps(1000), _can_end, True),

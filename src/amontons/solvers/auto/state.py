@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.compiled import njit
 from ...problem.friction import FrictionProblem
 from ...problem.judge.measures import natural_error
 from ...problem.law import Coulomb
@@ -20,18 +21,36 @@ from ..newton.inexact import InexactNewton
 from ..newton.joints import Joints
 from ..newton.semismooth import Condensed, SemismoothNewton
 from ..newton.smoothing import Workspace
-from ..sweeps.kernels import SweepOrder, sweep_data
+from ..sweeps.kernels import SweepOrder, by_approach, sweep_data
 
 Array = NDArray[np.float64]
 EXACT_WORK = 1e6  # products of blocks in an LU up to which an exact step costs no more
 # Nanoseconds measured on one core: only their ratios matter, and only roughly.
 SWEEP_BLOCK = 2.0
 SWEEP_CONTACT = 30.0
-HISTORY_CONTACT = 35.0
+HISTORY_CONTACT, DEEP_CONTACT = 35.0, 105.0
 MOMENTUM_CONTACT = 4.0
 PRODUCT = 5.4
 NEWTON_CONTACT = 500.0
 DENSE_STEP = 0.05  # per cube of the unknowns
+DENSE = 0.5  # share of blocks of W above which it comes from a mesh
+FEW = 30  # contacts up to which W may be full as all are on one rigid body
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def is_meshed(blocks: int, contacts: int) -> bool:
+    """True where so many stored blocks of W come from deformable bodies, all coupled."""
+    return contacts > FEW and blocks > DENSE * contacts * contacts
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def visits(q: Array, blocks: int) -> NDArray[np.int64]:
+    """Contacts in the order in which accelerated sweeps visit them; q (nc, 3).
+
+    By their approach, but on meshes as they are numbered: neighbours one after another, which
+    takes down to a quarter of the sweeps there, and a shuffled mesh half of them.
+    """
+    return np.arange(len(q)) if is_meshed(blocks, len(q)) else by_approach(q)
 
 
 def nanoseconds_of_sweep(blocks: int, contacts: int, more: float = 0.0) -> float:
@@ -57,7 +76,9 @@ class State:
         self.swept_error = self.error
         self.first_error = self.error if self.error < math.inf else self.problem.q_norm
         self.goal = self.target.tolerance * self.problem.q_norm
-        self.data = sweep_data(self.problem, order=SweepOrder.APPROACH)
+        meshed = is_meshed(len(self.problem.blocks.indices), self.problem.contacts)
+        order = SweepOrder.STORED if meshed else SweepOrder.APPROACH
+        self.data = sweep_data(self.problem, order=order)
 
     # ---------------------------------------------------------------- kind of the problem
     @property
@@ -106,6 +127,11 @@ class State:
     def accelerated_cost(self) -> float:
         """Nanoseconds of an accelerated sweep."""
         return self._cost(HISTORY_CONTACT)
+
+    @property
+    def deep_cost(self) -> float:
+        """Nanoseconds of a sweep with a deep memory."""
+        return self._cost(DEEP_CONTACT)
 
     @property
     def momentum_cost(self) -> float:

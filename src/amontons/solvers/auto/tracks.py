@@ -29,6 +29,9 @@ from .state import State
 
 Array = NDArray[np.float64]
 DEPTH = 10  # past sweeps that Anderson acceleration combines
+DEEP = 30  # of them where a track goes on from the best reaction of all
+NEARER = 0.3  # error of that, of the track's own, at which it begins again from there
+PATIENT = 600  # sweeps without halving its error, after which any better one will do
 TAKEN = 0.1  # error of the best reaction, of its own, at which a track goes on from that
 LEAST = 20  # sweeps of a chunk: a judgement costs as much as one
 BETWEEN = 200  # accelerated sweeps after each relaxation, and on while they halve the error
@@ -62,6 +65,28 @@ def anderson(state: State) -> Chunks:
             memory, watch = Acceleration(state.data, state.r, DEPTH), watch_for(state.goal)
         count, flops = memory.sweep(max(LEAST, int(turn.cost / cost)), watch)
         turn = yield Chunk(memory.r.copy(), count, cost * count, flops, watch[2])
+
+
+def polish(state: State) -> Chunks:
+    """Deeply accelerated sweeps from the best reaction of all, again when others have a better.
+
+    Momentum comes near a packing that rolls and hovers there, as statuses go on changing.  From
+    there a deep memory ends in some hundred sweeps; from the start it does not come so near.
+    """
+    cost = state.deep_cost
+    turn = yield Chunk(state.start, 0, 0.0)
+    while True:
+        memory, watch = Acceleration(state.data, state.r, DEEP), watch_for(state.goal)
+        first = mark = state.error
+        waited, better = 0, False
+        while not better:
+            count, flops = memory.sweep(max(LEAST, int(turn.cost / cost)), watch)
+            turn = yield Chunk(memory.r.copy(), count, cost * count, flops, watch[2])
+            own, waited = min(turn.error, first), waited + count
+            if own < 0.5 * mark:
+                mark, waited = own, 0
+            nearer = 0.99 if waited > PATIENT else NEARER
+            better = state.error < nearer * own
 
 
 def _swept(memory: Momentum | Acceleration, cost: float, watch: Array) -> Chunks:
@@ -194,6 +219,6 @@ def staged(stages: Staged, state: State) -> Chunks:
 
 
 __all__ = [
-    "anderson", "inexact_newton", "interior_point", "momentum", "relaxed", "semismooth_newton",
-    "smoothing_newton", "staged",
+    "anderson", "inexact_newton", "interior_point", "momentum", "polish", "relaxed",
+    "semismooth_newton", "smoothing_newton", "staged",
 ]  # fmt: skip
