@@ -46,7 +46,7 @@ from .meeting import Meetings, meetings
 from .quick import Found, Posed, law_of, pose
 from .rows import Rows, delassus, impulses, rotations, rows_at, turned
 from .states import Motion, RigidEnergies, RigidState, RigidStep
-from .sweeping import found_quickly
+from .sweeping import Search, found_quickly
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -182,7 +182,7 @@ class _Stepping:
                 at.rows, nc, (masses, self.inverse, R), (before.velocity, before.spin), free,
                 self.system.restitution, at.keys, (state.keys, state.impulses),
             ))  # fmt: skip
-            solved = self._solve(posed, nc, f"step {state.index + 1}", deadline)
+            solved = self._solve(at.rows, R, posed, nc, f"step {state.index + 1}", deadline)
             r = solved.r if isinstance(solved, Found) else solved.r.copy()
         motion, energies = ended(
             at.rows, r, R, self.bodies, gravity, h, begin, tuple(before), free
@@ -224,7 +224,7 @@ class _Stepping:
 
     # ------------------------------------------------------------------ problems
     def _solve(
-        self, posed: Posed, contacts: int, what: str, deadline: Deadline
+        self, rows: Rows, R: Array, posed: Posed, contacts: int, what: str, deadline: Deadline
     ) -> Found | FrictionSolution:
         """The impulses of a step, `what` for messages.
 
@@ -233,7 +233,8 @@ class _Stepping:
         mu, asked = self.system.mu, self.asked
         timed = deadline is not NEVER and (deadline.work is not None or deadline.passed)
         if self.solver is None and not timed:
-            found, start = found_quickly(posed, contacts, mu, asked.tolerance)
+            search = Search(posed, rows, R, self.bodies, contacts, mu, asked.tolerance)
+            found, start = found_quickly(search)
             if found is not None:
                 return found
             posed = posed._replace(start=start)
@@ -263,7 +264,8 @@ class _Stepping:
         posed = Posed(W.indptr, W.indices, W.data, W.diagonal, q, np.zeros_like(q))
         found = None
         if self.solver is None:
-            found, start = found_quickly(posed, nc, 0.0, self.asked.tolerance)
+            search = Search(posed, rows, R, self.bodies, nc, 0.0, self.asked.tolerance)
+            found, start = found_quickly(search)
             posed = posed._replace(start=start)
         if found is None:
             problem = posed.problem(law_of(nc, len(q) - nc, 0.0))
