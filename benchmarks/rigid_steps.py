@@ -134,9 +134,9 @@ def main():
     rows = [row(make) for make in (sliding, rocking, dominoes, pile, arch, rocked, wall)]
     text = "\n".join([
         "# Steps of rigid bodies", "",
-        "`python benchmarks/rigid_steps.py`: time of the processor, at most 20 s for each",
+        "`python benchmarks/rigid_steps.py`: time of the processor, at most 10 s for each",
         "case; the longest step of all. Swept: steps that compiled sweeps solved alone.",
-        "Solvers: the same with `solver=am.Auto()`, over as many steps as fit in ten seconds;",
+        "Solvers: the same with `solver=am.Auto()`, over as many steps as fit in five seconds;",
         "later steps of a motion may cost more.", "",
         "| case | steps | contacts | ms a step | us a contact | longest, ms | swept | "
         "solvers, ms (steps) | outcomes | contacts at the end |",

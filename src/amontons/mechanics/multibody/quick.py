@@ -130,7 +130,7 @@ def pose(rows, contacts, bodies, motion, free, restitution, keys, state):  # noq
         slave, master, axes, arms, master_arms, masses, inverse, indptr, indices, data, diagonal
     )
     start = np.zeros((n, 3))
-    _match(keys, state[0], state[1], start)
+    matched(keys, state[0], state[1], start)
     return indptr, indices, data, diagonal, q, start
 
 
@@ -153,7 +153,7 @@ def _turned_vector(R, own, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _match(keys, old, impulses, start):
+def matched(keys, old, impulses, start):
     """Give contacts the impulses that the same corners had in the last step.
 
     Contacts keep their order mostly, so that each is looked for behind the last one first.

@@ -1,4 +1,4 @@
-"""What is solved of a step without the solvers: plain sweeps, sweeps with momentum, relaxations.
+"""What is solved of a step without the solvers: plain sweeps, momentum, relaxations.
 
 Few contacts are swept until they are solved.  Many are swept with momentum, in chunks, while
 the rate at which the error has fallen in the last chunk promises an end for less than a

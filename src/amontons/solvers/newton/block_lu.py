@@ -67,7 +67,7 @@ def analyse(blocks: BlockRows) -> Symbolic:
 
 
 def analyse_doubled(indptr: Index, indices: Index) -> Symbolic:
-    """The same of a pattern (n + 1,), with indices, whose rows and columns stand for two each."""
+    """The same of a pattern, indptr (n + 1,), whose rows and columns stand for two each."""
     order, start, later = _doubled(*_minimum_degree(indptr, indices))
     return Symbolic(order, *_structure(order, start, later))
 

@@ -6,8 +6,8 @@ With the levers G of `sweeps.on_bodies`, W = G G^T, a step (W + E) dr = f, E = S
 
 six unknowns for each body where there are three for each contact: on a wall of bricks, which
 has some eight contacts for each of them, 2 ms in place of 100.  The matrix is positive definite
-whatever the contacts, so nothing is added to W where it is singular, and with D = k (2 w w^T - J),
-w the scaling point, J = diag(1, -1, -1),
+whatever the contacts, so nothing is added to W where it is singular, and with the scaling point
+w, D = k (2 w w^T - J), J = diag(1, -1, -1),
 
     D^-1 = (2 (J w) (J w)^T - J) / k
 
@@ -193,6 +193,68 @@ def _multiplied(blocks, v, out):
 
 
 @njit(cache=True, error_model="numpy")
+def _right_side(phase, sigma, mean, mu, able, lam, beta, w, dx, dy, residual, f):  # noqa: PLR0913
+    """f (n, 3) of the predictor (phase 0) or, with its dx and dy, of the corrector."""
+    keep = 1.0 - sigma
+    p, fa, fb = np.empty(3), np.empty(3), np.empty(3)
+    for i in range(len(f)):
+        if able[i] <= 0.0:
+            for a in range(3):
+                f[i, a] = keep * residual[i, a]
+            continue
+        l0, l1, l2 = lam[i, 0], lam[i, 1], lam[i, 2]
+        c0 = sigma * mean - (l0 * l0 + l1 * l1 + l2 * l2)
+        c1, c2 = -2.0 * l0 * l1, -2.0 * l0 * l2
+        if phase == 1:
+            _scale(beta[i], w[i], dx[i], fa)
+            _unscale(beta[i], w[i], dy[i], fb)
+            c0 -= fa[0] * fb[0] + fa[1] * fb[1] + fa[2] * fb[2]
+            c1 -= fa[0] * fb[1] + fb[0] * fa[1]
+            c2 -= fa[0] * fb[2] + fb[0] * fa[2]
+        t = math.sqrt(l1 * l1 + l2 * l2)
+        p[0] = (l0 * c0 - l1 * c1 - l2 * c2) / ((l0 - t) * (l0 + t))
+        p[1], p[2] = (c1 - l1 * p[0]) / l0, (c2 - l2 * p[0]) / l0
+        _scale(beta[i], w[i], p, fa)
+        f[i, 0] = fa[0] + keep * residual[i, 0]
+        if mu[i] > 0.0:
+            f[i, 0] *= mu[i]
+            f[i, 1] = fa[1] + keep * residual[i, 1]
+            f[i, 2] = fa[2] + keep * residual[i, 2]
+
+
+@njit(cache=True, error_model="numpy")
+def _solved(levers, sides, E, inverse, factor, f, dr, du):  # noqa: PLR0913
+    """dr (n, 3) of (W + E) dr = f by the factor on the bodies, refined once, and du = W dr."""
+    order, upper_start, upper, lower_start, lower, U, L, pivots = factor
+    n, halves = len(f), len(order)
+    rest, part = np.empty((n, 3)), np.empty((n, 3))
+    turned, moved = np.empty((halves // 2, 6)), np.empty((halves, 3))
+    dr[:, :] = 0.0
+    du[:, :] = 0.0
+    for _ in range(2):
+        _multiplied(E, dr, rest)
+        for i in range(n):
+            for a in range(3):
+                rest[i, a] = f[i, a] - du[i, a] - rest[i, a]
+        _multiplied(inverse, rest, part)
+        driven_inplace(levers, sides, part, turned)
+        solve_inplace(
+            order, upper_start, upper, lower_start, lower, U, L, pivots,
+            turned.reshape((halves, 3)), moved,
+        )  # fmt: skip
+        felt_inplace(levers, sides, moved.reshape((halves // 2, 6)), du)
+        for i in range(n):
+            for a in range(3):
+                rest[i, a] -= du[i, a]
+        _multiplied(inverse, rest, part)
+        for i in range(n):
+            for a in range(3):
+                dr[i, a] += part[i, a]
+        driven_inplace(levers, sides, dr, turned)
+        felt_inplace(levers, sides, turned, du)
+
+
+@njit(cache=True, error_model="numpy")
 def relax_on_bodies_inplace(  # noqa: PLR0913
     levers, sides, pattern, symbolic, blocks, q, law, rho, r, x, y, s, goal, steps,
 ):  # fmt: skip
@@ -216,9 +278,7 @@ def relax_on_bodies_inplace(  # noqa: PLR0913
     lam, w, beta = np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
     residual, f, dr = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
     dx, dy, du, u = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3)), np.empty((n, 3))
-    turned, moved = np.empty((bodies, 6)), np.empty((2 * bodies, 3))
-    rest, part = np.empty((n, 3)), np.empty((n, 3))
-    p, fa, fb = np.empty(3), np.empty(3), np.empty(3)
+    turned = np.empty((bodies, 6))
     short = 0
     for i in range(n):
         if kind[i] == TIED and rho[i] > 0.0:
@@ -254,6 +314,7 @@ def relax_on_bodies_inplace(  # noqa: PLR0913
             if able[i] > 0.0:
                 _scaling(x, y, mu[i], i, beta, w, lam, E, inverse)
         mean = total / max(free, 1)
+        factor = order, upper_start, upper, lower_start, lower, U, L, pivots
         _assemble(levers, sides, inverse, indptr, indices, data)
         if not factorise_inplace(
             indptr, indices, data, none, order, upper_start, upper, lower_start, lower,
@@ -263,52 +324,8 @@ def relax_on_bodies_inplace(  # noqa: PLR0913
         sigma = length = 0.0
         for phase in range(2):
             keep = 1.0 - sigma
-            for i in range(n):
-                if able[i] <= 0.0:
-                    for a in range(3):
-                        f[i, a] = keep * residual[i, a]
-                    continue
-                l0, l1, l2 = lam[i, 0], lam[i, 1], lam[i, 2]
-                c0 = sigma * mean - (l0 * l0 + l1 * l1 + l2 * l2)
-                c1, c2 = -2.0 * l0 * l1, -2.0 * l0 * l2
-                if phase == 1:
-                    _scale(beta[i], w[i], dx[i], fa)
-                    _unscale(beta[i], w[i], dy[i], fb)
-                    c0 -= fa[0] * fb[0] + fa[1] * fb[1] + fa[2] * fb[2]
-                    c1 -= fa[0] * fb[1] + fb[0] * fa[1]
-                    c2 -= fa[0] * fb[2] + fb[0] * fa[2]
-                t = math.sqrt(l1 * l1 + l2 * l2)
-                p[0] = (l0 * c0 - l1 * c1 - l2 * c2) / ((l0 - t) * (l0 + t))
-                p[1], p[2] = (c1 - l1 * p[0]) / l0, (c2 - l2 * p[0]) / l0
-                _scale(beta[i], w[i], p, fa)
-                f[i, 0] = fa[0] + keep * residual[i, 0]
-                if mu[i] > 0.0:
-                    f[i, 0] *= mu[i]
-                    f[i, 1] = fa[1] + keep * residual[i, 1]
-                    f[i, 2] = fa[2] + keep * residual[i, 2]
-            dr[:, :] = 0.0
-            du[:, :] = 0.0
-            for _ in range(2):  # the second refines
-                _multiplied(E, dr, rest)
-                for i in range(n):
-                    for a in range(3):
-                        rest[i, a] = f[i, a] - du[i, a] - rest[i, a]
-                _multiplied(inverse, rest, part)
-                driven_inplace(levers, sides, part, turned)
-                solve_inplace(
-                    order, upper_start, upper, lower_start, lower, U, L, pivots,
-                    turned.reshape((2 * bodies, 3)), moved,
-                )  # fmt: skip
-                felt_inplace(levers, sides, moved.reshape((bodies, 6)), du)
-                for i in range(n):
-                    for a in range(3):
-                        rest[i, a] -= du[i, a]
-                _multiplied(inverse, rest, part)
-                for i in range(n):
-                    for a in range(3):
-                        dr[i, a] += part[i, a]
-                driven_inplace(levers, sides, dr, turned)
-                felt_inplace(levers, sides, turned, du)
+            _right_side(phase, sigma, mean, mu, able, lam, beta, w, dx, dy, residual, f)
+            _solved(levers, sides, E, inverse, factor, f, dr, du)
             for i in range(n):
                 if able[i] <= 0.0:
                     continue
@@ -347,8 +364,8 @@ def relax_on_bodies_inplace(  # noqa: PLR0913
 
 
 def relaxed(  # noqa: PLR0913
-    levers: Array, sides: NDArray[np.int64], matrix: BodyMatrix, blocks: Any, q: Array, law: Any,
-    rho: Array, slip: Array, goal: float, steps: int,
+    levers: Array, sides: NDArray[np.int64], matrix: BodyMatrix, blocks: Any, q: Array,
+    law: Any, rho: Array, slip: Array, goal: float, steps: int,
 ) -> tuple[Array, int]:  # fmt: skip
     """(r (n, 3), steps) of the relaxation with frozen |u_T|, (n,), from inside of the cones."""
     mu = law[1][:, MU]

@@ -29,7 +29,7 @@ GROUND = -1  # in place of a second body
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def driven_inplace(levers, sides, r, w):
-    """w = G^T r (bodies, 6) of reactions r (n, 3); sides (n, 2): the bodies, GROUND for none."""
+    """w = G^T r (bodies, 6) of reactions r (n, 3); sides (n, 2): bodies, GROUND for none."""
     w[:, :] = 0.0
     for i in range(len(sides)):
         for p in range(2):
