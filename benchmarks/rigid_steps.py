@@ -3,7 +3,7 @@
     python benchmarks/rigid_steps.py
 
 Each case runs for a second first, in which kernels are compiled, then afresh until its end or
-for 20 seconds.  Beside it the same steps with a solver that is asked for, `solver=am.Auto()`,
+for 10 seconds.  Beside it the same steps with a solver that is asked for, `solver=am.Auto()`,
 as all steps were solved before sweeps were tried first.  Ball and wall begin with the hardest
 steps: an intact wall of 2200 contacts, four to a joint, more reactions than balances.  Writes
 results/rigid_steps.md.
@@ -19,7 +19,7 @@ import amontons as am
 from amontons.mechanics.multibody.quick import Found
 
 FLOOR = am.Plane((0, 0, 1))
-G, LONGEST = 9.81, 20.0
+G, LONGEST = 9.81, 10.0
 FIRST = 3  # steps at least: the first may meet nothing, and compile nothing
 
 
