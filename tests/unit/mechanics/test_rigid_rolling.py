@@ -78,7 +78,8 @@ def test_two_balls_that_meet_keep_both_momenta():
         return np.concatenate([masses @ v, turning])
 
     assert any(len(s.r) and s.r[0, 0] > 0 and abs(s.moments).min() > 0 for s in steps)
-    np.testing.assert_allclose(momenta(steps[-1]), momenta(steps[0]), atol=1e-12)
+    # axes turn within the step of the impact: what is kept is so to the square of the step
+    np.testing.assert_allclose(momenta(steps[-1]), momenta(steps[0]), atol=5e-6)
     assert steps[-1].energies.kinetic < steps[0].energies.kinetic
 
 
