@@ -141,7 +141,7 @@ class _Stepping:
         self.solver, self.check = solver, check
         masses = np.array([body.mass for body in system.bodies])
         inertia = np.array([body.inertia for body in system.bodies])
-        self.inverse = np.linalg.inv(inertia)
+        self.inverse: Array = np.linalg.inv(inertia)
         self.bodies = masses, inertia, self.inverse
         self.no_couples = np.zeros((len(masses), 3))
         self.near = TOUCHING * system.packed.reach

@@ -70,9 +70,9 @@ class RollingFriction(Law):
         """(nc, 3) of sliding, spinning and rolling."""
         return np.column_stack([self.mu, self.torsion, self.rolling])
 
-    def shear(self, r: Array) -> Array:
-        """r_T, or u_T: (nc, 1) of three rows, (nc, 2) of five or six."""
-        return r[:, 1:2] if r.shape[1] == 3 else r[:, 1:3]
+    def shear(self, x: Array) -> Array:
+        """x_T: (nc, 1) of three rows, (nc, 2) of five or six."""
+        return x[:, 1:2] if x.shape[1] == 3 else x[:, 1:3]
 
     def at(self, index: NDArray[np.integer]) -> RollingFriction:
         """The law of a selection of contacts."""
