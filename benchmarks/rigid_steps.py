@@ -3,7 +3,7 @@
     python benchmarks/rigid_steps.py
 
 Each case runs for a second first, in which kernels are compiled, then afresh until its end or
-for 20 seconds.  Beside it the same steps with a solver that is asked for, `solver=am.Auto()`,
+for 10 seconds.  Beside it the same steps with a solver that is asked for, `solver=am.Auto()`,
 as all steps were solved before sweeps were tried first.  Ball and wall begin with the hardest
 steps: an intact wall of 2200 contacts, four to a joint, more reactions than balances.  Writes
 results/rigid_steps.md.
@@ -19,7 +19,7 @@ import amontons as am
 from amontons.mechanics.multibody.quick import Found
 
 FLOOR = am.Plane((0, 0, 1))
-G, LONGEST = 9.81, 20.0
+G, LONGEST = 9.81, 10.0
 FIRST = 3  # steps at least: the first may meet nothing, and compile nothing
 
 
@@ -134,9 +134,9 @@ def main():
     rows = [row(make) for make in (sliding, rocking, dominoes, pile, arch, rocked, wall)]
     text = "\n".join([
         "# Steps of rigid bodies", "",
-        "`python benchmarks/rigid_steps.py`: time of the processor, at most 20 s for each",
+        "`python benchmarks/rigid_steps.py`: time of the processor, at most 10 s for each",
         "case; the longest step of all. Swept: steps that compiled sweeps solved alone.",
-        "Solvers: the same with `solver=am.Auto()`, over as many steps as fit in ten seconds;",
+        "Solvers: the same with `solver=am.Auto()`, over as many steps as fit in five seconds;",
         "later steps of a motion may cost more.", "",
         "| case | steps | contacts | ms a step | us a contact | longest, ms | swept | "
         "solvers, ms (steps) | outcomes | contacts at the end |",

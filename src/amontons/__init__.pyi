@@ -112,8 +112,9 @@ from .problem.law import (
     Orthotropic as Orthotropic, Tied as Tied, Tresca as Tresca,
     FrictionCurve as FrictionCurve, VaryingFriction as VaryingFriction,
     ExponentialOverclosure as ExponentialOverclosure, OverclosureCurve as OverclosureCurve,
-    VaryingCompliance as VaryingCompliance,
+    RollingFriction as RollingFriction, VaryingCompliance as VaryingCompliance,
 )
+from .problem.rolling import Regimes as Regimes, RollingProblem as RollingProblem
 from .problem.solution import (
     ContactStatus as ContactStatus, Convergence as Convergence,
     FrictionSolution as FrictionSolution, Outcome as Outcome,
@@ -130,7 +131,8 @@ from .solvers import (
     Jacobi as Jacobi, JeanMoreau as JeanMoreau, LocalSolver as LocalSolver, Metric as Metric,
     Modification as Modification, MultigridCycle as MultigridCycle, NaturalMap as NaturalMap,
     NonMonotone as NonMonotone, ProximalPoint as ProximalPoint, Restart as Restart,
-    RhoStrategy as RhoStrategy, SemismoothNewton as SemismoothNewton,
+    RhoStrategy as RhoStrategy, RollingSweeps as RollingSweeps,
+    SemismoothNewton as SemismoothNewton,
     SmoothingNewton as SmoothingNewton, SweepOrder as SweepOrder, Uzawa as Uzawa,
 )
 from .solvers.driver import drive as drive

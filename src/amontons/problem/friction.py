@@ -90,6 +90,11 @@ class FrictionProblem(Told, Equations):
                 f"law: expected a law such as Coulomb(mu), got {shown(self.law)}; "
                 "FrictionProblem.from_global and from_delassus take numbers too"
             )
+        if self.law.has_moments:
+            raise InvalidInput(
+                "law: RollingFriction is between moments too, which a FrictionProblem has not; "
+                "RollingProblem(W, q, law) and RigidBodies(..., rolling=, torsion=) take it"
+            )
         name = "w" if self.W is None else "q"
         wanted = ("M", "H", "f", "w") if self.W is None else ("W", "q")
         missing = [each for each in wanted if getattr(self, each) is None]

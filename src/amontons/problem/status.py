@@ -70,8 +70,9 @@ def margins(
 ) -> Array:
     """The margins of `classify` for given statuses, (nc,), unit of r_N."""
     pressure = r[:, 0] + problem.law.cohesion
-    slack = problem.law.bound(r) - np.linalg.norm(r[:, 1:], axis=1)  # along r_T
-    slide = problem.rho * np.linalg.norm(u[:, 1:], axis=1)
+    shear = problem.law.shear
+    slack = problem.law.bound(r) - np.linalg.norm(shear(r), axis=1)  # along r_T
+    slide = problem.rho * np.linalg.norm(shear(u), axis=1)
     stick = status == ContactStatus.STICK
     closed = np.minimum(pressure, np.where(stick, slack, slide))
     closed = np.where(problem.law.tied, np.inf, closed)

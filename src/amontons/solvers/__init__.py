@@ -21,6 +21,7 @@ from .sweeps.gauss_seidel import Batch, GaussSeidel
 from .sweeps.jacobi import Jacobi
 from .sweeps.kernels import SweepOrder
 from .sweeps.local_contact import LocalSolver
+from .sweeps.rolling import RollingSweeps
 
 METHODS: dict[str, type] = {
     "accelerated-gradient": AcceleratedGradient,
@@ -78,6 +79,7 @@ __all__ = [
     "ProximalPoint",
     "Restart",
     "RhoStrategy",
+    "RollingSweeps",
     "SemismoothNewton",
     "SmoothingNewton",
     "Solver",

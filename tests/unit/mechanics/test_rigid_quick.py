@@ -131,7 +131,8 @@ def test_what_sweeps_do_not_solve_goes_to_the_solvers_with_the_same_start(monkey
     system = pile()
     late = list(am.evolve_rigid(system, step=2e-3, until=0.4))[-1].state
     monkeypatch.setattr(sweeping, "WORK", 0)
-    monkeypatch.setattr(sweeping, "MOMENTUM", 0)
+    monkeypatch.setattr(sweeping.Search, "swept_while_promising", lambda self, start: None)
+    monkeypatch.setattr(sweeping, "ROUNDS", 0)
     step = next(am.evolve_rigid(system, step=2e-3, until=0.402, start=late))
     assert not isinstance(step._solved, Found) and step.solution.converged
     with pytest.raises(am.NotConverged, match="step"):

@@ -101,7 +101,8 @@ class RigidBodies:
     mu: coefficient of friction of all; restitution: normal velocity after over before an
     impact, from 0 to 1, of all; gravity (3,): acceleration, or a function of time: in axes
     that the ground takes along, less its acceleration.  apart: pairs of bodies that pass
-    through each other, such as those with a joint.
+    through each other, such as those with a joint.  rolling, torsion: lengths by which contacts
+    resist rolling and spinning, see `RollingFriction`; not together with joints.
     """
 
     bodies: Sequence[RigidBody]
@@ -111,6 +112,8 @@ class RigidBodies:
     gravity: ArrayLike | Callable[[float], ArrayLike] = (0.0, 0.0, -9.81)
     joints: Sequence[Joint] = ()
     apart: Sequence[tuple[int, int]] = ()
+    rolling: float = 0.0
+    torsion: float = 0.0
 
     def __post_init__(self) -> None:
         if not len(self.bodies):
@@ -126,6 +129,12 @@ class RigidBodies:
         if not 0 <= number("restitution", self.restitution) <= 1:
             text = f"expected a number from 0 to 1, got {self.restitution!r}"
             raise InvalidInput(text, ("restitution",))
+        for key in ("rolling", "torsion"):
+            if not number(key, getattr(self, key)) >= 0:
+                raise InvalidInput(f"expected a length >= 0, got {shown(getattr(self, key))}",
+                                   (key,))  # fmt: skip
+            if getattr(self, key) > 0 and len(self.joints):
+                raise InvalidInput("expected 0 with joints: they have no moments", (key,))
         now = self.gravity_at(0.0)
         if not callable(self.gravity):
             object.__setattr__(self, "gravity", read_only(now))
@@ -165,6 +174,11 @@ class RigidBodies:
     def packed(self) -> Packed:
         """All shapes in the arrays that kernels take."""
         return _packed(self)
+
+    @property
+    def has_moments(self) -> bool:
+        """True where contacts resist rolling or spinning."""
+        return self.rolling > 0 or self.torsion > 0
 
     @property
     def size(self) -> float:

@@ -22,8 +22,10 @@ def freely(velocity, spin, inertia, gravity, h):
 
 
 @njit(cache=True, error_model="numpy")
-def ended(rows, r, R, bodies, gravity, h, begin, motion, free):  # noqa: PLR0913
+def ended(rows, r, couples, R, bodies, gravity, h, begin, motion, free):  # noqa: PLR0913
     """Position, orientation, velocity and spin after impulses r of the rows, and energies.
+
+    couples (n, 3): angular impulses on the bodies besides, in global axes.
 
     R: in the middle; bodies: masses (n,), inertia and its inverse (n, 3, 3) in own axes;
     begin (n, 3): positions before overlaps were mended, motion: after that, as `Motion`; free:
@@ -33,6 +35,7 @@ def ended(rows, r, R, bodies, gravity, h, begin, motion, free):  # noqa: PLR0913
     slave, master, axes, arms, master_arms = rows
     position, orientation, velocity, spin = motion
     push, turn = row_impulses(slave, master, axes, arms, master_arms, r, len(masses))
+    turn += couples
     after, turning = np.empty_like(velocity), np.empty_like(spin)
     x = np.empty_like(position)
     contact = kinetic = gain = potential = mending = 0.0

@@ -36,6 +36,7 @@ from numpy.typing import NDArray
 from ...core.arrays import finite, number
 from ...core.clock import NEVER, Deadline
 from ...core.errors import Interrupted, InvalidInput, NotConverged
+from ...problem.protocol import Problem
 from ...problem.solution import FrictionSolution
 from ...solvers.asked import Asked
 from ...solvers.contract import Iterate, Solver
@@ -43,10 +44,11 @@ from ...solvers.driver import drive_as_asked
 from .bodies import GROUND, RigidBodies
 from .ends import ended, freely, middle_of
 from .meeting import Meetings, meetings
-from .quick import Found, Posed, law_of, pose
+from .quick import Found, Posed, law_of, matched, pose
+from .rolling import couples, rolling_problem
 from .rows import Rows, delassus, impulses, rotations, rows_at, turned
 from .states import Motion, RigidEnergies, RigidState, RigidStep
-from .sweeping import found_quickly
+from .sweeping import Search, found_quickly
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -139,8 +141,9 @@ class _Stepping:
         self.solver, self.check = solver, check
         masses = np.array([body.mass for body in system.bodies])
         inertia = np.array([body.inertia for body in system.bodies])
-        self.inverse = np.linalg.inv(inertia)
+        self.inverse: Array = np.linalg.inv(inertia)
         self.bodies = masses, inertia, self.inverse
+        self.no_couples = np.zeros((len(masses), 3))
         self.near = TOUCHING * system.packed.reach
         begin = at_start(system).motion
         R = rotations(begin.orientation)
@@ -176,18 +179,24 @@ class _Stepping:
                 at = self._closed(at, gaps)
         R, nc = middle[1], len(at.keys)
         free = freely(before.velocity, before.spin, self.bodies[1], gravity, h)
-        solved, r = None, np.zeros((0, 3))
+        solved, r, moments, turn = None, np.zeros((0, 3)), NOTHING, self.no_couples
         if len(at.rows.slave):
             posed = Posed(*pose(
                 at.rows, nc, (masses, self.inverse, R), (before.velocity, before.spin), free,
                 self.system.restitution, at.keys, (state.keys, state.impulses),
             ))  # fmt: skip
-            solved = self._solve(posed, nc, f"step {state.index + 1}", deadline)
-            r = solved.r if isinstance(solved, Found) else solved.r.copy()
+            what = f"step {state.index + 1}"
+            if self.system.has_moments:
+                solved = self._rolled(at, R, posed, free[1], state, what, deadline)
+                r, moments = solved.r[:, :3].copy(), solved.r[:, 3:].copy()
+                turn = couples(at.rows, moments, len(masses))
+            else:
+                solved = self._solve(at.rows, R, posed, nc, what, deadline)
+                r = solved.r if isinstance(solved, Found) else solved.r.copy()
         motion, energies = ended(
-            at.rows, r, R, self.bodies, gravity, h, begin, tuple(before), free
+            at.rows, r, turn, R, self.bodies, gravity, h, begin, tuple(before), free
         )
-        new = RigidState(state.index + 1, time, Motion(*motion), at.keys, r[:nc])
+        new = RigidState(state.index + 1, time, Motion(*motion), at.keys, r[:nc], moments)
         return RigidStep(self.system, new, at.found, at.rows.axes[:nc], r[:nc], r[nc:],
                          RigidEnergies(*energies), solved)  # fmt: skip
 
@@ -224,7 +233,7 @@ class _Stepping:
 
     # ------------------------------------------------------------------ problems
     def _solve(
-        self, posed: Posed, contacts: int, what: str, deadline: Deadline
+        self, rows: Rows, R: Array, posed: Posed, contacts: int, what: str, deadline: Deadline
     ) -> Found | FrictionSolution:
         """The impulses of a step, `what` for messages.
 
@@ -233,14 +242,32 @@ class _Stepping:
         mu, asked = self.system.mu, self.asked
         timed = deadline is not NEVER and (deadline.work is not None or deadline.passed)
         if self.solver is None and not timed:
-            found, start = found_quickly(posed, contacts, mu, asked.tolerance)
+            search = Search(posed, rows, R, self.bodies, contacts, mu, asked.tolerance)
+            found, start = found_quickly(search)
             if found is not None:
                 return found
             posed = posed._replace(start=start)
         law = law_of(contacts, len(posed.q) - contacts, mu)
+        return self._driven(posed.problem(law), posed.start, what, deadline)
+
+    def _rolled(  # noqa: PLR0913
+        self, at: _Met, R: Array, posed: Posed, spin: Array, state: RigidState, what: str,
+        deadline: Deadline,
+    ) -> FrictionSolution:  # fmt: skip
+        """Impulses and moments, (nc, 6), where contacts resist rolling or spinning."""
+        problem = rolling_problem(self.system, at.rows, R, self.bodies, posed.q, spin)
+        moments = np.zeros((len(at.keys), 3))
+        if len(state.moments):
+            matched(at.keys, state.keys, state.moments, moments)
+        return self._driven(problem, np.hstack([posed.start, moments]), what, deadline)
+
+    def _driven(
+        self, problem: Problem, start: Array, what: str, deadline: Deadline
+    ) -> FrictionSolution:
+        """What the solvers find from a start (n, d); raises NotConverged where asked to."""
+        asked = self.asked
         asked = asked if deadline is NEVER else replace(asked, time_limit=deadline)
-        problem = posed.problem(law)
-        solution = drive_as_asked(problem, asked, Iterate(posed.start), self.solver)
+        solution = drive_as_asked(problem, asked, Iterate(start), self.solver)
         if self.check and not solution.converged:
             record = solution.convergence
             kind = Interrupted if record.by_user else NotConverged
@@ -263,7 +290,8 @@ class _Stepping:
         posed = Posed(W.indptr, W.indices, W.data, W.diagonal, q, np.zeros_like(q))
         found = None
         if self.solver is None:
-            found, start = found_quickly(posed, nc, 0.0, self.asked.tolerance)
+            search = Search(posed, rows, R, self.bodies, nc, 0.0, self.asked.tolerance)
+            found, start = found_quickly(search)
             posed = posed._replace(start=start)
         if found is None:
             problem = posed.problem(law_of(nc, len(q) - nc, 0.0))

@@ -31,7 +31,7 @@ from ...problem.settling import Settled
 from ...problem.solution import Convergence, FrictionSolution, Outcome, Step
 from ...solvers.sweeps.kernels import EXACT, FIRST_JUDGED, Sweep, sweeps_inplace
 from ...solvers.sweeps.local_contact import CLOSE
-from ...solvers.sweeps.momentum import momentum_inplace
+from ...solvers.sweeps.on_bodies import momentum_on_bodies_inplace
 from .rows import coupled, fill_blocks, row_velocities
 
 Array = NDArray[np.float64]
@@ -130,7 +130,7 @@ def pose(rows, contacts, bodies, motion, free, restitution, keys, state):  # noq
         slave, master, axes, arms, master_arms, masses, inverse, indptr, indices, data, diagonal
     )
     start = np.zeros((n, 3))
-    _match(keys, state[0], state[1], start)
+    matched(keys, state[0], state[1], start)
     return indptr, indices, data, diagonal, q, start
 
 
@@ -153,7 +153,7 @@ def _turned_vector(R, own, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _match(keys, old, impulses, start):
+def matched(keys, old, impulses, start):
     """Give contacts the impulses that the same corners had in the last step.
 
     Contacts keep their order mostly, so that each is looked for behind the last one first.
@@ -228,9 +228,13 @@ def _largest_eigenvalue(A):
 
 @njit(cache=True, error_model="numpy")
 def solved(  # noqa: PLR0913
-    indptr, indices, data, diagonal, q, start, contacts, mu, tolerance, blur, sweeps, more
-):
-    """(r, (u, status, sliding), sweeps done or -1, error, contactwise error, its contact)."""
+    indptr, indices, data, diagonal, q, start, contacts, mu, tolerance, blur, sweeps, more,
+    levers, sides, bodies,
+):  # fmt: skip
+    """(r, (u, status, sliding), sweeps done or -1, error, contactwise error, its contact).
+
+    sweeps: plain ones at most; more: with momentum, on so many bodies, by `levers_of` them.
+    """
     n = len(q)
     kind, parameters = np.empty(n, np.int8), np.empty((n, 2))
     for i in range(n):
@@ -258,9 +262,8 @@ def solved(  # noqa: PLR0913
         )  # fmt: skip
         done = sweeps_inplace(s, r, sweeps, watch)
         if not watch[2] <= goal and more > 0:
-            old, pace = r.copy(), np.array([1.0, math.inf])
             watch[1] = FIRST_JUDGED * goal
-            done += momentum_inplace(s, r, old, pace, more, watch)
+            done += momentum_on_bodies_inplace(s, levers, sides, bodies, r, more, watch)
         if not watch[2] <= goal:
             return r, told, -1, math.inf, math.inf, -1
     floor = np.zeros(n)

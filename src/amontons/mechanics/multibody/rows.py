@@ -310,3 +310,30 @@ def rotations(orientation):
         out[b, 2, 1] = 2 * (y * z + w * x)
         out[b, 2, 2] = 1 - 2 * (x * x + y * y)
     return out
+
+
+@njit(cache=True, error_model="numpy")
+def levers_of(slave, master, axes, arms, master_arms, masses, inverse):  # noqa: PLR0913
+    """G (n, 2, 3, 6) with W = G G^T: rows on slave and master in the metric of the masses.
+
+    A row is (±a / sqrt(m), ±(arm x a) C) with C C^T = I^-1, `inverse` (b, 3, 3) in global axes.
+    """
+    n, bodies = len(slave), len(masses)
+    levers, C = np.zeros((n, 2, 3, 6)), np.zeros((bodies, 3, 3))
+    for b in range(bodies):
+        C[b] = np.linalg.cholesky(inverse[b])
+    for i in range(n):
+        for p in range(2):
+            b, arm = (slave[i], arms[i]) if p == 0 else (master[i], master_arms[i])
+            if b < 0:
+                continue
+            sign = 1.0 if p == 0 else -1.0
+            light = sign / np.sqrt(masses[b])
+            for k in range(3):
+                a, row = axes[i, k], levers[i, p, k]
+                turning = np.cross(arm, a)
+                for d in range(3):
+                    row[d] = light * a[d]
+                    for e in range(d, 3):  # C is lower triangular
+                        row[3 + d] += sign * turning[e] * C[b, e, d]
+    return levers

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...problem.rolling import Regimes, RollingProblem
 from ...problem.solution import FrictionSolution
 from .bodies import RigidBodies
 from .meeting import Meetings
@@ -40,6 +41,7 @@ class RigidState:
     motion: Motion
     keys: Index  # (nc, 3) slave, master and feature of the last contacts
     impulses: Array  # (nc, 3) theirs, in their frames
+    moments: Array = field(default_factory=lambda: np.zeros((0, 3)))  # (nc, 3) or none
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,8 @@ class RigidStep:
 
     meetings: contacts that were looked at, the first of `solution`; r (nc, 3): their impulses
     in their frames, normal first; frames (nc, 3, 3) by rows; joints (k, 3): impulses on the
-    first bodies, in global axes.
+    first bodies, in global axes; moments (nc, 3): angular impulses where friction resists
+    rolling or spinning, about the normal first, else none.
     """
 
     system: RigidBodies
@@ -95,6 +98,19 @@ class RigidStep:
     def solution(self) -> FrictionSolution | None:
         """Of the contact problem, made when asked for; None without contacts and joints."""
         return self._solved.solution if isinstance(self._solved, Found) else self._solved
+
+    @property
+    def moments(self) -> Array:
+        """Angular impulses of the contacts in their frames, (nc, 3), or (0, 3)."""
+        return self.state.moments
+
+    @property
+    def regimes(self) -> Regimes | None:
+        """Which contacts slip, spin and roll; None where nothing resists rolling."""
+        solution = self.solution
+        if solution is None or not isinstance(solution.problem, RollingProblem):
+            return None
+        return solution.problem.regimes(solution.r)
 
     @property
     def status(self) -> NDArray[np.int8]:

@@ -1,13 +1,21 @@
-"""What sweeps solve of a step alone: plain ones, then with momentum while that promises an end.
+"""What is solved of a step without the solvers: plain sweeps, momentum, relaxations.
 
-Momentum goes on in chunks.  With the rate at which the error has fallen in the last one it
-would need so many sweeps more; where those are more than are left of MOMENTUM, as on walls
-that stand and have more reactions than balances, the solvers are better asked at once.
+Few contacts are swept until they are solved.  Many are swept with momentum, in chunks, while
+the rate at which the error has fallen in the last chunk promises an end for less than a
+relaxation costs.  Where it does not, as in walls, which have more reactions than balances, the
+convex relaxation with the sliding velocities of the best reactions is solved on the bodies
+(`solvers.newton.body_relaxation`), and a chunk of sweeps goes on from there, which finds the
+sliding that the next relaxation is given.  What that does not solve goes to the solvers.
+
+Costs are operations counted, so that a step ends alike on all processors.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,53 +24,168 @@ from ...core.clock import now
 from ...problem.judge.measures import natural_error
 from ...problem.law.law import COULOMB, TIED
 from ...solvers.judging import BLUR
+from ...solvers.newton.body_relaxation import BodyMatrix, body_matrix, relaxed
+from ...solvers.sweeps.on_bodies import driven_inplace, felt_inplace
 from .quick import Found, Posed, eliminated_of, solved
+from .rows import Rows, levers_of
 
 Array = NDArray[np.float64]
 WORK = 100_000  # blocks of W that plain sweeps multiply at most
 FEWEST = 20  # sweeps that are worth to begin with
-MOMENTUM = 2000  # sweeps with momentum before the solvers are asked
-CHUNK = 250  # of them, after which the rate is told
-MORE = 200_000_000  # what they cost at most, in blocks, for many contacts
-CONTACT = 15  # blocks that take as long as the solution of a contact
+CHUNK = 250  # sweeps with momentum, after which the rate is told
+LONGEST = 1000  # after relaxations that have not helped
+STEPS = 60  # of a relaxation at most
+ROUNDS = 30  # relaxations before the solvers are asked
+PATIENCE = 5  # of them without halving the error
+# Nanoseconds, only ratios count: of a sweep per contact; of a step of a relaxation per contact
+# and per product of blocks; of a relaxation at most, beyond which packings in space fill in.
+SWEEP, STEP, PRODUCT, MOST = 120.0, 900.0, 12.0, 4e9
+USUAL = 40  # steps of a relaxation
+NO_LEVERS, NO_SIDES = np.zeros((0, 2, 3, 6)), np.zeros((0, 2), np.int64)
 
 
-def found_quickly(
-    posed: Posed, contacts: int, mu: float, tolerance: float
-) -> tuple[Found | None, Array]:
-    """What sweeps find, None where they do not meet the tolerance; and how far they came."""
-    blocks = max(len(posed.indices), 1)
-    plain = WORK // blocks
-    plain = plain if plain >= FEWEST else 0
-    left = min(MOMENTUM, MORE // (blocks + CONTACT * len(posed.q)))
-    goal = tolerance * float(np.linalg.norm(posed.q))
-    began, swept, error = now(), 0, math.inf
-    while True:
-        chunk = min(CHUNK, left) if left >= FEWEST else 0
+@dataclass(eq=False)
+class Search:
+    """The impulses of one problem of a step, and the best that was found so far.
+
+    rows, rotations R (b, 3, 3) and bodies, masses (b,) with inertia and its inverse (b, 3, 3)
+    in own axes: what W is made of.
+    """
+
+    posed: Posed
+    rows: Rows
+    R: Array
+    bodies: tuple[Array, Array, Array]
+    contacts: int
+    mu: float
+    tolerance: float
+    r: Array = field(init=False)
+    latest: Array = field(init=False)  # what the last sweeps came to
+    error: float = math.inf
+    swept: int = 0
+    relaxing: int = 0  # steps of relaxations
+
+    def __post_init__(self) -> None:
+        self.r = self.latest = self.posed.start
+        self.began = now()
+        self.goal = self.tolerance * float(np.linalg.norm(self.posed.q))
+
+    # ------------------------------------------------------------------ what it is made of
+    @cached_property
+    def levers(self) -> Array:
+        """(n, 2, 3, 6), see `levers_of`."""
+        masses, _, inverse = self.bodies
+        return levers_of(*self.rows, masses, self.R @ inverse @ self.R.swapaxes(1, 2))
+
+    @cached_property
+    def sides(self) -> NDArray[np.int64]:
+        """Bodies (n, 2) of each row."""
+        return np.ascontiguousarray(np.stack([self.rows.slave, self.rows.master], axis=1))
+
+    @cached_property
+    def matrix(self) -> BodyMatrix:
+        """Pattern of the relaxation's."""
+        return body_matrix(self.sides, len(self.bodies[0]))
+
+    @cached_property
+    def law(self) -> tuple[Any, Array, Array]:
+        """kind (n,), parameters (n, 2), rho (n,)."""
+        n = len(self.posed.q)
+        is_free = np.arange(n) < self.contacts
+        parameters = np.full((n, 2), np.inf)
+        parameters[:, 0] = np.where(is_free, self.mu, 0.0)
+        kind = np.where(is_free, np.int8(COULOMB), np.int8(TIED))
+        return kind, parameters, eliminated_of(self.posed.data, self.posed.diagonal)[1]
+
+    @property
+    def relaxation_cost(self) -> float:
+        """Nanoseconds of a usual relaxation."""
+        return USUAL * (STEP * len(self.posed.q) + PRODUCT * self.matrix.products)
+
+    # ------------------------------------------------------------------ what it does
+    def sweep(self, start: Array, plain: int, momentum: int) -> Found | None:
+        """Sweeps from impulses (n, 3); what they solve, else None with the error noted."""
+        given: tuple[Any, ...] = NO_LEVERS, NO_SIDES, 0
+        if momentum:
+            given = self.levers, self.sides, len(self.bodies[0])
         r, (u, status, sliding), done, judged, worst, contact = solved(
-            *posed, contacts, mu, tolerance, BLUR * tolerance, plain, chunk
-        )
+            *self.posed._replace(start=start), self.contacts, self.mu, self.tolerance,
+            BLUR * self.tolerance, plain, momentum, *given,
+        )  # fmt: skip
         if done >= 0:
-            return Found(posed, contacts, mu, tolerance, r, u, status, sliding, swept + done,
-                         judged, (worst, contact), now() - began), r  # fmt: skip
-        swept, left, plain = swept + plain + chunk, left - chunk, 0
-        before, error = error, _error(posed, contacts, mu, r)
-        if left < FEWEST or not goal < error < before:
-            return None, r
-        if before < math.inf:
-            needed = CHUNK * math.log(error / goal) / math.log(before / error)
-            if needed > left:
-                return None, r
-        posed = posed._replace(start=r)
+            return Found(
+                self.posed, self.contacts, self.mu, self.tolerance, r, u, status, sliding,
+                self.swept + self.relaxing + done, judged, (worst, contact), now() - self.began,
+            )  # fmt: skip
+        self.swept += plain + momentum
+        self.latest = r
+        # sweeps that still change much may have met the goal without being asked
+        small = self.offer(r) <= self.goal and plain + momentum > 0
+        return self.sweep(r, 0, 0) if small else None
+
+    def offer(self, r: Array) -> float:
+        """Keep impulses that are the best so far; their error, unit of u."""
+        kind, parameters, rho = self.law
+        p = self.posed
+        error = natural_error(p.indptr, p.indices, p.data, p.q, kind, parameters, rho, r)
+        if error < self.error:
+            self.r, self.error = r, float(error)
+        return float(error)
+
+    def swept_while_promising(self, start: Array) -> Found | None:
+        """Chunks of sweeps with momentum, one at least."""
+        cost, before = SWEEP * len(self.posed.q), math.inf
+        r = start
+        while True:
+            found = self.sweep(r, 0, CHUNK)
+            if found is not None or not self.goal < self.error < before:
+                return found
+            if before < math.inf:
+                needed = CHUNK * math.log(self.error / self.goal)
+                needed /= math.log(before / self.error)
+                if cost * needed > self.relaxation_cost:
+                    return None
+            before, r = self.error, self.r
+
+    def relax(self) -> Array:
+        """Impulses of the relaxation with the sliding of those that were swept last."""
+        moved, u = np.empty((len(self.bodies[0]), 6)), np.empty_like(self.latest)
+        driven_inplace(self.levers, self.sides, self.latest, moved)
+        felt_inplace(self.levers, self.sides, moved, u)
+        u += self.posed.q
+        kind, parameters, rho = self.law
+        p = self.posed
+        r, steps = relaxed(
+            self.levers, self.sides, self.matrix, (p.indptr, p.indices, p.data), p.q,
+            (kind, parameters), rho, np.hypot(u[:, 1], u[:, 2]), self.goal, STEPS,
+        )  # fmt: skip
+        self.relaxing += steps
+        return r
 
 
-def _error(posed: Posed, contacts: int, mu: float, r: Array) -> float:
-    """Of impulses r (n, 3), unit of u."""
-    n = len(posed.q)
-    is_free = np.arange(n) < contacts
-    kind = np.where(is_free, np.int8(COULOMB), np.int8(TIED))
-    parameters = np.full((n, 2), np.inf)
-    parameters[:, 0] = np.where(is_free, mu, 0.0)
-    rho = eliminated_of(posed.data, posed.diagonal)[1]
-    return float(natural_error(posed.indptr, posed.indices, posed.data, posed.q, kind,
-                               parameters, rho, r))  # fmt: skip
+def found_quickly(search: Search) -> tuple[Found | None, Array]:
+    """What is found, None where the tolerance is not met; and the best impulses (n, 3)."""
+    plain = WORK // max(len(search.posed.indices), 1)
+    if plain >= FEWEST:
+        found = search.sweep(search.r, plain, 0)
+        if found is not None:
+            return found, found.r
+    if not 0.0 < search.goal < math.inf:
+        return None, search.r
+    found = search.swept_while_promising(search.r)
+    mark, waited, chunk = search.error, 0, CHUNK
+    for _ in range(ROUNDS):
+        if found is not None:
+            return found, found.r
+        if not search.error > search.goal or search.relaxation_cost > MOST:
+            break
+        before = search.error
+        found = search.sweep(search.relax(), 0, chunk)
+        waited += 1
+        if not search.error < before:
+            chunk = min(2 * chunk, LONGEST)
+        if search.error < 0.5 * mark:
+            mark, waited, chunk = search.error, 0, CHUNK
+        if waited > PATIENCE:
+            break
+    return found, search.r if found is None else found.r

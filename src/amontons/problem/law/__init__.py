@@ -13,11 +13,12 @@ from .overclosure import (
     OverclosureCurve,
     VaryingCompliance,
 )
+from .rolling import RollingFriction
 from .tied import Tied
 from .tresca import Tresca
 from .varying import FrictionCurve, VaryingFriction
 
 __all__ = ["CappedCoulomb", "Cohesive", "Compliant", "Coulomb", "ExponentialOverclosure",
            "FrictionCurve", "Kind", "Law", "Mixed", "Orthotropic", "Overclosure",
-           "OverclosureCurve", "Tied", "Tresca", "VaryingCompliance", "VaryingFriction",
-           "joined"]
+           "OverclosureCurve", "RollingFriction", "Tied", "Tresca", "VaryingCompliance",
+           "VaryingFriction", "joined"]

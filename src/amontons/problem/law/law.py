@@ -93,9 +93,13 @@ class Law:
         """Derivative of the bound in r_N, (nc,): zero at r_N = 0 and at a cap."""
         return np.where(self.given(r) | (r[:, 0] <= 0), 0.0, self.parameters[:, MU])
 
+    def shear(self, x: Array) -> Array:
+        """x_T of rows (nc, d): all but the normal ones."""
+        return x[:, 1:]
+
     def excess(self, r: Array) -> Array:
         """What |r_T| is above its bound, or tension, whichever is more; (nc,), unit of r."""
-        shear = np.linalg.norm(r[:, 1:], axis=1) - self.bound(r)
+        shear = np.linalg.norm(self.shear(r), axis=1) - self.bound(r)
         return np.where(self.tied, 0.0, np.maximum(shear, -r[:, 0]))
 
     def natural_map(self, r: Array, u: Array, rho: Array) -> Array:
@@ -148,6 +152,7 @@ class Law:
         return out
 
     # ---------------------------------------------------------------- variants
+    has_moments: ClassVar[bool] = False  # True where contacts have more rows, see `rolling`
     varies: ClassVar[bool] = False  # True where coefficients follow the state, see `varying`
     stretch: Array | None = None  # T of tangents, (nc, 2, 2), see `changed`
     give: Array | None = None  # diagonal of C, (nc, 3)

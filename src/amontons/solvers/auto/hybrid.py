@@ -14,6 +14,7 @@
     Nitsche's method                Newton, then proximal points (`newton.nitsche`)
     large deformations              `NonlinearNewton`
     bodies that yield               `TangentNewton`
+    contacts with moments           `RollingSweeps`
 
 A mesh is what has levels or rigid modes (`FrictionProblem.levels`, `near_nullspace`).
 
@@ -43,6 +44,7 @@ from ...linear.blocks import spatial
 from ...problem.friction import Form, FrictionProblem
 from ...problem.nitsche import NitscheProblem
 from ...problem.protocol import Problem
+from ...problem.rolling import RollingProblem
 from ..active_set.sets import ActiveSet
 from ..contract import (
     Breakdown,
@@ -62,6 +64,7 @@ from ..newton.nonlinear import NonlinearNewton, NonlinearProblem
 from ..newton.semismooth import SemismoothNewton
 from ..newton.tangents import TangentNewton, TangentProblem
 from ..sweeps.gauss_seidel import GaussSeidel
+from ..sweeps.rolling import RollingSweeps
 from .compressed import CompressedDelassus
 from .portfolio import Portfolio
 from .tethers import Tethers
@@ -147,16 +150,20 @@ class Auto:
     """Tries, watches the error, switches; see the table of this module."""
 
     solves: ClassVar[tuple[type, ...]] = (
-        FrictionProblem, NitscheProblem, NonlinearProblem, TangentProblem
+        FrictionProblem, NitscheProblem, NonlinearProblem, RollingProblem, TangentProblem
     )  # fmt: skip
     form: ClassVar[Form] = Form.ANY
     matrix_free: ClassVar[bool] = True
     changes_method: ClassVar[bool] = True
 
-    def choice(self, problem: Problem) -> Auto | NonlinearNewton | TangentNewton:
+    def choice(
+        self, problem: Problem
+    ) -> Auto | NonlinearNewton | RollingSweeps | TangentNewton:
         """The method of a problem that one alone solves, else itself."""
         if isinstance(problem, TangentProblem):
             return TangentNewton()
+        if isinstance(problem, RollingProblem):
+            return RollingSweeps()
         return NonlinearNewton() if isinstance(problem, NonlinearProblem) else self
 
     def iterates(

@@ -66,6 +66,32 @@ def analyse(blocks: BlockRows) -> Symbolic:
     return Symbolic(order, *_structure(order, start, later))
 
 
+def analyse_doubled(indptr: Index, indices: Index) -> Symbolic:
+    """The same of a pattern, indptr (n + 1,), whose rows and columns stand for two each."""
+    order, start, later = _doubled(*_minimum_degree(indptr, indices))
+    return Symbolic(order, *_structure(order, start, later))
+
+
+@njit(cache=True, error_model="numpy")
+def _doubled(order, start, later):
+    """An order and what is still connected at each position, of both halves of every row."""
+    n = len(order)
+    halves, starts = np.empty(2 * n, np.int32), np.zeros(2 * n + 1, np.int32)
+    left = np.empty(4 * len(later) + n, np.int32)
+    at = 0
+    for p in range(n):
+        for half in range(2):
+            halves[2 * p + half] = 2 * order[p] + half
+            if half == 0:
+                left[at] = 2 * order[p] + 1
+                at += 1
+            for k in range(start[p], start[p + 1]):
+                left[at], left[at + 1] = 2 * later[k], 2 * later[k] + 1
+                at += 2
+            starts[2 * p + half + 1] = at
+    return halves, starts, left[:at].copy()
+
+
 @njit(cache=True, error_model="numpy")
 def _count_bits(word):
     word = word - ((word >> np.uint64(1)) & np.uint64(0x5555555555555555))

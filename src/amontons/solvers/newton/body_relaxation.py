@@ -1,0 +1,384 @@
+"""The relaxation of `interior_point` for rigid bodies: its steps solved on the bodies.
+
+With the levers G of `sweeps.on_bodies`, W = G G^T, a step (W + E) dr = f, E = S^-1 D S^-1, is
+
+    (1 + G^T E^-1 G) w = G^T E^-1 f,   dr = E^-1 (f - G w),
+
+six unknowns for each body where there are three for each contact: on a wall of bricks, which
+has some eight contacts for each of them, 2 ms in place of 100.  The matrix is positive definite
+whatever the contacts, so nothing is added to W where it is singular, and with the scaling point
+w, D = k (2 w w^T - J), J = diag(1, -1, -1),
+
+    D^-1 = (2 (J w) (J w)^T - J) / k
+
+has no cancellation.  Bonds (joints) have E = SOFT / rho and no cone.  dr is refined once.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.compiled import njit
+from ...problem.judge.measures import natural_error
+from ...problem.law.law import MU, TIED
+from ..sweeps.on_bodies import GROUND, driven_inplace, felt_inplace
+from .block_lu import Symbolic, analyse_doubled, factorise_inplace, solve_inplace
+from .interior_point import BOUNDARY, ENOUGH, SHORT, STALLED, _room, _scale, _unscale
+
+Array = NDArray[np.float64]
+SOFT = 1e-12  # of bonds, relative: E of a row that has none
+
+
+class BodyMatrix(NamedTuple):
+    """Pattern of 1 + G^T E^-1 G in 3x3 blocks, two for each body, and its symbolic factor."""
+
+    indptr: Any  # (2 bodies + 1,)
+    indices: Any
+    symbolic: Symbolic
+
+    @property
+    def products(self) -> int:
+        """Products of 3x3 blocks in one factorisation."""
+        return self.symbolic.products
+
+
+def body_matrix(sides: NDArray[np.int64], bodies: int) -> BodyMatrix:
+    """Of contacts between sides (n, 2) of so many bodies, GROUND for none."""
+    indptr, indices = _graph(sides, bodies)
+    return BodyMatrix(*_rows_in_halves(indptr, indices), analyse_doubled(indptr, indices))
+
+
+@njit(cache=True, error_model="numpy")
+def _graph(sides, bodies):
+    """Bodies that each body meets, itself too, ascending: (indptr, indices)."""
+    count = np.ones(bodies + 1, np.int64)
+    count[0] = 0
+    for i in range(len(sides)):
+        if sides[i, 1] != GROUND:
+            count[sides[i, 0] + 1] += 1
+            count[sides[i, 1] + 1] += 1
+    for b in range(bodies):
+        count[b + 1] += count[b]
+    place, all_of = count[:-1].copy(), np.empty(count[-1], np.int64)
+    for b in range(bodies):
+        all_of[place[b]] = b
+        place[b] += 1
+    for i in range(len(sides)):
+        if sides[i, 1] != GROUND:
+            for p in range(2):
+                b = sides[i, p]
+                all_of[place[b]] = sides[i, 1 - p]
+                place[b] += 1
+    indptr, indices = np.zeros(bodies + 1, np.int32), np.empty(count[-1], np.int32)
+    kept = 0
+    for b in range(bodies):
+        own = np.sort(all_of[count[b] : count[b + 1]])
+        for k in range(len(own)):
+            if k == 0 or own[k] != own[k - 1]:
+                indices[kept] = own[k]
+                kept += 1
+        indptr[b + 1] = kept
+    return indptr, indices[:kept].copy()
+
+
+@njit(cache=True, error_model="numpy")
+def _rows_in_halves(indptr, indices):
+    """The pattern with every row and column twice."""
+    n = len(indptr) - 1
+    starts, columns = np.zeros(2 * n + 1, np.int32), np.empty(4 * len(indices), np.int32)
+    at = 0
+    for b in range(n):
+        for half in range(2):
+            for k in range(indptr[b], indptr[b + 1]):
+                columns[at], columns[at + 1] = 2 * indices[k], 2 * indices[k] + 1
+                at += 2
+            starts[2 * b + half + 1] = at
+    return starts, columns
+
+
+@njit(cache=True, error_model="numpy")
+def _scaling(x, y, mu, i, beta, w, lam, E, inverse):
+    """Scaling (beta, w) and lambda of contact i, and its blocks E and E^-1."""
+    tx, ty = math.sqrt(x[i, 1] ** 2 + x[i, 2] ** 2), math.sqrt(y[i, 1] ** 2 + y[i, 2] ** 2)
+    sx = math.sqrt((x[i, 0] - tx) * (x[i, 0] + tx))
+    sy = math.sqrt((y[i, 0] - ty) * (y[i, 0] + ty))
+    inner = (x[i, 0] * y[i, 0] + x[i, 1] * y[i, 1] + x[i, 2] * y[i, 2]) / (sx * sy)
+    g = 2.0 * math.sqrt(0.5 * (1.0 + inner))
+    beta[i] = math.sqrt(sy / sx)
+    w[i, 0] = (y[i, 0] / sy + x[i, 0] / sx) / g
+    w[i, 1] = (y[i, 1] / sy - x[i, 1] / sx) / g
+    w[i, 2] = (y[i, 2] / sy - x[i, 2] / sx) / g
+    _scale(beta[i], w[i], x[i], lam[i])
+    k = sy / sx
+    for a in range(3):
+        for b in range(3):
+            sign = 1.0 if (a == 0) == (b == 0) else -1.0
+            E[i, a, b] = 2.0 * k * w[i, a] * w[i, b]
+            inverse[i, a, b] = 2.0 * sign * w[i, a] * w[i, b] / k
+        E[i, a, a] += -k if a == 0 else k
+        inverse[i, a, a] += -1.0 / k if a == 0 else 1.0 / k
+    if mu == 0.0:
+        for a in range(1, 3):
+            E[i, a, 0] = E[i, 0, a] = inverse[i, a, 0] = inverse[i, 0, a] = 0.0
+            E[i, 1, a] = E[i, 2, a] = inverse[i, 1, a] = inverse[i, 2, a] = 0.0
+    else:
+        for a in range(3):
+            E[i, 0, a] *= mu
+            E[i, a, 0] *= mu
+            inverse[i, 0, a] /= mu
+            inverse[i, a, 0] /= mu
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _assemble(levers, sides, inverse, indptr, indices, data):
+    """1 + G^T E^-1 G into blocks (., 3, 3)."""
+    data[:] = 0.0
+    for b in range(len(indptr) - 1):
+        data[_found(indptr, indices, b, b)] = np.eye(3)
+    product = np.empty((3, 6))
+    for i in range(len(sides)):
+        F = inverse[i]
+        for p in range(2):
+            b = sides[i, p]
+            if b == GROUND:
+                continue
+            G = levers[i, p]
+            for a in range(3):
+                for e in range(6):
+                    product[a, e] = F[a, 0] * G[0, e] + F[a, 1] * G[1, e] + F[a, 2] * G[2, e]
+            for o in range(2):
+                c = sides[i, o]
+                if c == GROUND:
+                    continue
+                T = levers[i, o]
+                for upper in range(2):
+                    at = _found(indptr, indices, 2 * c + upper, 2 * b)
+                    for right in range(2):
+                        block = data[at + right]
+                        for k in range(3):
+                            f = 3 * upper + k
+                            for m in range(3):
+                                e = 3 * right + m
+                                block[k, m] += (
+                                    T[0, f] * product[0, e] + T[1, f] * product[1, e]
+                                    + T[2, f] * product[2, e]
+                                )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def _found(indptr, indices, row, column):
+    """Where a stored block is."""
+    low, high = indptr[row], indptr[row + 1]
+    while low < high:
+        middle = (low + high) // 2
+        if indices[middle] < column:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _multiplied(blocks, v, out):
+    """out_i = blocks_i v_i."""
+    for i in range(len(v)):
+        B = blocks[i]
+        v0, v1, v2 = v[i, 0], v[i, 1], v[i, 2]
+        for a in range(3):
+            out[i, a] = B[a, 0] * v0 + B[a, 1] * v1 + B[a, 2] * v2
+
+
+@njit(cache=True, error_model="numpy")
+def _right_side(phase, sigma, mean, mu, able, lam, beta, w, dx, dy, residual, f):  # noqa: PLR0913
+    """f (n, 3) of the predictor (phase 0) or, with its dx and dy, of the corrector."""
+    keep = 1.0 - sigma
+    p, fa, fb = np.empty(3), np.empty(3), np.empty(3)
+    for i in range(len(f)):
+        if able[i] <= 0.0:
+            for a in range(3):
+                f[i, a] = keep * residual[i, a]
+            continue
+        l0, l1, l2 = lam[i, 0], lam[i, 1], lam[i, 2]
+        c0 = sigma * mean - (l0 * l0 + l1 * l1 + l2 * l2)
+        c1, c2 = -2.0 * l0 * l1, -2.0 * l0 * l2
+        if phase == 1:
+            _scale(beta[i], w[i], dx[i], fa)
+            _unscale(beta[i], w[i], dy[i], fb)
+            c0 -= fa[0] * fb[0] + fa[1] * fb[1] + fa[2] * fb[2]
+            c1 -= fa[0] * fb[1] + fb[0] * fa[1]
+            c2 -= fa[0] * fb[2] + fb[0] * fa[2]
+        t = math.sqrt(l1 * l1 + l2 * l2)
+        p[0] = (l0 * c0 - l1 * c1 - l2 * c2) / ((l0 - t) * (l0 + t))
+        p[1], p[2] = (c1 - l1 * p[0]) / l0, (c2 - l2 * p[0]) / l0
+        _scale(beta[i], w[i], p, fa)
+        f[i, 0] = fa[0] + keep * residual[i, 0]
+        if mu[i] > 0.0:
+            f[i, 0] *= mu[i]
+            f[i, 1] = fa[1] + keep * residual[i, 1]
+            f[i, 2] = fa[2] + keep * residual[i, 2]
+
+
+@njit(cache=True, error_model="numpy")
+def _solved(levers, sides, E, inverse, factor, f, dr, du):  # noqa: PLR0913
+    """dr (n, 3) of (W + E) dr = f by the factor on the bodies, refined once, and du = W dr."""
+    order, upper_start, upper, lower_start, lower, U, L, pivots = factor
+    n, halves = len(f), len(order)
+    rest, part = np.empty((n, 3)), np.empty((n, 3))
+    turned, moved = np.empty((halves // 2, 6)), np.empty((halves, 3))
+    dr[:, :] = 0.0
+    du[:, :] = 0.0
+    for _ in range(2):
+        _multiplied(E, dr, rest)
+        for i in range(n):
+            for a in range(3):
+                rest[i, a] = f[i, a] - du[i, a] - rest[i, a]
+        _multiplied(inverse, rest, part)
+        driven_inplace(levers, sides, part, turned)
+        solve_inplace(
+            order, upper_start, upper, lower_start, lower, U, L, pivots,
+            turned.reshape((halves, 3)), moved,
+        )  # fmt: skip
+        felt_inplace(levers, sides, moved.reshape((halves // 2, 6)), du)
+        for i in range(n):
+            for a in range(3):
+                rest[i, a] -= du[i, a]
+        _multiplied(inverse, rest, part)
+        for i in range(n):
+            for a in range(3):
+                dr[i, a] += part[i, a]
+        driven_inplace(levers, sides, dr, turned)
+        felt_inplace(levers, sides, turned, du)
+
+
+@njit(cache=True, error_model="numpy")
+def relax_on_bodies_inplace(  # noqa: PLR0913
+    levers, sides, pattern, symbolic, blocks, q, law, rho, r, x, y, s, goal, steps,
+):  # fmt: skip
+    """Predictor-corrector steps on (r, x, y) with s frozen; x and y inside the cones on entry.
+
+    levers (n, 2, 3, 6), sides (n, 2); pattern: see `BodyMatrix`; blocks: W in rows, for the
+    error; law: kind (n,) and parameters (n, 2); goal: error, unit of u, at which to stop.
+    Returns steps done; r is the last iterate, and finite.
+    """
+    indptr, indices = pattern
+    order, upper_start, upper, lower_start, lower = symbolic
+    kind, n, bodies = law[0], len(q), (len(indptr) - 1) // 2
+    mu, able = law[1][:, MU].copy(), rho.copy()
+    for i in range(n):
+        if kind[i] == TIED:
+            able[i] = 0.0
+    data, none = np.empty((len(indices), 3, 3)), np.zeros((2 * bodies, 3, 3))
+    U, L = np.empty((len(upper), 3, 3)), np.empty((len(upper), 3, 3))
+    pivots, work = np.empty((2 * bodies, 3, 3)), np.zeros((2 * bodies, 3, 3))
+    E, inverse = np.zeros((n, 3, 3)), np.zeros((n, 3, 3))
+    lam, w, beta = np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
+    residual, f, dr = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
+    dx, dy, du, u = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3)), np.empty((n, 3))
+    turned = np.empty((bodies, 6))
+    short = 0
+    for i in range(n):
+        if kind[i] == TIED and rho[i] > 0.0:
+            for a in range(3):
+                E[i, a, a], inverse[i, a, a] = SOFT / rho[i], rho[i] / SOFT
+    for count in range(steps):
+        driven_inplace(levers, sides, r, turned)
+        felt_inplace(levers, sides, turned, u)
+        gap = away = total = 0.0
+        free = 0
+        for i in range(n):
+            for a in range(3):
+                u[i, a] += q[i, a]
+            if able[i] <= 0.0:
+                if kind[i] == TIED:
+                    for a in range(3):
+                        residual[i, a] = -u[i, a]
+                        away += u[i, a] ** 2
+                continue
+            free += 1
+            scale = 1.0 / mu[i] if mu[i] > 0.0 else 1.0
+            residual[i, 0] = y[i, 0] - scale * u[i, 0] - s[i]
+            for a in range(1, 3):
+                residual[i, a] = y[i, a] - u[i, a] if mu[i] > 0.0 else 0.0
+            for a in range(3):
+                total += x[i, a] * y[i, a]
+                gap += max(x[i, a] * y[i, a], 0.0) / rho[i]
+                away += residual[i, a] ** 2
+        error = natural_error(blocks[0], blocks[1], blocks[2], q, kind, law[1], rho, r)
+        if error <= goal or math.sqrt(away + gap) <= max(ENOUGH * error, 0.1 * goal):
+            return count
+        for i in range(n):
+            if able[i] > 0.0:
+                _scaling(x, y, mu[i], i, beta, w, lam, E, inverse)
+        mean = total / max(free, 1)
+        factor = order, upper_start, upper, lower_start, lower, U, L, pivots
+        _assemble(levers, sides, inverse, indptr, indices, data)
+        if not factorise_inplace(
+            indptr, indices, data, none, order, upper_start, upper, lower_start, lower,
+            U, L, pivots, work,
+        ):  # fmt: skip
+            return count
+        sigma = length = 0.0
+        for phase in range(2):
+            keep = 1.0 - sigma
+            _right_side(phase, sigma, mean, mu, able, lam, beta, w, dx, dy, residual, f)
+            _solved(levers, sides, E, inverse, factor, f, dr, du)
+            for i in range(n):
+                if able[i] <= 0.0:
+                    continue
+                scale = mu[i] if mu[i] > 0.0 else 1.0
+                dx[i, 0] = scale * dr[i, 0]
+                dy[i, 0] = du[i, 0] / scale - keep * residual[i, 0]
+                for a in range(1, 3):
+                    if mu[i] > 0.0:
+                        dx[i, a], dy[i, a] = dr[i, a], du[i, a] - keep * residual[i, a]
+            length = min(_room(x, dx, able), _room(y, dy, able))
+            if not length > 0.0:
+                return count
+            length = min(1.0, length * (1.0 if phase == 0 else BOUNDARY))
+            if phase == 0 and total > 0.0:
+                left = 0.0
+                for i in range(n):
+                    if able[i] > 0.0:
+                        for a in range(3):
+                            end = x[i, a] + length * dx[i, a]
+                            left += end * (y[i, a] + length * dy[i, a])
+                sigma = min(max(left / total, 0.0), 1.0) ** 3
+        short = short + 1 if length < SHORT else 0
+        if short > STALLED:
+            return count
+        for i in range(n):
+            if able[i] > 0.0:
+                for a in range(3):
+                    x[i, a] += length * dx[i, a]
+                    y[i, a] += length * dy[i, a]
+                    r[i, a] = x[i, a]
+                r[i, 0] /= mu[i] if mu[i] > 0.0 else 1.0
+            elif kind[i] == TIED:
+                for a in range(3):
+                    r[i, a] += length * dr[i, a]
+    return steps
+
+
+def relaxed(  # noqa: PLR0913
+    levers: Array, sides: NDArray[np.int64], matrix: BodyMatrix, blocks: Any, q: Array,
+    law: Any, rho: Array, slip: Array, goal: float, steps: int,
+) -> tuple[Array, int]:  # fmt: skip
+    """(r (n, 3), steps) of the relaxation with frozen |u_T|, (n,), from inside of the cones."""
+    mu = law[1][:, MU]
+    size = float(np.linalg.norm(q)) / math.sqrt(max(len(q), 1))
+    x, y = np.zeros_like(q), np.zeros_like(q)
+    x[:, 0], y[:, 0] = size * rho, size
+    r = x / np.where(mu > 0, mu, 1.0)[:, None]
+    r[law[0] == TIED] = 0.0
+    done = relax_on_bodies_inplace(
+        levers, sides, (matrix.indptr, matrix.indices), matrix.symbolic.arrays, blocks, q, law,
+        rho, r, x, y, np.where(mu > 0, slip, 0.0), goal, steps,
+    )  # fmt: skip
+    return r, done
+
+
+__all__ = ["BodyMatrix", "body_matrix", "relaxed"]

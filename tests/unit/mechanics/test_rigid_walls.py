@@ -1,0 +1,76 @@
+"""Walls of rigid bricks: levers, and relaxations on the bodies."""
+
+import numpy as np
+import pytest
+
+import amontons as am
+from amontons.mechanics.multibody import moving, sweeping
+from amontons.mechanics.multibody.quick import Found
+from amontons.mechanics.multibody.sweeping import Search
+
+
+def wall(courses=4, across=3):
+    """Bricks on bricks, pushed by a ball."""
+    blocks = [am.RigidBody(am.cuboid((0.2, 0.1, 0.1)), 2000,
+                           (0.2 * k + 0.1 * (row % 2), 0, 0.05 + 0.1 * row))
+              for row in range(courses) for k in range(across)]  # fmt: skip
+    ball = am.RigidBody(am.Ball(0.1), 8000, (0.2, -0.151, 0.2), velocity=(0, 2, 0))
+    return am.RigidBodies([*blocks, ball], [am.Plane((0, 0, 1))], mu=0.6)
+
+
+@pytest.fixture
+def searches(monkeypatch):
+    """The searches of the steps of a wall, as they begin."""
+    made = []
+
+    class Kept(Search):
+        def __post_init__(self):
+            super().__post_init__()
+            made.append(self)
+
+    monkeypatch.setattr(moving, "Search", Kept)
+    monkeypatch.setattr(sweeping, "WORK", 0)
+    return made
+
+
+def test_levers_give_what_contacts_do_to_each_other(searches):
+    """W = G G^T, with the signs of slave and master and arms in global axes."""
+    _ = list(am.evolve_rigid(wall(), step=1e-3, until=2e-3, tolerance=1e-3))
+    for search in searches:
+        n, bodies = len(search.posed.q), len(search.bodies[0])
+        G = np.zeros((n, 3, bodies, 6))
+        for side in range(2):
+            for i in range(n):
+                if search.sides[i, side] >= 0:
+                    G[i, :, search.sides[i, side]] += search.levers[i, side]
+        G = G.reshape(3 * n, 6 * bodies)
+        posed, W = search.posed, np.zeros((n, 3, n, 3))
+        for i in range(n):
+            for k in range(posed.indptr[i], posed.indptr[i + 1]):
+                W[i, :, posed.indices[k]] = posed.data[k]
+        W = W.reshape(3 * n, 3 * n)
+        np.testing.assert_allclose(G @ G.T, W, atol=1e-12 * abs(W).max())
+
+
+def test_relaxations_take_joints_and_bricks(searches, monkeypatch):
+    """They are made to solve each step, with sweeps; with the sliding found they do alone."""
+    monkeypatch.setattr(Search, "swept_while_promising", lambda self, start: None)
+    beam = [am.RigidBody(am.cuboid((0.5, 0.05, 0.05)), 1000, (0.25 + 0.5 * k, 0, 0.025))
+            for k in range(3)]  # fmt: skip
+    joints = [am.Joint(k, k + 1, (0.5 * (k + 1), y, 0.025)) for k in range(2)
+              for y in (-0.02, 0.02)]  # fmt: skip
+    chain = am.RigidBodies(beam, [am.Plane((0, 0, 1))], mu=0.4, joints=joints,
+                           apart=[(0, 1), (1, 2)])  # fmt: skip
+    for system in (wall(), chain):
+        searches.clear()
+        steps = am.evolve_rigid(system, step=1e-3, until=4e-3, tolerance=1e-5)
+        solved = [s for s in steps if isinstance(s._solved, Found)]
+        assert len(solved) > 2
+        assert all(s.solution.problem.error(s.solution.r) <= 1e-5 for s in solved)
+        relaxed = [s for s in searches if s.mu > 0 and s.relaxing > 0]
+        assert relaxed
+        for search in relaxed:
+            found, r = sweeping.found_quickly(search)
+            assert found is not None
+            search.latest = r
+            assert search.offer(search.relax()) <= 10 * search.goal
