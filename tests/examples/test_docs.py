@@ -28,7 +28,7 @@ NEEDS = {"docs/distributed.md": ["petsc4py"], "docs/notebooks.md": ["xarray"],
 SLOW = {"docs/choosing-a-solver.md", "docs/tutorial.md"}  # commands of more than a minute
 ELSEWHERE = re.compile(  # other programs, and what .ci/run and .ci/full do themselves
     r"^(\w+=\S+ +)*(python -m (pip|pytest|venv|sphinx|reproduce)|mpirun|ruff|\.ci/|MPICC=)"
-    r"|^\S*PETSC"
+    r"|^\S*PETSC|^apt-get"
 )
 FENCE = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```", re.DOTALL | re.MULTILINE)
 

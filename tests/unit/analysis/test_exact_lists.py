@@ -207,8 +207,9 @@ def test_a_diagram_says_what_is_proved():
     q0, q1 = random.standard_normal((2, 2, 2))
     W = A @ A.T / 4 + 0.05 * np.eye(4)
     base, target = (am.FrictionProblem.from_delassus(W, q, [3.0] * 2) for q in (q0, q1))
-    few = am.diagram(target, "load", (0, 1), base=base)
+    few = am.diagram(target, "load", (0, 1), base=base, at=(0.0, 0.5, 1.0))
     assert few.complete
+    assert few.whole is None
     assert "nothing is proved between these values" in few.reason
     assert few.reason in str(few)
     assert few.record()["at"] == [0.0, 0.5, 1.0]
@@ -218,14 +219,14 @@ def test_a_diagram_says_what_is_proved():
 
 # ------------------------------------------------------------------- many problems
 def test_random_problems_in_the_plane(benchmark):
-    tallies = benchmark.run(105, 5, 2)
+    tallies = benchmark.run(105, 5, 2, benchmark.Kept(5))
     assert [text for t in tallies.values() for text in t.faults] == []
     assert sum(t.complete for t in tallies.values()) > 75
 
 
 def test_random_problems_in_space(benchmark, monkeypatch):
     monkeypatch.setattr(benchmark, "LIMIT", 1.0)
-    tallies = benchmark.run(14, 5, 3)
+    tallies = benchmark.run(14, 5, 3, benchmark.Kept(5))
     assert [text for t in tallies.values() for text in t.faults] == []
     assert sum(t.complete for t in tallies.values()) > 6
 

@@ -62,7 +62,7 @@ CASES = {
     "young nan": ("100.0", "nan", ["young", "nan"]),
     "poisson half": ("0.3\n[[fix", "0.5\n[[fix", ["poisson", "0.5"]),
     "law misspelt": ("young", 'law = "neo-hokean"\nyoung', ["neo-hookean", "law"]),
-    "law without plane": ("young", 'law = "neo-hookean"\nplane = "strain"\nyoung', ["plane"]),
+    "law without it": ("young", 'law = "elasto-plastic"\nplane = "strain"\nyoung', ["plane"]),
     "law unknown": ("young", 'law = "linear"\nyoung', ["law", "linear-elastic"]),
     "region unknown": ("material.default", "material.steel", ["material", "steel"]),
     "plane unknown": ("poisson", 'plane = "stresses"\npoisson', ["plane", "stress"]),

@@ -5,6 +5,7 @@ import pytest
 
 import amontons as am
 from amontons.mechanics.ready.gallery import random_delassus
+from amontons.solvers.auto.first_stage import solve_range
 
 
 @pytest.fixture(scope="module")
@@ -82,3 +83,11 @@ def test_an_unsolvable_problem_does_not_stop_the_others():
 def test_errors_are_named(problems, arguments, text):
     with pytest.raises(am.InvalidInput, match=text):
         am.solve_many(**{"problems": problems[:2], **arguments})
+
+
+def test_one_problem_and_many_take_the_same_compiled_function(problems):
+    """Another signature is another compilation, which may round differently."""
+    am.solve_many(problems[:1], tolerance=1e-9)
+    known = set(solve_range.signatures)
+    am.solve_many(problems[:5], tolerance=1e-9)
+    assert set(solve_range.signatures) == known

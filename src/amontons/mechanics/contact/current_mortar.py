@@ -277,6 +277,8 @@ class MortarMeeting:
         parts, pair = self.shared, self.pair
         nc, shape = len(pair.slaves), (len(pair.slaves), len(self.x))
         row, slave, master = self.rows, pair.slave, pair.master
+        if not nc:  # all are held
+            return sparse.csr_array(shape)
         scale = np.where(row >= 0, self.by_weight[row], 0.0)[:, :, None]
         left = scale * (parts.psi @ parts.mass) * ~parts.kept[:, None, :]
         onto = (scale * parts.psi)[parts.of] @ parts.cross

@@ -169,7 +169,7 @@ def last_motion(problem: LargeDeformation, state: State, duration: float) -> Arr
     along = meeting.averages @ moved.reshape(parts.X.shape)
     along -= n * (n * along).sum(axis=1)[:, None]
     law = parts.contact.law
-    pressed = law.pressed(state.force)  # T^-1 r, and T^-1 of that is where it slips from
+    pressed = np.array(law.pressed(state.force))  # T^-1 r; T^-1 of that is where it slips from
     size, bound = np.linalg.norm(pressed[:, 1:], axis=1), law.parameters[:, MU]
     bound = bound * np.maximum(pressed[:, 0], 0.0)
     pressed[:, 0] = 0.0

@@ -122,10 +122,11 @@ class Together:
         self.norms = np.array([p.q_norm for p in problems])
         kernels = [(*p.kernel_data, p.blocks.diagonal, p.blocks.eliminated) for p in problems]
         if len(kernels) == 1:
-            self.data, self.floor = kernels[0], problems[0].floor
+            self.data = kernels[0]
         else:
             self.data = tuple(_joined(x) for x in zip(*kernels, strict=True))
-            self.floor = _joined([p.floor for p in problems])
+        # of one type for one problem and for many: two compilations may round differently
+        self.floor = np.concatenate([p.floor for p in problems])
         total = len(self.r)
         self.u, self.kept = np.empty((2, total, 3))
         self.status, self.sliding = np.empty((2, total), np.int8)
