@@ -48,6 +48,32 @@ def attempt(what, *arguments):
         print(what, type(error).__name__, str(error)[:100])
 
 
+def sliding():
+    """Two bodies that slide far over each other, in 2D and 3D."""
+    for dim, kind in ((2, "quad"), (3, "hex"), (3, "tet")):
+        wide, narrow = (2,) * (dim - 1) + (1,), (1,) * dim
+        lower = am.Body(am.box(wide, 2, origin=(-0.4,) * (dim - 1) + (-1,), kind=kind),
+                        am.NeoHookean(1, 0.3), name="lower")  # fmt: skip
+        upper = am.Body(am.box(narrow, 2, kind=kind), am.NeoHookean(10, 0.3), name="upper")
+        push = am.Fix("upper.top", (0.02,) * (dim - 1) + (-0.02,))
+        pair = am.Contact("upper.bottom", master="lower.top", mu=0.3)
+        yield am.Model([lower, upper], [am.Fix("lower.bottom", 0), push], [pair])
+
+
+def fall(until, **friction):
+    """Stones and a ball on the ground."""
+    stones = [
+        am.RigidBody(am.cuboid((0.05, 0.2, 0.5)), density=2000, position=(0.2 * k, 0, 0.25))
+        for k in range(2)
+    ]
+    ball = am.RigidBody(am.Ball(0.08), density=8000, position=(-0.15, 0, 0.45),
+                        velocity=(2, 0, 0))  # fmt: skip
+    bodies = [ball] if "rolling" in friction else [*stones, ball]
+    system = am.RigidBodies(bodies, [am.Plane((0, 0, 1))], mu=0.5, **friction)
+    for _ in am.evolve_rigid(system, step=2e-3, until=until):
+        pass
+
+
 def problems():
     """Two contacts in 2D and in 3D."""
     import numpy as np
@@ -65,8 +91,10 @@ def main():
         for method in METHODS:
             attempt(method.__name__, problem, method())
     attempt("levels", without_levels(), am.ContactMultigrid())
-    for model in models():
+    for model in (*models(), *sliding()):
         attempt("model", model)
+    fall(0.2)
+    fall(0.4, rolling=0.005, torsion=0.002)
 
 
 if __name__ == "__main__":

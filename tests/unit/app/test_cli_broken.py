@@ -55,7 +55,7 @@ CASES = {
     "cells zero": ("cells = 2", "cells = 0", ["mesh.cells"]),
     "cells fraction": ("cells = 2", "cells = 2.5", ["mesh.cells", "2.5"]),
     "cells true": ("cells = 2", "cells = true", ["mesh.cells"]),
-    "too many cells": ("cells = 2", "cells = 1000000", ["mesh.cells", "5000000"]),
+    "too many cells": ("cells = 2", "cells = 1000000", ["mesh.cells", "20000000"]),
     "wrong kind": ("cells = 2", 'cells = 2\nkind = "hex"', ["mesh", "quad"]),
     "young negative": ("100.0", "-100.0", ["material.default", "young"]),
     "young text": ("100.0", '"hard"', ["young", "hard"]),

@@ -36,7 +36,7 @@ LAWS = {  # of materials, with their keys
     "reduced-polynomial": ("coefficients", "bulk", "plane", "density"),
     "saint-venant-kirchhoff": ("young", "poisson", "plane", "density"), "rigid": ("density",),
 }  # fmt: skip
-MAX_NODES = 5_000_000  # of a box: a typing error must not fill the memory
+MAX_NODES = 20_000_000  # of a box: a typing error must not fill the memory
 
 
 def read_bodies(top: Table, path: Path) -> list[Body]:
