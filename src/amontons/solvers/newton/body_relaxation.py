@@ -27,7 +27,15 @@ from ...problem.judge.measures import natural_error
 from ...problem.law.law import MU, TIED
 from ..sweeps.on_bodies import GROUND, driven_inplace, felt_inplace
 from .block_lu import Symbolic, analyse_doubled, factorise_inplace, solve_inplace
-from .interior_point import BOUNDARY, ENOUGH, SHORT, STALLED, _room, _scale, _unscale
+from .cone_steps import (
+    advance_inplace,
+    centering,
+    changes_inplace,
+    nesterov_todd_inplace,
+    right_side_inplace,
+    room,
+)
+from .interior_point import BOUNDARY, ENOUGH, SHORT, STALLED
 
 Array = NDArray[np.float64]
 SOFT = 1e-12  # of bonds, relative: E of a row that has none
@@ -103,17 +111,7 @@ def _rows_in_halves(indptr, indices):
 @njit(cache=True, error_model="numpy")
 def _scaling(x, y, mu, i, beta, w, lam, E, inverse):
     """Scaling (beta, w) and lambda of contact i, and its blocks E and E^-1."""
-    tx, ty = math.sqrt(x[i, 1] ** 2 + x[i, 2] ** 2), math.sqrt(y[i, 1] ** 2 + y[i, 2] ** 2)
-    sx = math.sqrt((x[i, 0] - tx) * (x[i, 0] + tx))
-    sy = math.sqrt((y[i, 0] - ty) * (y[i, 0] + ty))
-    inner = (x[i, 0] * y[i, 0] + x[i, 1] * y[i, 1] + x[i, 2] * y[i, 2]) / (sx * sy)
-    g = 2.0 * math.sqrt(0.5 * (1.0 + inner))
-    beta[i] = math.sqrt(sy / sx)
-    w[i, 0] = (y[i, 0] / sy + x[i, 0] / sx) / g
-    w[i, 1] = (y[i, 1] / sy - x[i, 1] / sx) / g
-    w[i, 2] = (y[i, 2] / sy - x[i, 2] / sx) / g
-    _scale(beta[i], w[i], x[i], lam[i])
-    k = sy / sx
+    k = nesterov_todd_inplace(x, y, i, beta, w, lam)
     for a in range(3):
         for b in range(3):
             sign = 1.0 if (a == 0) == (b == 0) else -1.0
@@ -190,36 +188,6 @@ def _multiplied(blocks, v, out):
         v0, v1, v2 = v[i, 0], v[i, 1], v[i, 2]
         for a in range(3):
             out[i, a] = B[a, 0] * v0 + B[a, 1] * v1 + B[a, 2] * v2
-
-
-@njit(cache=True, error_model="numpy")
-def _right_side(phase, sigma, mean, mu, able, lam, beta, w, dx, dy, residual, f):  # noqa: PLR0913
-    """f (n, 3) of the predictor (phase 0) or, with its dx and dy, of the corrector."""
-    keep = 1.0 - sigma
-    p, fa, fb = np.empty(3), np.empty(3), np.empty(3)
-    for i in range(len(f)):
-        if able[i] <= 0.0:
-            for a in range(3):
-                f[i, a] = keep * residual[i, a]
-            continue
-        l0, l1, l2 = lam[i, 0], lam[i, 1], lam[i, 2]
-        c0 = sigma * mean - (l0 * l0 + l1 * l1 + l2 * l2)
-        c1, c2 = -2.0 * l0 * l1, -2.0 * l0 * l2
-        if phase == 1:
-            _scale(beta[i], w[i], dx[i], fa)
-            _unscale(beta[i], w[i], dy[i], fb)
-            c0 -= fa[0] * fb[0] + fa[1] * fb[1] + fa[2] * fb[2]
-            c1 -= fa[0] * fb[1] + fb[0] * fa[1]
-            c2 -= fa[0] * fb[2] + fb[0] * fa[2]
-        t = math.sqrt(l1 * l1 + l2 * l2)
-        p[0] = (l0 * c0 - l1 * c1 - l2 * c2) / ((l0 - t) * (l0 + t))
-        p[1], p[2] = (c1 - l1 * p[0]) / l0, (c2 - l2 * p[0]) / l0
-        _scale(beta[i], w[i], p, fa)
-        f[i, 0] = fa[0] + keep * residual[i, 0]
-        if mu[i] > 0.0:
-            f[i, 0] *= mu[i]
-            f[i, 1] = fa[1] + keep * residual[i, 1]
-            f[i, 2] = fa[2] + keep * residual[i, 2]
 
 
 @njit(cache=True, error_model="numpy")
@@ -323,41 +291,21 @@ def relax_on_bodies_inplace(  # noqa: PLR0913
             return count
         sigma = length = 0.0
         for phase in range(2):
-            keep = 1.0 - sigma
-            _right_side(phase, sigma, mean, mu, able, lam, beta, w, dx, dy, residual, f)
+            right_side_inplace(phase, sigma, mean, mu, able, lam, beta, w, dx, dy, residual, f)
             _solved(levers, sides, E, inverse, factor, f, dr, du)
-            for i in range(n):
-                if able[i] <= 0.0:
-                    continue
-                scale = mu[i] if mu[i] > 0.0 else 1.0
-                dx[i, 0] = scale * dr[i, 0]
-                dy[i, 0] = du[i, 0] / scale - keep * residual[i, 0]
-                for a in range(1, 3):
-                    if mu[i] > 0.0:
-                        dx[i, a], dy[i, a] = dr[i, a], du[i, a] - keep * residual[i, a]
-            length = min(_room(x, dx, able), _room(y, dy, able))
+            changes_inplace(1.0 - sigma, mu, able, residual, dr, du, dx, dy)
+            length = min(room(x, dx, able), room(y, dy, able))
             if not length > 0.0:
                 return count
             length = min(1.0, length * (1.0 if phase == 0 else BOUNDARY))
-            if phase == 0 and total > 0.0:
-                left = 0.0
-                for i in range(n):
-                    if able[i] > 0.0:
-                        for a in range(3):
-                            end = x[i, a] + length * dx[i, a]
-                            left += end * (y[i, a] + length * dy[i, a])
-                sigma = min(max(left / total, 0.0), 1.0) ** 3
+            if phase == 0:
+                sigma = centering(x, y, dx, dy, able, length, total)
         short = short + 1 if length < SHORT else 0
         if short > STALLED:
             return count
+        advance_inplace(x, y, r, dx, dy, mu, able, length)
         for i in range(n):
-            if able[i] > 0.0:
-                for a in range(3):
-                    x[i, a] += length * dx[i, a]
-                    y[i, a] += length * dy[i, a]
-                    r[i, a] = x[i, a]
-                r[i, 0] /= mu[i] if mu[i] > 0.0 else 1.0
-            elif kind[i] == TIED:
+            if kind[i] == TIED:
                 for a in range(3):
                     r[i, a] += length * dr[i, a]
     return steps

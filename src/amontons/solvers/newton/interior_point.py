@@ -44,6 +44,14 @@ from ...problem.law.law import MU
 from ..contract import Iterate, Target, check_at_least, check_positive
 from ..sweeps.kernels import Acceleration, SweepOrder, sweep_data, watch_for
 from .block_lu import factorise_inplace, solve_inplace
+from .cone_steps import (
+    advance_inplace,
+    centering,
+    changes_inplace,
+    nesterov_todd_inplace,
+    right_side_inplace,
+    room,
+)
 from .smoothing import PINNED, Workspace
 
 Array = NDArray[np.float64]
@@ -57,58 +65,9 @@ DEPTH = 10  # past sweeps that the acceleration combines
 
 
 @njit(cache=True, error_model="numpy")
-def _scale(b, w, v, out):
-    """out = F v with F = b [[w_0, w'], [w, I + w w' / (1 + w_0)]]."""
-    z = w[1] * v[1] + w[2] * v[2]
-    k = v[0] + z / (1.0 + w[0])
-    out[0], out[1], out[2] = b * (w[0] * v[0] + z), b * (v[1] + w[1] * k), b * (v[2] + w[2] * k)
-
-
-@njit(cache=True, error_model="numpy")
-def _unscale(b, w, v, out):
-    """out = F^-1 v."""
-    z = w[1] * v[1] + w[2] * v[2]
-    k = z / (1.0 + w[0]) - v[0]
-    out[0], out[1], out[2] = (w[0] * v[0] - z) / b, (v[1] + w[1] * k) / b, (v[2] + w[2] * k) / b
-
-
-@njit(cache=True, error_model="numpy")
-def _room(x, dx, rho):
-    """Largest a with x + a dx in all cones, of the contacts that can react."""
-    room = math.inf
-    for i in range(len(x)):
-        if rho[i] <= 0.0:
-            continue
-        d0, d1, d2 = dx[i, 0], dx[i, 1], dx[i, 2]
-        t = math.sqrt(x[i, 1] ** 2 + x[i, 2] ** 2)
-        a = d0 * d0 - d1 * d1 - d2 * d2
-        b = x[i, 0] * d0 - x[i, 1] * d1 - x[i, 2] * d2
-        c = (x[i, 0] - t) * (x[i, 0] + t)
-        root = b * b - a * c
-        if a < 0.0:
-            root = math.sqrt(max(root, 0.0))
-            room = min(room, c / (root - b) if b < 0.0 else (-b - root) / a)
-        elif b < 0.0 and root >= 0.0:
-            room = min(room, c / (math.sqrt(root) - b))
-        if d0 < 0.0:
-            room = min(room, -x[i, 0] / d0)
-    return room
-
-
-@njit(cache=True, error_model="numpy")
-def _nesterov_todd(x, y, mu, shift, i, beta, w, lam, extra):
+def _newton_block(x, y, mu, shift, i, beta, w, lam, extra):
     """Scaling (beta, w) and lambda of contact i, and its block S^-1 D S^-1 plus the shift."""
-    tx, ty = math.sqrt(x[i, 1] ** 2 + x[i, 2] ** 2), math.sqrt(y[i, 1] ** 2 + y[i, 2] ** 2)
-    sx = math.sqrt((x[i, 0] - tx) * (x[i, 0] + tx))
-    sy = math.sqrt((y[i, 0] - ty) * (y[i, 0] + ty))
-    inner = (x[i, 0] * y[i, 0] + x[i, 1] * y[i, 1] + x[i, 2] * y[i, 2]) / (sx * sy)
-    g = 2.0 * math.sqrt(0.5 * (1.0 + inner))
-    beta[i] = math.sqrt(sy / sx)
-    w[i, 0] = (y[i, 0] / sy + x[i, 0] / sx) / g
-    w[i, 1] = (y[i, 1] / sy - x[i, 1] / sx) / g
-    w[i, 2] = (y[i, 2] / sy - x[i, 2] / sx) / g
-    _scale(beta[i], w[i], x[i], lam[i])
-    k, d = sy / sx, extra[i]
+    k, d = nesterov_todd_inplace(x, y, i, beta, w, lam), extra[i]
     for a in range(3):
         for b in range(3):
             d[a, b] = 2.0 * k * w[i, a] * w[i, b]
@@ -143,7 +102,6 @@ def relax_inplace(  # noqa: PLR0913
     rhs, dr = np.zeros((nc, 3)), np.empty((nc, 3))
     dx, dy, residual = np.zeros((nc, 3)), np.zeros((nc, 3)), np.zeros((nc, 3))
     lam, w, beta = np.empty((nc, 3)), np.empty((nc, 3)), np.empty(nc)
-    p, fa, fb = np.empty(3), np.empty(3), np.empty(3)
     for count in range(steps):
         velocity_of_rows_inplace(0, len(q), indptr, indices, data, q, r, u)
         gap = away = 0.0
@@ -169,7 +127,7 @@ def relax_inplace(  # noqa: PLR0913
                     extra[i, a, a] = 1e300
                 continue
             total += x[i, 0] * y[i, 0] + x[i, 1] * y[i, 1] + x[i, 2] * y[i, 2]
-            _nesterov_todd(x, y, mu[i], shift / rho[i], i, beta, w, lam, extra)
+            _newton_block(x, y, mu[i], shift / rho[i], i, beta, w, lam, extra)
         mean = total / max(able, 1)
         if not factorise_inplace(
             indptr, indices, data, extra, order, upper_start, upper, lower_start, lower,
@@ -178,61 +136,20 @@ def relax_inplace(  # noqa: PLR0913
             return count
         sigma = length = 0.0
         for phase in range(2):
-            keep = 1.0 - sigma
-            for i in range(nc):
-                if rho[i] <= 0.0:
-                    continue
-                l0, l1, l2 = lam[i, 0], lam[i, 1], lam[i, 2]
-                c0 = sigma * mean - (l0 * l0 + l1 * l1 + l2 * l2)
-                c1, c2 = -2.0 * l0 * l1, -2.0 * l0 * l2
-                if phase == 1:
-                    _scale(beta[i], w[i], dx[i], fa)
-                    _unscale(beta[i], w[i], dy[i], fb)
-                    c0 -= fa[0] * fb[0] + fa[1] * fb[1] + fa[2] * fb[2]
-                    c1 -= fa[0] * fb[1] + fb[0] * fa[1]
-                    c2 -= fa[0] * fb[2] + fb[0] * fa[2]
-                t = math.sqrt(l1 * l1 + l2 * l2)
-                p[0] = (l0 * c0 - l1 * c1 - l2 * c2) / ((l0 - t) * (l0 + t))
-                p[1], p[2] = (c1 - l1 * p[0]) / l0, (c2 - l2 * p[0]) / l0
-                _scale(beta[i], w[i], p, fa)
-                rhs[i, 0] = fa[0] + keep * residual[i, 0]
-                if mu[i] > 0.0:
-                    rhs[i, 0] *= mu[i]
-                    rhs[i, 1] = fa[1] + keep * residual[i, 1]
-                    rhs[i, 2] = fa[2] + keep * residual[i, 2]
+            right_side_inplace(phase, sigma, mean, mu, rho, lam, beta, w, dx, dy, residual, rhs)
             solve_inplace(order, upper_start, upper, lower_start, lower, U, L, inverse, rhs, dr)
             velocity_of_rows_inplace(0, len(q), indptr, indices, data, zero, dr, du)
-            for i in range(nc):
-                if rho[i] <= 0.0:
-                    continue
-                scale = mu[i] if mu[i] > 0.0 else 1.0
-                dx[i, 0] = scale * dr[i, 0]
-                dy[i, 0] = du[i, 0] / scale - keep * residual[i, 0]
-                for a in range(1, 3):
-                    if mu[i] > 0.0:
-                        dx[i, a], dy[i, a] = dr[i, a], du[i, a] - keep * residual[i, a]
-            length = min(_room(x, dx, rho), _room(y, dy, rho))
+            changes_inplace(1.0 - sigma, mu, rho, residual, dr, du, dx, dy)
+            length = min(room(x, dx, rho), room(y, dy, rho))
             if not length > 0.0:
                 return count
             length = min(1.0, length * (1.0 if phase == 0 else BOUNDARY))
             if phase == 0:
-                left = 0.0
-                for i in range(nc):
-                    if rho[i] > 0.0:
-                        for a in range(3):
-                            end = x[i, a] + length * dx[i, a]
-                            left += end * (y[i, a] + length * dy[i, a])
-                sigma = min(max(left / total, 0.0), 1.0) ** 3
+                sigma = centering(x, y, dx, dy, rho, length, total)
         short[0] = short[0] + 1 if length < SHORT else 0
         if short[0] > STALLED:
             return count
-        for i in range(nc):
-            if rho[i] > 0.0:
-                for a in range(3):
-                    x[i, a] += length * dx[i, a]
-                    y[i, a] += length * dy[i, a]
-                    r[i, a] = x[i, a]
-                r[i, 0] /= mu[i] if mu[i] > 0.0 else 1.0
+        advance_inplace(x, y, r, dx, dy, mu, rho, length)
     return steps
 
 
