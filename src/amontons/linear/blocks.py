@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..core.compiled import njit
+from ..core.locks import KeepsLocks
 from ..core.threads import over_rows
 from .block_kernels import blocks_of_dense, blocks_of_rows, contact_data
 
@@ -23,7 +24,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class BlockRows:
+class BlockRows(KeepsLocks):
     """Compressed rows of 3x3 blocks, column indices sorted, every diagonal block present.
 
     indptr (nc+1,), indices (nnzb,), data (nnzb, 3, 3), diagonal (nc,): where W_ii is in data.

@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..core.arrays import real
 from ..core.clock import NEVER, Deadline
 from ..core.errors import InvalidInput
+from ..core.locks import KeepsLocks
 from .judge.measures import Measure, Weakest
 from .law import Law
 from .settling import Accepted, Motion, settled
@@ -52,7 +53,7 @@ class Start(Protocol):
     v: Array | None
 
 
-class Problem:
+class Problem(KeepsLocks):
     """A discrete problem of contact, see the module."""
 
     law: Law

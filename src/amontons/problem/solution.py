@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..core.errors import SingularOperator
 from ..core.faces import Differentiated, Shown
+from ..core.locks import KeepsLocks
 from ..core.warned import ResultWarning
 from .judge import measures as judge
 from .judge.measures import Measure
@@ -159,7 +160,7 @@ class Convergence(Shown):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FrictionSolution(Differentiated):
+class FrictionSolution(Differentiated, KeepsLocks):
     """Reactions and velocities of a discrete problem, and what they mean.
 
     r, u: (nc, d) in the local frames; v: (n,) or None in the Delassus form; warnings: reasons

@@ -195,10 +195,11 @@ def test_loads_of_different_size_are_resolved_or_nothing_is_claimed(dimension, l
     q = np.zeros((2, dimension))
     q[0, :2], q[1, :2] = (0.2, 1.0), np.multiply(larger, second)
     problem = am.FrictionProblem.from_delassus(W, q, [2.0, 0.5])
-    found = am.all_solutions(problem, time_limit=20)
+    limit = 20 if larger < 1e6 else 2  # the larger ones in space end by it
+    found = am.all_solutions(problem, time_limit=limit)
     assert found.complete == (larger < 1e6)
     assert len(found) == 3 or not found.complete
-    assert am.uniqueness(problem, time_limit=20).verdict in (SEVERAL, UNDECIDED)
+    assert am.uniqueness(problem, time_limit=limit).verdict in (SEVERAL, UNDECIDED)
 
 
 def test_large_problems_are_not_examined_quickly():

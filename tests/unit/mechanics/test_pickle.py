@@ -81,6 +81,31 @@ RESULTS = {
 }
 
 
+def locks(made):
+    """Of every array in what is made, by its path: whether nobody can write to it."""
+    found, seen = {}, {}
+
+    def walk(value, path):
+        if id(value) in seen:
+            return
+        seen[id(value)] = value
+        if isinstance(value, np.ndarray):
+            found[path] = not value.flags.writeable
+        elif isinstance(value, (list, tuple)):
+            for k, part in enumerate(value):
+                walk(part, (*path, k))
+        elif isinstance(value, dict):
+            for key, part in value.items():
+                walk(part, (*path, key))
+        elif type(value).__module__.startswith("amontons") or sparse.issparse(value):
+            for key, part in getattr(value, "__dict__", {}).items():
+                if type(part).__name__ != "Prepared":  # starts anew elsewhere
+                    walk(part, (*path, key))
+
+    walk(made, ())
+    return found
+
+
 @pytest.mark.parametrize("name", RESULTS)
 def test_results_are_pickled_and_copied(name):
     made = RESULTS[name]()
@@ -88,6 +113,9 @@ def test_results_are_pickled_and_copied(name):
     for other in (there, pickle.loads(pickle.dumps(there)), copy.deepcopy(made)):
         assert type(other) is type(made)
         assert str(other) == str(made)
+        here, elsewhere = locks(made), locks(other)
+        both = here.keys() & elsewhere.keys()
+        assert [path for path in both if elsewhere[path] != here[path]] == []
 
 
 def test_a_branch_is_the_same_elsewhere():

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.locks import KeepsLocks
 from ..meshes.facets import Cells
 from ..meshes.mesh import Mesh
 from .cell_loops import energy_of, forces_inplace, tangent_inplace
@@ -30,7 +31,7 @@ Array = NDArray[np.float64]
 AT_ONCE = 16_000  # points of integration, for memory: the moduli have 81 numbers each
 
 
-class FiniteCells:
+class FiniteCells(KeepsLocks):
     """What all have: the geometry, and the pressures of hybrid cells."""
 
     modulus: float  # that stresses of strains near 1 are measured by

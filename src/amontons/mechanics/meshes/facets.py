@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.arrays import integers, read_only
 from ...core.errors import InvalidInput
+from ...core.locks import KeepsLocks
 from .cells import CELLS, FACET_KIND, FIRST
 from .single_sides import single_sides
 
@@ -17,7 +18,7 @@ Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
-class Cells:
+class Cells(KeepsLocks):
     """Cells of one kind in one region: nodes (k, nodes per cell) in VTK order.
 
     integration: of the stiffness, "full", or "hybrid", the volume changing on the mean of each
@@ -36,7 +37,7 @@ class Cells:
 
 
 @dataclass(frozen=True, eq=False)
-class Facets:
+class Facets(KeepsLocks):
     """Facets of one kind ("line", "tri", "quad", "line3", …): nodes (k, nodes per facet).
 
     Right-hand rule outwards; in 2D the outward normal is the right side of the direction.

@@ -13,6 +13,7 @@ from scipy import sparse
 
 from ...core.arrays import LARGEST, integers, read_only, real, squarable
 from ...core.errors import InvalidInput, shown
+from ...core.locks import KeepsLocks
 from ...core.words import near
 from ...linear.levels import checked_levels
 from .cells import CELLS
@@ -24,7 +25,7 @@ Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class Mesh(KeepsLocks):
     """A mesh in 2D or 3D, of first order or, see `second_order`, of second order.
 
     points (n, dim), unit of length; cells: blocks by kind and region; surfaces: name -> facets.

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InvalidInput
+from ...core.locks import KeepsLocks
 from ...problem.solution import FrictionSolution
 from ..contact import forces
 from ..meshes import Facets
@@ -28,7 +29,7 @@ Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
-class ContactFields:
+class ContactFields(KeepsLocks):
     """What a solution of the discrete problem means on the model.
 
     displacement: (nodes, dim) per body, unit of length.  Per contact, in the order of the

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.arrays import finite, number, read_only
 from ...core.errors import InvalidInput, shown
+from ...core.locks import KeepsLocks
 from ...core.words import helpful
 from ..contact.geometry import Plane
 from .shapes import Ball, Polyhedron
@@ -29,7 +30,7 @@ GROUND = -1  # the number of what does not move
 
 @helpful
 @dataclass(frozen=True, eq=False)
-class RigidBody:
+class RigidBody(KeepsLocks):
     """A body that does not deform, however far it moves and turns.
 
     shape: Ball, Polyhedron or cuboid(sides); density: mass per volume; position (3,): of the
@@ -95,7 +96,7 @@ class Joint:
 
 @helpful
 @dataclass(frozen=True, eq=False)
-class RigidBodies:
+class RigidBodies(KeepsLocks):
     """Bodies, planes that they stand on, friction between all, gravity and joints.
 
     mu: coefficient of friction of all; restitution: normal velocity after over before an

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...core.arrays import finite, integers, number
 from ...core.errors import InvalidInput, shown
 from ...core.faces import Shown
+from ...core.locks import KeepsLocks
 from ...core.warned import ResultWarning
 from ...problem.protocol import Problem
 from ...problem.solution import ContactStatus, FrictionSolution
@@ -37,7 +38,7 @@ RUBBED = {"slid": 2, "path": 1, "friction_work": 1}  # the same of what no step 
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class State(KeepsLocks):
     """All that the next step needs: it may be saved, and the evolution goes on from it.
 
     index: steps done; time; displacement, velocity (dofs,) of all bodies one after another;

@@ -33,6 +33,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.arrays import LARGEST, read_only, real
 from ...core.compiled import njit
 from ...core.errors import InvalidInput
+from ...core.locks import KeepsLocks
 from .cones import project_disk, project_disk_jacobian
 
 Array = NDArray[np.float64]
@@ -62,7 +63,7 @@ def given(kind, p, r0):
     return kind == TRESCA or kind == TIED or (kind == CAPPED and p[MU] * r0 > p[BOUND])
 
 
-class Law:
+class Law(KeepsLocks):
     """A law of friction for nc contacts; those of several kinds share these formulas."""
 
     name: ClassVar[str]  # in messages
