@@ -286,8 +286,7 @@ class _Stepping:
         q[:nc, 0] = at.found.gaps + 0.5 * self.overlap
         q[nc:] = at.apart
         inverse = R @ self.inverse @ R.swapaxes(1, 2)
-        W = delassus(rows, masses, inverse)
-        posed = Posed(W.indptr, W.indices, W.data, W.diagonal, q, np.zeros_like(q))
+        posed = Posed(*delassus(rows, masses, inverse), q, np.zeros_like(q))
         found = None
         if self.solver is None:
             search = Search(posed, rows, R, self.bodies, nc, 0.0, self.asked.tolerance)

@@ -11,13 +11,12 @@ with the rows A of axes and B of arm x axis, and the inertia I_b = R J R^T in gl
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
-from ...linear.blocks import BlockRows
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -35,15 +34,13 @@ class Rows(NamedTuple):
     master_arms: Array
 
 
-def delassus(rows: Rows, masses: Array, inverse: Array) -> BlockRows:
-    """W in block rows; masses (n,), inverse (n, 3, 3) of the inertia in global axes."""
+def delassus(rows: Rows, masses: Array, inverse: Array) -> tuple[Any, Any, Array, Any]:
+    """W as the arrays of `BlockRows`; inverse (n, 3, 3) of the inertia in global axes."""
     indptr, count = coupled(rows.slave, rows.master, len(masses))
     indices, data = np.empty(count, np.int32), np.empty((count, 3, 3))
     diagonal = np.empty(len(rows.slave), np.int32)
     fill_blocks(*rows, masses, inverse, indptr, indices, data, diagonal)
-    for array in (indptr, indices, data, diagonal):
-        array.flags.writeable = False
-    return BlockRows(indptr, indices, data, diagonal)
+    return indptr, indices, data, diagonal
 
 
 def velocities(rows: Rows, v: Array, omega: Array) -> Array:
