@@ -59,6 +59,13 @@ def fclib_error(command: Command) -> Command:
     )(command)  # fmt: skip
 
 
+def certificate(command: Command) -> Command:
+    """Of what proves something: the proof as a file."""
+    return click.option("--certificate", metavar="FILE",
+                        help="What proves it, as an HDF5 file for amontons check."
+                        )(command)  # fmt: skip
+
+
 def of_decks(command: Command) -> Command:
     """Of what reads decks: what to leave out, and contact as hard as it can be.
 
