@@ -2,7 +2,8 @@
 
     python benchmarks/certificate_files.py [--certificates 1000] [--forgeries 10000]
 
-Random problems of two to six contacts in 2D and 3D, every load and one load.  Each forgery
+Random problems of two to six contacts in 2D and 3D: every load and one load; in 2D all solutions
+where there are several, and all branches between two loads.  Each forgery
 changes one byte of one of the files at random; one counts as accepted where the checker still
 agrees while W, q, mu, r0, the claim or anything else that the hash covers is another.
 """
@@ -20,6 +21,7 @@ import numpy as np
 from machine import describe
 
 import amontons as am
+from amontons.analysis.certificates.verdict import Verdict
 from amontons.io import certificate_checker as checker
 
 RESULTS = Path(__file__).parent / "results"
@@ -34,8 +36,20 @@ def problem_of(seed: int) -> am.FrictionProblem:
     W *= 10.0 ** random.uniform(-6, 6)
     q = random.standard_normal((nc, d)) - np.eye(d)[0]
     much = seed % 4 == 0
-    mu = random.uniform(0, 1.5 if much else 0.08, nc)
+    mu = random.uniform(0, (1.5 if seed % 8 else 4.0) if much else 0.08, nc)
     return am.FrictionProblem.from_delassus(W, q, mu)
+
+
+def write(problem: am.FrictionProblem, seed: int, path: Path) -> str:
+    """The claim of a certificate of a problem."""
+    if problem.dimension == 2 and seed % 16 == 1:
+        q = np.random.default_rng(seed).standard_normal((problem.contacts, 2))
+        end = am.FrictionProblem.from_delassus(problem.W, q, problem.mu)
+        return am.write_certificate(problem, am.diagram(end, base=problem), path, end=end)
+    verdict = am.uniqueness(problem, time_limit=20)
+    if problem.dimension == 2 and verdict.verdict is Verdict.NOT_UNIQUE:
+        return am.write_certificate(problem, am.all_solutions(problem, time_limit=20), path)
+    return am.write_certificate(problem, verdict, path)
 
 
 def main() -> None:
@@ -51,9 +65,7 @@ def main() -> None:
             problem, seed = problem_of(seed), seed + 1
             path = Path(folder) / f"{seed}.h5"
             try:
-                claim = am.write_certificate(
-                    problem, am.uniqueness(problem, time_limit=20), path
-                )
+                claim = write(problem, seed, path)
             except am.InvalidInput:
                 count["without a certificate"] += 1
                 continue
