@@ -179,10 +179,55 @@ def test_many_sliding_contacts_in_space_by_the_inequality():
     assert len(found.sliding) > 8
 
 
+def test_the_step_that_jumps_and_no_other_may_jump():
+    """The brake arm lets go at t = 1.68691, where the path of its solutions turns back."""
+    model = am.read_case("example:release").model
+    method, last, told = am.QuasiStatic(0.05, crossing=am.PathCrossing()), None, []
+    for step in am.evolve(model, method, until=1.8):
+        found = am.rates(step.problem, step.solution, last)
+        told.append((found.jump_possible, step.passage.jumped))
+        last = step.solution.r
+    assert set(told) == {(False, False), (True, True)}
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_between_two_states_all_pieces_are_asked(seed):
+    """No jump is as much as every combination of the pieces having the orientation of all."""
+    problem, r, word = state_of(seed, kinds="okc")
+    W, mu = np.asarray(problem.W), problem.mu
+    random = np.random.default_rng(seed)
+    before = r.copy()
+    pieces = [{"o": "o", "k": "k", "c": "k" + "pm"[int(x[1] < 0)]}[kind]
+              for kind, x in zip(word, r, strict=True)]  # fmt: skip
+    for i, kind in enumerate(word):
+        if random.random() < 0.5:  # closed or opened, or slid the other way
+            before[i] = [0.0, 0.0] if kind != "o" else [1.0, 0.1 * mu[i]]
+            before[i] = -r[i] * [-1, 1] if kind == "c" and random.random() < 0.5 else before[i]
+            pieces[i] = "okpm"
+    signs = {np.sign(orientation(W, mu, letters)) for letters in itertools.product(*pieces)}
+    found = rates(problem, Found(r), before)
+    assert found.verdict is not RateVerdict.UNDECIDED
+    assert found.jump_possible == (signs != {1.0})
+
+
+def orientation(W, mu, letters):
+    """Determinant of a piece of the law for x = r - u."""
+    rows = []
+    one = np.eye(len(W))
+    for i, letter in enumerate(letters):
+        N, T = 2 * i, 2 * i + 1
+        s = {"p": mu[i], "m": -mu[i]}.get(letter, 0.0)
+        rows += {"o": [one[N], one[T]], "k": [W[N], W[T]]}.get(
+            letter, [W[N], one[T] - s * one[N]]
+        )
+    return np.linalg.det(np.array(rows))
+
+
 def test_errors_say_what_is_wrong():
     problem, r, _ = state_of(0)
-    with pytest.raises(am.InvalidInput, match="expected reactions"):
-        rates(problem, Found(r[:0]))
+    for given in ((Found(r[:0]), None), (Found(r), r[:0])):
+        with pytest.raises(am.InvalidInput, match="expected reactions"):
+            rates(problem, *given)
     tresca = am.FrictionProblem.from_delassus(np.eye(2), [[-1.0, 0]], am.Tresca([1.0]))
     with pytest.raises(am.UnsupportedLaw, match="expected Coulomb"):
         rates(tresca, am.solve(tresca))

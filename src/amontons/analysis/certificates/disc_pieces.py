@@ -226,9 +226,10 @@ class _Form:
         slip, loose, held, stuck = (np.flatnonzero(x) for x in (
             states >= SLIP, states == SLIP, states == HELD, states == STICK))  # fmt: skip
         free = (3 * np.flatnonzero(states == FREE)[:, None] + np.arange(3)).ravel()
-        V = _columns(3 * k, [(3 * slip, 3 * slip, np.ones(len(slip))), *_across(held, directions),
-                             *[(3 * stuck + j, 3 * stuck + j, np.ones(len(stuck)))
-                               for j in range(3)]])  # fmt: skip
+        rests = (3 * stuck[:, None] + np.arange(3)).ravel()
+        V = _columns(3 * k, [(3 * slip, 3 * slip, np.ones(len(slip))),
+                             (rests, rests, np.ones(len(rests))),
+                             *_across(held, directions)])  # fmt: skip
         moved = (-t * self.shape[slip])[:, None] * directions[slip]
         along = [(3 * slip + 1 + j, 3 * slip, moved[:, j]) for j in range(2)]
         R = V + _columns(3 * k, along)
@@ -250,7 +251,7 @@ class _Form:
         self, states: States, directions: Array, t: float
     ) -> tuple[Array, States, Array]:
         """(ratio of determinants of the best change of every contact, its state, direction)."""
-        k, own = self.contacts, np.arange(self.contacts)
+        own = np.arange(self.contacts)
         E, F = self.responses(states, directions, t)
         angle = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
         tried, state, direction = [np.linalg.det(E)], [FREE], [(1.0, 0.0)]

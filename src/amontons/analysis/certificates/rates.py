@@ -10,27 +10,30 @@ several.  In a state with reactions r let primes be rates, u' = W r' + q', and p
 
 so only contacts on their cones and grazing ones are in doubt: what is open or stuck is
 eliminated by a Schur complement, and so are the reactions that hold u_N' and u_T' across t at
-those on their cones.  What is left, y = D x + b with x = (l, r') and y = (f, u'), has exactly one
-solution for all b, without grazing contacts, where all principal minors of D are positive (K. G.
-Murty, "Linear Complementarity, Linear and Nonlinear Programming" (1988), theorem 3.13), in 2D
-also with some ([LR] proposition 8): decided both ways where these are not too many.  Sufficient
-for any number, in 2D and 3D, is that the form of two solutions, which by (1) and (2) obey
-df dl <= 0 and, for any tau, sigma, alpha > 0,
+those on their cones.  What is left is y = D x + b with x = (l, r') and y = (f, u').  In 2D, and
+in 3D without grazing contacts, it consists of linear pieces, and has exactly one solution for
+all b just where all of them have the orientation of l = r' = 0 (without grazing contacts: where
+all principal minors of D are positive, K. G. Murty, "Linear Complementarity, Linear and
+Nonlinear Programming" (1988), theorem 3.13; `exact_threshold`): decided both ways where pieces
+are not too many.  Sufficient for any number, in 2D and 3D, is that the form of two solutions,
+which by (1) and (2) obey df dl <= 0 and, for any tau, sigma, alpha > 0,
 
     tau dr_N du_N + sigma dr_T.du_T <= mu sigma / 2 (alpha dr_N^2 + |du_T|^2 / alpha)     (3)
 
 (`contact_multipliers`), is positive definite; tried with one set of multipliers, in variables
 for which D has a unit diagonal, to rounding.  Existence follows as in these theorems.
 
-Every b is asked for: some change of loads and supports, not the one that comes.
-
-[LR] T. Ligurský, Y. Renard, CMAME 280 (2014), section 3.1.
+Every b is asked for: some change of loads and supports, not the one that comes.  With the
+reactions of the last step the pieces of the law between both states are all asked at once: (2)
+for a contact that was open at one end alone, (1) for one that was on its cone at one of them.
+As long as no other contact changes in between, there is no jump on the way.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -42,13 +45,13 @@ from ...core.faces import Told
 from ...problem.friction import FrictionProblem
 from ...problem.law import Coulomb
 from ...problem.solution import FrictionSolution
-from ..paths.rate_claims import Claim, is_P_matrix
 from ..scaled import Scaled
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 ON = 1e-7  # distance to a border of the law that counts as none, of the largest reaction
-EXACT = 14  # conditions up to which all minors are looked at: 2^14
+PIECES = 2**14  # up to so many all are looked at
+ROUNDING = 1e-11  # of a determinant relative to its rows, that may have either sign
 MARGIN = 1e-9  # of an eigenvalue, of a matrix with unit diagonal, that counts as positive
 ALPHAS = (1.0, 0.5, 2.0, 0.25, 4.0)  # tried in (3)
 SECONDS = 60.0  # whose work W and the elimination may take
@@ -67,7 +70,8 @@ class Rates(Told):
     """Whether every small change of the loads has exactly one answer.
 
     sliding, grazing, sticking, open: numbers of the contacts that are on their cones, touch
-    without reaction, stick inside of their cones, are apart; the first two alone are in doubt.
+    without reaction (or have opened or closed since the last step), stick inside of their
+    cones, are apart; the first two alone are in doubt.
     D (m, m): of the module, x = (l, r' of grazing contacts, normals first).  margin: least
     eigenvalue of the form, of unit diagonal, where that decides, else 0.
     """
@@ -97,17 +101,18 @@ class Rates(Told):
         }  # fmt: skip
 
     def __str__(self) -> str:
-        doubt = f"{len(self.sliding)} contacts on their cones, {len(self.grazing)} grazing"
+        doubt = f"{len(self.sliding)} on their cones, {len(self.grazing)} grazing or changing"
         return f"{self.verdict.value}: {self.reason} ({doubt})"
 
 
 def rates(
-    problem: FrictionProblem, solution: FrictionSolution, *, tolerance: float = ON,
-    time_limit: TimeLimit = None,
+    problem: FrictionProblem, solution: FrictionSolution, last: Array | None = None, *,
+    tolerance: float = ON, time_limit: TimeLimit = None,
 ) -> Rates:  # fmt: skip
     """Whether the rates at a solution are unique for every change of the loads, see the module.
 
     problem, solution: of a quasi-static step (`step.problem`, `step.solution`) or of one load.
+    last (nc, d): reactions of the step before, for all that is between both.
     tolerance: distance to a border of the law that counts as none, relative to the largest
     scaled reaction.  time_limit: seconds for W, by default the work of about a minute.  Raises
     UnsupportedLaw unless the law is Coulomb's, InvalidInput for a solution of another problem,
@@ -115,13 +120,14 @@ def rates(
     """
     if not isinstance(problem.law, Coulomb):
         raise UnsupportedLaw(f"rates: expected Coulomb friction, got {problem.law.name}")
-    if solution.r.shape != (problem.contacts, problem.dimension):
-        raise InvalidInput(
-            f"solution: expected reactions {(problem.contacts, problem.dimension)}, got "
-            f"{solution.r.shape}"
-        )
+    for name, r in (("solution", solution.r), ("last", last)):
+        if r is not None and r.shape != (problem.contacts, problem.dimension):
+            raise InvalidInput(
+                f"{name}: expected reactions {(problem.contacts, problem.dimension)}, got "
+                f"{r.shape}"
+            )
     scaled = Scaled.of(problem, deadline_of(time_limit, SECONDS))
-    sets = _Sets.of(scaled, solution.r / scaled.to_r, tolerance)
+    sets = _Sets.of(scaled, solution.r, last, tolerance)
     found = _eliminated(scaled, sets)
     if found is None:
         return sets.answer(RateVerdict.UNDECIDED, "what sticks can not be eliminated")
@@ -140,15 +146,21 @@ class _Sets:
     mu: Array
 
     @classmethod
-    def of(cls, scaled: Scaled, r: Array, tolerance: float) -> _Sets:
+    def of(cls, scaled: Scaled, given: Array, last: Array | None, tolerance: float) -> _Sets:
+        r = given / scaled.to_r
         size = tolerance * max(1.0, float(np.abs(r).max(initial=0.0)))
-        u = scaled.velocity(r[None])[0]
-        shear = np.linalg.norm(r[:, 1:], axis=1)
-        closed = (r[:, 0] > size) & scaled.reacts
-        apart = ~closed & (u[:, 0] > size) | ~scaled.reacts
-        cone = closed & (scaled.mu > 0) & (scaled.mu * r[:, 0] - shear <= size)
-        t = -r[:, 1:] / np.where(shear > 0, shear, 1.0)[:, None]
-        kinds = cone, ~closed & ~apart, closed & ~cone, apart
+        closed, cone, t = _closed(scaled, r, size)
+        apart = ~closed & (scaled.velocity(r[None])[0][:, 0] > size) | ~scaled.reacts
+        grazes = ~closed & ~apart
+        if last is not None:
+            before = last / scaled.to_r
+            least = tolerance * max(1.0, float(np.abs(before).max(initial=0.0)))
+            was_closed, was_cone, was_t = _closed(scaled, before, least)
+            turned = cone & was_cone & ((t * was_t).sum(axis=1) < 0)
+            grazes |= (closed != was_closed) | turned
+            t = np.where(cone[:, None], t, was_t)
+            cone = (cone | was_cone) & ~grazes
+        kinds = cone, grazes, closed & ~cone & ~grazes, apart & ~grazes
         return cls(*(np.flatnonzero(kind) for kind in kinds), t, scaled.mu)
 
     def answer(
@@ -157,6 +169,14 @@ class _Sets:
         D = np.zeros((0, 0)) if D is None else D
         return Rates(verdict, reason, self.sliding, self.grazing, self.sticking, self.open, D,
                      margin)  # fmt: skip
+
+
+def _closed(scaled: Scaled, r: Array, size: float) -> tuple[Array, Array, Array]:
+    """(closed, on its cone (nc,), t (nc, d - 1)) of scaled reactions; size: a border."""
+    shear = np.linalg.norm(r[:, 1:], axis=1)
+    closed = (r[:, 0] > size) & scaled.reacts
+    cone = closed & (scaled.mu > 0) & (scaled.mu * r[:, 0] - shear <= size)
+    return closed, cone, -r[:, 1:] / np.where(shear > 0, shear, 1.0)[:, None]
 
 
 def _eliminated(scaled: Scaled, sets: _Sets) -> Array | None:
@@ -195,30 +215,49 @@ def _eliminated(scaled: Scaled, sets: _Sets) -> Array | None:
 def _judged(D: Array, sets: _Sets) -> Rates:
     """By all minors where these are few, else by the form."""
     m, mu = len(sets.sliding), sets.mu[sets.grazing]
-    count, d = m + len(mu), sets.t.shape[1] + 1
-    if not count:
+    d = sets.t.shape[1] + 1
+    if not m + len(mu):
         return sets.answer(RateVerdict.IMPOSSIBLE, "no contact is at a border of the law", D)
     least = _least(D, m, mu, d)
     if least > MARGIN:
         reason = "an inequality on rates leaves one answer to every change of the loads"
         return sets.answer(RateVerdict.IMPOSSIBLE, reason, D, least)
-    rubbing = mu[mu > 0]
-    plain = not len(rubbing) or (d == 2 and len(rubbing) == len(mu))
-    if plain and count <= EXACT:
-        pairs = m if len(rubbing) else count
-        claim = is_P_matrix(D, pairs, rubbing)
-        if claim is Claim.PROVED:
-            return sets.answer(RateVerdict.IMPOSSIBLE, "all minors are positive", D)
-        if claim is Claim.REFUTED:
-            reason = "a minor is negative: changes of the loads have several answers or none"
+    count = 2.0**m * float(np.prod(np.where(mu > 0, 4.0, 2.0)))
+    if (d == 2 or not (mu > 0).any()) and count <= PIECES:
+        signs = _orientations(D, m, mu)
+        if (signs > 0).all():
+            return sets.answer(RateVerdict.IMPOSSIBLE, "all pieces have one orientation", D)
+        if (signs < 0).any():
+            reason = "a piece is turned over: changes of the loads have several answers or none"
             return sets.answer(RateVerdict.POSSIBLE, reason, D)
-        return sets.answer(RateVerdict.UNDECIDED, "a minor is zero to rounding", D)
-    reason = "the inequality does not hold, and minors are too many or grazing is in 3D"
+        return sets.answer(RateVerdict.UNDECIDED, "a piece is singular to rounding", D)
+    reason = "the inequality does not hold, and pieces are too many or grazing is in 3D"
     return sets.answer(RateVerdict.UNDECIDED, reason, D)
 
 
+def _orientations(D: Array, m: int, mu: Array) -> Array:
+    """Signs of the determinants of all pieces, 0 where rounding decides."""
+    one, rubs = np.eye(len(D)), np.flatnonzero(mu > 0)
+    rows = [[one[[k]], D[[k]]] for k in range(m)]
+    tangent = dict(zip(rubs, m + len(mu) + np.arange(len(rubs)), strict=True))
+    order = list(range(m))
+    for i, own in enumerate(mu):
+        k, t = m + i, tangent.get(i)
+        if t is None:
+            rows.append([one[[k]], D[[k]]])
+            order.append(k)
+            continue
+        slips = [np.stack([D[k], one[t] - s * own * one[k]]) for s in (1, -1)]
+        rows.append([one[[k, t]], D[[k, t]], *slips])
+        order += [k, t]
+    pieces = np.array([np.concatenate(choice) for choice in product(*rows)])[:, :, order]
+    pieces /= np.linalg.norm(pieces, axis=2, keepdims=True)
+    found = np.linalg.det(pieces)
+    return np.where(np.abs(found) > ROUNDING, np.sign(found), 0.0)
+
+
 def _least(D: Array, m: int, mu: Array, d: int) -> float:
-    """Least eigenvalue of the form of differences, of unit diagonal, with the best of ALPHAS."""
+    """Least eigenvalue of the form, of unit diagonal, with the best of ALPHAS."""
     rubs = np.flatnonzero(mu > 0)
     normal = m + np.arange(len(mu))
     tangent = m + len(mu) + np.arange((d - 1) * len(rubs)).reshape(d - 1, -1)

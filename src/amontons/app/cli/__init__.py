@@ -378,6 +378,7 @@ has been made is saved, go on with --restart.
 @click.option("--restart", is_flag=True,
               help="Go on from the state in DIR, of the same case, after any end.")  # fmt: skip
 @click.option("--quiet", is_flag=True, help="No progress, no summary.")
+@flags.rates
 @flags.of_decks
 def run(**options: object) -> int:
     """Follow a case in time: dynamics, or quasi-static steps.
