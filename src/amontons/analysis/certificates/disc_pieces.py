@@ -136,6 +136,33 @@ def equations(W: Array, shape: Array, states: States, directions: Array, t: floa
     return blocks.reshape(3 * k, 3 * k)
 
 
+def bases(
+    shape: Array, states: States, directions: Array, t: float
+) -> tuple[sparse.csc_array, sparse.csc_array, sparse.csc_array, States]:
+    """(V, R, O, rest): what the `equations` of a pattern are made of, by contacts.
+
+    V (3 k, n): the velocities that vanish, in the equations `rest` (n,); R (3 k, n): reactions
+    that all other equations allow; O (3 k, 3 k): the reactions that these give outright.  The
+    determinant of the equations is that of V^T W R.
+    """
+    size = 3 * len(shape)
+    slip, loose, held, stuck = (np.flatnonzero(x) for x in (
+        states >= SLIP, states == SLIP, states == HELD, states == STICK))  # fmt: skip
+    free, rests = ((3 * x[:, None] + np.arange(3)).ravel()
+                   for x in (np.flatnonzero(states == FREE), stuck))  # fmt: skip
+    V = _columns(size, [(3 * slip, 3 * slip, np.ones(len(slip))),
+                        (rests, rests, np.ones(len(rests))),
+                        *_across(held, directions)])  # fmt: skip
+    moved = (-t * shape[slip])[:, None] * directions[slip]
+    along = [(3 * slip + 1 + j, 3 * slip, moved[:, j]) for j in range(2)]
+    given = [(3 * slip + 1 + j, 3 * slip + 1, directions[slip, j]) for j in range(2)]
+    O = _columns(size, [(free, free, np.ones(len(free))), *given,
+                        *_across(loose, directions)])  # fmt: skip
+    R = V + _columns(size, along)
+    rest = np.flatnonzero(np.diff(V.indptr))
+    return V[:, rest], R[:, rest], O, rest
+
+
 def _columns(size: int, parts: list[tuple[States, States, Array]]) -> sparse.csc_array:
     """A square matrix from (rows, columns, numbers)."""
     rows, columns, numbers = (np.concatenate(x) for x in zip(*parts, strict=True))
@@ -219,25 +246,10 @@ class _Form:
     def responses(self, states: States, directions: Array, t: float) -> tuple[Array, Array]:
         """(r, u) of every contact, (k, 3, 3), to a unit on the right of its own `equations`.
 
-        Some equations give a part of r outright, O; what is left is R y with V^T W (R y + O)
-        given, V the velocities that vanish.
+        r = R y + O (`bases`) with V^T W (R y + O) given.
         """
         k, W = self.contacts, self.W
-        slip, loose, held, stuck = (np.flatnonzero(x) for x in (
-            states >= SLIP, states == SLIP, states == HELD, states == STICK))  # fmt: skip
-        free = (3 * np.flatnonzero(states == FREE)[:, None] + np.arange(3)).ravel()
-        rests = (3 * stuck[:, None] + np.arange(3)).ravel()
-        V = _columns(3 * k, [(3 * slip, 3 * slip, np.ones(len(slip))),
-                             (rests, rests, np.ones(len(rests))),
-                             *_across(held, directions)])  # fmt: skip
-        moved = (-t * self.shape[slip])[:, None] * directions[slip]
-        along = [(3 * slip + 1 + j, 3 * slip, moved[:, j]) for j in range(2)]
-        R = V + _columns(3 * k, along)
-        O = _columns(3 * k, [(free, free, np.ones(len(free))), *_across(loose, directions),
-                             *[(3 * slip + 1 + j, 3 * slip + 1, directions[slip, j])
-                               for j in range(2)]])  # fmt: skip
-        rest = np.flatnonzero(np.diff(V.indptr))  # the equations of velocities
-        V, R = V[:, rest], R[:, rest]
+        V, R, O, rest = bases(self.shape, states, directions, t)
         WO, WR = (O.T @ W.T).T, (R.T @ W.T).T
         right = -(V.T @ WO)
         right[np.arange(len(rest)), rest] += 1.0
