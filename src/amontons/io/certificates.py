@@ -86,10 +86,11 @@ def write_certificate(
         raise InvalidInput(f"certificate: the checker does not accept it: {reason}") from reason
 
     def fill(file: h5py.File) -> None:
-        file.attrs["format"], file.attrs["claim"] = FORMAT, claim
+        # of fixed length: where a byte of HDF5's heap for others is wrong, it can crash
+        file.attrs["format"], file.attrs["claim"] = np.bytes_(FORMAT), np.bytes_(claim)
         for name, values in data.items():
             file.create_dataset(name, data=values)
-        file.attrs["sha256"] = digest(file)
+        file.attrs["sha256"] = np.bytes_(digest(file))
 
     write_hdf5(path, fill)
     return claim

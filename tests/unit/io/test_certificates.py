@@ -9,8 +9,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import amontons as am
+from amontons.app.cli import main
 from amontons.core.errors import InvalidInput
 from amontons.io import certificate_checker as checker
 from amontons.io.certificate_checker.numbers import positive_definite
@@ -129,7 +131,7 @@ def reseal(path, change):
     """Change a file and give it a new hash, as a forger would."""
     with h5py.File(path, "r+") as file:
         change(file)
-        file.attrs["sha256"] = checker.digest(file)
+        file.attrs["sha256"] = np.bytes_(checker.digest(file))
 
 
 def flipped(file, name):
@@ -149,7 +151,7 @@ FORGERIES = {
     "W of the other sign": lambda file: flipped(file, "W"),
     "a form left out": lambda file: file["V0"].write_direct(0 * file["V0"][()]),
     "more friction": lambda file: file["mu"].write_direct(file["mu"][()] * 3),
-    "another claim": lambda file: file.attrs.modify("claim", "every load"),
+    "another claim": lambda file: file.attrs.modify("claim", np.bytes_("every load")),
     "no number": lambda file: file["W"].write_direct(file["W"][()] * np.nan),
 }
 
@@ -332,3 +334,12 @@ def test_branches_over_the_load_are_proved_and_forged_ones_found(tmp_path):
             am.check_certificate(path)
     with pytest.raises(InvalidInput, match="end="):
         am.write_certificate(start, found, path)
+
+
+def test_the_command_line_writes_a_list_and_checks_it(tmp_path):
+    path = str(tmp_path / "c.h5")
+    run = CliRunner().invoke
+    done = run(main, ["enumerate", "example:hild", "--certificate", path])
+    assert done.exit_code == 0, done.output
+    assert "all solutions: certificate in" in done.output
+    assert "exactly 3:" in run(main, ["check", path]).output

@@ -38,8 +38,9 @@ def proves(claim, data):
 def check(path):
     """What a file proves, in a sentence; raises Refused where it does not prove its claim."""
     with h5py.File(path, "r") as file:
-        need(file.attrs.get("sha256") == digest(file), "the file was changed: another SHA-256")
-        return proves(str(file.attrs["claim"]), {k: np.asarray(file[k]) for k in file})
+        claim, hashed = (bytes(file.attrs[name]).decode() for name in ("claim", "sha256"))
+        need(hashed == digest(file), "the file was changed: another SHA-256")
+        return proves(claim, {k: np.asarray(file[k]) for k in file})
 
 
 def digest(file):
