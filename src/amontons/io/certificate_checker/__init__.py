@@ -38,7 +38,8 @@ def proves(claim, data):
 def check(path):
     """What a file proves, in a sentence; raises Refused where it does not prove its claim."""
     with h5py.File(path, "r") as file:
-        claim, hashed = (bytes(file.attrs[name]).decode() for name in ("claim", "sha256"))
+        told = [np.asarray(file.attrs[name]).tobytes() for name in ("claim", "sha256")]
+        claim, hashed = (words.decode() for words in told)
         need(hashed == digest(file), "the file was changed: another SHA-256")
         return proves(claim, {k: np.asarray(file[k]) for k in file})
 

@@ -9,6 +9,7 @@ is larger, also than what rounding did to A.
 
 from fractions import Fraction
 from math import hypot
+from typing import Any
 
 import numpy as np
 
@@ -76,7 +77,7 @@ def reference(W, q, mu, r0, letters):
     return u, t, moved, off + 2 * (abs(W) @ moved.ravel()).reshape(nc, d)
 
 
-def bound(W, V, size, R, off=None, q=None):
+def bound(W, V, size, R, off: Any = None, q: Any = None):
     """Bound of |R y| where sum z V z over contacts is not positive, z = (R y, W R y + e).
 
     V (nc, 2 d, 2 d), known to 30 U size; |e| <= off (nc, d).  With q (nc, d) V has a row more,
