@@ -49,6 +49,7 @@ from ..scaled import Scaled
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 ON = 1e-7  # distance to a border of the law that counts as none, of the largest reaction
 PIECES = 2**14  # up to so many all are looked at
 ROUNDING = 1e-11  # of a determinant relative to its rows, that may have either sign
@@ -171,7 +172,7 @@ class _Sets:
                      margin)  # fmt: skip
 
 
-def _closed(scaled: Scaled, r: Array, size: float) -> tuple[Array, Array, Array]:
+def _closed(scaled: Scaled, r: Array, size: float) -> tuple[Mask, Mask, Array]:
     """(closed, on its cone (nc,), t (nc, d - 1)) of scaled reactions; size: a border."""
     shear = np.linalg.norm(r[:, 1:], axis=1)
     closed = (r[:, 0] > size) & scaled.reacts
@@ -239,14 +240,15 @@ def _orientations(D: Array, m: int, mu: Array) -> Array:
     """Signs of the determinants of all pieces, 0 where rounding decides."""
     one, rubs = np.eye(len(D)), np.flatnonzero(mu > 0)
     rows = [[one[[k]], D[[k]]] for k in range(m)]
-    tangent = dict(zip(rubs, m + len(mu) + np.arange(len(rubs)), strict=True))
+    tangent = {int(i): m + len(mu) + k for k, i in enumerate(rubs)}
     order = list(range(m))
     for i, own in enumerate(mu):
-        k, t = m + i, tangent.get(i)
-        if t is None:
+        k = m + i
+        if i not in tangent:
             rows.append([one[[k]], D[[k]]])
             order.append(k)
             continue
+        t = tangent[i]
         slips = [np.stack([D[k], one[t] - s * own * one[k]]) for s in (1, -1)]
         rows.append([one[[k, t]], D[[k, t]], *slips])
         order += [k, t]
