@@ -77,7 +77,7 @@ def reference(W, q, mu, r0, letters):
     return u, t, moved, off + 2 * (abs(W) @ moved.ravel()).reshape(nc, d)
 
 
-def bound(W, V, size, R, off: Any = None, q: Any = None):
+def bound(W, V, size, R, off=None, q=None):
     """Bound of |R y| where sum z V z over contacts is not positive, z = (R y, W R y + e).
 
     V (nc, 2 d, 2 d), known to 30 U size; |e| <= off (nc, d).  With q (nc, d) V has a row more,
@@ -86,7 +86,9 @@ def bound(W, V, size, R, off: Any = None, q: Any = None):
     nc, d, parts = len(V), V.shape[1] // 2, []
     if not R.shape[1] and q is None:
         return 0.0
-    for r, w, v, load in ((R, W, V, q), (abs(R), abs(W), size, q if q is None else abs(q))):
+    terms: Any = abs(R), abs(W), size, q if q is None else abs(q)
+    given: Any = R, W, V, q
+    for r, w, v, load in (given, terms):
         Z = np.concatenate([x.reshape(nc, d, R.shape[1]) for x in (r, w @ r)], axis=1)
         if q is not None:
             one = np.concatenate([0 * load, load, np.ones((nc, 1))], axis=1)
@@ -95,7 +97,8 @@ def bound(W, V, size, R, off: Any = None, q: Any = None):
         parts += [Z.reshape(-1, Z.shape[2]).T @ turned.reshape(-1, Z.shape[2]), Z]
     M, _, rounding, terms = parts
     rounding, s = 2 * (3 * len(W) + 60) * U * rounding, unit_scale(M)
-    sharp = off is None or not off.any()
+    off = np.zeros((nc, d)) if off is None else off
+    sharp = not off.any()
     least = 0.0 if sharp else np.linalg.eigvalsh((M + M.T) / 2 * s * s[:, None])[0] / 2
     rounding += np.diag(4 * U * abs(least) / s**2)
     need(positive_definite(M - np.diag(least / s**2), rounding), "a matrix is not definite")
