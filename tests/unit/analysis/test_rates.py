@@ -223,6 +223,15 @@ def orientation(W, mu, letters):
     return np.linalg.det(np.array(rows))
 
 
+def test_a_singular_W_leaves_it_undecided():
+    W = np.kron(np.ones((2, 2)), np.eye(2))  # two contacts at one point, both stuck
+    r = np.array([[1.0, 0.0], [1.0, 0.0]])
+    problem = am.FrictionProblem.from_delassus(W, -(W @ r.ravel()).reshape(2, 2), [0.5, 0.5])
+    found = rates(problem, Found(r))
+    assert found.jump_possible is None
+    assert "can not be eliminated" in found.reason
+
+
 def test_errors_say_what_is_wrong():
     problem, r, _ = state_of(0)
     for given in ((Found(r[:0]), None), (Found(r), r[:0])):

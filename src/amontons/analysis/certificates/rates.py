@@ -26,7 +26,8 @@ for which D has a unit diagonal, to rounding.  Existence follows as in these the
 Every b is asked for: some change of loads and supports, not the one that comes.  With the
 reactions of the last step the pieces of the law between both states are all asked at once: (2)
 for a contact that was open at one end alone, (1) for one that was on its cone at one of them.
-As long as no other contact changes in between, there is no jump on the way.
+As long as no other contact changes in between, there is no jump on the way; in 3D what slides
+is taken to keep its direction.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ Mask = NDArray[np.bool_]
 ON = 1e-7  # distance to a border of the law that counts as none, of the largest reaction
 PIECES = 2**14  # up to so many all are looked at
 ROUNDING = 1e-11  # of a determinant relative to its rows, that may have either sign
-MARGIN = 1e-9  # of an eigenvalue, of a matrix with unit diagonal, that counts as positive
+MARGIN = 1e-9  # of an eigenvalue of unit diagonal that counts as positive; of a condition
 ALPHAS = (1.0, 0.5, 2.0, 0.25, 4.0)  # tried in (3)
 SECONDS = 60.0  # whose work W and the elimination may take
 
@@ -198,11 +199,14 @@ def _eliminated(scaled: Scaled, sets: _Sets) -> Array | None:
     E, X = np.concatenate(held), np.concatenate([L, one[graze, 0], *tangents])
     W, m = scaled.W, len(slide)
     try:
-        back = np.linalg.solve(E @ W @ E.T, E @ W @ X.T) if len(E) else np.zeros((0, len(X)))
+        stiff = E @ W @ E.T
+        if len(E) and np.linalg.cond(stiff, 1) > 1 / MARGIN:
+            return None
+        back = np.linalg.solve(stiff, E @ W @ X.T) if len(E) else np.zeros((0, len(X)))
         A = X @ W @ X.T - X @ W @ E.T @ back  # (l, u' of grazing) = A (p, g)
         slack = -sets.mu[slide, None] * back[:m]  # f = p + mu r_N'
         slack[:, :m] += np.eye(m)
-        if m and np.linalg.cond(A[:m, :m]) > 1 / MARGIN:
+        if m and np.linalg.cond(A[:m, :m], 1) > 1 / MARGIN:
             return None
         solve = np.linalg.solve(A[:m, :m], np.hstack([np.eye(m), -A[:m, m:]]))
     except np.linalg.LinAlgError:
