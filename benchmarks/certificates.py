@@ -1,7 +1,7 @@
 """Certificates of uniqueness: how far they reach, what they cost, and whether they are right.
 
     python benchmarks/certificates.py [small] [hild] [mixed] [large] [cube] [body]
-                                      [--problems 500] [--levels 2,3,4]
+                                      [--problems 500] [--levels 2,3,4,5]
 
 Each name is one table (all of them without a name); results/certificates.json keeps the rows,
 so that tables can be made one at a time; results/certificates.md is written from all of them.
@@ -318,7 +318,7 @@ def main() -> None:
     parser.add_argument("tables", nargs="*", choices=[[], *TABLES], default=[])
     parser.add_argument("--problems", type=int, default=500)
     parser.add_argument("--loads", type=int, default=20, help="mixed loads per friction")
-    parser.add_argument("--levels", default="2,3,4", help="of the cube, 5 takes minutes for W")
+    parser.add_argument("--levels", default="2,3,4,5", help="of the cube; 5: W in a minute")
     parser.add_argument("--limit", type=float, default=300.0, help="seconds per certificate")
     arguments = parser.parse_args()
     kept = RESULTS / "certificates.json"

@@ -1,7 +1,7 @@
 """The critical friction: listed values, bounds on finer triangles, and 500 random problems.
 
     python benchmarks/critical_friction.py [--limit 60] [--contacts 15,25,50] [--random 500]
-                                           [--space 500] [--levels 2,3,4]
+                                           [--space 500] [--levels 2,3,4,5]
 
 Seconds are those of the processor.  Random problems have up to four contacts, any definite W
 and any shape of friction; the truth is every determinant by numpy, and every proof and witness
@@ -186,7 +186,7 @@ def main():
     parser.add_argument("--contacts", default="15,25,50")
     parser.add_argument("--random", type=int, default=500)
     parser.add_argument("--space", type=int, default=500)
-    parser.add_argument("--levels", default="2,3,4")
+    parser.add_argument("--levels", default="2,3,4,5")
     options = parser.parse_args()
     levels = [int(n) for n in options.levels.split(",") if n]
     sizes = [int(n) for n in options.contacts.split(",") if n]

@@ -41,6 +41,7 @@ _HOME = {
     "analysis.gradients.with_torch": ("torch_function",),
     "solvers.driver": ("drive",),
     "solvers.many": ("solve_many",),
+    "analysis.certificates.rates": ("RateVerdict", "Rates", "rates"),
     "analysis.solutions.second_start": ("Other", "maybe_others"),
     "io.decks.written": ("write_deck",),
     "io.certificates": ("check_certificate", "write_certificate"),

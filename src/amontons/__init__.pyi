@@ -42,6 +42,8 @@ from .app.questions import (
     full_contact_friction as full_contact_friction, multistart as multistart,
     p_matrix_friction as p_matrix_friction, uniqueness as uniqueness,
 )
+from .analysis.certificates.rates import Rates as Rates, RateVerdict as RateVerdict
+from .analysis.certificates.rates import rates as rates
 from .core.errors import (
     AmontonsError as AmontonsError, FileFormatError as FileFormatError,
     Interrupted as Interrupted, InvalidInput as InvalidInput, InvertedCells as InvertedCells,

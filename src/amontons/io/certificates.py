@@ -4,15 +4,17 @@ A file holds W (nc d, nc d), q (nc, d), mu (nc,) of the Delassus form, the attri
 claim and sha256, and what proves the claim:
 
     every load   tau, sigma, alpha (nc,), f (nc, d - 1): multipliers of every contact
-    this load    r0 (nc, d), patterns (k,) of statuses, V0 ... V(k-1): their multipliers,
-                 distance: within which of r0 all solutions are, unit of r
+    this load    r0 (nc, d), statuses (nc,) there, patterns (k,) of statuses, V0 ... V(k-1):
+                 their multipliers, distance: within which of r0 all solutions are, unit of r
     this load    r0, statuses (nc,), tau, sigma, eta (nc, d - 1), pinned: multipliers of every
                  contact about r0, distance
+    all solutions, all branches   see `certificate_lists`
 """
 
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -26,14 +28,20 @@ from ..analysis.certificates.one_load.answer import LoadBranch, LoadCertificate,
 from ..analysis.certificates.one_load.certificate import certify_load
 from ..analysis.certificates.status_pieces import friction_shape
 from ..analysis.certificates.verdict import Uniqueness, Verdict
+from ..analysis.paths.diagram import Diagram
 from ..analysis.scaled import COPIES
+from ..analysis.solutions.enumerate import Solutions
+from ..analysis.solutions.interval_search import pieces_between
 from ..core.clock import TimeLimit, deadline_of
 from ..core.errors import FileFormatError, InvalidInput
 from ..core.hdf5 import check_file
 from ..linear.dense import dense
 from ..problem.friction import FrictionProblem
 from ..solvers.driver import drive
-from .certificate_checker import Refused, about, check, digest
+from .certificate_checker import Refused, check, digest, proves
+from .certificate_checker.contacts import about
+from .certificate_checker.patterns import tree
+from .certificate_lists import all_branches_between, all_solutions_of
 from .fclib.memory import write_hdf5
 
 Array = NDArray[np.float64]
@@ -42,45 +50,47 @@ FORMAT = "amontons/certificate/1"
 BROKEN = (Refused, FileFormatError, OSError, KeyError, ValueError, TypeError, IndexError,
           RuntimeError, AttributeError, MemoryError, OverflowError, ZeroDivisionError)
 ROOM = 1.1  # times what the checker finds here, for other processors
-GENEROUS = 100.0  # times the distance of a certificate: what the checker may find
 ABOVE = 1e-9  # relative, at which friction is proved to be safe
+NEARLY = 1e-8  # of the load, velocities of a solution that count as none
 SECONDS = 60.0  # whose work multipliers may take that the verdict did not need
 
 
 def write_certificate(
-    problem: FrictionProblem, verdict: Uniqueness, path: str | os.PathLike[str], *,
+    problem: FrictionProblem, verdict: Uniqueness | Solutions | Diagram,
+    path: str | os.PathLike[str], *, end: FrictionProblem | None = None,
     time_limit: TimeLimit = None,
 ) -> str:  # fmt: skip
-    """Write what proves a verdict on a Coulomb problem; the claim, "every load" or "this load".
+    """Write what proves a verdict on a Coulomb problem; the claim, as in the module.
 
-    Multipliers that the verdict did not need (few contacts are decided by all patterns) are
-    looked for, with a time limit in seconds, by default the work of about a minute.  The global
-    form is condensed.  Raises InvalidInput for a verdict that nothing of this kind proves, with
-    the reason; nothing is written then.
+    A complete list of `all_solutions` in 2D is proved as "all solutions", a diagram over the
+    load that is `whole` as "all branches" between problem and `end`.  What the verdict did not
+    need (few contacts are decided by all patterns) is looked for, with a time limit in seconds,
+    by default the work of about a minute.  The global
+    form is condensed.  Raises InvalidInput for a verdict that nothing of this kind proves, or
+    that the checker does not accept, with the reason; nothing is written then.
     """
     deadline = deadline_of(time_limit, SECONDS)
     local = problem.condensed(deadline)
     W = np.ascontiguousarray(dense(local.W, COPIES))
     q, mu = local.free_velocity, np.array(problem.mu)
-    claim, arrays = "every load", None
-    if verdict.verdict is Verdict.UNIQUE_EVERY_LOAD:
-        arrays = _every_load(W, mu, verdict, deadline)
-    if arrays is None and verdict.verdict in (
-        Verdict.UNIQUE_EVERY_LOAD, Verdict.UNIQUE_THIS_LOAD
-    ):  # fmt: skip
-        claim, arrays = "this load", _this_load(local, verdict, deadline)
-    if arrays is None:
-        raise InvalidInput(
-            f"certificate: expected a verdict of uniqueness that multipliers prove, got "
-            f"{verdict.verdict.value!r}; lists, regions of 3D solutions and motions alone have "
-            "no file format yet"
-        )
+    if isinstance(verdict, Solutions):
+        claim, arrays = "all solutions", all_solutions_of(local, verdict, deadline)
+    elif isinstance(verdict, Diagram):
+        claim, arrays = "all branches", _all_branches(local, verdict, end, deadline)
+    else:
+        claim, arrays = _one_solution(local, W, verdict, deadline)
+    data = {k: np.asarray(x) for k, x in {"W": W, "q": q, "mu": mu, **arrays}.items()}
+    try:
+        proves(claim, data)
+    except (Refused, ValueError) as reason:  # it rounds more than the package
+        raise InvalidInput(f"certificate: the checker does not accept it: {reason}") from reason
 
     def fill(file: h5py.File) -> None:
-        file.attrs["format"], file.attrs["claim"] = FORMAT, claim
-        for name, values in {"W": W, "q": q, "mu": mu, **arrays}.items():
+        # of fixed length: where a byte of HDF5's heap for others is wrong, it can crash
+        file.attrs["format"], file.attrs["claim"] = np.bytes_(FORMAT), np.bytes_(claim)
+        for name, values in data.items():
             file.create_dataset(name, data=values)
-        file.attrs["sha256"] = digest(file)
+        file.attrs["sha256"] = np.bytes_(digest(file))
 
     write_hdf5(path, fill)
     return claim
@@ -93,6 +103,36 @@ def check_certificate(path: str | os.PathLike[str]) -> str:
         return check(os.fspath(path))
     except BROKEN as reason:
         raise InvalidInput(f"{os.fspath(path)}: refused: {reason}") from reason
+
+
+def _one_solution(
+    local: FrictionProblem, W: Array, verdict: Uniqueness, deadline: Any
+) -> tuple[str, Any]:
+    """(claim, arrays) of a verdict that there is one solution."""
+    every = verdict.verdict is Verdict.UNIQUE_EVERY_LOAD
+    arrays = _every_load(W, np.array(local.mu), verdict, deadline) if every else None
+    if arrays is not None:
+        return "every load", arrays
+    if every or verdict.verdict is Verdict.UNIQUE_THIS_LOAD:
+        arrays = _this_load(local, verdict, deadline)
+    if arrays is None:
+        raise InvalidInput(
+            f"certificate: expected a verdict of uniqueness that multipliers prove, got "
+            f"{verdict.verdict.value!r}; regions of 3D solutions and motions alone have no "
+            "file format yet; lists are written from all_solutions, branches from diagram"
+        )
+    return "this load", arrays
+
+
+def _all_branches(
+    local: FrictionProblem, diagram: Diagram, end: FrictionProblem | None, deadline: Any
+) -> Any:
+    if diagram.whole is None or end is None:
+        what = "a diagram that is whole" if end else "end=, the problem at the other load"
+        raise InvalidInput(f"certificate: expected {what}; {diagram.reason}")
+    last = end.condensed(deadline)
+    found = pieces_between(local, last, deadline)
+    return all_branches_between(local, last, found, deadline)
 
 
 def _every_load(W: Array, mu: Array, verdict: Uniqueness, deadline: Any) -> Any:
@@ -124,33 +164,47 @@ def _this_load(local: FrictionProblem, verdict: Uniqueness, deadline: Any) -> An
     if local.dimension != 2:
         return None
     branches = [one for one in found.branches if isinstance(one, LoadBranch)]
-    size = float(np.abs(found.r0).max(initial=0.0))
-    return {
-        "r0": found.r0, "distance": _room(local, found, size),
+    arrays = {
+        "r0": found.r0, "statuses": _statuses(local, found.r0),
         "patterns": np.array([one.pattern for one in branches], dtype="S"),
         **{f"V{k}": one.multipliers for k, one in enumerate(branches)},
     }  # fmt: skip
+    return _with_distance(local, tree, arrays)
+
+
+def _statuses(local: FrictionProblem, r0: Array) -> Any:
+    """A letter of every contact of a 2D solution, for `certificate_checker.numbers`."""
+    mu, u = np.array(local.mu), np.array(local.velocity(r0)[0])
+    small = NEARLY * float(np.abs(local.free_velocity).max(initial=0.0))
+    letters = []
+    for i, (normal, tangent) in enumerate(r0):
+        limit = mu[i] * normal
+        if normal == 0:
+            letters.append("f" if u[i, 0] > small else "g")
+        elif mu[i] == 0 or abs(u[i, 1]) > small:
+            letters.append("l")
+        elif abs(tangent) >= limit * (1 - 1e-9):
+            letters.append("+" if tangent > 0 else "-")
+        else:
+            letters.append("s")
+    return np.array(letters, dtype="S")
 
 
 def _of_contacts(local: FrictionProblem, by: LoadMultipliers) -> Any:
     """Multipliers of every contact about a solution, None where a contact does not react."""
     if not np.linalg.norm(dense(local.W).reshape(local.contacts, -1), axis=1).all():
         return None
-    arrays = {"r0": by.r0, "tau": by.tau, "sigma": by.sigma, "eta": by.eta,
-              "pinned": by.pinned.astype(np.int8)}  # fmt: skip
-    given = {k: v for k, v in arrays.items() if k != "r0"} | {"pinned": by.pinned}
-    W, q, mu = dense(local.W), local.free_velocity, np.array(local.mu)
+    arrays = {
+        "r0": by.r0, "statuses": np.array(list(by.statuses), dtype="S"), "tau": by.tau,
+        "sigma": by.sigma, "eta": by.eta, "pinned": by.pinned.astype(np.int8),
+    }  # fmt: skip
+    return _with_distance(local, about, arrays)
+
+
+def _with_distance(local: FrictionProblem, proof: Callable[..., float], arrays: Any) -> Any:
+    """With how near solutions are, None where the checker rounds more than the package."""
     try:
-        far = about(W, q, mu, by.r0, list(by.statuses), **given)
-    except Refused:  # it rounds more than the package
+        far = proof(dense(local.W), local.free_velocity, np.array(local.mu), **arrays)
+    except Refused:
         return None
-    return {**arrays, "statuses": np.array(list(by.statuses), dtype="S"),
-            "distance": ROOM * far}  # fmt: skip
-
-
-def _room(local: FrictionProblem, found: LoadCertificate, size: float) -> float:
-    """The distance of a certificate in the unit of r; the checker counts more generously."""
-    rho = local.rho[local.rho > 0]
-    load = float(np.abs(local.free_velocity).max(initial=0.0) * rho.max(initial=0.0))
-    return GENEROUS * found.distance * max(size, load)
-
+    return {**arrays, "distance": ROOM * far}

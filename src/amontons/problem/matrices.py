@@ -40,6 +40,8 @@ Array = NDArray[np.float64]
 T = TypeVar("T")
 OPERATORS = (GridMatrix,)  # which M may be instead of a stored matrix
 DIRECT_LIMIT = 600_000  # unknowns of a mesh whose factor takes some 10 GB
+CONDENSED_LIMIT = 250_000  # the same where W alone needs one: some 3 GB
+MANY_COLUMNS = 60  # solves by cycles that take as long as a direct factor, at least
 EXACT_WORK = 2e6  # n * nc * d up to which forming W costs nothing that matters
 LARGE_BODY = 10_000  # unknowns of a body with levels from which multigrid is the way
 CHEAP = 2.0  # work of W, relative to that of a compressed W, which is full and not exact
@@ -197,14 +199,22 @@ class GlobalMatrices:
         H = sparse.csc_array(self.H)
         m = H.shape[1]
         W = np.empty((m, m))
-        for part in self.column_parts(m):
+        factor = self._factor_of_many(m)
+        for part in self.column_parts(m, factor):
             deadline.check()
-            W[:, part] = H.T @ self.solve(H[:, part].toarray())
+            W[:, part] = H.T @ factor.solve(H[:, part].toarray())
         return W
 
-    def column_parts(self, count: int) -> list[slice]:
+    def _factor_of_many(self, columns: int) -> Factor:
+        """That of M, or a direct one, not kept, where cycles for each column take longer."""
+        factor, n = self.factor(), self.H.shape[0]
+        if factor.exact or columns < MANY_COLUMNS or n > CONDENSED_LIMIT:  # type: ignore
+            return factor
+        return Direct().factor(stored(self.M))
+
+    def column_parts(self, count: int, factor: Factor | None = None) -> list[slice]:
         """Right-hand sides in parts that take no longer together than each for itself."""
-        exact = self.small_blocks is not None or self.factor().exact
+        exact = self.small_blocks is not None or (factor or self.factor()).exact
         size = SOLVE_COLUMNS if exact else 1
         return [slice(first, first + size) for first in range(0, count, size)]
 

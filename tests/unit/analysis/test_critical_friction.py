@@ -9,6 +9,7 @@ import pytest
 from uniqueness_checker import check_witness, piece_matrix, smallest_determinant
 
 import amontons as am
+from amontons.analysis.certificates import disc_pieces
 from amontons.analysis.certificates.critical_friction import critical_friction
 from amontons.analysis.certificates.determinant_search import NEGATIVE, POSITIVE, UNKNOWN
 from amontons.analysis.certificates.energy_bound import energy_bound
@@ -205,3 +206,21 @@ def test_bad_input_is_refused():
         critical_friction(one_contact_2d(), time_limit=0)
     with pytest.raises(InvalidInput, match="gap"):
         critical_friction(one_contact_2d(), gap=2)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_responses_of_a_piece_are_those_of_its_equations(seed):
+    """Against the inverse of all equations; the reduced ones have the same determinant."""
+    random, k = np.random.default_rng(seed), 5
+    A = random.standard_normal((3 * k, 3 * k))
+    form = disc_pieces._Form(A @ A.T / k + np.eye(3 * k), random.uniform(0.2, 1, k))
+    states = np.full(k, seed) if seed < 4 else random.integers(0, 4, k)
+    angle, t = random.uniform(0, 6, k), 1.3
+    piece = states, np.stack([np.cos(angle), np.sin(angle)], axis=1), t
+    J, own = disc_pieces.equations(form.W, form.shape, *piece), np.arange(k)
+    inverse = np.linalg.inv(J)
+    r, u = form.responses(*piece)
+    for found, all_of in ((r, inverse), (u, form.W @ inverse)):
+        np.testing.assert_allclose(found, all_of.reshape(k, 3, k, 3)[own, :, own], atol=1e-10)
+    V, R, _, _ = disc_pieces.bases(form.shape, *piece)
+    assert np.linalg.det(V.T @ form.W @ R) == pytest.approx(np.linalg.det(J), rel=1e-9)

@@ -1,16 +1,21 @@
 """Certificates as files: accepted where they prove, refused where somebody changed them."""
 
+import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import amontons as am
+from amontons.app.cli import main
 from amontons.core.errors import InvalidInput
 from amontons.io import certificate_checker as checker
+from amontons.io.certificate_checker.numbers import positive_definite
 from amontons.mechanics.ready.hild import hild_triangle
 
 
@@ -126,7 +131,7 @@ def reseal(path, change):
     """Change a file and give it a new hash, as a forger would."""
     with h5py.File(path, "r+") as file:
         change(file)
-        file.attrs["sha256"] = checker.digest(file)
+        file.attrs["sha256"] = np.bytes_(checker.digest(file))
 
 
 def flipped(file, name):
@@ -146,7 +151,7 @@ FORGERIES = {
     "W of the other sign": lambda file: flipped(file, "W"),
     "a form left out": lambda file: file["V0"].write_direct(0 * file["V0"][()]),
     "more friction": lambda file: file["mu"].write_direct(file["mu"][()] * 3),
-    "another claim": lambda file: file.attrs.modify("claim", "every load"),
+    "another claim": lambda file: file.attrs.modify("claim", np.bytes_("every load")),
     "no number": lambda file: file["W"].write_direct(file["W"][()] * np.nan),
 }
 
@@ -158,6 +163,23 @@ def test_a_forger_who_seals_the_file_again_is_found(tmp_path, forgery):
     reseal(path, FORGERIES[forgery])
     with pytest.raises(InvalidInput, match="refused"):
         am.check_certificate(path)
+
+
+def test_forms_about_a_point_outside_of_their_pattern_prove_nothing(tmp_path):
+    """Three solutions: forms that only see differences inside of a pattern miss the others."""
+    W = np.array([[1.0, 0.8], [0.8, 1.0]])
+    q, mu = np.array([[0.1, 0.5]]), np.array([2.0])
+    problem = am.FrictionProblem.from_delassus(W, q, mu)
+    found = am.all_solutions(problem)
+    assert len(found) > 1
+    stuck = next(s.r for s in found.solutions if s.pattern == "s")
+    forms = {"f": np.zeros((4, 4)), "s": np.diag([0, 0, 1.0, 1.0]),
+             "+": np.diag([0, 0, 1.0, 0]), "-": np.diag([0, 0, 1.0, 0])}  # fmt: skip
+    data = {"W": W, "q": q, "mu": mu, "r0": stuck, "statuses": np.array([b"s"]),
+            "patterns": np.array(list(forms), dtype="S"), "distance": np.array(1e-6),
+            **{f"V{k}": V[None] for k, V in enumerate(forms.values())}}  # fmt: skip
+    with pytest.raises(checker.Refused, match="r0 is not in"):
+        checker.proves("this load", data)
 
 
 def test_a_pattern_that_is_left_out_is_missed(tmp_path):
@@ -203,14 +225,16 @@ def test_what_is_not_unique_has_no_certificate(tmp_path):
 
 def test_the_checker_stands_alone(tmp_path):
     """Copied elsewhere it runs with numpy and h5py, and imports nothing of the package."""
-    source = Path(checker.__file__).read_text(encoding="utf-8")
-    alone = tmp_path / "checker.py"
-    alone.write_text(source, encoding="utf-8")
-    assert "amontons" not in "".join(line for line in source.splitlines() if "import" in line)
+    folder = Path(checker.__file__).parent
+    alone = shutil.copytree(folder, tmp_path / "checker")
+    sources = [path.read_text(encoding="utf-8") for path in alone.glob("*.py")]
+    imports = [x for text in sources for x in text.splitlines() if "import" in x]
+    assert not any("amontons" in line or "from .." in line for line in imports)
+    assert all(len(text.splitlines()) <= 150 for text in sources)
     path, _ = written(tmp_path, problem_of(0, 3, 0.05))
-    for name, code in ((path, 0), (alone, 1)):
-        ran = subprocess.run([sys.executable, "-I", str(alone), str(name)], check=False,
-                             capture_output=True, text=True)  # fmt: skip
+    for name, code in ((path, 0), (alone / "lists.py", 1)):
+        ran = subprocess.run([sys.executable, "-E", "-m", "checker", str(name)], check=False,
+                             capture_output=True, text=True, cwd=tmp_path)  # fmt: skip
         assert ran.returncode == code
     assert "refused" in ran.stderr
 
@@ -222,6 +246,100 @@ def test_positive_definite_never_errs(seed):
     A = random.integers(-4, 5, (6, 5)).astype(float)
     singular = A @ A.T
     nothing = np.zeros((6, 6))
-    assert not checker.positive_definite(singular, nothing)
-    assert checker.positive_definite(singular + 1e-6 * np.eye(6) * singular.max(), nothing)
-    assert not checker.positive_definite(np.eye(6), np.full((6, 6), 0.5))
+    assert not positive_definite(singular, nothing)
+    assert positive_definite(singular + 1e-6 * np.eye(6) * singular.max(), nothing)
+    assert not positive_definite(np.eye(6), np.full((6, 6), 0.5))
+
+
+# ---------------------------------------------------------------- lists and branches in 2D
+FORGED_LISTS = {
+    "a pattern less": lambda file: turned_letters(file, "patterns"),
+    "one that is not left": lambda file: turned_letters(file, "left"),
+    "a multiplier": lambda file: file["y"].write_direct(0 * file["y"][()]),
+    "another load": lambda file: flipped(file, "q"),
+    "another solution": lambda file: file["r"].write_direct(file["r"][()] * 1.01),
+    "more friction": lambda file: file["mu"].write_direct(file["mu"][()] * 2),
+    "another W": lambda file: flipped(file, "W"),
+}
+
+
+def turned_letters(file, name):
+    """The first word with its first free contact stuck, or the other way."""
+    words = file[name][()]
+    words[0] = bytes(words[0]).translate(bytes.maketrans(b"fs.c", b"sfff"))
+    file[name].write_direct(words)
+
+
+@pytest.fixture(scope="module")
+def listed(tmp_path_factory):
+    """A file with the five solutions of three contacts."""
+    path = tmp_path_factory.mktemp("lists") / "c.h5"
+    problem = hild_triangle(3).assemble().with_mu(4.0)
+    assert am.write_certificate(problem, am.all_solutions(problem), path) == "all solutions"
+    assert "exactly 5" in am.check_certificate(path)
+    return path.read_bytes()
+
+
+@pytest.mark.parametrize("forgery", FORGED_LISTS)
+def test_a_forged_list_is_found(tmp_path, listed, forgery):
+    path = tmp_path / "c.h5"
+    path.write_bytes(listed)
+    reseal(path, FORGED_LISTS[forgery])
+    with pytest.raises(InvalidInput, match="refused"):
+        am.check_certificate(path)
+
+
+@pytest.mark.parametrize("without", [False, True])
+@pytest.mark.parametrize("seed", range(4))
+def test_lists_of_random_problems_are_proved(tmp_path, seed, without):
+    random = np.random.default_rng(seed)
+    W = np.kron(np.eye(3), [[1, 0.8], [0.8, 1]])
+    A = random.standard_normal((6, 6))
+    W = W + 0.05 * A @ A.T / 3
+    mu = random.uniform(1, 3, 3) * [not without, 1, 1]
+    problem = am.FrictionProblem.from_delassus(W, np.abs(random.standard_normal((3, 2))), mu)
+    found = am.all_solutions(problem)
+    am.write_certificate(problem, found, tmp_path / "c.h5")
+    assert f"exactly {len(found)}:" in am.check_certificate(tmp_path / "c.h5")
+
+
+def test_what_is_not_complete_is_no_list(tmp_path):
+    problem = hild_triangle(3).assemble().with_mu(4.0)
+    found = replace(am.all_solutions(problem), complete=False, reason="stopped")
+    with pytest.raises(InvalidInput, match="stopped"):
+        am.write_certificate(problem, found, tmp_path / "c.h5")
+
+
+def load_problems():
+    """Three contacts under two loads, between which there are up to three solutions."""
+    random = np.random.default_rng(0)
+    A = random.standard_normal((6, 6))
+    W = np.kron(np.eye(3), [[1, 0.8], [0.8, 1]]) + 0.05 * A @ A.T / 3
+    loads, mu = random.standard_normal((2, 3, 2)), random.uniform(1, 3, 3)
+    return [am.FrictionProblem.from_delassus(W, q, mu) for q in loads]
+
+
+def test_branches_over_the_load_are_proved_and_forged_ones_found(tmp_path):
+    start, end = load_problems()
+    path = tmp_path / "c.h5"
+    found = am.diagram(end, base=start)
+    assert found.whole == (0.0, 1.0)
+    assert am.write_certificate(start, found, path, end=end) == "all branches"
+    assert "solutions are on lines" in am.check_certificate(path)
+    right = path.read_bytes()
+    for forgery in ("end", "q", "r"):
+        path.write_bytes(right)
+        reseal(path, lambda file, name=forgery: flipped(file, name))
+        with pytest.raises(InvalidInput, match="refused"):
+            am.check_certificate(path)
+    with pytest.raises(InvalidInput, match="end="):
+        am.write_certificate(start, found, path)
+
+
+def test_the_command_line_writes_a_list_and_checks_it(tmp_path):
+    path = str(tmp_path / "c.h5")
+    run = CliRunner().invoke
+    done = run(main, ["enumerate", "example:hild", "--certificate", path])
+    assert done.exit_code == 0, done.output
+    assert "all solutions: certificate in" in done.output
+    assert "exactly 3:" in run(main, ["check", path]).output

@@ -6,6 +6,7 @@ from scipy import sparse
 
 import amontons as am
 from amontons.linear import GeometricMultigrid, grid
+from amontons.linear.geometric import MultigridFactor
 from amontons.linear.grid_matrix import GridMatrix
 from amontons.linear.patched import PatchedOperator, Rows
 from amontons.linear.transfer import Transfer
@@ -170,6 +171,18 @@ def test_other_solvers_get_the_stored_matrix(unstored):
     solution = drive(problem, SemismoothNewton(), tolerance=1e-8)
     assert solution.converged
     assert drive(problem).converged
+
+
+def test_w_of_many_contacts_comes_from_a_direct_factor(unstored, monkeypatch):
+    """Cycles for each column would take far longer."""
+    problem = model((8, 8, 2)).assemble()
+    assert problem.contacts >= 60 and not problem.factor().exact
+    with monkeypatch.context() as patch:
+        patch.setattr(MultigridFactor, "solve", None)
+        W = problem.matrices.delassus()
+    H = problem.H.toarray()
+    expected = H.T @ np.linalg.solve(problem.matrices.stored().toarray(), H)
+    np.testing.assert_allclose(W, expected, atol=1e-12 * np.abs(expected).max())
 
 
 def test_the_stored_matrix_comes_with_the_levels(monkeypatch):

@@ -1,6 +1,7 @@
 """Steps in time that follow the path of solutions: where bodies jump, and where not."""
 
 import csv
+import json
 
 import numpy as np
 import pytest
@@ -148,8 +149,12 @@ def test_bad_options_are_named():
 
 
 def test_run_tells_the_jump(tmp_path):
-    done = CliRunner().invoke(main, ["run", "example:release", "-o", str(tmp_path / "out")])
+    done = CliRunner().invoke(
+        main, ["run", "example:release", "--rates", "-o", str(tmp_path / "out")]
+    )
     assert done.exit_code == 0, done.output
+    assert "a jump is possible: in the steps to t = 1.7" in done.output
+    assert "no jump: proved of 39 steps" in done.output
     assert "jumps at t = 1.68691" in done.output
     assert "jumped at t = 1.68691: the path has folds at t = 1.68691, 1.25" in done.output
     with (tmp_path / "out" / "steps.csv").open(newline="") as file:
@@ -157,6 +162,9 @@ def test_run_tells_the_jump(tmp_path):
     assert [float(row["jump"]) for row in rows if row["jump"]] == [
         pytest.approx(1.68691, abs=1e-5)
     ]
+    assert [row["index"] for row in rows if float(row["jump_possible"])] == ["34"]
+    record = json.loads((tmp_path / "out" / "solution.json").read_text(encoding="utf-8"))
+    assert record["rates"]["jump_possible"] is False
     plain = CliRunner().invoke(
         main, ["run", "example:release", "--set", "evolution.crossing=false", "--quiet",
                "-o", str(tmp_path / "plain")],

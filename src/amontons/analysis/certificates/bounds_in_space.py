@@ -15,7 +15,7 @@ from ...core.errors import TimeUp
 from ...core.onlookers import say
 from ..multipliers.rounding import EPSILON, determinant_sign
 from .contact_multipliers import ContactMultipliers, contact_multipliers
-from .disc_pieces import FREE, SLIP, DiscPiece, equations, singular_piece
+from .disc_pieces import SLIP, DiscPiece, bases, equations, singular_piece
 from .status_pieces import Pieces
 
 Array = NDArray[np.float64]
@@ -85,14 +85,12 @@ def residual(pieces: Pieces, found: DiscPiece) -> float:
 def _sign(pieces: Pieces, found: DiscPiece, t: float) -> int:
     """Sign of the determinant at friction t shape, 0 where rounding could change it.
 
-    Directions are unit vectors within rounding, which scales rows and turns nothing else.  The
-    rows of free contacts are those of the identity, the determinant is that of the others.
+    Directions are unit vectors within rounding, which scales rows and turns nothing else.
     """
-    J = equations(pieces.W, pieces.shape, found.states, found.directions, t)
-    size = np.abs(pieces.W).reshape(len(pieces.shape), 3, -1).max(axis=1).repeat(3, axis=0)
-    rest = np.flatnonzero((found.states != FREE).repeat(3))
-    J, size = J[np.ix_(rest, rest)], size[np.ix_(rest, rest)]
-    return determinant_sign(J, 4 * EPSILON * (np.abs(J) + size))
+    V, R, _, _ = bases(pieces.shape, found.states, found.directions, t)
+    J, size = (a.T @ (b.T @ w.T).T for a, b, w in (
+        (V, R, pieces.W), (abs(V), abs(R), np.abs(pieces.W))))  # fmt: skip
+    return determinant_sign(J, 8 * EPSILON * size)
 
 
 __all__ = ["coefficients", "directions", "lower_bound", "pattern", "residual", "upper_bound"]

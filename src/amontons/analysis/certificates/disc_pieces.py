@@ -26,6 +26,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from ...core.clock import Deadline
 from .status_pieces import REAL, Pieces
@@ -40,7 +41,7 @@ BELOW = (0.1, 0.03, 0.01, 0.003, 5e-4)  # parts of t by which it is below in a c
 FALL = 1e-5  # relative, by which t must fall
 STARTS = 24  # first patterns of few contacts
 ROUNDS = 60  # of changes from one pattern
-WORK = 8.0  # operations of a round per cube of the rows
+WORK = 4.0  # operations of a round per cube of the rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +136,46 @@ def equations(W: Array, shape: Array, states: States, directions: Array, t: floa
     return blocks.reshape(3 * k, 3 * k)
 
 
+def bases(
+    shape: Array, states: States, directions: Array, t: float
+) -> tuple[sparse.csc_array, sparse.csc_array, sparse.csc_array, States]:
+    """(V, R, O, rest): what the `equations` of a pattern are made of, by contacts.
+
+    V (3 k, n): the velocities that vanish, in the equations `rest` (n,); R (3 k, n): reactions
+    that all other equations allow; O (3 k, 3 k): the reactions that these give outright.  The
+    determinant of the equations is that of V^T W R.
+    """
+    size = 3 * len(shape)
+    slip, loose, held, stuck = (np.flatnonzero(x) for x in (
+        states >= SLIP, states == SLIP, states == HELD, states == STICK))  # fmt: skip
+    free, rests = ((3 * x[:, None] + np.arange(3)).ravel()
+                   for x in (np.flatnonzero(states == FREE), stuck))  # fmt: skip
+    V = _columns(size, [(3 * slip, 3 * slip, np.ones(len(slip))),
+                        (rests, rests, np.ones(len(rests))),
+                        *_across(held, directions)])  # fmt: skip
+    moved = (-t * shape[slip])[:, None] * directions[slip]
+    along = [(3 * slip + 1 + j, 3 * slip, moved[:, j]) for j in range(2)]
+    given = [(3 * slip + 1 + j, 3 * slip + 1, directions[slip, j]) for j in range(2)]
+    O = _columns(size, [(free, free, np.ones(len(free))), *given,
+                        *_across(loose, directions)])  # fmt: skip
+    R = V + _columns(size, along)
+    rest = np.flatnonzero(np.diff(V.indptr))
+    return V[:, rest], R[:, rest], O, rest
+
+
+def _columns(size: int, parts: list[tuple[States, States, Array]]) -> sparse.csc_array:
+    """A square matrix from (rows, columns, numbers)."""
+    rows, columns, numbers = (np.concatenate(x) for x in zip(*parts, strict=True))
+    return sparse.csc_array((numbers, (rows, columns)), shape=(size, size))
+
+
+def _across(contacts: States, directions: Array) -> list[tuple[States, States, Array]]:
+    """The directions across slip, as entries in the third column of their contacts."""
+    a, b = directions[contacts].T
+    first, second, third = (3 * contacts + j for j in (1, 2, 2))
+    return [(first, third, -b), (second, third, a)]
+
+
 @dataclass(frozen=True, eq=False)
 class _Form:
     """W (3 k, 3 k) of contacts that react, and the shape (k,) of friction."""
@@ -157,18 +198,19 @@ class _Form:
         if not len(slip):
             return None
         held = self._held(states, directions)
-        along = np.zeros((len(self.W), len(slip)))
-        along[3 * slip + 1, np.arange(len(slip))] = directions[slip, 0]
-        along[3 * slip + 2, np.arange(len(slip))] = directions[slip, 1]
-        along *= self.shape[slip]
+        column, count = np.arange(len(slip)), (len(self.W), len(slip))
+        numbers = (directions[slip] * self.shape[slip, None]).T.ravel()
+        places = np.tile(column, 2), np.concatenate([3 * slip + 1, 3 * slip + 2])
+        along = sparse.csc_array((numbers, places[::-1]), shape=count)
         normal = self.W[:, 3 * slip]
-        tangent = self.W @ along
+        tangent = (along.T @ self.W.T).T
         try:
             if held.shape[1]:
                 rows = held.T @ self.W
-                hh = rows @ held
-                back = np.linalg.solve(hh, np.hstack([rows[:, 3 * slip], rows @ along]))
-                onto = self.W[3 * slip] @ held
+                hh = (held.T @ rows.T).T
+                right = np.hstack([rows[:, 3 * slip], (along.T @ rows.T).T])
+                back = np.linalg.solve(hh, right)
+                onto = (held.T @ self.W[3 * slip].T).T
                 m = len(slip)
                 G = normal[3 * slip] - onto @ back[:, :m]
                 C = tangent[3 * slip] - onto @ back[:, m:]
@@ -189,27 +231,40 @@ class _Form:
         r -= held @ (back[:, :m] @ x - t * (back[:, m:] @ x))
         return t, r / np.abs(r).max()
 
-    def _held(self, states: States, directions: Array) -> Array:
+    def _held(self, states: States, directions: Array) -> sparse.csc_array:
         """Directions (3 k, h) that do not move: all of stick, those across where it is held."""
         stuck, across = np.flatnonzero(states == STICK), np.flatnonzero(states == HELD)
-        out = np.zeros((len(self.W), 3 * len(stuck) + len(across)))
-        out[(3 * stuck[:, None] + np.arange(3)).ravel(), np.arange(3 * len(stuck))] = 1.0
-        column = 3 * len(stuck) + np.arange(len(across))
-        out[3 * across + 1, column] = -directions[across, 1]
-        out[3 * across + 2, column] = directions[across, 0]
-        return out
+        first = 3 * len(stuck)
+        column = first + np.arange(len(across))
+        rows = [(3 * stuck[:, None] + np.arange(3)).ravel(), 3 * across + 1, 3 * across + 2]
+        numbers = [np.ones(first), -directions[across, 1], directions[across, 0]]
+        places = np.concatenate(rows), np.concatenate([np.arange(first), column, column])
+        shape = (len(self.W), first + len(across))
+        return sparse.csc_array((np.concatenate(numbers), places), shape=shape)
 
     # ---------------------------------------------------------------- changes
+    def responses(self, states: States, directions: Array, t: float) -> tuple[Array, Array]:
+        """(r, u) of every contact, (k, 3, 3), to a unit on the right of its own `equations`.
+
+        r = R y + O (`bases`) with V^T W (R y + O) given.
+        """
+        k, W = self.contacts, self.W
+        V, R, O, rest = bases(self.shape, states, directions, t)
+        WO, WR = (O.T @ W.T).T, (R.T @ W.T).T
+        right = -(V.T @ WO)
+        right[np.arange(len(rest)), rest] += 1.0
+        y = np.linalg.solve(V.T @ WR, right) if len(rest) else right
+        own = np.arange(k)
+        r = ((R @ y) + O.toarray()).reshape(k, 3, k, 3)[own, :, own]
+        mine = np.ascontiguousarray(y.reshape(len(rest), k, 3).transpose(1, 0, 2))
+        return r, WR.reshape(k, 3, -1) @ mine + WO.reshape(k, 3, k, 3)[own, :, own]
+
     def changes(
         self, states: States, directions: Array, t: float
     ) -> tuple[Array, States, Array]:
         """(ratio of determinants of the best change of every contact, its state, direction)."""
-        k, own = self.contacts, np.arange(self.contacts)
-        J = equations(self.W, self.shape, states, directions, t)
-        inverse = np.linalg.inv(J).reshape(k, 3, k, 3)
-        E = inverse[own, :, own]
-        columns = np.ascontiguousarray(inverse.transpose(2, 0, 1, 3)).reshape(k, 3 * k, 3)
-        F = self.W.reshape(k, 3, 3 * k) @ columns
+        own = np.arange(self.contacts)
+        E, F = self.responses(states, directions, t)
         angle = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
         tried, state, direction = [np.linalg.det(E)], [FREE], [(1.0, 0.0)]
         stick = np.linalg.det(F)

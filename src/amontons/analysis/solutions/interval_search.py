@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.clock import Deadline
-from ...core.errors import TimeUp
+from ...core.errors import InvalidInput, TimeUp
 from ...core.onlookers import say
 from ...problem.friction import FrictionProblem
 from ..multipliers.rounding import EPSILON, gamma
@@ -36,7 +36,7 @@ from ..scaled import Scaled
 from ..statuses import ANY, FREE, LOAD, MINUS, PLUS, States, word
 from ..tolerances import DATA, SAME
 from .moving_pattern import MovingPattern
-from .pattern_leaves import NODE, leaves_of
+from .pattern_leaves import NODE, Cut, leaves_of
 from .plane_problem import PlaneProblem
 
 Array = NDArray[np.float64]
@@ -114,6 +114,49 @@ def pieces_between(start: FrictionProblem, end: FrictionProblem, deadline: Deadl
     return Pieces(pieces, family.interval, len(others), "; ".join(search.doubts), search.nodes)
 
 
+@dataclass(frozen=True, eq=False)
+class Exclusions:
+    """Which patterns have no solution at any load between two, and why.
+
+    excluded: as in `Proof`, with multipliers (k, nc, 2); left: the complete patterns that are
+    not; loads (2, nc, 2): at both ends of the interval, which begins or ends a little inside
+    where there is no load.  All in the units of the problem.
+    """
+
+    excluded: tuple[str, ...]
+    multipliers: Array
+    left: tuple[str, ...]
+    loads: Array
+
+
+def exclusions_between(
+    start: FrictionProblem, end: FrictionProblem, deadline: Deadline
+) -> Exclusions:
+    """What the search excludes on the whole interval between two loads.
+
+    Raises InvalidInput where friction differs too, W is not definite, or there is no load at
+    an end: then solutions are multiples of those at the other one; TimeUp.
+    """
+    family = _Family(*(Scaled.of(problem, deadline) for problem in (start, end)))
+    if family.zero.any():
+        raise InvalidInput("branches: there is no load at an end: solutions are multiples of "
+                           "those at the other one, of which there is a list")  # fmt: skip
+    if family.rubs or not family.bounded:
+        why = "friction differs" if family.rubs else "W is not definite"
+        raise InvalidInput(f"branches: expected loads alone to differ and W definite; {why}")
+    cuts: list[Cut] = []
+    left: list[str] = []
+    work = NODE * (2.0 * family.scaled.contacts + 2) ** 2
+    for leaves, more in family.leaves(family.interval, cuts=cuts):
+        deadline.pay(work * more)
+        left += [word(states) for states in leaves]
+    loads = family.at(*family.interval)[0] * family.scaled.to_u.repeat(2)
+    rows = np.array([y for _, y in cuts]).reshape(len(cuts), -1, 2)
+    return Exclusions(
+        tuple(word(states) for states, _ in cuts), rows, tuple(left), loads.reshape(2, -1, 2)
+    )
+
+
 class _Family:
     """Load and friction over t, scaled by the larger unit of both ends."""
 
@@ -136,12 +179,15 @@ class _Family:
         loads, mus = ((1 - t) * x[0] + t * x[1] for x in (self.loads, self.mus))
         return loads, mus
 
-    def leaves(self, span: Span, below: States | None = None) -> Iterator[tuple[States, int]]:
+    def leaves(
+        self, span: Span, below: States | None = None, cuts: list[Cut] | None = None
+    ) -> Iterator[tuple[States, int]]:
         """(patterns of a span that the search can not exclude, nodes) in turns.
 
         Contacts with the largest mu of the span, behind them the same with the least one for
         slip, which lies between both, and the load.  below: a pattern, to search through
-        those that differ from it in the first contact.
+        those that differ from it in the first contact.  cuts takes what is excluded, with
+        multipliers (2 nc,) of u in the units of the problem.
         """
         loads, mus = self.at(*span)
         plane = PlaneProblem(self.scaled, loads, mus.max(axis=0))
@@ -170,12 +216,16 @@ class _Family:
         if below is not None and more:
             root[nc + 1 : -1] = np.where(np.isin(below[1:], (PLUS, MINUS)), below[1:], FREE)
         partner = np.append(nc + np.arange(nc), np.full(nc + 1, -1)) if more else None
+        excluded: list[Cut] | None = None if cuts is None else []
         turns = leaves_of(
             A, spread, c, (low.ravel(), high.ravel()), np.resize(plane.reacts, len(root)),
-            np.resize(plane.mu > 0, len(root)), root=root, partner=partner,
+            np.resize(plane.mu > 0, len(root)), excluded, root=root, partner=partner,
         )  # fmt: skip
         for leaves, nodes, _ in turns:
             yield leaves[:, :nc], nodes
+        if cuts is not None:
+            to_u = self.scaled.to_u.repeat(2) / box.u
+            cuts += [(states[:nc], y[:m] / to_u) for states, y in excluded or ()]
 
     def allows(self, states: States, span: Span) -> bool:
         """False where a pattern has no solution in the box of all of them, by the search."""

@@ -170,6 +170,7 @@ Examples:
   amontons enumerate example:hild --mu 2 --set mesh.refine=4
   amontons enumerate problem.hdf5 --json - | jq .complete
   amontons enumerate example:brake -o brake   solutions.csv: a row per solution and contact
+  amontons enumerate example:hild --certificate c.h5     then amontons check c.h5
 
 \b
 Exit codes: 0 the list is complete, 1 there may be others, 2 bad input, 130 interrupted before
@@ -185,6 +186,7 @@ it was complete: Ctrl-C ends the search with what it has found, a second one at 
 @click.option("--json", "json_copy", metavar="FILE", help="The same as JSON; - prints it.")
 @click.option("--picture", metavar="FILE",
               help="Draw the solutions side by side: .png, .svg or .pdf.")  # fmt: skip
+@flags.certificate
 @results_folder("name of the source with -results", asked=True)
 @flags.of_decks
 def enumerate_solutions(**options: object) -> int:
@@ -278,9 +280,7 @@ Ctrl-C ends the search with what is known, a second one at once.
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
               help="Replace a value of the case.")  # fmt: skip
 @click.option("--json", "json_copy", metavar="FILE", help="The same as JSON; - prints it.")
-@click.option("--certificate", metavar="FILE",
-              help="What proves that there is one solution, as an HDF5 file for amontons check."
-              )  # fmt: skip
+@flags.certificate
 @flags.of_decks
 def uniqueness(**options: object) -> int:
     """Say whether a problem has one solution: for every load, for this load, or several.
@@ -378,6 +378,7 @@ has been made is saved, go on with --restart.
 @click.option("--restart", is_flag=True,
               help="Go on from the state in DIR, of the same case, after any end.")  # fmt: skip
 @click.option("--quiet", is_flag=True, help="No progress, no summary.")
+@flags.rates
 @flags.of_decks
 def run(**options: object) -> int:
     """Follow a case in time: dynamics, or quasi-static steps.

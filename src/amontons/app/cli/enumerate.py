@@ -30,6 +30,7 @@ from .terminal import (
     show_table,
     write_report,
 )
+from .uniqueness import deliver_certificate
 
 Array = NDArray[np.float64]
 SCHEMA = "amontons/enumerate/1"
@@ -40,10 +41,11 @@ INCOMPLETE = 1  # exit code
 def run(
     source: str, overrides: Sequence[str], mu: float | None, time_limit: float | None,
     json_copy: str | None, picture: str | None, report: bool = False,
-    folder: str | None = None,
+    folder: str | None = None, certificate: str | None = None,
 ) -> int:  # fmt: skip
     """Search, show; the exit code."""
     check_writable(json_copy, "--json")
+    check_writable(certificate, "--certificate")
     check_writable(picture, "--picture", FIGURES)
     opened = open_source(source, overrides)
     place = None
@@ -51,7 +53,8 @@ def run(
         place = check_folder(f"{opened.name}-results" if folder is None else folder)
     problem = opened.discrete_with(mu)
     with ending_early() as stop:
-        found = all_solutions(opened.target_with(mu), time_limit=time_limit)
+        found = all_solutions(opened.target_with(mu), time_limit=time_limit,
+                              keep_proof=certificate is not None)  # fmt: skip
     if json_copy != "-":
         _show(opened.title, found)
         say_when(opened.target)
@@ -64,6 +67,10 @@ def run(
         draw(opened, problem, [s.r for s in found.solutions], named, picture)
     if place is not None:
         _write(found, opened, problem, mu, place, report=report)
+    if certificate is not None and not deliver_certificate(
+        problem, found, certificate, json_copy == "-"
+    ):
+        return INCOMPLETE
     if found.complete:
         return 0
     return INCOMPLETE if stop.received is None else stop.code

@@ -59,6 +59,22 @@ def fclib_error(command: Command) -> Command:
     )(command)  # fmt: skip
 
 
+def rates(command: Command) -> Command:
+    """Of steps in time: where a body can jump."""
+    return click.option(
+        "--rates", is_flag=True,
+        help="Quasi-static: say of each step whether the body can jump in it, by the rates of "
+        "contacts that slide or graze.",
+    )(command)  # fmt: skip
+
+
+def certificate(command: Command) -> Command:
+    """Of what proves something: the proof as a file."""
+    return click.option("--certificate", metavar="FILE",
+                        help="What proves it, as an HDF5 file for amontons check."
+                        )(command)  # fmt: skip
+
+
 def of_decks(command: Command) -> Command:
     """Of what reads decks: what to leave out, and contact as hard as it can be.
 

@@ -21,6 +21,7 @@ from ...mechanics.steps import Energies, QuasiStatic, TimeStep, at_rest, evolve
 from ...mechanics.steps.stepping import at_end
 from ...problem.solution import Outcome
 from .doubts import Doubts
+from .jumps import Jumps, check_rates
 from .locking import locked
 from .run_folder import BALANCE, PICTURES, WORKS, RunFolder, clear, continued, numbers_of
 from .sources import open_source, with_flags
@@ -45,6 +46,7 @@ class Wanted:
     xdmf: bool = False
     export: str | None = None
     exported: list[range] | None = None  # the steps of export, None for all
+    rates: bool = False
 
 
 @dataclass
@@ -57,6 +59,7 @@ class _Run:
     stop: Stopping
     frames: list[Frame] = field(default_factory=list)
     doubts: Doubts = field(default_factory=Doubts)
+    jumps: Jumps | None = None  # where --rates asks for them
     film: Film | None = None  # of the report, where one is asked for
     failed: bool = False  # the step after the last one did not converge
 
@@ -69,6 +72,10 @@ class _Run:
         why = ", the next step did not converge" if self.failed else ""
         return f"NOT FINISHED ({until}{why})"
 
+    def lines(self) -> list[str]:
+        """What is said of all steps at the end."""
+        return [*([] if self.jumps is None else self.jumps.lines()), *self.doubts.lines()]
+
     def ended(self, time: float) -> bool:
         """True for the time of the last step."""
         assert self.case.evolution is not None
@@ -79,13 +86,14 @@ def run(
     case: str, overrides: Sequence[str], tolerance: float | None, time_limit: float | None,
     folder: str | None, export: str | None, every: int, pictures: bool, restart: bool,
     quiet: bool, export_steps: str | None = None, xdmf: bool = False, report: bool = False,
+    rates: bool = False,
 ) -> int:  # fmt: skip
     """Read, step and write; returns the exit code."""
     if time_limit is not None and not time_limit > 0:
         raise InvalidInput(f"--time-limit: expected seconds > 0, got {time_limit}")
     chosen = _chosen(export, export_steps)
     wanted = Wanted(
-        time_limit, every, pictures, quiet, report, restart, xdmf, export, chosen
+        time_limit, every, pictures, quiet, report, restart, xdmf, export, chosen, rates
     )
     deadline = Deadline.after(time_limit)
     read = open_source(case, overrides)
@@ -103,6 +111,8 @@ def make_steps(read: Case, folder: str | None, wanted: Wanted, deadline: Deadlin
     place = check_folder(f"{read.name}-results" if folder is None else folder)
     export = wanted.export
     exported = None if export is None else check_folder(export, "--export-fclib")
+    if wanted.rates:
+        check_rates(read)
     with read.naming_keys():
         _ = read.in_time.discretisation, read.in_time.law
     if not wanted.quiet:
@@ -165,6 +175,7 @@ def _prepared(asked: _Run, place: Path) -> tuple[RunFolder, Iterator[TimeStep]]:
     )  # fmt: skip
     if not wanted.restart:
         results.save(start)
+    asked.jumps = Jumps.after(start) if wanted.rates else None
     return results, steps
 
 
@@ -188,7 +199,10 @@ def _follow(steps: Iterator[TimeStep], results: RunFolder, asked: _Run) -> int:
                 step = next(steps, None)
             if step is None:
                 break
-            results.add(step, now() - began)
+            told = None
+            if asked.jumps is not None:
+                told = asked.jumps.note(step, quiet=asked.wanted.quiet)
+            results.add(step, now() - began, told)
             last = step
             asked.doubts.note(step, quiet=asked.wanted.quiet)
             if asked.film is not None:
@@ -218,7 +232,7 @@ def _follow(steps: Iterator[TimeStep], results: RunFolder, asked: _Run) -> int:
         _report(asked.film, results, asked)
     if not asked.wanted.quiet:
         _summary(results, asked)
-        for line in asked.doubts.lines():
+        for line in asked.lines():
             click.echo(line)
     return code
 
@@ -280,7 +294,7 @@ def _report(film: Film, results: RunFolder, asked: _Run) -> None:
 
     table, case = results.table, asked.case
     note = asked.unfinished(float(table["time"][-1]))
-    told = (*asked.doubts.lines(), *case.notes)
+    told = (*asked.lines(), *case.notes)
     page = run_page(film, table, case.title, case.units, note, told)
     save_page(page, results.folder / REPORT)
 

@@ -35,7 +35,8 @@ WORKS = tuple(field.name for field in fields_of(Energies))
 WHOLE = ("index", "open", "slip", "stick", "iterations")
 SUMMED = tuple(name for name in WORKS if name not in ("kinetic", "elastic"))  # of a step each
 COLUMNS = ("index", "time", "open", "slip", "stick", *WORKS, "defect", "iterations", "error",
-           "seconds", "jump")  # fmt: skip
+           "seconds", "jump", "jump_possible")  # fmt: skip
+LATER = ("jump_possible",)  # columns that a checkpoint of an older version lacks
 MOST_NUMBERS = 400  # columns of pairs and supports: HDF5 keeps a row's names in 64 kB
 STATE, TABLE, FILM, BALANCE = "state.h5", "steps.csv", "steps.pvd", "energy.png"
 RECORD = "solution.json"
@@ -64,9 +65,12 @@ class RunFolder:
     saved: int = -1
     record: dict[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    rates: dict[str, Any] | None = None  # of the last step, where they were asked for
 
-    def add(self, step: TimeStep, seconds: float) -> None:
-        """Take a step into the table."""
+    def add(
+        self, step: TimeStep, seconds: float, rates: dict[str, Any] | None = None
+    ) -> None:
+        """Take a step into the table; rates: the record of what was asked of them."""
         e, record = step.energies, step.solution.convergence
         counts = [int((step.status == status).sum()) for status in ContactStatus]
         jumped = step.passage is not None and step.passage.jumped
@@ -74,8 +78,9 @@ class RunFolder:
         numbers = _in_columns(step, self.numbers)
         self.rows.append((
             step.state.index, step.time, *counts, *(getattr(e, name) for name in WORKS),
-            e.defect, record.iterations, record.error, seconds, jump, *numbers,
+            e.defect, record.iterations, record.error, seconds, jump, _number(rates), *numbers,
         ))  # fmt: skip
+        self.rates = rates
 
     def draw(self, step: TimeStep) -> None:
         """Write the VTK file of a step, once."""
@@ -89,6 +94,8 @@ class RunFolder:
     def keep(self, step: TimeStep) -> None:
         """Write the checkpoint of a step, then the files that follow from it."""
         self.record = step_record(step, self.title, self.works()) | {"notes": [*self.notes]}
+        if self.rates is not None:
+            self.record["rates"] = self.rates
         self.save(step.state)
 
     def save(self, state: State) -> None:
@@ -121,6 +128,12 @@ class RunFolder:
     def table(self) -> NDArray[np.void]:
         """All rows, (steps,), fields COLUMNS and numbers; NaN: no jump, or not known."""
         return np.array(self.rows, dtype=row_of(self.numbers))
+
+
+def _number(rates: dict[str, Any] | None) -> float:
+    """1 where a jump is possible, 0 where not, NaN where that is not known."""
+    known = None if rates is None else rates["jump_possible"]
+    return np.nan if known is None else float(known)
 
 
 def row_of(numbers: tuple[str, ...]) -> np.dtype:
@@ -172,7 +185,8 @@ def continued(
     found = load_checkpoint(path)
     indices = np.arange(1, found.state.index + 1)
     names = found.table.dtype.names or ()
-    if not set(COLUMNS) <= set(names) or not np.array_equal(found.table["index"], indices):
+    lacking = set(COLUMNS) - set(LATER) - set(names)
+    if lacking or not np.array_equal(found.table["index"], indices):
         raise FileFormatError(
             f"{path}: /amontons_run/table: expected {found.state.index} rows with "
             f"{', '.join(COLUMNS)}"

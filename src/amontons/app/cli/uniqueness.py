@@ -6,10 +6,12 @@ from collections.abc import Sequence
 
 import click
 
-from ...analysis.certificates.verdict import Verdict
+from ...analysis.certificates.verdict import Uniqueness, Verdict
+from ...analysis.solutions.enumerate import Solutions
 from ...core.errors import InvalidInput
 from ...io.certificates import check_certificate, write_certificate
 from ...io.results import to_json, verdict_record
+from ...mechanics.model import Model
 from ...problem.friction import FrictionProblem
 from ..questions import uniqueness
 from .sources import open_source
@@ -37,18 +39,27 @@ def run(
         say_when(opened.target)
     if json_copy is not None:
         deliver_json(to_json(verdict_record(found)), json_copy)
-    if certificate is not None:
-        problem = target if isinstance(target, FrictionProblem) else target.assemble()
-        try:
-            claim = write_certificate(problem, found, certificate)
-        except InvalidInput as reason:  # the verdict stands
-            click.echo(f"No certificate was written: {reason}", err=True)
-            return UNSETTLED
-        click.echo(f"{claim}: certificate in {certificate}; see amontons check",
-                   err=json_copy == "-")  # fmt: skip
+    if certificate is not None and not deliver_certificate(
+        target, found, certificate, json_copy == "-"
+    ):
+        return UNSETTLED
     if found.verdict is not Verdict.UNDECIDED:
         return 0
     return UNSETTLED if stop.received is None else stop.code
+
+
+def deliver_certificate(
+    target: Model | FrictionProblem, found: Uniqueness | Solutions, path: str, err: bool
+) -> bool:
+    """Write what proves an answer and say so, err: on stderr; False where nothing does."""
+    problem = target if isinstance(target, FrictionProblem) else target.assemble()
+    try:
+        claim = write_certificate(problem, found, path)
+    except InvalidInput as reason:  # the answer stands
+        click.echo(f"No certificate was written: {reason}", err=True)
+        return False
+    click.echo(f"{claim}: certificate in {path}; see amontons check", err=err)
+    return True
 
 
 def check(path: str) -> int:
