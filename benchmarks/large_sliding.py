@@ -60,8 +60,8 @@ MORE_RUNS = {  # where two programs differ: finer in mesh, load step and stiffne
     "rolling tyre": (
         "amontons, quarter steps", "amontons, fine, half steps",
         "amontons, fine, quarter steps", "amontons, fine, exchanged", "amontons, finer",
-        "amontons, finer, half steps", "GetFEM, fine, half steps", "GetFEM, fine, x 10",
-        f"{THIRD}, half steps", f"{THIRD}, half steps, x 3", f"{THIRD}, quarter steps",
+        "GetFEM, fine, half steps", "GetFEM, fine, x 10", f"{THIRD}, half steps",
+        f"{THIRD}, half steps, x 3", f"{THIRD}, quarter steps",
         f"{THIRD}, fine, half steps",
     ),
     "folded strip": ("GetFEM, fine, x 10",),

@@ -14,6 +14,14 @@ FORCES = {"turned by 360 degrees": ((2, "normal"), (3, "moment")),
 USUAL = ((2, "normal"), (1, "horizontal"))
 ONE = ("Hertz, large",)  # nothing but a normal force
 THIRD = "third method"
+LIMITS = {  # runs from which a program's limit is taken: both meshes, load steps on each
+    "rolling tyre": (
+        ("amontons", "amontons, half steps", "amontons, quarter steps",
+         "amontons, fine, half steps", "amontons, fine, quarter steps"),
+        ("GetFEM", "GetFEM, x 10", "GetFEM, fine, x 10"),
+        (THIRD, f"{THIRD}, half steps", f"{THIRD}, fine, half steps"),
+    ),
+}  # fmt: skip
 WHOLE = ("folded strip",)  # let go in the second half: the whole path is compared
 
 
@@ -119,6 +127,27 @@ def beside_third(rows, name):
     return out
 
 
+def extrapolated(rows, name):
+    """Lines of the table of limits about a case, beside that of the third method, its last."""
+    found = {row["program"]: curves(row) for row in rows if row["case"] == name}
+    limits = []
+    for text, *runs in LIMITS.get(name, ()):
+        meshes = [found.get(runs[0]), found.get(runs[-1])]
+        if len(runs) == 4:  # whole and half load steps on both meshes: an error of first order
+            pairs = [[found.get(program) for program in some] for some in (runs[:2], runs[2:])]
+            meshes = [None if one is None or two is None
+                      else 2 * two - one for one, two in pairs]  # fmt: skip
+        at_limit = limit_of(*meshes)
+        if at_limit is not None:
+            limits.append((text, runs, at_limit))
+    out = []
+    for text, runs, curve in limits:
+        means = np.abs(curve.mean(axis=0))
+        out.append([name, text, "; ".join(runs), ", ".join(f"{value:.4g}" for value in means),
+                    apart(curve, limits[-1][2])])  # fmt: skip
+    return out
+
+
 def table(head, lines):
     """Lines of a table."""
     return [f"| {' | '.join(map(str, line))} |" for line in (head, ["---"] * len(head), *lines)]
@@ -129,6 +158,7 @@ def written(rows, cases, programs):
     rows = [row for row in rows if row["case"] in cases and row["program"] in programs]
     rows.sort(key=lambda r: (cases.index(r["case"]), programs.index(r["program"])))
     third = [line for name in cases for line in beside_third(rows, name)]
+    limits = [line for name in cases for line in extrapolated(rows, name)]
     both = [line for name in cases for line in compared(rows, name)]
     lines = ["# Two bodies that slide far", "", "`python -m benchmarks.large_sliding`", "",
              "; ".join(f"{k} {v}" for k, v in describe().items()), "",
@@ -147,7 +177,11 @@ def written(rows, cases, programs):
              "master, bodies of rotation by their meridian. Means of all forces, and how far "
              "they and the curves (root mean squares) are from its finest run, in percent.", "",
              *table(["case", "program", "unknowns", "load steps", "means", "means apart",
-                     "curves apart"], third), ""]  # fmt: skip
+                     "curves apart"], third), "",
+             "Limits of zero width at an error of second order, with four runs those of zero "
+             "load steps at one of first order before, and how far their curves are from that "
+             "of the third method.", "",
+             *table(["case", "program", "from", "means", "apart"], limits), ""]  # fmt: skip
     notes = RESULTS / "large_sliding_notes.txt"
     text = "\n".join(lines) + ("\n" + notes.read_text() if notes.exists() else "")
     (RESULTS / "large_sliding.md").write_text(text)
