@@ -12,6 +12,8 @@ Runs are added to results/large_sliding.json, and results/large_sliding.md is wr
 of them; --only runs those whose name, "case; program", holds the text, --limit: CPU seconds of
 one.  A second table compares with every peer's own limit: its stiffness (CalculiX: the penalty,
 GetFEM: r) times 10 and 100, all with half the mesh width, and load steps of half the length.
+Where programs differ in the limit a third method, `large_sliding_reference`, and runs that are
+finer in mesh and load steps at once show who is right (a third table).
 """
 
 import os
@@ -36,6 +38,8 @@ from large_sliding_models import CASES, Case, split_off_volume
 from large_sliding_more import MORE
 from large_sliding_page import written
 from large_sliding_peers import by_getfem, setting
+from large_sliding_reference import meridian
+from large_sliding_reference import solved as by_third_method
 
 import amontons as am
 
@@ -48,6 +52,23 @@ PEERS = ("amontons, half steps", "amontons, fine", "amontons, law of CalculiX",
          "CalculiX, x 10, fine")  # fmt: skip
 ALONE = ("ironing, second order", "ironing, beyond the rim", "turned, second order")
 ALL = CASES | MORE
+MESHES = {"fine": 2, "finer": 4}  # times as many cells
+STEPS = {"half steps": 2, "quarter steps": 4}  # parts of a load step
+THIRD = "third method"
+ROUND = ("pressed into a tube",)  # given to it by its meridian
+MORE_RUNS = {  # where two programs differ: finer in mesh, load step and stiffness
+    "rolling tyre": (
+        "amontons, quarter steps", "amontons, fine, half steps",
+        "amontons, fine, quarter steps", "amontons, fine, exchanged", "amontons, finer",
+        "GetFEM, fine, half steps", "GetFEM, fine, x 10", f"{THIRD}, half steps",
+        f"{THIRD}, half steps, x 3", f"{THIRD}, quarter steps",
+        f"{THIRD}, fine, half steps",
+    ),
+    "pressed into a tube": (
+        "amontons, fine, exchanged", f"{THIRD}, fine", f"{THIRD}, fine, half steps",
+        f"{THIRD}, finer",
+    ),
+}  # fmt: skip
 
 
 def by_amontons(case, given, swap=False, law=am.NeoHookean, limit=600):
@@ -92,15 +113,19 @@ def in_parts(case, parts):
 def child(name, program, limit):
     """One run; its row as JSON on the last line."""
     words = program.split(", ")
-    case = ALL[name](fine=2) if "fine" in words else ALL[name]()
-    parts = 2 if "half steps" in words else 1
+    fine = max(MESHES.get(word, 1) for word in words)
+    case = ALL[name](fine=fine) if fine > 1 else ALL[name]()
+    parts = max(STEPS.get(word, 1) for word in words)
     case = in_parts(case, parts)
     swap = "exchanged" in words
-    given = setting(case, swap)
+    round_ = words[0] == THIRD and name in ROUND
+    given = meridian(fine, parts) if round_ else setting(case, swap)
     factor = float(next((word[2:] for word in words if word.startswith("x ")), 1.0))
     if words[0] == "amontons":
         law = split_off_volume if "law of CalculiX" in words else am.NeoHookean
         row = by_amontons(case, given, swap, law, limit)
+    elif words[0] == THIRD:
+        row = by_third_method(given, limit, factor, round_)
     else:
         by = by_getfem if words[0] == "GetFEM" else by_calculix
         with tempfile.TemporaryDirectory() as folder:
@@ -108,6 +133,16 @@ def child(name, program, limit):
     row["forces"] = [[force[0] / parts, *force[1:]] for force in row["forces"]]
     row |= {"facet": given.facet, "unknowns": given.unknowns}
     print(json.dumps({"case": name, "program": program, **row}))
+
+
+def of_program(text):
+    """Sorts by program, as in the lists above."""
+    return ("amontons", "GetFEM", "CalculiX", THIRD).index(text.split(", ")[0])
+
+
+def programs_of(name):
+    """What runs a case."""
+    return OURS if name in ALONE else (*OURS, *PEERS, *MORE_RUNS.get(name, ()))
 
 
 def main():
@@ -125,7 +160,7 @@ def main():
     stored = HERE / "results" / "large_sliding.json"
     rows = json.loads(stored.read_text()) if stored.exists() else []
     for name in ALL if not asked.page else ():
-        for program in OURS if name in ALONE else OURS + PEERS:
+        for program in programs_of(name):
             there = any((r["case"], r["program"]) == (name, program) for r in rows)
             wanted = not asked.only or any(text in f"{name}; {program};" for text in asked.only)
             if not wanted or (asked.missing and there):
@@ -142,7 +177,8 @@ def main():
                   f"{row['seconds']:.1f}", *row["forces"][-1:], row["why"], sep=" | ",
                   flush=True)  # fmt: skip
             stored.write_text(json.dumps(rows) + "\n")
-    written(rows, list(ALL), [*OURS, *PEERS])
+    more = dict.fromkeys(program for some in MORE_RUNS.values() for program in some)
+    written(rows, list(ALL), sorted([*OURS, *PEERS, *more], key=of_program))
 
 
 if __name__ == "__main__":

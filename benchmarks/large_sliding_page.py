@@ -13,6 +13,15 @@ FORCES = {"turned by 360 degrees": ((2, "normal"), (3, "moment")),
           "pressed into a tube": ((2, "axial"),)}  # fmt: skip
 USUAL = ((2, "normal"), (1, "horizontal"))
 ONE = ("Hertz, large",)  # nothing but a normal force
+THIRD = "third method"
+LIMITS = {  # runs from which a program's limit is taken: both meshes, load steps on each
+    "rolling tyre": (
+        ("amontons", "amontons, half steps", "amontons, quarter steps",
+         "amontons, fine, half steps", "amontons, fine, quarter steps"),
+        ("GetFEM", "GetFEM, x 10", "GetFEM, fine, x 10"),
+        (THIRD, f"{THIRD}, half steps", f"{THIRD}, fine, half steps"),
+    ),
+}  # fmt: skip
 WHOLE = ("folded strip",)  # let go in the second half: the whole path is compared
 
 
@@ -96,6 +105,49 @@ def compared(rows, name):
     return out
 
 
+def beside_third(rows, name):
+    """Lines of the third table about a case: every run beside the finest of a third method."""
+    whole = [row for row in rows if row["case"] == name and curves(row) is not None]
+    third = [row for row in whole if row["program"].startswith(THIRD)]
+    if not third:
+        return []
+    finest = max(third, key=lambda row: (row["unknowns"], row["steps"]))
+    sides = curves(finest)
+    out = []
+    for row in whole:
+        if row["program"].startswith("CalculiX"):
+            continue
+        mine = curves(row)
+        means = np.abs(mine.mean(axis=0))
+        away = 100 * (means / np.abs(sides.mean(axis=0)) - 1)
+        out.append([name, row["program"], row["unknowns"], row["steps"],
+                    ", ".join(f"{value:.4g}" for value in means),
+                    ", ".join(f"{value:+.1f}" for value in away),
+                    apart(mine, sides) if row is not finest else ""])  # fmt: skip
+    return out
+
+
+def extrapolated(rows, name):
+    """Lines of the table of limits about a case, beside that of the third method, its last."""
+    found = {row["program"]: curves(row) for row in rows if row["case"] == name}
+    limits = []
+    for text, *runs in LIMITS.get(name, ()):
+        meshes = [found.get(runs[0]), found.get(runs[-1])]
+        if len(runs) == 4:  # whole and half load steps on both meshes: an error of first order
+            pairs = [[found.get(program) for program in some] for some in (runs[:2], runs[2:])]
+            meshes = [None if one is None or two is None
+                      else 2 * two - one for one, two in pairs]  # fmt: skip
+        at_limit = limit_of(*meshes)
+        if at_limit is not None:
+            limits.append((text, runs, at_limit))
+    out = []
+    for text, runs, curve in limits:
+        means = np.abs(curve.mean(axis=0))
+        out.append([name, text, "; ".join(runs), ", ".join(f"{value:.4g}" for value in means),
+                    apart(curve, limits[-1][2])])  # fmt: skip
+    return out
+
+
 def table(head, lines):
     """Lines of a table."""
     return [f"| {' | '.join(map(str, line))} |" for line in (head, ["---"] * len(head), *lines)]
@@ -105,6 +157,8 @@ def written(rows, cases, programs):
     """Write results/large_sliding.md."""
     rows = [row for row in rows if row["case"] in cases and row["program"] in programs]
     rows.sort(key=lambda r: (cases.index(r["case"]), programs.index(r["program"])))
+    third = [line for name in cases for line in beside_third(rows, name)]
+    limits = [line for name in cases for line in extrapolated(rows, name)]
     both = [line for name in cases for line in compared(rows, name)]
     lines = ["# Two bodies that slide far", "", "`python -m benchmarks.large_sliding`", "",
              "; ".join(f"{k} {v}" for k, v in describe().items()), "",
@@ -117,7 +171,17 @@ def written(rows, cases, programs):
              "itself changes where the other side is the slave. Empty: a path that ended or "
              "was not run. Last column: its CPU time over that of amontons.", "",
              *table(["case", "beside", "x 1", "x 10", "x 100", "half the width", "limit",
-                     "half the steps", "time over ours"], both), ""]  # fmt: skip
+                     "half the steps", "time over ours"], both), "",
+             "## Beside a third method", "",
+             "`large_sliding_reference.py`: a penalty at points of facets with anchors in the "
+             "master, bodies of rotation by their meridian. Means of all forces, and how far "
+             "they and the curves (root mean squares) are from its finest run, in percent.", "",
+             *table(["case", "program", "unknowns", "load steps", "means", "means apart",
+                     "curves apart"], third), "",
+             "Limits of zero width at an error of second order, with four runs those of zero "
+             "load steps at one of first order before, and how far their curves are from that "
+             "of the third method.", "",
+             *table(["case", "program", "from", "means", "apart"], limits), ""]  # fmt: skip
     notes = RESULTS / "large_sliding_notes.txt"
     text = "\n".join(lines) + ("\n" + notes.read_text() if notes.exists() else "")
     (RESULTS / "large_sliding.md").write_text(text)
