@@ -28,7 +28,7 @@ from scipy import sparse
 
 from ..core.errors import SingularOperator
 from .petsc import PREFIX, Petsc, petsc
-from .spread_levels import FollowingLevels
+from .spread_levels import FollowingLevels, small_products
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -299,9 +299,10 @@ class SpreadMatrix:
         """Multigrid of the matrix as it is now, or what else the preconditioner is."""
         self.rebuilt += 1
         self._built = self.held.copy()
-        self.ksp.setUp()
         if self.levels is not None:
             self.levels.destroy()
+        with small_products(self.comm):
+            self.ksp.setUp()
         pc = self.ksp.getPC()
         if pc.getType() == "gamg":
             self.levels = FollowingLevels(pc, self.A, *self._changing[1], self._values)
