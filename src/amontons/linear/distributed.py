@@ -13,8 +13,8 @@ the rows that have an entry in the row or column of a direction that may ever be
 A x with these rows taken from there.
 
 GMRES is preconditioned from the right by multigrid (GAMG).  Its aggregates are made once.  Its
-coarse matrices follow (`spread_levels`), and are made anew only when an iteration gains far less
-than it did, or with another preconditioner also when many directions have changed.
+coarse matrices follow (`spread_levels`), and are made anew only when an iteration gains far
+less than it did; another preconditioner also when many directions have changed.
 """
 
 from __future__ import annotations
@@ -95,8 +95,8 @@ class SpreadMatrix:
 
     def destroy(self) -> None:
         """Give the memory back; all processes have to, and have no use of this object then."""
-        for part in (self.levels, self.ksp, self.A, self.T, self.touched, self._fetch, self._near, self._x,
-                     self._y, self._rest):  # fmt: skip
+        for part in (self.levels, self.ksp, self.A, self.T, self.touched, self._fetch,
+                     self._near, self._x, self._y, self._rest):  # fmt: skip
             if part is not None:
                 part.destroy()
 

@@ -46,7 +46,8 @@ class FollowingLevels:
         )  # fmt: skip
         finest = pc.getMGLevels() - 1
         self._down = [pc.getMGInterpolation(k) for k in range(finest, 0, -1)]
-        self._coarse = [pc.getMGSmoother(k).getOperators()[0] for k in range(finest - 1, -1, -1)]
+        below = range(finest - 1, -1, -1)
+        self._coarse = [pc.getMGSmoother(k).getOperators()[0] for k in below]
         self._products: list[Any] = [None] * finest
 
     def follow(self, values: Array) -> None:
