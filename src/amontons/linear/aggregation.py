@@ -27,6 +27,7 @@ from scipy import sparse
 
 from .chunks import units_of
 from .node_blocks import NodeBlocks
+from .products import product
 from .transfer import Transfer
 from .vectors import dot, norm
 
@@ -119,7 +120,7 @@ def _smoothed(A: NodeBlocks, T: sparse.bsr_array, omega: float) -> sparse.bsr_ar
     n = 3 * A.nodes
     scaled = np.matmul(np.repeat(A.inverse, np.diff(A.indptr), axis=0), A.data)
     matrix = sparse.bsr_array((scaled, A.indices, A.indptr), shape=(n, n))
-    step = sparse.bsr_array(matrix @ T)
+    step = product(matrix, T)
     step.data *= -omega
     return sparse.bsr_array((T + step).tobsr((3, 3)))
 

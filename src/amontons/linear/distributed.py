@@ -13,8 +13,8 @@ the rows that have an entry in the row or column of a direction that may ever be
 A x with these rows taken from there.
 
 GMRES is preconditioned from the right by multigrid (GAMG).  Its aggregates are made once.  Its
-coarse matrices are made anew only when they have become bad: when many directions have changed,
-or an iteration gains less than it did.
+coarse matrices follow (`spread_levels`), and are made anew only when an iteration gains far
+less than it did; another preconditioner also when many directions have changed.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from scipy import sparse
 
 from ..core.errors import SingularOperator
 from .petsc import PREFIX, Petsc, petsc
+from .spread_levels import FollowingLevels, small_products
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -59,16 +60,16 @@ class SpreadMatrix:
     rows: K of the own unknowns in blocks (own, n), columns in the numbers of PETSc,
     where processes follow one another; basis: T = I + C (own, n) in which contact is seen on
     one side, C C = 0, None where nobody has one (the same answer on all processes).
-    modes (own, k): rigid motions; d: unknowns a node; may_be_held (own,): directions that are
-    held, or may be; directions: of all contacts, which may change.
+    modes (own, k): rigid motions; d: unknowns a node; fixed, contact (own,): directions that
+    supports hold, and those of contacts, whose rows and columns change from step to step.
     """
 
     def __init__(  # noqa: PLR0913  # what a matrix is made of
         self, comm: Any, rows: sparse.bsr_array, basis: sparse.bsr_array | None, *,
-        modes: Array, d: int, may_be_held: Mask, directions: int, options: Petsc,
+        modes: Array, d: int, fixed: Mask, contact: Mask, options: Petsc,
     ) -> None:  # fmt: skip
-        self.comm, self.d, self.options, self.directions = comm, d, options, directions
-        self.own = len(may_be_held)
+        self.comm, self.d, self.options = comm, d, options
+        self.own, self.directions = len(fixed), int(comm.allreduce(int(contact.sum())))
         self.A = _matrix(comm, rows, d)
         self.T = None
         if basis is not None:
@@ -82,10 +83,11 @@ class SpreadMatrix:
         self._x, self._y = self.A.createVecs()
         self.A.getDiagonal(self._x)
         self.diagonal = self._x.array_r.copy()
-        self._take_rows(may_be_held)
+        self._take_rows(fixed | contact, contact)
         self._give_modes(modes)
         self.held = np.zeros(self.own, dtype=bool)
         self.ksp: Any = None
+        self.levels: FollowingLevels | None = None
         self._fresh = True
         self.iterations = self.rebuilt = 0
         self._built = np.zeros(self.own, dtype=bool)
@@ -93,8 +95,8 @@ class SpreadMatrix:
 
     def destroy(self) -> None:
         """Give the memory back; all processes have to, and have no use of this object then."""
-        for part in (self.ksp, self.A, self.T, self.touched, self._fetch, self._near, self._x,
-                     self._y, self._rest):  # fmt: skip
+        for part in (self.levels, self.ksp, self.A, self.T, self.touched, self._fetch,
+                     self._near, self._x, self._y, self._rest):  # fmt: skip
             if part is not None:
                 part.destroy()
 
@@ -128,7 +130,7 @@ class SpreadMatrix:
         return f if self.T is None else 2 * f - self.load_in_basis(f)
 
     # ------------------------------------------------------------------ set-up
-    def _take_rows(self, may_be_held: Mask) -> None:
+    def _take_rows(self, may_be_held: Mask, changing: Mask) -> None:
         """Keep the rows that have an entry in the row or column of a marked direction."""
         PETSc = petsc()
         index = (self.first + np.flatnonzero(may_be_held)).astype(PETSc.IntType)
@@ -158,6 +160,24 @@ class SpreadMatrix:
             self._near, None,
         )  # fmt: skip
         flags.destroy()
+        self._find_changing(changing)
+
+    def _find_changing(self, changing: Mask) -> None:
+        """Which of the touched rows have an entry in the row or column of such a direction."""
+        pointers, columns, _ = self._pattern
+        entries = self._fetched(changing)[self._place] | changing[self._of]
+        near = np.repeat(np.arange(len(self.touched_rows)), np.diff(pointers))[entries]
+        some = np.unique(near)
+        counts = np.diff(pointers)[some]
+        ends = np.concatenate([[0], np.cumsum(counts)])
+        slots = np.arange(ends[-1]) + np.repeat(pointers[some] - ends[:-1], counts)
+        self._changing = slots, (self.touched_rows[some], ends, columns[slots])
+
+    def _fetched(self, mine: Mask) -> Mask:
+        """A mask of own directions at the columns of the touched rows, of all processes."""
+        self._x.array = mine.astype(float)
+        self._fetch.scatter(self._x, self._near, mode=petsc().ScatterMode.FORWARD)
+        return self._near.array_r > 0
 
     def _give_modes(self, modes: Array) -> None:
         """Rigid motions in the basis, orthonormal, as PETSc asks for."""
@@ -188,10 +208,8 @@ class SpreadMatrix:
     def hold(self, held: Mask, sliding: Sliding) -> None:
         """Hold own directions (own,), and let contacts slide by their conditions."""
         PETSc = petsc()
-        self._x.array = held.astype(float)
-        self._fetch.scatter(self._x, self._near, mode=PETSc.ScatterMode.FORWARD)
         pointers, columns, values = self._pattern
-        free = np.where(self._near.array_r[self._place] > 0, 0.0, values)  # columns
+        free = np.where(self._fetched(held)[self._place], 0.0, values)  # columns
         values = np.where(held[self._of], 0.0, free)
         mine = self._on_diagonal & held[self._of]
         values[mine] = self.diagonal[self._of[mine]]
@@ -201,6 +219,7 @@ class SpreadMatrix:
         if len(index):
             self.A.setValuesIJV(pointers, columns, values, rowmap=index)
         self.A.assemble()
+        self._values = values[self._changing[0]]
         self._changed = float(self.total(int((held != self._built).sum())))
 
     def _let_slide(self, values: Array, free: Array, sliding: Sliding) -> None:
@@ -210,15 +229,19 @@ class SpreadMatrix:
         stands a whole number of rows further on.
         """
         pointers, columns, _ = self._pattern
-        d = self.d
-        at = np.searchsorted(self.touched_rows, sliding.rows)
-        for contact, a in np.argwhere(sliding.wanted):
-            spans = [slice(*pointers[row : row + 2]) for row in at[contact]]
-            out = sliding.G_r[contact, a] @ np.stack([free[spans[b]] for b in range(d)])
-            where = np.searchsorted(columns[spans[a]], self.first + sliding.rows[contact])
-            out[where] += np.where(self.held[sliding.rows[contact]], 0.0,
-                                   sliding.G_u[contact, a])  # fmt: skip
-            values[spans[a]] = out
+        d, rows = self.d, sliding.rows
+        starts = pointers[np.searchsorted(self.touched_rows, rows)]
+        count = pointers[1 + np.searchsorted(self.touched_rows, rows[:, 0])] - starts[:, 0]
+        of = np.repeat(np.arange(len(rows)), count)
+        entry = starts[of].T + np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count)
+        beside = columns[entry[0]] - self.first - rows[of, 0]  # direction of the same node
+        own = np.flatnonzero((beside >= 0) & (beside < d))
+        G_u = np.where(self.held[rows][:, None, :], 0.0, sliding.G_u)
+        for a in range(d):
+            out = np.einsum("kb,bk->k", sliding.G_r[of, a], free[entry])
+            out[own] += G_u[of[own], a, beside[own]]
+            wanted = sliding.wanted[of, a]
+            values[entry[a, wanted]] = out[wanted]
 
     # ------------------------------------------------------------------ products
     def times(self, x: Array) -> Array:
@@ -258,19 +281,31 @@ class SpreadMatrix:
         return np.where(self.held, 0.0, x.array_r)
 
     def _prepare(self) -> None:
-        """Make the solver, or let multigrid follow the matrix where it is time to."""
+        """Make the solver, or let multigrid follow the matrix, anew where it is time to."""
         if self.ksp is None:
             self.ksp = krylov_of_steps(self.A)
             self._fresh = True
         else:
-            many = self._changed > CHANGED * self.directions
+            many = self.levels is None and self._changed > CHANGED * self.directions
             self._fresh = many or self._stale
             self.ksp.getPC().setReusePreconditioner(not self._fresh)
             self.ksp.setOperators(self.A)
         if self._fresh:
-            self.rebuilt += 1
-            self._built = self.held.copy()
+            self._make_levels()
+        elif self.levels is not None:
+            self.levels.follow(self._values)
+
+    def _make_levels(self) -> None:
+        """Multigrid of the matrix as it is now, or what else the preconditioner is."""
+        self.rebuilt += 1
+        self._built = self.held.copy()
+        if self.levels is not None:
+            self.levels.destroy()
+        with small_products(self.comm):
             self.ksp.setUp()
+        pc = self.ksp.getPC()
+        if pc.getType() == "gamg":
+            self.levels = FollowingLevels(pc, self.A, *self._changing[1], self._values)
 
 
 def krylov_of_steps(A: Any) -> Any:

@@ -14,6 +14,7 @@ from ..core.compiled import njit
 from ..core.threads import over_rows
 from .box_transfer import add_in_box, restrict_in_box
 from .node_blocks import NodeBlocks, row_product, with_diagonal
+from .products import product
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -184,8 +185,7 @@ class Transfer:
 def _galerkin_blocks(P: Transfer, A: NodeBlocks) -> NodeBlocks:
     tiles = sparse.bsr_array((P.blocks, P.indices, P.indptr), shape=(3 * P.fine, 3 * P.coarse))
     matrix = sparse.bsr_array((A.data, A.indices, A.indptr), shape=(3 * A.nodes, 3 * A.nodes))
-    coarse = (tiles.T.tobsr((3, 3)) @ (matrix @ tiles)).tobsr((3, 3))
-    coarse = with_diagonal(coarse)
+    coarse = with_diagonal(product(tiles.T.tobsr((3, 3)), product(matrix, tiles)))
     data = np.asarray(coarse.data, dtype=float)
     _set_idle(coarse.indptr, coarse.indices, data, _mask(P.coarse_idle, P.coarse))
     return NodeBlocks.of(coarse.indptr, coarse.indices, data)

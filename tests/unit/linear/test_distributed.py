@@ -283,6 +283,29 @@ except am.InvalidInput as error:
     print(error, flush=True)
 """
 
+FOLLOWED = """
+import amontons as am
+from amontons.linear.distributed import SpreadMatrix
+plain, off = SpreadMatrix.solve, []
+def solve(self, b, reduction):
+    x = plain(self, b, reduction)
+    pc, fine = self.ksp.getPC(), self.A
+    for k in range(pc.getMGLevels() - 1, 0, -1):
+        fine = fine.PtAP(pc.getMGInterpolation(k))
+        coarse = pc.getMGSmoother(k - 1).getOperators()[0].copy()
+        coarse.axpy(-1.0, fine)
+        off.append(coarse.norm() / fine.norm())
+    return x
+SpreadMatrix.solve = solve
+solution = am.distributed(lambda: am.Model(
+    [am.Body(am.box((1, 1, 1), cells=5), am.LinearElastic(young=1, poisson=0.3))],
+    supports=[am.Fix("top", lambda x: (0.05, 0.1, -0.02 - 0.1 * x[0]))],
+    contacts=[am.Contact("bottom", am.Plane(normal=(0, 0, 1)), mu=0.5)]))
+solution.check()
+assert solution.rebuilt == 1 and len(off) > 4 and max(off) < 1e-12, (solution.rebuilt, off)
+print("fine", flush=True)
+"""
+
 
 @pytest.fixture
 def on_two():
@@ -349,3 +372,10 @@ def test_an_error_of_the_first_process_reaches_both(on_two):
     done = on_two("-c", WRONG)
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("no such mesh") == 2
+
+
+def test_coarse_matrices_follow_the_contacts(on_two):
+    """They are the products P' A P of the matrix of every step, though made once."""
+    done = on_two("-c", FOLLOWED)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("fine") == 2

@@ -195,12 +195,11 @@ def _problem(
         return out.reshape(values.shape)
 
     fixed = share.fixed.ravel()
-    may_be_held = fixed.copy()
-    may_be_held[dofs] = True
+    contact = np.zeros(len(fixed), dtype=bool)
+    contact[dofs] = True
     matrix = SpreadMatrix(
         comm, K, _basis(share, comm.rank) if share.coupled else None,
-        modes=turned(share.modes), d=d, may_be_held=may_be_held,
-        directions=share.all_contacts * d, options=options,
+        modes=turned(share.modes), d=d, fixed=fixed, contact=contact, options=options,
     )  # fmt: skip
     y = matrix.to_basis(turned(share.prescribed.ravel()))
     y[~fixed] = 0.0

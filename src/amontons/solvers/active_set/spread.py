@@ -33,7 +33,7 @@ from .conditions import Conditions, Modification, Settings, conditions, newton_c
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
-LOOSE = 0.1  # reduction of the linear residual while sets change
+LOOSE = 0.03  # reduction of the linear residual while sets change
 LAGS_AFTER = 14  # steps after which the bound of friction lags behind, [HSW] Algorithm 2
 MOST_STEPS = 60
 MOST_IDLE = 15  # steps without a smaller error
