@@ -233,17 +233,34 @@ def test_the_rate_is_told_from_where_a_method_has_got_to():
     def smoothed(state):
         where, best = 100 * state.first_error, state.first_error
         yield Chunk(state.start, 0, 0.0)
-        for k in range(60):  # far above its start at first, where it begins anew once
-            where = 100 * state.first_error if k == 10 else 0.5 * where
+        for _ in range(60):  # far above its start at first
+            where *= 0.5
             best = where if where <= state.goal else best
-            _ = yield Chunk(state.start, 1, UNIT, error=best, path=where, anew=k in (0, 10))
+            yield Chunk(state.start, 1, UNIT, error=best, path=where)
 
     spent, done = costs(Entry("slow", falling(0.9, 1.0)),
                         Entry("smoothed", smoothed, share=0.3, needs=lambda state: 5 * UNIT),
                         most=400)  # fmt: skip
     assert done
-    assert spent["smoothed"] > 40
+    assert spent["smoothed"] > 30
     assert spent["slow"] < 80
+
+
+def test_a_method_that_begins_again_promises_by_its_best_error_alone():
+    def begins_again(state):
+        yield Chunk(state.start, 0, 0.0)
+        for k in range(10**6):
+            path = 0.5**k * state.first_error if k < 12 else math.inf
+            _ = yield Chunk(state.start, 1, UNIT, error=state.first_error, path=path)
+
+    state = state_of(random_delassus(0, 10))
+    track = Track(Entry("again", begins_again), state)
+    for _ in range(10):
+        track.advance()
+    assert track.promise < 100 * UNIT
+    for _ in range(10):
+        track.advance()
+    assert track.promise == math.inf
 
 
 def test_a_race_goes_on_to_a_tighter_goal():

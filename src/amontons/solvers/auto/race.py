@@ -8,9 +8,9 @@ promises the goal for the least further cost:
 C what the track has cost and error(c) its best error then: the rate of the last part of its own
 cost, a long one, which is patience.  Smoothing Newton begins at a point far worse than the one
 that it starts from, and its best error stands until it has come back: its rate is told from the
-error of where it is, since it last began anew.  Every chunk costs a call besides.  A track that
-has promised to be there at a cost F, and has not, is believed less: its rest counts
-C / (GRACE F) times.  Besides
+error of where it is, the first time; once it had to begin again, that promises nothing.  Every
+chunk costs a call besides.  A track that has promised to be there at a cost F, and has not, is
+believed less: its rest counts C / (GRACE F) times.  Besides
 
     unknown     a track is taken to need some part, or multiple, of all that was spent while it
                 has had a small share of it; a method of Newton's kind what it usually needs
@@ -65,7 +65,7 @@ class Chunk(NamedTuple):
 
     flops None where they are not counted; error of r, unit of u, where it is known.  path: the
     error of where a method has got to, unit of u, where r, the best that it has come by, does
-    not tell that; begun anew where it has just been.
+    not tell that.
     """
 
     r: Array
@@ -75,7 +75,6 @@ class Chunk(NamedTuple):
     error: float = math.inf
     linear_iterations: int = 0
     path: float = math.inf
-    anew: bool = False
 
 
 class Turn(NamedTuple):
@@ -122,6 +121,7 @@ class Track:
     errors: list[float] = field(default_factory=list)
     # cost and what its rate is told from: its best error, or that of where it has got to
     path: list[tuple[float, float]] = field(default_factory=list)
+    along: bool = False  # the latter
     chunks: Chunks | None = None
     promise: float = math.inf  # nanoseconds to the goal at its rate
     foreseen: float = math.inf  # the least cost at which it has promised the goal
@@ -172,13 +172,12 @@ class Track:
 
     def _go_along(self, chunk: Chunk) -> None:
         """Note what the rate is told from."""
-        if chunk.path == math.inf:
-            self.path.append((self.cost, self.errors[-1]))
-            return
-        if chunk.anew:
+        along = chunk.path < math.inf
+        if along is not self.along:
+            self.along = along
             self.path.clear()
         best = self.path[-1][1] if self.path else math.inf
-        self.path.append((self.cost, min(chunk.path, best)))
+        self.path.append((self.cost, min(chunk.path, best) if along else self.errors[-1]))
 
     def _at_its_rate(self) -> float:
         if len(self.path) <= FIRST_CHUNKS:

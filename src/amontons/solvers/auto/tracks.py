@@ -154,24 +154,24 @@ def smoothing_newton(state: State) -> Chunks:
     """
     root, x = math.sqrt(max(state.problem.contacts, 1)), state.start
     turn = yield Chunk(x, 0, 0.0)
-    afar = 0.1 * state.problem.q_norm / root
+    afar, first = 0.1 * state.problem.q_norm / root, True
     for smoothing, shrink, swept in chain(SMOOTHED, cycle(AGAIN)):
         r, error = (state.swept, state.swept_error) if swept else (state.r, state.error)
         x, sigma = r.copy(), min(smoothing * error / root, afar)
         if not smoothing:
             x, sigma = np.zeros_like(r), afar
-        solver, patience, anew = SmoothingNewton(shrink=shrink), Patience(PATIENCE), True
+        solver, patience = SmoothingNewton(shrink=shrink), Patience(PATIENCE)
         while not patience.waited > patience.most:
             steps = state.affordable(max(1, int(turn.cost / state.step_cost)))
             count, residual, sigma, found = state.work.newton(
                 x, sigma, solver, goal=0.5 * state.goal, steps=steps
             )
             cost = max(abs(count), 1) * state.step_cost
-            path = state.judge(x) if count > 0 else state.error
-            turn = yield Chunk(found, max(abs(count), 1), cost, path=path, anew=anew)
-            anew = False
+            path = state.judge(x) if first and count > 0 else math.inf
+            turn = yield Chunk(found, max(abs(count), 1), cost, path=path)
             if count < 0 or patience.over(residual):
                 break
+        first = False
 
 
 def inexact_newton(state: State) -> Chunks:
