@@ -80,7 +80,8 @@ about them, and on each class with those that are the best on all others.
 def trace(problem, entry, cap):
     """What a track does alone: first error, CPU seconds before it, and after each chunk.
 
-    Rows of CPU seconds, cost in ns by operations and best error; None where it does not run.
+    Rows of CPU seconds, cost in ns by operations, best error, the error from which its rate is
+    told, and the cost at which that began; None where it does not run.
     """
     state = State(problem, Target(1e-8), np.zeros((problem.contacts, 3)))
     if not entry.when(state):
@@ -92,6 +93,7 @@ def trace(problem, entry, cap):
         memory.sweep(SWEPT, watch_for(0.0))
         before = time.process_time() - began
         state.offer(memory.r.copy(), SWEPT, "")
+        state.swept, state.swept_error = state.r, state.error
         state.first_error = min(state.error, state.first_error)
     track, rows, seconds = Track(entry, state), [], 0.0
     gc.disable()
@@ -101,10 +103,12 @@ def trace(problem, entry, cap):
         seconds += time.process_time() - began
         if found is None:
             break
-        rows.append((seconds, track.cost, track.errors[-1] / problem.q_norm))
+        path = track.path[-1][1] / problem.q_norm
+        rows.append((seconds, track.cost, track.errors[-1] / problem.q_norm, path,
+                     track.path[0][0]))  # fmt: skip
     gc.enable()
     first = track.errors[0] / problem.q_norm if track.errors else 1.0
-    return first, np.array(rows).reshape(-1, 3), before
+    return first, np.array(rows).reshape(-1, 5), before
 
 
 def crossing(found, tolerance):
@@ -222,14 +226,16 @@ class Replay:
 
     def rate(self, goal, window, first):
         """Cost to the goal at the rate of the last part."""
-        if self.at < first:
+        path, begun = self.rows[self.at - 1, 3:] if self.at else (self.first, 0.0)
+        if self.at < first + np.searchsorted(self.rows[:, 1], begun):
             return math.inf
-        k = int(np.searchsorted(self.rows[: self.at, 1], (1 - window) * self.cost, "right")) - 1
-        cost, error = (self.rows[k, 1], self.rows[k, 2]) if k >= 0 else (0.0, self.first)
-        if not self.error < error:
+        since = self.cost - window * (self.cost - begun)
+        k = int(np.searchsorted(self.rows[: self.at, 1], since, "right")) - 1
+        cost, error = (self.rows[k, 1], self.rows[k, 3]) if k >= 0 else (0.0, self.first)
+        if not path < error:
             return math.inf
-        rest = math.log(max(self.error / goal, 1.0))
-        return rest * (self.cost - cost) / math.log(error / self.error)
+        rest = math.log(max(path / goal, 1.0))
+        return rest * (self.cost - cost) / math.log(error / path)
 
     def promise(self, goal, c):
         """Cost to the goal at its rate, more where it has broken promises."""

@@ -38,6 +38,8 @@ class Iterate:
 
     ends: None where the judge alone decides; of a method with a stopping rule of its own, ""
     while that asks for more, then the reason why it ends here.
+    goes_on: where its error will do but not its weakest contact, the method goes on to the
+    tighter goal that it is told; others are started again from here.
     """
 
     r: Array
@@ -49,18 +51,21 @@ class Iterate:
     ends: str | None = None
     flops: float | None = None  # floating point operations since the last; None: not counted
     own: tuple[float, ...] = ()  # own measure of each iteration since the last, where known
+    goes_on: bool = False
 
 
 class Judgement(NamedTuple):
     """What the driver tells a solver of the iterate that it has just handed out.
 
     error: by the criterion of the target; contact_error: of the weakest contact on its own
-    scale, None while the error alone will not do; deadline: at which the driver will stop.
+    scale, None while the error alone will not do; deadline: at which the driver will stop;
+    goal: the error that will do, at most that of the target.
     """
 
     error: float
     contact_error: float | None = None
     deadline: Deadline = NEVER
+    goal: float = np.inf
 
     @property
     def seconds_left(self) -> float:

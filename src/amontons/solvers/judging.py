@@ -64,7 +64,7 @@ class Watch:
     history: list[Step] = field(default_factory=list)
     seen: list[tuple[float, Array]] = field(default_factory=list)
     cycled: bool = False  # the last iterate was here before
-    goal: float = 0.0  # error that the solver is asked for, perhaps tighter than the tolerance
+    goal: float = 0.0  # error that the solver is asked for, perhaps below the tolerance
     content: int = 0  # iterates in a row that the judge would take, but not the criterion
     blurred: int = 0  # iterates whose error rounding hides
     mark: tuple[int, float] = (0, np.inf)  # iterate and error of the last real progress
@@ -124,7 +124,7 @@ class Watch:
     def judgement(self) -> Judgement:
         """What a solver is told of its last iterate."""
         weakest = None if self.last is None else self.last.error
-        return Judgement(self.history[-1].error, weakest, self.asked.deadline)
+        return Judgement(self.history[-1].error, weakest, self.asked.deadline, self.goal)
 
     def late(self, iterations: int) -> bool:
         """True when the time is over, of which the last iterate took so many iterations."""
@@ -182,8 +182,12 @@ class Watch:
             f"own scale, {self.asked.of_contacts:.0e} is allowed"
         )
 
-    def tighter(self, goal: float) -> float:
-        """The next goal for the error, so that the weakest contact will do too."""
+    def tighten(self) -> None:
+        """Choose the next goal for the error, so that the weakest contact will do too."""
+        self.goal = self._tighter(self.goal)
+        self.content = 0
+
+    def _tighter(self, goal: float) -> float:
         if self.asked.criterion is Criterion.NATURAL:
             return TIGHTER * goal * min(self.asked.tolerance / self.error, 1.0)
         assert self.weakest is not None
@@ -261,14 +265,13 @@ def run(
         known = start.v is not None or watch.problem.measure is Measure.EXACT
         error = watch.error if known else np.inf
         target = Target(asked.tolerance, asked.deadline, asked.criterion, error)
+        watch.goal = asked.tolerance
         ended: tuple[Outcome, str] | None = (Outcome.STAGNATED, "")
-        while target.tolerance >= TIGHTEST:
+        while watch.goal >= TIGHTEST:
             if watch.weak or ended is None:
-                goal = watch.tighter(target.tolerance)
+                watch.tighten()
                 start = watch.best or start
-                target = replace(target, tolerance=goal, start_error=watch.error)
-                watch.content = 0
-            watch.goal = target.tolerance
+                target = replace(target, tolerance=watch.goal, start_error=watch.error)
             ended = _once(watching, watch, solver, start, target)
             if ended is not None:
                 break
@@ -318,8 +321,10 @@ def _once(
                 return Outcome.MAX_ITERATIONS, ""
             if watch.late(iterate.iterations):
                 return Outcome.TIME_LIMIT, ""
-            if watch.weak and step.error <= target.tolerance and iterate.ends is None:
-                return None
+            if watch.weak and step.error <= watch.goal and iterate.ends is None:
+                if not iterate.goes_on or watch.goal < TIGHTEST:
+                    return None
+                watch.tighten()
             if watch.content > CONTENT:
                 return None
             if len(watch.history) == EARLY and watch.problem.gains_energy:

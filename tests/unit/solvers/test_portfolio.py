@@ -12,7 +12,7 @@ from amontons.solvers.auto.portfolio import MOST_TURNS, RESTARTS, TRACKS, Portfo
 from amontons.solvers.auto.race import LOST_CHUNKS, Chunk, Entry, Race, Track
 from amontons.solvers.auto.state import FEW, State, visits
 from amontons.solvers.auto.tracks import polish
-from amontons.solvers.contract import Target
+from amontons.solvers.contract import Judgement, Target
 from amontons.solvers.sweeps.kernels import by_approach, sweep_data, watch_for
 from amontons.solvers.sweeps.momentum import Momentum
 
@@ -190,7 +190,7 @@ def test_dear_steps_count_by_their_cost():
 
 
 def test_a_first_track_that_is_nearly_there_goes_on_alone():
-    spent, done = costs(Entry("first", falling(0.5, 0.01)), Entry("other", falling(0.1, 0.01)))
+    spent, done = costs(Entry("first", falling(0.1, 0.01)), Entry("other", falling(0.01, 0.01)))
     assert done
     assert list(spent) == ["first"]
 
@@ -226,7 +226,56 @@ def test_a_method_of_newtons_kind_is_given_time():
     spent, done = costs(Entry("slow", falling(0.999, 1.0)),
                         Entry("late", late, needs=lambda state: 20.0 * UNIT))  # fmt: skip
     assert done
-    assert spent["late"] == 10
+    assert spent["late"] == pytest.approx(10, rel=0.05)
+
+
+def test_the_rate_is_told_from_where_a_method_has_got_to():
+    def smoothed(state):
+        where, best = 100 * state.first_error, state.first_error
+        yield Chunk(state.start, 0, 0.0)
+        for _ in range(60):  # far above its start at first
+            where *= 0.5
+            best = where if where <= state.goal else best
+            yield Chunk(state.start, 1, UNIT, error=best, path=where)
+
+    spent, done = costs(Entry("slow", falling(0.9, 1.0)),
+                        Entry("smoothed", smoothed, share=0.3, needs=lambda state: 5 * UNIT),
+                        most=400)  # fmt: skip
+    assert done
+    assert spent["smoothed"] > 30
+    assert spent["slow"] < 80
+
+
+def test_a_method_that_begins_again_promises_by_its_best_error_alone():
+    def begins_again(state):
+        yield Chunk(state.start, 0, 0.0)
+        for k in range(10**6):
+            path = 0.5**k * state.first_error if k < 12 else math.inf
+            _ = yield Chunk(state.start, 1, UNIT, error=state.first_error, path=path)
+
+    state = state_of(random_delassus(0, 10))
+    track = Track(Entry("again", begins_again), state)
+    for _ in range(10):
+        track.advance()
+    assert track.promise < 100 * UNIT
+    for _ in range(10):
+        track.advance()
+    assert track.promise == math.inf
+
+
+def test_a_race_goes_on_to_a_tighter_goal():
+    state = state_of(random_delassus(0, 10))
+    race = Race(state, (Entry("a", falling(0.5, 1.0)), Entry("b", falling(0.4, 1.0))))
+    iterates, first = race.iterates(), state.goal
+    next(iterates)
+    while state.error > first:
+        iterates.send(Judgement(1.0, goal=state.target.tolerance))
+    before = race.total
+    iterates.send(Judgement(0.0, 1.0, goal=1e-4 * state.target.tolerance))
+    while state.error > 1e-4 * first:
+        next(iterates)
+    assert state.goal == pytest.approx(1e-4 * first)
+    assert race.total < 3 * before
 
 
 def test_the_last_resort_has_its_share_and_no_more():

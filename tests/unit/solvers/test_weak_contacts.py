@@ -2,6 +2,7 @@
 
 import decimal
 import json
+from dataclasses import replace
 from decimal import Decimal
 
 import numpy as np
@@ -122,6 +123,36 @@ def test_named_outcome(last):
     assert data["contact_error"] == pytest.approx(1 / (1 + 0.3**2) ** 0.5, rel=0.1)
     assert data["weakest"] == 0
     json.dumps(data, allow_nan=False)
+
+
+class Steady:
+    """Sweeps that go on to the goal that they are told."""
+
+    form = am.Form.DELASSUS
+
+    def __init__(self, goes_on):
+        self.goes_on, self.starts, self.goals = goes_on, 0, []
+
+    def iterates(self, problem, start, target):
+        self.starts += 1
+        for iterate in am.GaussSeidel(batch=1).iterates(problem, start, target):
+            judged = yield replace(iterate, goes_on=self.goes_on)
+            self.goals.append(judged.goal)
+
+
+def test_a_method_that_goes_on_is_not_started_again():
+    sizes = np.array([1.0, 1e-2, 1e-3, 1.0])  # loads: a weak contact lags behind
+    problem = random_problem(3)
+    problem = am.FrictionProblem.from_delassus(
+        problem.W, problem.q * sizes[:, None], problem.law
+    )
+    again, on = Steady(False), Steady(True)
+    for solver in (again, on):
+        found = drive(problem, solver, tolerance=1e-2, contact_tolerance=1e-6)
+        assert found.converged
+        assert found.convergence.contact_error <= 1e-6
+    assert on.starts == 1 < again.starts
+    assert on.goals[-1] < on.goals[0] == 1e-2
 
 
 def test_rounding_of_a_load_that_cancels_is_no_error():

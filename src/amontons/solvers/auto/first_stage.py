@@ -30,7 +30,7 @@ from ..sweeps.kernels import (
     flops_of_sweep,
 )
 from ..sweeps.local_contact import CLOSE, STEPS
-from .race import FIRST_CHUNKS, GROWTH, SHORTEST
+from .race import CALL, FIRST_CHUNKS, GROWTH, SHORTEST
 from .state import HISTORY_CONTACT, nanoseconds_of_sweep, visits
 from .tracks import DEPTH, LEAST
 
@@ -45,7 +45,7 @@ def sweeps_of_first_chunks(blocks: int, contacts: int) -> int:
     cost, total, done = nanoseconds_of_sweep(blocks, contacts, HISTORY_CONTACT), 0.0, 0
     for _ in range(FIRST_CHUNKS):
         sweeps = max(LEAST, int(max(GROWTH * total, SHORTEST) / cost))
-        total, done = total + sweeps * cost, done + sweeps
+        total, done = total + sweeps * cost + CALL, done + sweeps
     return done
 
 

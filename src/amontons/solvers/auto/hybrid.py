@@ -209,7 +209,7 @@ def _tried(
             yield from _watched(solver, problem, best if from_best else first, target, best)
 
 
-def _stages(problem: FrictionProblem, start: Iterate, target: Target) -> Iterator[Iterate]:
+def _stages(problem: FrictionProblem, start: Iterate, target: Target) -> Iterates:
     return Portfolio(problem, target, spatial(start.r)).iterates()
 
 

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...problem.friction import FrictionProblem
-from ..contract import Iterate, Target
+from ..contract import Iterate, Iterates, Target
 from .race import Entry, Race
 from .stages import (
     SEMISMOOTH_CONTACTS,
@@ -140,6 +140,6 @@ class Portfolio:
     r: Array
     table: tuple[Entry, ...] = TRACKS
 
-    def iterates(self) -> Iterator[Iterate]:
+    def iterates(self) -> Iterates:
         """The best reaction after every chunk of a track."""
         return Race(State(self.problem, self.target, self.r), self.table).iterates()

@@ -6,8 +6,11 @@ promises the goal for the least further cost:
     rest = ln(error / goal) (C - c) / ln(error(c) / error(C)),   c = (1 - WINDOW) C,
 
 C what the track has cost and error(c) its best error then: the rate of the last part of its own
-cost, a long one, which is patience.  A track that has promised to be there at a cost F, and has
-not, is believed less: its rest counts C / (GRACE F) times.  Besides
+cost, a long one, which is patience.  Smoothing Newton begins at a point far worse than the one
+that it starts from, and its best error stands until it has come back: its rate is told from the
+error of where it is, the first time; once it had to begin again, that promises nothing.  Every
+chunk costs a call besides.  A track that has promised to be there at a cost F, and has not, is
+believed less: its rest counts C / (GRACE F) times.  Besides
 
     unknown     a track is taken to need some part, or multiple, of all that was spent while it
                 has had a small share of it; a method of Newton's kind what it usually needs
@@ -28,15 +31,16 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Generator, Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, field
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import SingularOperator
-from ..contract import Breakdown, Iterate
+from ..contract import Breakdown, Iterate, Iterates
 from .state import State
 
 Array = NDArray[np.float64]
@@ -44,7 +48,8 @@ WINDOW = 0.7  # last part of a track's cost from which its rate is told
 FIRST_CHUNKS = 3  # of the first track before its rate counts
 GRACE = 1.5  # times the cost at which a track has promised the goal: its promise is broken
 GROWTH = 0.2  # cost of a chunk, of what its track has cost
-SHORTEST = 3e4  # nanoseconds of a chunk at least, or the calls cost more than the sweeps
+CALL = 3e4  # nanoseconds that a chunk costs besides: Python, a judgement, bookkeeping
+SHORTEST = 6e4  # nanoseconds of a chunk at least, or the calls cost more than the sweeps
 # Nanoseconds that letting the other tracks in costs: joints, symbolic factors; per block of W.
 ENTRY, ENTRY_BLOCK = 3e5, 150.0
 # All cost, in what it was at the last progress; Newton steps since, and nanoseconds or chunks;
@@ -58,7 +63,9 @@ PAUSE, LEAST_PAUSE, MOST_PAUSE = 0.1, 1e6, 5e7
 class Chunk(NamedTuple):
     """What a track has after a chunk: r (nc, 3), its iterations, cost in ns and operations.
 
-    flops None where they are not counted; error of r, unit of u, where it is known.
+    flops None where they are not counted; error of r, unit of u, where it is known.  path: the
+    error of where a method has got to, unit of u, where r, the best that it has come by, does
+    not tell that.
     """
 
     r: Array
@@ -67,6 +74,7 @@ class Chunk(NamedTuple):
     flops: float | None = None
     error: float = math.inf
     linear_iterations: int = 0
+    path: float = math.inf
 
 
 class Turn(NamedTuple):
@@ -109,40 +117,37 @@ class Track:
 
     entry: Entry
     state: State
-    costs: list[float] = field(default_factory=lambda: [0.0])
+    cost: float = 0.0  # nanoseconds so far
     errors: list[float] = field(default_factory=list)
+    # cost and what its rate is told from: its best error, or that of where it has got to
+    path: list[tuple[float, float]] = field(default_factory=list)
+    along: bool = False  # the latter
     chunks: Chunks | None = None
     promise: float = math.inf  # nanoseconds to the goal at its rate
     foreseen: float = math.inf  # the least cost at which it has promised the goal
 
-    @property
-    def cost(self) -> float:
-        """Nanoseconds so far."""
-        return self.costs[-1]
-
-    def advance(self) -> Iterate | None:
-        """The state's best iterate after a chunk; None where the method has ended."""
+    def advance(self) -> Chunk | None:
+        """A chunk, its reaction taken by the state; None where the method has ended."""
         if self.chunks is None:
             self.chunks = self.entry.chunks(self.state)
             next(self.chunks)
             self.errors.append(self.state.first_error)
+            self.path.append((0.0, self.state.first_error))
         try:
             turn = Turn(max(GROWTH * self.cost, SHORTEST), self.errors[-1])
             chunk = self.chunks.send(turn)
         except (StopIteration, Breakdown, SingularOperator):
             return None
         state = self.state
-        found = state.offer(
-            chunk.r, chunk.iterations, self.entry.name, chunk.flops, chunk.error,
-            chunk.linear_iterations,
-        )  # fmt: skip
+        state.take(chunk.r, chunk.error)
         if self.entry.needs is None and state.latest < state.swept_error:
             state.swept, state.swept_error = chunk.r, state.latest
-        self.costs.append(self.cost + chunk.cost)
+        self.cost += chunk.cost + CALL
         self.errors.append(min(state.latest, self.errors[-1]))
+        self._go_along(chunk)
         self.promise = self._at_its_rate()
         self.foreseen = min(self.foreseen, self.cost + self.promise)
-        return found
+        return chunk
 
     def rest(self, total: float) -> float:
         """Nanoseconds to the goal that it promises, of `total` spent on all tracks."""
@@ -159,28 +164,51 @@ class Track:
         unknown = self.cost < entry.share * total
         return min(promise, entry.optimism * total) if unknown else promise
 
+    def aim(self) -> None:
+        """Promise the goal of the state anew."""
+        if self.path:
+            self.promise = self._at_its_rate()
+            self.foreseen = self.cost + self.promise
+
+    def _go_along(self, chunk: Chunk) -> None:
+        """Note what the rate is told from."""
+        along = chunk.path < math.inf
+        if along is not self.along:
+            self.along = along
+            self.path.clear()
+        best = self.path[-1][1] if self.path else math.inf
+        self.path.append((self.cost, min(chunk.path, best) if along else self.errors[-1]))
+
     def _at_its_rate(self) -> float:
-        if len(self.errors) <= FIRST_CHUNKS:
+        if len(self.path) <= FIRST_CHUNKS:
             return math.inf
-        error, cost = self.errors[-1], self.cost
-        at = bisect_right(self.costs, (1.0 - WINDOW) * cost) - 1
-        if not error < self.errors[at]:
+        (begun, _), (cost, error) = self.path[0], self.path[-1]
+        at = bisect_right(self.path, cost - WINDOW * (cost - begun), key=itemgetter(0)) - 1
+        before, higher = self.path[max(at, 0)]
+        if not error < higher:
             return math.inf
         if error <= self.state.goal:
             return 0.0
-        rate = math.log(self.errors[at] / error) / (cost - self.costs[at])
+        rate = math.log(higher / error) / (cost - before)
         return math.log(error / self.state.goal) / rate
 
 
-def _counted_with(before: Iterate, found: Iterate) -> Iterate:
-    """The iterate, what was done for one before it counted in."""
-    flops = None
-    if before.flops is not None and found.flops is not None:
-        flops = before.flops + found.flops
-    return replace(
-        found, iterations=before.iterations + found.iterations, flops=flops,
-        linear_iterations=before.linear_iterations + found.linear_iterations,
-    )  # fmt: skip
+@dataclass(eq=False)
+class Done:
+    """What tracks have done since the last iterate, and the last of them."""
+
+    iterations: int = 0
+    flops: float | None = 0.0  # None where one does not count them
+    linear_iterations: int = 0
+    stage: str = ""
+
+    def add(self, chunk: Chunk, stage: str) -> None:
+        """Count a chunk in."""
+        self.iterations += chunk.iterations
+        self.linear_iterations += chunk.linear_iterations
+        if self.flops is not None:
+            self.flops = None if chunk.flops is None else self.flops + chunk.flops
+        self.stage = stage
 
 
 @dataclass(eq=False)
@@ -194,21 +222,24 @@ class Race:
         self.tracks = [Track(self.table[0], self.state)]
         self.total = 0.0  # nanoseconds of all tracks
         self.shown = 0.0  # total when an iterate was handed out last
-        self.held: Iterate | None = None  # counts of those since then
+        self.done = Done()  # since then
         self.chunks = 0
         self.shows_all = False  # where the driver ends what can not come to an end
         # error, total and chunks at the last progress
         self.mark = (self.state.first_error, 0.0, 0)
 
-    def iterates(self) -> Iterator[Iterate]:
-        """The best reaction now and then, until nothing helps or is left."""
+    def iterates(self) -> Iterates:
+        """The best reaction now and then, until nothing helps or is left.
+
+        A tighter goal that is sent counts from there on.
+        """
         while self.tracks and self._is_first():
             yield from self._go_on(self.tracks[0])
         self.enter()
         while self.tracks and not self._is_lost():
             yield from self._go_on(self._next())
-        if self.held is not None:
-            yield self.held
+        if self.done.iterations:
+            yield self._shown()
 
     def _is_first(self) -> bool:
         """True while the first track has its chunks, or promises the goal before others run."""
@@ -222,18 +253,28 @@ class Race:
         self.shows_all = state.problem.gains_energy
         self.tracks += [Track(e, state) for e in self.table[1:] if e.when(state)]
 
-    def _go_on(self, track: Track) -> Iterator[Iterate]:
+    def _go_on(self, track: Track) -> Iterates:
         """A chunk of a track, which leaves where it has ended."""
-        before, found = track.cost, track.advance()
-        if found is None:
+        before, chunk = track.cost, track.advance()
+        if chunk is None:
             self.tracks.remove(track)
             return
         self.total += track.cost - before
         self.chunks += 1
-        self.held = found if self.held is None else _counted_with(self.held, found)
+        self.done.add(chunk, track.entry.name)
         if self._is_due():
-            found, self.held, self.shown = self.held, None, self.total
-            yield found
+            judged = yield self._shown()
+            if judged is not None and judged.goal < self.state.target.tolerance:
+                self.state.aim(judged.goal)
+                for every in self.tracks:
+                    every.aim()
+
+    def _shown(self) -> Iterate:
+        """The best reaction for the driver."""
+        done, self.done, self.shown = self.done, Done(), self.total
+        return self.state.best(
+            done.iterations, done.stage, done.flops, done.linear_iterations
+        )
 
     def _is_due(self) -> bool:
         """True where the driver should see the best reaction: it may do, or it has waited."""

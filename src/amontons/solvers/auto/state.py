@@ -6,7 +6,7 @@ Costs are operation counts, so that the same problem takes the same path on ever
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -153,6 +153,11 @@ class State:
         )
 
     # ---------------------------------------------------------------- bookkeeping
+    def aim(self, tolerance: float) -> None:
+        """Go on to another error, unit-free."""
+        self.target = replace(self.target, tolerance=tolerance)
+        self.goal = tolerance * self.problem.q_norm
+
     def judge(self, r: Array) -> float:
         """Error of r, (nc, 3), unit of u."""
         return natural_error(*self.problem.kernel_data, r)
@@ -166,17 +171,28 @@ class State:
         flops: floating point operations that x took, None where they are not counted; error of
         x, unit of u, if known.
         """
+        self.take(x, error)
+        return self.best(iterations, stage, flops, linear_iterations)
+
+    def take(self, x: Array, error: float = math.inf) -> None:
+        """Keep x, (nc, 3), if it is better; error of x, unit of u, if known."""
         if error == math.inf:
             error = self.judge(x)
-            flops = None if flops is None else flops + self.problem.judge_flops
+            self.unsaid += self.problem.judge_flops
         self.latest = error
         if error < self.error:
             self.r, self.error = x, error
+
+    def best(
+        self, iterations: int, stage: str, flops: float | None = None,
+        linear_iterations: int = 0,
+    ) -> Iterate:  # fmt: skip
+        """The best reaction as an iterate, with what was done since the last one."""
         if flops is not None:
             flops, self.unsaid = flops + self.unsaid, 0.0
         return Iterate(
             self.r[:, : self.problem.dimension].copy(), iterations=iterations, stage=stage,
-            flops=flops, linear_iterations=linear_iterations,
+            flops=flops, linear_iterations=linear_iterations, goes_on=True,
         )  # fmt: skip
 
     def iterate(self, r: Array) -> Iterate:

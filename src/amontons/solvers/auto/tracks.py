@@ -46,10 +46,21 @@ STALLED = 8  # steps of Newton's method without halving its error
 
 
 # ---------------------------------------------------------------- sweeps
+def aimed(watch: Array, goal: float) -> None:
+    """Let sweeps go on where the goal has become another one."""
+    if watch[0] != goal:
+        watch[:] = watch_for(goal)
+
+
 def momentum(state: State) -> Chunks:
     """Sweeps with Nesterov's momentum."""
     memory, watch = Momentum(sweep_data(state.problem), state.start), watch_for(state.goal)
-    return _swept(memory, state.momentum_cost, watch)
+    cost = state.momentum_cost
+    turn = yield Chunk(memory.r, 0, 0.0)
+    while True:
+        aimed(watch, state.goal)
+        count, flops = memory.sweep(max(LEAST, int(turn.cost / cost)), watch)
+        turn = yield Chunk(memory.r.copy(), count, cost * count, flops, watch[2])
 
 
 def anderson(state: State) -> Chunks:
@@ -63,6 +74,7 @@ def anderson(state: State) -> Chunks:
     while True:
         if state.error < TAKEN * turn.error:
             memory, watch = Acceleration(state.data, state.r, DEPTH), watch_for(state.goal)
+        aimed(watch, state.goal)
         count, flops = memory.sweep(max(LEAST, int(turn.cost / cost)), watch)
         turn = yield Chunk(memory.r.copy(), count, cost * count, flops, watch[2])
 
@@ -80,6 +92,7 @@ def polish(state: State) -> Chunks:
         first = mark = state.error
         waited, better = 0, False
         while not better:
+            aimed(watch, state.goal)
             count, flops = memory.sweep(max(LEAST, int(turn.cost / cost)), watch)
             turn = yield Chunk(memory.r.copy(), count, cost * count, flops, watch[2])
             own, waited = min(turn.error, first), waited + count
@@ -89,14 +102,6 @@ def polish(state: State) -> Chunks:
             better = state.error < nearer * own
 
 
-def _swept(memory: Momentum | Acceleration, cost: float, watch: Array) -> Chunks:
-    """Chunks of sweeps that cost so many nanoseconds each."""
-    turn = yield Chunk(memory.r, 0, 0.0)
-    while True:
-        count, flops = memory.sweep(max(LEAST, int(turn.cost / cost)), watch)
-        turn = yield Chunk(memory.r.copy(), count, cost * count, flops, watch[2])
-
-
 def relaxed(relaxation: float, state: State) -> Chunks:
     """Sweeps with a relaxation, 1: none."""
     watch, r = watch_for(state.goal), state.start.copy()
@@ -104,6 +109,7 @@ def relaxed(relaxation: float, state: State) -> Chunks:
     turn = yield Chunk(r, 0, 0.0)
     while True:
         sweeps = max(LEAST, int(turn.cost / cost))
+        aimed(watch, state.goal)
         count, flops = counted(data, partial(shared_sweeps, data, r, sweeps, watch))
         turn = yield Chunk(r.copy(), count, cost * count, flops, watch[2])
 
@@ -131,6 +137,7 @@ def interior_point(state: State) -> Chunks:
         watch, cost, left = watch_for(state.goal), state.accelerated_cost, BETWEEN
         mark = turn.error
         while left > 0:
+            aimed(watch, state.goal)
             count, flops = memory.sweep(int(np.clip(turn.cost / cost, LEAST, left)), watch)
             left -= count
             turn = yield Chunk(memory.r.copy(), count, cost * count, flops, watch[2])
@@ -147,7 +154,7 @@ def smoothing_newton(state: State) -> Chunks:
     """
     root, x = math.sqrt(max(state.problem.contacts, 1)), state.start
     turn = yield Chunk(x, 0, 0.0)
-    afar = 0.1 * state.problem.q_norm / root
+    afar, first = 0.1 * state.problem.q_norm / root, True
     for smoothing, shrink, swept in chain(SMOOTHED, cycle(AGAIN)):
         r, error = (state.swept, state.swept_error) if swept else (state.r, state.error)
         x, sigma = r.copy(), min(smoothing * error / root, afar)
@@ -160,9 +167,11 @@ def smoothing_newton(state: State) -> Chunks:
                 x, sigma, solver, goal=0.5 * state.goal, steps=steps
             )
             cost = max(abs(count), 1) * state.step_cost
-            turn = yield Chunk(found, max(abs(count), 1), cost)
+            path = state.judge(x) if first and count > 0 else math.inf
+            turn = yield Chunk(found, max(abs(count), 1), cost, path=path)
             if count < 0 or patience.over(residual):
                 break
+        first = False
 
 
 def inexact_newton(state: State) -> Chunks:
@@ -211,9 +220,8 @@ def staged(stages: Staged, state: State) -> Chunks:
     """Stages that start from the best reaction, and offer what they find themselves."""
     _ = yield Chunk(state.start, 0, 0.0)
     for found in stages(state):
-        cost = state.step_cost * found.iterations
-        if found.flops is not None:
-            cost = min(cost, FLOP * found.flops)
+        steps = state.step_cost * found.iterations
+        cost = steps if found.flops is None else FLOP * found.flops
         yield Chunk(spatial(found.r), found.iterations, cost, found.flops, state.error,
                     found.linear_iterations)  # fmt: skip
 
