@@ -249,7 +249,14 @@ def polygon(face: Face, sides: int, *, outside: bool) -> sparse.csr_array:
 
     In 2D both are K.
     """
-    s, d = len(face.stick), face.d
+    own = cone_rows(face.mu, face.d, sides, outside=outside)
+    rest = sparse.csr_array((own.shape[0], face.unknowns - own.shape[1]))
+    return sparse.csr_array(sparse.hstack([own, rest]))
+
+
+def cone_rows(mu: Array, d: int, sides: int, *, outside: bool) -> sparse.csr_array:
+    """G (s many, s d), where G r <= 0 keeps r (s, d) in polygonal cones in K, or around it."""
+    s = len(mu)
     if d == 2:
         turns, shrink = np.array([[1.0], [-1.0]]), 1.0
     else:
@@ -258,11 +265,11 @@ def polygon(face: Face, sides: int, *, outside: bool) -> sparse.csr_array:
         shrink = 1.0 if outside else float(np.cos(np.pi / sides))
     many = len(turns)
     blocks = np.empty((s, many, d))
-    blocks[:, :, 0] = -shrink * face.mu[:, None]
+    blocks[:, :, 0] = -shrink * mu[:, None]
     blocks[:, :, 1:] = turns
     rows = np.arange(s * many).repeat(d)
     columns = (d * np.arange(s)[:, None, None] + np.arange(d)).repeat(many, axis=1).ravel()
-    return sparse.csr_array((blocks.ravel(), (rows, columns)), shape=(s * many, face.unknowns))
+    return sparse.csr_array((blocks.ravel(), (rows, columns)), shape=(s * many, s * d))
 
 
 def _moved_inside(face: Face, deadline: Deadline) -> Array:
