@@ -1,10 +1,10 @@
 """One solution where W is singular: multipliers about a known one, and bounded reactions.
 
 Let z0 = (r0, u0) be a solution, z another one of the same load, d = z - z0, d_u = W d_r, as in
-`certificates.load_multipliers`: with tau = sigma = 1 the sum over the contacts of d_r . d_u + eta . d_uT
-d_rN, eta = mu t, is not positive, but where W is singular no matrix of it alone is definite:
-on the kernel of W it vanishes.  What a contact loses on the way there is left out in (1) and
-(2) of that module.  Where z0 slips with u0_T = s0 t, let y = d_rT + mu d_rN t = r_T + mu r_N t.
+`certificates.load_multipliers`: with tau = sigma = 1 the sum over the contacts of d_r . d_u +
+d_rN eta . d_uT, eta = mu t, is not positive, but where W is singular it vanishes on the kernel
+of W, and its matrix is not definite.  Inequalities (1) and (2) of that module give something
+away there.  Where z0 slips with u0_T = s0 t, let y = d_rT + mu d_rN t = r_T + mu r_N t.
 If z slips along t',
 
     y . d_uT = -mu r_N (|u_T| + s0) (1 - t . t') = -(|u_T| + s0) |y|^2 / (2 mu r_N),

@@ -42,6 +42,7 @@ Array = NDArray[np.float64]
 Places = NDArray[np.int64]
 EDGE = 1e-5  # distance to the edge of the cone, of the largest r_N, that counts as none
 NOTHING, STILL = 1e-9, 1e-13  # reactions, and velocities of what rests, that count as none
+SURELY, DOUBT = 10.0, 1e3  # errors of the solution that count as none; times that, as moving
 SHIFT = 1e-13  # of the diagonal of A H^-1 A^T: rows of A may depend on each other
 SIDES = 8  # of the polygon in which contacts are moved off the edge
 CENTRING = 60  # Newton steps
@@ -55,7 +56,7 @@ class Face:
 
     F (nc d, k); A (m, k) sparse or dense.  stick (s,), slip (l,): contacts; the columns of F
     are d per stick, then one per slip.  mu (s,) of the sticks.  unit: the largest r_N.
-    edge: contacts held on the ray of r0.
+    edge: contacts held on the ray of r0, or whose status the solution's accuracy leaves open.
     """
 
     F: sparse.csr_array
@@ -169,12 +170,15 @@ def face_of(problem: FrictionProblem, solution: FrictionSolution, deadline: Dead
     mu = problem.mu
     nothing = _speed(problem, solution)
     loaded = (r[:, 0] > NOTHING * unit) & (solution.status != OPEN)
+    speed = np.linalg.norm(u[:, 1:], axis=1)
     closed = loaded | (u[:, 0] <= nothing)
-    ray = closed & ((np.linalg.norm(u[:, 1:], axis=1) > nothing) | (mu == 0))
+    ray = closed & ((speed > nothing) | (mu == 0))
+    doubtful = np.where(closed, (speed > nothing) & (speed <= DOUBT * nothing) & (mu > 0),
+                        u[:, 0] <= DOUBT * nothing)  # fmt: skip
     whole = _face(problem, r, _rays(r, u, mu, loaded), unit, closed & ~ray, ray, deadline)
     if not (whole.slack(whole.c0) <= EDGE).any():
-        return whole
-    inner = _moved_inside(whole, deadline)
+        return replace(whole, edge=int(doubtful.sum()))
+    inner, known = _moved_inside(whole, deadline)
     slack = whole.slack(inner)
     moved, rays = whole.reactions(inner), _rays(whole.reactions(inner), u, mu, loaded)
     s = len(whole.stick)
@@ -184,7 +188,8 @@ def face_of(problem: FrictionProblem, solution: FrictionSolution, deadline: Dead
     gone |= held & (moved[:, 0] <= NOTHING * unit)
     stick = closed & ~ray & ~held
     found = _face(problem, moved, rays, unit, stick, (ray | held) & ~gone, deadline)
-    return replace(found, edge=int((held & ~gone).sum()))
+    doubtful |= held & ~gone if known else held | gone
+    return replace(found, edge=int(doubtful.sum()))
 
 
 def _speed(problem: FrictionProblem, solution: FrictionSolution) -> float:
@@ -192,7 +197,7 @@ def _speed(problem: FrictionProblem, solution: FrictionSolution) -> float:
     size = float(np.linalg.norm(solution.u))
     if not problem.loose_modes.shape[1]:
         size = float(np.linalg.norm(problem.free_velocity))
-    return max(solution.convergence.error, STILL) * size
+    return SURELY * max(solution.convergence.error, STILL) * size
 
 
 def _rays(r: Array, u: Array, mu: Array, loaded: NDArray[np.bool_]) -> Array:
@@ -272,24 +277,30 @@ def cone_rows(mu: Array, d: int, sides: int, *, outside: bool) -> sparse.csr_arr
     return sparse.csr_array((blocks.ravel(), (rows, columns)), shape=(s * many, s * d))
 
 
-def _moved_inside(face: Face, deadline: Deadline) -> Array:
-    """c of the face with as many contacts as possible off the edges."""
+def _moved_inside(face: Face, deadline: Deadline) -> tuple[Array, bool]:
+    """c of the face with as many contacts as possible off the edges; whether that is known."""
     from scipy.optimize import linprog
 
     k, s, rays = face.unknowns, len(face.stick), len(face.slip)
     G = polygon(face, SIDES, outside=False)
-    most = float(face.parts(face.c0[:, None])[0].mean()) if s else 1.0
-    apart = sparse.csr_array(sparse.kron(sparse.eye_array(s), np.ones((G.shape[0] // s, 1))))
-    left = sparse.hstack([G, apart], format="csr")
-    equal = sparse.hstack([sparse.csr_array(face.A), sparse.csr_array((face.A.shape[0], s))])
+    normal, _, slip = face.parts(face.c0[:, None])
+    most = 0.1 * float(np.concatenate([normal, slip]).mean()) if s + rays else 1.0
+    many = G.shape[0] // s if s else 0
+    apart = sparse.kron(sparse.eye_array(s), np.ones((many, 1)))
+    beside = sparse.csr_array((-np.ones(rays), (np.arange(rays), np.arange(k - rays, k))),
+                              shape=(rays, k))  # fmt: skip
+    left = sparse.csr_array(sparse.block_diag([apart, sparse.eye_array(rays)]))
+    left = sparse.hstack([sparse.vstack([G, beside]), left], format="csr")
+    free = sparse.csr_array((face.A.shape[0], s + rays))
+    equal = sparse.hstack([sparse.csr_array(face.A), free])
     deadline.pay(lp_work(left, equal))
-    bounds = [(None, None)] * (k - rays) + [(0.0, None)] * rays + [(0.0, 0.1 * most)] * s
-    cost = np.concatenate([np.zeros(k), -np.ones(s)])
+    bounds = [(None, None)] * (k - rays) + [(0.0, None)] * rays + [(0.0, most)] * (s + rays)
+    cost = np.concatenate([np.zeros(k), -np.ones(s + rays)])
     found = linprog(cost, left, np.zeros(left.shape[0]), equal.tocsr(), face.A @ face.c0,
                     bounds, method="highs-ipm")  # fmt: skip
     if found.x is None or found.status != 0:
-        return face.c0
-    return 0.5 * (face.c0 + found.x[:k])
+        return face.c0, False
+    return 0.5 * (face.c0 + found.x[:k]), True
 
 
 def lp_work(left: Any, equal: Any) -> float:

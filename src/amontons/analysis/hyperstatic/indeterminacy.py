@@ -20,13 +20,15 @@ from ...core.onlookers import say
 from ...linear.rank import matrix_rank, semidefinite_rank
 from ...problem.friction import FrictionProblem
 from ...problem.solution import FrictionSolution
+from ...solvers.driver import drive
 from .ball import Ball, MotionBound, ball_of
 from .bounded_reactions import Confined, confined
 from .face import face_of
 from .motion import NO_MORE, OtherMotion, Rest, other_motion, rest
 from .ranges import SPREAD, ReactionRanges, reaction_ranges
 
-RANGES, BALL, PROOF, REST, MOTIONS = 0.4, 0.15, 0.3, 0.3, 0.9  # parts of the time left
+RANGES, BALL, PROOF, REST, MOTIONS = 0.4, 0.15, 0.3, 0.3, 0.6  # parts of the time left
+ACCURATE, POLISH = 1e-12, 0.15  # error of a solution that is asked for, part of the time
 NAMED = 3  # contacts whose ranges are told in words
 _PROVED = {
     "unique_every_load": "The motion is unique, whatever the load.",
@@ -204,6 +206,7 @@ def indeterminacy(
     proved: str = "", why: str = "",
 ) -> Indeterminacy:  # fmt: skip
     """What is known in time of a Coulomb problem with a solution; proved, why: its motion."""
+    solution = _polished(problem, solution, deadline)
     ranges, reason = None, ""
     try:
         say("reactions of this motion")
@@ -229,6 +232,18 @@ def indeterminacy(
     if known.motion_is_unique:
         return known
     return _searched(problem, solution, known, ball, deadline)
+
+
+def _polished(
+    problem: FrictionProblem, solution: FrictionSolution, deadline: Deadline
+) -> FrictionSolution:
+    """The solution to ACCURATE if that is quick: what rests is told from what moves by it."""
+    if solution.convergence.error <= ACCURATE:
+        return solution
+    share = deadline.share(POLISH)
+    found = drive(problem, start=solution, tolerance=ACCURATE, time_limit=share)
+    better = found.convergence.error < solution.convergence.error
+    return found if better and np.isfinite(found.r).all() else solution
 
 
 def _searched(

@@ -34,6 +34,7 @@ STARTS = ((1.0, 0, True), (3.0, 1, True), (3.0, -1, True), (1.0, 0, False), (0.3
 SUSPECT, FAR = 30.0, 1e3  # differences of motions, in their errors: looked at again; counted
 SOLVED, POLISHED = 1e-9, 1e-11  # error by the judge that both need, and are asked for
 NO_MORE = 1e-6  # distance of any other motion, relative, that counts as none
+ROUNDING = 1e-14  # the least error that is believed
 SIDES = 16  # of polygons in the place of discs
 NEAR = 0.2  # part of the time for a start from rest, or without friction
 CAP = 0.1  # margin to the border of a cone that is wanted at rest, of the largest load
@@ -129,7 +130,7 @@ def other_motion(
 
 
 def _errors(*solutions: FrictionSolution) -> float:
-    return sum(one.convergence.error for one in solutions)
+    return sum(max(one.convergence.error, ROUNDING) for one in solutions)
 
 
 def _distance(a: FrictionSolution, b: FrictionSolution, speed: float) -> float:
