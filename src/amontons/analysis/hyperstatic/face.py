@@ -46,6 +46,7 @@ SURELY, DOUBT = 10.0, 1e3  # errors of the solution that count as none; times th
 SHIFT = 1e-13  # of the diagonal of A H^-1 A^T: rows of A may depend on each other
 SIDES = 8  # of the polygon in which contacts are moved off the edge
 CENTRING = 60  # Newton steps
+FARTHEST = 1e4  # c, in the largest reaction of the solution, beyond which there is no centre
 CENTRED = 1e-6  # Newton decrement at the centre
 FILL = 40.0  # operations of a factorisation per entry of the matrix and row, guessed
 
@@ -188,7 +189,7 @@ def face_of(problem: FrictionProblem, solution: FrictionSolution, deadline: Dead
     gone |= held & (moved[:, 0] <= NOTHING * unit)
     stick = closed & ~ray & ~held
     found = _face(problem, moved, rays, unit, stick, (ray | held) & ~gone, deadline)
-    doubtful |= held & ~gone if known else held | gone
+    doubtful |= held if known else held | gone  # nothing now may be something on the edge
     return replace(found, edge=int(doubtful.sum()))
 
 
@@ -328,6 +329,8 @@ def centred(face: Face, deadline: Deadline) -> tuple[Array, Array | None, bool]:
             break
         reach = longest(face, c, step[:, None])[0]
         c = c + min(1.0 if decrement < 0.1 else 0.7 * reach, 1.0, 0.9 * reach) * step
+        if not np.abs(c).max(initial=0.0) <= FARTHEST:  # no end that way
+            break
     return c, s, at_rest
 
 
