@@ -46,7 +46,6 @@ CASES: dict[str, Callable[[], Any]] = {
     "rigid wall 6x4": lambda: wall(6, 4).problem(0.6),
     "rigid arch 15": lambda: arch(15).problem(0.6),
     "elastic wall": masonry,
-    "wall": lambda: am.read_case("example:wall").model,
     "dome": lambda: am.read_case("example:dome").model,
 }
 

@@ -28,6 +28,7 @@ from .motion import NO_MORE, OtherMotion, Rest, other_motion, rest
 from .ranges import SPREAD, ReactionRanges, reaction_ranges
 
 RANGES, BALL, PROOF, REST, MOTIONS = 0.4, 0.15, 0.3, 0.3, 0.6  # parts of the time left
+LOOSE = 0.2  # of the time, for other motions, where contact alone holds bodies
 ACCURATE, POLISH = 1e-12, 0.15  # error of a solution that is asked for, part of the time
 NAMED = 3  # contacts whose ranges are told in words
 _PROVED = {
@@ -257,6 +258,6 @@ def _searched(
     starts = [r for r in (resting.r, None if ball is None else ball.p) if r is not None]
     other, compared = None, 0
     with suppress(TimeUp):
-        share = deadline.share(MOTIONS)
+        share = deadline.share(LOOSE if problem.loose_modes.shape[1] else MOTIONS)
         other, compared = other_motion(problem, solution, share, starts)
     return replace(known, rest_excluded=resting.excluded, other=other, starts=compared)
