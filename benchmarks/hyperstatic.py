@@ -11,6 +11,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -30,10 +31,17 @@ def masonry() -> am.Model:
     return made.model([], [am.BodyForce((0, 0, -2000 * 9.81))])
 
 
+def spheres(count: int, mu: float, seed: int) -> am.FrictionProblem:
+    """A packing at rest, or about to flow."""
+    return SpherePacking(count, mu=mu, seed=seed).problem(1e-3)
+
+
+PACKINGS = ((15, 0.02, 1), (70, 0.02, 1), (70, 0.1, 2), (70, 0.3, 0), (70, 1.0, 0),
+            (200, 0.1, 0), (200, 0.5, 0), (200, 1.0, 0), (700, 0.1, 1), (700, 0.5, 0))
+
 CASES: dict[str, Callable[[], Any]] = {
-    "70 spheres": lambda: SpherePacking(70).problem(1e-3),
-    "200 spheres": lambda: SpherePacking(200).problem(1e-3),
-    "700 spheres": lambda: SpherePacking(700).problem(1e-3),
+    **{f"{n} spheres, mu {mu}, seed {seed}": partial(spheres, n, mu, seed)
+       for n, mu, seed in PACKINGS},
     "200 spheres spinning": lambda: spinning(SpherePacking(200, mu=0.3), 5.0, 0),
     "rigid wall 6x4": lambda: wall(6, 4).problem(0.6),
     "rigid arch 15": lambda: arch(15).problem(0.6),
@@ -56,6 +64,11 @@ def row(name: str) -> str:
         return (f"| {name} | {solution.r.shape[0]} | {solved:.1f} | {found.reason} | | | | "
                 f"{seconds:.1f} |")  # fmt: skip
     bound = "" if apart.bound is None else f"{apart.bound.distance:.2g}"
+    bound += " of strains" if apart.bound is not None and apart.bound.strains else ""
+    bound += ", no rest" if apart.rest_excluded else ""
+    if apart.confined is not None and not apart.confined.everywhere:
+        size = apart.confined.within / solution.r[:, 0].max()
+        bound += f", alone to {size:.3g} of the largest reaction"
     other = "none" if apart.other is None else f"{apart.other.distance:.1%} away"
     ranges = apart.reactions
     told = apart.reason
@@ -80,9 +93,10 @@ def main() -> None:
 `python benchmarks/hyperstatic.py`, {where['cpu']}, Python {where['python']}; CPU seconds, the
 first with compilation, at most the work of a minute (operations counted) for each verdict.
 
-Bound: how far any other motion can be, relative to the free motion, in the norm of energy.
-Other: another motion, of so many solutions from other starts. Reactions: of how many contacts
-they are not unique with this motion, by up to which part of the largest.
+Bound: how far any other motion can be, relative to the free motion, in the norm of energy; "no
+rest": rest is proved to be no solution; "alone": any other has a larger reaction. Other:
+another motion, of so many solutions from other starts. Reactions: of how many contacts they are
+not unique with this motion, by up to which part of the largest.
 
 | problem | contacts | solve, s | motion | bound | other | reactions | verdict, s |
 |---|---|---|---|---|---|---|---|

@@ -33,7 +33,7 @@ obstacle = { plane = { normal = [0, 1] } }
 friction = { coulomb = 0.5 }
 """
 GOOD = {"enumerate": (0, 1), "uniqueness": (0, 1), "jam": (0, 1),  # exit codes; 1: undecided
-        "modes": (0, 1)}  # 1: one grows  # fmt: skip
+        "collapse": (0, 1), "modes": (0, 1)}  # 1: wide; one grows  # fmt: skip
 
 
 def commands():

@@ -3,12 +3,15 @@
 import numpy as np
 import pytest
 from scipy import sparse
+from status_polytopes import Polytopes
 
 import amontons as am
 from amontons.analysis.certificates.verdict import Verdict
+from amontons.analysis.hyperstatic.ball import motion_bound
 from amontons.analysis.hyperstatic.face import centred, face_of, longest
 from amontons.analysis.hyperstatic.held_tangents import held_tangents
-from amontons.analysis.hyperstatic.motion import motion_bound, other_motion
+from amontons.analysis.hyperstatic.indeterminacy import indeterminacy
+from amontons.analysis.hyperstatic.motion import other_motion, rest
 from amontons.analysis.hyperstatic.ranges import reaction_ranges
 from amontons.core.clock import Deadline
 from amontons.mechanics.ready.hild import hild_triangle
@@ -133,3 +136,115 @@ def test_the_way_to_the_edge_of_a_cone():
     p = np.array([[0.0, -1.0, 1.0, 0.0], [1.0, 0.0, 0.5, 2.0], [0.0, 0.0, 0.0, 0.0]])
     np.testing.assert_allclose(longest(face, face.c0, p), [0.5, 1.0, np.inf, 0.25])
     assert centred(face, Deadline.after(5))[0] == pytest.approx(face.c0, abs=1e-6)
+
+
+# --------------------------------------------------------- against polytopes of all statuses
+def plane(seed):
+    """(M, H, f, w, mu) with fewer unknowns than reactions; every third has a contact twice."""
+    random = np.random.default_rng(seed)
+    nc = int(random.integers(2, 4))
+    n = int(random.integers(2, min(2 * nc - 1, 5)))
+    H = random.standard_normal((n, 2 * nc))
+    if seed % 3 == 0:
+        H = random.integers(-2, 3, (n, 2 * nc)).astype(float)
+    if seed % 3 == 2:
+        H[:, 2:4] = H[:, :2]
+    M = np.diag(random.uniform(0.5, 2, n))
+    f = -H[:, ::2] @ random.uniform(0, 1, nc) + 0.5 * random.standard_normal(n)
+    w = np.zeros((nc, 2))
+    if random.random() < 0.4:
+        w[random.integers(nc), 0] = random.uniform(0, 0.5)
+    return M, H, f, w, random.uniform(0.02, 1.0 if seed % 2 else 0.2, nc)
+
+
+def examined(parts):
+    """(problem, solution, what is known of it)."""
+    M, H, f, w, mu = parts
+    problem = am.FrictionProblem.from_global(
+        sparse.csc_array(M), sparse.csc_array(H), f, w, mu
+    )
+    solution = am.solve(problem, tolerance=1e-10, check=False)
+    assert solution.converged
+    return problem, solution, indeterminacy(problem, solution, Deadline.after(20))
+
+
+# rest excluded, unique and not, with reactions that are and are not; a contact that moves at
+# the solution's error (16), one that may carry on the edge alone (192), unbounded ones (73)
+@pytest.mark.parametrize("seed", [5, 16, 47, 73, 192])
+def test_nothing_is_claimed_that_the_statuses_refute(seed):
+    parts = M, H, f, w, mu = plane(seed)
+    problem, solution, apart = examined(parts)
+    every = Polytopes(*parts)
+    low, high = every.motions()
+    size = np.abs(np.linalg.solve(M, f)).max()
+    one = (high - low).max() < 1e-6 * size
+    assert not apart.motion_is_unique or one
+    assert apart.other is None or not one
+    if apart.confined is not None and not apart.confined.everywhere:
+        least, most = Polytopes(*parts, most=apart.confined.within * (1 - 1e-6)).motions()
+        assert (most - least).max() < 1e-6 * size
+    if apart.bound is not None:
+        worst = max(np.abs(low - solution.v).max(), np.abs(high - solution.v).max())
+        free = np.sqrt(f @ np.linalg.solve(M, f))
+        assert worst * np.sqrt(np.diag(M).min()) <= apart.bound.distance * free * (1 + 1e-6)
+    if not one:
+        return
+    for k, component in enumerate(np.eye(every.m + every.n)[: every.m]):
+        least, most = every.extremes(component)
+        i, axis = divmod(k, 2)
+        if apart.reactions_are_unique:
+            assert most - least < 1e-6
+        assert least - 1e-6 <= apart.reactions.low[i, axis]
+        assert apart.reactions.high[i, axis] <= most + 1e-6 * (1 + abs(most))
+        assert axis or apart.reactions.most[i] >= most * (1 - 1e-6) - 1e-7
+
+
+def test_bounded_reactions_prove_motions_that_slip():
+    """Of random plane problems whose W is singular; the bound of reactions holds, too."""
+    proved = 0
+    for seed in range(30, 42):
+        parts = plane(seed)
+        _, _, apart = examined(parts)
+        if apart.confined is None or not apart.confined.everywhere:
+            continue
+        proved += 1
+        every = Polytopes(*parts)
+        low, high = every.motions()
+        assert (high - low).max() < 1e-6
+        normals = np.eye(every.m + every.n)[: every.m : 2]
+        assert max(every.extremes(c)[1] for c in normals) <= apart.confined.bound
+    assert proved >= 2
+
+
+def test_rest_is_found_beside_a_motion():
+    """A weight between two walls: falls where they do not press, hangs where they do."""
+    H = np.array([[1.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 1.0]])
+    M, mu = sparse.eye_array(2).tocsc(), np.full(2, 0.5)
+    problem = am.FrictionProblem.from_global(
+        M, sparse.csc_array(H), [0.0, -1.0], np.zeros((2, 2)), mu
+    )
+    falls = am.solve(problem.with_mu(0.0))
+    falls = am.solve(problem, start=falls)
+    assert np.abs(falls.v).max() > 0.5
+    apart = indeterminacy(problem, falls, Deadline.after(20))
+    assert apart.motion == "not_unique" and not apart.rest_excluded
+    assert np.abs(apart.other.solution.u - falls.u).max() > 0.01
+    resting = rest(problem, Deadline.after(10))
+    np.testing.assert_allclose(H @ resting.r.ravel(), [0.0, 1.0], atol=1e-9)
+    assert rest(problem.with_mu(0.0), Deadline.after(10)).excluded
+
+
+def test_a_ball_of_strains_where_contact_holds_the_bodies():
+    """A block on a floor under its weight: static, so that its motion as a whole is loose."""
+    block = am.Body(am.box((1, 1), 2), am.LinearElastic(10.0, 0.3))
+    model = am.Model([block], contacts=[am.Contact("bottom", am.Plane((0, 1)), mu=0.3)],
+                     loads=[am.BodyForce((0.0, -1.0))])  # fmt: skip
+    problem = model.assemble()
+    bound = motion_bound(problem, am.solve(problem), Deadline.after(20))
+    assert bound.strains
+    K, energies = problem.M, []
+    for mu in (0.0, 0.1, 0.3, 1.0):
+        v = am.solve(problem.with_mu(mu)).v
+        energies.append(v @ (K @ v))
+    at = energies[2]
+    assert max(energies) <= bound.energy * at * (1 + 1e-6)

@@ -1,4 +1,4 @@
-"""The verbs `jam` and `modes`: words, JSON, pictures, exit codes."""
+"""The verbs `jam`, `collapse` and `modes`: words, JSON, pictures, exit codes."""
 
 import json
 
@@ -40,6 +40,31 @@ def test_jam_of_the_brake():
     assert record["lower"] <= record["upper"] == pytest.approx(0.38638, abs=1e-5)
     assert len(record["r"]) == len(record["v"]) == 5
     assert run("jam", "example:brake", "--time-limit", 0).exit_code == 2
+
+
+def test_collapse_of_a_column():
+    """Five blocks of 1 by 0.5: 1 / 2.5 of their weight overturns them; on top they slide."""
+    asked = ["collapse", "example:column"]
+    told = run(*asked, "--live", "1,0")
+    assert told.exit_code == 0 and "0.4." in told.output, told.output
+    record = json.loads(run(*asked, "--live", "1,0", "--json", "-").output)
+    assert record["schema"] == "amontons/collapse/1" and record["balanced"]
+    assert record["lower"] < 0.4 <= record["upper"] * (1 + 1e-6) and record["width"] <= 0.01
+    top = ["--traction", "row 5 block 1.top=1,0", "--json", "-"]
+    found = json.loads(run(*asked, *top).output)  # friction below the block on top
+    assert found["upper"] == pytest.approx(0.7 * 0.5)
+
+
+@pytest.mark.parametrize(("words", "told"), [
+    ([], "expected a live load"), (["--live", "1"], "--live 1: expected 2 numbers"),
+    (["--live", "east,0"], "--live east,0"), (["--traction", "1,0"], "expected SURFACE=X,Y"),
+    (["--live", "1,0", "--gap", "2"], "--gap"), (["--live", "no such=1,0"], "no such"),
+    (["--live", "1,0", "--time-limit", "-1"], "--time-limit"),
+])  # fmt: skip
+def test_wrong_live_loads_are_named(words, told):
+    found = run("collapse", "example:column", *words)
+    assert found.exit_code == 2 and told in found.output
+    assert "has no bodies" in run("collapse", "example:tower", "--live", "1,0").output
 
 
 def test_modes_of_a_case(tmp_path):

@@ -175,9 +175,13 @@ def load_multipliers(
 
 
 def proved_distance(
-    scaled: Scaled, z0: Reference, tau: Array, sigma: Array, eta: Array, pinned: Mask
-) -> float | None:
-    """Bound of the difference of scaled reactions, rounding included; None without a proof."""
+    scaled: Scaled, z0: Reference, tau: Array, sigma: Array, eta: Array, pinned: Mask, *,
+    held: Array | None = None,
+) -> float | None:  # fmt: skip
+    """Bound of the difference of scaled reactions, rounding included; None without a proof.
+
+    held (nc, d, d): what else is known to hold d_r with these multipliers, added to the matrix.
+    """
     given = (tau, sigma, eta)
     if not all(np.isfinite(x).all() for x in given) or min(tau.min(), sigma.min()) <= 0:
         return None
@@ -202,6 +206,10 @@ def proved_distance(
     turned *= scale.reshape(k, d)
     turned[:, 1:] += np.abs(eta) * scale.reshape(k, d)[:, :1]
     spread = (spread + size.T @ turned.ravel()) / 2
+    if held is not None:
+        here = np.arange(k * d).reshape(k, d)
+        M[here[:, :, None], here[:, None, :]] += held
+        spread += (np.abs(held) @ scale.reshape(k, d, 1)).ravel()
     M *= scale[:, None]
     M *= scale
     rounding = gamma(4 * d + 40) * float((spread * scale).max()) * (1 + 1e-9)

@@ -42,9 +42,11 @@ Array = NDArray[np.float64]
 Places = NDArray[np.int64]
 EDGE = 1e-5  # distance to the edge of the cone, of the largest r_N, that counts as none
 NOTHING, STILL = 1e-9, 1e-13  # reactions, and velocities of what rests, that count as none
+SURELY, DOUBT = 10.0, 1e3  # errors of the solution that count as none; times that, as moving
 SHIFT = 1e-13  # of the diagonal of A H^-1 A^T: rows of A may depend on each other
 SIDES = 8  # of the polygon in which contacts are moved off the edge
 CENTRING = 60  # Newton steps
+FARTHEST = 1e4  # c, in the largest reaction of the solution, beyond which there is no centre
 CENTRED = 1e-6  # Newton decrement at the centre
 FILL = 40.0  # operations of a factorisation per entry of the matrix and row, guessed
 
@@ -55,7 +57,7 @@ class Face:
 
     F (nc d, k); A (m, k) sparse or dense.  stick (s,), slip (l,): contacts; the columns of F
     are d per stick, then one per slip.  mu (s,) of the sticks.  unit: the largest r_N.
-    edge: contacts held on the ray of r0.
+    edge: contacts held on the ray of r0, or whose status the solution's accuracy leaves open.
     """
 
     F: sparse.csr_array
@@ -169,12 +171,15 @@ def face_of(problem: FrictionProblem, solution: FrictionSolution, deadline: Dead
     mu = problem.mu
     nothing = _speed(problem, solution)
     loaded = (r[:, 0] > NOTHING * unit) & (solution.status != OPEN)
+    speed = np.linalg.norm(u[:, 1:], axis=1)
     closed = loaded | (u[:, 0] <= nothing)
-    ray = closed & ((np.linalg.norm(u[:, 1:], axis=1) > nothing) | (mu == 0))
+    ray = closed & ((speed > nothing) | (mu == 0))
+    doubtful = np.where(closed, (speed > nothing) & (speed <= DOUBT * nothing) & (mu > 0),
+                        u[:, 0] <= DOUBT * nothing)  # fmt: skip
     whole = _face(problem, r, _rays(r, u, mu, loaded), unit, closed & ~ray, ray, deadline)
     if not (whole.slack(whole.c0) <= EDGE).any():
-        return whole
-    inner = _moved_inside(whole, deadline)
+        return replace(whole, edge=int(doubtful.sum()))
+    inner, known = _moved_inside(whole, deadline)
     slack = whole.slack(inner)
     moved, rays = whole.reactions(inner), _rays(whole.reactions(inner), u, mu, loaded)
     s = len(whole.stick)
@@ -184,7 +189,8 @@ def face_of(problem: FrictionProblem, solution: FrictionSolution, deadline: Dead
     gone |= held & (moved[:, 0] <= NOTHING * unit)
     stick = closed & ~ray & ~held
     found = _face(problem, moved, rays, unit, stick, (ray | held) & ~gone, deadline)
-    return replace(found, edge=int((held & ~gone).sum()))
+    doubtful |= held if known else held | gone  # nothing now may be something on the edge
+    return replace(found, edge=int(doubtful.sum()))
 
 
 def _speed(problem: FrictionProblem, solution: FrictionSolution) -> float:
@@ -192,7 +198,7 @@ def _speed(problem: FrictionProblem, solution: FrictionSolution) -> float:
     size = float(np.linalg.norm(solution.u))
     if not problem.loose_modes.shape[1]:
         size = float(np.linalg.norm(problem.free_velocity))
-    return max(solution.convergence.error, STILL) * size
+    return SURELY * max(solution.convergence.error, STILL) * size
 
 
 def _rays(r: Array, u: Array, mu: Array, loaded: NDArray[np.bool_]) -> Array:
@@ -249,7 +255,14 @@ def polygon(face: Face, sides: int, *, outside: bool) -> sparse.csr_array:
 
     In 2D both are K.
     """
-    s, d = len(face.stick), face.d
+    own = cone_rows(face.mu, face.d, sides, outside=outside)
+    rest = sparse.csr_array((own.shape[0], face.unknowns - own.shape[1]))
+    return sparse.csr_array(sparse.hstack([own, rest]))
+
+
+def cone_rows(mu: Array, d: int, sides: int, *, outside: bool) -> sparse.csr_array:
+    """G (s many, s d), where G r <= 0 keeps r (s, d) in polygonal cones in K, or around it."""
+    s = len(mu)
     if d == 2:
         turns, shrink = np.array([[1.0], [-1.0]]), 1.0
     else:
@@ -258,31 +271,37 @@ def polygon(face: Face, sides: int, *, outside: bool) -> sparse.csr_array:
         shrink = 1.0 if outside else float(np.cos(np.pi / sides))
     many = len(turns)
     blocks = np.empty((s, many, d))
-    blocks[:, :, 0] = -shrink * face.mu[:, None]
+    blocks[:, :, 0] = -shrink * mu[:, None]
     blocks[:, :, 1:] = turns
     rows = np.arange(s * many).repeat(d)
     columns = (d * np.arange(s)[:, None, None] + np.arange(d)).repeat(many, axis=1).ravel()
-    return sparse.csr_array((blocks.ravel(), (rows, columns)), shape=(s * many, face.unknowns))
+    return sparse.csr_array((blocks.ravel(), (rows, columns)), shape=(s * many, s * d))
 
 
-def _moved_inside(face: Face, deadline: Deadline) -> Array:
-    """c of the face with as many contacts as possible off the edges."""
+def _moved_inside(face: Face, deadline: Deadline) -> tuple[Array, bool]:
+    """c of the face with as many contacts as possible off the edges; whether that is known."""
     from scipy.optimize import linprog
 
     k, s, rays = face.unknowns, len(face.stick), len(face.slip)
     G = polygon(face, SIDES, outside=False)
-    most = float(face.parts(face.c0[:, None])[0].mean()) if s else 1.0
-    apart = sparse.csr_array(sparse.kron(sparse.eye_array(s), np.ones((G.shape[0] // s, 1))))
-    left = sparse.hstack([G, apart], format="csr")
-    equal = sparse.hstack([sparse.csr_array(face.A), sparse.csr_array((face.A.shape[0], s))])
+    normal, _, slip = face.parts(face.c0[:, None])
+    most = 0.1 * float(np.concatenate([normal, slip]).mean()) if s + rays else 1.0
+    many = G.shape[0] // s if s else 0
+    apart = sparse.kron(sparse.eye_array(s), np.ones((many, 1)))
+    beside = sparse.csr_array((-np.ones(rays), (np.arange(rays), np.arange(k - rays, k))),
+                              shape=(rays, k))  # fmt: skip
+    left = sparse.csr_array(sparse.block_diag([apart, sparse.eye_array(rays)]))
+    left = sparse.hstack([sparse.vstack([G, beside]), left], format="csr")
+    free = sparse.csr_array((face.A.shape[0], s + rays))
+    equal = sparse.hstack([sparse.csr_array(face.A), free])
     deadline.pay(lp_work(left, equal))
-    bounds = [(None, None)] * (k - rays) + [(0.0, None)] * rays + [(0.0, 0.1 * most)] * s
-    cost = np.concatenate([np.zeros(k), -np.ones(s)])
+    bounds = [(None, None)] * (k - rays) + [(0.0, None)] * rays + [(0.0, most)] * (s + rays)
+    cost = np.concatenate([np.zeros(k), -np.ones(s + rays)])
     found = linprog(cost, left, np.zeros(left.shape[0]), equal.tocsr(), face.A @ face.c0,
                     bounds, method="highs-ipm")  # fmt: skip
     if found.x is None or found.status != 0:
-        return face.c0
-    return 0.5 * (face.c0 + found.x[:k])
+        return face.c0, False
+    return 0.5 * (face.c0 + found.x[:k]), True
 
 
 def lp_work(left: Any, equal: Any) -> float:
@@ -310,6 +329,8 @@ def centred(face: Face, deadline: Deadline) -> tuple[Array, Array | None, bool]:
             break
         reach = longest(face, c, step[:, None])[0]
         c = c + min(1.0 if decrement < 0.1 else 0.7 * reach, 1.0, 0.9 * reach) * step
+        if not np.abs(c).max(initial=0.0) <= FARTHEST:  # no end that way
+            break
     return c, s, at_rest
 
 

@@ -8,23 +8,28 @@ what is open of the reactions of the motion that was found.
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ...core.clock import Deadline
-from ...core.errors import InvalidInput, TimeUp
+from ...core.errors import InvalidInput, SingularOperator, TimeUp
 from ...core.faces import Told
 from ...core.onlookers import say
 from ...linear.rank import matrix_rank, semidefinite_rank
 from ...problem.friction import FrictionProblem
 from ...problem.solution import FrictionSolution
+from ...solvers.driver import drive
+from .ball import Ball, MotionBound, ball_of
+from .bounded_reactions import Confined, confined
 from .face import face_of
-from .motion import NO_MORE, MotionBound, OtherMotion, motion_bound, other_motion
+from .motion import NO_MORE, OtherMotion, Rest, other_motion, rest
 from .ranges import SPREAD, ReactionRanges, reaction_ranges
 
-RANGES, BALL, MOTIONS = 0.4, 0.15, 0.9  # parts of the time that is left
+RANGES, BALL, PROOF, REST, MOTIONS = 0.4, 0.15, 0.3, 0.3, 0.6  # parts of the time left
+LOOSE = 0.2  # of the time, for other motions, where contact alone holds bodies
+ACCURATE, POLISH = 1e-12, 0.15  # error of a solution that is asked for, part of the time
 NAMED = 3  # contacts whose ranges are told in words
 _PROVED = {
     "unique_every_load": "The motion is unique, whatever the load.",
@@ -39,14 +44,17 @@ class Indeterminacy(Told):
 
     proved: "unique_every_load" or "unique_this_load" where the motion is proved to be the only
     one, by what `why` says; "not_unique" where another is; "" without a proof.  bound: how far
-    any other motion of this load can be; other: another motion; starts: solutions from other
-    starts that were compared.  reactions: what the motion leaves open of them; None where there
-    was no time, see reason.
+    any other motion of this load can be; confined: how large reactions of any other solution
+    are at least, by multipliers; rest_excluded: rest is no solution; other: another motion;
+    starts: solutions from other starts that were compared.  reactions: what the motion leaves
+    open of them; None where there was no time, see reason.
     """
 
     proved: str = ""
     why: str = ""
     bound: MotionBound | None = None
+    confined: Confined | None = None
+    rest_excluded: bool = False
     other: OtherMotion | None = None
     starts: int = 0
     reactions: ReactionRanges | None = None
@@ -59,8 +67,16 @@ class Indeterminacy(Told):
             return self.proved
         if self.other is not None:
             return "not_unique"
-        unique = self.bound is not None and self.bound.distance <= NO_MORE
-        return "unique_this_load" if unique else "undecided"
+        return "unique_this_load" if self._is_within_ball or self._is_alone else "undecided"
+
+    @property
+    def _is_within_ball(self) -> bool:
+        bound = self.bound
+        return bound is not None and not bound.strains and bound.distance <= NO_MORE
+
+    @property
+    def _is_alone(self) -> bool:
+        return self.confined is not None and self.confined.everywhere
 
     @property
     def motion_is_unique(self) -> bool:
@@ -86,6 +102,10 @@ class Indeterminacy(Told):
         """What is known of the motion, in a sentence or two."""
         if self.proved:
             return f"{_PROVED[self.proved]} {self.why}".strip()
+        if self._is_alone and self.confined is not None and self.other is None:
+            by = self.confined
+            return (f"The motion is unique, to {by.distance:.0e}: multipliers exclude all "
+                    f"others, as no reaction can be above {by.bound:.3g}.")  # fmt: skip
         if self.motion == "unique_this_load":
             assert self.bound is not None
             return (f"The motion is unique, to {self.bound.distance:.0e} of the free one: "
@@ -95,11 +115,22 @@ class Indeterminacy(Told):
             return (f"There is another motion, {self.other.distance:.1%} away; the errors of "
                     f"both by the judge are {a:.0e} and {b:.0e}, and no proof is possible, as "
                     "any rounding of a singular W makes another problem.")  # fmt: skip
+        return self._without_a_decision
+
+    @property
+    def _without_a_decision(self) -> str:
+        """What is known where neither a proof nor another motion was found."""
         starts = f" from {self.starts} other starts" if self.starts else ""
         text = f"No other motion was found{starts}, and no proof that there is none"
+        if self.rest_excluded:
+            text += "; rest is not one"
+        if self.confined is not None:
+            text += (f"; any other has a normal reaction above {self.confined.within:.3g} "
+                     "somewhere")  # fmt: skip
         if self.bound is not None:
-            text += (f"; any other differs by at most {self.bound.distance:.2g} of the free "
-                     "motion in the norm of energy")  # fmt: skip
+            of = "strains of the found one" if self.bound.strains else "free motion"
+            text += (f"; any other differs by at most {self.bound.distance:.2g} of the {of} "
+                     "in the norm of energy")  # fmt: skip
         return text + "."
 
     @property
@@ -130,12 +161,17 @@ class Indeterminacy(Told):
     def record(self) -> dict[str, Any]:
         """Plain data, as JSON files have it."""
         bound, other, found = self.bound, self.other, self.reactions
+        confined = self.confined
         return {
             "motion": {
                 "verdict": self.motion,
                 "bound": None if bound is None else {
                     "distance": bound.distance, "energy": bound.energy,
+                    "of": "strains" if bound.strains else "motion",
                 },
+                "reactions_above": None if confined is None or confined.everywhere
+                else confined.within,
+                "rest_excluded": self.rest_excluded,
                 "other": None if other is None else {
                     "distance": other.distance, "errors": list(other.errors),
                     "r": other.solution.r.tolist(), "u": other.solution.u.tolist(),
@@ -171,6 +207,7 @@ def indeterminacy(
     proved: str = "", why: str = "",
 ) -> Indeterminacy:  # fmt: skip
     """What is known in time of a Coulomb problem with a solution; proved, why: its motion."""
+    solution = _polished(problem, solution, deadline)
     ranges, reason = None, ""
     try:
         say("reactions of this motion")
@@ -179,11 +216,48 @@ def indeterminacy(
         ranges = reaction_ranges(face, solution.r, share)
     except (TimeUp, InvalidInput) as error:
         reason = f"What the motion leaves open of the reactions is not known: {error}."
-    bound, other, starts = None, None, 0
-    if not proved:
-        with suppress(TimeUp):
-            say("other motions")
-            bound = motion_bound(problem, solution, deadline.share(BALL))
-            if bound is None or bound.distance > NO_MORE:
-                other, starts = other_motion(problem, solution, deadline.share(MOTIONS))
-    return Indeterminacy(proved, why, bound, other, starts, ranges, reason)
+    if proved:
+        return Indeterminacy(proved, why, reactions=ranges, reason=reason)
+    say("other motions")
+    ball: Ball | None = None
+    with suppress(TimeUp):
+        ball = ball_of(problem, deadline.share(BALL))
+    bound = None if ball is None else ball.bound(solution)
+    known = Indeterminacy("", "", bound, reactions=ranges, reason=reason)
+    if known.motion_is_unique:
+        return known
+    if ranges is not None and ranges.sure and ranges.dimension == 0:
+        with suppress(TimeUp, InvalidInput, SingularOperator):
+            share = deadline.share(PROOF)
+            known = replace(known, confined=confined(problem, solution, ball, share))
+    if known.motion_is_unique:
+        return known
+    return _searched(problem, solution, known, ball, deadline)
+
+
+def _polished(
+    problem: FrictionProblem, solution: FrictionSolution, deadline: Deadline
+) -> FrictionSolution:
+    """The solution to ACCURATE if that is quick: what rests is told from what moves by it."""
+    if solution.convergence.error <= ACCURATE:
+        return solution
+    share = deadline.share(POLISH)
+    found = drive(problem, start=solution, tolerance=ACCURATE, time_limit=share)
+    better = found.convergence.error < solution.convergence.error
+    return found if better and np.isfinite(found.r).all() else solution
+
+
+def _searched(
+    problem: FrictionProblem, solution: FrictionSolution, known: Indeterminacy,
+    ball: Ball | None, deadline: Deadline,
+) -> Indeterminacy:  # fmt: skip
+    """With another motion, where one is found."""
+    resting = Rest(None, False)
+    with suppress(TimeUp, InvalidInput):
+        resting = rest(problem, deadline.share(REST))
+    starts = [r for r in (resting.r, None if ball is None else ball.p) if r is not None]
+    other, compared = None, 0
+    with suppress(TimeUp):
+        share = deadline.share(LOOSE if problem.loose_modes.shape[1] else MOTIONS)
+        other, compared = other_motion(problem, solution, share, starts)
+    return replace(known, rest_excluded=resting.excluded, other=other, starts=compared)

@@ -1,25 +1,16 @@
-"""What is known about other motions where W is singular or missing.
+"""Other motions where W is singular or missing: rest, by a linear program, and second starts.
 
-All solutions lie in one ball.  A solution obeys r.u <= 0, so with w_T = 0 <= w_N (gaps)
-
-    v^T M v <= f.v,       and for any normal reactions p >= 0 with M v_p = f + H_N p
-    f.v = v_p^T M v - p.(u_N - w_N) <= v_p^T M v + p.w_N,
-
-hence |v - v_p / 2|_M^2 <= |v_p|_M^2 / 4 + p.w_N.  Best is the p of the problem without friction
-(then p.w_N vanishes with u_N): no solution with friction has more energy than the one without,
-and where that rests, by frictionless balance, rest is the only motion.  Any p gives a bound.
-In the Delassus form W = L L^T stands for H^T M^-1 H with M = 1, and q = L f + w is needed.
-Where bodies of a static model are held by contact alone (M semidefinite) there is no ball.
-
-Other motions are looked for from random reactions in the cones.  One counts when both solve the
-problem to SOLVED, asked for POLISHED, and they differ by more than FAR times that: the judge's
-error is relative to the free velocity as the difference is.  That is no proof, nor could there
-be one: any rounding of a singular W makes it another problem.
+Rest is a solution exactly if reactions in the cones balance the load: a convex question, which
+a linear program decides (polygons in the place of discs leave 2 % of mu open).  Then starts:
+from those reactions, from the problem without friction, from random reactions in the cones.
+One counts when both solve the problem to SOLVED, asked for POLISHED, and they differ by more
+than FAR times that: the judge's error is relative to the free velocity as the difference is.
+That is no proof, nor could there be one: any rounding of a singular W makes it another problem.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,7 +25,8 @@ from ...problem.solution import FrictionSolution
 from ...solvers import GaussSeidel
 from ...solvers.contract import Iterate
 from ...solvers.driver import drive
-from .face import rank_factor
+from .ball import free_speed, has_plain_gaps, in_coordinates_of_energy
+from .face import cone_rows, lp_work
 
 Array = NDArray[np.float64]
 # of random starts: size, times a typical one; tangents one way, the other, or any; sweeps
@@ -42,20 +34,10 @@ STARTS = ((1.0, 0, True), (3.0, 1, True), (3.0, -1, True), (1.0, 0, False), (0.3
 SUSPECT, FAR = 30.0, 1e3  # differences of motions, in their errors: looked at again; counted
 SOLVED, POLISHED = 1e-9, 1e-11  # error by the judge that both need, and are asked for
 NO_MORE = 1e-6  # distance of any other motion, relative, that counts as none
-FITS = 1e-9  # part of q outside of the range of W that counts as rounding
-GAP = 1e-12  # negative gap or tangential w, relative to the velocities, that counts as none
-
-
-@dataclass(frozen=True, eq=False)
-class MotionBound:
-    """Every solution's motion is within `distance` of the found one, in the norm of energy.
-
-    distance: relative to the free motion, without reactions.  energy: the largest energy of a
-    solution, relative to that of the free motion.
-    """
-
-    distance: float
-    energy: float
+ROUNDING = 1e-14  # the least error that is believed
+SIDES = 16  # of polygons in the place of discs
+NEAR = 0.2  # part of the time for a start from rest, or without friction
+CAP = 0.1  # margin to the border of a cone that is wanted at rest, of the largest load
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,77 +52,67 @@ class OtherMotion:
     errors: tuple[float, float]
 
 
-# --------------------------------------------------------------------------- the ball
-def motion_bound(
-    problem: FrictionProblem, solution: FrictionSolution, deadline: Deadline
-) -> MotionBound | None:
-    """The ball of the module docstring about a solution, None where it can not be had."""
-    if not problem.has_v:
-        in_energy = _in_coordinates_of_energy(problem, deadline)
-        if in_energy is None:
-            return None
-        problem = in_energy
-    if problem.loose_modes.shape[1] or not _has_plain_gaps(problem):
-        return None
-    bare = drive(problem.with_mu(0.0), time_limit=deadline)
-    if not np.isfinite(bare.convergence.error):
-        return None
-    p = np.zeros_like(bare.r)
-    p[:, 0] = np.maximum(bare.r[:, 0], 0.0)
-    with_p, with_r = (problem.velocity(r)[1] for r in (p, solution.r))
-    assert with_p is not None and with_r is not None and problem.f is not None
-    free = problem.solve_M(problem.f)
-    M, w = problem.assembled().M, np.maximum(problem.w[:, 0], 0.0)  # type: ignore[index]
+# ------------------------------------------------------------------------------ rest
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """Whether rest is a solution: reactions (nc, d) that balance the load, or None.
 
-    def size(v: Array) -> float:
-        return float(np.sqrt(max(v @ (M @ v), 0.0)))
+    excluded: there are none, not even in the polygons around the discs.
+    """
 
-    scale = size(free)
-    if scale == 0.0:
-        return None
-    radius = np.sqrt(size(with_p) ** 2 / 4 + float(p[:, 0] @ w))
-    distance = size(with_p / 2 - with_r) + radius
-    return MotionBound(distance / scale, ((size(with_p) / 2 + radius) / scale) ** 2)
+    r: Array | None
+    excluded: bool
 
 
-def _in_coordinates_of_energy(
-    problem: FrictionProblem, deadline: Deadline
-) -> FrictionProblem | None:
-    """The Delassus form as M = 1, H = L^T with W = L L^T; None where q does not fit."""
-    deadline.pay(5.0 * float(problem.q_norm > 0) * problem.free_velocity.size ** 3)
-    L, q = problem.kept(rank_factor), problem.free_velocity
-    if not L.shape[1]:
-        return None
-    f = np.linalg.lstsq(L, q.ravel())[0]
-    w = q - (L @ f).reshape(q.shape)
-    w[np.abs(w) <= FITS * float(np.abs(q).max(initial=0.0))] = 0.0
-    return FrictionProblem.from_global(sparse.eye_array(L.shape[1]).tocsc(),
-                                       sparse.csc_array(L.T), f, w, problem.law)  # fmt: skip
+def rest(problem: FrictionProblem, deadline: Deadline) -> Rest:
+    """By a linear program; neither where that does not say, or loads are not plain."""
+    from scipy.optimize import linprog
 
-
-def _has_plain_gaps(problem: FrictionProblem) -> bool:
-    """Whether w is only open gaps."""
-    w = problem.w
-    assert w is not None
-    size = GAP * max(float(np.abs(w).max(initial=0.0)), _speed(problem))
-    return bool((w[:, 0] >= -size).all() and (np.abs(w[:, 1:]) <= size).all())
-
-
-def _speed(problem: FrictionProblem) -> float:
-    """|q|, 0 where there is none."""
-    try:
-        return float(np.linalg.norm(problem.free_velocity))
-    except SingularOperator:
-        return 0.0
+    nothing = Rest(None, False)
+    given = problem if problem.has_v else in_coordinates_of_energy(problem, deadline)
+    if given is None or given.loose_modes.shape[1] or not has_plain_gaps(given):
+        return nothing
+    H, f, w = sparse.csr_array(given.H), given.f, given.w
+    assert f is not None and w is not None
+    reached = np.diff(H.indptr) > 0
+    M = sparse.csr_array(given.assembled().M)
+    if M[reached][:, ~reached].nnz:
+        return nothing  # what no contact reaches moves those that one does
+    nc, d = w.shape
+    closed = w[:, 0] <= 0
+    columns = (d * np.flatnonzero(closed)[:, None] + np.arange(d)).ravel()
+    A, load = sparse.csr_array(H[reached][:, columns]), f[reached]
+    size, mu, k = float(np.abs(load).max(initial=0.0)) or 1.0, given.mu[closed], len(columns)
+    for outside in (False, True):
+        G = cone_rows(mu, d, SIDES, outside=outside)
+        apart = sparse.kron(sparse.eye_array(len(mu)), np.ones((G.shape[0] // len(mu), 1)))
+        left = sparse.csr_array(sparse.hstack([G, apart]))
+        equal = sparse.csr_array(sparse.hstack([A, sparse.csr_array((A.shape[0], len(mu)))]))
+        deadline.pay(lp_work(left, equal))
+        bounds = [(0.0, None), *[(None, None)] * (d - 1)] * len(mu) + [(0.0, CAP)] * len(mu)
+        cost = np.concatenate([np.zeros(k), -np.ones(len(mu))])
+        found = linprog(cost, left, np.zeros(left.shape[0]), equal, -load / size, bounds,
+                        method="highs-ipm")  # fmt: skip
+        if found.status == 0 and not outside:
+            r = np.zeros((nc, d))
+            r[closed] = size * np.asarray(found.x[:k]).reshape(-1, d)
+            return Rest(r, False)
+        if found.status != 2:
+            return nothing
+    return Rest(None, True)
 
 
 # --------------------------------------------------------------------- second starts
 def other_motion(
-    problem: FrictionProblem, solution: FrictionSolution, deadline: Deadline
-) -> tuple[OtherMotion | None, int]:
-    """(another motion or None, solutions that were compared with the given one)."""
-    speed, compared = _speed(problem), 0
-    for found in _others(problem, solution, deadline):
+    problem: FrictionProblem, solution: FrictionSolution, deadline: Deadline,
+    starts: Sequence[Array] = (),
+) -> tuple[OtherMotion | None, int]:  # fmt: skip
+    """(another motion or None, solutions that were compared with the given one).
+
+    starts: reactions (nc, d) from where to start first.
+    """
+    speed, compared = free_speed(problem), 0
+    for found in _others(problem, solution, deadline, starts):
         compared += found.convergence.error <= 1e-6
         first, distance = solution, _distance(solution, found, speed)
         if distance <= SUSPECT * _errors(first, found):
@@ -158,7 +130,7 @@ def other_motion(
 
 
 def _errors(*solutions: FrictionSolution) -> float:
-    return sum(one.convergence.error for one in solutions)
+    return sum(max(one.convergence.error, ROUNDING) for one in solutions)
 
 
 def _distance(a: FrictionSolution, b: FrictionSolution, speed: float) -> float:
@@ -168,15 +140,22 @@ def _distance(a: FrictionSolution, b: FrictionSolution, speed: float) -> float:
 
 
 def _others(
-    problem: FrictionProblem, solution: FrictionSolution, deadline: Deadline
-) -> Iterator[FrictionSolution]:
-    """Solutions from random reactions in the cones, each with its share of the time."""
+    problem: FrictionProblem, solution: FrictionSolution, deadline: Deadline,
+    starts: Sequence[Array],
+) -> Iterator[FrictionSolution]:  # fmt: skip
+    """Solutions from given starts and from random reactions in the cones, each in its time."""
     random, r = np.random.default_rng(0), solution.r
     local = problem
     try:
         local = problem.condensed(deadline)
     except (SingularOperator, InvalidInput, TimeUp):
         pass  # then in displacements
+    for begin in starts:
+        if deadline.passed:
+            return
+        say("other motions, from rest and without friction")
+        share = deadline.share(NEAR)
+        yield from _finite(drive(local, start=Iterate(begin), time_limit=share))
     closed = r[r[:, 0] > 0, 0]
     typical = float(np.median(closed)) if len(closed) else 0.0
     if not typical and not local.has_v:  # nothing closed: what the free motion would ask for
@@ -193,6 +172,10 @@ def _others(
         start = Iterate(np.column_stack([normal, tangent]))
         share = deadline.share(1 / (len(STARTS) + 1 - k))
         solver = GaussSeidel() if sweeps and not local.has_v else None
-        found = drive(local, solver, start=start, time_limit=share)
-        if np.isfinite(found.u).all():
-            yield found
+        yield from _finite(drive(local, solver, start=start, time_limit=share))
+
+
+def _finite(found: FrictionSolution) -> Iterator[FrictionSolution]:
+    """What is a number."""
+    if np.isfinite(found.u).all():
+        yield found

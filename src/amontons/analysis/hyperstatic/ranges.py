@@ -40,7 +40,8 @@ class ReactionRanges:
     states of reactions with the same motion; they differ at `open` contacts alone.  exact
     (nc,): normal ranges from linear programs, in 3D within 2 % of mu r_N.  most (nc,): no
     normal reaction with this motion is larger; inf where that is not known.  other (nc, d): the
-    attained state farthest from the given one.
+    attained state farthest from the given one.  Where contacts stick at the edge of their
+    cones, or their status is open, nothing is exact and most is inf.
     """
 
     dimension: int
@@ -78,7 +79,7 @@ def reaction_ranges(face: Face, r: Array, deadline: Deadline) -> ReactionRanges:
     found = ReactionRanges(dimension, sure, nothing, r.copy(), r.copy(), nothing.copy(),
                            np.full(nc, np.inf), r)  # fmt: skip
     if dimension == 0:
-        return replace(found, most=r[:, 0].copy())
+        return found if face.edge else replace(found, most=r[:, 0].copy())
     walk = _Walk(face, found, d)
     try:
         walk.begin(deadline)
@@ -220,6 +221,10 @@ class _Walk:
         low[face.slip], high[face.slip] = ends.min(axis=0), ends.max(axis=0)
         same = ~self.open
         low[same], high[same] = begun.low[same], begun.high[same]
+        low[:, 0] = np.maximum(low[:, 0], 0.0)
+        if face.edge:  # the face is but a part of what the motion leaves open
+            return replace(begun, open=self.open, low=low, high=high,
+                           other=face.reactions(self.far))  # fmt: skip
         determined = same & np.isin(np.arange(len(same)), self.owner)
         self.most[determined] = np.minimum(self.most, begun.high[:, 0])[determined]
         off = np.setdiff1d(np.arange(len(same)), self.owner)

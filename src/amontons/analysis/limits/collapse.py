@@ -68,14 +68,17 @@ class Collapse(Told):
 
     @property
     def width(self) -> float:
-        """(upper - lower) / upper."""
+        """(upper - lower) / upper, 1 where nothing limits the load."""
+        if not np.isfinite(self.upper):
+            return 1.0
         return (self.upper - self.lower) / self.upper if self.upper > 0 else 0.0
 
     @property
     def record(self) -> dict[str, Any]:
         """For JSON."""
         return {
-            "lower": self.lower, "upper": self.upper, "balanced": self.balanced,
+            "lower": self.lower, "upper": self.upper if np.isfinite(self.upper) else None,
+            "width": self.width, "balanced": self.balanced,
             "programs": self.programs, "seconds": self.seconds, "reason": self.reason,
             "r": None if self.r is None else self.r.tolist(),
             "motion": None if self.motion is None else self.motion.tolist(),

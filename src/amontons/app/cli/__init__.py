@@ -8,7 +8,7 @@ from ... import __version__
 from . import flags
 from .folders import results_folder
 from .group import Commands
-from .more_commands import audit, check, convert, examples, jam, modes
+from .more_commands import audit, check, collapse, convert, examples, jam, modes
 
 EPILOG = """\b
 Examples:
@@ -397,4 +397,5 @@ main.add_command(check)
 main.add_command(convert)
 main.add_command(examples)
 main.add_command(jam)
+main.add_command(collapse)
 main.add_command(modes)

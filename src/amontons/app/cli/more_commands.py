@@ -131,6 +131,40 @@ def jam(**options: object) -> int:
 @click.command(
     epilog="""\b
 Examples:
+  amontons collapse example:column --live 1,0           sideways, in parts of its weight
+  amontons collapse example:column --traction "row 5 block 1.top=1,0"
+  amontons collapse example:column --live 1,0 --json - | jq .lower
+
+\b
+Exit codes: 0 both bounds are as near as --gap asks, 1 farther apart, 2 bad input.
+"""
+)
+@click.argument("source")
+@click.option("--live", multiple=True, metavar="[REGION=]X,Y[,Z]",
+              help="Live force per volume, of all bodies or a region.")  # fmt: skip
+@click.option("--traction", multiple=True, metavar="SURFACE=X,Y[,Z]",
+              help="Live force per area (per length in 2D).")  # fmt: skip
+@click.option("--gap", type=float, default=2e-3, show_default=True, metavar="X",
+              help="Relative distance of the bounds that is good enough.")  # fmt: skip
+@click.option("--time-limit", type=float, metavar="SECONDS", help="For the lower bound. [60]")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
+              help="Replace a value of the case.")  # fmt: skip
+@click.option("--json", "json_copy", metavar="FILE", help="The same as JSON; - prints it.")
+@flags.of_decks
+def collapse(**options: object) -> int:
+    """Bound the factor of a live load at which blocks in frictional contact give way.
+
+    SOURCE is a case file (.toml), a deck (.inp) or example:NAME; its loads are dead.  Nothing
+    moves below the lower bound, there is no balance beyond the upper one; both are proved.
+    """
+    from .collapse import run
+
+    return run(**options)  # type: ignore[arg-type]
+
+
+@click.command(
+    epilog="""\b
+Examples:
   amontons modes case.toml --count 20 --picture modes.png
   amontons modes case.toml --velocity 1,0 --flutter     the lower side slides along x everywhere
   amontons modes case.toml --near 6474 --json - | jq .stable
