@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...linear.sums import Blocks, by_components, sum_of_blocks, sum_of_products
+from .facet_integrals import FacetPairs
 
 if TYPE_CHECKING:
     from .current_mortar import MortarMeeting
@@ -137,7 +138,9 @@ class MortarSlopes:
         """
         parts, pair = self.at.shared, self.at.pair
         slave, master = pair.slave.nodes[parts.slave], pair.master.nodes[parts.master]
-        own, cross = self.at.facet_pairs(parts.slave, parts.master).slopes()
+        own, cross = FacetPairs.of(
+            pair.slave, parts.slave, pair.master, parts.master, self.at.x
+        ).slopes()
         return own, cross, _dofs(np.concatenate([slave, master], axis=1), self.at.x.shape[1])
 
     @cached_property
