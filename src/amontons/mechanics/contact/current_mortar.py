@@ -56,6 +56,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...linear.sums import sum_of_blocks, sum_of_products
+from .couples import Couples
 from .current_slopes import MortarSlopes
 from .facing import Skin
 from .folds import Fold
@@ -331,6 +332,10 @@ class MortarMeeting:
         if earlier.approach.nnz:
             out -= self.closed_by(earlier)[:, None] * (earlier.approach @ self.x)
         return out
+
+    def couples(self, x: Array) -> Couples:
+        """What leaves forces without a moment about nodes at x (nodes, d)."""
+        return Couples(self, x)
 
     @cached_property
     def slopes(self) -> MortarSlopes:

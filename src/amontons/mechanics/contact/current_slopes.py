@@ -103,6 +103,10 @@ class MortarSlopes:
         """dG/dx, (nc d, nodes d), of nodes that meet; zero for the others."""
         return self._alone(by_distance=self._eyes)
 
+    def by_distances(self, factors: Array) -> sparse.csr_array:
+        """factors (nc, m, d) times dG/dx, (nc m, nodes d), of nodes that meet."""
+        return self._alone(factors.shape[1], by_distance=factors)
+
     @property
     def gap(self) -> sparse.csr_array:
         """dg/dx, (nc, nodes d), of nodes that meet; zero for the others."""
@@ -131,7 +135,7 @@ class MortarSlopes:
         return SlotSlopes(values, row, _dofs(skin.nodes, d))
 
     @cached_property
-    def _integrals(self) -> tuple[Array, Array, Index]:
+    def integrals(self) -> tuple[Array, Array, Index]:
         """Of own (k, a, a + e, w) and cross (k, a, b + h, w) of every pair by dofs (k, w).
 
         Those of own add up to the ones of their facet.
@@ -164,9 +168,13 @@ class MortarSlopes:
         by_own[..., :a] += (apart[:, :, :, None] * np.eye(a)[:, None])[..., None]
         by_cross = there.swapaxes(1, 2)[:, None, :, None, :]
         by_cross = -scaled[parts.of][:, :, None, :, None] * by_cross
-        own, cross, dofs = self._integrals
+        own, cross, dofs = self.integrals
         values = _through(by_own[parts.of], own) + _through(by_cross, cross)
         return SlotSlopes(values.reshape(-1, a, d, dofs.shape[1]), row[parts.of], dofs)
+
+    def pushed(self, force: Array) -> sparse.csr_array:
+        """Derivative of all forces by x, (nodes d, nodes d); force (nc, d): lambda, held."""
+        return sparse.csr_array(self.spread(force) + self.at.couples(self.at.x).slopes(force))
 
     def spread(self, force: Array) -> sparse.csr_array:
         """Derivative of sum_p B_pj lambda_p at all nodes j by x, (nodes d, nodes d).
@@ -195,7 +203,7 @@ class MortarSlopes:
         parts, row = self.at.shared, self.at.rows
         f, a, d = z.shape
         n, nc = self.at.x.size, len(self.at.pair.slaves)
-        own, _, dofs = self._integrals
+        own, _, dofs = self.integrals
         mass = own[:, :, :a]
         inverse = np.where(parts.kept[:, :, None], parts.inverse, 0.0)
         # (f, r, c, s, t): by mass_st
@@ -227,7 +235,7 @@ class MortarSlopes:
         """
         parts = self.at.shared
         f, a, d = z.shape
-        own, cross, dofs = self._integrals
+        own, cross, dofs = self.integrals
         forms, local = [], []
         for (nodes, slots), held, slopes, of in (
             (mine, parts.own, own, np.arange(f)), (theirs, -parts.cross, -cross, parts.of)
