@@ -219,22 +219,22 @@ class Meetings:
         return found[0] if len(found) == 1 else sparse.csr_array(sparse.hstack(found))
 
     @cached_property
-    def _turned(self) -> sparse.csr_array | None:
-        """Where the nodes are."""
+    def turned_here(self) -> sparse.csr_array | None:
+        """`turned` where the nodes are."""
         xs = [part.x for part in self.parts if isinstance(part, MortarMeeting)]
         return self.turned(xs[0]) if xs else None
 
     def returned(self, counts: Array) -> sparse.csr_array:
         """Forces on other nodes per force lambda times counts (nc, d), (nodes d, nc d)."""
         out = by_components(self.others, counts)
-        if self._turned is None:
+        if self.turned_here is None:
             return out
-        return sparse.csr_array(out + self._turned @ sparse.diags_array(counts.ravel()))
+        return sparse.csr_array(out + self.turned_here @ sparse.diags_array(counts.ravel()))
 
     def given(self, force: Array) -> Array:
         """Forces (nodes d,) on other nodes of forces lambda (nc, d)."""
         out = (self.others @ force).ravel()
-        return out if self._turned is None else out + self._turned @ force.ravel()
+        return out if self.turned_here is None else out + self.turned_here @ force.ravel()
 
     def relative(self, v: Array) -> Array:
         """Motions (nc, d) of the slaves, of all nodes v (nodes, d), against the other side.
@@ -242,15 +242,15 @@ class Meetings:
         What forces lambda work on.
         """
         out = self.averages @ v
-        if self._turned is None:
+        if self.turned_here is None:
             return out
-        return out + (self._turned.T @ v.ravel()).reshape(out.shape)
+        return out + (self.turned_here.T @ v.ravel()).reshape(out.shape)
 
     def pushed(self, axes: Array, r: Array) -> Array:
         """Forces (nodes d,) of reactions r (nc, d) in the frames axes (nc, d, d): H r."""
         force = np.einsum("pkc,pk->pc", axes, r)
         out = (self.averages.T @ force).ravel()
-        return out if self._turned is None else out + self._turned @ force.ravel()
+        return out if self.turned_here is None else out + self.turned_here @ force.ravel()
 
     def columns(self, axes: Array) -> sparse.csc_array:
         """H (nodes d, nc d): column p d + k holds the forces of a unit along axis k of p.
@@ -259,8 +259,8 @@ class Meetings:
         """
         nc, d = axes.shape[:2]
         spread = sparse.kron(self.averages.T, np.eye(d), format="csr")
-        if self._turned is not None:
-            spread = spread + self._turned
+        if self.turned_here is not None:
+            spread = spread + self.turned_here
         local = (axes.swapaxes(1, 2), np.arange(nc), np.arange(nc + 1))
         return sparse.csc_array(spread @ sparse.bsr_array(local, shape=(nc * d,) * 2).tocsr())
 
