@@ -140,10 +140,12 @@ class Couples:
     def matrix(self) -> sparse.csr_array:
         """Forces of the couples, (nodes d, nc d), per force lambda on the slaves."""
         d = self.x.shape[1]
+        shape = self.x.size, len(self.at.slaves) * d
+        if not self.at.met.any():
+            return sparse.csr_array(shape)
         by_force = self._weights[..., None, None] * np.einsum(
             "kabrc,kare->kabec", self._turned, -self._of(self._levers)
         )
-        shape = self.x.size, len(self.at.slaves) * d
         return sum_of_blocks([self._onto_nodes(by_force)], shape)
 
     def slopes(self, force: Array) -> sparse.csr_array:
@@ -151,7 +153,10 @@ class Couples:
 
         Of couples where the meeting is.
         """
-        (nc, d), n, R, w = force.shape, self.x.size, self._axes, self._weights
+        (nc, d), n = force.shape, self.x.size
+        if not self.at.met.any():
+            return sparse.csr_array((n, n))
+        R, w = self._axes, self._weights
         omega = -np.einsum("prd,pd->pr", self._levers, force)
         spin = np.einsum("pr,rcd->pcd", omega, R)  # v: omega x v
         ahead = self._of(spin)
