@@ -27,6 +27,7 @@ B and w are those of the meeting.  R_r v is the product of the axis r with v; 2D
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -59,6 +60,10 @@ class Couples:
 
     at: MortarMeeting
     x: Array
+
+    def about(self, x: Array) -> Couples:
+        """The same with places of the nodes x (nodes, d) in G and d."""
+        return self if x is self.x else Couples(self.at, x)
 
     @property
     def _axes(self) -> Array:
@@ -125,16 +130,17 @@ class Couples:
         d = self.x.shape[1]
         return (self._nodes[:, :, None] * d + np.arange(d)).reshape(len(self._nodes), -1)
 
-    def _numbers(self, m: int) -> Index:
-        """Rows of m values of every p, (k, a m), -1 for none."""
-        at = np.where((self._rows >= 0)[:, :, None], self._rows[:, :, None] * m, -m)
-        return np.maximum(at + np.arange(m), -1).reshape(len(at), -1)
+    def _numbers(self, m: int, first: int = 0) -> Index:
+        """Rows of m values of every p from `first` on, (k, a m), -1 for none."""
+        at = first + self._rows[:, :, None] * m + np.arange(m)
+        at = np.where((self._rows >= 0)[:, :, None], at, -1)
+        return at.reshape(len(at), at.shape[1] * m)
 
-    def _onto_nodes(self, values: Array) -> Blocks:
-        """Entries (k, a, b, m, d) of m values of p at the nodes q."""
+    def _onto_nodes(self, values: Array, first: int = 0) -> Blocks:
+        """Entries (k, a, b, m, d) of m values of p at the nodes q, columns from `first` on."""
         k, a, b, m, d = values.shape
         moved = values.transpose(0, 2, 4, 1, 3).reshape(k, b * d, a * m)
-        return moved, self._dofs(), np.maximum(self._numbers(m), 0)
+        return moved, self._dofs(), np.maximum(self._numbers(m, first), 0)
 
     @cached_property
     def matrix(self) -> sparse.csr_array:
@@ -153,49 +159,64 @@ class Couples:
 
         Of couples where the meeting is.
         """
-        (nc, d), n = force.shape, self.x.size
+        (nc, d), n, w = force.shape, self.x.size, self._weights
         if not self.at.met.any():
             return sparse.csr_array((n, n))
-        R, w = self._axes, self._weights
         omega = -np.einsum("prd,pd->pr", self._levers, force)
-        spin = np.einsum("pr,rcd->pcd", omega, R)  # v: omega x v
-        ahead = self._of(spin)
-        pushed = np.einsum("kacd,kabd->kabc", ahead, self._arms)  # omega x d
-        _, cross, dofs = self.at.slopes.integrals
-        by_w = cross[:, :, : w.shape[2]]
-        # at held means and omega
-        k, _, b = w.shape
-        there, m = self._dofs(), dofs.shape[1]
-        local = np.einsum("kabc,kabw->kbcw", pushed, by_w).reshape(k, b * d, m)
-        turning = np.einsum("kab,kacd->kbcd", w, ahead).reshape(k * b, d, d)
+        spin = self._of(np.einsum("pr,rcd->pcd", omega, self._axes))  # v: omega x v
+        pushed = np.einsum("kacd,kabd->kabc", spin, self._arms)
+        (k, _, b), there = w.shape, self._dofs()
+        by_w, dofs = self._by_weights
+        local = np.einsum("kabc,kabw->kbcw", pushed, by_w).reshape(k, b * d, dofs.shape[1])
+        turning = np.einsum("kab,kacd->kbcd", w, spin).reshape(k * b, d, d)
         nodes = there.reshape(k * b, d)
         held = sum_of_blocks([(local, there, dofs), (turning, nodes, nodes)], (n, n))
-        # by the means
-        share = self._of(self.at.by_weight)
-        moved = np.einsum("kabc,kabw,ka->kacw", self._arms, by_w, share)
-        along = np.einsum("kab,ka,cd->kacbd", w, share, np.eye(d))
-        means = sum_of_blocks([
-            (moved.reshape(k, -1, m), self._numbers(d), dofs),
-            (along.reshape(k, -1, b * d), self._numbers(d), there),
-        ], (nc * d, n))  # fmt: skip
-        by_means = -w[..., None, None] * ahead.swapaxes(2, 3)[:, :, None]
-        # by omega
-        r = len(R)
-        inverse = self._of(self._inverse)
-        moved = np.einsum("kabsc,kabc,kabw->kasw", self._turned, pushed, by_w)
-        along = np.einsum("scd,kabc->kabsd", R, pushed)
-        along = along + np.einsum("kabsc,kacd->kabsd", self._turned, ahead)
-        along = (inverse @ np.einsum("kab,kabsd->kasbd", w, along).reshape(k, -1, r, b * d))
-        turns = sum_of_blocks([
-            (-(inverse @ moved).reshape(k, -1, m), self._numbers(r), dofs),
-            (-along.reshape(k, -1, b * d), self._numbers(r), there),
-        ], (nc * r, n))  # fmt: skip
-        apart = -self._inverse @ np.einsum("pc,scd->psd", force, R)
-        by_distance = self.at.slopes.by_distances(apart)
-        by_omega, by_mean = (
-            sum_of_blocks([self._onto_nodes(values)], (n, nc * count))
-            for values, count in ((w[..., None, None] * self._turned, r), (by_means, d))
-        )
-        return sum_of_products(
-            [(None, held), (by_mean, means), (by_omega, turns), (by_omega, by_distance)], (n, n)
-        )
+        apart = -self._inverse @ np.einsum("pc,scd->psd", force, self._axes)
+        changes = [*self._of_means(), *self._of_omega(spin, pushed, nc * d),
+                   *_below(self.at.slopes.by_distances(apart), nc * d)]  # fmt: skip
+        by_means = -w[..., None, None] * spin.swapaxes(2, 3)[:, :, None]
+        by_omega = w[..., None, None] * self._turned
+        onto = [self._onto_nodes(by_means), self._onto_nodes(by_omega, nc * d)]
+        count = nc * (d + len(self._axes))
+        products = sum_of_blocks(onto, (n, count)), sum_of_blocks(changes, (count, n))
+        return sum_of_products([(None, held), products], (n, n))
+
+    @property
+    def _by_weights(self) -> tuple[Array, Index]:
+        """Derivatives of parts of w (k, a, b, w) by dofs (k, w)."""
+        _, cross, dofs = self.at.slopes.integrals
+        return cross[:, :, : self._weights.shape[2]], dofs
+
+    def _of_means(self) -> list[Blocks]:
+        """Derivatives of x_p, rows (nc d,)."""
+        (k, a, b), d, w = self._weights.shape, self.x.shape[1], self._weights
+        by_w, dofs = self._by_weights
+        share, rows = self._of(self.at.by_weight), self._numbers(d)
+        through = np.einsum("kabc,kabw,ka->kacw", self._arms, by_w, share)
+        direct = np.einsum("kab,ka,cd->kacbd", w, share, np.eye(d))
+        return [(through.reshape(k, a * d, dofs.shape[1]), rows, dofs),
+                (direct.reshape(k, a * d, b * d), rows, self._dofs())]  # fmt: skip
+
+    def _of_omega(self, spin: Array, pushed: Array, first: int) -> list[Blocks]:
+        """Derivatives of omega with G held, rows (nc r,) from `first` on.
+
+        spin (k, a, d, d): v to omega x v; pushed (k, a, b, d): that of the arms.
+        """
+        (k, a, b), d, w = self._weights.shape, self.x.shape[1], self._weights
+        by_w, dofs = self._by_weights
+        r, inverse = len(self._axes), self._of(self._inverse)
+        rows = self._numbers(r, first)
+        through = np.einsum("kabsc,kabc,kabw->kasw", self._turned, pushed, by_w)
+        direct = np.einsum("scd,kabc->kabsd", self._axes, pushed)
+        direct = direct + np.einsum("kabsc,kacd->kabsd", self._turned, spin)
+        direct = np.einsum("kab,kabsd->kasbd", w, direct).reshape(k, a, r, b * d)
+        return [((-inverse @ through).reshape(k, a * r, dofs.shape[1]), rows, dofs),
+                ((-inverse @ direct).reshape(k, a * r, b * d), rows, self._dofs())]  # fmt: skip
+
+
+def _below(entries: Sequence[Blocks], first: int) -> list[Blocks]:
+    """Entries with their rows moved down by `first`."""
+    return [
+        (values, np.where(rows < 0, -1, rows + first), columns)
+        for values, rows, columns in entries
+    ]

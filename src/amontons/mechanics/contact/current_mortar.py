@@ -333,9 +333,10 @@ class MortarMeeting:
             out -= self.closed_by(earlier)[:, None] * (earlier.approach @ self.x)
         return out
 
-    def couples(self, x: Array) -> Couples:
-        """What leaves forces without a moment about nodes at x (nodes, d)."""
-        return Couples(self, x)
+    @cached_property
+    def couples(self) -> Couples:
+        """What leaves the forces without a moment."""
+        return Couples(self, self.x)
 
     @cached_property
     def slopes(self) -> MortarSlopes:

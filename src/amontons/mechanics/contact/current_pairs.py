@@ -213,7 +213,7 @@ class Meetings:
         if not any(isinstance(part, MortarMeeting) for part in self.parts):
             return None
         found = [
-            part.couples(x).matrix if isinstance(part, MortarMeeting)
+            part.couples.about(x).matrix if isinstance(part, MortarMeeting)
             else sparse.csr_array((nodes * d, len(part.slaves) * d)) for part in self.parts
         ]  # fmt: skip
         return found[0] if len(found) == 1 else sparse.csr_array(sparse.hstack(found))
@@ -229,7 +229,10 @@ class Meetings:
         out = by_components(self.others, counts)
         if self.turned_here is None:
             return out
-        return sparse.csr_array(out + self.turned_here @ sparse.diags_array(counts.ravel()))
+        more = self.turned_here
+        data = more.data * counts.ravel()[more.indices]
+        more = sparse.csr_array((data, more.indices, more.indptr), shape=more.shape)
+        return sparse.csr_array(out + more)
 
     def given(self, force: Array) -> Array:
         """Forces (nodes d,) on other nodes of forces lambda (nc, d)."""

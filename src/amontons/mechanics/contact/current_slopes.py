@@ -75,8 +75,7 @@ class MortarSlopes:
             by_gap = (by_motion @ beside[:, :, None]) * both
             by_normal = by_normal + by_gap * self.at.distances[:, None]
             by_distance = by_distance + by_gap * self.at.normals[:, None]
-        entries += [self._normals.times(by_normal), self._distances.times(by_distance),
-                    averaged(self.at.met_averages, by_distance),
+        entries += [self._normals.times(by_normal), *self.by_distances(by_distance),
                     averaged(earlier.references, by_motion)]  # fmt: skip
         nc, m = by_normal.shape[:2]
         return sum_of_blocks(entries, (nc * m, self.at.x.size))
@@ -103,9 +102,9 @@ class MortarSlopes:
         """dG/dx, (nc d, nodes d), of nodes that meet; zero for the others."""
         return self._alone(by_distance=self._eyes)
 
-    def by_distances(self, factors: Array) -> sparse.csr_array:
-        """factors (nc, m, d) times dG/dx, (nc m, nodes d), of nodes that meet."""
-        return self._alone(factors.shape[1], by_distance=factors)
+    def by_distances(self, factors: Array) -> list[Blocks]:
+        """Entries of factors (nc, m, d) times dG/dx, (nc m, nodes d), of nodes that meet."""
+        return [self._distances.times(factors), averaged(self.at.met_averages, factors)]
 
     @property
     def gap(self) -> sparse.csr_array:
@@ -174,7 +173,7 @@ class MortarSlopes:
 
     def pushed(self, force: Array) -> sparse.csr_array:
         """Derivative of all forces by x, (nodes d, nodes d); force (nc, d): lambda, held."""
-        return sparse.csr_array(self.spread(force) + self.at.couples(self.at.x).slopes(force))
+        return sparse.csr_array(self.spread(force) + self.at.couples.slopes(force))
 
     def spread(self, force: Array) -> sparse.csr_array:
         """Derivative of sum_p B_pj lambda_p at all nodes j by x, (nodes d, nodes d).
