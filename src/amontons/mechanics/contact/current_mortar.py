@@ -11,8 +11,8 @@ faces the master ([PSG]), D_p = int psi_p over all facets, and
 
 G the distance vector, g the gap, and s the motion since the last step, whose B is B' ([PL]):
 what slides is the change of B, not of x.  Rotations of everything leave B as it is: s = 0.
-A force lambda_p acts on p, and -B_pj lambda_p on the other nodes j: together no force, and no
-moment but G_p x lambda_p, which is none where the sides touch all along.
+A force lambda_p acts on p, and -B_pj lambda_p on the other nodes j: together no force, and a
+moment G_p x lambda_p, none where the sides touch all along, which `couples` take away.
 A node that met nobody at the end of the last step has as s_p its motion against the master node
 that was closest then.  One that was open then, by g' > 0, met the point over there along its
 normal n', but both sides turn towards each other until they touch: they come closer without a
