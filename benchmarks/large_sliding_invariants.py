@@ -155,7 +155,7 @@ def moments():
         model = am.Model(both, [am.Fix("one.top", way), am.Fix("other.top", 0)],
                          [am.Contact("one.bottom", master="other.bottom", mu=mu)])  # fmt: skip
         *_, step = am.evolve(model, am.QuasiStatic(0.2), until=2.0 if d == 2 else 1.6,
-                              tolerance=1e-11)  # fmt: skip
+                              tolerance=1e-9)  # fmt: skip
         parts = large_deformation(step.model).parts
         u = step.state.displacement.reshape(parts.X.shape)
         f = (parts.meet(u).columns(step.frames) @ step.state.force.ravel()).reshape(u.shape)

@@ -117,13 +117,15 @@ class Couples:
         J = self._summed(np.einsum("kab,kabrc,kabsc->kars", self._weights, own, own))
         size = np.trace(J, axis1=1, axis2=2)
         least = np.where(size > 0, FLAT * size, 1.0)
-        return np.linalg.inv(J + least[:, None, None] * np.eye(len(self._axes)))
+        regular = J + least[:, None, None] * np.eye(len(self._axes))
+        return np.asarray(np.linalg.inv(regular), dtype=np.float64)
 
     @cached_property
     def _levers(self) -> Array:
         """J^-1 R_r G, (nc, r, d): -omega per force."""
         apart = (self.at.references @ self.x) * self.at.met[:, None]
-        return self._inverse @ np.einsum("rcd,pd->prc", self._axes, apart)
+        turned: Array = np.einsum("rcd,pd->prc", self._axes, apart)
+        return self._inverse @ turned
 
     def _dofs(self) -> Index:
         """(k, b d)."""

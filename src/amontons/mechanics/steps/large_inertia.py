@@ -9,9 +9,10 @@ Times v_h this is the balance of energy, without any loss of the scheme; times a
 the nodes at q_h that of momentum and of moment of momentum: both change by loads, supports and
 contacts alone ([ST], [G]).  f is the load at the mean time, of loads that follow at q_h.
 
-Gaps are those at q0; normals, tangents and averages, in H, those of q0 + h v0 / 2.  Couples in H
-(`contact.couples`) are of places at q_h: impulses between bodies have neither sum nor moment
-there, and the law has the motions H^T v that they work on.  A contact takes part where its gap and `prediction` h u_N are not positive together; its law is that of
+Gaps are those at q0; normals, tangents and averages, in H, those of q0 + h v0 / 2.  Couples
+(`contact.couples`), in H too, are of places at q_h: impulses between bodies have neither sum
+nor moment there, and the law has the motions H^T v that they work on.  A contact takes part
+where its gap and `prediction` h u_N are not positive together; its law is that of
 `moreau_jean`: between r and u1 + e u0, and where contacts would create energy on u_theta, with
 bounds of impulses, and springs of contacts that give way as in `springs`.
 
