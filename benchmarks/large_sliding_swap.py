@@ -46,8 +46,8 @@ In the first step two to five nodes of the slave are in contact.  Each stands fo
 strip of the length of a facet, and the edge of the strip lies somewhere between two of them:
 the force of *either* side goes up and down by 1 to 2 % as that place changes with the mesh, and
 so does the difference, with changing sign.  With 10 and more nodes in contact it is 0.1 % and
-less, in either step; it is no matter of the die's edges, which the section does not have, nor
-of which side is the slave.
+less, in either step; it is no matter of the ends of the cylinder, which the section does not
+have, nor of which side is the slave.
 """
 STEPS = ("press 1", "press 2", "drag 1", "drag 2", "horizontal 1", "horizontal 2")
 
