@@ -17,6 +17,8 @@ import numpy as np
 
 import amontons as am
 from amontons.mechanics.model.large_deformation import large_deformation, large_step
+from amontons.mechanics.model.nonlinear_parts import nonlinear_parts
+from amontons.mechanics.steps.system import Inertia
 
 NEO = am.NeoHookean(1.0, 0.3)
 STEP = 1e-6
@@ -127,32 +129,72 @@ def patches(meshes):
               f"above 1e-11 | {worst:.1e} | {time.process_time() - begin:.0f} |", flush=True)
 
 
-def round_end(cells, name, *, down):
-    """A block with a round end."""
-    mesh = am.box((1.0, 1.0), cells)
-    x, y = mesh.points[:, 0] - 0.5, mesh.points[:, 1]
-    points = np.stack([x, y + (1.0 - np.sqrt(1.0 - x**2)) * (1 - y)], axis=1)
-    return am.Body(replace(mesh, points=points if down else -points), NEO, name=name)
+def round_end(cells, name, *, up, order=1, young=1.0):
+    """A block with a round end at the origin, above or below."""
+    d = len(cells)
+    mesh = am.box((1.0,) * d, cells)
+    x = mesh.points - np.append([0.5] * (d - 1), 0.0)
+    square = (x[:, :-1] ** 2).sum(axis=1)
+    x[:, -1] += (1.0 - np.sqrt(1.0 - square)) * (1 - x[:, -1])
+    turn = np.ones(d)
+    turn[[0, -1]] = 1 if up else -1
+    law = am.NeoHookean(young, 0.3, density=1.0)
+    return am.Body(replace(mesh, points=x * turn), law, name=name, order=order)
 
 
 def moments():
     """Sum and moment of contact forces between round ends that slide, over meshes."""
-    for n in (6, 12, 24, 48):
-        begin = time.process_time()
-        both = [round_end((n, n), "one", down=True),
-                round_end((n + n // 3, n), "other", down=False)]  # fmt: skip
-        way = (lambda x, t: 0.3 * max(t - 1, 0), lambda x, t: -0.2 * min(t, 1))
+    for n, order, mu in ((6, 1, 0.3), (48, 1, 0.3), (6, 2, 0.3), (4, 1, 0.0), (4, 1, 0.3),
+                         (3, 2, 0.3)):  # fmt: skip
+        begin, d = time.process_time(), 3 if n in (3, 4) else 2
+        more = (n,) * (d - 1)
+        both = [round_end((n, *more), "one", up=True, order=order),
+                round_end((n + n // 3, *more), "other", up=False, order=order)]  # fmt: skip
+        way = (lambda x, t: 0.3 * max(t - 1, 0), *[0.0] * (d - 2),
+               lambda x, t: -0.2 * min(t, 1))  # fmt: skip
         model = am.Model(both, [am.Fix("one.top", way), am.Fix("other.top", 0)],
-                         [am.Contact("one.bottom", master="other.bottom", mu=0.3)])  # fmt: skip
-        *_, step = am.evolve(model, am.QuasiStatic(0.2), until=2.0, tolerance=1e-11)
+                         [am.Contact("one.bottom", master="other.bottom", mu=mu)])  # fmt: skip
+        *_, step = am.evolve(model, am.QuasiStatic(0.2), until=2.0 if d == 2 else 1.6,
+                              tolerance=1e-9)  # fmt: skip
         parts = large_deformation(step.model).parts
         u = step.state.displacement.reshape(parts.X.shape)
         f = (parts.meet(u).columns(step.frames) @ step.state.force.ravel()).reshape(u.shape)
-        x, size = parts.X + u, np.abs(f).sum()
-        lost = abs((x[:, 0] * f[:, 1] - x[:, 1] * f[:, 0]).sum())
-        total = np.abs(f.sum(axis=0)).max() / size
-        print(f"| moment | 2D round ends, {n} facets | sum of forces {total:.0e} | "
-              f"{lost / size:.1e} | {time.process_time() - begin:.0f} |", flush=True)
+        arm, size = (parts.X + u).T @ f, np.abs(f).sum()
+        lost, total = np.abs(arm - arm.T).max() / size, np.abs(f.sum(axis=0)).max() / size
+        print(f"| moment | {d}D round ends, {n} facets, order {order}, mu {mu:g} | "
+              f"sum of forces {total:.0e} | {lost:.1e} | "
+              f"{time.process_time() - begin:.0f} |", flush=True)  # fmt: skip
+
+
+def velocity(x):
+    """Off the centres towards each other, both turning."""
+    side = np.sign(x[-1])
+    spun = [-0.6 * side * x[1]] if len(x) == 3 else []
+    return np.array([0.4 * side - 0.8 * x[-1], *spun, 0.8 * x[0] - 0.6 * side])
+
+
+def momenta():
+    """What is lost of momentum and its moment while round ends roll off each other."""
+    for d, order, mu, step, count in ((2, 1, 0.3, 4e-3, 300), (2, 2, 0.3, 4e-3, 150),
+                                      (2, 1, 0.0, 4e-3, 150), (3, 1, 0.3, 1e-2, 100),
+                                      (3, 2, 0.3, 1e-2, 40)):  # fmt: skip
+        begin, n = time.process_time(), (4 if d == 2 else 3) // order
+        both = [round_end((n + k,) * d, name, up=not k, order=order, young=10.0)
+                for k, name in enumerate(("one", "other"))]  # fmt: skip
+        model = am.Model(both, [], [am.Contact("one.bottom", master="other.bottom", mu=mu)])
+        start = am.at_rest(model, velocity=velocity)
+        M, X = Inertia(model, 0.0, 0.0, False).M, nonlinear_parts(model).X
+        told, closed = [], 0
+        steps = am.evolve(model, am.MoreauJean(step), until=count * step, start=start)
+        for state in (start, *(one.state for one in steps)):
+            p = (M @ state.velocity).reshape(X.shape)
+            arm = (X + state.displacement.reshape(X.shape)).T @ p
+            told.append(np.append(p.sum(axis=0), arm - arm.T))
+            closed += bool(np.abs(state.force).max() > 0)
+        sums = np.abs(np.array(told) - told[0]).max(axis=0) / np.abs(M @ start.velocity).sum()
+        print(f"| moment of momentum | {d}D round ends, order {order}, mu {mu:g} | "
+              f"{count} steps, {closed} in contact, momentum {sums[:d].max():.0e} | "
+              f"{sums[d:].max():.1e} | {time.process_time() - begin:.0f} |", flush=True)
 
 
 def main():
@@ -165,6 +207,7 @@ def main():
     tangents(given.states)
     patches(given.meshes)
     moments()
+    momenta()
 
 
 if __name__ == "__main__":

@@ -43,7 +43,7 @@ def told(meeting, earlier, force):
     both = (meeting.met & earlier.met)[:, None]
     return [meeting.normals, meeting.distances * meeting.met[:, None],
             meeting.gap * meeting.met, meeting.averages.T @ force,
-            meeting.motion(earlier) * both]  # fmt: skip
+            meeting.couples.matrix @ force.ravel(), meeting.motion(earlier) * both]  # fmt: skip
 
 
 @pytest.mark.parametrize("left_out", [None, 2])
@@ -61,7 +61,7 @@ def test_slopes_are_exact_at_random_states(left_out):
         slopes, both = here.slopes, np.repeat(here.met & earlier.met, 2)
         found = [one @ way.ravel() for one in (
             slopes.normals, slopes.distances, slopes.gap, slopes.spread(force),
-            slopes.motion(earlier),
+            here.couples.slopes(force), slopes.motion(earlier),
         )]  # fmt: skip
         found[-1] = found[-1] * both
         differences = (told(side, earlier, force) for side in (ahead, behind))
@@ -83,6 +83,9 @@ def test_forces_balance_and_rotations_are_no_slip():
     assert np.abs(spread.sum(axis=0)).max() < 1e-14
     moment = moments(x, spread) - moments(here.distances, force)
     assert abs(moment) < 1e-14
+    couples = (here.couples.matrix @ force.ravel()).reshape(x.shape)
+    assert np.abs(couples.sum(axis=0)).max() < 1e-14
+    assert abs(moments(x, spread + couples)) < 1e-14 < 1e-4 < abs(moments(x, spread))
     for angle in (0.3, 1.7, 3.0, -2.2):
         c, s = np.cos(angle), np.sin(angle)
         turn = np.array([[c, -s], [s, c]])

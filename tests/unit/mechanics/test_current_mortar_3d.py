@@ -39,7 +39,7 @@ def told(meeting, earlier, force):
     both = (meeting.met & earlier.met)[:, None]
     return [meeting.normals, meeting.distances * meeting.met[:, None],
             meeting.gap * meeting.met, meeting.averages.T @ force,
-            meeting.motion(earlier) * both]  # fmt: skip
+            meeting.couples.matrix @ force.ravel(), meeting.motion(earlier) * both]  # fmt: skip
 
 
 def alike(one, other):
@@ -60,7 +60,7 @@ def worst_slope(pair, earlier, x, way, rng):
     slopes, both = here.slopes, np.repeat(here.met & earlier.met, 3)
     found = [one @ way.ravel() for one in (
         slopes.normals, slopes.distances, slopes.gap, slopes.spread(force),
-        slopes.motion(earlier))]  # fmt: skip
+        here.couples.slopes(force), slopes.motion(earlier))]  # fmt: skip
     found[-1] = found[-1] * both
     sides = (told(side, earlier, force) for side in (ahead, behind))
     worst = 0.0
@@ -133,6 +133,8 @@ def test_forces_balance_and_rotations_change_nothing(split):
     assert np.abs(spread.sum(axis=0)).max() < 1e-14
     moment = np.cross(x, spread).sum(axis=0) - np.cross(here.distances, force).sum(axis=0)
     assert np.abs(moment).max() < 1e-14
+    couples = (here.couples.matrix @ force.ravel()).reshape(x.shape)
+    assert np.abs(couples.sum(axis=0)).max() < 1e-14
     for _ in range(5):
         turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
         turn *= np.sign(np.linalg.det(turn))
@@ -146,8 +148,8 @@ def test_forces_balance_and_rotations_change_nothing(split):
         np.testing.assert_allclose(after.normals, here.normals @ turn.T, atol=1e-12)
 
 
-def test_the_moment_of_forces_vanishes_as_gaps_do():
-    """Sides that touch all along have none; bent ones one of the size of force times gap."""
+def test_forces_have_no_moment_and_couples_vanish_as_gaps_do():
+    """Of sides that touch all along there are none, of bent ones some of force times gap."""
     pair, rest = surfaces(apart=0.0)
     rng = np.random.default_rng(2)
     flat = rest.copy()
@@ -158,6 +160,8 @@ def test_the_moment_of_forces_vanishes_as_gaps_do():
         here = pair.at(x)
         force = here.normals * here.met[:, None]
         spread = here.averages.T @ force
+        couples = (here.couples.matrix @ force.ravel()).reshape(x.shape)
+        assert np.abs(np.cross(x, spread + couples).sum(axis=0)).max() < 1e-14
         moment = np.abs(np.cross(x, spread).sum(axis=0)).max()
         along = np.linalg.norm(here.distances[here.met], axis=1).sum()
         assert moment < (along if limit is None else limit)
@@ -177,7 +181,7 @@ def test_slopes_of_surfaces_that_face_nothing_are_those_of_the_normals_alone():
     assert not here.met.any()
     slopes, force = here.slopes, np.ones((len(here.met), 3))
     assert slopes.distances.nnz == slopes.gap.nnz == 0
-    assert slopes.spread(force * here.met[:, None]).nnz == 0
+    assert slopes.pushed(force * here.met[:, None]).nnz == here.couples.matrix.nnz == 0
     way = np.random.default_rng(0).standard_normal(x.shape)
     turned = (pair.at(away + STEP * way).normals - pair.at(away - STEP * way).normals)
     np.testing.assert_allclose(slopes.normals @ way.ravel(), turned.ravel() / (2 * STEP),

@@ -105,7 +105,7 @@ def told(meeting, earlier, force):
     both = (meeting.met & earlier.met)[:, None]
     return [meeting.normals, meeting.distances * meeting.met[:, None],
             meeting.gap * meeting.met, meeting.averages.T @ force,
-            meeting.motion(earlier) * both]  # fmt: skip
+            meeting.couples.matrix @ force.ravel(), meeting.motion(earlier) * both]  # fmt: skip
 
 
 @pytest.mark.parametrize(("dim", "kinds", "serendipity", "orders"), CASES)
@@ -122,7 +122,7 @@ def test_slopes_at_random_states(dim, kinds, serendipity, orders):
         slopes, both = here.slopes, np.repeat(here.met & earlier.met, dim)
         found = [one @ way.ravel() for one in (
             slopes.normals, slopes.distances, slopes.gap, slopes.spread(force),
-            slopes.motion(earlier))]  # fmt: skip
+            here.couples.slopes(force), slopes.motion(earlier))]  # fmt: skip
         found[-1] = found[-1] * both
         sides = (told(side, earlier, force) for side in (ahead, behind))
         for mine, after, before in zip(found, *sides, strict=True):
@@ -142,6 +142,10 @@ def test_forces_balance_and_rotations_change_nothing(dim, kinds, serendipity, or
     moments = [np.einsum("pi,pj->ij", *both) for both in ((x, spread), (here.distances, force))]
     moments = [arm - arm.T for arm in moments]
     assert np.abs(moments[0] - moments[1]).max() < 1e-13
+    couples = (here.couples.matrix @ force.ravel()).reshape(x.shape)
+    assert np.abs(couples.sum(axis=0)).max() < 1e-13
+    moment = np.einsum("pi,pj->ij", x, spread + couples)
+    assert np.abs(moment - moment.T).max() < 1e-13
     for _ in range(3):
         turn = np.linalg.qr(rng.standard_normal((dim, dim)))[0]
         turn[0] *= np.sign(np.linalg.det(turn))

@@ -11,8 +11,8 @@ faces the master ([PSG]), D_p = int psi_p over all facets, and
 
 G the distance vector, g the gap, and s the motion since the last step, whose B is B' ([PL]):
 what slides is the change of B, not of x.  Rotations of everything leave B as it is: s = 0.
-A force lambda_p acts on p, and -B_pj lambda_p on the other nodes j: together no force, and no
-moment but G_p x lambda_p, which is none where the sides touch all along.
+A force lambda_p acts on p, and -B_pj lambda_p on the other nodes j: together no force, and a
+moment G_p x lambda_p, none where the sides touch all along, which `couples` take away.
 A node that met nobody at the end of the last step has as s_p its motion against the master node
 that was closest then.  One that was open then, by g' > 0, met the point over there along its
 normal n', but both sides turn towards each other until they touch: they come closer without a
@@ -56,18 +56,16 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...linear.sums import sum_of_blocks, sum_of_products
+from .couples import Couples
 from .current_slopes import MortarSlopes
-from .dual import dual_functions, nodes_with_multiplier
-from .facet_integrals import FacetPairs
-from .facing import Skin, candidates, nearest
+from .facing import Skin
 from .folds import Fold
+from .shared import Shared
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
-HARDLY = 0.1  # part of a node's area that has to face the master for it to carry force
 ACROSS = 0.5  # m . n_M of (3') below which sides hardly face each other: d is zero
-SLIVER = 1e-8  # part of a facet; biorthogonal functions on less are lost in rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,39 +118,6 @@ def folded(
 
 
 @dataclass(frozen=True, eq=False)
-class _Shared:
-    """k pairs of facets, slave and master (k,), on `facets` (f,) of the slave; of (k,): which.
-
-    own (f, a, a + e), cross (k, a, b + h): integrals with corners and middles of slave and
-    master; psi (f, a, a): A of `current_slopes`; kept (f, a): slots that carry force.
-    """
-
-    slave: Index
-    master: Index
-    facets: Index
-    of: Index
-    own: Array
-    cross: Array
-    psi: Array
-    kept: Mask
-
-    @property
-    def mass(self) -> Array:
-        """int phi phi, (f, a, a)."""
-        return self.own[:, :, : self.own.shape[1]]
-
-    @property
-    def weights(self) -> Array:
-        """W, (f, a)."""
-        return np.where(self.kept, self.mass.sum(axis=2), 0.0)
-
-    @property
-    def inverse(self) -> Array:
-        """Q, (f, a, a)."""
-        return self.psi / np.where(self.kept, self.weights, 1.0)[:, :, None]
-
-
-@dataclass(frozen=True, eq=False)
 class MortarMeeting:
     """A pair at positions x (nodes, d); arrays are made when they are asked for."""
 
@@ -201,49 +166,9 @@ class MortarMeeting:
         return out
 
     @cached_property
-    def shared(self) -> _Shared:
+    def shared(self) -> Shared:
         """What the facets share."""
-        slave, master, x = self.pair.slave, self.pair.master, self.x
-        fold = self.pair.fold
-        of, other = candidates(slave, master, x) if fold is None else fold.candidates(x)
-        own, cross = self.facet_pairs(of, other).integrals()
-        a = own.shape[1]
-        p, q = slave.values(x)[of], master.values(x)[other]
-        area = own[:, :, :a].sum(axis=(1, 2))
-        vectors = slave.areas(x)
-        whole = np.linalg.norm(vectors, axis=1)
-        between = np.einsum("kb,kbc->kc", cross.sum(axis=1), q)
-        between -= np.einsum("ka,kac->kc", own.sum(axis=1), p)
-        gap = np.einsum("kc,kc->k", between, vectors[of])
-        gap /= np.where(area > 0, area, 1.0) * whole[of]
-        there = np.flatnonzero(area > 0)
-        there = there[nearest(of[there], area[there], gap[there], whole)]
-        reached = np.bincount(of[there], area[there], minlength=len(whole))
-        there = there[(reached > SLIVER * whole)[of[there]]]
-        of, other, cross = of[there], other[there], cross[there]
-        facets, numbers = np.unique(of, return_inverse=True)
-        total = np.zeros((len(facets), *own.shape[1:]))
-        np.add.at(total, numbers, own[there])
-        mass = total[:, :, :a]
-        kept = self._carrying(facets, mass, whole)
-        psi = dual_functions(mass, kept, slave.real[facets])
-        return _Shared(of, other, facets, numbers, total, cross, psi, kept)
-
-    def facet_pairs(self, of: Index, other: Index) -> FacetPairs:
-        """Facets of the slave (k,) and of the master (k,), where they are."""
-        return FacetPairs.of(self.pair.slave, of, self.pair.master, other, self.x)
-
-    def _carrying(self, facets: Index, mass: Array, whole: Array) -> Mask:
-        """Slots (f, a) of facets (f,) that carry force; whole: areas of all slave facets."""
-        skin, n = self.pair.slave, len(self.x)
-        share = (whole / skin.corners)[:, None] * skin.real
-        around = np.bincount(skin.nodes.ravel(), share.ravel(), minlength=n)
-        nodes, real = skin.nodes[facets], skin.real[facets]
-        reached = np.bincount(nodes.ravel(), mass.sum(axis=2).ravel(), minlength=n)
-        reached = reached / np.where(around > 0, around, 1.0)
-        without = self.row < 0
-        kept = nodes_with_multiplier(nodes, real, without, reached < HARDLY, reached)
-        return kept[nodes] & real
+        return Shared.at(self.pair, self.x, self.row < 0)
 
     @cached_property
     def _weights(self) -> Array:
@@ -407,6 +332,11 @@ class MortarMeeting:
         if earlier.approach.nnz:
             out -= self.closed_by(earlier)[:, None] * (earlier.approach @ self.x)
         return out
+
+    @cached_property
+    def couples(self) -> Couples:
+        """What leaves the forces without a moment."""
+        return Couples(self, self.x)
 
     @cached_property
     def slopes(self) -> MortarSlopes:

@@ -4,7 +4,8 @@ A pair is a set of slave nodes and another side.  At the positions x of all node
 each slave node p, with the averages B of `current_mortar`,
 
     gap g_p(x), normal n_p(x), motion s_p(x) since the last step;
-    a force lambda_p acts on p and -B_pj lambda_p on the other nodes j.                    (1)
+    a force lambda_p acts on p and -B_pj lambda_p on the other nodes j, and               (1)
+    what `couples` add on the master.
 
 An obstacle is a pair whose other side has no unknowns: B is 1 at p, nobody takes -lambda.
 """
@@ -20,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ...linear.sums import by_components
 from .carried import TiedMeeting, TiedPair
 from .current_mortar import MortarMeeting, MortarPair
 from .geometry import Obstacle, frames
@@ -182,8 +184,7 @@ class Meetings:
     def averages(self) -> sparse.csr_array:
         """B of (1), (nc, nodes).
 
-        Times displacements (nodes, d) the motion against the other side; its transpose times
-        forces lambda (nc, d) those on all nodes.
+        Its transpose times forces lambda (nc, d) are those on all nodes without `couples`.
         """
         if len(self.parts) == 1:
             return self.parts[0].averages
@@ -206,9 +207,53 @@ class Meetings:
             for part in self.parts
         ])  # fmt: skip
 
+    def turned(self, x: Array) -> sparse.csr_array | None:
+        """Forces of `couples` with nodes at x (nodes, d), (nodes d, nc d); None without any."""
+        nodes, d = x.shape
+        if not any(isinstance(part, MortarMeeting) for part in self.parts):
+            return None
+        found = [
+            part.couples.about(x).matrix if isinstance(part, MortarMeeting)
+            else sparse.csr_array((nodes * d, len(part.slaves) * d)) for part in self.parts
+        ]  # fmt: skip
+        return found[0] if len(found) == 1 else sparse.csr_array(sparse.hstack(found))
+
+    @cached_property
+    def turned_here(self) -> sparse.csr_array | None:
+        """`turned` where the nodes are."""
+        xs = [part.x for part in self.parts if isinstance(part, MortarMeeting)]
+        return self.turned(xs[0]) if xs else None
+
+    def returned(self, counts: Array) -> sparse.csr_array:
+        """Forces on other nodes per force lambda times counts (nc, d), (nodes d, nc d)."""
+        out = by_components(self.others, counts)
+        if self.turned_here is None:
+            return out
+        more = self.turned_here
+        data = more.data * counts.ravel()[more.indices]
+        more = sparse.csr_array((data, more.indices, more.indptr), shape=more.shape)
+        return sparse.csr_array(out + more)
+
+    def given(self, force: Array) -> Array:
+        """Forces (nodes d,) on other nodes of forces lambda (nc, d)."""
+        out = (self.others @ force).ravel()
+        return out if self.turned_here is None else out + self.turned_here @ force.ravel()
+
+    def relative(self, v: Array) -> Array:
+        """Motions (nc, d) of the slaves, of all nodes v (nodes, d), against the other side.
+
+        What forces lambda work on.
+        """
+        out = self.averages @ v
+        if self.turned_here is None:
+            return out
+        return out + (self.turned_here.T @ v.ravel()).reshape(out.shape)
+
     def pushed(self, axes: Array, r: Array) -> Array:
         """Forces (nodes d,) of reactions r (nc, d) in the frames axes (nc, d, d): H r."""
-        return (self.averages.T @ np.einsum("pkc,pk->pc", axes, r)).ravel()
+        force = np.einsum("pkc,pk->pc", axes, r)
+        out = (self.averages.T @ force).ravel()
+        return out if self.turned_here is None else out + self.turned_here @ force.ravel()
 
     def columns(self, axes: Array) -> sparse.csc_array:
         """H (nodes d, nc d): column p d + k holds the forces of a unit along axis k of p.
@@ -217,6 +262,8 @@ class Meetings:
         """
         nc, d = axes.shape[:2]
         spread = sparse.kron(self.averages.T, np.eye(d), format="csr")
+        if self.turned_here is not None:
+            spread = spread + self.turned_here
         local = (axes.swapaxes(1, 2), np.arange(nc), np.arange(nc + 1))
         return sparse.csc_array(spread @ sparse.bsr_array(local, shape=(nc * d,) * 2).tocsr())
 

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...linear.sums import Blocks, by_components, sum_of_blocks, sum_of_products
+from .facet_integrals import FacetPairs
 
 if TYPE_CHECKING:
     from .current_mortar import MortarMeeting
@@ -74,8 +75,7 @@ class MortarSlopes:
             by_gap = (by_motion @ beside[:, :, None]) * both
             by_normal = by_normal + by_gap * self.at.distances[:, None]
             by_distance = by_distance + by_gap * self.at.normals[:, None]
-        entries += [self._normals.times(by_normal), self._distances.times(by_distance),
-                    averaged(self.at.met_averages, by_distance),
+        entries += [self._normals.times(by_normal), *self.by_distances(by_distance),
                     averaged(earlier.references, by_motion)]  # fmt: skip
         nc, m = by_normal.shape[:2]
         return sum_of_blocks(entries, (nc * m, self.at.x.size))
@@ -101,6 +101,10 @@ class MortarSlopes:
     def distances(self) -> sparse.csr_array:
         """dG/dx, (nc d, nodes d), of nodes that meet; zero for the others."""
         return self._alone(by_distance=self._eyes)
+
+    def by_distances(self, factors: Array) -> list[Blocks]:
+        """Entries of factors (nc, m, d) times dG/dx, (nc m, nodes d), of nodes that meet."""
+        return [self._distances.times(factors), averaged(self.at.met_averages, factors)]
 
     @property
     def gap(self) -> sparse.csr_array:
@@ -130,14 +134,16 @@ class MortarSlopes:
         return SlotSlopes(values, row, _dofs(skin.nodes, d))
 
     @cached_property
-    def _integrals(self) -> tuple[Array, Array, Index]:
+    def integrals(self) -> tuple[Array, Array, Index]:
         """Of own (k, a, a + e, w) and cross (k, a, b + h, w) of every pair by dofs (k, w).
 
         Those of own add up to the ones of their facet.
         """
         parts, pair = self.at.shared, self.at.pair
         slave, master = pair.slave.nodes[parts.slave], pair.master.nodes[parts.master]
-        own, cross = self.at.facet_pairs(parts.slave, parts.master).slopes()
+        own, cross = FacetPairs.of(
+            pair.slave, parts.slave, pair.master, parts.master, self.at.x
+        ).slopes()
         return own, cross, _dofs(np.concatenate([slave, master], axis=1), self.at.x.shape[1])
 
     @cached_property
@@ -161,9 +167,13 @@ class MortarSlopes:
         by_own[..., :a] += (apart[:, :, :, None] * np.eye(a)[:, None])[..., None]
         by_cross = there.swapaxes(1, 2)[:, None, :, None, :]
         by_cross = -scaled[parts.of][:, :, None, :, None] * by_cross
-        own, cross, dofs = self._integrals
+        own, cross, dofs = self.integrals
         values = _through(by_own[parts.of], own) + _through(by_cross, cross)
         return SlotSlopes(values.reshape(-1, a, d, dofs.shape[1]), row[parts.of], dofs)
+
+    def pushed(self, force: Array) -> sparse.csr_array:
+        """Derivative of all forces by x, (nodes d, nodes d); force (nc, d): lambda, held."""
+        return sparse.csr_array(self.spread(force) + self.at.couples.slopes(force))
 
     def spread(self, force: Array) -> sparse.csr_array:
         """Derivative of sum_p B_pj lambda_p at all nodes j by x, (nodes d, nodes d).
@@ -192,7 +202,7 @@ class MortarSlopes:
         parts, row = self.at.shared, self.at.rows
         f, a, d = z.shape
         n, nc = self.at.x.size, len(self.at.pair.slaves)
-        own, _, dofs = self._integrals
+        own, _, dofs = self.integrals
         mass = own[:, :, :a]
         inverse = np.where(parts.kept[:, :, None], parts.inverse, 0.0)
         # (f, r, c, s, t): by mass_st
@@ -224,7 +234,7 @@ class MortarSlopes:
         """
         parts = self.at.shared
         f, a, d = z.shape
-        own, cross, dofs = self._integrals
+        own, cross, dofs = self.integrals
         forms, local = [], []
         for (nodes, slots), held, slopes, of in (
             (mine, parts.own, own, np.arange(f)), (theirs, -parts.cross, -cross, parts.of)

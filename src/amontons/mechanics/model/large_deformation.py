@@ -319,7 +319,7 @@ class LargeDeformation(NonlinearProblem):
         blocks = now._needed_slopes(displaced)[1]
         force = (then.load - now.load).at(displaced) - self.parts.matrix(blocks) @ moved
         meeting = self.parts.meet(displaced)
-        across = meeting.averages @ moved.reshape(displaced.shape)
+        across = meeting.relative(moved.reshape(displaced.shape))
         w = np.array(tangent.w)
         w[:, 0] += (meeting.normals * across).sum(axis=1)
         return replace(tangent, f=tangent.f + force[self.parts.free], w=w)

@@ -6,8 +6,8 @@ other slave's force on it.  The other nodes j of its pair carry
 
     f_int - f = sum_p B_pj lambda_p,                                                        (1)
 
-B of `contact.current_mortar`.  With both eliminated that way the displacements are all
-unknowns; `PairLinearisation` has the derivative of (1) and of the law in them.
+and `contact.couples`, B of `contact.current_mortar`.  With both eliminated that way the
+displacements are all unknowns; `PairLinearisation` has the derivative of (1) and of the law.
 
 Where slaves of one pair are of another one's master, their lambda is what is left beside (1):
 with O the part of (1) that contacts of nodes that meet give to others, in global axes,
@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...linear.condensed import Structure
-from ...linear.sums import among, by_components, in_rows, sum_of_products
+from ...linear.sums import among, in_rows, sum_of_products
 from ..contact.carried import TiedMeeting
 from ..contact.current import ContactPoint, Partials
 from ..contact.current_mortar import MortarMeeting
@@ -50,7 +50,7 @@ def balanced(parts: NonlinearParts, meeting: Meetings, rest: Array) -> Array:
     if meeting.only_obstacles:
         return rest
     own = _own(parts, meeting, rest)
-    out = rest - (meeting.others @ own).ravel()
+    out = rest - meeting.given(own)
     out[parts.at] = (parts.gathers @ out).reshape(parts.at.shape)
     return out
 
@@ -75,7 +75,7 @@ def _unchained(parts: NonlinearParts, others: sparse.csr_array, gathered: Any) -
 def _others(parts: NonlinearParts, meeting: Meetings) -> sparse.csr_array:
     """Forces on other nodes per force on the slaves, (dofs, nc d)."""
     counts = parts.contact.free * meeting.met[:, None]
-    return by_components(meeting.others, counts.astype(float))
+    return meeting.returned(counts.astype(float))
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,7 +213,7 @@ class PairLinearisation:
             start = mine.stop
             slopes = by_normal[mine], by_gap[mine], by_motion[mine]
             if isinstance(part, MortarMeeting) and isinstance(old, MortarMeeting):
-                turned = part.slopes.spread(force[mine])
+                turned = part.slopes.pushed(force[mine])
                 taken.append((None, -turned))
                 if parts.chained:
                     taken.append((self._others, sparse.csr_array(self._left(turned))))

@@ -9,8 +9,10 @@ Times v_h this is the balance of energy, without any loss of the scheme; times a
 the nodes at q_h that of momentum and of moment of momentum: both change by loads, supports and
 contacts alone ([ST], [G]).  f is the load at the mean time, of loads that follow at q_h.
 
-Gaps are those at q0; normals, tangents and averages, in H, those of q0 + h v0 / 2.  A contact
-takes part where its gap and `prediction` h u_N are not positive together; its law is that of
+Gaps are those at q0; normals, tangents and averages, in H, those of q0 + h v0 / 2.  Couples
+(`contact.couples`), in H too, are of places at q_h: impulses between bodies have neither sum
+nor moment there, and the law has the motions H^T v that they work on.  A contact takes part
+where its gap and `prediction` h u_N are not positive together; its law is that of
 `moreau_jean`: between r and u1 + e u0, and where contacts would create energy on u_theta, with
 bounds of impulses, and springs of contacts that give way as in `springs`.
 
@@ -19,7 +21,8 @@ work on v_h, and as T q_h = 0 their impulses have neither sum nor moment.  A bon
 drawn by T q0 at the beginning of a step.
 
 (1) is solved by Newton's method with the symmetric matrix M + h/2 C + h^2/4 K(q1), a contact
-problem of impulses in every iteration, until its residual is rounding.
+problem of impulses in every iteration, until its residual is rounding.  What couples change
+between the prediction and q_h is taken from the last iterate, so that H stays in it.
 
 [ST] J. C. Simo, N. Tarnow, "The discrete energy-momentum method. Conserving algorithms for
 nonlinear elastodynamics", ZAMP 43 (1992) 757-792.
@@ -65,8 +68,12 @@ TOUCHING = 1e-9  # gaps below this part of the size of a contact's area count as
 
 @dataclass
 class _Trial:
-    """An iterate: velocities and impulses, and what (1) misses there, (dofs,)."""
+    """An iterate: velocities and impulses, and what (1) misses there, (dofs,).
 
+    turned (dofs, k d): what couples at q_h add to H of the active contacts; None: nothing.
+    """
+
+    turned: sparse.csr_array | None
     velocity: Array
     impulse: Array
     missing: Array
@@ -119,8 +126,9 @@ class LargeMovingModel:
             energies, held = step.energies(trial)
             size = energies.total + abs(energies.loads) + abs(energies.supports)
             excess = energies.contact - self.tolerance * size
-            after = step.local(trial.velocity)[step.active]
-            shifts = excess > 0 and step.shifts.changed(solution.r, after, excess)
+            shifts = excess > 0 and step.shifted(trial).changed(
+                solution.r, step.after(trial)[step.active], excess
+            )
             if not shifts:
                 return step.done(trial, solution, energies, held)
             step.shifts = shifts
@@ -153,6 +161,7 @@ class _Step:
         self.parts = parts
         start = parts.meet(q0.reshape(shape))
         meeting = parts.meet((q0 + h / 2 * v0).reshape(shape))
+        self.meeting = meeting
         self.H = sparse.csc_array(meeting.columns(meeting.frames))
         u0 = self.local(v0)
         closing = start.gap + method.prediction * h * u0[:, 0] <= model._closed
@@ -178,6 +187,39 @@ class _Step:
         """Local values of motions (dofs,), (nc, d)."""
         return (self.H.T @ v).reshape(-1, self.model.parts.dimension)
 
+    def after(self, trial: _Trial) -> Array:
+        """Local velocities at the end, (nc, d)."""
+        return self.local(trial.velocity) + self._whole(self._more(trial, trial.velocity))
+
+    def _more(self, trial: _Trial, v: Array) -> Array:
+        """What couples at q_h add to local values (k d,) of motions (dofs,)."""
+        if trial.turned is None:
+            return np.zeros(self._columns.shape[1])
+        return trial.turned.T @ v
+
+    def shifted(self, trial: _Trial) -> Shifts:
+        """The law's shifts with couples at q_h."""
+        more = self._more(trial, self.state.velocity)
+        before = self._before[self.active]
+        return replace(self.shifts, before=before + more.reshape(before.shape))
+
+    def _turned_at(self, q: Array) -> sparse.csr_array | None:
+        """`turned` of a trial with displacements q (dofs,) halfway."""
+        if self.meeting.turned_here is None or not len(self.active):
+            return None
+        here = self.meeting.turned(self.parts.X + q.reshape(self.parts.X.shape))
+        assert here is not None
+        nc, d = self._before.shape
+        axes = (self.meeting.frames.swapaxes(1, 2), np.arange(nc), np.arange(nc + 1))
+        axes = sparse.csc_array(sparse.bsr_array(axes, shape=(nc * d, nc * d)))
+        columns = (self.active[:, None] * d + np.arange(d)).ravel()
+        return sparse.csr_array((here - self.meeting.turned_here) @ axes[:, columns])
+
+    def _pushed(self, turned: sparse.csr_array | None, impulse: Array) -> Array:
+        """Impulses (dofs,) on all nodes."""
+        out = self._columns @ impulse
+        return out if turned is None else out + turned @ impulse
+
     def _whole(self, impulse: Array) -> Array:
         """Impulses (nc, d) of all contacts, of those (k d,) of the active ones."""
         out = np.zeros_like(self._before)
@@ -195,25 +237,32 @@ class _Step:
         inertia, inner = m.M @ (v1 - v0), h * m.between(q0, q1)
         damped = h / 2 * (m.C @ (v0 + v1))
         load = h * self.load.at(((q0 + q1) / 2).reshape(m.parts.X.shape))
-        pushed = self._columns @ impulse
+        turned = self._turned_at((q0 + q1) / 2)
+        pushed = self._pushed(turned, impulse)
         missing = inertia + damped + inner - load - pushed
         free = m.parts.free
         terms = (m.M @ v0, m.M @ v1, inner, damped, load, pushed)
         size = sum(float(np.linalg.norm(term[free])) for term in terms) or 1.0
         error = float(np.linalg.norm(missing[free])) / size
-        return _Trial(v1, impulse, missing, error, max(GOOD, h * m.blur / size))
+        return _Trial(turned, v1, impulse, missing, error, max(GOOD, h * m.blur / size))
 
     def solver(self, solve: Any) -> Any:
         """solve of a linearised step: (trial, matrix) -> (velocities, solution)."""
         m, free = self.model, self.model.parts.free
         kept: dict[int, FrictionProblem] = {}
 
+        def lagging(trial: _Trial) -> tuple[Array, Array]:
+            """Forces (dofs,) and shifts (k, d) with what couples change, of the last trial."""
+            shifts = self.shifted(trial).values
+            more = self._more(trial, trial.velocity).reshape(shifts.shape)
+            return trial.missing + self._columns @ trial.impulse, shifts + more
+
         def in_frames(trial: _Trial, T: Any) -> tuple[Array, FrictionSolution]:
             assert m.frames is not None
-            rest = trial.missing + self._columns @ trial.impulse
+            rest, shifts = lagging(trial)
             known = m.frames.product(T, trial.velocity) - rest
             problem = m.frames.problem(
-                T, self._columns, known, self.shifts.values, self.law, m.motion.body.name
+                T, self._columns, known, shifts, self.law, m.motion.body.name
             )
             start = Iterate(trial.impulse.reshape(-1, m.parts.dimension))
             solution = solve(problem, start, None)
@@ -221,10 +270,10 @@ class _Step:
             return T @ solution.v, solution
 
         def solved(trial: _Trial, matrix: Any) -> tuple[Array, FrictionSolution]:
-            rest = trial.missing + self._columns @ trial.impulse
+            rest, shifts = lagging(trial)
             known = matrix @ (trial.velocity - self._full(self.held)) - rest
             w = (self._columns.T @ self._full(self.held)).reshape(-1, m.parts.dimension)
-            w = w + self.shifts.values
+            w = w + shifts
             if id(matrix) not in kept:
                 kept.clear()
                 kept[id(matrix)] = FrictionProblem.from_global(
@@ -305,7 +354,7 @@ class _Step:
         return Energies(
             kinetic=float(kinetic), elastic=float(elastic) + stored, gain=float(gain) + taken,
             loads=float(load @ dq), supports=float(held @ dq) / h,
-            contact=float((self._columns @ trial.impulse) @ dq) / h + taken,
+            contact=float(self._pushed(trial.turned, trial.impulse) @ dq) / h + taken,
             damping=float(dq @ (m.C @ dq)) / h + m.lost(q0, q1),
         ), held  # fmt: skip
 
@@ -315,7 +364,8 @@ class _Step:
         """The step with its state."""
         m, h, state = self.model, self.model.method.step, self.state
         q1, impulse = self._moved(trial.velocity), self._whole(trial.impulse)
-        mean = 0.5 * (self._before + self.local(trial.velocity))
+        mean = 0.5 * (self._before + self.after(trial))
+        mean += 0.5 * self._whole(self._more(trial, self.state.velocity))
         slip = m.springs.slipped(h * mean, state.force, impulse / h)
         mean = mean[:, 1:]
         work = (impulse[:, 1:] * mean).sum(axis=1) + m.springs.taken(state.force, impulse / h)

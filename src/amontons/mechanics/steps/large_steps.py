@@ -166,7 +166,7 @@ def last_motion(problem: LargeDeformation, state: State, duration: float) -> Arr
     if not pairs.any() and not problem.law.tied.any():
         return out
     n = meeting.normals
-    along = meeting.averages @ moved.reshape(parts.X.shape)
+    along = meeting.relative(moved.reshape(parts.X.shape))
     along -= n * (n * along).sum(axis=1)[:, None]
     law = parts.contact.law
     pressed = np.array(law.pressed(state.force))  # T^-1 r; T^-1 of that is where it slips from
