@@ -174,7 +174,7 @@ def _part(G: sparse.csc_array, rows: Index, columns: Index, size: Array) -> _Par
     scaled = G[:, columns].tocsr()[rows].toarray() / size[rows, None]
     lengths = 1 / np.linalg.norm(scaled, axis=0)
     scaled *= lengths
-    found: tuple[Array, ...] = qr(scaled, mode="economic", pivoting=True)
+    found: Any = qr(scaled, mode="economic", pivoting=True)
     pivots = np.abs(found[1].diagonal())
     basis = found[0][:, : int((pivots > DEPENDENT * pivots[0]).sum())]
     return _Part(rows, columns, basis, size[rows], basis.T @ scaled, lengths)
