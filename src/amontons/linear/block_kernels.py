@@ -37,6 +37,20 @@ def _contact_of(k, d):
 
 
 @njit(cache=True, error_model="numpy")
+def _distinct_rows(indptr, indices, first, d):
+    """How many of the d rows from `first` on have to be looked at for columns: 1 or d."""
+    begin, size = indptr[first], indptr[first + 1] - indptr[first]
+    for a in range(1, d):
+        shift = indptr[first + a] - begin
+        if indptr[first + a + 1] - indptr[first + a] != size:
+            return d
+        for k in range(begin, begin + size):
+            if indices[k + shift] != indices[k]:
+                return d
+    return 1
+
+
+@njit(cache=True, error_model="numpy")
 def blocks_of_rows(indptr, indices, values, d):
     """Block rows of a matrix (nc d, nc d) in compressed rows, in any order, summed if double.
 
@@ -45,11 +59,16 @@ def blocks_of_rows(indptr, indices, values, d):
     nc = (len(indptr) - 1) // d
     mark = np.full(nc, -1, np.int32)
     start = np.zeros(nc + 1, np.int32)
+    rows = np.empty(nc, np.int8)
     for i in range(nc):
-        count = 1
+        count, end = 1, 0
         mark[i] = i
-        for k in range(indptr[d * i], indptr[d * i + d]):
+        rows[i] = _distinct_rows(indptr, indices, d * i, d)
+        for k in range(indptr[d * i], indptr[d * i + rows[i]]):
+            if end - d <= indices[k] < end:  # the block of the entry before
+                continue
             j = _contact_of(indices[k], d)
+            end = d * j + d
             if mark[j] != i:
                 mark[j] = i
                 count += 1
@@ -60,11 +79,14 @@ def blocks_of_rows(indptr, indices, values, d):
     mark[:] = -1
     for i in range(nc):
         first = start[i]
-        count = 1
+        count, end = 1, 0
         mark[i] = i
         column[first] = i
-        for k in range(indptr[d * i], indptr[d * i + d]):
+        for k in range(indptr[d * i], indptr[d * i + rows[i]]):
+            if end - d <= indices[k] < end:
+                continue
             j = _contact_of(indices[k], d)
+            end = d * j + d
             if mark[j] != i:
                 mark[j] = i
                 at = first + count
@@ -132,7 +154,7 @@ def _turn(x, y, z):
 
 @njit(cache=True, error_model="numpy")
 def _largest_eigenvalue(x, y, z, xy, xz, yz):
-    """Of the symmetric matrix [[x, xy, xz], [xy, y, yz], [xz, yz, z]], by Jacobi's rotations."""
+    """Of the symmetric [[x, xy, xz], [xy, y, yz], [xz, yz, z]], by Jacobi's rotations."""
     for _ in range(TURNS):
         rest = max(abs(xy), abs(xz), abs(yz))
         if abs(xy) > ALIKE * max(x, y):

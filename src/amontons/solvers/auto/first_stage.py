@@ -37,7 +37,7 @@ from .tracks import DEPTH, LEAST
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
-SMALL = 30  # contacts of a problem that is solved here whatever its tolerance
+SHORT = 5e3  # nanoseconds of a sweep of a problem that is solved here whatever its tolerance
 COARSE, BLOCKS = 1e-4, 10_000  # tolerance from which, blocks of W to which larger ones are
 # Columns of what is told of a problem.
 SWEEPS, START, ERROR, WORST, CONTACT, HIDDEN, CHANGED, WORK = range(8)
@@ -49,9 +49,10 @@ def is_brief(problem: FrictionProblem, tolerance: float) -> bool:
     If it is not, its sweeps are made once more: where they are few and as cheap as the calls of
     the race, or where the goal is so near that most problems reach it in them.
     """
-    if problem.contacts <= SMALL:
+    blocks = len(problem.blocks.indices)
+    if nanoseconds_of_sweep(blocks, problem.contacts, HISTORY_CONTACT) <= SHORT:
         return True
-    return tolerance >= COARSE and len(problem.blocks.indices) <= BLOCKS
+    return tolerance >= COARSE and blocks <= BLOCKS
 
 
 def sweeps_of_first_chunks(blocks: int, contacts: int) -> int:
